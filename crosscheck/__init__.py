@@ -1,0 +1,1 @@
+"""crosscheck: the same mechanism in several engines, against truth."""

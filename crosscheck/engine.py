@@ -1,0 +1,101 @@
+"""The Engine interface, what an engine cannot do, and the table of engines."""
+
+from __future__ import annotations
+
+import enum
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module, metadata
+from typing import Any
+
+import numpy as np
+
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+
+
+class Why(enum.Enum):
+    """Whose turn a gap is."""
+
+    UNBUILT = "not built here yet"
+    UPSTREAM = "waits for the engine"
+    NEVER = "the engine's model excludes it"
+
+
+@dataclass(frozen=True)
+class Cannot:
+    """Something an engine cannot do with a scene, asked before running."""
+
+    why: Why
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.reason} ({self.why.value})"
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One way of running an engine.
+
+    ``family`` groups the settings that differ only in accuracy ("defaults" is what a user gets
+    without tuning, "tuned" what the engine's documentation allows at best); ``options`` are the
+    engine's own numbers; (family, options) reproduce the run.
+    """
+
+    family: str
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        return self.family + "".join(f" {k}={v:g}" if isinstance(v, float) else f" {k}={v}"
+                                     for k, v in self.options.items())  # fmt: skip
+
+
+class Engine(ABC):
+    """A simulator that takes a Scene and gives a Trajectory. Constructed without arguments.
+
+    The third-party package is imported inside the methods, so that naming an engine loads nothing.
+    """
+
+    name: str
+    package: str  # what to install when it is missing
+
+    @abstractmethod
+    def version(self) -> str:
+        """Version of the engine; raises ImportError when its package is not installed."""
+
+    @abstractmethod
+    def cannot(self, scene: Scene) -> Cannot | None:
+        """Why this scene cannot be run, or None."""
+
+    @abstractmethod
+    def settings(self, scene: Scene) -> Sequence[Setting]:
+        """The sweep over this engine's families and accuracies for a scene, coarse to fine in each
+        family."""
+
+    @abstractmethod
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        """Simulate from t = 0 and sample at ``times`` (k,), increasing, the first may be 0.
+
+        A failure of the engine is an Outcome of the trajectory, with the states reached before it.
+        ``cost.seconds`` is the process CPU time of the stepping alone.
+        """
+
+
+BUILT_IN = ("mbref", "mujoco", "pinocchio", "exudyn")
+ENTRY_POINTS = "crosscheck.engines"
+
+
+def engine_names() -> tuple[str, ...]:
+    """Names of the built-in engines and of those that installed packages offer."""
+    return (*BUILT_IN, *(point.name for point in metadata.entry_points(group=ENTRY_POINTS)))
+
+
+def engine(name: str) -> Engine:
+    """The engine of that name; raises LookupError with the known names."""
+    if name in BUILT_IN:
+        return import_module(f"crosscheck.engines.{name}").ENGINE
+    for point in metadata.entry_points(group=ENTRY_POINTS):
+        if point.name == name:
+            return point.load()
+    raise LookupError(f"unknown engine {name!r}; known: {', '.join(engine_names())}")

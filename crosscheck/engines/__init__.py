@@ -1,0 +1,1 @@
+"""One adapter a file; what adapters share stands in graph.py."""

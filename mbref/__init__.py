@@ -1,0 +1,1 @@
+"""mbref: reference implementation of the constraint-handling methods of multibody dynamics."""

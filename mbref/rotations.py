@@ -1,0 +1,78 @@
+"""Euler parameters (unit quaternions w, x, y, z; body to world) and rotation vectors.
+
+Functions of arrays with any leading shape, for the door: reading scenes, writing trajectories,
+measuring angles.  The compiled kernels have their own scalar forms in ``kernels.py``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def to_matrix(p: np.ndarray) -> np.ndarray:
+    """Rotation matrices (…, 3, 3) of unit quaternions (…, 4)."""
+    w, x, y, z = np.moveaxis(np.asarray(p, dtype=float), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def from_matrix(matrix: np.ndarray) -> np.ndarray:
+    """Unit quaternions (…, 4), w ≥ 0, of rotation matrices (…, 3, 3).
+
+    Takes the column of 4 p pᵀ with the largest diagonal, so that nothing cancels.
+    """
+    a = np.asarray(matrix, dtype=float)
+    trace = a[..., 0, 0] + a[..., 1, 1] + a[..., 2, 2]
+    k = np.zeros((*a.shape[:-2], 4, 4))
+    k[..., 0, 0] = 1 + trace
+    for i in range(3):
+        j, l = (i + 1) % 3, (i + 2) % 3
+        k[..., 1 + i, 1 + i] = 1 + 2 * a[..., i, i] - trace
+        k[..., 0, 1 + i] = k[..., 1 + i, 0] = a[..., l, j] - a[..., j, l]
+        k[..., 1 + i, 1 + j] = k[..., 1 + j, 1 + i] = a[..., i, j] + a[..., j, i]
+    best = np.argmax(np.diagonal(k, axis1=-2, axis2=-1), axis=-1)
+    p = np.take_along_axis(k, best[..., None, None], axis=-2)[..., 0, :]
+    p = p / np.linalg.norm(p, axis=-1, keepdims=True)
+    return np.where(p[..., :1] < 0, -p, p)
+
+
+def multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Hamilton products (…, 4): the rotation q followed by p."""
+    pw, px, py, pz = np.moveaxis(np.asarray(p, dtype=float), -1, 0)
+    qw, qx, qy, qz = np.moveaxis(np.asarray(q, dtype=float), -1, 0)
+    return np.stack(
+        [
+            pw * qw - px * qx - py * qy - pz * qz,
+            pw * qx + px * qw + py * qz - pz * qy,
+            pw * qy - px * qz + py * qw + pz * qx,
+            pw * qz + px * qy - py * qx + pz * qw,
+        ],
+        axis=-1,
+    )
+
+
+def conjugate(p: np.ndarray) -> np.ndarray:
+    """The inverse rotations (…, 4) of unit quaternions."""
+    return np.asarray(p, dtype=float) * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def rotate(p: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Vectors (…, 3) taken from the body frame to the world."""
+    return np.einsum("...ij,...j->...i", to_matrix(p), v)
+
+
+def from_vector(v: np.ndarray) -> np.ndarray:
+    """Unit quaternions (…, 4) of rotation vectors (…, 3): axis times angle (rad)."""
+    v = np.asarray(v, dtype=float)
+    half = np.linalg.norm(v, axis=-1, keepdims=True) / 2
+    return np.concatenate([np.cos(half), np.sinc(half / np.pi) * v / 2], axis=-1)
+
+
+def angle_between(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Geodesic angle (…,) between orientations: 2 atan2(|vector|, |w|) of the relative quaternion."""
+    relative = multiply(conjugate(p), q)
+    return 2 * np.arctan2(np.linalg.norm(relative[..., 1:], axis=-1), np.abs(relative[..., 0]))

@@ -1,0 +1,48 @@
+"""The built-in mechanisms: name → function that returns the Scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from mbref.scene import Scene, SceneError
+from mbref.scenes.five_bar import five_bar, five_bar_gravity
+from mbref.scenes.four_bar import four_bar, four_bar_gravity
+from mbref.scenes.planar_slider_crank import (
+    planar_slider_crank,
+    planar_slider_crank_equal,
+    planar_slider_crank_gravity,
+    planar_slider_crank_heavy,
+)
+from mbref.scenes.spatial_slider_crank import (
+    spatial_slider_crank,
+    spatial_slider_crank_driven,
+    spatial_slider_crank_gravity,
+)
+
+SCENES: dict[str, Callable[[], Scene]] = {
+    "four_bar": four_bar,
+    "four_bar_quarter": partial(four_bar, math.pi / 4, "four_bar_quarter"),
+    "four_bar_straight": partial(four_bar, math.pi, "four_bar_straight"),
+    "four_bar_gravity": four_bar_gravity,
+    "five_bar": five_bar,
+    "five_bar_gravity": five_bar_gravity,
+    "spatial_slider_crank": spatial_slider_crank,
+    "spatial_slider_crank_driven": spatial_slider_crank_driven,
+    "spatial_slider_crank_gravity": spatial_slider_crank_gravity,
+    "planar_slider_crank": planar_slider_crank,
+    "planar_slider_crank_equal": planar_slider_crank_equal,
+    "planar_slider_crank_heavy": planar_slider_crank_heavy,
+    "planar_slider_crank_gravity": planar_slider_crank_gravity,
+}
+
+
+def find_scene(name: str) -> Scene:
+    """The built-in scene of that name, or the scene in that .toml file; raises SceneError."""
+    if name in SCENES:
+        return SCENES[name]()
+    if name.endswith(".toml") or Path(name).exists():
+        return Scene.from_file(name)
+    raise SceneError([f"unknown scene {name!r}; built-in: {', '.join(SCENES)}; or a .toml file"])

@@ -1,0 +1,51 @@
+"""The paper's four-bar linkage (Figure 3): a rhombus of 0.5 m links in three dimensions.
+
+Revolutes about z at A and D; universals at B and C with z on crank and rocker and, on the coupler,
+its transverse in-plane axis (the longitudinal one would leave the coupler free to spin).
+With ``ground = "body"``: 24 coordinates, 25 rows with the driver, rank 24, one redundant row.  Rank 23 at
+θ₂ = nπ: at θ₂ = 0 the fold branch does not meet a turning crank, at θ₂ = π it does, a bifurcation.
+The paper drives the crank at θ₂ = θ₀ - 124.8 t; its inertias, which it leaves open, are ours.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbref.scene import Driver, Revolute, Scene, Universal
+from mbref.scenes.links import CRANK_RATE, about_z, link
+
+LENGTH = 0.5
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def four_bar(theta0: float = math.pi / 2, name: str = "four_bar") -> Scene:
+    """Driven at -124.8 rad/s from θ₂ = theta0 (rad)."""
+    return parallelogram(theta0, name).with_(
+        driver=(Driver(joint="A", polynomial=(0.0, -CRANK_RATE)),), duration=0.1
+    )
+
+
+def four_bar_gravity(theta0: float = 0.3, name: str = "four_bar_gravity") -> Scene:
+    """Released from rest at θ₂ = theta0 under gravity along -y: the inverted parallelogram swing."""
+    return parallelogram(theta0, name).with_(gravity=(0.0, -9.81, 0.0), duration=1.0)
+
+
+def parallelogram(theta0: float, name: str) -> Scene:
+    """The linkage without driver or load."""
+    across = (LENGTH * math.cos(theta0), LENGTH * math.sin(theta0), 0.0)
+    a, d = (0.0, 0.0, 0.0), (LENGTH, 0.0, 0.0)
+    b, c = across, (LENGTH + across[0], across[1], 0.0)
+    return Scene(
+        name=name,
+        body=(
+            link("crank", a, b, about_z(theta0), LENGTH),
+            link("coupler", b, c, about_z(0.0), LENGTH),
+            link("rocker", d, c, about_z(theta0), LENGTH),
+        ),
+        joint=(
+            Revolute(name="A", bodies=("ground", "crank"), anchor=a, axis=Z),
+            Universal(name="B", bodies=("crank", "coupler"), anchor=b, axes=(Z, Y)),
+            Universal(name="C", bodies=("coupler", "rocker"), anchor=c, axes=(Y, Z)),
+            Revolute(name="D", bodies=("ground", "rocker"), anchor=d, axis=Z),
+        ),
+    )

@@ -1,0 +1,44 @@
+"""The parts the paper's mechanisms share: thin rods, sliders and poses in a plane."""
+
+from __future__ import annotations
+
+import math
+
+from mbref.scene import Body
+
+ROD_RADIUS = 0.01  # m
+DENSITY = 1.0  # kg per metre of link
+CRANK_RATE = 124.8  # rad/s, of every driven crank in the paper
+
+
+def about_z(angle: float) -> tuple[float, float, float, float]:
+    """Quaternion of a rotation about world z."""
+    return (math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2))
+
+
+def rod_inertia(mass: float, length: float) -> tuple[float, float, float]:
+    """Principal moments of a round rod, axis along x: m r²/2 and m (3 r² + L²)/12."""
+    across = mass * (3 * ROD_RADIUS**2 + length**2) / 12
+    return (mass * ROD_RADIUS**2 / 2, across, across)
+
+
+def link(
+    name: str,
+    start: tuple[float, float, float],
+    end: tuple[float, float, float],
+    orientation: tuple[float, float, float, float],
+    length: float,
+    **velocities: tuple[float, float, float],
+) -> Body:
+    """A rod of 1 kg per metre between two points; its x axis runs from start to end."""
+    middle = tuple((p + q) / 2 for p, q in zip(start, end, strict=True))
+    mass = DENSITY * length
+    return Body(
+        name=name, mass=mass, inertia=rod_inertia(mass, length), position=middle,
+        orientation=orientation, **velocities,
+    )  # fmt: skip
+
+
+def slider(position: tuple[float, float, float], **velocities: tuple[float, float, float]) -> Body:
+    """The slider of both slider-cranks: 1 kg, 0.001 kg m² about every axis."""
+    return Body(name="slider", mass=1.0, inertia=(1e-3, 1e-3, 1e-3), position=position, **velocities)

@@ -1,0 +1,66 @@
+"""The paper's planar slider-crank (Figure 10): crank a, rod b in the xy-plane, slider on the x axis.
+
+Revolutes about z at A and B, a spherical joint at C, a translational joint along x at D.  With
+``ground = "body"``: 24 coordinates, 24 rows, rank 23, one redundant row, one degree of freedom.
+With a = b singular at θ = ±π/2, where the slider passes the crank's centre; never singular otherwise.
+Driven by 100 N m on the crank, from rest at θ = 0; inertias and start, which the paper leaves open,
+are ours.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbref.scene import Moment, Revolute, Scene, Spherical, Translational
+from mbref.scenes.links import about_z, link, slider
+
+X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+TORQUE = (0.0, 0.0, 100.0)  # N m
+FLYWHEEL = 104.125  # kg m², puts the first singular position at 1.81 s, as in the paper
+
+
+def planar_slider_crank(a: float = 0.304, b: float = 0.4048, name: str = "planar_slider_crank") -> Scene:
+    """100 N m on the crank, from rest at θ = 0; crank a, rod b (m)."""
+    return _mechanism(a, b, 0.0, name).with_(load=(Moment(body="crank", moment=TORQUE),), duration=0.4)
+
+
+def planar_slider_crank_equal(name: str = "planar_slider_crank_equal") -> Scene:
+    """Crank and rod of 0.308 m: passes singular positions at θ = ±π/2."""
+    return planar_slider_crank(0.308, 0.308, name).with_(duration=0.2)
+
+
+def planar_slider_crank_heavy(name: str = "planar_slider_crank_heavy") -> Scene:
+    """a = b = 0.308 m with a flywheel disc on the crank: 64 singular positions in 20 s."""
+    base = planar_slider_crank(0.308, 0.308, name)
+    crank = base.body[0]
+    disc = (FLYWHEEL / 2, FLYWHEEL / 2, FLYWHEEL)
+    inertia = tuple(i + j for i, j in zip(crank.inertia, disc, strict=True))
+    crank = crank.model_copy(update={"inertia": inertia})
+    return base.with_(body=(crank, *base.body[1:]), duration=20.0)
+
+
+def planar_slider_crank_gravity(name: str = "planar_slider_crank_gravity") -> Scene:
+    """Under gravity along -y, from θ = 0.3 at 30 rad/s."""
+    return _mechanism(0.304, 0.4048, 0.3, name, rate=30.0).with_(gravity=(0.0, -9.81, 0.0), duration=1.0)
+
+
+def _mechanism(a: float, b: float, theta0: float, name: str, rate: float | None = None) -> Scene:
+    phi = -math.asin(a * math.sin(theta0) / b)
+    pin = (a * math.cos(theta0), a * math.sin(theta0), 0.0)
+    end = (pin[0] + b * math.cos(phi), 0.0, 0.0)
+    origin = (0.0, 0.0, 0.0)
+    moving = {} if rate is None else {"angular_velocity": (0.0, 0.0, rate)}
+    return Scene(
+        name=name,
+        body=(
+            link("crank", origin, pin, about_z(theta0), a, **moving),
+            link("rod", pin, end, about_z(phi), b),
+            slider(end),
+        ),
+        joint=(
+            Revolute(name="A", bodies=("ground", "crank"), anchor=origin, axis=Z),
+            Revolute(name="B", bodies=("crank", "rod"), anchor=pin, axis=Z),
+            Spherical(name="C", bodies=("rod", "slider"), anchor=end),
+            Translational(name="D", bodies=("ground", "slider"), anchor=end, axis=X),
+        ),
+    )

@@ -1,0 +1,137 @@
+"""Trajectory, Outcome and Cost: what every engine and every method returns."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+
+
+class Outcome(enum.Enum):
+    """How a run ended; ``letter`` is the footnote letter of the paper's tables, where it has one."""
+
+    COMPLETED = ("COMPLETED", "", "reached the end time")
+    SINGULAR_MATRIX = ("SINGULAR_MATRIX", "a", "the leading matrix is singular")
+    NOT_CONVERGED = ("NOT_CONVERGED", "b", "the iteration did not converge")
+    VIOLATION = ("VIOLATION", "c", "the constraint violation exceeds the allowed tolerance")
+    STEP_FAILED = ("STEP_FAILED", "d", "the integrator could not take a step")
+    NOT_FINITE = ("NOT_FINITE", "", "the state is not finite")
+    TIMED_OUT = ("TIMED_OUT", "", "the time limit was reached")
+    CRASHED = ("CRASHED", "", "the process ended without a result")
+
+    def __init__(self, label: str, letter: str, sentence: str):
+        self.label = label
+        self.letter = letter
+        self.sentence = sentence
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a run cost: process CPU seconds of the stepping alone, build apart, and counts."""
+
+    seconds: float = 0.0
+    build_seconds: float = 0.0
+    steps: int = 0
+    rejected: int = 0
+    rhs: int = 0
+    factorisations: int = 0
+    newton: int = 0
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Poses of every body at the caller's times, as far as the run got.
+
+    With k times reached and nb bodies: ``position`` (k, nb, 3) of the centres of mass, ``velocity``,
+    ``angular_velocity`` (k, nb, 3), all in the world frame; ``orientation`` (k, nb, 4) unit
+    quaternions (w, x, y, z), body to world.  ``acceleration`` and ``angular_acceleration``
+    (k, nb, 3, world) and ``reactions`` are None where the engine does not give them.
+    ``reactions[joint]`` (k, 6) is the force and the moment (world) on the joint's second body at the
+    anchor on that body, the driver's share included.
+    """
+
+    scene: str
+    engine: str
+    version: str
+    method: str
+    settings: Mapping[str, Any]
+    times: np.ndarray
+    bodies: tuple[str, ...]
+    position: np.ndarray
+    orientation: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+    acceleration: np.ndarray | None = None
+    angular_acceleration: np.ndarray | None = None
+    reactions: Mapping[str, np.ndarray] | None = None
+    outcome: Outcome = Outcome.COMPLETED
+    t_end: float = 0.0
+    message: str = ""
+    cost: Cost = field(default_factory=Cost)
+
+    @staticmethod
+    def failed(
+        *, scene: str, engine: str, version: str, method: str, settings: Mapping[str, Any],
+        bodies: tuple[str, ...], outcome: Outcome, message: str,
+    ) -> Trajectory:  # fmt: skip
+        """A trajectory without a single state: a run that crashed, hung or never began."""
+        nb = len(bodies)
+        return Trajectory(
+            scene, engine, version, method, settings, np.zeros(0), bodies, np.zeros((0, nb, 3)),
+            np.zeros((0, nb, 4)), np.zeros((0, nb, 3)), np.zeros((0, nb, 3)),
+            outcome=outcome, message=message,
+        )  # fmt: skip
+
+    def to_record(self) -> dict[str, Any]:
+        """The record that ``run --json`` prints (its ``metrics`` are added by crosscheck)."""
+        per_body = ["position", "orientation", "velocity", "angular_velocity"]
+        per_body += [n for n in ("acceleration", "angular_acceleration") if getattr(self, n) is not None]
+        return {
+            "engine": self.engine,
+            "version": self.version,
+            "method": self.method,
+            "settings": dict(self.settings),
+            "outcome": self.outcome.label,
+            "message": self.message,
+            "t_end": float(self.t_end),
+            "times": self.times.tolist(),
+            "bodies": {
+                name: {key: getattr(self, key)[:, b].tolist() for key in per_body}
+                for b, name in enumerate(self.bodies)
+            },
+            "reactions": {k: np.asarray(v).tolist() for k, v in (self.reactions or {}).items()},
+            "metrics": {},
+            "cost": {f.name: getattr(self.cost, f.name) for f in fields(Cost)},
+        }
+
+    @staticmethod
+    def from_record(scene: str, record: Mapping[str, Any]) -> Trajectory:
+        """The trajectory a record was made of."""
+        names = tuple(record["bodies"])
+        k = len(record["times"])
+
+        def stacked(key: str, width: int) -> np.ndarray | None:
+            rows = [record["bodies"][name].get(key) for name in names]
+            if any(row is None for row in rows):
+                return None
+            return np.array(rows, dtype=float).reshape(len(names), k, width).transpose(1, 0, 2)
+
+        reactions = {n: np.array(v, dtype=float).reshape(k, 6) for n, v in record["reactions"].items()}
+        return Trajectory(
+            scene=scene,
+            **{key: record[key] for key in ("engine", "version", "method", "settings", "message", "t_end")},
+            times=np.array(record["times"], dtype=float),
+            bodies=names,
+            position=stacked("position", 3),
+            orientation=stacked("orientation", 4),
+            velocity=stacked("velocity", 3),
+            angular_velocity=stacked("angular_velocity", 3),
+            acceleration=stacked("acceleration", 3),
+            angular_acceleration=stacked("angular_acceleration", 3),
+            reactions=reactions or None,
+            outcome=Outcome[record["outcome"]],
+            cost=Cost(**record["cost"]),
+        )
