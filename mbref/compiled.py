@@ -1,0 +1,120 @@
+"""How kernels are compiled: once per machine and source version, cached on disk, replaceable.
+
+``kernel`` marks a helper that other kernels call.  ``exchangeable(signature)`` marks one that is passed
+to another kernel as an argument (a formulation, a chart, an integrator): it is compiled when it is first
+asked for, and the kernels that take it need no compilation of their own for it.
+With NUMBA_DISABLE_JIT=1 both leave the plain Python function.
+
+The cache lives in a folder named after a hash of mbref's sources, because numba does not notice an edit
+in a kernel that another file's kernel calls.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numba
+from numba import b1, cfunc, f8, i8, njit, types
+
+OPTIONS = {"cache": True, "error_model": "numpy"}  # no fastmath: the same bits with and without the JIT
+PLAIN = bool(numba.config.DISABLE_JIT)
+
+VECTOR = types.Array(f8, 1, "C")
+MATRIX = types.Array(f8, 2, "C")
+INDICES = types.Array(i8, 1, "C")
+INDEX_TABLE = types.Array(i8, 2, "C")
+BOOL = b1
+FLOAT = f8
+INT = i8
+
+
+def _source_hash() -> str:
+    digest = hashlib.sha256(numba.__version__.encode())
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _cache_root() -> Path:
+    default = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "mbref"
+    return Path(os.environ.get("NUMBA_CACHE_DIR") or default)
+
+
+CACHE = _cache_root() / f"kernels-{_source_hash()}"
+
+
+@contextlib.contextmanager
+def _own_cache() -> Iterator[None]:
+    """numba reads its cache folder when a function is decorated; other users of numba keep theirs."""
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(CACHE)
+    try:
+        yield
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+def kernel(function: Callable) -> Callable:
+    """A compiled helper, callable from kernels and from Python."""
+    with _own_cache():
+        return njit(**OPTIONS)(function)
+
+
+class Exchangeable:
+    """A kernel of fixed signature that other kernels take as an argument; ``pointer`` compiles it."""
+
+    def __init__(self, function: Callable, signature: types.Type):
+        self.function, self.signature = function, signature
+        self._compiled: Callable | None = function if PLAIN else None
+
+    @property
+    def pointer(self) -> Callable:
+        """What is passed to a kernel: the compiled function, or the plain one without the JIT."""
+        if self._compiled is None:
+            self._say_compiling()
+            with _own_cache():
+                self._compiled = self._compile()
+        return self._compiled
+
+    def _compile(self) -> Callable:
+        return cfunc(self.signature, **OPTIONS)(self.function)
+
+    def _say_compiling(self) -> None:
+        module = self.function.__module__.rpartition(".")[2]
+        if not any(CACHE.rglob(f"{module}.{self.function.__name__}-*.nbi")):
+            announce(f"mbref: compiling {module}.{self.function.__name__} for this machine, once")
+
+
+class Entry(Exchangeable):
+    """A kernel that Python calls: explicit signature, compiled on first use."""
+
+    def __call__(self, *arguments: object) -> object:
+        return self.pointer(*arguments)
+
+    def _compile(self) -> Callable:
+        return njit(self.signature, **OPTIONS)(self.function)
+
+
+def exchangeable(signature: types.Type) -> Callable[[Callable], Exchangeable]:
+    """Decorator: a kernel that is passed to other kernels."""
+    return lambda function: Exchangeable(function, signature)
+
+
+def entry(signature: types.Type) -> Callable[[Callable], Entry]:
+    """Decorator: a kernel that Python calls."""
+    return lambda function: Entry(function, signature)
+
+
+def pointer_to(signature: types.Type) -> types.Type:
+    """The argument type of an exchangeable kernel."""
+    return types.FunctionType(signature)
+
+
+def announce(message: str) -> None:
+    """Tell the user on stderr; standard output belongs to results."""
+    print(message, file=sys.stderr, flush=True)

@@ -1,0 +1,88 @@
+"""Three-vectors as tuples, for the kernels: compiled they cost nothing and allocate nothing."""
+
+from __future__ import annotations
+
+from mbref.compiled import kernel
+from mbref.tables import ROTATION
+
+
+@kernel
+def vector(table, row, column):
+    """Three consecutive entries of a row."""
+    return table[row, column], table[row, column + 1], table[row, column + 2]
+
+
+@kernel
+def add(a, b):
+    """a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@kernel
+def subtract(a, b):
+    """a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@kernel
+def scale(s, a):
+    """s a."""
+    return s * a[0], s * a[1], s * a[2]
+
+
+@kernel
+def dot(a, b):
+    """a · b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def cross(a, b):
+    """a × b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@kernel
+def to_world(frames, body, a):
+    """A vector of the body's frame in the world."""
+    r = ROTATION
+    return (
+        frames[body, r] * a[0] + frames[body, r + 1] * a[1] + frames[body, r + 2] * a[2],
+        frames[body, r + 3] * a[0] + frames[body, r + 4] * a[1] + frames[body, r + 5] * a[2],
+        frames[body, r + 6] * a[0] + frames[body, r + 7] * a[1] + frames[body, r + 8] * a[2],
+    )
+
+
+@kernel
+def to_body(frames, body, a):
+    """A vector of the world in the body's frame."""
+    r = ROTATION
+    return (
+        frames[body, r] * a[0] + frames[body, r + 3] * a[1] + frames[body, r + 6] * a[2],
+        frames[body, r + 1] * a[0] + frames[body, r + 4] * a[1] + frames[body, r + 7] * a[2],
+        frames[body, r + 2] * a[0] + frames[body, r + 5] * a[1] + frames[body, r + 8] * a[2],
+    )
+
+
+@kernel
+def put(table, row, column, a):
+    """Write a three-vector into a row."""
+    table[row, column] = a[0]
+    table[row, column + 1] = a[1]
+    table[row, column + 2] = a[2]
+
+
+@kernel
+def put_negative(table, row, column, a):
+    """Write minus a three-vector into a row."""
+    table[row, column] = -a[0]
+    table[row, column + 1] = -a[1]
+    table[row, column + 2] = -a[2]
+
+
+@kernel
+def accumulate(values, start, a):
+    """Add a three-vector to three consecutive entries of a vector."""
+    values[start] += a[0]
+    values[start + 1] += a[1]
+    values[start + 2] += a[2]
