@@ -92,10 +92,13 @@ def engine_names() -> tuple[str, ...]:
 
 
 def engine(name: str) -> Engine:
-    """The engine of that name; raises LookupError with the known names."""
+    """The engine of that name, or at ``module:attribute``; raises LookupError with the known names."""
     if name in BUILT_IN:
         return import_module(f"crosscheck.engines.{name}").ENGINE
     for point in metadata.entry_points(group=ENTRY_POINTS):
         if point.name == name:
             return point.load()
+    if ":" in name:
+        module, attribute = name.split(":", 1)
+        return getattr(import_module(module), attribute)
     raise LookupError(f"unknown engine {name!r}; known: {', '.join(engine_names())}")

@@ -1,0 +1,106 @@
+"""Engines that misbehave in every way `isolate` has to survive, and one that behaves."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from crosscheck.engine import Cannot, Engine, Setting, Why
+from mbref.scene import Scene
+from mbref.trajectory import Cost, Outcome, Trajectory
+
+
+class Fake(Engine):
+    """Leaves every body where it starts; ``options`` say what else to do."""
+
+    name = "fake"
+    package = "fake-package"
+
+    def version(self) -> str:
+        return "1.2.3"
+
+    def cannot(self, scene: Scene) -> Cannot | None:
+        return Cannot(Why.NEVER, "this fake has no loads") if scene.load else None
+
+    def settings(self, scene: Scene) -> list[Setting]:
+        coarse_to_fine = [Setting("plain", {"seconds": s}) for s in (0.1, 0.2)]
+        return [*coarse_to_fine, Setting("noisy", {"seconds": 0.5})]
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        self.misbehave(scene)
+        k, nb = len(times), len(scene.body)
+        still = np.zeros((k, nb, 3))
+        return Trajectory(
+            scene.name, self.name, self.version(), setting.family, dict(setting.options), np.array(times),
+            tuple(b.name for b in scene.body), still + [b.position for b in scene.body],
+            np.zeros((k, nb, 4)) + [b.orientation for b in scene.body], still, still,
+            outcome=Outcome[setting.options.get("outcome", "COMPLETED")], t_end=float(times[-1]),
+            cost=Cost(seconds=setting.options.get("seconds", 0.0)),
+        )  # fmt: skip
+
+    def misbehave(self, scene: Scene) -> None:
+        pass
+
+
+class Segfault(Fake):
+    def misbehave(self, scene: Scene) -> None:
+        os.write(2, b"about to touch a bad pointer\n")
+        os.kill(os.getpid(), signal.SIGSEGV)
+
+
+class Hang(Fake):
+    """Sleeps, and so does a grandchild, whose process id is left in the file the scene's name gives."""
+
+    def misbehave(self, scene: Scene) -> None:
+        grandchild = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
+        Path(scene.name).write_text(str(grandchild.pid))
+        time.sleep(600)
+
+
+class Chatter(Fake):
+    """Prints past Python's sys.stdout, as compiled code does, and writes into the working directory."""
+
+    def misbehave(self, scene: Scene) -> None:
+        os.write(1, b"solver banner\n")
+        print("python banner")
+        Path("solution.txt").write_text("left behind")
+
+
+class Raise(Fake):
+    def misbehave(self, scene: Scene) -> None:
+        print("residual 1e+300", flush=True)
+        raise ValueError("no such joint")
+
+
+class Quit(Fake):
+    def misbehave(self, scene: Scene) -> None:
+        os._exit(0)
+
+
+class Threads(Fake):
+    def version(self) -> str:
+        return os.environ["OPENBLAS_NUM_THREADS"] + os.environ["OMP_NUM_THREADS"]
+
+
+class Missing(Fake):
+    def version(self) -> str:
+        raise ModuleNotFoundError("No module named 'fake_package'")
+
+
+class Recorder(Fake):
+    """Its runs leave their order in the file that the scene's name gives."""
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        with open(scene.name, "a") as file:
+            file.write(f"{setting.family} {os.getpid()}\n")
+        return super().run(scene, times, setting)
+
+
+FAKE, SEGFAULT, HANG, CHATTER, RAISE, QUIT = Fake(), Segfault(), Hang(), Chatter(), Raise(), Quit()
+THREADS, MISSING, RECORDER = Threads(), Missing(), Recorder()
