@@ -1,0 +1,207 @@
+"""The grid (scene × engine × setting) → raw records, one JSON line each; an interrupted study resumes."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import json
+import os
+import platform
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_completed
+from importlib import metadata
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from crosscheck import metrics
+from crosscheck.engine import Cannot, Setting, engine
+from crosscheck.isolate import run_isolated, stop_all
+from crosscheck.truth import truth_for
+from mbref.scene import Scene
+from mbref.trajectory import Outcome
+
+SCHEMA = 1
+SAMPLES = 101  # sample times of a default case, both ends included
+TIME_LIMIT = 60.0  # s, of a default case
+PACKAGES = ("mbref", "numpy", "scipy", "numba")
+
+Record = dict[str, Any]
+Progress = Callable[[int, int, Record], None]  # cases done, cases in all, the record just done
+
+
+class Case(NamedTuple):
+    """One run of a study; ``time_limit`` is wall time (s) of the whole child process."""
+
+    scene: Scene
+    times: np.ndarray
+    engine: str
+    setting: Setting
+    time_limit: float = TIME_LIMIT
+
+
+class Unable(NamedTuple):
+    """A pair of a default sweep that is not run, and why."""
+
+    scene: Scene
+    engine: str
+    cannot: Cannot
+
+
+def default_cases(
+    scene: Scene,
+    engines: Sequence[str],
+    families: Sequence[str] | None = None,
+    times: np.ndarray | None = None,
+    time_limit: float = TIME_LIMIT,
+) -> tuple[list[Case], list[Unable]]:
+    """The sweep of every engine's settings over a scene, and the engines that cannot run it.
+
+    ``families`` restricts the settings; ``times`` (k,) default to SAMPLES over the scene's duration.
+    """
+    times = np.linspace(0.0, scene.duration, SAMPLES) if times is None else times
+    cases, unable = [], []
+    for name in engines:
+        simulator = engine(name)
+        cannot = simulator.cannot(scene)
+        if cannot:
+            unable.append(Unable(scene, name, cannot))
+            continue
+        wanted = [s for s in simulator.settings(scene) if families is None or s.family in families]
+        cases += [Case(scene, times, name, setting, time_limit) for setting in wanted]
+    return cases, unable
+
+
+def study(
+    cases: Sequence[Case],
+    executor: Executor | None = None,
+    records_path: str | Path | None = None,
+    progress: Progress | None = None,
+) -> list[Record]:
+    """The record of every case, in the order of the cases.
+
+    Each record is appended to ``records_path`` as its run ends; records that the file already has are
+    not run again, unless they ran out of a shorter time limit than the case's.  Runs are spread by
+    ``executor``, by default threads, one a core: each run is a process of its own.
+    """
+    keys = [key(case) for case in cases]
+    records = _resumed(records_path, cases, keys)
+    left = {k: case for k, case in zip(keys, cases, strict=True) if k not in records}
+    with contextlib.closing(_run_all(list(left.values()), executor)) as fresh:
+        for record in fresh:
+            records[record["key"]] = record
+            _append(records_path, record)
+            if progress:
+                progress(len(records), len(set(keys)), record)
+    return [records[k] for k in keys]
+
+
+def key(case: Case) -> str:
+    """Hash of all that determines a record: scene, times, engine, version and setting."""
+    identity = [
+        SCHEMA, case.scene.to_dict(), list(map(float, case.times)), case.engine, _version(case.engine),
+        case.setting.family, dict(case.setting.options),
+    ]  # fmt: skip
+    return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
+
+
+def run_case(case: Case) -> Record:
+    """The raw record of one run, its metrics included."""
+    trajectory = run_isolated(case.engine, case.scene, case.times, case.setting, case.time_limit)
+    return {
+        "schema": SCHEMA,
+        "key": key(case),
+        "scene": case.scene.name,
+        **trajectory.to_record(),
+        "family": case.setting.family,
+        "time_limit": case.time_limit,
+        "metrics": metrics.measure(case.scene, trajectory, _truth(case.scene)),
+        "seed": 0,
+        "versions": versions(),
+        "machine": machine(),
+    }
+
+
+@functools.cache
+def versions() -> dict[str, str | None]:
+    """Versions of Python and of the packages that results depend on; None when not installed."""
+    return {"python": platform.python_version(), **{name: _installed(name) for name in PACKAGES}}
+
+
+@functools.cache
+def machine() -> dict[str, str | int | None]:
+    """Processor, number of cores and operating system."""
+    return {"cpu": _processor(), "cores": os.cpu_count(), "system": platform.platform()}
+
+
+def _run_all(cases: Sequence[Case], executor: Executor | None) -> Generator[Record, None, None]:
+    """Records as their runs end; when the caller stops early, so do the runs."""
+    own = ThreadPoolExecutor(os.cpu_count()) if executor is None else None
+    futures: list[Future[Record]] = []
+    try:
+        futures += [(executor or own).submit(run_case, case) for case in cases]
+        for future in as_completed(futures):
+            yield future.result()
+    except BaseException:
+        for future in futures:
+            future.cancel()
+        stop_all()
+        raise
+    finally:
+        if own:
+            own.shutdown()
+
+
+def _resumed(path: str | Path | None, cases: Sequence[Case], keys: Sequence[str]) -> dict[str, Record]:
+    """Records of the file that answer the cases; a last line cut short is removed from the file."""
+    if path is None or not Path(path).exists():
+        return {}
+    text = Path(path).read_bytes()
+    whole = text[: text.rfind(b"\n") + 1]
+    if len(whole) < len(text):
+        Path(path).write_bytes(whole)
+    known = {record["key"]: record for record in map(json.loads, whole.splitlines())}
+    limits = dict(zip(keys, (case.time_limit for case in cases), strict=True))
+    return {k: known[k] for k in limits if k in known and not _worth_repeating(known[k], limits[k])}
+
+
+def _worth_repeating(record: Record, time_limit: float) -> bool:
+    return record["outcome"] == Outcome.TIMED_OUT.label and record["time_limit"] < time_limit
+
+
+def _append(path: str | Path | None, record: Record) -> None:
+    if path is not None:
+        with open(path, "a") as file:
+            file.write(json.dumps(record) + "\n")
+
+
+@functools.cache
+def _version(engine_name: str) -> str:
+    """The engine's version; empty when its package is missing, which each run then says."""
+    try:
+        return engine(engine_name).version()
+    except ImportError:
+        return ""
+
+
+@functools.lru_cache(maxsize=32)
+def _truth(scene: Scene) -> Any:
+    return truth_for(scene)
+
+
+def _installed(package: str) -> str | None:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    models = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return models[0] if models else platform.processor() or platform.machine()

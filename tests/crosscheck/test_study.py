@@ -1,0 +1,133 @@
+"""Studies: what was run and stored / what a rerun, an interruption or another executor gives."""
+
+from __future__ import annotations
+
+import json
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Setting
+from crosscheck.study import Case, default_cases, key, study
+from mbref.scene import Body, Force, Scene
+from mbref.trajectory import Trajectory
+
+TIMES = np.array([0.0, 0.1, 0.3])
+
+
+@pytest.fixture(autouse=True)
+def _fakes_importable(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+
+
+def still(name: str = "still", **changes: object) -> Scene:
+    block = Body(name="block", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(1.0, 2.0, 3.0))
+    return Scene(name=name, body=(block,), **changes)
+
+
+def case(family: str, fake: str = "FAKE", scene: Scene | None = None, limit: float = 60.0) -> Case:
+    return Case(scene or still(), TIMES, f"fake_engines:{fake}", Setting(family, {"seconds": 0.5}), limit)
+
+
+def test_record_and_trajectory_agree():
+    from fake_engines import FAKE
+
+    wanted = case("a")
+    [record] = study([wanted], ThreadPoolExecutor(1))
+    there = Trajectory.from_record("still", json.loads(json.dumps(record)))
+    here = FAKE.run(wanted.scene, TIMES, wanted.setting)
+    assert there.to_record() == here.to_record(), (there, here)
+    identity = {name: record[name] for name in ("schema", "key", "scene", "family", "seed")}
+    assert identity == {"schema": 1, "key": key(wanted), "scene": "still", "family": "a", "seed": 0}
+    assert record["versions"]["numpy"] == np.__version__, record["versions"]
+    assert record["machine"]["cores"] >= 1, record["machine"]
+    assert record["metrics"], "no metric was computed"
+
+
+def test_stored_lines_and_returned_records_agree(tmp_path: Path):
+    path, seen = tmp_path / "records.jsonl", []
+    cases = [case("a"), case("b"), case("c", "SEGFAULT"), case("a")]
+    records = study(cases, None, path, lambda done, total, record: seen.append((done, total)))
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    assert [r["family"] for r in records] == ["a", "b", "c", "a"]
+    assert [r["outcome"] for r in records] == ["COMPLETED", "COMPLETED", "CRASHED", "COMPLETED"]
+    assert sorted(r["family"] for r in lines) == ["a", "b", "c"], "one line for each different case"
+    assert all(r in records for r in lines), (lines, records)
+    assert seen == [(1, 3), (2, 3), (3, 3)], seen
+
+
+def test_rerun_and_first_run_agree_without_running_again(tmp_path: Path):
+    path, log = tmp_path / "records.jsonl", tmp_path / "log"
+    cases = [case(family, "RECORDER", still(str(log))) for family in "abc"]
+    study(cases[:2], None, path)
+    with path.open("a") as file:
+        file.write('{"schema": 1, "key": "cut sho')
+    records = study(cases, None, path)
+    ran = sorted(line.split()[0] for line in log.read_text().splitlines())
+    assert ran == ["a", "b", "c"], f"each case once, got {ran}"
+    stored = [json.loads(line) for line in path.read_text().splitlines()]
+    assert sorted(stored, key=lambda r: r["family"]) == records
+
+
+def test_interrupted_study_keeps_what_has_ended(tmp_path: Path):
+    path = tmp_path / "records.jsonl"
+
+    def interrupt(done: int, total: int, record: dict) -> None:
+        raise KeyboardInterrupt
+
+    hanging = case("b", "HANG", still(str(tmp_path / "pid")), limit=60.0)
+    with pytest.raises(KeyboardInterrupt):
+        study([case("a"), hanging], ThreadPoolExecutor(2), path, interrupt)
+    stored = [json.loads(line)["family"] for line in path.read_text().splitlines()]
+    assert stored == ["a"], stored
+
+
+def test_timed_out_case_is_repeated_with_a_longer_limit_only(tmp_path: Path):
+    path, scene = tmp_path / "records.jsonl", still(str(tmp_path / "pid"))
+    short, shorter, longer = (case("a", "HANG", scene, limit) for limit in (1.0, 0.5, 1.5))
+    [first] = study([short], None, path)
+    assert first["outcome"] == "TIMED_OUT", first["message"]
+    assert study([shorter], None, path) == [first]
+    [again] = study([longer], None, path)
+    assert (again["key"], again["time_limit"]) == (first["key"], 1.5)
+
+
+def test_process_pool_and_threads_agree():
+    cases = [case("a"), case("b", "RAISE")]
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        assert study(cases, pool) == study(cases)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        case("b"),
+        case("a", "RECORDER"),
+        case("a", scene=still(gravity=(0.0, 0.0, -9.81))),
+        case("a")._replace(times=TIMES[:2]),
+        case("a")._replace(setting=Setting("a", {"seconds": 0.6})),
+        case("a", "THREADS"),
+    ],
+    ids=["family", "engine", "scene", "times", "options", "version"],
+)
+def test_keys_of_different_cases_differ(other: Case, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    assert key(other) != key(case("a"))
+    assert key(other) == key(other._replace(time_limit=1.0)), "the time limit is no part of a result"
+
+
+def test_default_cases_are_the_settings_of_the_engines_that_can():
+    pushed = still(load=(Force(body="block", point=(1.0, 2.0, 3.0), force=(1.0, 0.0, 0.0)),))
+    cases, unable = default_cases(still(), ["fake_engines:FAKE"], families=["plain"])
+    assert [str(c.setting) for c in cases] == ["plain seconds=0.1", "plain seconds=0.2"]
+    assert len(default_cases(still(), ["fake_engines:FAKE"])[0]) == 3
+    assert unable == []
+    cases, unable = default_cases(pushed, ["fake_engines:FAKE"])
+    assert cases == []
+    assert [(u.scene, u.engine, u.cannot.reason) for u in unable] == [
+        (pushed, "fake_engines:FAKE", "this fake has no loads")
+    ]
