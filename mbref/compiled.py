@@ -12,6 +12,7 @@ in a kernel that another file's kernel calls.
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import os
 import sys
@@ -80,6 +81,15 @@ class Exchangeable:
             with _own_cache():
                 self._compiled = self._compile()
         return self._compiled
+
+    def prepare(self) -> None:
+        """Compile now, or load from the cache."""
+        self.pointer  # noqa: B018
+
+    @functools.cached_property
+    def callable(self) -> Callable:
+        """The same kernel as a function for Python to call with arrays."""
+        return self.function if PLAIN else Entry(self.function, self.signature)
 
     def _compile(self) -> Callable:
         return cfunc(self.signature, **OPTIONS)(self.function)

@@ -121,15 +121,10 @@ def qr_pivoted(b, n, m, order, tau, norms, work, tolerance):
     for i in range(n):
         for j in range(m):
             norms[0, j] += b[i, j] * b[i, j]
-    largest = 0.0
-    for j in range(m):
-        norms[1, j] = norms[0, j]
-        largest = max(largest, norms[0, j])
+    norms[1] = norms[0]
+    largest = norms[0, largest_from(norms[0], 0, m)]
     for k in range(min(m, n)):
-        best = k
-        for j in range(k + 1, m):
-            if norms[0, j] > norms[0, best]:
-                best = j
+        best = largest_from(norms[0], k, m)
         if best != k:
             exchange_columns(b, n, k, best, order)
             norms[0, best], norms[1, best] = norms[0, k], norms[1, k]
@@ -147,6 +142,16 @@ def qr_pivoted(b, n, m, order, tau, norms, work, tolerance):
                     norms[0, j] += b[i, j] * b[i, j]
                 norms[1, j] = norms[0, j]
     return min(m, n)
+
+
+@kernel
+def largest_from(values, start, stop):
+    """Index of the largest entry in values[start:stop]."""
+    best = start
+    for j in range(start + 1, stop):
+        if values[j] > values[best]:
+            best = j
+    return best
 
 
 @kernel
@@ -210,24 +215,39 @@ def equilibrate(jacobian, inverse_root, d, row_scale):
 
 @kernel
 def svd_solve(d, rhs, tolerance, x, dual):
-    """x = D⁺ rhs and dual = (Dᵀ)⁺ x by the singular value decomposition (Eqs. 27 and 28); the rank."""
+    """x = D⁺ rhs and dual = (Dᵀ)⁺ x by the singular value decomposition (Eqs. 27 and 28); the rank.
+
+    One step of refinement, x += D⁺ (rhs - D x), takes out the rounding that the orthogonal factors
+    spread over all of x: a planar motion stays planar.  ``rhs`` (m,) becomes the residual.
+    """
     u, s, vt = np.linalg.svd(d, full_matrices=False)
     m, n = d.shape
     x[:] = 0.0
     dual[:] = 0.0
     rank = 0
-    for k in range(s.size):
-        if s[k] > tolerance * s[0]:
-            rank += 1
-            value = 0.0
-            for i in range(m):
-                value += u[i, k] * rhs[i]
-            value /= s[k]
-            for j in range(n):
-                x[j] += vt[k, j] * value
-            for i in range(m):
-                dual[i] += u[i, k] * (value / s[k])
+    while rank < s.size and s[rank] > tolerance * s[0]:
+        rank += 1
+    add_pseudo_solution(u, s, vt, rank, rhs, x, dual)
+    for i in range(m):
+        for j in range(n):
+            rhs[i] -= d[i, j] * x[j]
+    add_pseudo_solution(u, s, vt, rank, rhs, x, dual)
     return rank
+
+
+@kernel
+def add_pseudo_solution(u, s, vt, rank, rhs, x, dual):
+    """x += V S⁺ Uᵀ rhs and dual += U S⁺ S⁺ Uᵀ rhs, of the first ``rank`` singular values."""
+    m, n = u.shape[0], vt.shape[1]
+    for k in range(rank):
+        value = 0.0
+        for i in range(m):
+            value += u[i, k] * rhs[i]
+        value /= s[k]
+        for j in range(n):
+            x[j] += vt[k, j] * value
+        for i in range(m):
+            dual[i] += u[i, k] * (value / s[k])
 
 
 def pinv_svd(d: np.ndarray, tolerance: float = 1e-10) -> tuple[np.ndarray, int]:

@@ -15,7 +15,7 @@ from mbref.evaluation import evaluate_all
 from mbref.joints import JOINTS
 from mbref.joints.base import ROWS_OF, Primitive, driven_angle, driven_displacement, frame
 from mbref.loads import CONSTANTS, FIRST, FOURTH, SECOND, THIRD
-from mbref.scene import GROUND, Body, Driver, Fixed, Joint, Scene, SceneError
+from mbref.scene import GROUND, Body, Driver, Fixed, Joint, Scene
 from mbref.tables import (
     COLUMNS,
     FORCE,
@@ -55,7 +55,7 @@ class Terms:
 class Model:
     """A scene packed once; ``bodies`` are those of the scene, then the ground if it is modelled.
 
-    Raises SceneError when a scene without all masses has no driver to move it.
+    A scene without all masses is ``kinematic``: M is the identity and there are no forces.
     """
 
     def __init__(self, scene: Scene):
@@ -64,8 +64,6 @@ class Model:
         self.nb = len(self.bodies)
         self.n = 6 * self.nb
         self.kinematic = not scene.has_mass()
-        if self.kinematic and not scene.driver:
-            raise SceneError(missing_masses(scene))
         self._index = {body.name: b for b, body in enumerate(self.bodies)}
         self._index.setdefault(GROUND, self.nb)
         self._index[FRAME] = self.nb
@@ -105,6 +103,18 @@ class Model:
         return Terms(
             self.mass, work[PHI_Q].copy(), rows[PHI], rows[NU], rows[GAMMA], work[COLUMNS][FORCE].copy()
         )
+
+    def index(self, name: str) -> int:
+        """Index of a body, ``nb`` for the fixed frame."""
+        return self._index[name]
+
+    def anchor(self, joint: Joint, q: np.ndarray) -> np.ndarray:
+        """World position (3,) of the joint's anchor on its second body at coordinates q (nb, 7)."""
+        point = joint.anchors[1] if joint.type == "distance" else joint.anchor
+        b = self._index[joint.bodies[1]]
+        if b == self.nb:
+            return np.array(point)
+        return q[b, :3] + rotations.rotate(q[b, 3:], self._point(joint.bodies[1], point))
 
     def _pack_bodies(self) -> None:
         principal = [_principal_axes(body) for body in self.bodies]
@@ -192,15 +202,6 @@ class Model:
                 row[CONSTANTS:] = load.stiffness, load.damping, load.natural_angle
             data.append(row)
         return np.array(index, dtype=np.int64).reshape(-1, 4), np.array(data).reshape(-1, 15)
-
-
-def missing_masses(scene: Scene) -> list[str]:
-    """One fault per body without mass, for a dynamic analysis."""
-    return [
-        f"body[{b}].mass: {body.name!r} has no mass and inertia, which a dynamic analysis needs"
-        for b, body in enumerate(scene.body)
-        if body.mass is None
-    ]
 
 
 def _with_ground(scene: Scene) -> tuple[tuple[Body, ...], tuple[Joint, ...]]:

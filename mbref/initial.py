@@ -1,0 +1,133 @@
+"""Consistent initial positions and velocities (section 1 and Figure 2 of the paper)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbref import rotations
+from mbref.model import Model
+from mbref.scene import SceneError
+
+RANK_TOLERANCE = 1e-5  # singular values below it (relative) are left alone: rank may drop at the start
+GROSS = 0.05  # of the scene's length, or of its speed: a larger inconsistency is a fault
+MOST_ITERATIONS = 30
+
+
+@dataclass(frozen=True)
+class Start:
+    """A consistent state and how far the scene's own data was from it."""
+
+    q: np.ndarray  # (7 nb,)
+    v: np.ndarray  # (6 nb,)
+    position_violation: float  # largest |Φ| before correction (m or rad)
+    velocity_violation: float  # largest |Φ_q v - ν| of fully given velocities before correction
+
+    def report(self) -> str:
+        """One sentence for the user; empty where nothing but rounding was corrected."""
+        parts = []
+        if self.position_violation > 1e-9:
+            parts.append(f"positions were off the constraints by {self.position_violation:.2e}")
+        if self.velocity_violation > 1e-9:
+            parts.append(f"velocities by {self.velocity_violation:.2e}")
+        return f"initial {' and '.join(parts)}; corrected" if parts else ""
+
+
+def consistent_start(model: Model) -> Start:
+    """The nearest consistent state; raises SceneError naming the joint that is grossly violated."""
+    q, position_violation = _correct_positions(model)
+    v, velocity_violation = _velocities(model, q)
+    return Start(q, v, position_violation, velocity_violation)
+
+
+def scene_length(model: Model) -> float:
+    """The largest distance between two of the centres of mass and joint anchors at t = 0 (m)."""
+    points = [body.position for body in model.bodies]
+    for joint in model.joints:
+        points += getattr(joint, "anchors", None) or [joint.anchor]
+    array = np.array(points)
+    return float(np.max(np.linalg.norm(array[:, None] - array[None], axis=-1))) or 1.0
+
+
+def _fault(model: Model, row: int, what: str) -> SceneError:
+    name = model.row_joint[row]
+    index = next((j for j, joint in enumerate(model.scene.joint) if joint.name == name), 0)
+    return SceneError([f"joint[{index}]: {what} at joint {name!r}"])
+
+
+def _correct_positions(model: Model) -> tuple[np.ndarray, float]:
+    """Newton–Raphson on Φ(q, 0) = 0 with the pseudo-inverse, least change in the metric of M."""
+    q, v = model.start(), np.zeros(model.n)
+    inverse_root = _inverse_root(model)
+    before = 0.0
+    for iteration in range(MOST_ITERATIONS):
+        terms = model.terms(0.0, q, v)
+        if not model.m:
+            return q, 0.0
+        worst = int(np.argmax(np.abs(terms.phi)))
+        violation = abs(terms.phi[worst])
+        if iteration == 0:
+            before = violation
+            if before > GROSS * max(1.0, scene_length(model)):
+                raise _fault(model, worst, f"the initial positions violate the constraint by {before:.3g}")
+        if violation <= 1e-14 * max(1.0, scene_length(model)):
+            return q, before
+        x = _least_norm(terms.jacobian * inverse_root, -terms.phi) * inverse_root
+        if np.max(np.abs(x)) < 1e-15:
+            break
+        q = displaced(q, x)
+    if violation > 1e-10:
+        raise _fault(model, worst, f"the initial positions cannot be corrected; {violation:.3g} is left")
+    return q, before
+
+
+def displaced(q: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Coordinates (7 nb,) moved by (δr, δπ') per body (6 nb,)."""
+    bodies, change = q.reshape(-1, 7), x.reshape(-1, 6)
+    turned = rotations.multiply(bodies[:, 3:], rotations.from_vector(change[:, 3:]))
+    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+    return np.concatenate([bodies[:, :3] + change[:, :3], turned], axis=1).ravel()
+
+
+def _inverse_root(model: Model) -> np.ndarray:
+    return 1 / np.sqrt(np.where(model.mass > 0, model.mass, 1.0))
+
+
+def _least_norm(matrix: np.ndarray, rhs: np.ndarray) -> np.ndarray:
+    return np.linalg.lstsq(matrix, rhs, rcond=RANK_TOLERANCE)[0]
+
+
+def _given(model: Model, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The velocities the scene gives (zero elsewhere) and which those are, both (6 nb,)."""
+    v, given = np.zeros((model.nb, 6)), np.zeros((model.nb, 6), dtype=bool)
+    for b, body in enumerate(model.bodies):
+        if body.velocity is not None:
+            v[b, :3], given[b, :3] = body.velocity, True
+        if body.angular_velocity is not None:
+            to_body = rotations.conjugate(q.reshape(-1, 7)[b, 3:])
+            v[b, 3:], given[b, 3:] = rotations.rotate(to_body, np.array(body.angular_velocity)), True
+    return v.ravel(), given.ravel()
+
+
+def _velocities(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]:
+    """Velocities that meet Φ_q v = ν and the given ones as nearly as that allows; the rest least in M."""
+    v, given = _given(model, q)
+    if not model.m:
+        return v, 0.0
+    terms = model.terms(0.0, q, v)
+    inverse_root = _inverse_root(model)
+    d = terms.jacobian * inverse_root
+    free = np.flatnonzero(~given)
+    x = _least_norm(d[:, free], terms.nu - terms.jacobian @ v)  # let what is not given do it alone
+    completed = v.copy()
+    completed[free] += inverse_root[free] * x
+    residual = terms.nu - terms.jacobian @ completed
+    violation = float(np.max(np.abs(residual)))
+    speed = max(float(np.max(np.abs(completed))), float(np.max(np.abs(terms.nu))), 1e-12)
+    if given.any() and violation > GROSS * speed:
+        worst = int(np.argmax(np.abs(residual)))
+        raise _fault(model, worst, f"the initial velocities violate the constraint by {violation:.3g}")
+    completed += inverse_root * _least_norm(d, residual)
+    completed += inverse_root * _least_norm(d, terms.nu - terms.jacobian @ completed)
+    return completed, violation if given.any() else 0.0

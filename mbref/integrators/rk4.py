@@ -1,0 +1,34 @@
+"""RK4: the classical Runge–Kutta method of order 4 with a fixed step."""
+
+from __future__ import annotations
+
+from mbref.compiled import exchangeable
+from mbref.integrators.base import Integrator
+from mbref.tables import OK, STEP
+
+
+@exchangeable(STEP)
+def step(
+    rates, accelerate, t, h, y, y_rate, y_new, memory, tolerances,
+    ints, floats, work, pivots, settings, counts,
+):  # fmt: skip
+    n = y.shape[0]
+    k, total = memory[0, :n], memory[1, :n]
+    k[:] = y_rate
+    total[:] = y_rate
+    for s in range(3):
+        part = h if s == 2 else 0.5 * h
+        for i in range(n):
+            y_new[i] = y[i] + part * k[i]
+        status = rates(accelerate, t + part, y_new, k, ints, floats, work, pivots, settings, counts)
+        if status != OK:
+            return -float(status)
+        weight = 1.0 if s == 2 else 2.0
+        for i in range(n):
+            total[i] += weight * k[i]
+    for i in range(n):
+        y_new[i] = y[i] + h / 6.0 * total[i]
+    return 0.0
+
+
+RK4 = Integrator("rk4", 4, step, 2, adaptive=False, options={"step": 1e-4})

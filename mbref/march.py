@@ -1,0 +1,204 @@
+"""The stepping loop: from sample time to sample time, compiled, no Python object inside."""
+
+from __future__ import annotations
+
+from numpy import isfinite
+
+from mbref.compiled import INDICES, INT, MATRIX, VECTOR, entry, kernel, pointer_to
+from mbref.loads import remember_angles
+from mbref.tables import (
+    ACCELERATE,
+    ACCELERATION,
+    ACCEPT,
+    CHANGED,
+    COLUMNS,
+    COORDINATES,
+    FRAMES,
+    LAST,
+    LAST_TIME,
+    MEMO,
+    MULTIPLIERS,
+    NOT_FINITE,
+    OK,
+    OMEGA,
+    PHI,
+    PROBLEM,
+    RATES,
+    REJECTED,
+    ROWS,
+    SIZES,
+    STATE,
+    STEP,
+    STEPS,
+    VELOCITIES,
+)
+
+# how a call ends; evaluation statuses (SINGULAR, …) end it too
+DONE, VIOLATED, STEP_TOO_SMALL, TOO_MANY_STEPS, PAUSED = range(10, 15)
+# clock: the state of the loop between calls
+TIME, NEXT_STEP = range(2)
+# control: what the loop is to keep to
+ORDER, FIXED_STEP, SMALLEST_STEP, LARGEST_STEP, LARGEST_TURN, VIOLATION, MOST_STEPS, STEPS_PER_CALL = range(8)
+# place: sample to take next, and the violated row
+SAMPLE, ROW = range(2)
+
+SAFETY, SHRINK, GROW, RETRY = 0.9, 0.2, 6.0, 0.25
+
+
+@kernel
+def take_sample(k, work, sample_q, sample_v, sample_a, sample_m):
+    """Record state, accelerations and multipliers as the last evaluation left them."""
+    state, columns = work[STATE], work[COLUMNS]
+    sample_q[k] = state[COORDINATES]
+    sample_v[k] = state[VELOCITIES][: columns.shape[1]]
+    sample_a[k] = columns[ACCELERATION]
+    sample_m[k] = work[ROWS][MULTIPLIERS]
+
+
+@kernel
+def all_finite(values):
+    """Whether no entry is infinite or undefined."""
+    for value in values:  # noqa: SIM110 - numba compiles no generator expression
+        if not isfinite(value):
+            return False
+    return True
+
+
+@kernel
+def worst_row(work):
+    """The row with the largest violation; -1 without rows."""
+    phi, worst = work[ROWS][PHI], -1
+    for row in range(phi.shape[0]):
+        if worst < 0 or abs(phi[row]) > abs(phi[worst]):
+            worst = row
+    return worst
+
+
+@kernel
+def fastest_turn(work):
+    """The largest component of a body's angular velocity (rad/s)."""
+    frames, fastest = work[FRAMES], 0.0
+    for b in range(frames.shape[0]):
+        for k in range(3):
+            fastest = max(fastest, abs(frames[b, OMEGA + k]))
+    return fastest
+
+
+@kernel
+def keep(t, ints, floats, work):
+    """Remember the accepted state, from which charts predict and angles unwrap."""
+    work[LAST][:] = work[STATE]
+    work[MEMO][0, LAST_TIME] = t
+    remember_angles(ints, floats, work)
+
+
+@kernel
+def largest_step(control, work):
+    """The step that the user's limit and the fastest turning body allow."""
+    fastest = fastest_turn(work)
+    h = control[LARGEST_STEP]
+    return min(h, control[LARGEST_TURN] / fastest) if fastest > 0.0 else h
+
+
+@kernel
+def part_of(interval, h):
+    """The step next taken towards the end of an interval: to the end, to the middle of it, or h."""
+    if h * (1.0 + 1e-9) >= interval:
+        return interval
+    return 0.5 * interval if 2.0 * h > interval else h
+
+
+@kernel
+def first_step(t, control, tolerances, y, y_rate):
+    """A first step from the sizes of y and y' (Hairer, Nørsett & Wanner, section II.4)."""
+    size, rate = 0.0, 0.0
+    for i in range(y.shape[0]):
+        scale = tolerances[1] + tolerances[0] * abs(y[i])
+        size += (y[i] / scale) ** 2
+        rate += (y_rate[i] / scale) ** 2
+    if size < 1e-10 or rate < 1e-10:
+        return 1e-6 * control[LARGEST_STEP]
+    return 0.01 * (size / rate) ** 0.5
+
+
+@entry(
+    INT(
+        pointer_to(STEP), pointer_to(RATES), pointer_to(ACCEPT), pointer_to(ACCELERATE),
+        VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, VECTOR, INDICES, VECTOR,
+        VECTOR, VECTOR, VECTOR, MATRIX, *PROBLEM,
+    )
+)  # fmt: skip
+def march(
+    step, rates, accept, accelerate,
+    times, sample_q, sample_v, sample_a, sample_m, clock, control, place, tolerances,
+    y, y_rate, y_new, memory, ints, floats, work, pivots, settings, counts,
+):  # fmt: skip
+    """Advance until the last sample time, a failure, or the number of steps per call; says which."""
+    taken = 0
+    while True:
+        t, size = clock[TIME], pivots[SIZES, 1]
+        status = rates(accelerate, t, y[:size], y_rate[:size], ints, floats, work, pivots, settings, counts)
+        if status != OK:
+            return status
+        if not (all_finite(y[:size]) and all_finite(y_rate[:size])):
+            return NOT_FINITE
+        keep(t, ints, floats, work)
+        place[ROW] = worst_row(work)
+        if place[ROW] >= 0 and abs(work[ROWS][PHI, place[ROW]]) > control[VIOLATION]:
+            return VIOLATED
+        while place[SAMPLE] < times.shape[0] and t >= times[place[SAMPLE]]:
+            take_sample(place[SAMPLE], work, sample_q, sample_v, sample_a, sample_m)
+            place[SAMPLE] += 1
+        if place[SAMPLE] == times.shape[0]:
+            return DONE
+        if counts[STEPS] >= control[MOST_STEPS]:
+            return TOO_MANY_STEPS
+        if taken >= control[STEPS_PER_CALL]:
+            return PAUSED
+        if clock[NEXT_STEP] == 0.0:
+            clock[NEXT_STEP] = first_step(t, control, tolerances, y[:size], y_rate[:size])
+        status = advance(
+            step, rates, accept, accelerate, times[place[SAMPLE]], clock, control, tolerances,
+            y, y_rate, y_new, memory, ints, floats, work, pivots, settings, counts,
+        )  # fmt: skip
+        if status != OK:
+            return status
+        taken += 1
+
+
+@kernel
+def advance(
+    step, rates, accept, accelerate, target, clock, control, tolerances,
+    y, y_rate, y_new, memory, ints, floats, work, pivots, settings, counts,
+):  # fmt: skip
+    """One accepted step towards the target time, as many attempts as it takes."""
+    t, size, interval = clock[TIME], pivots[SIZES, 1], target - clock[TIME]
+    limit = largest_step(control, work)
+    suggested = min(clock[NEXT_STEP], limit)
+    while True:
+        if control[FIXED_STEP] > 0.0:
+            h = interval / max(1.0, -(-(interval / control[FIXED_STEP] - 1e-6) // 1.0))
+        else:
+            h = part_of(interval, suggested)
+        ratio = step(
+            rates, accelerate, t, h, y[:size], y_rate[:size], y_new[:size], memory, tolerances,
+            ints, floats, work, pivots, settings, counts,
+        )  # fmt: skip
+        now = target if h == interval else t + h
+        status = OK if ratio >= 0.0 else (int(-ratio) if ratio < 0.0 else NOT_FINITE)
+        if status == OK and ratio <= 1.0:
+            status = accept(now, y_new, ints, floats, work, pivots, settings, counts)
+            if status == OK or status == CHANGED:  # noqa: SIM109 - no containers in kernels
+                counts[STEPS] += 1
+                y[:] = y_new
+                clock[TIME] = now
+                factor = GROW if ratio == 0.0 else min(GROW, SAFETY * ratio ** (-1.0 / control[ORDER]))
+                clock[NEXT_STEP] = max(suggested, h * factor) if h < suggested else h * factor
+                return OK
+        counts[REJECTED] += 1
+        if control[FIXED_STEP] > 0.0:
+            return status
+        shrink = RETRY if status != OK else max(SHRINK, SAFETY * ratio ** (-1.0 / control[ORDER]))
+        suggested = h * shrink
+        if suggested < control[SMALLEST_STEP]:
+            return STEP_TOO_SMALL if status == OK else status

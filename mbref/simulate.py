@@ -1,0 +1,269 @@
+"""simulate: a scene by a method, sampled at given times; the one place where a failure becomes an Outcome."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from mbref import __version__, rotations
+from mbref.initial import Start, consistent_start, scene_length
+from mbref.march import (
+    DONE,
+    FIXED_STEP,
+    LARGEST_STEP,
+    LARGEST_TURN,
+    MOST_STEPS,
+    ORDER,
+    PAUSED,
+    ROW,
+    SAMPLE,
+    SMALLEST_STEP,
+    STEP_TOO_SMALL,
+    STEPS_PER_CALL,
+    TIME,
+    TOO_MANY_STEPS,
+    VIOLATED,
+    VIOLATION,
+    march,
+)
+from mbref.method import Method
+from mbref.model import Model
+from mbref.scene import Scene, SceneError
+from mbref.tables import (
+    COORDINATES,
+    EVALUATIONS,
+    FACTORISATIONS,
+    NEWTON,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    PHI,
+    REJECTED,
+    ROWS,
+    SINGULAR,
+    SIZES,
+    STATE,
+    STEPS,
+    VELOCITIES,
+)
+from mbref.trajectory import Cost, Outcome, Trajectory
+
+CALL = 5_000  # steps between returns to Python, where an interrupt is heard and progress is told
+
+OUTCOMES = {
+    DONE: Outcome.COMPLETED,
+    SINGULAR: Outcome.SINGULAR_MATRIX,
+    NOT_CONVERGED: Outcome.NOT_CONVERGED,
+    NOT_FINITE: Outcome.NOT_FINITE,
+    VIOLATED: Outcome.VIOLATION,
+    STEP_TOO_SMALL: Outcome.STEP_FAILED,
+    TOO_MANY_STEPS: Outcome.STEP_FAILED,
+}
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Numbers of a run that belong to no part of the method."""
+
+    rtol: float = 1e-9  # local error per step, relative …
+    atol: float | None = None  # … and absolute (SI units); None means as rtol
+    rank_tolerance: float = 1e-10  # relative; a singular value or pivot below it counts as zero
+    violation: float = 3e-3  # largest |Φ| tolerated (m or rad), times the scene's length where over 1 m
+    smallest_step: float = 0.0  # s; 0 means a million-millionth of the duration
+    largest_step: float = 0.0  # s; 0 means the duration
+    largest_turn: float = 1.0  # rad that the fastest body may turn in an adaptive step
+    most_steps: int = 5_000_000
+
+
+def simulate(
+    scene: Scene,
+    method: Method | str,
+    times: Sequence[float] | np.ndarray,
+    limits: Limits | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Trajectory:
+    """Simulate from t = 0 and sample at ``times`` (k,), increasing, s; ``progress`` is told the time reached.
+
+    Returns the states reached, with accelerations and reactions; a failure of the method is the
+    trajectory's outcome.  Raises SceneError for a scene that cannot be simulated, ValueError for times
+    that do not increase, MethodError for an unknown method name.
+    """
+    method = Method.parse(method) if isinstance(method, str) else method
+    limits = limits or Limits()
+    times = checked_times(times)
+    began = time.process_time()
+    run = _Run(scene, method, times, limits)
+    built = time.process_time() - began
+    status, seconds = run.march(progress)
+    return run.trajectory(status, seconds, built)
+
+
+def checked_times(times: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Sample times as an array (k,); ValueError unless finite, not negative and increasing."""
+    array = np.ascontiguousarray(times, dtype=float)
+    if array.ndim != 1 or not array.size:
+        raise ValueError("times: needs at least one sample time")
+    if not np.isfinite(array).all() or array[0] < 0 or np.any(np.diff(array) <= 0):
+        raise ValueError("times: must be finite, not negative and increasing")
+    return array
+
+
+def missing_masses(scene: Scene) -> list[str]:
+    """One fault per body without mass, for a dynamic analysis."""
+    return [
+        f"body[{b}].mass: {body.name!r} has no mass and inertia, which a dynamic analysis needs"
+        for b, body in enumerate(scene.body)
+        if body.mass is None
+    ]
+
+
+class _Run:
+    """One simulation: the arrays that ``march`` works on, and what they mean afterwards."""
+
+    def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
+        self.scene, self.method, self.times, self.limits = scene, method, times, limits
+        self.model = model = Model(scene)
+        if model.kinematic and scene.counts().degrees_of_freedom > 0:
+            raise SceneError(missing_masses(scene))
+        self.start = consistent_start(model)
+        formulation, stabilisation, integrator = method.parts
+        self.work = model.workspace(formulation.scratch(model.m, model.n))
+        self.pivots = np.zeros((5, 2 * (model.m + 7 * model.nb)), dtype=np.int64)
+        self.counts = np.zeros(5, dtype=np.int64)
+        self.problem = (
+            model.ints, model.floats, self.work, self.pivots,
+            method.settings(limits.rank_tolerance), self.counts,
+        )  # fmt: skip
+        self.kernels = tuple(
+            k.pointer
+            for k in (integrator.step, stabilisation.rates, stabilisation.accept, formulation.accelerate)
+        )
+        march.prepare()  # so that the run alone is timed
+        self.clock = np.zeros(2)
+        self.place = np.zeros(2, dtype=np.int64)
+        self.control = self._control()
+        self._enter(stabilisation, self.start)
+        self._allocate(integrator.rows)
+
+    def _control(self) -> np.ndarray:
+        limits, integrator = self.limits, self.method.integrator
+        span = float(self.times[-1]) or 1.0
+        control = np.zeros(8)
+        control[ORDER] = integrator.order
+        control[FIXED_STEP] = 0.0 if integrator.adaptive else self.method.options_of(integrator)["step"]
+        control[SMALLEST_STEP] = limits.smallest_step or 1e-12 * span
+        control[LARGEST_STEP] = limits.largest_step or span
+        control[LARGEST_TURN] = limits.largest_turn
+        control[VIOLATION] = limits.violation * max(1.0, scene_length(self.model))
+        control[MOST_STEPS] = limits.most_steps
+        control[STEPS_PER_CALL] = CALL
+        return control
+
+    def _enter(self, stabilisation, start: Start) -> None:
+        state = self.work[STATE]
+        state[COORDINATES] = start.q
+        state[VELOCITIES, : start.v.size] = start.v
+        self.y = np.zeros(14 * self.model.nb)
+        self.pivots[SIZES, 1] = stabilisation.enter.callable(0.0, self.y, *self.problem)
+
+    def _allocate(self, rows: int) -> None:
+        k, nb, n, m = self.times.size, self.model.nb, self.model.n, self.model.m
+        self.y_rate, self.y_new = np.zeros_like(self.y), np.zeros_like(self.y)
+        self.memory = np.zeros((rows, self.y.size))
+        self.samples = (np.zeros((k, 7 * nb)), np.zeros((k, n)), np.zeros((k, n)), np.zeros((k, m)))
+
+    def march(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
+        """Run to the end; the final status and the process CPU time of the stepping alone."""
+        atol = self.limits.rtol if self.limits.atol is None else self.limits.atol
+        tolerances = np.array([self.limits.rtol, atol])
+        arguments = (
+            *self.kernels, self.times, *self.samples, self.clock, self.control, self.place, tolerances,
+            self.y, self.y_rate, self.y_new, self.memory, *self.problem,
+        )  # fmt: skip
+        began, status = time.process_time(), PAUSED
+        while status == PAUSED:
+            status = march(*arguments)
+            if progress is not None:
+                progress(float(self.clock[TIME]))
+        return status, time.process_time() - began
+
+    def trajectory(self, status: int, seconds: float, built: float) -> Trajectory:
+        """The samples reached, in the scene's frames and units."""
+        model, reached, n_bodies = self.model, int(self.place[SAMPLE]), len(self.scene.body)
+        q, v, a, multipliers = (sample[:reached] for sample in self.samples)
+        nb = model.nb
+        q, v, a = q.reshape(reached, nb, 7), v.reshape(reached, nb, 6), a.reshape(reached, nb, 6)
+        p = q[..., 3:]
+        own = slice(0, n_bodies)
+        counts = self.counts
+        return Trajectory(
+            scene=self.scene.name,
+            engine="mbref",
+            version=__version__,
+            method=str(self.method),
+            settings=asdict(self.limits),
+            times=self.times[:reached],
+            bodies=tuple(body.name for body in self.scene.body),
+            position=q[:, own, :3],
+            orientation=rotations.multiply(p, rotations.conjugate(model.principal))[:, own],
+            velocity=v[:, own, :3],
+            angular_velocity=rotations.rotate(p, v[..., 3:])[:, own],
+            acceleration=a[:, own, :3],
+            angular_acceleration=rotations.rotate(p, a[..., 3:])[:, own],
+            reactions=self._reactions(q, v, multipliers),
+            outcome=OUTCOMES[status],
+            t_end=float(self.clock[TIME]),
+            message=self._message(status),
+            cost=Cost(
+                seconds,
+                built,
+                int(counts[STEPS]),
+                int(counts[REJECTED]),
+                int(counts[EVALUATIONS]),
+                int(counts[FACTORISATIONS]),
+                int(counts[NEWTON]),
+            ),  # fmt: skip
+        )
+
+    def _reactions(
+        self, q: np.ndarray, v: np.ndarray, multipliers: np.ndarray
+    ) -> dict[str, np.ndarray] | None:
+        """-Φ_qᵀ λ of each joint's rows on its second body, moved from the centre of mass to the anchor."""
+        if self.model.kinematic:
+            return None
+        reactions = {joint.name: np.zeros((len(q), 6)) for joint in self.scene.joint}
+        for k in range(len(q)):
+            jacobian = self.model.terms(self.times[k], q[k].ravel(), v[k].ravel()).jacobian
+            for joint in self.scene.joint:
+                reactions[joint.name][k] = self._reaction(joint, jacobian, q[k], multipliers[k])
+        return reactions
+
+    def _reaction(self, joint, jacobian: np.ndarray, q: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+        rows = [row for row, name in enumerate(self.model.row_joint) if name == joint.name]
+        first, second = (self.model.index(name) for name in joint.bodies)
+        b, sign = (second, 1.0) if second < self.model.nb else (first, -1.0)
+        generalised = -sign * jacobian[rows, 6 * b : 6 * b + 6].T @ multipliers[rows]
+        force, moment = generalised[:3], rotations.rotate(q[b, 3:], generalised[3:])
+        anchor = self.model.anchor(joint, q)
+        return np.concatenate([force, moment - np.cross(anchor - q[b, :3], force)])
+
+    def _message(self, status: int) -> str:
+        """One sentence: what ended the run, where; or what was corrected at its start."""
+        if status == DONE:
+            return self.start.report()
+        t = self.clock[TIME]
+        if status == VIOLATED:
+            row = int(self.place[ROW])
+            size = abs(self.work[ROWS][PHI, row])
+            return (
+                f"joint {self.model.row_joint[row]!r} is violated by {size:.3g}, more than "
+                f"{self.control[VIOLATION]:.3g}, at t = {t:.6g} s"
+            )
+        if status == TOO_MANY_STEPS:
+            return f"{self.limits.most_steps} steps were taken without reaching the end, at t = {t:.6g} s"
+        if status == STEP_TOO_SMALL:
+            h = self.control[SMALLEST_STEP]
+            return f"the error estimate asks for a step below {h:.3g} s at t = {t:.6g} s"
+        return f"{OUTCOMES[status].sentence} at t = {t:.6g} s ({self.method.formulation.name})"

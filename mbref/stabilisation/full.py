@@ -1,0 +1,67 @@
+"""The chart of all coordinates: y = (r, Euler parameters of every body; r', ω' of every body)."""
+
+from __future__ import annotations
+
+from numpy import sqrt
+
+from mbref.compiled import exchangeable, kernel
+from mbref.evaluation import accelerations, coordinate_rates
+from mbref.tables import (
+    ACCELERATION,
+    ACCEPT,
+    COLUMNS,
+    COORDINATE_RATES,
+    COORDINATES,
+    ENTER,
+    OK,
+    RATES,
+    STATE,
+    VELOCITIES,
+)
+
+
+@exchangeable(ENTER)
+def enter(t, y, ints, floats, work, pivots, settings, counts):
+    state = work[STATE]
+    nq = state.shape[1]
+    nv = 6 * (nq // 7)
+    for k in range(nq):
+        y[k] = state[COORDINATES, k]
+    for k in range(nv):
+        y[nq + k] = state[VELOCITIES, k]
+    return nq + nv
+
+
+@exchangeable(RATES)
+def rates(accelerate, t, y, y_rate, ints, floats, work, pivots, settings, counts):
+    state, acceleration = work[STATE], work[COLUMNS][ACCELERATION]
+    nq = state.shape[1]
+    nv = acceleration.shape[0]
+    q, v = y[:nq], y[nq : nq + nv]
+    status = accelerations(accelerate, t, q, v, ints, floats, work, pivots, settings, counts)
+    coordinate_rates(q, v, y_rate)
+    for k in range(nv):
+        y_rate[nq + k] = acceleration[k]
+        state[VELOCITIES, k] = v[k]
+    for k in range(nq):
+        state[COORDINATES, k] = q[k]
+        state[COORDINATE_RATES, k] = y_rate[k]
+    return status
+
+
+@kernel
+def normalise(q):
+    """Euler parameters of every body back to unit length."""
+    for b in range(q.shape[0] // 7):
+        square = 0.0
+        for k in range(3, 7):
+            square += q[7 * b + k] * q[7 * b + k]
+        inverse = 1.0 / sqrt(square)
+        for k in range(3, 7):
+            q[7 * b + k] *= inverse
+
+
+@exchangeable(ACCEPT)
+def accept(t, y, ints, floats, work, pivots, settings, counts):
+    normalise(y[: work[STATE].shape[1]])
+    return OK
