@@ -1,0 +1,126 @@
+"""Slider-crank in a plane: crank on a revolute, connecting rod, slider on a straight line.
+
+With θ the crank's and φ the rod's angle from the line, a and b their lengths, h the line's offset from
+the crank's axis: b sin φ = h - a sin θ and x = a cos θ + b cos φ.  When a = b and h = 0 the branch that
+passes the singular positions θ = ±π/2 smoothly is φ = -θ, or φ = π + θ with the slider at rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.loads import initial_rotations
+from crosscheck.truth.parallelogram import pivots_of, turning_driver, unit
+from crosscheck.truth.path import ON_PATH, Path, Pose, circle, turned
+from mbref.scene import GROUND, Joint, Scene
+
+EQUAL = 1e-12  # relative difference of crank and rod up to which they are the same length
+
+
+@dataclass(frozen=True)
+class Lengths:
+    """Crank a, rod b, offset h of the line (m), and the initial angles of crank and rod (rad)."""
+
+    a: float
+    b: float
+    h: float
+    theta0: float
+    phi0: float
+
+    def equal(self) -> bool:
+        """Whether the linkage has singular positions it can pass smoothly."""
+        return abs(self.a - self.b) <= EQUAL * self.b and abs(self.h) <= EQUAL * self.b
+
+    def turns_fully(self) -> bool:
+        """Whether the crank meets no dead point."""
+        return self.equal() or self.a + abs(self.h) < self.b
+
+    def rod(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """φ and its first and second derivative by θ."""
+        if self.equal():
+            folded = np.cos(self.phi0 - self.theta0 - np.pi) > np.cos(self.phi0 + self.theta0) + ON_PATH
+            slope = 1.0 if folded else -1.0
+            return self.phi0 + slope * (theta - self.theta0), slope + 0 * theta, 0 * theta
+        sine = (self.h - self.a * np.sin(theta)) / self.b
+        side = np.sign(np.cos(self.phi0))
+        cosine = side * np.sqrt(1 - sine**2)
+        phi = np.arcsin(sine) if side > 0 else np.pi - np.arcsin(sine)
+        slope = -self.a * np.cos(theta) / (self.b * cosine)
+        return phi, slope, (self.a * np.sin(theta) / self.b + sine * slope**2) / cosine
+
+
+def planar_slider_crank(scene: Scene) -> Path | None:
+    """The path of a scene that looks like the family, or None."""
+    parts = parts_of(scene, "revolute")
+    if parts is None:
+        return None
+    crank, rod, slider, pivot, pin, end, guide = parts
+    axis, line = unit(pivot.axis), unit(guide.axis)
+    across = np.cross(axis, line)
+    if abs(axis @ line) > EQUAL:
+        return None
+    centre, b0, c0 = (np.array(joint.anchor) for joint in (pivot, pin, end))
+    arm, reach = b0 - centre, c0 - b0
+    a, b = np.hypot(arm @ line, arm @ across), np.hypot(reach @ line, reach @ across)
+    theta0, phi0 = np.arctan2(arm @ across, arm @ line), np.arctan2(reach @ across, reach @ line)
+    lengths = Lengths(a, b, (c0 - centre) @ across, theta0, phi0)
+    if min(a, b) == 0 or not lengths.turns_fully():
+        return None
+    rotation0 = initial_rotations(scene)
+    position0 = np.array([body.position for body in scene.body])
+    start = float(lengths.rod(np.array([theta0]))[0][0])
+
+    def poses(q: np.ndarray) -> Pose:
+        phi, slope, bend = lengths.rod(theta0 + q)
+        turn = phi - start
+        zero, one = 0 * q, 1 + 0 * q
+        turns = {crank: (q, one, zero), rod: (turn, slope, bend), slider: (zero, zero, zero)}
+        pin_path = circle(axis, q, arm)
+        rod_path = _chained(circle(axis, turn, reach), slope, bend)
+        slider_path = [line * ((p + r) @ line)[:, None] for p, r in zip(pin_path, rod_path, strict=True)]
+        slider_path[0] = slider_path[0] - line * ((arm + reach) @ line) + position0[slider]
+        centre_path = _chained(circle(axis, turn, position0[rod] - b0), slope, bend)
+        crank_path = circle(axis, q, position0[crank] - centre)
+        paths = {
+            crank: (centre + crank_path[0], *crank_path[1:]),
+            rod: (centre + pin_path[0] + centre_path[0], *(pin_path[i] + centre_path[i] for i in (1, 2))),
+            slider: tuple(slider_path),
+        }
+        order = sorted(paths)
+        position, dposition, ddposition = (np.stack([paths[i][n] for i in order], axis=1) for n in range(3))
+        angle, spin, dspin = (np.stack([turns[i][n] for i in order], axis=1) for n in range(3))
+        rotation = np.stack([turned(axis, angle[:, i]) @ rotation0[i] for i in order], axis=1)
+        spins = (rate[..., None] * axis for rate in (spin, dspin))
+        return Pose(position, rotation, angle, dposition, ddposition, *spins)
+
+    with_q = np.array([{crank: 1.0, rod: np.nan, slider: 0.0}[i] for i in range(3)])
+    return Path("planar_slider_crank", poses, axis, turning_driver(scene, axis, with_q))
+
+
+def parts_of(
+    scene: Scene, pin_type: str
+) -> tuple[int, int, int, Joint, Joint, Joint, Joint] | None:  # fmt: skip
+    """(crank, rod, slider, pivot, pin, end, guide) of three bodies in a chain from ground to ground: body
+    indices, then the joints on the way, pivot revolute, pin of the type asked for, guide translational."""
+    if len(scene.body) != 3 or len(scene.joint) != 4:
+        return None
+    pivots = pivots_of(scene)
+    guides = {n: j for j in scene.joint if j.type == "translational" and GROUND in j.bodies for n in j.bodies}
+    guides.pop(GROUND, None)
+    if len(pivots) != 1 or len(guides) != 1 or pivots.keys() & guides.keys():
+        return None
+    (crank, pivot), (slider, guide) = *pivots.items(), *guides.items()
+    rod = next(body.name for body in scene.body if body.name not in (crank, slider))
+    pins = [j for j in scene.joint if set(j.bodies) == {crank, rod} and j.type == pin_type]
+    ends = [j for j in scene.joint if set(j.bodies) == {rod, slider} and j.type != "distance"]
+    if len(pins) != 1 or len(ends) != 1:
+        return None
+    return (*(scene.body_index(n) for n in (crank, rod, slider)), pivot, pins[0], ends[0], guide)
+
+
+def _chained(path: tuple[np.ndarray, ...], slope: np.ndarray, bend: np.ndarray) -> tuple[np.ndarray, ...]:
+    """A path given by an angle, with derivatives by q instead, the angle's derivatives being given."""
+    value, first, second = path
+    return value, first * slope[:, None], second * slope[:, None] ** 2 + first * bend[:, None]
