@@ -97,7 +97,7 @@ class Exchangeable:
     def _say_compiling(self) -> None:
         module = self.function.__module__.rpartition(".")[2]
         if not any(CACHE.rglob(f"{module}.{self.function.__name__}-*.nbi")):
-            announce(f"mbref: compiling {module}.{self.function.__name__} for this machine, once")
+            _announce_once()
 
 
 class Entry(Exchangeable):
@@ -125,6 +125,8 @@ def pointer_to(signature: types.Type) -> types.Type:
     return types.FunctionType(signature)
 
 
-def announce(message: str) -> None:
-    """Tell the user on stderr; standard output belongs to results."""
+@functools.cache
+def _announce_once() -> None:
+    """Tell the user on stderr why the first run takes long; standard output belongs to results."""
+    message = "mbref: compiling kernels for this machine; this happens once and takes about 20 s"
     print(message, file=sys.stderr, flush=True)

@@ -224,7 +224,7 @@ class _Run:
                 int(counts[EVALUATIONS]),
                 int(counts[FACTORISATIONS]),
                 int(counts[NEWTON]),
-            ),  # fmt: skip
+            ),
         )
 
     def _reactions(

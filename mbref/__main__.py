@@ -1,0 +1,7 @@
+"""python -m mbref"""
+
+import sys
+
+from mbref.cli import main
+
+sys.exit(main())

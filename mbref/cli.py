@@ -1,0 +1,187 @@
+"""The command line of mbref: run a scene, or say what it is."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+
+from mbref.method import DEFAULT, Method, MethodError
+from mbref.scene import Scene, SceneError
+from mbref.scenes import SCENES, find_scene
+
+BAD_INPUT, INCOMPLETE, INTERRUPTED = 2, 1, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; the exit status: 0 completed, 1 ended otherwise, 2 bad input."""
+    options = _parser().parse_args(arguments)
+    try:
+        return options.action(options)
+    except SceneError as error:
+        return _refuse(error.faults)
+    except (MethodError, ValueError) as error:
+        return _refuse([str(error)])
+    except KeyboardInterrupt:
+        print("mbref: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:  # the reader of our output has gone, as `head` does
+        sys.stdout = None
+        return INCOMPLETE
+
+
+def _refuse(faults: Sequence[str]) -> int:
+    for fault in faults:
+        print(fault, file=sys.stderr)
+    return BAD_INPUT
+
+
+def _parser() -> argparse.ArgumentParser:
+    text = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(
+        prog="mbref",
+        formatter_class=text,
+        description="Reference implementation of the constraint-handling methods of multibody dynamics.",
+        epilog="examples:\n  mbref run planar_slider_crank\n  mbref diagnose five_bar\n  mbref run --help",
+    )
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    scene_help = "a built-in name or a .toml file; built in: " + ", ".join(SCENES)
+
+    run = commands.add_parser(
+        "run", help="simulate a scene by one method", formatter_class=text,
+        description="Simulate a scene by one method: formulation+stabilisation/integrator.",
+        epilog="examples:\n"
+        "  mbref run planar_slider_crank --method mpi-svd+projection --times 0.1,0.2,0.4 --rtol 1e-11\n"
+        "  mbref run four_bar --method mpi-svd+partitioning --duration 0.02 --json\n"
+        "  mbref run mechanism.toml --method lm1+baumgarte[alpha=10,beta=10]/rk4[step=1e-4]",
+    )  # fmt: skip
+    run.add_argument("scene", metavar="SCENE", help=scene_help)
+    run.add_argument("--method", default=DEFAULT, help=f"default {DEFAULT}")
+    add_time_options(run)
+    run.add_argument("--rtol", type=float, default=1e-9, help="relative tolerance per step (default 1e-9)")
+    run.add_argument("--max-step", type=float, default=0.0, help="largest step, s (default: the duration)")
+    run.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    run.set_defaults(action=_run)
+
+    diagnose = commands.add_parser(
+        "diagnose", help="say what a scene is: counts, rank, redundant rows", formatter_class=text,
+        description="Coordinates, rows by joint, rank, redundant rows, degrees of freedom at t = 0.",
+        epilog="examples:\n  mbref diagnose five_bar\n  mbref diagnose mechanism.toml --json",
+    )  # fmt: skip
+    diagnose.add_argument("scene", metavar="SCENE", help=scene_help)
+    diagnose.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    diagnose.set_defaults(action=_diagnose)
+    return parser
+
+
+def add_time_options(parser: argparse.ArgumentParser) -> None:
+    """--times, or --samples over --duration."""
+    when = parser.add_mutually_exclusive_group()
+    when.add_argument("--times", help="sample times in s, increasing, e.g. 0.1,0.2,0.4")
+    when.add_argument("--samples", type=int, help="this many equally spaced times from 0 to the duration")
+    parser.add_argument("--duration", type=float, help="end time in s (default: the scene's)")
+
+
+def sample_times(options: argparse.Namespace, scene: Scene) -> np.ndarray:
+    """The sample times the options ask for; ValueError names the option that is wrong."""
+    duration = scene.duration if options.duration is None else options.duration
+    if not 0 < duration < np.inf:
+        raise ValueError(f"--duration: must be positive, got {duration:g}")
+    if options.times is None:
+        samples = 101 if options.samples is None else options.samples
+        if samples < 2:
+            raise ValueError(f"--samples: must be at least 2, got {samples}")
+        return np.linspace(0.0, duration, samples)
+    try:
+        times = np.array([float(word) for word in options.times.split(",")])
+    except ValueError:
+        raise ValueError(f"--times: must be numbers separated by commas, got {options.times!r}") from None
+    if not np.isfinite(times).all() or times[0] < 0 or np.any(np.diff(times) <= 0):
+        raise ValueError(f"--times: must be finite, not negative and increasing, got {options.times}")
+    return times if options.duration is None else times[times <= duration]
+
+
+def _run(options: argparse.Namespace) -> int:
+    scene = find_scene(options.scene)
+    method, times = Method.parse(options.method), sample_times(options, scene)
+    if not 0 < options.rtol < 1:
+        raise ValueError(f"--rtol: must be between 0 and 1, got {options.rtol:g}")
+    if options.max_step < 0:
+        raise ValueError(f"--max-step: must not be negative, got {options.max_step:g}")
+    from mbref.simulate import Limits, simulate
+
+    limits = Limits(rtol=options.rtol, largest_step=options.max_step)
+    with _progress_bar(float(times[-1])) as progress:
+        trajectory = simulate(scene, method, times, limits, progress)
+    if options.json:
+        print(json.dumps({"scene": scene.name, "records": [trajectory.to_record()]}))
+    else:
+        _show(scene, trajectory)
+    return 0 if trajectory.outcome.name == "COMPLETED" else INCOMPLETE
+
+
+@contextmanager
+def _progress_bar(end: float) -> Iterator:
+    """Tells the time reached on stderr, where that is a terminal; appears only on long runs."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("simulating", total=end)
+        yield lambda t: bar.update(task, completed=t)
+
+
+def _show(scene: Scene, trajectory) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console, cost = Console(), trajectory.cost
+    ended = trajectory.outcome
+    console.print(f"[bold]{scene.name}[/] by {trajectory.method}: {ended.name} at t = {trajectory.t_end:g} s")
+    if trajectory.message:
+        console.print(trajectory.message)
+    console.print(
+        f"{cost.steps} steps, {cost.rejected} rejected, {cost.rhs} evaluations, "
+        f"{cost.factorisations} factorisations, {cost.newton} Newton iterations\n"
+        f"{cost.seconds:.3g} s of stepping, {cost.build_seconds:.2g} s of building"
+    )
+    if not trajectory.times.size:
+        return
+    table = Table(title=f"state at t = {trajectory.times[-1]:g} s")
+    table.add_column("body")
+    for heading in ("position, m", "velocity, m/s", "angular velocity, rad/s"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for b, name in enumerate(trajectory.bodies):
+        arrays = trajectory.position, trajectory.velocity, trajectory.angular_velocity
+        table.add_row(name, *(" ".join(f"{x:.5g}" for x in _rounded(array[-1, b])) for array in arrays))
+    console.print(table)
+
+
+def _rounded(vector: np.ndarray) -> np.ndarray:
+    """Without the rounding errors of zeros, for reading."""
+    return np.round(vector, 12) + 0.0
+
+
+def _diagnose(options: argparse.Namespace) -> int:
+    from dataclasses import asdict
+
+    scene = find_scene(options.scene)
+    counts = scene.counts()
+    if options.json:
+        print(json.dumps({"scene": scene.name, "ground": scene.ground, **asdict(counts)}))
+        return 0
+    rows = ", ".join(f"{name} {number}" for name, number in counts.rows_by_joint.items())
+    print(
+        f"{scene.name} (ground as a {scene.ground})\n"
+        f"  coordinates         {counts.coordinates}\n"
+        f"  constraint rows     {counts.rows}   ({rows})\n"
+        f"  rank                {counts.rank}\n"
+        f"  redundant rows      {counts.redundant}\n"
+        f"  degrees of freedom  {counts.degrees_of_freedom}"
+    )
+    return 0

@@ -1,0 +1,61 @@
+"""Φ_q, ν and γ of every joint against differences of Φ and of Φ_q v along exact motions."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mbref.initial import displaced
+from mbref.model import Model
+from mbref.scene import Cylindrical, Distance, Fixed, Revolute, Spherical, Translational, Universal
+from tests.strategies import DRIVABLE, one_joint_scenes, states
+
+KINDS = [Fixed, Revolute, Universal, Spherical, Translational, Cylindrical, Distance]
+CASES = [(kind, False) for kind in KINDS] + [(kind, True) for kind in DRIVABLE]
+STEP = 0.005
+STENCIL = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280]) / STEP  # order 8: truncation below 1e-15 here
+TOLERANCE = 2e-11  # rounding of 1e-16 over STEP, times the size of the terms, with a hundredfold margin
+
+
+def derivative(function):
+    """d/ds at s = 0 by the central difference of order 8."""
+    pairs = [(function(k * STEP) - function(-k * STEP)) for k in (1, 2, 3, 4)]
+    return np.tensordot(STENCIL, np.array(pairs), axes=1)
+
+
+def agree(measured, expected, what):
+    scale = max(1.0, np.max(np.abs(expected), initial=0.0))
+    error = np.max(np.abs(measured - expected), initial=0.0) / scale
+    assert error < TOLERANCE, f"{what}: differ by {error:.2e} of {scale:.2e}\n{measured}\n{expected}"
+
+
+@pytest.mark.parametrize(("kind", "driven"), CASES)
+@given(data=st.data())
+def test_jacobian_and_difference_of_phi(kind, driven, data):
+    model = Model(data.draw(one_joint_scenes(kind, driven), label="scene"))
+    t, q, v = data.draw(states(model.nb), label="state")
+    difference = derivative(lambda s: model.terms(t, displaced(q, s * v), v).phi)
+    agree(model.terms(t, q, v).jacobian @ v, difference, f"{kind.__name__}: Φ_q v and the difference of Φ")
+
+
+@pytest.mark.parametrize(("kind", "driven"), CASES)
+@given(data=st.data())
+def test_nu_and_rate_of_phi(kind, driven, data):
+    model = Model(data.draw(one_joint_scenes(kind, driven), label="scene"))
+    t, q, v = data.draw(states(model.nb), label="state")
+    terms = model.terms(t, q, v)
+    rate = derivative(lambda s: model.terms(t + s, displaced(q, s * v), v).phi)
+    agree(terms.jacobian @ v - terms.nu, rate, f"{kind.__name__}: Φ_q v - ν and dΦ/dt")
+
+
+@pytest.mark.parametrize(("kind", "driven"), CASES)
+@given(data=st.data())
+def test_gamma_and_rate_of_velocity_equations(kind, driven, data):
+    model = Model(data.draw(one_joint_scenes(kind, driven), label="scene"))
+    t, q, v = data.draw(states(model.nb), label="state")
+
+    def velocity_equations(s):
+        terms = model.terms(t + s, displaced(q, s * v), v)  # constant r' and body-fixed ω': q̈ = 0
+        return terms.jacobian @ v - terms.nu
+
+    agree(model.terms(t, q, v).gamma, -derivative(velocity_equations), f"{kind.__name__}: γ")
