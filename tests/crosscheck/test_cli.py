@@ -1,0 +1,268 @@
+"""Command line: what is asked for / exit status, standard output and standard error."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from crosscheck import cli, request, study
+from crosscheck.cli import main
+from crosscheck.compare import PUBLIC, timed
+from crosscheck.isolate import ChildFailed
+from mbref.scene import Body, Moment, Scene
+from mbref.scenes import SCENES
+from mbref.trajectory import Cost, Outcome
+
+FAKE = "fake_engines:FAKE"
+COST = {"seconds", "build_seconds", "steps", "rejected", "rhs", "factorisations", "newton"}
+
+
+@pytest.fixture(autouse=True)
+def _fakes_importable(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+
+
+@pytest.fixture
+def still(tmp_path: Path) -> str:
+    return saved(tmp_path, "still")
+
+
+def saved(folder: Path, name: str, **changes: object) -> str:
+    block = Body(name="block", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(1.0, 2.0, 3.0))
+    path = folder / f"{name}.toml"
+    Scene(name=name, body=(block,), duration=0.5, **changes).save(path)
+    return str(path)
+
+
+def run_main(capsys: pytest.CaptureFixture, *argv: str) -> tuple[int, str, str]:
+    """Exit status, standard output and standard error of a command line."""
+    try:
+        status = main(argv)
+    except SystemExit as stop:  # argparse's own way out
+        status = int(stop.code or 0)
+    printed = capsys.readouterr()
+    assert "Traceback" not in printed.err, printed.err
+    return status, printed.out, printed.err
+
+
+def test_json_and_the_design_s_schema(capsys, still):
+    asked = ("--engine", FAKE, "--setting", "plain", "--times", "0,0.1,0.3", "--json")
+    status, out, _ = run_main(capsys, "run", still, *asked)
+    document = json.loads(out)
+    assert status == 0, (status, document)
+    assert set(document) == {"scene", "records"} and document["scene"] == "still", document
+    assert len(document["records"]) == 2, [r["settings"] for r in document["records"]]
+    for record, seconds in zip(document["records"], (0.1, 0.2), strict=True):
+        assert tuple(record) == PUBLIC, (tuple(record), PUBLIC)
+        assert set(record["cost"]) == COST, record["cost"]
+        assert record["cost"]["seconds"] == seconds == record["settings"]["seconds"], record
+        assert (record["engine"], record["version"], record["method"]) == ("fake", "1.2.3", "plain"), record
+        assert record["times"] == [0.0, 0.1, 0.3] and record["t_end"] == 0.3, record["times"]
+        assert record["bodies"]["block"]["position"] == [[1.0, 2.0, 3.0]] * 3, record["bodies"]
+        assert record["bodies"]["block"]["orientation"] == [[1.0, 0.0, 0.0, 0.0]] * 3, record["bodies"]
+        assert record["metrics"], "no metric"
+
+
+def test_json_of_several_scenes_and_a_list_in_the_order_asked(capsys, tmp_path):
+    paths = [saved(tmp_path, "b"), saved(tmp_path, "a")]
+    status, out, _ = run_main(capsys, "run", *paths, "--engine", FAKE, "--samples", "3", "--json")
+    documents = json.loads(out)
+    assert status == 0
+    assert [d["scene"] for d in documents] == ["b", "a"], [d["scene"] for d in documents]
+    assert [[r["method"] for r in d["records"]] for d in documents] == [["plain", "plain", "noisy"]] * 2
+    assert documents[0]["records"][0]["times"] == [0.0, 0.25, 0.5], documents[0]["records"][0]["times"]
+
+
+def test_run_without_json_and_a_table_of_every_setting(capsys, still):
+    status, out, _ = run_main(capsys, "run", still, "--engine", FAKE)
+    assert status == 0
+    for word in ("still", "plain", "noisy", "completed", "0.5"):
+        assert word in out, (word, out)
+
+
+def test_a_run_that_crashes_and_exit_status_one(capsys, still):
+    asked = ("--engine", "fake_engines:SEGFAULT", "--setting", "noisy", "--json")
+    status, out, err = run_main(capsys, "run", still, *asked)
+    [record] = json.loads(out)["records"]
+    assert status == 1, (status, err)
+    assert record["outcome"] == "CRASHED" and "SIGSEGV" in record["message"], record
+    assert record["times"] == [] and record["bodies"]["block"]["position"] == [], record
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (["--times", "0,0.2,0.1"], "--times: must increase, got 0.1 after 0.2"),
+        (["--times=-1,0.2"], "--times: must be finite and not negative, got -1"),
+        (["--times", "0"], "--times: must have a time after 0"),
+        (["--times", "0,nan"], "--times: must be finite and not negative, got nan"),
+        (["--times", "0,1", "--duration", "2"], "--samples and --duration cannot be added"),
+        (["--times", "0,x"], "must be numbers separated by commas, got '0,x'"),
+        (["--samples", "1"], "--samples: must be at least 2, got 1"),
+        (["--duration", "-2"], "--duration: must be positive, got -2"),
+        (["--duration", "inf"], "--duration: must be positive, got inf"),
+        (["--rtol", "0"], "--rtol: must be positive, got 0"),
+        (["--time-limit", "0"], "--time-limit: must be positive, got 0"),
+        (["--setting", "gentle"], "unknown method or setting 'gentle'; known: plain, noisy"),
+        (["--engine", "bullet"], "unknown engine 'bullet'; known: mbref, mujoco, pinocchio, exudyn"),
+        (["--engine", "no_such_module:ENGINE"], "engine 'no_such_module:ENGINE' cannot be loaded"),
+    ],
+)  # fmt: skip
+def test_bad_options_and_one_sentence(capsys, still, options, sentence):
+    status, out, err = run_main(capsys, "run", still, "--engine", FAKE, "--json", *options)
+    assert status == 2, (status, err)
+    assert out == "", out
+    assert sentence in err, (sentence, err)
+
+
+def test_faulty_scene_file_and_one_line_a_fault(capsys, tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_text(
+        'name = "bad"\ngravity = [0, 0]\n[[body]]\nname = "a"\nmass = -1.0\nposition = [0, 0, 0]\n'
+    )
+    status, out, err = run_main(capsys, "run", str(path), "--json")
+    lines = err.strip().split("\n")
+    assert (status, out) == (2, ""), (status, out)
+    assert any(line.startswith("body[0].mass: ") for line in lines), lines
+    assert any(line.startswith("gravity") for line in lines), lines
+
+
+def test_scene_of_no_name_and_the_known_ones(capsys):
+    status, _, err = run_main(capsys, "run", "no_such_scene", "--engine", FAKE)
+    assert status == 2 and "unknown scene 'no_such_scene'" in err and "four_bar" in err, err
+
+
+def test_scene_asked_twice_is_a_fault(capsys, still):
+    status, _, err = run_main(capsys, "run", still, still, "--engine", FAKE)
+    assert status == 2 and "scene 'still' is asked for twice" in err, err
+
+
+def test_a_scene_an_engine_cannot_run_and_the_reason(capsys, tmp_path):
+    loaded = saved(tmp_path, "loaded", load=(Moment(body="block", moment=(1.0, 0.0, 0.0)),))
+    status, out, err = run_main(capsys, "run", loaded, saved(tmp_path, "free"), "--engine", FAKE, "--json")
+    assert status == 0, (status, err)
+    assert "cannot run loaded: this fake has no loads" in err, err
+    assert json.loads(out)["scene"] == "free", out
+    status, out, err = run_main(capsys, "run", loaded, "--engine", FAKE)
+    assert (status, out) == (2, "") and "cannot run loaded: this fake has no loads" in err, err
+
+
+def test_missing_package_and_what_to_install(capsys, still):
+    missing = "fake_engines:MISSING"
+    sentence = f"{missing}: the package fake-package is not installed: pip install fake-package"
+    status, out, err = run_main(capsys, "run", still, "--engine", missing)
+    assert (status, out, err.strip()) == (2, "", sentence), err
+    status, _, err = run_main(capsys, "run", still, "--engine", missing, "--engine", FAKE)
+    assert status == 0 and sentence in err, (status, err)
+
+
+def test_missing_engine_of_ours_and_the_extra(monkeypatch):
+    class Absent:
+        package = "mujoco"
+
+        def version(self):
+            raise ImportError("No module named 'mujoco'")
+
+    monkeypatch.setattr(request, "engine", lambda name: Absent())
+    assert request.missing_package("mujoco").endswith("pip install 'mbref[engines]'")
+
+
+def test_tolerance_and_one_run_of_a_family_that_has_one(still):
+    scene = Scene.from_file(still)
+    sweep = (("a", {"rtol": 1e-3}), ("a", {"rtol": 1e-6}), ("b", {"step": 0.1}))
+    cases = [study.Case(scene, [0, 1], "e", study.Setting(family, options)) for family, options in sweep]
+    chosen = request._at_tolerance(cases, 1e-5)
+    settings = [(c.setting.family, dict(c.setting.options)) for c in chosen]
+    assert settings == [("a", {"rtol": 1e-5}), ("b", {"step": 0.1})], settings
+
+
+def test_method_beyond_the_sweep_and_its_tolerances(capsys, still):
+    method = "lm1+baumgarte/rk4[step=0.1]"
+    asked = ("--engine", "mbref", "--method", method, "--rtol", "1e-6", "--samples", "2", "--json")
+    status, out, err = run_main(capsys, "run", still, *asked)
+    [record] = json.loads(out)["records"]
+    assert status == 0, err
+    assert (record["method"], record["settings"]["rtol"]) == (method, 1e-6), record
+
+
+def test_method_that_means_nothing_and_the_known_ones(capsys, still):
+    status, _, err = run_main(capsys, "run", still, "--engine", "mbref", "--method", "lm9+none")
+    assert status == 2 and "unknown method or setting 'lm9+none'; known: mpi-svd+projection" in err, err
+
+
+def test_interrupt_and_the_records_finished_before(capsys, still, monkeypatch):
+    def interrupted(cases, progress):
+        progress(1, len(cases), study.run_case(cases[1]))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "study", interrupted)
+    status, out, err = run_main(capsys, "run", still, "--engine", FAKE, "--json")
+    [record] = json.loads(out)["records"]
+    assert status == 130 and "interrupted" in err, (status, err)
+    assert record["settings"] == {"seconds": 0.2}, record
+
+
+@pytest.mark.parametrize("what", ["scenes", "engines", "methods", "metrics"])
+def test_list_and_the_tables(capsys, what):
+    from crosscheck.engine import engine_names
+    from crosscheck.metrics import METRICS
+    from mbref.formulations import FORMULATIONS
+
+    known = {"scenes": SCENES, "engines": engine_names(), "methods": FORMULATIONS, "metrics": METRICS}[what]
+    status, out, _ = run_main(capsys, "list", what)
+    squeezed = "".join(out.split())
+    assert status == 0
+    for name in known:
+        assert name in out or name in squeezed, (name, out)
+
+
+@pytest.mark.parametrize("command", ["list", "run", "compare", "report"])
+def test_help_and_an_example(capsys, command):
+    status, out, _ = run_main(capsys, command, "--help")
+    assert status == 0 and f"example: crosscheck {command}" in " ".join(out.split()), out
+
+
+def test_comparison_and_interleaved_times(capsys, still):
+    status, out, err = run_main(capsys, "compare", still, "--engine", FAKE, "--json")
+    costs = [record["cost"] for record in json.loads(out)["records"]]
+    assert status == 0, err
+    assert [(c["seconds"], c["median"], c["repeats"]) for c in costs] == [
+        (0.1, 0.1, 5), (0.2, 0.2, 5), (0.5, 0.5, 5)
+    ], costs  # fmt: skip
+
+
+def test_comparison_table_and_ratio_to_the_fastest(capsys, still):
+    status, out, _ = run_main(capsys, "compare", still, "--engine", FAKE)
+    assert status == 0
+    for word in ("ratio", "1.0", "2.0", "5.0", "fake plain"):
+        assert word in out, (word, out)
+
+
+def test_fewer_than_five_repeats_is_a_fault(capsys, still):
+    status, _, err = run_main(capsys, "compare", still, "--engine", FAKE, "--repeats", "2")
+    assert status == 2 and "--repeats: must be at least 5, got 2" in err, err
+
+
+def test_timing_that_fails_and_the_seconds_of_single_runs(still, monkeypatch):
+    def dies(*_):
+        raise ChildFailed(Outcome.CRASHED, "the process was ended by SIGSEGV")
+
+    monkeypatch.setattr("crosscheck.compare.time_interleaved", dies)
+    case = study.Case(Scene.from_file(still), [0, 1], FAKE, study.Setting("plain", {"seconds": 0.3}))
+    record = {"scene": "still", "outcome": "COMPLETED", "cost": {"seconds": 0.3}}
+    sentences: list[str] = []
+    assert timed([case], [record], 5, sentences.append) == [record]
+    assert len(sentences) == 1 and "SIGSEGV" in sentences[0], sentences
+
+
+def test_report_command_and_the_program_it_starts(monkeypatch):
+    started = []
+    monkeypatch.setattr(cli.subprocess, "call", lambda command: started.append(command) or 1)
+    assert main(["report", "--quick", "--out", "x", "--section", "speed"]) == 1
+    assert started[0][1:] == ["-m", "reports", "--out", "x", "--quick", "--section", "speed"], started
+
+
+def test_cost_fields_and_the_trajectory_s():
+    assert set(Cost.__dataclass_fields__) == COST
