@@ -9,11 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck import mates
+from crosscheck.tolerances import CONTRADICTION, RANK
 from mbref import rotations
 from mbref.scene import DRIVEN, Scene, SceneError
-
-GROSS = 0.05  # given velocities or drivers that miss the joints by more, relative, contradict them
-RANK_TOLERANCE = 1e-9  # relative to the largest singular value
 
 Residuals = dict[str, np.ndarray]
 
@@ -57,10 +55,12 @@ def joint_coordinates(
 ) -> dict[str, np.ndarray]:  # fmt: skip
     """(k, 2) angle (rad) and displacement (m) since t = 0 of every joint with an axis, by name.
 
-    Trajectory arrays (k, nb, ·).  The angle counts turns: of its values 2π apart the one nearest to the
-    integral of its rate over the samples (trapezoids) is taken.
+    Trajectory arrays (k, nb, ·).  The angle counts turns; it is NaN from where the samples are too far
+    apart to tell them.
     """
     motion = (np.asarray(times, float), *_pose(position, orientation), _grounded(angular_velocity))
+    if not len(motion[0]):
+        return {m.name: np.zeros((0, 2)) for m in mates.mates(scene) if m.type in DRIVEN}
     return {m.name: mates.coordinates(m, *motion) for m in mates.mates(scene) if m.type in DRIVEN}
 
 
@@ -102,7 +102,7 @@ def initial_twists(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     _refuse(scene, "its driver contradicts the joints", j @ x - b, x)
     step, still_free = _solve(free[given], wanted - x[given])
     x, free = x + free @ step, free @ still_free
-    if np.abs(x[given] - wanted).max(initial=0.0) > GROSS * np.abs(wanted).max(initial=0.0):
+    if np.abs(x[given] - wanted).max(initial=0.0) > CONTRADICTION * np.abs(wanted).max(initial=0.0):
         as_given = x.copy()
         as_given[given] = wanted
         _refuse(scene, "the given velocities contradict it", j @ as_given - b, as_given)
@@ -140,7 +140,7 @@ def _given(scene: Scene, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _solve(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Least-squares solution of least norm, and a basis (n, k) of the null space."""
     u, s, vt = np.linalg.svd(matrix, full_matrices=True)
-    rank = int(np.sum(s > RANK_TOLERANCE * max(s.max(initial=0.0), 1e-300)))
+    rank = int(np.sum(s > RANK * max(s.max(initial=0.0), 1e-300)))
     return vt[:rank].T @ ((u[:, :rank].T @ rhs) / s[:rank]), vt[rank:].T
 
 
@@ -148,7 +148,7 @@ def _refuse(scene: Scene, why: str, residual: np.ndarray, x: np.ndarray) -> None
     """SceneError naming the joint with the largest residual, if that is gross beside the velocities."""
     names = [name for name, rows in length_rows(scene).items() for _ in rows]
     scale = np.abs(x).max(initial=0.0)
-    if names and np.abs(residual).max() > GROSS * scale:
+    if names and np.abs(residual).max() > CONTRADICTION * scale:
         name = names[int(np.abs(residual).argmax())]
         index = [joint.name for joint in scene.joint].index(name)
         size = np.abs(residual).max()

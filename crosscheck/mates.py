@@ -158,9 +158,22 @@ def coordinates(
     _, offset, frames = _in_world(mate, position, orientation)
     twist = _twist(rotations.multiply(rotations.conjugate(frames[0]), frames[1]))
     rate = _resolve(frames[0], spin[..., mate.bodies[1], :] - spin[..., mate.bodies[0], :])[..., 2]
-    before = np.concatenate([rate[:1], rate[:-1]])
-    expected = np.cumsum(np.diff(times, prepend=0.0) * (rate + before) / 2)
-    return np.stack([expected + wrapped(twist - expected), _resolve(frames[0], offset)[..., 2]], axis=-1)
+    return np.stack([counted(times, twist, rate), _resolve(frames[0], offset)[..., 2]], axis=-1)
+
+
+def counted(times: np.ndarray, angle: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    """Angles (k,), known up to turns and zero at t = 0, with their turns counted by the rates (k,).
+
+    Between samples the change nearest to the trapezoid of the rates is taken; NaN from where the rates
+    near a sample differ so much that this does not tell the turn.
+    """
+    before, step = np.concatenate([rate[:1], rate[:-1]]), np.diff(times, prepend=0.0)
+    expected = step * (rate + before) / 2
+    change = expected + wrapped(np.diff(angle, prepend=0.0) - expected)
+    near = np.lib.stride_tricks.sliding_window_view(np.pad(rate, 2, mode="edge"), 5, axis=0)
+    doubt = step * (near.max(axis=-1) - near.min(axis=-1))
+    doubt[:1] = np.abs(step[:1] * rate[:1])
+    return np.where(np.cumsum(doubt >= np.pi) > 0, np.nan, np.cumsum(change))
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:

@@ -14,6 +14,7 @@ import numpy as np
 from crosscheck.truth.free_body import free_body
 from crosscheck.truth.parallelogram import parallelogram
 from crosscheck.truth.path import Path, one_dof
+from crosscheck.truth.picard import NoSolution
 from crosscheck.truth.planar_slider_crank import planar_slider_crank
 from crosscheck.truth.slider import slider
 from crosscheck.truth.spatial_slider_crank import spatial_slider_crank
@@ -26,6 +27,9 @@ PATHS: tuple[Callable[[Scene], Path | None], ...] = (
     spatial_slider_crank,
     slider,
 )
+
+
+__all__ = ["NoSolution", "Truth", "truth_for"]
 
 
 class Truth(Protocol):

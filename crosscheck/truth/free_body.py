@@ -9,6 +9,7 @@ import numpy as np
 
 from crosscheck.kinematics import inertia_matrices, scene_length
 from crosscheck.loads import Motion, cross, wrenches
+from crosscheck.tolerances import TRUTH_DYNAMIC
 from crosscheck.truth.path import trajectory
 from crosscheck.truth.picard import REAL, Solution
 from mbref.scene import Scene, TorsionSpring
@@ -21,7 +22,7 @@ class FreeBody:
     """Truth of a scene of one free body under gravity, forces, moments and springs to the ground."""
 
     name = "free_body"
-    accuracy = 1e-12
+    accuracy = TRUTH_DYNAMIC
 
     def __init__(self, scene: Scene):
         body = scene.body[0]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck.loads import initial_rotations
+from crosscheck.tolerances import PARALLEL
 from crosscheck.truth.path import Path, Pose, circle, turned
 from mbref.scene import GROUND, Driver, Joint, Scene
 
@@ -20,7 +21,7 @@ def parallelogram(scene: Scene) -> Path | None:
     if not pivots:
         return None
     axis = unit(next(iter(pivots.values())).axis)
-    if any(abs(abs(unit(joint.axis) @ axis) - 1) > 1e-12 for joint in pivots.values()):
+    if any(abs(abs(unit(joint.axis) @ axis) - 1) > PARALLEL for joint in pivots.values()):
         return None
     arms = [_arm(scene, pivots, body.name) for body in scene.body]
     if any(arm is None for arm in arms):
@@ -59,7 +60,7 @@ def turning_driver(scene: Scene, axis: np.ndarray, turns: np.ndarray):
             return None
         first, second = (0.0 if n == GROUND else turns[scene.body_index(n)] for n in joint.bodies)
         along = float(unit(joint.axis) @ axis) * (second - first)
-        return along if abs(abs(along) - 1) < 1e-12 else None
+        return along if abs(abs(along) - 1) < PARALLEL else None
 
     return sign
 

@@ -15,13 +15,12 @@ import numpy as np
 from crosscheck import kinematics
 from crosscheck.loads import Motion, world_inertia, wrenches
 from crosscheck.mates import driver_value
+from crosscheck.tolerances import FREEDOM, ON_PATH, PARALLEL, TRUTH_DRIVEN, TRUTH_DYNAMIC
 from crosscheck.truth.picard import REAL, Solution
 from mbref import rotations
 from mbref.scene import Driver, Scene, TorsionSpring
 from mbref.trajectory import Trajectory
 
-ON_PATH = 1e-9  # relative residual up to which a scene is one of the family
-SINGULAR = 1e-7  # singular values relative to the largest: below, the mechanism has a freedom
 EYE = np.eye(3)
 PROBES = (0.0, 0.31, -0.83)  # path coordinates (rad, or lengths of the scene) where a path is tried
 
@@ -59,7 +58,7 @@ class OneDof:
 
     def __init__(self, scene: Scene, path: Path, rate: float | None):
         self.name = path.family
-        self.accuracy = 1e-13 if scene.driver else 1e-12
+        self.accuracy = TRUTH_DRIVEN if scene.driver else TRUTH_DYNAMIC
         self._scene, self._path = scene, path
         self._reduced = None if rate is None else Reduced(scene, path, rate)
 
@@ -191,7 +190,7 @@ def _fits(scene: Scene, path: Path) -> bool:
     gap = max((np.abs(r).max() for r in residuals.values()), default=0.0)
     j, _ = kinematics.jacobian(undriven, 0.0, pose.position[1].astype(float), orientation[1])
     values = np.linalg.svd(j, compute_uv=False)
-    rank = int(np.sum(values > SINGULAR * values.max(initial=1.0)))
+    rank = int(np.sum(values > FREEDOM * values.max(initial=1.0)))
     return gap <= ON_PATH * max(length, 1.0) and rank == 6 * len(scene.body) - 1
 
 
@@ -201,7 +200,7 @@ def _torsion_angles_known(scene: Scene, path: Path) -> bool:
         if isinstance(load, TorsionSpring):
             joint = next(j for j in scene.joint if j.name == load.joint)
             indices = [scene.body_index(name) for name in joint.bodies]
-            aligned = abs(abs(np.dot(joint.axis, path.axis)) - np.linalg.norm(joint.axis)) < ON_PATH
+            aligned = abs(abs(np.dot(joint.axis, path.axis)) - np.linalg.norm(joint.axis)) < PARALLEL
             if not aligned or not all(known[i] for i in indices if i >= 0):
                 return False
     return True

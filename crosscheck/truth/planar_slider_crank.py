@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.loads import initial_rotations
+from crosscheck.tolerances import ON_PATH, PARALLEL, SAME_LENGTH
 from crosscheck.truth.parallelogram import pivots_of, turning_driver, unit
-from crosscheck.truth.path import ON_PATH, Path, Pose, circle, turned
+from crosscheck.truth.path import Path, Pose, circle, turned
 from mbref.scene import GROUND, Joint, Scene
-
-EQUAL = 1e-12  # relative difference of crank and rod up to which they are the same length
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,7 @@ class Lengths:
 
     def equal(self) -> bool:
         """Whether the linkage has singular positions it can pass smoothly."""
-        return abs(self.a - self.b) <= EQUAL * self.b and abs(self.h) <= EQUAL * self.b
+        return abs(self.a - self.b) <= SAME_LENGTH * self.b and abs(self.h) <= SAME_LENGTH * self.b
 
     def turns_fully(self) -> bool:
         """Whether the crank meets no dead point."""
@@ -59,7 +58,7 @@ def planar_slider_crank(scene: Scene) -> Path | None:
     crank, rod, slider, pivot, pin, end, guide = parts
     axis, line = unit(pivot.axis), unit(guide.axis)
     across = np.cross(axis, line)
-    if abs(axis @ line) > EQUAL:
+    if abs(axis @ line) > PARALLEL:
         return None
     centre, b0, c0 = (np.array(joint.anchor) for joint in (pivot, pin, end))
     arm, reach = b0 - centre, c0 - b0

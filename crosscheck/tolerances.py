@@ -1,0 +1,61 @@
+"""Every tolerance of the judge in one place, each with the reason for it; fixed before results are seen."""
+
+from __future__ import annotations
+
+import numpy as np
+
+ROUNDING = float(np.finfo(float).eps)
+
+RANK = 1e-9
+"""Singular values below this part of the largest count as zero: poses are consistent to about 1e-15, so
+true zeros are 1e-15, and a mechanism 1e-9 from singular cannot be told from a singular one in practice."""
+
+FREEDOM = 1e-7
+"""The same for the mobility of a family's path away from singular positions: a freedom is exactly zero
+there, while the least true singular value of any linkage worth the name is above 1e-3."""
+
+ON_PATH = 1e-9
+"""Relative gap up to which a scene is of a truth's family. Scenes written with twelve digits pass; one
+whose lengths differ by more is another mechanism, and its truth would be off by as much."""
+
+SAME_LENGTH = 1e-12
+"""Relative difference up to which crank and rod are equal: with computed anchors rounding leaves 1e-16,
+and a difference d changes the smooth branch only within an angle of about sqrt(d) of the singularity."""
+
+PARALLEL = 1e-9
+"""Sine of the angle up to which directions are parallel: errors of work from it are its square."""
+
+CONTRADICTION = 0.05
+"""Part of the velocity scale by which given velocities may miss the joints and still be corrected: more
+is not a rounded number but another motion than the one meant."""
+
+TRUTH_DRIVEN = 1e-13
+"""Accuracy of closed forms: a few roundings of double precision in poses, times the angle's size."""
+
+TRUTH_DYNAMIC = 1e-12
+"""Accuracy of reduced equations, solved in extended precision: measured 1e-15 on all built-in scenes
+(rounding of the result to double); where extended precision is double, 1e-13."""
+
+STRAIGHT_LINE = 0.1
+"""Root mean square distance, in decades, from a line of a convergence curve's asymptotic range: error
+constants of rejected-step or event effects scatter by tens of percent, a floor bends by decades."""
+
+ERROR_LEVELS = (1e-3, 1e-6, 1e-9)
+"""Errors at which costs are compared: animation, engineering, reference."""
+
+FALSE_SUCCESS = 1e-2
+"""Error of a completed run that makes it a false success: one percent of the mechanism's size or 0.6
+degrees is beyond any accuracy asked for, and is what a wrong branch or a lost constraint leaves."""
+
+SAME_START = 1e-8
+"""Relative difference of initial poses and velocities between engines: joint-coordinate engines rebuild
+them from tree coordinates by Newton iterations that stop at 1e-10 or better."""
+
+SAME_CHANGE = 1e-4
+"""Relative difference of the velocity changes over the gate's short time, and of given accelerations: one
+percent of one body's mass changes them by 5e-4 or more in most built-in scenes; integration errors of an
+engine at its finer settings are below 1e-6 over so short a time."""
+
+GATE_TIME = 1e-3
+"""Part of the scene's duration that the gate simulates: long enough that changes are 1e10 roundings,
+short enough that they are accelerations times time."""
