@@ -1,0 +1,65 @@
+"""Driver motions as plain numbers, and how fast a scene moves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from mbref.scene import Driver, Scene, Spring, TorsionSpring
+from mbref.trajectory import Trajectory
+
+SCOUT = (2000, 16000)  # steps of the coarse run that finds how fast a scene turns
+SCOUT_TURN = 0.5  # rad per step that such a run resolves
+
+
+def motion(driver: Driver, t: float) -> tuple[float, float, float]:
+    """Value, rate and acceleration of a driver at time t (rad or m, and per second)."""
+    value = rate = acceleration = 0.0
+    for c in reversed(driver.polynomial):
+        acceleration = acceleration * t + 2 * rate
+        rate = rate * t + value
+        value = value * t + c
+    if sine := driver.sine:
+        w, phase = sine.frequency, sine.frequency * t + sine.phase
+        value += sine.amplitude * math.sin(phase)
+        rate += sine.amplitude * w * math.cos(phase)
+        acceleration -= sine.amplitude * w * w * math.sin(phase)
+    return value, rate, acceleration
+
+
+def stated_rate(scene: Scene) -> float:
+    """The fastest rate (rad/s) to read off a scene: of its duration, drivers, springs and velocities."""
+    rates = [1 / scene.duration]
+    for driver in scene.driver:
+        rates += [abs(motion(driver, t)[1]) for t in np.linspace(0, scene.duration, 101)]
+        rates += [abs(driver.sine.frequency)] if driver.sine else []
+    for body in scene.body:
+        rates += [math.hypot(*body.angular_velocity)] if body.angular_velocity else []
+    mass = min((body.mass for body in scene.body if body.mass), default=1.0)
+    inertia = min((_middle_moment(body.inertia) for body in scene.body if body.inertia), default=1.0)
+    for load in scene.load:
+        if isinstance(load, Spring):
+            rates += [math.sqrt(load.stiffness / mass), load.damping / mass]
+        elif isinstance(load, TorsionSpring) and inertia > 0:
+            rates += [math.sqrt(load.stiffness / inertia), load.damping / inertia]
+    return max(rates)
+
+
+def _middle_moment(inertia: Sequence) -> float:
+    """The middle principal moment: about their own axis thin rods have next to none."""
+    matrix = np.array(inertia)
+    return float(np.linalg.eigvalsh(np.diag(matrix) if matrix.ndim == 1 else matrix)[1])
+
+
+def fastest_rate(scene: Scene, coarse: Callable[[float], Trajectory]) -> float:
+    """The fastest angular velocity (rad/s) of a coarse run, of steps of the length given, or what the
+    scene states if faster; a run too coarse to tell is repeated once with finer steps."""
+    for steps in SCOUT:
+        spins = np.linalg.norm(coarse(scene.duration / steps).angular_velocity, axis=2)
+        resolved = SCOUT_TURN * steps / scene.duration
+        rate = max(stated_rate(scene), float(spins.max(initial=0.0)))
+        if rate < resolved:
+            break
+    return min(rate, resolved)

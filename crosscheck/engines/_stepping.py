@@ -1,0 +1,197 @@
+"""Stepping an engine from sample to sample: what a run collects, and the integrators run outside engines."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.integrate import DOP853
+
+from mbref.scene import Scene
+from mbref.trajectory import Cost, Outcome, Trajectory
+
+WIDTHS = {"position": 3, "orientation": 4, "velocity": 3, "angular_velocity": 3, "acceleration": 3,
+          "angular_acceleration": 3}  # fmt: skip
+MAX_STEPS = 10**6  # of one interval; beyond it the run is not going to end
+
+Rhs = Callable[[float, np.ndarray], np.ndarray]
+Settle = Callable[[float, np.ndarray], np.ndarray]  # what an accepted state is corrected to
+
+
+class Failed(Exception):
+    """A run the engine could not finish: its outcome, the time reached and one sentence."""
+
+    def __init__(self, outcome: Outcome, t: float, message: str):
+        super().__init__(message)
+        self.outcome = outcome
+        self.t = t
+
+
+@dataclass
+class Counts:
+    """What stepping has cost so far."""
+
+    steps: int = 0
+    rejected: int = 0
+    rhs: int = 0
+
+
+@dataclass(frozen=True)
+class Sample:
+    """The scene's bodies at one time, as a Trajectory has them: (nb, 3), orientations (nb, 4)."""
+
+    position: np.ndarray
+    orientation: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+    acceleration: np.ndarray
+    angular_acceleration: np.ndarray
+    reactions: dict[str, np.ndarray] = field(default_factory=dict)  # joint: (6,) force and moment
+
+
+def run_through(
+    scene: Scene, times: Sequence[float], advance: Callable[[float, float], None],
+    sample: Callable[[float], Sample], counts: Counts, build_seconds: float, labels: dict[str, Any],
+) -> Trajectory:  # fmt: skip
+    """Advances from sample to sample; the trajectory, complete or as far as it got.
+
+    ``labels`` are the trajectory's engine, version, method and settings.
+    """
+    samples: list[Sample] = []
+    seconds, t, outcome, message = 0.0, 0.0, Outcome.COMPLETED, ""
+    try:
+        for target in map(float, times):
+            start = time.process_time()
+            try:
+                if target > t:
+                    advance(t, target)
+            finally:
+                seconds += time.process_time() - start
+            reached = sample(target)
+            if not _finite(reached):
+                raise Failed(Outcome.NOT_FINITE, t, f"the motion is not finite at {target:.6g} s")
+            samples.append(reached)
+            t = target
+    except Failed as failure:
+        outcome, t, message = failure.outcome, failure.t, str(failure)
+    return Trajectory(
+        scene=scene.name, **labels, times=np.array(times[: len(samples)], dtype=float),
+        bodies=tuple(body.name for body in scene.body),
+        **{name: _stacked(samples, name, len(scene.body), width) for name, width in WIDTHS.items()},
+        reactions=_by_joint([s.reactions for s in samples]),
+        outcome=outcome, t_end=t, message=message,
+        cost=Cost(seconds, build_seconds, counts.steps, counts.rejected, counts.rhs),
+    )  # fmt: skip
+
+
+def _finite(sample: Sample) -> bool:
+    return all(np.isfinite(getattr(sample, name)).all() for name in WIDTHS)
+
+
+def _stacked(samples: list[Sample], name: str, bodies: int, width: int) -> np.ndarray:
+    return np.array([getattr(s, name) for s in samples], dtype=float).reshape(len(samples), bodies, width)
+
+
+def _by_joint(reactions: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray] | None:
+    if not reactions or not reactions[0]:
+        return None
+    return {name: np.array([sample[name] for sample in reactions]) for name in reactions[0]}
+
+
+def step_count(t0: float, t1: float, step: float) -> int:
+    """Number of equal steps, none longer than ``step``, from t0 to t1."""
+    return max(1, math.ceil((t1 - t0) / step * (1 - 1e-9)))
+
+
+def rk4(
+    rhs: Rhs, settle: Settle, y: np.ndarray, t0: float, t1: float, step: float, counts: Counts
+) -> np.ndarray:
+    """The state at t1 by the classical Runge-Kutta method, in equal steps no longer than ``step`` (s)."""
+    n = step_count(t0, t1, step)
+    h = (t1 - t0) / n
+    for i in range(n):
+        t = t0 + i * h
+        k1 = rhs(t, y)
+        k2 = rhs(t + h / 2, y + h / 2 * k1)
+        k3 = rhs(t + h / 2, y + h / 2 * k2)
+        k4 = rhs(t + h, y + h * k3)
+        y = settle(t + h, y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
+        counts.steps += 1
+        counts.rhs += 4
+        if not math.isfinite(y.sum()):
+            raise Failed(Outcome.NOT_FINITE, t, f"the state is not finite after the step from {t:.6g} s")
+    return y
+
+
+@dataclass
+class Adaptive:
+    """DOP853 from sample to sample, every accepted state settled; keeps its step length between samples.
+
+    A step of ``min_step`` is accepted whatever its error estimate: near a singular position the
+    accelerations are noise, and ever shorter steps would integrate the noise instead of passing it.
+    """
+
+    rhs: Rhs
+    settle: Settle | None
+    rtol: float  # of every component; the absolute tolerance is a hundredth of it
+    min_step: float  # s
+    max_step: float  # s
+    counts: Counts
+    step: float = 0.0  # s, tried next
+
+    def advance(self, y: np.ndarray, t0: float, t1: float) -> np.ndarray:
+        """The state at t1; raises Failed where the motion stops being finite or does not end."""
+        t, f, taken = t0, self._evaluate(t0, y), 0
+        self.step = self.step or self.min_step
+        while t < t1:
+            wanted = min(max(self.step, self.min_step), self.max_step)
+            h = t1 - t if t + 1.01 * wanted >= t1 else wanted
+            new, slope, error = self._attempt(t, y, f, h)
+            if error <= 1 or (h <= self.min_step and math.isfinite(error)):
+                t = t1 if h == t1 - t else t + h
+                y, f, taken = new, slope, taken + 1
+                if self.settle is not None:
+                    y = self.settle(t, y)
+                    f = self._evaluate(t, y)
+                self.counts.steps += 1
+                self.step = max(h * _growth(error), self.step if h < wanted else 0.0)
+            else:
+                self.counts.rejected += 1
+                self.step = h * min(_growth(error), 1.0)
+                if h <= self.min_step:
+                    raise Failed(Outcome.NOT_FINITE, t, f"the motion is not finite after {t:.6g} s")
+            if taken > MAX_STEPS:
+                raise Failed(Outcome.STEP_FAILED, t, f"{MAX_STEPS} steps have only reached {t:.6g} s")
+        return y
+
+    def _evaluate(self, t: float, y: np.ndarray) -> np.ndarray:
+        self.counts.rhs += 1
+        return self.rhs(t, y)
+
+    def _attempt(
+        self, t: float, y: np.ndarray, f: np.ndarray, h: float
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """New state, its slope, and the error estimate over the tolerance, of a step of h."""
+        k = np.empty((len(DOP853.C) + 1, len(y)))
+        k[0] = f
+        for i in range(1, len(DOP853.C)):
+            k[i] = self._evaluate(t + DOP853.C[i] * h, y + h * (DOP853.A[i, :i] @ k[:i]))
+        new = y + h * (DOP853.B @ k[:-1])
+        k[-1] = self._evaluate(t + h, new)
+        scale = self.rtol * (0.01 + np.maximum(abs(y), abs(new)))
+        fifth, third = (DOP853.E5 @ k) / scale, (DOP853.E3 @ k) / scale
+        squares = fifth @ fifth
+        if squares == 0:
+            return new, k[-1], 0.0
+        return new, k[-1], h * squares / math.sqrt((squares + 0.01 * (third @ third)) * len(y))
+
+
+def _growth(error: float) -> float:
+    """Factor of the step length after an error estimate (in tolerances) of an eighth-order step."""
+    if not math.isfinite(error):
+        return 0.2
+    return min(10.0, max(0.2, 0.9 * error ** (-1 / 8))) if error else 10.0

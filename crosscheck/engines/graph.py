@@ -1,0 +1,245 @@
+"""A scene as a spanning tree with loop closures, for the engines that work in joint coordinates.
+
+Nodes are the bodies and the ground, edges the joints.  A maximum-weight spanning tree by constraint rows
+keeps the stiff joints, and every driven one; what is cut closes a loop:
+
+- a cut spherical joint is a point that two links share;
+- any other cut joint carries a *ghost*: its second body's mass and inertia are divided in equal shares
+  between the body and its ghosts, the ghost hangs from the first body by the joint itself, and a weld
+  holds it to its body.  The motion is exactly that of the undivided body.
+
+A distance joint is a *rod* with a spherical joint at either end.  Its inertia is that of two point masses
+at its ends, taken out of the two bodies, so the motion is again exactly the scene's; the moment of inertia
+about its own axis is arbitrary, because a rod that starts without spin never spins.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mbref import rotations
+from mbref.scene import Body, Distance, Fixed, Joint, Scene, Spherical, Universal
+
+GROUND_LINK = -1
+ROWS = {"fixed": 6, "revolute": 5, "translational": 5, "universal": 4, "cylindrical": 4, "spherical": 3}
+FREEDOMS = {"fixed": 0, "revolute": 1, "translational": 1, "universal": 2, "cylindrical": 2, "spherical": 3,
+            "free": 6}  # fmt: skip
+NO_AXES = np.zeros((0, 3))
+DRIVEN_WEIGHT = 10  # more than any joint has rows: a driven joint is cut last
+ROD_SHARE = 0.1  # of the smallest effective mass a body shows at the anchor of a distance joint
+
+
+@dataclass(frozen=True)
+class Link:
+    """A rigid piece of the tree and the joint that carries it.
+
+    Its frame sits at ``position`` (world) with world-aligned axes at t = 0; ``offset`` leads from there
+    to its centre of mass, about which ``inertia`` (3, 3) is taken.  ``kind`` is the scene's joint type or
+    ``"free"``; ``axes`` (n, 3) are unit vectors, from the parent's side to the child's, such that positive
+    coordinates move the joint's second body relative to its first.  A cylindrical joint's coordinates are
+    displacement and angle, a free one's displacement and rotation.
+    """
+
+    body: int  # index in scene.body; -1 for the rod of a distance joint
+    position: np.ndarray
+    mass: float
+    offset: np.ndarray
+    inertia: np.ndarray
+    kind: str = "free"
+    joint: int = -1  # index in scene.joint; -1 for a free link and the first end of a rod
+    parent: int = GROUND_LINK
+    anchor: np.ndarray | None = None
+    axes: np.ndarray | None = None
+    ghost: bool = False
+    ends: tuple[tuple[int, np.ndarray], ...] = ()  # of a rod: the bodies it ties, and where (world)
+
+    @property
+    def freedoms(self) -> int:
+        """Number of joint coordinates (velocities)."""
+        return FREEDOMS[self.kind]
+
+
+@dataclass(frozen=True)
+class Closure:
+    """What the tree does not hold: a ``point`` two links share, or a ``weld`` of a link and its ghost."""
+
+    kind: str
+    joint: int
+    links: tuple[int, int]  # the joint's first and second body's; of a weld: the body's link and the ghost
+    anchor: np.ndarray
+
+
+@dataclass(frozen=True)
+class Tree:
+    """Links in depth-first order (parents first), closures, and where the scene's parts went."""
+
+    links: tuple[Link, ...]
+    closures: tuple[Closure, ...]
+    own: tuple[int, ...]  # the link of each of the scene's bodies
+    starts: tuple[int, ...]  # first joint velocity of each link
+
+    @property
+    def nv(self) -> int:
+        """Number of joint velocities."""
+        return sum(link.freedoms for link in self.links)
+
+    def link_of(self, body: int) -> int:
+        """The link of a scene's body; the ground's for -1."""
+        return self.own[body] if body >= 0 else GROUND_LINK
+
+    def coordinate(self, scene: Scene, joint: str) -> int:
+        """Index of the velocity that a driver or torsion spring of that joint acts on."""
+        index = [j.name for j in scene.joint].index(joint)
+        link = next(k for k, item in enumerate(self.links) if item.joint == index)
+        return self.starts[link] + self.links[link].freedoms - 1
+
+
+@dataclass(frozen=True)
+class _Edge:
+    kind: str
+    joint: int
+    nodes: tuple[int, int]
+    anchor: np.ndarray
+    axes: np.ndarray
+    weight: int
+
+
+def spanning_tree(scene: Scene) -> Tree:
+    """The scene as links and closures; bodies without mass (kinematics) count 1 kg and 1 kg m²."""
+    nodes = [_body_link(b, body) for b, body in enumerate(scene.body)]
+    edges = []
+    for j, joint in enumerate(scene.joint):
+        pair = tuple(scene.body_index(name) for name in joint.bodies)
+        if isinstance(joint, Distance):
+            edges += _rod(nodes, j, pair, np.array(joint.anchors, dtype=float))
+        else:
+            driven = any(driver.joint == joint.name for driver in scene.driver)
+            weight = ROWS[joint.type] + DRIVEN_WEIGHT * driven
+            anchor = np.array(joint.anchor, dtype=float)
+            edges.append(_Edge(joint.type, j, pair, anchor, _axes(joint), weight))
+    kept, cut = _kruskal(len(nodes), edges)
+    closures = _cut_open(nodes, kept, cut)
+    return _depth_first(nodes, kept, closures, len(scene.body))
+
+
+def _body_link(index: int, body: Body) -> Link:
+    rotation = rotations.to_matrix(np.array(body.orientation))
+    inertia = np.array(body.inertia if body.inertia is not None else (1.0, 1.0, 1.0), dtype=float)
+    inertia = np.diag(inertia) if inertia.ndim == 1 else inertia
+    mass = 1.0 if body.mass is None else body.mass
+    return Link(
+        index, np.array(body.position, dtype=float), mass, np.zeros(3), rotation @ inertia @ rotation.T
+    )
+
+
+def _axes(joint: Joint) -> np.ndarray:
+    """Unit axes (n, 3) of a joint, first body's first."""
+    if isinstance(joint, Fixed | Spherical):
+        return NO_AXES
+    axes = np.array(joint.axes if isinstance(joint, Universal) else [joint.axis], dtype=float)
+    return axes / np.linalg.norm(axes, axis=1, keepdims=True)
+
+
+def cross_matrix(v: np.ndarray) -> np.ndarray:
+    """The matrix (3, 3) of the product v × ·."""
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+def effective_mass(link: Link, point: np.ndarray) -> float:
+    """The smallest mass (kg) a free link shows to a force at a point (world), over all directions."""
+    arm = cross_matrix(point - link.position - link.offset)
+    mobility = np.eye(3) / link.mass - arm @ np.linalg.pinv(link.inertia, hermitian=True) @ arm
+    return 1 / np.linalg.eigvalsh(mobility)[-1]
+
+
+def _without_point_mass(link: Link, point: np.ndarray, mass: float) -> Link:
+    """A link after a point mass at a point (world) was taken out of it."""
+    rest = link.mass - mass
+    arm = point - link.position
+    offset = (link.mass * link.offset - mass * arm) / rest
+    lever = cross_matrix(arm - link.offset)
+    inertia = link.inertia + (link.mass * mass / rest) * lever @ lever
+    return replace(link, mass=rest, offset=offset, inertia=inertia)
+
+
+def _rod(nodes: list[Link], joint: int, pair: tuple[int, int], anchors: np.ndarray) -> list[_Edge]:
+    """Adds the rod of a distance joint to the nodes; its two edges."""
+    ends = [(b, anchor) for b, anchor in zip(pair, anchors, strict=True) if b >= 0]
+    mass = ROD_SHARE * min(effective_mass(nodes[b], anchor) for b, anchor in ends)
+    for b, anchor in ends:
+        nodes[b] = _without_point_mass(nodes[b], anchor, mass)
+    moment = mass * np.sum((anchors[1] - anchors[0]) ** 2) / 2
+    rod = len(nodes)
+    inertia = moment * np.eye(3)
+    ties = tuple(zip(pair, anchors, strict=True))
+    nodes.append(Link(-1, anchors.mean(axis=0), 2 * mass, np.zeros(3), inertia, ends=ties))
+    return [
+        _Edge("spherical", -1, (pair[0], rod), anchors[0], NO_AXES, ROWS["spherical"]),
+        _Edge("spherical", joint, (rod, pair[1]), anchors[1], NO_AXES, ROWS["spherical"]),
+    ]
+
+
+def _kruskal(count: int, edges: list[_Edge]) -> tuple[list[_Edge], list[_Edge]]:
+    """Edges of a maximum-weight spanning forest, ground included, and the edges cut."""
+    group = list(range(count + 1))  # the ground, -1, is the last entry
+    kept, cut = [], []
+    for edge in sorted(edges, key=lambda edge: -edge.weight):
+        a, b = group[edge.nodes[0]], group[edge.nodes[1]]
+        (cut if a == b else kept).append(edge)
+        group = [a if g == b else g for g in group]
+    return kept, cut
+
+
+def _cut_open(nodes: list[Link], kept: list[_Edge], cut: list[_Edge]) -> list[Closure]:
+    """Closures of the cut edges; adds the ghosts to the nodes and their joints to the kept edges."""
+    closures, ghosts = [], {}
+    for edge in cut:
+        if edge.kind == "spherical":
+            closures.append(Closure("point", edge.joint, edge.nodes, edge.anchor))
+            continue
+        end = 1 if edge.nodes[1] != GROUND_LINK else 0
+        body, ghost = edge.nodes[end], len(nodes)
+        nodes.append(replace(nodes[body], ghost=True))
+        ends = (edge.nodes[0], ghost) if end else (ghost, edge.nodes[1])
+        kept.append(replace(edge, nodes=ends))
+        closures.append(Closure("weld", edge.joint, (body, ghost), edge.anchor))
+        ghosts.setdefault(body, []).append(ghost)
+    for body, copies in ghosts.items():
+        share = 1 / (1 + len(copies))
+        for n in (body, *copies):
+            nodes[n] = replace(nodes[n], mass=nodes[n].mass * share, inertia=nodes[n].inertia * share)
+    return closures
+
+
+def _depth_first(nodes: list[Link], edges: list[_Edge], closures: list[Closure], bodies: int) -> Tree:
+    """Numbers the nodes depth first from the ground; a part nothing ties to it begins with a free link."""
+    number: dict[int, int] = {GROUND_LINK: GROUND_LINK}
+    links: list[Link] = []
+
+    def add(node: int, **carrier) -> None:
+        number[node] = len(links)
+        links.append(replace(nodes[node], **carrier))
+        grow(node)
+
+    def grow(node: int) -> None:
+        for edge in edges:
+            if node not in edge.nodes or set(edge.nodes) <= number.keys():
+                continue
+            forward = edge.nodes[0] == node
+            child = edge.nodes[1] if forward else edge.nodes[0]
+            axes = edge.axes if forward or edge.kind == "fixed" else -edge.axes[::-1]
+            add(child, kind=edge.kind, joint=edge.joint, parent=number[node], anchor=edge.anchor, axes=axes)
+
+    grow(GROUND_LINK)
+    for node in range(len(nodes)):
+        if node not in number:
+            add(node, anchor=nodes[node].position, axes=NO_AXES)
+    starts = np.cumsum([0, *(link.freedoms for link in links)])[:-1]
+    return Tree(
+        links=tuple(links),
+        closures=tuple(replace(c, links=tuple(number[n] for n in c.links)) for c in closures),
+        own=tuple(number[b] for b in range(bodies)),
+        starts=tuple(starts.tolist()),
+    )
