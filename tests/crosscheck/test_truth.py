@@ -1,0 +1,277 @@
+"""Truths against second computations: textbook formulas, quadrature, differences of poses, a DAE."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+from scipy.special import ellipj, ellipk
+
+from crosscheck import kinematics
+from crosscheck.energy import energy_series
+from crosscheck.loads import Motion, world_inertia, wrenches
+from crosscheck.metrics import measure
+from crosscheck.truth import truth_for
+from mbref import rotations
+from mbref.scene import (
+    Body,
+    Driver,
+    Revolute,
+    Scene,
+    Spring,
+    TorsionSpring,
+)
+from mbref.scenes import SCENES
+from tests.crosscheck.truth_scenes import ALL, DYNAMIC, Z, block, free, pendulum
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_truth_satisfies_the_joints_at_three_levels(name):
+    scene = ALL[name]
+    motion = truth_for(scene).poses(np.linspace(0.0, scene.duration, 41))
+    spin = max(1.0, np.abs(motion.angular_velocity).max())
+    found = measure(scene, motion)
+    for level, scale in (("position", 1.0), ("velocity", spin), ("acceleration", spin**2)):
+        got = found[f"violation_{level}"]
+        assert got < 1e-12 * scale, f"{name}: {level} violation {got}, allowed {1e-12 * scale}"
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_truth_starts_where_the_scene_does(name):
+    scene = ALL[name]
+    motion = truth_for(scene).poses(np.zeros(1))
+    position, orientation = kinematics.initial_poses(scene)
+    off = (
+        np.abs(motion.position[0] - position).max(),
+        rotations.angle_between(motion.orientation[0], orientation).max(),
+    )
+    assert max(off) < 1e-15 * 8, f"{name}: starts {off} away"
+    if name != "four_bar_straight" and scene.joint:  # there the joints alone do not tell the velocities
+        velocity, spin = kinematics.initial_twists(scene)
+        got = np.abs(motion.velocity[0] - velocity).max(), np.abs(motion.angular_velocity[0] - spin).max()
+        assert max(got) < 1e-14 * max(1, np.abs(spin).max()) * 4, f"{name}: initial velocities {got} away"
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_velocities_and_accelerations_are_differences_of_poses(name):
+    scene = ALL[name]
+    truth = truth_for(scene)
+    times = np.linspace(0.1, 0.9, 9) * scene.duration
+    spin = np.abs(truth.poses(times).angular_velocity).max() + 3.0
+    h = 0.004 / spin
+    at = {k: truth.poses(times + k * h) for k in range(-4, 5)}
+    weights = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}  # eighth order
+
+    def slope(of):
+        return sum(w * (of(at[k]) - of(at[-k])) for k, w in weights.items()) / h
+
+    def turn(m):
+        relative = rotations.multiply(m.orientation, rotations.conjugate(at[0].orientation))
+        relative = np.where(relative[..., :1] < 0, -relative, relative)
+        size = np.linalg.norm(relative[..., 1:], axis=-1, keepdims=True)
+        return 2 * np.arctan2(size, relative[..., :1]) * relative[..., 1:] / np.where(size > 0, size, 1)
+
+    pairs = {
+        "velocity": (slope(lambda m: m.position), at[0].velocity, spin),
+        "angular velocity": (slope(turn), at[0].angular_velocity, spin),
+        "acceleration": (slope(lambda m: m.velocity), at[0].acceleration, spin**2),
+        "angular acceleration": (slope(lambda m: m.angular_velocity), at[0].angular_acceleration, spin**2),
+    }
+    for what, (difference, given_value, scale) in pairs.items():
+        off = np.abs(difference - given_value).max() / scale
+        assert off < 1e-10, f"{name}: {what} differs from the difference quotient by {off}"
+
+
+@pytest.mark.parametrize("name", DYNAMIC)
+def test_truth_conserves_the_energy_that_potentials_give(name):
+    scene = DYNAMIC[name]
+    drift = energy_series(scene, truth_for(scene).poses(np.linspace(0.0, scene.duration, 301)))
+    assert drift.max() < 1e-13, f"{name}: energy drifts by {drift.max()}, allowed 1e-13"
+
+
+def multipliers_rhs(scene):
+    """y' of (position, orientation, twists) from M a - Jᵀ λ = F, J a = γ: nothing of the reduced equation."""
+    nb = len(scene.body)
+    mass = np.array([body.mass for body in scene.body])
+
+    def rhs(_, y):
+        r, p = y[: 3 * nb].reshape(1, nb, 3), y[3 * nb : 7 * nb].reshape(1, nb, 4)
+        v, w = y[7 * nb : 10 * nb].reshape(1, nb, 3), y[10 * nb :].reshape(1, nb, 3)
+        rotation = rotations.to_matrix(p / np.linalg.norm(p, axis=-1, keepdims=True))
+        motion = Motion(r, rotation, v, w, np.zeros((1, nb)))
+        force, moment = wrenches(scene, motion, np.array(Z))
+        inertia = world_inertia(scene, rotation)[0]
+        j, _ = kinematics.jacobian(scene, 0.0, r[0], p[0])
+        gamma = kinematics.closure_accelerations(scene, 0.0, r, p, v, w, 0 * v, 0 * w).values()
+        inverse = np.zeros((6 * nb, 6 * nb))
+        push = np.zeros(6 * nb)
+        for b in range(nb):
+            i = 6 * b
+            inverse[i : i + 3, i : i + 3] = np.eye(3) / mass[b]
+            inverse[i + 3 : i + 6, i + 3 : i + 6] = np.linalg.inv(inertia[b])
+            push[i : i + 3] = force[0, b]
+            push[i + 3 : i + 6] = moment[0, b] - np.cross(w[0, b], inertia[b] @ w[0, b])
+        free_acceleration = inverse @ push
+        excess = j @ free_acceleration + np.concatenate([g[0] for g in gamma])
+        hold = np.linalg.lstsq(j @ inverse @ j.T, excess, rcond=1e-10)[0]
+        a = (free_acceleration - inverse @ j.T @ hold).reshape(nb, 6)
+        spin_quaternion = np.concatenate([np.zeros((nb, 1)), w[0]], axis=1)
+        dp = rotations.multiply(spin_quaternion, p[0]) / 2
+        return np.concatenate([v.ravel(), dp.ravel(), a[:, :3].ravel(), a[:, 3:].ravel()])
+
+    return rhs
+
+
+@pytest.mark.parametrize(
+    ("name", "end"),
+    [("four_bar_gravity", 0.15), ("five_bar_gravity", 0.15), ("planar_slider_crank", 0.04),
+     ("planar_slider_crank_gravity", 0.08), ("spatial_slider_crank", 0.006),
+     ("spatial_slider_crank_gravity", 0.08), ("slider_spring", 0.08)],
+)  # fmt: skip
+def test_truth_is_the_motion_of_the_multiplier_equations(name, end):
+    scene = ALL[name]
+    start = np.concatenate(
+        [a.ravel() for a in (*kinematics.initial_poses(scene), *kinematics.initial_twists(scene))]
+    )
+    end_state = solve_ivp(multipliers_rhs(scene), (0, end), start, method="DOP853", rtol=1e-11, atol=1e-12).y[
+        :, -1
+    ]
+    exact = truth_for(scene).poses(np.array([end]))
+    nb = len(scene.body)
+    position = np.abs(end_state[: 3 * nb].reshape(nb, 3) - exact.position[0]).max()
+    spin = np.abs(end_state[10 * nb :].reshape(nb, 3) - exact.angular_velocity[0]).max()
+    scale = np.abs(exact.angular_velocity).max() + 1
+    moved = np.abs(exact.position[0] - kinematics.initial_poses(scene)[0]).max()
+    assert moved > 1e-2, f"{name}: moved only {moved}"
+    assert position < 1e-9 and spin < 1e-8 * scale, (
+        f"{name}: position off by {position}, spin by {spin} of {scale}"
+    )
+
+
+@pytest.mark.parametrize("theta0", [0.4, math.pi / 2, math.pi])
+def test_parallelogram_is_the_circle_of_its_crank(theta0):
+    name = {0.4: None, math.pi / 2: "four_bar", math.pi: "four_bar_straight"}[theta0]
+    scene = SCENES[name]() if name else SCENES["four_bar_gravity"]().with_(
+        driver=(Driver(joint="D", polynomial=(0.0, 3.0)),), gravity=(0, 0, 0)
+    )  # fmt: skip
+    start, rate = (theta0, -124.8) if name else (0.3, 3.0)
+    t = np.linspace(0, scene.duration, 30)
+    angle = start + rate * t
+    coupler = np.stack([0.25 + 0.5 * np.cos(angle), 0.5 * np.sin(angle), 0 * t], axis=1)
+    motion = truth_for(scene).poses(t)
+    assert np.abs(motion.position[:, 1] - coupler).max() < 1e-14, np.abs(
+        motion.position[:, 1] - coupler
+    ).max()
+    turned = rotations.angle_between(motion.orientation[:, 1], np.array([1.0, 0, 0, 0])).max()
+    assert turned < 1e-15, f"the coupler turned by {turned}"
+
+
+def test_spatial_slider_follows_the_paper_s_formula():
+    scene = SCENES["spatial_slider_crank_driven"]()
+    t = np.linspace(0, 0.2, 57)
+    angle = 124.8 * t
+    wanted = np.sqrt(0.4**2 - (0.1 * np.cos(angle) - 0.15) ** 2 - (0.1 * np.sin(angle)) ** 2)
+    off = np.abs(truth_for(scene).poses(t).position[:, 2, 1] - wanted).max()
+    assert off < 1e-14, f"slider off by {off}"
+
+
+@pytest.mark.parametrize("name", ["planar_slider_crank_equal", "planar_slider_crank_heavy"])
+def test_equal_slider_crank_meets_the_energy_quadrature(name):
+    """From rest under a constant moment, θ'² = 2 τ θ / I(θ), so t = ∫ sqrt(I / 2 τ θ) dθ; θ = u²."""
+    scene = SCENES[name]()
+    a, crank, rod = 0.308, scene.body[0], scene.body[1]
+
+    def inertia(theta):
+        s, c = math.sin(theta) ** 2, math.cos(theta) ** 2
+        fixed = crank.inertia[2] + crank.mass * a**2 / 4 + rod.inertia[2]
+        return fixed + rod.mass * a**2 * (2.25 * s + 0.25 * c) + 4 * scene.body[2].mass * a**2 * s
+
+    end = scene.duration
+    motion = truth_for(scene)
+    (theta, rate) = motion.coordinate(np.array([end]))[0]
+    top = math.sqrt(theta)
+    edges = np.linspace(0, top, 200)
+    pieces = [
+        quad(lambda u: math.sqrt(2 * inertia(u * u) / 100.0), lo, hi, epsabs=0, epsrel=1e-13)[0]
+        for lo, hi in itertools.pairwise(edges)
+    ]
+    assert abs(math.fsum(pieces) - end) < 1e-13 * end * 5, (
+        f"θ = {theta} after {math.fsum(pieces)} s, not {end}"
+    )
+    speed = math.sqrt(200.0 * theta / inertia(theta))
+    assert abs(rate - speed) < 1e-13 * speed, f"rate {rate}, energy gives {speed}"
+    slider = motion.poses(np.array([end])).position[0, 2, 0]
+    assert abs(slider - 2 * a * math.cos(theta)) < 1e-13, f"slider at {slider}"
+    assert theta > 3.5 * math.pi, "passes singular positions"
+
+
+def test_pendulum_is_the_elliptic_function():
+    scene = pendulum(gravity=(0.0, -9.81, 0.0), duration=4.0)
+    t = np.linspace(0, 4.0, 50)
+    length, inertia = 0.5, 0.1 + 1.2 * 0.25
+    start = math.atan2(0.3, 0.4)  # from hanging
+    w, m = math.sqrt(1.2 * 9.81 * length / inertia), math.sin(start / 2) ** 2
+    angle = 2 * np.arcsin(math.sqrt(m) * ellipj(w * t + ellipk(m), m)[0])
+    wanted = np.stack([length * np.sin(angle), -length * np.cos(angle)], axis=1)
+    off = np.abs(truth_for(scene).poses(t).position[:, 0, :2] - wanted).max()
+    assert off < 1e-13, f"pendulum off by {off}"
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_torsion_pendulum_is_the_damped_oscillator(sign):
+    pair = ("ground", "bar") if sign > 0 else ("bar", "ground")
+    pivot = Revolute(name="pivot", bodies=pair, anchor=(0.0, 0.0, 0.0), axis=(0, 0, 2.0))
+    spring = TorsionSpring(joint="pivot", stiffness=5.0, damping=0.3, natural_angle=7.0)
+    scene = pendulum(joint=(pivot,), load=(spring,), duration=3.0)
+    t = np.linspace(0, 3.0, 40)
+    inertia = 0.1 + 1.2 * 0.25
+    decay, w = 0.3 / (2 * inertia), math.sqrt(5.0 / inertia - (0.3 / (2 * inertia)) ** 2)
+    angle = sign * (7.0 - 7.0 * np.exp(-decay * t) * (np.cos(w * t) + decay / w * np.sin(w * t)))
+    got = truth_for(scene).coordinate(t)[:, 0]
+    assert np.abs(got - angle).max() < 1e-13, f"angle off by {np.abs(got - angle).max()}"
+
+
+def test_block_is_the_damped_oscillator():
+    spring = Spring(bodies=("block", "ground"), points=((1.0, 2.0, 3.0), (7.0, 10.0, 3.0)), stiffness=50.0,
+                    damping=4.0, natural_length=9.0)  # fmt: skip
+    scene = block(gravity=(0.0, -9.81, 0.0), load=(spring,))
+    t = np.linspace(0, 1, 30)
+    rest = (50.0 * (10.0 - 9.0) - 2.0 * 9.81 * 0.8) / 50.0
+    w = math.sqrt(50.0 / 2.0 - 1.0)
+    wanted = rest - rest * np.exp(-t) * (np.cos(w * t) + np.sin(w * t) / w)
+    got = truth_for(scene).coordinate(t)[:, 0]
+    assert np.abs(got - wanted).max() < 1e-13, f"displacement off by {np.abs(got - wanted).max()}"
+
+
+def test_symmetric_top_precesses_about_its_angular_momentum():
+    body = Body(
+        name="top", mass=1.0, inertia=(0.2, 0.2, 0.3), position=(0, 0, 0), angular_velocity=(1.0, 0.0, 4.0)
+    )
+    t = np.linspace(0, 3.0, 40)
+    motion = truth_for(Scene(name="top", body=(body,), duration=3.0)).poses(t)
+    momentum = np.array([0.2 * 1.0, 0.0, 0.3 * 4.0])
+    rate = np.linalg.norm(momentum) / 0.2
+    precession = rotations.from_vector(rate * t[:, None] * momentum / np.linalg.norm(momentum))
+    relative = rotations.from_vector((4.0 - 0.3 * 4.0 / 0.2) * t[:, None] * np.array(Z))
+    wanted = rotations.multiply(precession, relative)
+    off = rotations.angle_between(motion.orientation[:, 0], wanted).max()
+    assert off < 1e-13, f"top off by {off} rad"
+
+
+def test_free_body_falls_and_keeps_energy_and_angular_momentum():
+    scene = free(gravity=(0.0, 0.0, -9.81), duration=5.0)
+    t = np.linspace(0, 5.0, 40)
+    motion = truth_for(scene).poses(t)
+    fall = (
+        np.array([1.0, 0, 0])
+        + t[:, None] * np.array([0, 2.0, 1.0])
+        + t[:, None] ** 2 / 2 * np.array([0, 0, -9.81])
+    )
+    assert np.abs(motion.position[:, 0] - fall).max() < 1e-13, np.abs(motion.position[:, 0] - fall).max()
+    inertia = world_inertia(scene, rotations.to_matrix(motion.orientation))[:, 0]
+    momentum = np.einsum("kij,kj->ki", inertia, motion.angular_velocity[:, 0])
+    off = np.abs(momentum - momentum[0]).max()
+    assert off < 1e-14, f"angular momentum drifts by {off}"
+    drift = energy_series(scene, motion).max()
+    assert drift < 1e-14, f"energy drifts by {drift}"

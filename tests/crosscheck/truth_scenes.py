@@ -1,0 +1,122 @@
+"""Scenes the tests of the judge share: one for each family of truths, with every kind of load."""
+
+import numpy as np
+
+from mbref import rotations
+from mbref.scene import (
+    Body,
+    Driver,
+    Force,
+    Moment,
+    Revolute,
+    Scene,
+    Sine,
+    Spring,
+    TorsionSpring,
+    Translational,
+)  # fmt: skip
+from mbref.scenes import SCENES
+
+Z = (0.0, 0.0, 1.0)
+
+
+def pendulum(**changes):
+    """A bar of 1 m held at one end, its frame not along its principal axes."""
+    inertia = ((0.05, 0.01, 0.0), (0.01, 0.06, 0.0), (0.0, 0.0, 0.1))
+    bar = Body(name="bar", mass=1.2, inertia=inertia, position=(0.3, -0.4, 0.2))
+    pivot = Revolute(name="pivot", bodies=("ground", "bar"), anchor=(0.0, 0.0, 0.0), axis=Z)
+    return Scene(**({"name": "pendulum", "body": (bar,), "joint": (pivot,)} | changes))
+
+
+def block(**changes):
+    """A body on an inclined line."""
+    body = Body(name="block", mass=2.0, inertia=(0.1, 0.1, 0.1), position=(1.0, 2.0, 3.0))
+    guide = Translational(
+        name="line", bodies=("ground", "block"), anchor=(1.0, 2.0, 3.0), axis=(3.0, 4.0, 0.0)
+    )
+    return Scene(**({"name": "block", "body": (body,), "joint": (guide,)} | changes))
+
+
+def free(**changes):
+    """A body with three different moments, spinning near its middle axis."""
+    body = Body(
+        name="body", mass=2.0, inertia=(0.2, 0.3, 0.4), position=(1.0, 0.0, 0.0), velocity=(0.0, 2.0, 1.0),
+        angular_velocity=(0.3, 5.0, 0.2), orientation=tuple(rotations.from_vector(np.array([0.3, 0.2, 0.9]))),
+    )  # fmt: skip
+    return Scene(**({"name": "free", "body": (body,)} | changes))
+
+
+def spring(first, start, second, stop, stiffness, natural_length):
+    """An undamped spring between two points."""
+    return Spring(
+        bodies=(first, second), points=(start, stop), stiffness=stiffness, natural_length=natural_length
+    )
+
+
+def swing(**changes):
+    return SCENES["planar_slider_crank_gravity"]().with_(**changes)
+
+
+SPRUNG = {
+    "pendulum_all": pendulum(
+        gravity=(1.0, -9.0, 2.0),
+        load=(
+            Moment(body="bar", moment=(0.0, 0.0, 2.5)),
+            Force(body="bar", point=(0.5, -0.8, 0.2), force=(1.0, 2.0, 3.0)),
+            spring("bar", (0.6, -0.8, 0.0), "ground", (1.0, 1.0, 1.0), 7.0, 0.4),
+            TorsionSpring(joint="pivot", stiffness=3.0, natural_angle=0.4),
+        ),
+    ),
+    "crank_torsion": swing(load=(TorsionSpring(joint="B", stiffness=8.0, natural_angle=-0.3),)),
+    "slider_spring": swing(
+        load=(
+            spring("crank", (0.1, 0.05, 0.0), "slider", (0.7, 0.0, 0.1), 90.0, 0.2),
+            Force(body="rod", point=(0.5, 0.1, 0.0), force=(3.0, -4.0, 1.0)),
+        )
+    ),
+    "block_spring": block(
+        gravity=(0.0, -9.81, 0.0),
+        load=(spring("ground", (0, 0, 0), "block", (1.5, 2, 3), 60.0, 2.0),),
+    ),
+    "free_spring": free(
+        gravity=(0.0, 0.0, -9.81),
+        load=(
+            spring("body", (1.1, 0.2, 0.3), "ground", (0, 0, 1), 30.0, 0.5),
+            Force(body="body", point=(1.0, 0.1, 0.0), force=(0.0, 1.0, 2.0)),
+        ),
+    ),
+}  # fmt: skip
+DYNAMIC = {n: SCENES[n]() for n in SCENES if not SCENES[n]().driver} | SPRUNG
+ALL = (
+    {n: SCENES[n]() for n in SCENES}
+    | SPRUNG
+    | {
+        "pendulum_driven": pendulum(driver=(Driver(joint="pivot", polynomial=(0, 2.0, -1.0)),)),
+        "block_driven": block(driver=(Driver(joint="line", sine=Sine(amplitude=0.3, frequency=4.0)),)),
+    }
+)
+
+
+def turned_scene(scene, q):
+    """The same mechanism, rotated in space."""
+
+    def turn(v):
+        return None if v is None else tuple(rotations.rotate(q, np.array(v)))
+
+    def retyped(item):
+        keys = [k for k in ("anchor", "axis", "moment", "force", "point") if hasattr(item, k)]
+        pairs = [k for k in ("axes", "anchors", "points") if hasattr(item, k)]
+        both = {k: turn(getattr(item, k)) for k in keys}
+        return item.model_copy(update=both | {k: tuple(map(turn, getattr(item, k))) for k in pairs})
+
+    bodies = [
+        b.model_copy(
+            update={k: turn(getattr(b, k)) for k in ("position", "velocity", "angular_velocity")}
+            | {"orientation": tuple(rotations.multiply(q, b.orientation))}
+        )
+        for b in scene.body
+    ]
+    return scene.with_(
+        body=tuple(bodies), joint=tuple(map(retyped, scene.joint)), load=tuple(map(retyped, scene.load)),
+        gravity=turn(scene.gravity),
+    )  # fmt: skip
