@@ -25,8 +25,9 @@ PUBLIC = ("engine", "version", "method", "settings", "outcome", "message", "t_en
 
 
 def public(record: Record) -> Record:
-    """The fields of a record that ``--json`` prints; numbers that are not finite become null."""
-    return {name: _finite(record[name]) for name in PUBLIC}
+    """The fields of a record that ``--json`` prints, ``timing`` too where the run was timed; numbers that
+    are not finite become null."""
+    return {name: _finite(record[name]) for name in (*PUBLIC, "timing") if name in record}
 
 
 def _finite(value: Any) -> Any:
@@ -40,7 +41,8 @@ def _finite(value: Any) -> Any:
 def timed(
     cases: Sequence[Case], records: Sequence[Record], repeats: int, notice: Callable[[str], None]
 ) -> list[Record]:
-    """The records with the ``cost.seconds`` of interleaved runs: their minimum, and ``cost.median``.
+    """The records with the ``cost.seconds`` of interleaved runs: their minimum, and ``timing``
+    with their median and number.
 
     The completed runs of a scene take turns in one process, so that all see the same machine.  A scene
     whose timing process fails keeps the seconds of its isolated runs, which a ``notice`` says.
@@ -71,10 +73,8 @@ def _with_cost(record: Record, seconds: Sequence[float]) -> Record:
     finite = [s for s in seconds if math.isfinite(s)]
     if not finite:
         return record
-    return {
-        **record,
-        "cost": {**record["cost"], "seconds": min(finite), "median": median(finite), "repeats": len(finite)},
-    }
+    cost = {**record["cost"], "seconds": min(finite)}
+    return {**record, "cost": cost, "timing": {"median": median(finite), "repeats": len(finite)}}
 
 
 def _completed(record: Record) -> bool:
@@ -133,7 +133,7 @@ def print_comparison(console: Console, records: Sequence[Record]) -> None:
 
 def _times(record: Record, fastest: float) -> tuple[str, str, str]:
     seconds = record["cost"]["seconds"]
-    middle = _number(record["cost"].get("median"))
+    middle = _number(record.get("timing", {}).get("median"))
     return _number(seconds), middle, f"{seconds / fastest:.1f}" if _completed(record) and fastest > 0 else "–"
 
 

@@ -1,0 +1,82 @@
+"""`python -m reports`: run the study, or what is missing of it, and render the report."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+from crosscheck.progress import shown
+from crosscheck.request import RequestError, find_engines
+from crosscheck.study import Record, study
+from mbref.scene import Scene
+from reports import plan
+from reports.timings import with_timings
+
+NEEDS = ("matplotlib", "jinja2")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Write the report; returns 0, or 2 when something is missing, or 130 when interrupted."""
+    if missing := [package for package in NEEDS if find_spec(package) is None]:
+        _notice(f"the report needs {' and '.join(missing)}: pip install 'mbref[report]'")
+        return 2
+    from reports.sections import NAMES
+
+    arguments = _parser(NAMES).parse_args(argv)
+    try:
+        scenes, records = _collect(Path(arguments.out), arguments.quick)
+    except RequestError as error:
+        _notice(str(error))
+        return 2
+    except KeyboardInterrupt:
+        _notice(f"interrupted; what has been run is in {arguments.out}, the same command goes on from there")
+        return 130
+    _render(scenes, records, Path(arguments.out), arguments.section or NAMES)
+    return 0
+
+
+def _collect(out: Path, is_quick: bool) -> tuple[dict[str, Scene], list[Record]]:
+    """Scenes and records of the study; raw records stay in ``out``/records.jsonl."""
+    engines = find_engines(None, _notice)
+    _notice("planning the sweep")
+    scenes, cases, unable = (plan.quick if is_quick else plan.whole)(engines)
+    for pair in unable:
+        _notice(f"{pair.engine} cannot run {pair.scene.name}: {pair.cannot}")
+    (out / "scenes").mkdir(parents=True, exist_ok=True)
+    for scene in scenes:
+        scene.save(out / "scenes" / f"{scene.name}.toml")
+    with shown("running", len(cases)) as progress:
+        records = study(cases, records_path=out / "records.jsonl", progress=progress)
+    records = with_timings(cases, records, out / "timings.jsonl", _notice)
+    return {scene.name: scene for scene in scenes}, records
+
+
+def _render(scenes: Mapping[str, Scene], records: Sequence[Record], out: Path, names: Sequence[str]) -> None:
+    from reports import render, sections
+    from reports.runs import by_scene
+
+    render.write(sections.blocks(by_scene(records, scenes), names), out)
+    _notice(f"written: {out / 'index.html'} and {out / 'report.md'}")
+
+
+def _parser(sections: Sequence[str]) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m reports",
+        description="Run the study, or what is missing of it, and render the report.",
+        epilog="example: python -m reports --quick --out report",
+    )
+    parser.add_argument("--quick", action="store_true", help="fewer scenes and settings, minutes")
+    parser.add_argument("--section", action="append", choices=sections, help="only this one; may repeat")
+    parser.add_argument("--out", default="report", metavar="DIR", help="folder to write (default: report)")
+    return parser
+
+
+def _notice(sentence: str) -> None:
+    print(sentence, file=sys.stderr)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,90 @@
+"""The look shared by every picture, and pictures as SVG text and PNG bytes, the same each time."""
+
+from __future__ import annotations
+
+import io
+import itertools
+from collections.abc import Iterable, Mapping
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from crosscheck.engine import engine_names
+from reports.runs import Curve
+
+# Okabe and Ito's colours, distinguishable with every common colour blindness; yellow is left out
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+MARKERS = ("o", "s", "^", "D", "v", "P", "h", "<", ">", "p")
+DASHES = ("-", "--", ":", "-.", (0, (6, 1.5, 1, 1.5, 1, 1.5)), (0, (1, 3)))
+FAILED = "X"
+INK, GREY = "#222222", "#8a8a8a"
+STYLE = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans", "sans-serif"],
+    "font.size": 9.0,
+    "axes.edgecolor": GREY,
+    "axes.labelcolor": INK,
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e6e6e6",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.5,
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+    "svg.fonttype": "none",
+    "path.simplify_threshold": 0.5,
+}
+
+
+def canvas(width: float = 7.2, height: float = 4.0, rows: int = 1) -> tuple[Figure, list[Axes]]:
+    """A figure of ``rows`` axes above one another sharing x; sizes in inches."""
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(width, height), layout="constrained")
+        axes = figure.subplots(rows, 1, sharex=True, squeeze=False)
+    return figure, list(axes[:, 0])
+
+
+def colour(engine: str) -> str:
+    """The engine's colour, the same in every picture; engines of third parties share the last ones."""
+    names = engine_names()
+    return COLOURS[names.index(engine) % len(COLOURS)] if engine in names else COLOURS[-1]
+
+
+def looks(curves: Iterable[Curve]) -> Mapping[Curve, dict]:
+    """Line and marker of every (engine, family): colour by engine, marker and dash by family."""
+    styles: dict[Curve, dict] = {}
+    for engine, group in itertools.groupby(sorted(set(curves)), key=lambda curve: curve[0]):
+        for i, curve in enumerate(group):
+            dash, marker = DASHES[i % len(DASHES)], MARKERS[i % len(MARKERS)]
+            styles[curve] = {"color": colour(engine), "linestyle": dash, "marker": marker}
+    return styles
+
+
+def legend_below(figure: Figure, axes: Axes, columns: int = 3) -> None:
+    """The legend of ``axes`` in columns under the figure, where it covers nothing."""
+    handles, labels = axes.get_legend_handles_labels()
+    if handles:
+        with matplotlib.rc_context(STYLE):
+            figure.legend(handles, labels, loc="outside lower left", ncols=columns, handlelength=3.2)
+
+
+def svg(figure: Figure, name: str) -> str:
+    """The picture as an SVG element; ``name`` makes its ids unique in a page."""
+    out = io.StringIO()
+    with matplotlib.rc_context({**STYLE, "svg.hashsalt": name, "svg.id": name}):
+        figure.savefig(out, format="svg", metadata={"Date": None, "Creator": None})
+    text = out.getvalue()
+    return text[text.index("<svg") :]
+
+
+def png(figure: Figure) -> bytes:
+    """The picture as PNG."""
+    out = io.BytesIO()
+    with matplotlib.rc_context(STYLE):
+        figure.savefig(out, format="png", dpi=110, metadata={"Software": None})
+    return out.getvalue()

@@ -1,0 +1,162 @@
+"""Run: a stored record as the sections read it, and the groupings they share."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from mbref.scene import Scene
+from mbref.trajectory import Outcome, Trajectory
+
+LEVELS = (1e-3, 1e-6, 1e-9)  # errors at which costs are compared
+WRONG = 1e-2  # a run that completes with a larger error has not followed the motion
+Curve = tuple[str, str]  # engine, family
+
+
+@dataclass(frozen=True)
+class Run:
+    """One record of the study. ``error`` is NaN where no truth could be compared with."""
+
+    record: Mapping[str, Any]
+
+    @property
+    def scene(self) -> str:
+        return self.record["scene"]
+
+    @property
+    def curve(self) -> Curve:
+        return self.record["engine"], self.record["family"]
+
+    @property
+    def label(self) -> str:
+        return " ".join(self.curve)
+
+    @property
+    def outcome(self) -> Outcome:
+        return Outcome[self.record["outcome"]]
+
+    @property
+    def completed(self) -> bool:
+        return self.outcome is Outcome.COMPLETED
+
+    @property
+    def t_end(self) -> float:
+        return self.record["t_end"]
+
+    @property
+    def reason(self) -> str:
+        """Why the run ended, one sentence; the outcome's own sentence where the engine gave none."""
+        return self.record["message"] or self.outcome.sentence
+
+    @property
+    def seconds(self) -> float:
+        return self.record["cost"]["seconds"]
+
+    @property
+    def error(self) -> float:
+        return self.metric("error")
+
+    @property
+    def is_false_success(self) -> bool:
+        """Whether the run says it completed and yet is WRONG."""
+        return self.completed and self.error > WRONG
+
+    def metric(self, name: str) -> float:
+        """A metric of the record; NaN where it has none."""
+        value = self.record["metrics"].get(name)
+        return math.nan if value is None else float(value)
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        return Trajectory.from_record(self.scene, self.record)
+
+
+@dataclass(frozen=True)
+class SceneRuns:
+    """A scene and its runs: what the sections about one scene are given."""
+
+    scene: Scene
+    runs: Sequence[Run]
+
+    def curves(self) -> dict[Curve, list[Run]]:
+        """Runs by engine and family, in the order of the records."""
+        curves: dict[Curve, list[Run]] = {}
+        for run in self.runs:
+            curves.setdefault(run.curve, []).append(run)
+        return curves
+
+    def swept(self, run: Run) -> str:
+        """The settings of a run that vary along its curve, as printed (``rtol=1e-06``); all if alone."""
+        settings = [other.record["settings"] for other in self.curves()[run.curve]]
+        own = run.record["settings"]
+        names = (
+            own
+            if len(settings) == 1
+            else [k for k in own if any(s.get(k, own[k]) != own[k] for s in settings)]
+        )
+        return ", ".join(f"{name}={plain(own[name])}" for name in names)
+
+    def completed(self) -> list[Run]:
+        return [run for run in self.runs if run.completed]
+
+    def best(self) -> dict[Curve, Run]:
+        """Of every curve the completed run of least error, else the one that got furthest."""
+        return {curve: min(runs, key=_rank) for curve, runs in self.curves().items()}
+
+
+def _rank(run: Run) -> tuple[bool, float, float]:
+    error = run.error if math.isfinite(run.error) else math.inf
+    return not run.completed, 0.0 if run.completed else -run.t_end, error
+
+
+def load(path: Path) -> list[dict[str, Any]]:
+    """The records of a JSON-lines file."""
+    return [json.loads(line) for line in path.read_text().splitlines() if line.strip()]
+
+
+def by_scene(records: Iterable[Mapping[str, Any]], scenes: Mapping[str, Scene]) -> list[SceneRuns]:
+    """Runs grouped by scene, in the order of ``scenes``; scenes without records are left out."""
+    groups: dict[str, list[Run]] = {name: [] for name in scenes}
+    for record in records:
+        groups[record["scene"]].append(Run(record))
+    return [SceneRuns(scenes[name], runs) for name, runs in groups.items() if runs]
+
+
+def plain(value: Any) -> str:
+    """A setting as text, numbers in their shortest form."""
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def number(value: float, digits: int = 2) -> str:
+    """A measured number for a table cell; an en dash where there is none."""
+    return "–" if not math.isfinite(value) else f"{value:.{digits}g}"
+
+
+def ratio(value: float) -> str:
+    """A multiple for a table cell."""
+    return "–" if not math.isfinite(value) else f"{value:.1f}"
+
+
+def short(level: float) -> str:
+    """An error level in words of the page: 1e-3."""
+    return f"{level:.0e}".replace("e-0", "e-")
+
+
+def power(value: float) -> str:
+    """An error for a table cell: one decimal and a power of ten."""
+    return "–" if not math.isfinite(value) else "0" if value == 0 else f"{value:.1e}"
+
+
+def duration(seconds: float) -> str:
+    """Seconds with the unit that suits them."""
+    if not math.isfinite(seconds):
+        return "–"
+    for unit, scale in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if seconds >= scale:
+            return f"{seconds / scale:.3g} {unit}"
+    return f"{seconds * 1e6:.3g} µs"

@@ -1,0 +1,32 @@
+"""One section a file; `render` takes runs and gives blocks, and never simulates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+
+from reports.blocks import Block, Heading
+from reports.runs import SceneRuns
+from reports.sections import convergence, energy, mechanism, outcomes, provenance, speed, summary, violation
+
+Chapter = Callable[[Sequence[SceneRuns]], list[Block]]
+Part = Callable[[SceneRuns], list[Block]]
+
+OPENING: Mapping[str, Chapter] = {"summary": summary.render}
+OF_A_SCENE: Mapping[str, Part] = {
+    "mechanism": mechanism.render,
+    "speed": speed.render,
+    "violation": violation.render,
+    "energy": energy.render,
+    "outcomes": outcomes.render,
+}
+CLOSING: Mapping[str, Chapter] = {"convergence": convergence.render, "provenance": provenance.render}
+NAMES = (*OPENING, *OF_A_SCENE, *CLOSING)
+
+
+def blocks(groups: Sequence[SceneRuns], names: Collection[str] = NAMES) -> list[Block]:
+    """The blocks of the named sections, scene by scene between opening and closing chapters."""
+    out = [block for name, render in OPENING.items() if name in names for block in render(groups)]
+    parts = [render for name, render in OF_A_SCENE.items() if name in names]
+    for group in groups if parts else ():
+        out += [Heading(group.scene.name, 2), *(block for part in parts for block in part(group))]
+    return out + [block for name, render in CLOSING.items() if name in names for block in render(groups)]

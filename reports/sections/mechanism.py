@@ -1,0 +1,49 @@
+"""The mechanism in motion, and its counts."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from reports import drawing
+from reports.blocks import Block, Figure, Heading, Table, Text
+from reports.runs import Run, SceneRuns, power
+
+
+def render(scene_runs: SceneRuns) -> list[Block]:
+    """Counts, and the poses of the most accurate run; without any state, the counts alone."""
+    blocks: list[Block] = [Heading("The mechanism"), _counts(scene_runs)]
+    shown = _most_accurate(scene_runs)
+    if shown is None:
+        return [*blocks, Text("No run left a state, so there is no motion to draw.")]
+    caption = (
+        f"Poses of {shown.label} ({scene_runs.swept(shown) or 'no settings'}; error {power(shown.error)}) "
+        f"from t = {shown.trajectory.times[0]:g} s to {shown.trajectory.times[-1]:g} s, the last darkest; "
+        f"triangles are joints to the ground, dashed lines their guides, thin grey lines the paths of the "
+        f"centres of mass. Seen along z if the motion is planar, else obliquely with y to the back."
+    )
+    draw = partial(drawing.mechanism, scene_runs.scene, shown.trajectory)
+    return [*blocks, Figure(f"{scene_runs.scene.name}-mechanism", caption, draw)]
+
+
+def _most_accurate(scene_runs: SceneRuns) -> Run | None:
+    best = [run for run in scene_runs.best().values() if len(run.trajectory.times)]
+    return min(best, key=lambda run: (not run.completed, run.error), default=None)
+
+
+def _counts(scene_runs: SceneRuns) -> Table:
+    counts = scene_runs.scene.counts()
+    joints = {joint.name: joint.type for joint in scene_runs.scene.joint}
+    columns = {
+        "Coordinates": counts.coordinates,
+        **{f"{name} {joints.get(name, '')}".strip(): rows for name, rows in counts.rows_by_joint.items()},
+        "Rows": counts.rows,
+        "Rank": counts.rank,
+        "Redundant rows": counts.redundant,
+        "Degrees of freedom": counts.degrees_of_freedom,
+    }
+    caption = (
+        "Counts at t = 0: velocity coordinates, six a body; the rows of every joint, its driver's included; "
+        "all rows, how many are independent, and the freedom that is left."
+    )
+    cells = [str(number) for number in columns.values()]
+    return Table(caption, tuple(columns), [cells], right=frozenset(range(len(cells))))

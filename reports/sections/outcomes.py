@@ -1,0 +1,26 @@
+"""Every run in one table: outcome, end time and error always together."""
+
+from __future__ import annotations
+
+from reports.blocks import Block, Heading, Table
+from reports.runs import Run, SceneRuns, duration, power
+
+HEADER = ("Engine", "Family", "Settings", "Outcome", "End time (s)", "Error", "Time", "Steps",
+          "Right-hand sides", "Message")  # fmt: skip
+
+
+def render(scene_runs: SceneRuns) -> list[Block]:
+    """The table of all runs of a scene."""
+    runs = scene_runs.runs
+    caption = f"All {len(runs)} runs: how each ended, when, and its error up to there."
+    rows = [_row(run, scene_runs.swept(run)) for run in runs]
+    return [Heading("Outcomes"), Table(caption, HEADER, rows, right=frozenset(range(4, 9)), folded=True)]
+
+
+def _row(run: Run, settings: str) -> tuple[str, ...]:
+    cost = run.record["cost"]
+    letter = f" ({run.outcome.letter})" if run.outcome.letter else ""
+    return (
+        *run.curve, settings, run.outcome.label + letter, f"{run.t_end:.4g}", power(run.error),
+        duration(run.seconds), str(cost["steps"]), str(cost["rhs"]), run.record["message"],
+    )  # fmt: skip

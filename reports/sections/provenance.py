@@ -1,0 +1,72 @@
+"""Where the numbers come from: versions, machines, settings, seed, and how to make them again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from reports.blocks import Block, Heading, Listing, Table, Text
+from reports.runs import Curve, Run, SceneRuns, plain
+
+
+def render(groups: Sequence[SceneRuns]) -> list[Block]:
+    """Versions and machines of all records, the settings of every family, the commands."""
+    runs = [run for group in groups for run in group.runs]
+    return [
+        Heading("Provenance", 2),
+        Text(f"{len(runs)} records; seed {_all({str(run.record['seed']) for run in runs})}. {_timing(runs)}"),
+        _versions(runs),
+        _machines(runs),
+        _settings(runs),
+        Text("To make this report again; records that are already stored are not run again:"),
+        Listing(_commands(groups)),
+    ]
+
+
+def _timing(runs: Sequence[Run]) -> str:
+    repeats = sorted({run.record.get("timing", {}).get("repeats", 1) for run in runs if run.completed})
+    if not repeats:
+        return "No run completed."
+    return (
+        f"Time is the CPU time of the stepping alone, the least of {' or '.join(map(str, repeats))} runs; "
+        f"where there are several, the runs of a scene took turns in one process."
+    )
+
+
+def _versions(runs: Sequence[Run]) -> Table:
+    engines = sorted({(run.record["engine"], run.record["version"] or "not installed") for run in runs})
+    packages = sorted({(k, v or "not installed") for run in runs for k, v in run.record["versions"].items()})
+    rows = [("engine", *row) for row in engines] + [("package", *row) for row in packages]
+    return Table("Versions that made the records.", ("Kind", "Name", "Version"), rows)
+
+
+def _machines(runs: Sequence[Run]) -> Table:
+    machines = {tuple(map(str, run.record["machine"].values())) for run in runs}
+    header = tuple(runs[0].record["machine"]) if runs else ()
+    return Table("Machines the runs were made on.", header, sorted(machines))
+
+
+def _settings(runs: Sequence[Run]) -> Table:
+    values: dict[tuple[Curve, str], dict[str, None]] = {}
+    for run in runs:
+        for name, value in run.record["settings"].items():
+            values.setdefault((run.curve, name), {})[plain(value)] = None
+    rows = [(*curve, name, ", ".join(seen)) for (curve, name), seen in values.items()]
+    return Table("Settings of every family.", ("Engine", "Family", "Option", "Values"), rows, folded=True)
+
+
+def _commands(groups: Sequence[SceneRuns]) -> str:
+    lines = [
+        "pip install 'mbref[engines,report]'",
+        "crosscheck report [--quick] --out DIR",
+        "",
+        "# one run alone",
+    ]
+    for group in groups[:1]:
+        first = group.runs[0]
+        engine, family = first.curve
+        lines.append(f"crosscheck run {group.scene.name} --engine {engine} --setting {family} --json")
+    return "\n".join(lines)
+
+
+def _all(values: set[str]) -> str:
+    return ", ".join(sorted(values))

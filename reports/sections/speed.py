@@ -1,0 +1,119 @@
+"""Speed against error: one curve per engine and family, and every failed run as a mark."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import partial
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
+from matplotlib.gridspec import GridSpec
+
+from reports import figures
+from reports.blocks import Block, Figure, Heading, Table, Text
+from reports.runs import WRONG, Curve, Run, SceneRuns, duration, power, short
+
+SMALLEST = 1e-16  # an error of exactly zero is drawn here
+UNTIMED = 1e-6  # s; a run that reports no time is drawn no lower
+
+Failures = Mapping[tuple[Curve, str], Sequence[Run]]
+
+
+def render(scene_runs: SceneRuns) -> list[Block]:
+    """The plot, and the key to its failed runs."""
+    heading = Heading("Speed against error")
+    drawable = [run for run in scene_runs.completed() if math.isfinite(run.error)]
+    failures = failed(scene_runs.runs)
+    if not drawable and not failures:
+        return [heading, Text("No run has an error to plot: this scene has no truth to compare with.")]
+    draw = partial(plot, scene_runs, failures)
+    picture = Figure(f"{scene_runs.scene.name}-speed", _caption(scene_runs, drawable), draw)
+    return [heading, picture, *([_key(failures)] if failures else [])]
+
+
+def failed(runs: Sequence[Run]) -> Failures:
+    """Runs that did not complete, by curve and outcome: those with one number in the plot."""
+    groups: dict[tuple[Curve, str], list[Run]] = {}
+    for run in runs:
+        if not run.completed:
+            groups.setdefault((run.curve, run.outcome.label), []).append(run)
+    return groups
+
+
+def _caption(scene_runs: SceneRuns, drawable: Sequence[Run]) -> str:
+    text = (
+        "Seconds of stepping against the largest error of any body at any sample; further left is more "
+        f"accurate, lower is faster. {len(scene_runs.completed())} of {len(scene_runs.runs)} runs completed."
+    )
+    if drawable:
+        best = min(drawable, key=lambda run: run.error)
+        quick = min(drawable, key=lambda run: run.seconds)
+        text += (
+            f" The least error is {power(best.error)} ({best.label}, {duration(best.seconds)}); "
+            f"the least time {duration(quick.seconds)} ({quick.label}, error {power(quick.error)})."
+        )
+    if wrong := sum(run.is_false_success for run in drawable):
+        text += f" {wrong} completed with an error above {short(WRONG)}: their outcome alone would deceive."
+    if len(scene_runs.completed()) < len(scene_runs.runs):
+        text += (
+            " The others stand in the strip on the right at the time they took; the key says why they ended."
+        )
+    return text
+
+
+def _key(failures: Failures) -> Table:
+    rows = []
+    for number, ((curve, _), runs) in enumerate(failures.items(), 1):
+        first = min(runs, key=lambda run: run.t_end)
+        ends = sorted({f"{run.t_end:.4g}" for run in runs}, key=float)
+        span = ends[0] if len(ends) == 1 else f"{ends[0]} … {ends[-1]}"
+        rows.append((str(number), *curve, str(len(runs)), first.outcome.label, span, first.reason))
+    header = ("Mark", "Engine", "Family", "Runs", "Outcome", "End time (s)", "Reason of the earliest")
+    return Table("The runs that did not complete.", header, rows, right=frozenset({0, 3, 5}))
+
+
+def plot(scene_runs: SceneRuns, failures: Failures) -> Drawing:
+    """Error and time on logarithmic axes; failed runs numbered in a strip of their own."""
+    figure, (main,) = figures.canvas(7.6, 4.8)
+    looks = figures.looks(scene_runs.curves())
+    for curve, runs in scene_runs.curves().items():
+        _draw_curve(main, curve, [r for r in runs if r.completed and math.isfinite(r.error)], looks[curve])
+    main.set(xscale="log", yscale="log", xlabel="largest error (fraction of the scene's length, or rad)",
+             ylabel="time of stepping (s)")  # fmt: skip
+    if failures:
+        _draw_strip(_beside(main), failures, looks)
+    main.margins(0.06, 0.09)
+    figures.legend_below(figure, main)
+    return figure
+
+
+def _draw_curve(axes: Axes, curve: Curve, runs: Sequence[Run], look: Mapping) -> None:
+    points = np.array([(max(r.error, SMALLEST), max(r.seconds, UNTIMED)) for r in runs])
+    if len(points):
+        axes.plot(*points.T, label=" ".join(curve), markersize=5, alpha=0.9, **look)
+
+
+def _beside(main: Axes) -> Axes:
+    """A narrow strip at the right of ``main`` with the same time axis."""
+    grid = GridSpec(1, 2, figure=main.figure, width_ratios=(5, 1))
+    main.set_subplotspec(grid[0])
+    with matplotlib.rc_context(figures.STYLE):
+        strip = main.figure.add_subplot(grid[1], sharey=main)
+    strip.set_facecolor("#f6f0ee")
+    strip.spines["left"].set_visible(False)
+    strip.tick_params(labelleft=False, which="both", left=False)
+    strip.set(xticks=[], xlim=(0, 1), title="did not\ncomplete")
+    strip.title.set_fontsize(8)
+    return strip
+
+
+def _draw_strip(strip: Axes, failures: Failures, looks: Mapping) -> None:
+    for number, ((curve, _), runs) in enumerate(failures.items(), 1):
+        x = (number - 0.5) / len(failures)
+        seconds = [max(run.seconds, UNTIMED) for run in runs]
+        strip.plot([x] * len(runs), seconds, figures.FAILED, color=looks[curve]["color"], markersize=6)
+        strip.annotate(str(number), (x, max(seconds)), (0, 6), textcoords="offset points", ha="center",
+                       fontsize=8)  # fmt: skip

@@ -1,0 +1,85 @@
+"""The first table: what every engine and family reaches, and what an error costs in it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from crosscheck.metrics import cost_at_error
+from reports.blocks import Block, Heading, Table, Text
+from reports.runs import LEVELS, Curve, Run, SceneRuns, duration, power, ratio, short
+
+HEADER = ("Engine", "Family", "Completed", "Least error", "Its settings", "Its time",
+          *(f"At {short(level)}" for level in LEVELS), "Ended otherwise")  # fmt: skip
+
+Costs = Mapping[Curve, Sequence[float]]  # seconds at each of LEVELS, NaN where it is not reached
+
+
+def render(groups: Sequence[SceneRuns]) -> list[Block]:
+    """One table a scene."""
+    runs = [run for group in groups for run in group.runs]
+    completed = sum(run.completed for run in runs)
+    text = (
+        f"{len(groups)} scenes, {len(runs)} runs of {len({run.curve[0] for run in runs})} engines; "
+        f"{completed} completed. Under an error level stands the time to reach it, read off the family's "
+        f"curve of time against error, as a multiple of the fastest; an en dash: it never gets there."
+    )
+    return [Heading("Summary", 2), Text(text), *(block for group in groups for block in _scene(group))]
+
+
+def _scene(group: SceneRuns) -> list[Block]:
+    curves = group.curves()
+    costs = {curve: [_cost(runs, level) for level in LEVELS] for curve, runs in curves.items()}
+    fastest = [_least(costs, i) for i in range(len(LEVELS))]
+    best = group.best()
+    order = sorted(curves, key=lambda curve: _rank(best[curve], costs[curve]))
+    rows = [_row(group, best[curve], costs[curve], fastest) for curve in order]
+    caption = f"To t = {group.scene.duration:g} s. Fastest: {_winners(costs, fastest)}."
+    table = Table(caption, HEADER, rows, right=frozenset({2, 3, 5, *range(6, 6 + len(LEVELS))}))
+    return [Heading(group.scene.name), table]
+
+
+def _cost(runs: Sequence[Run], level: float) -> float:
+    """Seconds at which the curve of the completed runs reaches an error; NaN where it does not."""
+    usable = [run for run in runs if run.completed and math.isfinite(run.error)]
+    cost = cost_at_error([run.seconds for run in usable], [run.error for run in usable], level)
+    return math.nan if cost is None else cost
+
+
+def _least(costs: Costs, level: int) -> float:
+    return min((c[level] for c in costs.values() if math.isfinite(c[level])), default=math.nan)
+
+
+def _rank(best: Run, costs: Sequence[float]) -> tuple[bool, float, float]:
+    """Completed first, then by the middle level's cost, then by the least error."""
+    middle = costs[len(costs) // 2]
+    return not best.completed, middle if math.isfinite(middle) else math.inf, best.error
+
+
+def _row(group: SceneRuns, best: Run, costs: Sequence[float], fastest: Sequence[float]) -> tuple[str, ...]:
+    runs = group.curves()[best.curve]
+    ratios = [ratio(cost / least) for cost, least in zip(costs, fastest, strict=True)]
+    floor = (
+        (power(best.error), group.swept(best), duration(best.seconds)) if best.completed else ("–", "–", "–")
+    )
+    done = f"{sum(run.completed for run in runs)} of {len(runs)}"
+    return (*best.curve, done, *floor, *ratios, _otherwise(runs))
+
+
+def _otherwise(runs: Sequence[Run]) -> str:
+    """How and when the other runs ended: the earliest of each outcome."""
+    earliest: dict[str, float] = {}
+    for run in runs:
+        if not run.completed:
+            earliest[run.outcome.label] = min(run.t_end, earliest.get(run.outcome.label, math.inf))
+    return ", ".join(f"{label} from {t:.4g} s" for label, t in earliest.items())
+
+
+def _winners(costs: Costs, fastest: Sequence[float]) -> str:
+    parts = []
+    for i, (level, least) in enumerate(zip(LEVELS, fastest, strict=True)):
+        names = [" ".join(curve) for curve, cost in costs.items() if cost[i] == least]
+        parts.append(
+            f"at {short(level)} {names[0]} ({duration(least)})" if names else f"at {short(level)} none"
+        )
+    return ", ".join(parts)

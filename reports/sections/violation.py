@@ -1,0 +1,34 @@
+"""Constraint violation over time, from the poses and velocities of the records."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from crosscheck.metrics import violation_series
+from reports import histories
+from reports.blocks import Block, Figure, Heading, Text
+from reports.runs import Run, SceneRuns, power
+
+LABELS = ("position (rad, or of the length)", "velocity (per second)")
+
+
+def render(scene_runs: SceneRuns) -> list[Block]:
+    """Violation of the most accurate run of every family, at position and velocity level."""
+
+    def measure(run: Run) -> list[np.ndarray]:
+        return [violation_series(scene_runs.scene, run.trajectory, level) for level in range(len(LABELS))]
+
+    heading, values = Heading("Constraint violation over time"), histories.series(scene_runs, measure)
+    if not values:
+        return [heading, Text("No run reached a second sample.")]
+    (low, least), (high, most) = histories.largest(values)
+    caption = (
+        "Largest violation of any joint in the most accurate run of every family; lower is better, a rising "
+        "line is drift, a cross where a run ended early. At position level the least maximum is "
+        f"{power(least)} "
+        f"({' '.join(low)}), the greatest {power(most)} ({' '.join(high)})."
+    )
+    draw = partial(histories.plot, scene_runs, values, LABELS)
+    return [heading, Figure(f"{scene_runs.scene.name}-violation", caption, draw)]
