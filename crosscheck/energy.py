@@ -34,9 +34,9 @@ def energy_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
         return np.full(len(trajectory.times), np.inf)
     kinetic = kinetic_energy(scene, *_motion(trajectory)[1:])
     start = kinetic_energy(scene, *(a[None] for a in _initial(scene)[1:]))[0]
-    gains = [kinetic - start, *_potential_gains(scene, trajectory)]
-    scale = max(start, kinetic.max(), *(np.abs(gain).max() for gain in gains))
-    return np.abs(np.sum(gains, axis=0)) / scale if np.isfinite(scale) and scale > 0 else None
+    gains = np.array([kinetic - start, *_potential_gains(scene, trajectory)])
+    scale = max(start, kinetic.max(), np.abs(gains).max())
+    return None if np.isnan(gains).any() or scale == 0 else np.abs(gains.sum(axis=0)) / scale
 
 
 def kinetic_energy(

@@ -14,7 +14,7 @@ import numpy as np
 
 from crosscheck import kinematics
 from crosscheck.energy import energy_series
-from crosscheck.tolerances import ROUNDING, STRAIGHT_LINE
+from crosscheck.tolerances import LEAST_ORDER, ROUNDING, STRAIGHT_LINE
 from crosscheck.truth import NoSolution, Truth
 from mbref import rotations
 from mbref.scene import Scene
@@ -168,20 +168,18 @@ def false_success(trajectory: Trajectory, error: float | None, level: float) -> 
 
 def order_of_convergence(steps: Sequence[float], errors: Sequence[float]) -> float | None:
     """Slope of log error over log step in the longest range of at least three neighbouring step sizes
-    that lies on a line; flat ranges (floors of rounding) count only when there is no other.
-
-    None when no three neighbours lie on a line.
+    that lies on a rising line; None where there is none, as on a floor of rounding.
     """
     table = np.array([(s, e) for s, e in zip(steps, errors, strict=True) if 0 < e < math.inf]).reshape(-1, 2)
     x, y = np.log10(table[np.argsort(table[:, 0])]).T
-    best: tuple[bool, int, float] | None = None
+    best: tuple[int, float] | None = None
     for i in range(len(x)):
         for j in range(i + 3, len(x) + 1):
             slope, level = np.polyfit(x[i:j], y[i:j], 1)
-            if np.sqrt(np.mean((slope * x[i:j] + level - y[i:j]) ** 2)) <= STRAIGHT_LINE:
-                candidate = (slope > 0.5, j - i, float(slope))
-                best = candidate if best is None else max(best, candidate)
-    return None if best is None else best[2]
+            scatter = np.sqrt(np.mean((slope * x[i:j] + level - y[i:j]) ** 2))
+            if scatter <= STRAIGHT_LINE and slope > LEAST_ORDER:
+                best = max(best or (0, 0.0), (j - i, float(slope)))
+    return None if best is None else best[1]
 
 
 def cost_at_error(costs: Sequence[float], errors: Sequence[float], level: float) -> float | None:

@@ -40,6 +40,9 @@ STRAIGHT_LINE = 0.1
 """Root mean square distance, in decades, from a line of a convergence curve's asymptotic range: error
 constants of rejected-step or event effects scatter by tens of percent, a floor bends by decades."""
 
+LEAST_ORDER = 0.5
+"""Slope below which errors do not converge: no consistent method has an order below one."""
+
 ERROR_LEVELS = (1e-3, 1e-6, 1e-9)
 """Errors at which costs are compared: animation, engineering, reference."""
 

@@ -1,0 +1,197 @@
+"""Metrics against trajectories whose faults were put in by hand."""
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from crosscheck import metrics
+from crosscheck.energy import energy_series, kinetic_energy
+from crosscheck.kinematics import scene_length
+from crosscheck.metrics import METRICS, cost_at_error, false_success, measure, order_of_convergence
+from crosscheck.truth import truth_for
+from mbref import rotations
+from mbref.scene import Moment
+from mbref.scenes import SCENES
+from mbref.trajectory import Outcome, Trajectory
+from tests.crosscheck.truth_scenes import SPRUNG, free, pendulum
+
+SCENE = SCENES["planar_slider_crank_gravity"]()
+TRUTH = truth_for(SCENE)
+EXACT = TRUTH.poses(np.linspace(0, 0.2, 21))
+
+
+def bumped(array, sample, body, bump):
+    """A copy of a trajectory array with one body's row changed at one sample."""
+    changed = array.copy()
+    changed[sample, body] += bump
+    return changed
+
+
+def test_exact_motion_has_no_error():
+    found = measure(SCENE, EXACT, TRUTH)
+    assert found["error"] < 1e-15 and found["velocity_error"] == 0 and found["scd"] > 15, found
+    assert found["energy_error"] < 1e-14 and found["violation_position"] < 1e-15, found
+    assert found.keys() == METRICS.keys()
+
+
+@pytest.mark.parametrize("body", [0, 1, 2])
+def test_position_error_is_the_shift_put_in_over_the_length(body):
+    shift = np.array([0.003, -0.004, 0.012])
+    found = measure(SCENE, replace(EXACT, position=bumped(EXACT.position, 7, body, shift)), TRUTH)
+    wanted = 0.013 / scene_length(SCENE)
+    assert found["position_error"] == pytest.approx(wanted, rel=1e-12), f"put in {wanted}, got {found}"
+    assert found["error"] == found["position_error"] and found["rotation_error"] < 1e-15, found
+    assert found["scd"] == pytest.approx(-math.log10(wanted)), found
+
+
+@given(vector=st.tuples(*[st.floats(-1.8, 1.8)] * 3))
+def test_rotation_error_is_the_angle_put_in(vector):
+    orientation = EXACT.orientation.copy()
+    orientation[4, 1] = -rotations.multiply(rotations.from_vector(np.array(vector)), orientation[4, 1])
+    got = measure(SCENE, replace(EXACT, orientation=orientation), TRUTH)["rotation_error"]
+    angle = np.linalg.norm(vector)
+    assert got == pytest.approx(angle, abs=1e-14), f"put in {angle}, measured {got}"
+
+
+def test_velocity_error_is_relative_to_the_largest_true_velocity():
+    spin = bumped(EXACT.angular_velocity, 5, 1, np.array([0.0, 0.3, 0.0]))
+    found = measure(SCENE, replace(EXACT, angular_velocity=spin), TRUTH)["velocity_error"]
+    length = scene_length(SCENE)
+    fastest = max(
+        np.linalg.norm(EXACT.velocity, axis=-1).max(),
+        length * np.linalg.norm(EXACT.angular_velocity, axis=-1).max(),
+    )
+    assert found == pytest.approx(0.3 * length / fastest, rel=1e-10), found
+
+
+def test_violations_are_the_gap_and_the_rates_put_in():
+    """The slider lifted off its line by z: 3 mm, 0.2 m/s and 5 m/s² at one sample."""
+    up = np.array([0.0, 0.0, 1.0])
+    lifted = replace(
+        EXACT,
+        position=bumped(EXACT.position, 3, 2, 0.003 * up),
+        velocity=bumped(EXACT.velocity, 6, 2, 0.2 * up),
+        acceleration=bumped(EXACT.acceleration, 9, 2, 5.0 * up),
+    )
+    found = measure(SCENE, lifted, TRUTH)
+    length = scene_length(SCENE)
+    wanted = {"position": 0.003 / length, "velocity": 0.2 / length, "acceleration": 5.0 / length}
+    for level, size in wanted.items():
+        got = found[f"violation_{level}"]
+        assert got == pytest.approx(size, rel=1e-9), f"{level}: put in {size}, measured {got}"
+    series = metrics.violation_series(SCENE, lifted)
+    assert series.argmax() == 3 and np.delete(series, 3).max() < 1e-15, series
+
+
+def test_energy_error_is_the_kinetic_energy_put_in():
+    push = np.array([0.0, 0.0, 2.0])
+    faster = replace(EXACT, velocity=bumped(EXACT.velocity, 8, 0, push))
+    added = SCENE.body[0].mass * 2.0**2 / 2
+    kinetic = kinetic_energy(SCENE, faster.orientation, faster.velocity, faster.angular_velocity)
+    got = energy_series(SCENE, faster)
+    assert got[8] == pytest.approx(added / kinetic.max(), rel=1e-9), f"{got[8]} of {added} J"
+    assert np.delete(got, 8).max() < 1e-14, got
+
+
+def test_work_of_a_moment_across_the_turning_axis_is_its_power_integrated():
+    scene = pendulum(gravity=(0.0, -9.81, 0.0), load=(Moment(body="bar", moment=(1.0, 0.0, 2.5)),))
+    truth = truth_for(scene)
+    drifts = [energy_series(scene, truth.poses(np.linspace(0, 1, n + 1))).max() for n in (40, 80, 160)]
+    orders = [math.log2(a / b) for a, b in itertools.pairwise(drifts)]
+    assert drifts[-1] < 1e-8 and min(orders) > 3.3, f"drifts {drifts}, orders {orders}"
+
+
+def test_work_of_a_moment_on_a_free_body_is_its_power_integrated():
+    scene = free(load=(Moment(body="body", moment=(1.0, -2.0, 0.5)),))
+    drift = energy_series(scene, truth_for(scene).poses(np.linspace(0, 1, 401))).max()
+    assert drift < 1e-8, f"energy drifts by {drift}"
+
+
+def test_turns_that_samples_cannot_tell_give_no_energy():
+    scene = SCENES["planar_slider_crank"]()
+    sparse = truth_for(scene).poses(np.linspace(0, 0.4, 9))
+    assert measure(scene, sparse)["energy_error"] is None, "6 turns between samples"
+
+
+@pytest.mark.parametrize("name", ["four_bar", "spatial_slider_crank_driven"])
+def test_driver_s_work_gives_no_energy(name):
+    scene = SCENES[name]()
+    assert measure(scene, truth_for(scene).poses(np.linspace(0, 0.1, 5)))["energy_error"] is None
+
+
+def test_damper_s_work_gives_no_energy():
+    scene = SPRUNG["block_spring"]
+    damped = scene.with_(load=(scene.load[0].model_copy(update={"damping": 1.0}),))
+    assert measure(damped, truth_for(damped).poses(np.linspace(0, 1, 50)))["energy_error"] is None
+
+
+def test_a_run_without_samples_has_no_numbers():
+    empty = Trajectory.failed(
+        scene=SCENE.name, engine="e", version="1", method="m", settings={}, bodies=EXACT.bodies,
+        outcome=Outcome.CRASHED, message="",
+    )  # fmt: skip
+    found = measure(SCENE, empty, TRUTH)
+    assert set(found.values()) == {None}, found
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_states_that_are_not_finite_have_infinite_errors(value):
+    lost = replace(EXACT, position=bumped(EXACT.position, 20, 1, value), acceleration=None)
+    found = measure(SCENE, lost, TRUTH)
+    assert found["error"] == found["violation_position"] == found["energy_error"] == math.inf, found
+    assert found["violation_acceleration"] is None and found["scd"] is None, found
+    assert not any(v is not None and math.isnan(v) for v in found.values()), found
+
+
+def test_without_truth_only_errors_are_missing():
+    found = measure(SCENE, EXACT)
+    missing = {name for name, value in found.items() if value is None}
+    assert missing == {"error", "position_error", "rotation_error", "scd", "velocity_error"}, missing
+
+
+def test_bodies_in_another_order_are_the_same_run():
+    order = [2, 0, 1]
+    keys = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
+    shuffled = replace(
+        EXACT, bodies=tuple(EXACT.bodies[i] for i in order), **{k: getattr(EXACT, k)[:, order] for k in keys}
+    )
+    assert measure(SCENE, shuffled, TRUTH) == pytest.approx(measure(SCENE, EXACT, TRUTH), abs=1e-15)
+    with pytest.raises(ValueError, match="other"):
+        measure(SCENE, replace(EXACT, bodies=("crank", "rod", "other")), TRUTH)
+
+
+@pytest.mark.parametrize("order", [1, 2, 4, 8])
+def test_order_is_the_power_put_in_above_a_floor(order):
+    steps = 0.5 / 2.0 ** np.arange(12)
+    scatter = 1 + 0.1 * np.sin(7 * np.arange(12))
+    errors = np.maximum(3 * steps**order * scatter, 1e-13)
+    errors[0] = 0.9  # not yet asymptotic
+    got = order_of_convergence(steps[::-1], errors[::-1])
+    assert got == pytest.approx(order, abs=0.1), f"put in {order}, measured {got}"
+
+
+def test_no_line_has_no_order():
+    assert order_of_convergence([0.1, 0.05], [1e-2, 1e-3]) is None
+    assert order_of_convergence([0.1, 0.05, 0.025, 0.0125], [1e-13, 2e-13, 1e-13, 1.5e-13]) is None
+    assert order_of_convergence([0.1, 0.05, 0.025, 0.0125], [1e-2, 1e-7, 1e-3, 1e-9]) is None
+    assert order_of_convergence([0.1, 0.05, 0.025], [math.inf, math.nan, 0.0]) is None
+
+
+def test_cost_is_read_on_the_lower_envelope():
+    costs, errors = [1.0, 10.0, 100.0, 50.0], [1e-2, 1e-4, 1e-6, 1e-3]  # error = 1e-2 / cost²; one is beaten
+    got = cost_at_error(costs, errors, 1e-5)
+    assert got == pytest.approx(10**1.5), f"measured {got}, the line has {10**1.5}"
+    assert cost_at_error(costs, errors, 0.5) == 1.0, "the cheapest run is already better"
+    assert cost_at_error(costs, errors, 1e-7) is None, "no run is so good"
+    assert cost_at_error([1.0, 2.0], [math.nan, math.inf], 1.0) is None
+
+
+def test_a_run_that_completes_far_from_the_truth_is_a_false_success():
+    assert false_success(EXACT, 0.5, 1e-2) and false_success(EXACT, math.inf, 1e-2)
+    assert not false_success(EXACT, 1e-3, 1e-2) and not false_success(EXACT, None, 1e-2)
+    assert not false_success(replace(EXACT, outcome=Outcome.VIOLATION), 0.5, 1e-2)
