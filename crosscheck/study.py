@@ -9,13 +9,14 @@ import json
 import os
 import platform
 from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_completed
+from concurrent.futures import Executor, ThreadPoolExecutor, as_completed, wait
 from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+import mbref
 from crosscheck import metrics
 from crosscheck.engine import Cannot, Setting, engine
 from crosscheck.isolate import run_isolated, stop_all
@@ -26,7 +27,7 @@ from mbref.trajectory import Outcome
 SCHEMA = 1
 SAMPLES = 101  # sample times of a default case, both ends included
 TIME_LIMIT = 60.0  # s, of a default case
-PACKAGES = ("mbref", "numpy", "scipy", "numba")
+PACKAGES = ("numpy", "scipy", "numba")
 
 Record = dict[str, Any]
 Progress = Callable[[int, int, Record], None]  # cases done, cases in all, the record just done
@@ -127,7 +128,8 @@ def run_case(case: Case) -> Record:
 @functools.cache
 def versions() -> dict[str, str | None]:
     """Versions of Python and of the packages that results depend on; None when not installed."""
-    return {"python": platform.python_version(), **{name: _installed(name) for name in PACKAGES}}
+    installed = {name: _installed(name) for name in PACKAGES}
+    return {"python": platform.python_version(), "mbref": mbref.__version__, **installed}
 
 
 @functools.cache
@@ -138,20 +140,20 @@ def machine() -> dict[str, str | int | None]:
 
 def _run_all(cases: Sequence[Case], executor: Executor | None) -> Generator[Record, None, None]:
     """Records as their runs end; when the caller stops early, so do the runs."""
-    own = ThreadPoolExecutor(os.cpu_count()) if executor is None else None
-    futures: list[Future[Record]] = []
+    if executor is None:
+        with ThreadPoolExecutor(os.cpu_count()) as threads:
+            yield from _run_all(cases, threads)
+        return
+    futures = [executor.submit(run_case, case) for case in cases]
     try:
-        futures += [(executor or own).submit(run_case, case) for case in cases]
         for future in as_completed(futures):
             yield future.result()
     except BaseException:
         for future in futures:
             future.cancel()
-        stop_all()
+        while isinstance(executor, ThreadPoolExecutor) and wait(futures, timeout=0.1).not_done:
+            stop_all()  # again and again: a run may have been about to start
         raise
-    finally:
-        if own:
-            own.shutdown()
 
 
 def _resumed(path: str | Path | None, cases: Sequence[Case], keys: Sequence[str]) -> dict[str, Record]:
