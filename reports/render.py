@@ -66,8 +66,12 @@ def _markdown(block: Block) -> str:
 
 def _rows(table: Table) -> str:
     rule = ["---:" if i in table.right else "---" for i in range(len(table.header))]
-    lines = [table.header, rule, *table.rows]
-    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+    return "\n".join(_line(cells) for cells in (table.header, rule, *table.rows))
+
+
+def _line(cells: Sequence[str]) -> str:
+    """One line of a Markdown table; what would end a cell or a line is taken out of it."""
+    return "| " + " | ".join(" ".join(cell.replace("|", "\\|").split()) for cell in cells) + " |"
 
 
 def slug(text: str) -> str:

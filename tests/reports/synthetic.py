@@ -1,0 +1,97 @@
+"""Records made without any engine: exact motions with errors of known size, and runs that fail."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from typing import Any
+
+import numpy as np
+
+from crosscheck.kinematics import scene_length
+from crosscheck.metrics import measure
+from crosscheck.truth import truth_for
+from mbref.scene import Scene
+from mbref.scenes import SCENES
+from mbref.trajectory import Cost, Outcome, Trajectory
+from reports.runs import SceneRuns, by_scene
+
+MADE_OF = {
+    "schema": 1, "time_limit": 60.0, "seed": 0, "versions": {"python": "3.x", "numpy": "2.x", "numba": None},
+    "machine": {"cpu": "a processor", "cores": 2, "system": "a system"},
+}  # fmt: skip
+
+
+@functools.cache
+def scene(name: str = "spatial_slider_crank") -> Scene:
+    return SCENES[name]().with_(duration=0.02)
+
+
+def exact(a_scene: Scene, samples: int = 13, share: float = 1.0) -> Trajectory:
+    """The true motion up to a share of the duration."""
+    times = np.linspace(0.0, a_scene.duration, samples)
+    return truth_for(a_scene).poses(times[times <= share * a_scene.duration])
+
+
+def record(
+    engine: str, family: str, error: float, seconds: float, steps: int = 100, a_scene: Scene | None = None,
+    outcome: Outcome = Outcome.COMPLETED, share: float = 1.0, **settings: Any,
+) -> dict[str, Any]:  # fmt: skip
+    """The record of a run that is shifted from the truth by ``error``, in scene lengths, at every sample."""
+    a_scene = a_scene or scene()
+    true = exact(a_scene, share=share)
+    shift = np.array([error * scene_length(a_scene), 0.0, 0.0])
+    shifted = dataclasses.replace(
+        true, engine=engine, version="1.0", method=family, settings=settings, outcome=outcome,
+        position=true.position + shift, t_end=share * a_scene.duration,
+        message="" if outcome is Outcome.COMPLETED else f"{outcome.sentence} | early\nindeed",
+        cost=Cost(seconds=seconds, steps=steps, rhs=4 * steps), scene=a_scene.name,
+    )  # fmt: skip
+    metrics = measure(a_scene, shifted, truth_for(a_scene))
+    key = f"{a_scene.name} {engine} {family} {settings} {error}"
+    return {
+        **MADE_OF,
+        **shifted.to_record(),
+        "scene": a_scene.name,
+        "family": family,
+        "key": key,
+        "metrics": metrics,
+    }
+
+
+def nothing(engine: str, family: str, a_scene: Scene | None = None) -> dict[str, Any]:
+    """The record of a run that crashed without a state."""
+    a_scene = a_scene or scene()
+    lost = Trajectory.failed(
+        scene=a_scene.name, engine=engine, version="", method=family, settings={}, outcome=Outcome.CRASHED,
+        bodies=tuple(b.name for b in a_scene.body), message="the process was ended by SIGSEGV",
+    )  # fmt: skip
+    metrics = measure(a_scene, lost, truth_for(a_scene))
+    more = {"scene": a_scene.name, "family": family, "key": f"{engine} {family}", "metrics": metrics}
+    return {**MADE_OF, **lost.to_record(), **more}
+
+
+@functools.cache
+def records() -> tuple[dict[str, Any], ...]:
+    """Two scenes: a method of order 4, a faster one of order 1, a wrong one, and three kinds of failure."""
+    spatial, planar = scene(), scene("planar_slider_crank")
+    orders = [
+        *(
+            record("mbref", "mpi-svd+projection", 1e-3 / 8**k, 0.01 * 2**k, 100 * 2**k, rtol=10.0**-k)
+            for k in range(3)
+        ),
+        *(record("mujoco", "tuned", 8e-3 / 2**k, 0.001 * 2**k, 50 * 2**k, step=0.1 / 2**k) for k in range(3)),
+        record("mujoco", "defaults", 0.5, 0.0005, step=0.1),
+    ]
+    failures = [
+        record("exudyn", "tuned", 1e-6, 0.02, outcome=Outcome.NOT_CONVERGED, share=0.5, step=0.1),
+        record("exudyn", "tuned", 1e-7, 0.04, outcome=Outcome.NOT_CONVERGED, share=0.6, step=0.01),
+        nothing("pinocchio", "defaults"),
+    ]
+    others = [record("mbref", "lm1+none", 1e-5, 0.01, a_scene=planar), nothing("exudyn", "defaults", planar)]
+    assert spatial.name != planar.name
+    return (*orders, *failures, *others)
+
+
+def groups() -> list[SceneRuns]:
+    return by_scene(records(), {s.name: s for s in (scene(), scene("planar_slider_crank"))})

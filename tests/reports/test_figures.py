@@ -1,0 +1,124 @@
+"""Figures: what the records say / what is drawn."""
+
+from __future__ import annotations
+
+import itertools
+import struct
+import zlib
+
+import numpy as np
+import pytest
+from synthetic import exact, groups, scene
+
+from crosscheck.engine import BUILT_IN
+from mbref.scenes import SCENES
+from reports import drawing, figures, histories
+from reports.blocks import Figure
+from reports.sections import blocks, speed
+
+
+def pictures() -> dict[str, Figure]:
+    return {block.name: block for block in blocks(groups()) if isinstance(block, Figure)}
+
+
+def pixels(png: bytes) -> int:
+    """How many different rows of pixels a PNG has, its filtering aside: a blank picture has few."""
+    place, data, width = 8, b"", struct.unpack(">I", png[16:20])[0]
+    while place < len(png):
+        length, kind = struct.unpack(">I4s", png[place : place + 8])
+        data += png[place + 8 : place + 8 + length] if kind == b"IDAT" else b""
+        place += 12 + length
+    rows = zlib.decompress(data)
+    stride = 4 * width + 1
+    return len({rows[i : i + stride] for i in range(0, len(rows), stride)})
+
+
+def test_every_picture_and_its_scene():
+    kinds = ("mechanism", "speed", "violation", "energy")
+    wanted = {f"{name}-{kind}" for name in ("spatial_slider_crank", "planar_slider_crank") for kind in kinds}
+    assert set(pictures()) == wanted, set(pictures()) ^ wanted
+
+
+@pytest.mark.parametrize(
+    "name", [f"spatial_slider_crank-{k}" for k in ("mechanism", "speed", "violation", "energy")]
+)
+def test_picture_is_not_blank_and_is_the_same_each_time(name):
+    picture = pictures()[name]
+    once, again = figures.svg(picture.draw(), name), figures.svg(picture.draw(), name)
+    assert once == again, f"{name} changes from one drawing to the next"
+    assert once.count("<path") > 10, f"{name} has {once.count('<path')} paths"
+    assert pixels(figures.png(picture.draw())) > 60, f"{name} is nearly blank"
+
+
+def test_speed_plot_and_one_mark_a_run():
+    group = groups()[0]
+    failures = speed.failed(group.runs)
+    main, strip = speed.plot(group, failures).axes
+    drawn = {line.get_label(): line.get_xydata() for line in main.lines}
+    for curve, runs in group.curves().items():
+        points = [(run.error, run.seconds) for run in runs if run.completed]
+        if points:
+            label = " ".join(curve)
+            np.testing.assert_allclose(drawn[label], points, err_msg=f"{label}: drawn / recorded")
+    marks = sum(len(line.get_xdata()) for line in strip.lines)
+    assert marks == sum(not run.completed for run in group.runs) == 3, marks
+    assert [text.get_text() for text in strip.texts] == ["1", "2"], [text.get_text() for text in strip.texts]
+    assert main.get_ylim() == strip.get_ylim(), "the strip has another time axis"
+
+
+def test_history_and_a_cross_where_a_run_ended_early():
+    group = groups()[0]
+    values = histories.series(group, lambda run: [np.ones_like(run.trajectory.times)])
+    [axes] = histories.plot(group, values, ["one"]).axes
+    crosses = [line.get_xdata()[0] for line in axes.lines if line.get_marker() == figures.FAILED]
+    assert len(crosses) == 1, crosses
+    assert 0 < crosses[0] <= 0.6 * group.scene.duration, crosses
+
+
+def test_engines_and_different_colours():
+    colours = {figures.colour(name) for name in BUILT_IN}
+    assert len(colours) == len(BUILT_IN), colours
+
+
+def test_curves_of_an_engine_and_different_looks():
+    looks = figures.looks([("mbref", str(i)) for i in range(12)])
+    kinds = {(str(look["linestyle"]), look["marker"]) for look in looks.values()}
+    assert len(kinds) == 12, kinds
+    assert {look["color"] for look in looks.values()} == {figures.colour("mbref")}
+
+
+@pytest.mark.parametrize("name", ["spatial_slider_crank", "planar_slider_crank", "four_bar", "five_bar"])
+def test_bodies_of_a_joint_and_one_point(name):
+    """Both bodies of every joint that keeps its points together are drawn through a common point."""
+    a_scene = SCENES[name]().with_(duration=0.02)
+    trajectory = exact(a_scene)
+    parts = {s.name: drawing.moved(s, trajectory, b) for b, s in enumerate(drawing.shapes(a_scene))}
+    for joint in a_scene.joint:
+        if "ground" in joint.bodies:
+            continue
+        first, second = (parts[body] for body in joint.bodies)
+        gap = np.linalg.norm(first[:, :, None] - second[:, None], axis=-1).min(axis=(1, 2)).max()
+        assert gap < 1e-9, f"{name} {joint.name}: {gap} m between the bodies"
+
+
+def test_links_and_their_lengths():
+    lengths = {s.name: np.ptp(s.points, axis=0) for s in drawing.shapes(scene("planar_slider_crank"))}
+    assert lengths["crank"] == pytest.approx([0.304, 0, 0], abs=1e-12), lengths
+    assert lengths["rod"] == pytest.approx([0.4048, 0, 0], abs=1e-12), lengths
+    assert lengths["slider"] == pytest.approx([0, 0, 0], abs=1e-12), lengths
+
+
+def test_path_and_the_truth_between_samples():
+    coarse, fine = exact(scene(), 49), exact(scene(), 12 * 49)
+    error = abs(drawing.path(coarse, 0) - fine.position[:, 0]).max()
+    assert error < 1e-5, f"{error} m off the path of the crank"
+
+
+def test_projection_and_the_directions_on_the_page():
+    x, y, z = (drawing.project(np.eye(3)[i], False) for i in range(3))
+    assert x == pytest.approx([1, 0]) and z == pytest.approx([0, 1]), (x, z)
+    assert np.linalg.norm(y) == pytest.approx(drawing.DEPTH) and (y > 0).all(), y
+    points = np.array([[0.0, 0, 3], [1, 2, 3]])
+    assert drawing.is_planar(points) and not drawing.is_planar(points[:, ::-1]), "planar is: constant z"
+    for a, b in itertools.pairwise(points):
+        assert drawing.project(b, True) - drawing.project(a, True) == pytest.approx([1, 2])

@@ -1,0 +1,145 @@
+"""The written report: blocks / page, Markdown and pictures; and the program that writes it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic import groups
+
+from crosscheck.engine import Setting
+from crosscheck.study import Case, default_cases, study
+from mbref.scene import Body, Scene
+from reports import __main__ as program
+from reports import plan, render
+from reports.blocks import Heading, Table
+from reports.sections import blocks
+from reports.timings import LONG, with_timings
+
+FAKE = "fake_engines:FAKE"
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("report")
+    render.write(blocks(groups()), out)
+    return out
+
+
+def test_page_and_every_block(written):
+    page = (written / "index.html").read_text()
+    for block in blocks(groups()):
+        if isinstance(block, Heading):
+            assert f">{block.text}</h{block.level}>" in page, block
+    assert page.count("<svg") == len(list((written / "figures").glob("*.svg"))) == 8, page.count("<svg")
+    assert page.count("<table>") == sum(isinstance(b, Table) for b in blocks(groups()))
+    assert "SIGSEGV" in page and "NOT_CONVERGED" in page, "a failed run is missing"
+
+
+def test_page_opens_offline(written):
+    page = (written / "index.html").read_text()
+    loaded = re.findall(
+        r'<(?:script|link|img|iframe)\b[^>]*|(?:url|src|@import)\s*[(=]\s*["\']?http[^)"\']*', page
+    )
+    assert not loaded, loaded
+
+
+def test_page_and_its_places(written):
+    page = (written / "index.html").read_text()
+    targets, ids = (
+        re.findall(r'href="#([\w-]+)"', page.split("</nav>")[0]),
+        set(re.findall(r'id="([\w-]+)"', page)),
+    )
+    assert targets and set(targets) <= ids, set(targets) - ids
+
+
+def test_words_of_a_message_are_no_markup(tmp_path):
+    render.write([Table("a < b", ("x",), [("<script>alert(1)</script>",)])], tmp_path)
+    assert "<script>" not in (tmp_path / "index.html").read_text()
+
+
+def test_markdown_and_the_pictures_beside_it(written):
+    text = (written / "report.md").read_text()
+    shown = re.findall(r"!\[[\w-]+\]\(([^)]+)\)", text)
+    assert len(shown) == 8, shown
+    for name in shown:
+        assert (written / name).stat().st_size > 5_000, f"{name} is nearly empty"
+        assert (written / name).with_suffix(".svg").exists(), name
+
+
+def test_markdown_tables_and_one_line_a_row(written):
+    lines = (written / "report.md").read_text().split("\n")
+    rows = [b for b in blocks(groups()) if isinstance(b, Table)]
+    assert sum(line.startswith("| ") for line in lines) == sum(len(b.rows) + 2 for b in rows)
+    for line in lines:
+        assert not line.startswith("|") or line.endswith("|"), f"a row is broken: {line}"
+
+
+def still(name: str) -> Scene:
+    block = Body(name="block", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(1.0, 2.0, 3.0))
+    return Scene(name=name, body=(block,), duration=0.5)
+
+
+def sweep(engines) -> plan.Sweep:
+    cases, unable = default_cases(still("still"), engines, None, np.linspace(0, 0.5, 4))
+    return [still("still")], cases, unable
+
+
+@pytest.fixture
+def of_fakes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(program, "find_engines", lambda names, notice: [FAKE])
+    monkeypatch.setattr(plan, "quick", sweep)
+
+
+def test_program_and_a_report_that_is_not_run_twice(tmp_path, of_fakes, capsys):
+    out = tmp_path / "report"
+    assert program.main(["--quick", "--out", str(out)]) == 0
+    names = ("records.jsonl", "timings.jsonl", "scenes/still.toml")
+    before = [(out / name).read_text() for name in names]
+    assert "fake plain" in (out / "index.html").read_text()
+    assert len(before[0].splitlines()) == 3, before[0]
+    assert Scene.from_file(out / "scenes" / "still.toml") == still("still")
+    assert program.main(["--quick", "--out", str(out), "--section", "provenance"]) == 0
+    assert [(out / name).read_text() for name in names] == before, "a stored run was run or timed again"
+    page = (out / "index.html").read_text()
+    assert "Provenance" in page and "Speed against error" not in page
+    assert "written" in capsys.readouterr().err
+
+
+def test_program_interrupted_and_what_to_do(tmp_path, of_fakes, capsys, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(program, "study", interrupted)
+    assert program.main(["--quick", "--out", str(tmp_path)]) == 130
+    assert "the same command goes on from there" in capsys.readouterr().err
+
+
+def test_program_without_its_packages_and_what_to_install(capsys, monkeypatch):
+    monkeypatch.setattr(program, "find_spec", lambda package: None)
+    assert program.main([]) == 2
+    assert "pip install 'mbref[report]'" in capsys.readouterr().err
+
+
+def test_short_runs_and_interleaved_times(tmp_path):
+    _, cases, _ = sweep([FAKE])
+    long = cases[0]._replace(setting=Setting("plain", {"seconds": 2 * LONG}))
+    cases = [*cases, long]
+    timed = with_timings(cases, study(cases), tmp_path / "timings.jsonl", lambda _: None)
+    assert [r.get("timing", {}).get("repeats") for r in timed] == [5, 5, 5, None], timed
+    assert [r["cost"]["seconds"] for r in timed] == [0.1, 0.2, 0.5, 2 * LONG]
+
+
+def case(family: str, k: int) -> Case:
+    return Case(still("s"), np.array([0.0, 1.0]), "e", Setting(family, {"k": k}))
+
+
+def test_thinned_sweep_and_the_ends_of_every_family():
+    named = [case(family, k) for family in ("other", "defaults", "tuned") for k in range(7)]
+    kept = [(c.setting.family, c.setting.options["k"]) for c in plan.thinned(named)]
+    assert kept == [(f, k) for f in ("defaults", "tuned") for k in (0, 3, 6)], kept
+    unnamed = [case(family, k) for family in ("a", "b", "c", "d") for k in range(2)]
+    kept = [(c.setting.family, c.setting.options["k"]) for c in plan.thinned(unnamed)]
+    assert kept == [(f, k) for f in ("a", "b", "c") for k in (0, 1)], kept

@@ -1,0 +1,178 @@
+"""Sections: the records / the numbers and words in the blocks; nothing is simulated."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from synthetic import groups, nothing, record, records, scene
+
+import crosscheck.isolate
+import crosscheck.study
+import mbref.simulate
+from mbref.trajectory import Outcome
+from reports.blocks import Figure, Heading, Table, Text
+from reports.runs import SceneRuns, by_scene, duration, ratio
+from reports.sections import (
+    NAMES,
+    blocks,
+    convergence,
+    energy,
+    mechanism,
+    outcomes,
+    provenance,
+    speed,
+    summary,
+)
+
+
+def table(parts, word: str) -> Table:
+    [found] = [b for b in parts if isinstance(b, Table) and word in b.header]
+    return found
+
+
+def column(found: Table, name: str) -> dict[tuple[str, str], str]:
+    """Cells of a column by engine and family."""
+    return {tuple(row[:2]): row[list(found.header).index(name)] for row in found.rows}
+
+
+def test_every_section_and_a_heading(monkeypatch):
+    def simulated(*_, **__):
+        raise AssertionError("a section simulated")
+
+    for module, name in ((crosscheck.study, "study"), (crosscheck.isolate, "run_isolated"),
+                         (mbref.simulate, "simulate"), (crosscheck.study, "run_isolated")):  # fmt: skip
+        monkeypatch.setattr(module, name, simulated)
+    parts = blocks(groups())
+    for part in parts:
+        if isinstance(part, Figure):
+            part.draw()
+    headings = [part.text for part in parts if isinstance(part, Heading)]
+    for heading in ("Summary", "spatial_slider_crank", "The mechanism", "Speed against error",
+                    "Constraint violation over time", "Energy balance over time", "Outcomes",
+                    "Order of convergence", "Provenance"):  # fmt: skip
+        assert heading in headings, (heading, headings)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_section_alone_and_its_blocks(name):
+    alone, everything = blocks(groups(), [name]), blocks(groups())
+    assert alone and len(alone) < len(everything), (len(alone), len(everything))
+
+
+def test_every_table_and_cells_that_are_words():
+    for part in blocks(groups()):
+        if isinstance(part, Table):
+            for row in part.rows:
+                assert len(row) == len(part.header), (part.header, row)
+                assert all(isinstance(cell, str) and "nan" not in cell for cell in row), row
+
+
+def test_summary_and_costs_worked_out_by_hand():
+    """The order-3 curve has time ∝ error^(-1/3), the order-1 curve time ∝ error^(-1) but ends at 2e-3."""
+    found = table(summary.render(groups()[:1]), "Least error")
+    at = column(found, "At 1e-3")
+    assert at["mbref", "mpi-svd+projection"] == "1.0", at
+    assert at["mujoco", "tuned"] == at["mujoco", "defaults"] == "–", at
+    assert column(found, "Completed")["exudyn", "tuned"] == "0 of 2", found.rows
+    assert column(found, "Ended otherwise")["exudyn", "tuned"] == "NOT_CONVERGED from 0.01 s", found.rows
+    assert column(found, "Least error")["mujoco", "tuned"] == "2.0e-03", found.rows
+    assert column(found, "Its settings")["mujoco", "tuned"] == "step=0.025", found.rows
+    assert "at 1e-3 mbref mpi-svd+projection (10 ms), at 1e-6 none" in found.caption, found.caption
+
+
+def test_summary_and_the_ratio_of_two_curves():
+    slow = [record("a", "x", e, s, rtol=e) for e, s in ((1e-2, 0.02), (1e-4, 0.2))]
+    fast = [record("b", "y", e, s, rtol=e) for e, s in ((1e-2, 0.01), (1e-4, 0.04))]
+    [group] = by_scene([*slow, *fast], {scene().name: scene()})
+    at = column(table(summary.render([group]), "Least error"), "At 1e-3")
+    expected = math.sqrt(0.02 * 0.2) / math.sqrt(0.01 * 0.04)  # half-way in both logarithms
+    assert at["b", "y"] == "1.0" and at["a", "x"] == ratio(expected) == "3.2", (at, expected)
+
+
+def test_least_error_and_end_times_that_rounding_moves():
+    ends = [
+        record("a", "x", 1e-3, 0.1, step=1.0),
+        {**record("a", "x", 1e-5, 0.1, step=0.1), "t_end": 0.0199999999},
+    ]
+    [group] = by_scene(ends, {scene().name: scene()})
+    assert group.best()["a", "x"].error == pytest.approx(1e-5), group.best()
+
+
+def test_order_of_convergence_and_the_synthetic_slopes():
+    [found] = [b for b in convergence.render(groups()[:1]) if isinstance(b, Table)]
+    orders = column(found, "spatial_slider_crank")
+    assert orders["mbref", "mpi-svd+projection"] == "3", orders
+    assert orders["mujoco", "tuned"] == "1", orders
+    assert orders["mujoco", "defaults"] == "–", orders
+
+
+def test_equal_mean_steps_and_no_order():
+    same = [record("a", "x", e, 0.1, 100, rtol=e) for e in (1e-3, 1e-5, 1e-7)]
+    [group] = by_scene(same, {scene().name: scene()})
+    assert math.isnan(convergence.slope(group, ("a", "x"))), convergence.slope(group, ("a", "x"))
+
+
+def test_outcome_table_and_outcome_time_and_error_together():
+    found = table(outcomes.render(groups()[0]), "Outcome")
+    assert len(found.rows) == len(groups()[0].runs)
+    for row, run in zip(found.rows, groups()[0].runs, strict=True):
+        cells = dict(zip(found.header, row, strict=True))
+        assert cells["Outcome"].startswith(run.record["outcome"]), cells
+        assert cells["End time (s)"] == f"{run.t_end:.4g}" and cells["Error"], cells
+    assert "NOT_CONVERGED (b)" in {row[3] for row in found.rows}, "the letter of the paper's footnote"
+
+
+def test_key_of_failures_and_their_reasons():
+    found = table(speed.render(groups()[0]), "Mark")
+    assert [row[:5] for row in found.rows] == [
+        ("1", "exudyn", "tuned", "2", "NOT_CONVERGED"), ("2", "pinocchio", "defaults", "1", "CRASHED")
+    ], found.rows  # fmt: skip
+    assert "SIGSEGV" in found.rows[1][-1] and "did not converge" in found.rows[0][-1], found.rows
+
+
+def test_caption_of_the_speed_plot_and_the_counts():
+    [caption] = [b.caption for b in speed.render(groups()[0]) if isinstance(b, Figure)]
+    for words in ("7 of 10 runs completed", "1 completed with an error above 1e-2", "least error is 1.6e-05"):
+        assert words in caption, caption
+
+
+def test_scene_without_any_state_and_words_instead_of_pictures():
+    [group] = by_scene([nothing("a", "x")], {scene().name: scene()})
+    for render in (mechanism.render, energy.render):
+        parts = render(group)
+        assert any(isinstance(b, Text) for b in parts), parts
+        assert not any(isinstance(b, Figure) for b in parts), parts
+
+
+def test_counts_and_the_scene_s():
+    found = table(mechanism.render(groups()[0]), "Redundant rows")
+    cells = dict(zip(found.header, found.rows[0], strict=True))
+    counts = scene().counts()
+    assert cells["Rank"] == str(counts.rank) and cells["Rows"] == str(counts.rows), (cells, counts)
+    assert (
+        sum(int(v) for k, v in cells.items() if k[:2] in {f"{j.name} " for j in scene().joint}) == counts.rows
+    )
+
+
+def test_provenance_and_every_version_and_setting():
+    parts = provenance.render(groups())
+    words = " ".join(cell for b in parts if isinstance(b, Table) for row in b.rows for cell in row)
+    for word in ("mujoco", "1.0", "numpy", "2.x", "not installed", "a processor", "step", "0.025"):
+        assert word in words, (word, words)
+    text = next(b.text for b in parts if isinstance(b, Text))
+    assert f"{len(records())} records; seed 0" in text and "the least of 1 runs" in text, text
+
+
+def test_completed_and_failed_runs_apart():
+    group = groups()[0]
+    assert isinstance(group, SceneRuns)
+    assert [r.outcome for r in group.completed()] == [Outcome.COMPLETED] * 7
+    assert [r.is_false_success for r in group.runs].count(True) == 1
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(2.5, "2.5 s"), (0.0123, "12.3 ms"), (4e-5, "40 µs"), (math.nan, "–")]
+)
+def test_duration_and_its_unit(seconds, text):
+    assert duration(seconds) == text, duration(seconds)
