@@ -9,7 +9,7 @@ import math
 import re
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -26,10 +26,14 @@ Configure = Callable[[Any, Any, bool], Any]  # (exudyn, simulation settings, sin
 
 @dataclass(frozen=True)
 class Motion:
-    """Node coordinates (3, k, nb, 7) at times (k,): values, rates, second rates; and how it ended."""
+    """Node coordinates (3, k, nb, 7) at times (k,): values, rates, second rates; and how it ended.
+
+    ``forces`` (k, ·) are the outputs of the joints' sensors, None where there are none.
+    """
 
     times: np.ndarray
     coordinates: np.ndarray
+    forces: np.ndarray | None
     cost: Cost
     t_end: float  # the last time the solver accepted
     outcome: Outcome = Outcome.COMPLETED
@@ -44,7 +48,7 @@ def integrate(
     clock = time.process_time()
     system = build(exu, scene, forces=True)
     built = time.process_time() - clock
-    pieces, failed, counts, seconds = [], None, np.zeros(3, dtype=int), 0.0
+    pieces, ended, seconds, counts = [], (Outcome.COMPLETED, ""), 0.0, np.zeros(3, dtype=int)
     for start, end, intervals in stretches(times):
         settings = exu.SimulationSettings()
         kind = configure(exu, settings, bool(system.redundant or scene.driver))
@@ -53,31 +57,35 @@ def integrate(
         try:
             system.mbs.SolveDynamic(settings, solverType=kind, updateInitialValues=True)
         except (exu.SolverError, exu.InternalError) as failure:
-            failed = _failure(system, failure)
+            ended = _failure(system, failure)
         seconds += time.process_time() - clock
         counts += _counts(system)
         pieces.append(system.samples())
-        if failed:
+        if ended[0] is not Outcome.COMPLETED:
             break
-    reached, coordinates = _join(times, pieces, complete=failed is None)
-    cost = Cost(seconds, built, *map(int, (counts[0], 0, 0, counts[1], counts[2])))
-    return finite(Motion(reached, coordinates, cost, _accepted(system), *(failed or (Outcome.COMPLETED, ""))))
+    samples = _join(times, pieces, complete=ended[0] is Outcome.COMPLETED)
+    steps, factorisations, newton = map(int, counts)
+    cost = Cost(seconds, built, steps=steps, factorisations=factorisations, newton=newton)
+    return finite(Motion(*samples, cost, _accepted(system), *ended))
 
 
 def extrapolate(exu: Any, scene: Scene, times: np.ndarray, step: float, configure: Configure) -> Motion:
     """Richardson extrapolation of runs with h, h/2, h/4 for a method whose error is even in h.
 
-    Positions, Euler parameters (normalised when they are read) and their rates are extrapolated; the
-    samples are those that all three runs reached.
+    Positions, Euler parameters (normalised when they are read), their rates and the joint sensors'
+    outputs are extrapolated; the samples are those that all three runs reached.
     """
     runs = [integrate(exu, scene, times, step, configure, divisor) for divisor in RICHARDSON]
     k = min(len(run.times) for run in runs)
-    coordinates = sum(
-        weight * run.coordinates[:, :k] for weight, run in zip(RICHARDSON.values(), runs, strict=True)
-    )
+    weighted = list(zip(RICHARDSON.values(), runs, strict=True))
     failed = next((run for run in runs if run.outcome is not Outcome.COMPLETED), runs[-1])
-    totals = [sum(getattr(run.cost, name) for run in runs) for name in Cost.__dataclass_fields__]
-    return Motion(runs[0].times[:k], coordinates, Cost(*totals), failed.t_end, failed.outcome, failed.message)
+    return replace(
+        failed,
+        times=times[:k],
+        coordinates=sum(weight * run.coordinates[:, :k] for weight, run in weighted),
+        forces=sum(weight * run.forces[:k] for weight, run in weighted),
+        cost=Cost(*(sum(getattr(run.cost, item.name) for run in runs) for item in fields(Cost))),
+    )
 
 
 def finite(motion: Motion) -> Motion:
@@ -89,6 +97,7 @@ def finite(motion: Motion) -> Motion:
     message = f"the state at t = {motion.times[k]:g} s is not finite"
     return replace(
         motion, times=motion.times[:k], coordinates=motion.coordinates[:, :k],
+        forces=None if motion.forces is None else motion.forces[:k],
         t_end=float(motion.times[k - 1]) if k else 0.0, outcome=Outcome.NOT_FINITE, message=message,
     )  # fmt: skip
 
@@ -150,20 +159,23 @@ def _counts(system: System) -> np.ndarray:
     return np.array([it.currentStepIndex - 1, it.newtonJacobiCount, it.newtonStepsCount])
 
 
-def _join(
-    times: np.ndarray, pieces: Sequence[tuple[np.ndarray, np.ndarray]], complete: bool
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+Samples = tuple[np.ndarray, np.ndarray, np.ndarray]  # times (k,), coordinates (3, k, nb, 7), forces (k, ·)
+
+
+def _join(times: np.ndarray, pieces: Sequence[Samples], complete: bool) -> Samples:
     """The wanted samples out of what the stretches recorded (each repeats its start)."""
-    recorded = np.concatenate([t if k == 0 else t[1:] for k, (t, _) in enumerate(pieces)])
-    values = np.concatenate([c if k == 0 else c[:, 1:] for k, (_, c) in enumerate(pieces)], axis=1)
+    recorded, values, forces = (
+        np.concatenate([part if n == 0 else np.delete(part, 0, axis) for n, part in enumerate(parts)], axis)
+        for axis, parts in zip((0, 1, 0), zip(*pieces, strict=True), strict=True)
+    )
     if times[0] > 0:
-        recorded, values = recorded[1:], values[:, 1:]
+        recorded, values, forces = recorded[1:], values[:, 1:], forces[1:]
     wanted = times[: len(recorded)]
     shift = wanted - recorded
     spacing = np.diff(times).min(initial=math.inf)
     if abs(shift).max(initial=0.0) > spacing / 2 or (complete and len(wanted) < len(times)):
         raise RuntimeError(f"Exudyn recorded samples at {recorded}, not at {times}")
-    return wanted, _moved(values, shift)
+    return wanted, _moved(values, shift), forces
 
 
 def _moved(values: np.ndarray, dt: np.ndarray) -> np.ndarray:

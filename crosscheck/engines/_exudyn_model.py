@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engines._exudyn_reactions import joint_frame, sensed, unit
 from crosscheck.engines._motion import motion
 from crosscheck.kinematics import initial_twists
 from mbref import rotations
@@ -34,12 +35,17 @@ class System:
     nodes: list[int]
     sensors: list[list[int]]  # per node: coordinates (7), their rates and second rates
     drivers: list[int]  # objects of the driver constraints
+    joint_sensors: list[int]  # joint by joint: what `sensed` names; then the drivers' forces
     redundant: int  # redundant constraints in the assembled configuration
 
-    def samples(self) -> tuple[np.ndarray, np.ndarray]:
-        """Times (k,) and node coordinates (3, k, nb, 7) recorded by the last run: values, rates, seconds."""
+    def samples(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What the last run recorded: times (k,), node coordinates (3, k, nb, 7) - values, rates, second
+        rates -, and the outputs (k, ·) of the joints' sensors side by side."""
         rows = np.array([[self.mbs.GetSensorStoredData(s) for s in node] for node in self.sensors])
-        return rows[0, 0, :, 0], rows[..., 1:].transpose(1, 2, 0, 3)
+        times = rows[0, 0, :, 0]
+        forces = [self.mbs.GetSensorStoredData(s)[:, 1:] for s in self.joint_sensors]
+        forces = np.concatenate([np.zeros((len(times), 0)), *forces], axis=1)
+        return times, rows[..., 1:].transpose(1, 2, 0, 3), forces
 
 
 def build(exu: Any, scene: Scene, forces: bool) -> System:
@@ -49,16 +55,21 @@ def build(exu: Any, scene: Scene, forces: bool) -> System:
     mbs = container.AddSystem()
     parts = _Parts(exu, items, scene, mbs, mbs.AddObject(items.ObjectGround()))
     nodes = parts.bodies(forces)
-    for joint in scene.joint:
-        parts.joint(joint)
+    joints = [parts.joint(joint) for joint in scene.joint]
     drivers = [parts.driver(driver) for driver in scene.driver]
+    of_joints = [
+        parts.sensor(number, output)
+        for joint, number in zip(scene.joint, joints, strict=True)
+        for output in sensed(joint)
+    ]
+    of_joints += [parts.sensor(number, "Force") for number in drivers]
     if forces:
         for load in scene.load:
             parts.load(load)
     sensors = [parts.sensors(node) for node in nodes]
     mbs.Assemble()
     redundant = int(mbs.ComputeSystemDegreeOfFreedom()["redundantConstraints"])
-    return System(mbs, nodes, sensors, drivers, redundant)
+    return System(mbs, nodes, sensors, drivers, of_joints, redundant)
 
 
 class _Parts:
@@ -98,25 +109,31 @@ class _Parts:
         local = self.exu.HT(rotation=frame, translation=np.asarray(point) - self.position[body])
         return self.mbs.AddMarker(self.items.MarkerBodyRigid(bodyNumber=self.number[body], localHT=local))
 
-    def joint(self, joint: Joint) -> None:
+    def joint(self, joint: Joint) -> int:
         items, bodies = self.items, joint.bodies
         if joint.type == "distance":
             markers = [self.marker(b, p) for b, p in zip(bodies, joint.anchors, strict=True)]
             length = float(np.linalg.norm(np.subtract(*joint.anchors)))
-            self.mbs.AddObject(items.ObjectConnectorDistance(markerNumbers=markers, distance=length))
-            return
-        frame = _joint_frame(joint)
+            return self.mbs.AddObject(items.ObjectConnectorDistance(markerNumbers=markers, distance=length))
+        frame = joint_frame(joint)
         markers = [self.marker(body, joint.anchor, frame) for body in bodies]
         if joint.type in GENERIC:
             axes = GENERIC[joint.type]
-            self.mbs.AddObject(items.ObjectJointGeneric(markerNumbers=markers, constrainedAxes=axes))
-            return
+            return self.mbs.AddObject(items.ObjectJointGeneric(markerNumbers=markers, constrainedAxes=axes))
         native = {
             "revolute": items.ObjectJointRevoluteZ,
             "spherical": items.ObjectJointSpherical,
             "translational": items.ObjectJointPrismaticX,
         }
-        self.mbs.AddObject(native[joint.type](markerNumbers=markers))
+        return self.mbs.AddObject(native[joint.type](markerNumbers=markers))
+
+    def sensor(self, number: int, output: str) -> int:
+        """A sensor of an output variable of a joint or constraint."""
+        kind = getattr(self.exu.OutputVariableType, output)
+        sensor = self.items.SensorObject(
+            objectNumber=number, outputVariableType=kind, storeInternal=True, writeToFile=False
+        )
+        return self.mbs.AddSensor(sensor)
 
     def driver(self, driver: Driver) -> int:
         """A coordinate constraint: relative coordinate of the joint's bodies = the driver's value."""
@@ -138,7 +155,7 @@ class _Parts:
             "bodyNumbers": [self.number[body] for body in joint.bodies],
             "localPosition0": local[0],
             "localPosition1": local[1],
-            "axis0": _unit(joint.axis),
+            "axis0": unit(joint.axis),
         }
 
     def _turns(self) -> int:
@@ -176,7 +193,7 @@ class _Parts:
 
     def _torsion_spring(self, load: Any) -> None:
         joint = self.joints[load.joint]
-        frame = _joint_frame(joint)
+        frame = joint_frame(joint)
         spring = self.items.ObjectConnectorTorsionalSpringDamper(
             markerNumbers=[self.marker(body, joint.anchor, frame) for body in joint.bodies],
             nodeNumber=self._turns(), stiffness=load.stiffness, damping=load.damping,
@@ -202,23 +219,3 @@ def _world_inertia(body: Any) -> np.ndarray:
     turn = rotations.to_matrix(np.array(body.orientation))
     j = turn @ (np.diag(local) if local.ndim == 1 else local) @ turn.T
     return np.array([j[0, 0], j[1, 1], j[2, 2], j[1, 2], j[0, 2], j[0, 1]])
-
-
-def _unit(axis: Any) -> np.ndarray:
-    return np.asarray(axis, dtype=float) / np.linalg.norm(axis)
-
-
-def _joint_frame(joint: Joint) -> np.ndarray:
-    """World axes (columns) of a joint's markers: the z axis along the joint's, x for a translation.
-
-    A universal joint keeps its frame's x on the first body and y on the second perpendicular.
-    """
-    if joint.type in ("fixed", "spherical"):
-        return np.eye(3)
-    if joint.type == "universal":
-        x, y = (_unit(axis) for axis in joint.axes)
-        return np.column_stack([x, y, np.cross(x, y)])
-    z = _unit(joint.axis)
-    x = _unit(np.cross(np.eye(3)[np.argmin(np.abs(z))], z))
-    y = np.cross(z, x)
-    return np.column_stack([z, x, y] if joint.type == "translational" else [x, y, z])

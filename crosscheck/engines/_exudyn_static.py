@@ -128,4 +128,4 @@ def drive(exu: Any, scene: Scene, times: np.ndarray, step: float) -> Motion:
     seconds = time.process_time() - built
     cost = Cost(seconds, built - clock, moving.steps, 0, 0, moving.factorisations, moving.newton)
     coordinates = np.array(found).reshape(len(found), 2, len(scene.body), 7).swapaxes(0, 1)
-    return finite(Motion(times[: len(found)], coordinates, cost, moving.now, outcome, message))
+    return finite(Motion(times[: len(found)], coordinates, None, cost, moving.now, outcome, message))

@@ -20,6 +20,7 @@ import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Setting, Why
 from crosscheck.engines._exudyn_dynamic import RICHARDSON, Motion, extrapolate, integrate
+from crosscheck.engines._exudyn_reactions import reactions
 from crosscheck.engines._exudyn_static import drive
 from crosscheck.kinematics import initial_poses, jacobian
 from crosscheck.tolerances import RANK
@@ -74,17 +75,19 @@ class Exudyn(Engine):
     def _trajectory(self, scene: Scene, setting: Setting, motion: Motion) -> Trajectory:
         q, rates, *seconds = motion.coordinates
         turned = q[..., 3:] + [1.0, 0.0, 0.0, 0.0]
+        turn = _normalised(turned)
         start, orientation = initial_poses(scene)
         known = bool(seconds) and not any(_accelerates(driver) for driver in scene.driver)
         return Trajectory(
             scene.name, self.name, self.version(), setting.family, dict(setting.options), motion.times,
             tuple(body.name for body in scene.body),
             position=start + q[..., :3],
-            orientation=rotations.multiply(_normalised(turned), orientation),
+            orientation=rotations.multiply(turn, orientation),
             velocity=rates[..., :3],
             angular_velocity=_spin(turned, rates[..., 3:]),
             acceleration=seconds[0][..., :3] if known else None,
             angular_acceleration=_spin(turned, seconds[0][..., 3:]) if known else None,
+            reactions=reactions(scene, q[..., :3], turn, motion.forces) if known else None,
             outcome=motion.outcome, message=motion.message, cost=motion.cost,
             t_end=motion.t_end,
         )  # fmt: skip

@@ -1,0 +1,91 @@
+"""Exudyn's reactions / Newton and Euler's equations of the body they hold."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Setting
+from crosscheck.engines.exudyn import ENGINE
+from mbref import rotations
+from mbref.scene import (
+    Body,
+    Cylindrical,
+    Distance,
+    Driver,
+    Fixed,
+    Moment,
+    Revolute,
+    Scene,
+    Sine,
+    Spherical,
+    Translational,
+    Universal,
+)
+from mbref.trajectory import Outcome, Trajectory
+
+SIDEWAYS = (0.6, 0.0, 0.8)  # an axis along no coordinate axis
+INERTIA = ((0.02, 0.002, -0.001), (0.002, 0.03, 0.003), (-0.001, 0.003, 0.025))
+BODY = Body(
+    name="b", mass=2.0, inertia=INERTIA, position=(0.0, 0.2, 0.0),
+    orientation=tuple(rotations.from_vector([0.3, -0.5, 0.8]).tolist()),
+)  # fmt: skip
+ANCHOR, OTHER = (0.1, 0.1, -0.2), (0.3, -0.1, 0.1)
+HELD = {
+    "fixed": lambda **j: Fixed(anchor=ANCHOR, **j),
+    "revolute": lambda **j: Revolute(anchor=ANCHOR, axis=SIDEWAYS, **j),
+    "cylindrical": lambda **j: Cylindrical(anchor=ANCHOR, axis=SIDEWAYS, **j),
+    "translational": lambda **j: Translational(anchor=ANCHOR, axis=SIDEWAYS, **j),
+    "spherical": lambda **j: Spherical(anchor=ANCHOR, **j),
+    "universal": lambda **j: Universal(anchor=ANCHOR, axes=((1.0, 0.0, 0.0), (0.0, 1.0, 1.0)), **j),
+    "distance": lambda **j: Distance(anchors=(ANCHOR, OTHER), **j),
+}
+
+
+def needed_wrench(scene: Scene, trajectory: Trajectory) -> np.ndarray:
+    """Force and moment (k, 6) about the anchor on the second body that Newton and Euler ask of the joint."""
+    body, joint = scene.body[0], scene.joint[0]
+    turn = rotations.to_matrix(trajectory.orientation[:, 0])
+    inertia = turn @ np.array(INERTIA) @ np.swapaxes(turn, 1, 2)
+    w, alpha = trajectory.angular_velocity[:, 0], trajectory.angular_acceleration[:, 0]
+    force = body.mass * (trajectory.acceleration[:, 0] - np.array(scene.gravity))
+    spin = np.einsum("kij,kj->ki", inertia, w)
+    moment = np.einsum("kij,kj->ki", inertia, alpha) + np.cross(w, spin) - np.array(scene.load[0].moment)
+    anchors = joint.anchors if joint.type == "distance" else (joint.anchor,) * 2
+    point = np.array(anchors[1])
+    if joint.bodies[1] == "b":
+        start = rotations.to_matrix(np.array(body.orientation))
+        point = trajectory.position[:, 0] + turn @ start.T @ (point - np.array(body.position))
+    moment = moment - np.cross(point - trajectory.position[:, 0], force)
+    return np.concatenate([force, moment], axis=1) * (1 if joint.bodies[1] == "b" else -1)
+
+
+@pytest.mark.parametrize("bodies", [("ground", "b"), ("b", "ground")])
+@pytest.mark.parametrize(
+    ("kind", "driven"),
+    [*((k, False) for k in HELD), ("revolute", True), ("cylindrical", True), ("translational", True)],
+)
+def test_reaction_and_newton_euler_agree(kind: str, driven: bool, bodies: tuple[str, str]):
+    scene = Scene(
+        name="held",
+        body=(BODY,),
+        gravity=(1.0, -9.81, 2.0),
+        joint=(HELD[kind](name="J", bodies=bodies),),
+        driver=(Driver(joint="J", polynomial=(0.0, 3.0)),) if driven else (),
+        load=(Moment(body="b", moment=(0.3, 0.5, -0.4)),),
+    )
+    trajectory = ENGINE.run(scene, np.linspace(0, 0.4, 5), Setting("tuned", {"step": 1e-3}))
+    assert trajectory.outcome is Outcome.COMPLETED, trajectory.message
+    needed = needed_wrench(scene, trajectory)
+    off = np.abs(trajectory.reactions["J"] - needed).max()
+    assert off < 1e-6 * np.abs(needed).max(), f"off by {off:.2e}:\n{trajectory.reactions['J']}\n{needed}"
+
+
+def test_reactions_without_reliable_accelerations_are_not_given():
+    """With an accelerating driver Exudyn's initial multipliers leave its acceleration out."""
+    driver = Driver(joint="J", sine=Sine(amplitude=0.1, frequency=3.0))
+    joint = HELD["revolute"](name="J", bodies=("ground", "b"))
+    scene = Scene(name="shaken", body=(BODY,), joint=(joint,), driver=(driver,))
+    trajectory = ENGINE.run(scene, np.linspace(0, 0.1, 3), Setting("tuned", {"step": 1e-3}))
+    assert trajectory.reactions is None
+    assert trajectory.acceleration is None
