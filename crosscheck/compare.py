@@ -99,7 +99,11 @@ def print_runs(console: Console, records: Sequence[Record]) -> None:
         for r in group:
             numbers = [_number(r["metrics"].get(m)) for m in MEASURED]
             table.add_row(
-                *_identity(r), _outcome(r), f"{r['t_end']:.4g}", *numbers, _number(r["cost"]["seconds"])
+                *_identity(r, group),
+                _outcome(r),
+                f"{r['t_end']:.4g}",
+                *numbers,
+                _number(r["cost"]["seconds"]),
             )
         console.print(table)
         _print_messages(console, group)
@@ -125,7 +129,7 @@ def print_comparison(console: Console, records: Sequence[Record]) -> None:
         table = _table(name, header, right_from=5)
         for r in sorted(group, key=lambda r: (not _completed(r), error(r))):
             measured = (f"{r['t_end']:.4g}", _number(error(r)), *_times(r, fastest))
-            table.add_row(letters[_curve(r)], *_identity(r), _outcome(r), *measured)
+            table.add_row(letters[_curve(r)], *_identity(r, group), _outcome(r), *measured)
         console.print(table)
         console.print(scatter(group, letters))
         _print_messages(console, group)
@@ -140,7 +144,7 @@ def _times(record: Record, fastest: float) -> tuple[str, str, str]:
 def _print_messages(console: Console, records: Sequence[Record]) -> None:
     for r in records:
         if not _completed(r):
-            console.print(Text(f"{' '.join(_identity(r))}: {r['outcome']}: {r['message']}"))
+            console.print(Text(f"{' '.join(_identity(r, records))}: {r['outcome']}: {r['message']}"))
 
 
 def scatter(records: Sequence[Record], letters: Mapping[tuple[str, str], str]) -> Text:
@@ -209,12 +213,17 @@ def _curve(record: Record) -> tuple[str, str]:
     return record["engine"], record["family"]
 
 
-def _identity(record: Record) -> tuple[str, str, str]:
-    settings = record["settings"].items()
-    return (
-        *_curve(record),
-        ", ".join(f"{k}={v:g}" if isinstance(v, float) else f"{k}={v}" for k, v in settings),
-    )
+def swept(record: Record, records: Sequence[Record]) -> str:
+    """The settings in which a record differs from others of its family, as printed (``rtol=1e-06``);
+    all of them when it is alone."""
+    own = record["settings"]
+    settings = [r["settings"] for r in records if _curve(r) == _curve(record)]
+    names = [k for k in own if len(settings) == 1 or any(s.get(k, own[k]) != own[k] for s in settings)]
+    return ", ".join(f"{k}={own[k]:g}" if isinstance(own[k], float) else f"{k}={own[k]}" for k in names)
+
+
+def _identity(record: Record, records: Sequence[Record]) -> tuple[str, str, str]:
+    return (*_curve(record), swept(record, records))
 
 
 def _outcome(record: Record) -> str:

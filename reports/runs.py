@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from crosscheck.compare import swept
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
@@ -92,14 +93,7 @@ class SceneRuns:
 
     def swept(self, run: Run) -> str:
         """The settings of a run that vary along its curve, as printed (``rtol=1e-06``); all if alone."""
-        settings = [other.record["settings"] for other in self.curves()[run.curve]]
-        own = run.record["settings"]
-        names = (
-            own
-            if len(settings) == 1
-            else [k for k in own if any(s.get(k, own[k]) != own[k] for s in settings)]
-        )
-        return ", ".join(f"{name}={plain(own[name])}" for name in names)
+        return swept(run.record, [other.record for other in self.runs])
 
     def completed(self) -> list[Run]:
         return [run for run in self.runs if run.completed]
