@@ -50,6 +50,75 @@ def test_slider_crank_of_any_lengths_is_recognised(a, ratio):
     assert np.abs(motion.position[:, 2, 0] - x).max() < 1e-13 * a * ratio * 10
 
 
+def with_joints(scene, change, **changes):
+    return scene.with_(joint=tuple(map(change, scene.joint)), **changes)
+
+
+def assert_same_motion(scene, other):
+    times = np.linspace(0, scene.duration / 2, 9)
+    wanted, got = truth_for(scene).poses(times), truth_for(other).poses(times)
+    off = np.abs(got.position - wanted.position).max()
+    angle = rotations.angle_between(got.orientation, wanted.orientation).max()
+    assert max(off, angle) < 1e-13, f"{scene.name}: {off} m and {angle} rad apart"
+
+
+@pytest.mark.parametrize(
+    "name", ["planar_slider_crank_gravity", "spatial_slider_crank_gravity", "four_bar_gravity"]
+)
+def test_truth_does_not_depend_on_the_sign_of_an_axis(name):
+    def flipped(joint):
+        axis = getattr(joint, "axis", None)
+        return joint if axis is None else joint.model_copy(update={"axis": tuple(-x for x in axis)})
+
+    assert_same_motion(ALL[name], with_joints(ALL[name], flipped))
+
+
+@pytest.mark.parametrize(
+    "name", ["four_bar", "spatial_slider_crank_driven", "pendulum_driven", "block_driven"]
+)
+def test_joint_seen_from_its_other_body_is_driven_backwards(name):
+    def swapped(joint):
+        axes = {"axes": joint.axes[::-1]} if joint.type == "universal" else {}
+        return joint.model_copy(update={"bodies": joint.bodies[::-1], **axes})
+
+    scene = ALL[name]
+    (driver,) = scene.driver
+    sine = driver.sine and driver.sine.model_copy(update={"amplitude": -driver.sine.amplitude})
+    backwards = Driver(joint=driver.joint, polynomial=tuple(-c for c in driver.polynomial), sine=sine)
+    assert_same_motion(scene, with_joints(scene, swapped, driver=(backwards,)))
+
+
+@pytest.mark.parametrize("joint", ["A", "D", "E", "F"])
+def test_five_bar_driven_at_any_joint_moves_alike(joint):
+    """Crank and rocker turn against the ground, the bar turns the other way against the crank."""
+    scene = ALL["five_bar"]
+    rate = 124.8 if joint == "E" else -124.8
+    assert_same_motion(scene, scene.with_(driver=(Driver(joint=joint, polynomial=(0.0, rate)),)))
+
+
+def test_folded_slider_crank_turns_about_the_resting_slider():
+    straight = planar_slider_crank(0.3, 0.3)
+    crank, rod, slider = straight.body
+    theta0 = 0.4
+    pin = (0.3 * np.cos(theta0), 0.3 * np.sin(theta0), 0.0)
+    middle = tuple(x / 2 for x in pin)
+    half = theta0 / 2
+    bodies = (
+        crank.model_copy(update={"position": middle, "orientation": (np.cos(half), 0.0, 0.0, np.sin(half))}),
+        rod.model_copy(update={"position": middle, "orientation": (-np.sin(half), 0.0, 0.0, np.cos(half))}),
+        slider.model_copy(update={"position": (0.0, 0.0, 0.0)}),
+    )
+    anchors = {"A": (0.0, 0.0, 0.0), "B": pin, "C": (0.0, 0.0, 0.0), "D": (0.0, 0.0, 0.0)}
+    joints = tuple(j.model_copy(update={"anchor": anchors[j.name]}) for j in straight.joint)
+    driver = Driver(joint="A", polynomial=(0.0, 5.0))
+    folded = straight.with_(body=bodies, joint=joints, driver=(driver,), load=())
+    t = np.linspace(0, 1, 20)
+    motion = truth_for(folded).poses(t)
+    circle = 0.15 * np.stack([np.cos(theta0 + 5 * t), np.sin(theta0 + 5 * t), 0 * t], axis=1)
+    off = np.abs(motion.position[:, 1] - circle).max(), np.abs(motion.position[:, 2]).max()
+    assert max(off) < 1e-14, f"rod and slider off by {off}"
+
+
 def moved_anchor(scene, joint, anchor):
     joints = [j.model_copy(update={"anchor": anchor}) if j.name == joint else j for j in scene.joint]
     return scene.with_(joint=tuple(joints))
