@@ -16,6 +16,7 @@ import functools
 import hashlib
 import os
 import sys
+import types as types_of_python
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -88,8 +89,16 @@ class Exchangeable:
 
     @functools.cached_property
     def callable(self) -> Callable:
-        """The same kernel as a function for Python to call with arrays."""
-        return self.function if PLAIN else Entry(self.function, self.signature)
+        """The same kernel as a function for Python to call with arrays.
+
+        Compiled from a renamed copy: numba's cache tells functions apart by name and signature only.
+        """
+        if PLAIN:
+            return self.function
+        f = self.function
+        copy = types_of_python.FunctionType(f.__code__, f.__globals__, f"{f.__name__}_entry")
+        copy.__module__, copy.__qualname__ = f.__module__, f"{f.__qualname__}_entry"
+        return Entry(copy, self.signature)
 
     def _compile(self) -> Callable:
         return cfunc(self.signature, **OPTIONS)(self.function)

@@ -6,6 +6,14 @@ from numpy import isfinite
 
 from mbref.compiled import INDICES, INT, MATRIX, VECTOR, entry, kernel, pointer_to
 from mbref.loads import remember_angles
+from mbref.singular import (
+    choose_nodes,
+    extrapolate,
+    keep_state,
+    leap_length,
+    relative_pivot,
+    to_edge,
+)
 from mbref.tables import (
     ACCELERATE,
     ACCELERATION,
@@ -13,6 +21,8 @@ from mbref.tables import (
     CHANGED,
     COLUMNS,
     COORDINATES,
+    CROSSINGS,
+    DENSE,
     FRAMES,
     LAST,
     LAST_TIME,
@@ -75,6 +85,17 @@ def worst_row(work):
 
 
 @kernel
+def judge(y, y_rate, place, control, work):
+    """Whether a state can be kept: finite, and no row violated beyond what is tolerated."""
+    if not (all_finite(y) and all_finite(y_rate)):
+        return NOT_FINITE
+    place[ROW] = worst_row(work)
+    if place[ROW] >= 0 and abs(work[ROWS][PHI, place[ROW]]) > control[VIOLATION]:
+        return VIOLATED
+    return OK
+
+
+@kernel
 def fastest_turn(work):
     """The largest component of a body's angular velocity (rad/s)."""
     frames, fastest = work[FRAMES], 0.0
@@ -98,6 +119,19 @@ def largest_step(control, work):
     fastest = fastest_turn(work)
     h = control[LARGEST_STEP]
     return min(h, control[LARGEST_TURN] / fastest) if fastest > 0.0 else h
+
+
+@kernel
+def place_inside(t, history, nodes, found, y, y_rate, work):
+    """The extrapolated state and accelerations at a sample time inside a window, for ``take_sample``."""
+    extrapolate(history, nodes, found, t, y, y_rate, work[DENSE])
+    state, acceleration = work[STATE], work[COLUMNS][ACCELERATION]
+    nq = state.shape[1]
+    for k in range(nq):
+        state[COORDINATES, k] = y[k]
+    for k in range(acceleration.shape[0]):
+        state[VELOCITIES, k] = y[nq + k]
+        acceleration[k] = y_rate[nq + k]
 
 
 @kernel
@@ -125,41 +159,51 @@ def first_step(t, control, tolerances, y, y_rate):
     INT(
         pointer_to(STEP), pointer_to(RATES), pointer_to(ACCEPT), pointer_to(ACCELERATE),
         VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, VECTOR, INDICES, VECTOR,
-        VECTOR, VECTOR, VECTOR, MATRIX, *PROBLEM,
+        VECTOR, VECTOR, VECTOR, MATRIX, MATRIX, INDICES, *PROBLEM,
     )
 )  # fmt: skip
 def march(
     step, rates, accept, accelerate,
     times, sample_q, sample_v, sample_a, sample_m, clock, control, place, tolerances,
-    y, y_rate, y_new, memory, ints, floats, work, pivots, settings, counts,
+    y, y_rate, y_new, memory, history, nodes, ints, floats, work, pivots, settings, counts,
 ):  # fmt: skip
     """Advance until the last sample time, a failure, or the number of steps per call; says which."""
     taken = 0
     while True:
         t, size = clock[TIME], pivots[SIZES, 1]
         status = rates(accelerate, t, y[:size], y_rate[:size], ints, floats, work, pivots, settings, counts)
+        if status == OK:
+            status = judge(y[:size], y_rate[:size], place, control, work)
         if status != OK:
             return status
-        if not (all_finite(y[:size]) and all_finite(y_rate[:size])):
-            return NOT_FINITE
         keep(t, ints, floats, work)
-        place[ROW] = worst_row(work)
-        if place[ROW] >= 0 and abs(work[ROWS][PHI, place[ROW]]) > control[VIOLATION]:
-            return VIOLATED
         while place[SAMPLE] < times.shape[0] and t >= times[place[SAMPLE]]:
             take_sample(place[SAMPLE], work, sample_q, sample_v, sample_a, sample_m)
             place[SAMPLE] += 1
+        keep_state(history, counts[STEPS], t, relative_pivot(work), y[:size], y_rate[:size])
         if place[SAMPLE] == times.shape[0]:
             return DONE
         if counts[STEPS] >= control[MOST_STEPS]:
             return TOO_MANY_STEPS
         if taken >= control[STEPS_PER_CALL]:
             return PAUSED
+        length = 0.0 if control[FIXED_STEP] > 0.0 else leap_length(history, counts[STEPS])
+        if length > 0.0:
+            status = leap(
+                length, accept, times, sample_q, sample_v, sample_a, sample_m, clock, place,
+                y, y_rate, y_new, history, nodes, ints, floats, work, pivots, settings, counts,
+            )  # fmt: skip
+            if place[SAMPLE] == times.shape[0]:
+                return DONE
+            if status != OK:
+                return status
+            taken += 1
+            continue
         if clock[NEXT_STEP] == 0.0:
             clock[NEXT_STEP] = first_step(t, control, tolerances, y[:size], y_rate[:size])
         status = advance(
             step, rates, accept, accelerate, times[place[SAMPLE]], clock, control, tolerances,
-            y, y_rate, y_new, memory, ints, floats, work, pivots, settings, counts,
+            y, y_rate, y_new, memory, history, nodes, ints, floats, work, pivots, settings, counts,
         )  # fmt: skip
         if status != OK:
             return status
@@ -167,13 +211,36 @@ def march(
 
 
 @kernel
+def leap(
+    length, accept, times, sample_q, sample_v, sample_a, sample_m, clock, place,
+    y, y_rate, y_new, history, nodes, ints, floats, work, pivots, settings, counts,
+):  # fmt: skip
+    """Cross a window by extrapolation and projection; samples inside it are taken as extrapolated."""
+    t, size = clock[TIME], pivots[SIZES, 1]
+    found = choose_nodes(history, counts[STEPS], 0.5 * length, nodes)
+    while place[SAMPLE] < times.shape[0] and times[place[SAMPLE]] <= t + length:
+        clock[TIME] = times[place[SAMPLE]]
+        place_inside(clock[TIME], history, nodes, found, y_new[:size], y_rate[:size], work)
+        take_sample(place[SAMPLE], work, sample_q, sample_v, sample_a, sample_m)
+        place[SAMPLE] += 1
+    clock[TIME] = t + length if place[SAMPLE] < times.shape[0] else clock[TIME]
+    extrapolate(history, nodes, found, t + length, y_new[:size], y_rate[:size], work[DENSE])
+    counts[STEPS] += 1
+    counts[CROSSINGS] += 1
+    status = accept(t + length, y_new, ints, floats, work, pivots, settings, counts)
+    if status == OK:
+        y[:] = y_new
+    return status
+
+
+@kernel
 def advance(
     step, rates, accept, accelerate, target, clock, control, tolerances,
-    y, y_rate, y_new, memory, ints, floats, work, pivots, settings, counts,
+    y, y_rate, y_new, memory, history, nodes, ints, floats, work, pivots, settings, counts,
 ):  # fmt: skip
     """One accepted step towards the target time, as many attempts as it takes."""
     t, size, interval = clock[TIME], pivots[SIZES, 1], target - clock[TIME]
-    limit = largest_step(control, work)
+    limit = min(largest_step(control, work), to_edge(history, counts[STEPS]))
     suggested = min(clock[NEXT_STEP], limit)
     while True:
         if control[FIXED_STEP] > 0.0:

@@ -87,7 +87,7 @@ class Model:
         return (
             frames, np.zeros((m, 12)), np.zeros((7, m)), columns, np.zeros((4, 7 * nb)),
             np.zeros((4, 7 * nb)), np.zeros((2 * big, big)), np.zeros((8, big)), np.zeros((1, scratch)),
-            angles, np.zeros((m, n)), np.zeros((1, 3)),
+            angles, np.zeros((m, n)), np.zeros((1, 4)),
         )  # fmt: skip
 
     def start(self) -> np.ndarray:

@@ -32,8 +32,10 @@ from mbref.march import (
 from mbref.method import Method
 from mbref.model import Model
 from mbref.scene import Scene, SceneError
+from mbref.singular import KEPT, NODES
 from mbref.tables import (
     COORDINATES,
+    CROSSINGS,
     EVALUATIONS,
     FACTORISATIONS,
     NEWTON,
@@ -131,7 +133,7 @@ class _Run:
         formulation, stabilisation, integrator = method.parts
         self.work = model.workspace(formulation.scratch(model.m, model.n))
         self.pivots = np.zeros((5, 2 * (model.m + 7 * model.nb)), dtype=np.int64)
-        self.counts = np.zeros(5, dtype=np.int64)
+        self.counts = np.zeros(6, dtype=np.int64)
         self.problem = (
             model.ints, model.floats, self.work, self.pivots,
             method.settings(limits.rank_tolerance), self.counts,
@@ -172,6 +174,8 @@ class _Run:
         k, nb, n, m = self.times.size, self.model.nb, self.model.n, self.model.m
         self.y_rate, self.y_new = np.zeros_like(self.y), np.zeros_like(self.y)
         self.memory = np.zeros((rows, self.y.size))
+        self.history = np.zeros((KEPT, 2 + 2 * self.y.size))
+        self.nodes = np.zeros(NODES, dtype=np.int64)
         self.samples = (np.zeros((k, 7 * nb)), np.zeros((k, n)), np.zeros((k, n)), np.zeros((k, m)))
 
     def march(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
@@ -180,7 +184,7 @@ class _Run:
         tolerances = np.array([self.limits.rtol, atol])
         arguments = (
             *self.kernels, self.times, *self.samples, self.clock, self.control, self.place, tolerances,
-            self.y, self.y_rate, self.y_new, self.memory, *self.problem,
+            self.y, self.y_rate, self.y_new, self.memory, self.history, self.nodes, *self.problem,
         )  # fmt: skip
         began, status = time.process_time(), PAUSED
         while status == PAUSED:
@@ -252,7 +256,9 @@ class _Run:
     def _message(self, status: int) -> str:
         """One sentence: what ended the run, where; or what was corrected at its start."""
         if status == DONE:
-            return self.start.report()
+            crossings = int(self.counts[CROSSINGS])
+            passed = f"singular positions passed: {crossings}" if crossings else ""
+            return "; ".join(filter(None, (self.start.report(), passed)))
         t = self.clock[TIME]
         if status == VIOLATED:
             row = int(self.place[ROW])

@@ -34,12 +34,12 @@ DENSE_VECTORS = 7  # (8, ·) vectors for the chart
 SCRATCH = 8  # (1, ·) memory of the formulation
 ANGLES = 9  # (1, torsion springs): unwrapped angle at the last accepted step
 PHI_Q = 10  # (rows, 6 nb): the dense constraint Jacobian
-MEMO = 11  # (1, 3): what a chart remembers between steps, see below
+MEMO = 11  # (1, 4): what a chart remembers between steps, see below
 
 PHI, NU, GAMMA, PHI_RATE, RHS, MULTIPLIERS, ROW_SCALE = range(7)  # rows of ROWS
 FORCE, ACCELERATION, MASS, INVERSE_ROOT, STEP_X, STEP_Y = range(6)  # rows of COLUMNS
 COORDINATES, VELOCITIES, COORDINATE_RATES, COORDINATE_SECOND = range(4)  # rows of STATE and LAST
-LAST_TIME, REFERENCE_PIVOT, SMALLEST_PIVOT = range(3)  # entries of MEMO
+LAST_TIME, REFERENCE_PIVOT, SMALLEST_PIVOT, GENERIC_RANK = range(4)  # entries of MEMO
 ROW_ORDER, COLUMN_ORDER, SIZES, CHART_PIVOTS, FORMULATION_PIVOTS = range(5)  # rows of pivots
 
 POSITION, ROTATION, VELOCITY, OMEGA = 0, 3, 12, 15  # columns of FRAMES
@@ -48,7 +48,7 @@ POINT, DOT1, DOT2, DISTANCE = range(4)  # kinds of primitives
 MOMENT, FORCE_AT_POINT, SPRING, TORSION_SPRING = range(4)  # kinds of loads
 
 # counts, an array of integers that kernels add to
-STEPS, REJECTED, EVALUATIONS, FACTORISATIONS, NEWTON = range(5)
+STEPS, REJECTED, EVALUATIONS, FACTORISATIONS, NEWTON, CROSSINGS = range(6)
 
 # settings, an array of floats
 VELOCITY_GAIN, POSITION_GAIN, RANK_TOLERANCE, NEWTON_TOLERANCE = range(4)

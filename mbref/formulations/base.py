@@ -53,6 +53,6 @@ class Formulation:
             mass, inverse_root, np.ascontiguousarray(jacobian, dtype=float),
             np.ascontiguousarray(force, dtype=float), np.ascontiguousarray(gamma, dtype=float),
             self.settings(options, rank_tolerance), np.zeros(self.scratch(m, n)),
-            np.zeros(m + n, dtype=np.int64), np.zeros(5, dtype=np.int64), acceleration, multipliers,
+            np.zeros(m + n, dtype=np.int64), np.zeros(6, dtype=np.int64), acceleration, multipliers,
         )  # fmt: skip
         return status, acceleration, multipliers

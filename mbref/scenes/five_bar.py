@@ -8,16 +8,14 @@ from __future__ import annotations
 
 import math
 
-from mbref.scene import Driver, Revolute, Scene
-from mbref.scenes.four_bar import LENGTH, Z, parallelogram
-from mbref.scenes.links import CRANK_RATE, about_z, link
+from mbref.scene import Revolute, Scene
+from mbref.scenes.four_bar import LENGTH, Z, driven, parallelogram
+from mbref.scenes.links import about_z, link
 
 
 def five_bar(theta0: float = math.pi / 2, name: str = "five_bar") -> Scene:
     """Driven at -124.8 rad/s from θ₂ = theta0 (rad)."""
-    return _with_bar(theta0, name).with_(
-        driver=(Driver(joint="A", polynomial=(0.0, -CRANK_RATE)),), duration=0.1
-    )
+    return driven(_with_bar(theta0, name))
 
 
 def five_bar_gravity(theta0: float = 0.3, name: str = "five_bar_gravity") -> Scene:

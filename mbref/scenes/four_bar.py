@@ -20,9 +20,17 @@ X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 def four_bar(theta0: float = math.pi / 2, name: str = "four_bar") -> Scene:
     """Driven at -124.8 rad/s from θ₂ = theta0 (rad)."""
-    return parallelogram(theta0, name).with_(
-        driver=(Driver(joint="A", polynomial=(0.0, -CRANK_RATE)),), duration=0.1
+    return driven(parallelogram(theta0, name))
+
+
+def driven(linkage: Scene) -> Scene:
+    """With the crank driven; the rates name the branch, which a singular start leaves open."""
+    turning = {"crank": -CRANK_RATE, "rocker": -CRANK_RATE}
+    body = tuple(
+        b.model_copy(update={"angular_velocity": (0.0, 0.0, turning.get(b.name, 0.0))}) for b in linkage.body
     )
+    driver = Driver(joint="A", polynomial=(0.0, -CRANK_RATE))
+    return linkage.with_(body=body, driver=(driver,), duration=0.1)
 
 
 def four_bar_gravity(theta0: float = 0.3, name: str = "four_bar_gravity") -> Scene:

@@ -20,9 +20,9 @@ from mbref.tables import (
 )
 
 
-@exchangeable(ENTER)
-def enter(t, y, ints, floats, work, pivots, settings, counts):
-    state = work[STATE]
+@kernel
+def copy_state(state, y):
+    """Coordinates and velocities of ``work[STATE]`` into y; the length of y."""
     nq = state.shape[1]
     nv = 6 * (nq // 7)
     for k in range(nq):
@@ -30,6 +30,11 @@ def enter(t, y, ints, floats, work, pivots, settings, counts):
     for k in range(nv):
         y[nq + k] = state[VELOCITIES, k]
     return nq + nv
+
+
+@exchangeable(ENTER)
+def enter(t, y, ints, floats, work, pivots, settings, counts):
+    return copy_state(work[STATE], y)
 
 
 @exchangeable(RATES)

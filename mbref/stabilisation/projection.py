@@ -13,15 +13,18 @@ from mbref.compiled import exchangeable, kernel
 from mbref.evaluation import dense_jacobian, evaluate, violation_rate
 from mbref.linalg import equilibrate, minimum_norm, qr_pivoted
 from mbref.stabilisation.base import Stabilisation
-from mbref.stabilisation.full import enter, normalise, rates
+from mbref.stabilisation.full import copy_state, normalise, rates
 from mbref.tables import (
     ACCEPT,
     CHART_PIVOTS,
     COLUMNS,
     DENSE,
     DENSE_VECTORS,
+    ENTER,
     FACTORISATIONS,
+    GENERIC_RANK,
     INVERSE_ROOT,
+    MEMO,
     NEWTON,
     NEWTON_TOLERANCE,
     NOT_CONVERGED,
@@ -30,9 +33,11 @@ from mbref.tables import (
     PHI_Q,
     PHI_RATE,
     RANK_TOLERANCE,
+    REFERENCE_PIVOT,
     RHS,
     ROW_SCALE,
     ROWS,
+    SMALLEST_PIVOT,
     STATE,
     STEP_X,
 )
@@ -54,10 +59,33 @@ def factor(ints, work, pivots, settings, counts):
         for j in range(n):
             b[j, i] = jacobian[i, j]
     counts[FACTORISATIONS] += 1
-    return qr_pivoted(
+    rank = qr_pivoted(
         b, n, m, pivots[CHART_PIVOTS], vectors[TAU], vectors[NORMS : NORMS + 2], vectors[ROW_WORK],
         settings[RANK_TOLERANCE],
     )  # fmt: skip
+    watch_pivot(rank, work)
+    return rank
+
+
+@kernel
+def watch_pivot(rank, work):
+    """Keep the largest rank seen, its last pivot now, and the largest that pivot has been."""
+    memo = work[MEMO][0]
+    if rank > memo[GENERIC_RANK]:
+        memo[GENERIC_RANK] = rank
+        memo[REFERENCE_PIVOT] = 0.0
+    generic = int(memo[GENERIC_RANK])
+    memo[SMALLEST_PIVOT] = abs(work[DENSE][generic - 1, generic - 1]) if 0 < generic == rank else 0.0
+    memo[REFERENCE_PIVOT] = max(memo[REFERENCE_PIVOT], memo[SMALLEST_PIVOT])
+
+
+@exchangeable(ENTER)
+def enter(t, y, ints, floats, work, pivots, settings, counts):
+    size = copy_state(work[STATE], y)
+    nq, nv = work[STATE].shape[1], work[COLUMNS].shape[1]
+    evaluate(t, y[:nq], y[nq : nq + nv], ints, floats, work)
+    factor(ints, work, pivots, settings, counts)
+    return size
 
 
 @kernel
