@@ -59,7 +59,8 @@ def _caption(scene_runs: SceneRuns, drawable: Sequence[Run]) -> str:
         text += f" {wrong} completed with an error above {short(WRONG)}: their outcome alone would deceive."
     if len(scene_runs.completed()) < len(scene_runs.runs):
         text += (
-            " The others stand in the strip on the right at the time they took; the key says why they ended."
+            " The others stand in the strip on the right at the time they took, at its foot if that was less "
+            "than any completed run took; the key says why they ended."
         )
     return text
 
@@ -84,7 +85,8 @@ def plot(scene_runs: SceneRuns, failures: Failures) -> Drawing:
     main.set(xscale="log", yscale="log", xlabel="largest error (fraction of the scene's length, or rad)",
              ylabel="time of stepping (s)")  # fmt: skip
     if failures:
-        _draw_strip(_beside(main), failures, looks)
+        times = [run.seconds for run in scene_runs.completed()]
+        _draw_strip(_beside(main), failures, looks, foot=max(min(times, default=UNTIMED), UNTIMED))
     main.margins(0.06, 0.09)
     figures.legend_below(figure, main)
     return figure
@@ -110,10 +112,10 @@ def _beside(main: Axes) -> Axes:
     return strip
 
 
-def _draw_strip(strip: Axes, failures: Failures, looks: Mapping) -> None:
+def _draw_strip(strip: Axes, failures: Failures, looks: Mapping, foot: float) -> None:
     for number, ((curve, _), runs) in enumerate(failures.items(), 1):
         x = (number - 0.5) / len(failures)
-        seconds = [max(run.seconds, UNTIMED) for run in runs]
+        seconds = [max(run.seconds, foot) for run in runs]
         strip.plot([x] * len(runs), seconds, figures.FAILED, color=looks[curve]["color"], markersize=6)
         strip.annotate(str(number), (x, max(seconds)), (0, 6), textcoords="offset points", ha="center",
                        fontsize=8)  # fmt: skip
