@@ -1,0 +1,209 @@
+"""Spanning trees / the scene's own counts, masses and velocities."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from crosscheck.engines._motion import motion
+from crosscheck.engines._start import initial_rates, lacks_mass, twist_maps
+from crosscheck.engines.graph import GROUND_LINK, ROWS, Link, Tree, effective_mass, spanning_tree
+from crosscheck.kinematics import initial_twists
+from mbref import rotations
+from mbref.scene import (
+    Body,
+    Cylindrical,
+    Distance,
+    Driver,
+    Fixed,
+    Revolute,
+    Scene,
+    Sine,
+    Spherical,
+    Translational,
+    Universal,
+)
+from mbref.scenes import SCENES
+from tests.crosscheck.tree_scenes import INERTIA, driven, every_joint, ring
+
+KINDS = (Fixed, Revolute, Translational, Universal, Cylindrical, Spherical, Distance)
+CLOSURE_ROWS = {"point": 3, "weld": 6}
+
+
+@st.composite
+def graphs(draw: st.DrawFn) -> Scene:
+    """Scenes of 1 to 6 bodies and up to 9 joints of any kind between any two of them or the ground."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1), label="seed"))
+    n = draw(st.integers(1, 6), label="bodies")
+    bodies = tuple(
+        Body(name=f"b{i}", mass=float(rng.uniform(0.5, 2)), inertia=INERTIA, position=rng.normal(size=3),
+             orientation=rotations.from_vector(rng.normal(size=3)))
+        for i in range(n)
+    )  # fmt: skip
+    names = ["ground", *(b.name for b in bodies)]
+    joints = []
+    for k, kind in enumerate(draw(st.lists(st.sampled_from(KINDS), max_size=9), label="joints")):
+        pair = tuple(str(name) for name in rng.choice(names, 2, replace=False))
+        u, v = rng.normal(size=(2, 3))
+        places = {
+            "axis": u, "axes": (u, np.cross(u, v)), "anchor": v, "anchors": (u, v),
+            "name": f"j{k}", "bodies": pair,
+        }  # fmt: skip
+        joints.append(kind(**{key: value for key, value in places.items() if key in kind.model_fields}))
+    return Scene(name="graph", body=bodies, joint=tuple(joints))
+
+
+def rods(tree: Tree) -> list:
+    return [link for link in tree.links if link.ends]
+
+
+@given(graphs())
+def test_parents_of_links_lie_on_the_way_from_the_ground(scene: Scene) -> None:
+    way: list[int] = []
+    for k, link in enumerate(spanning_tree(scene).links):
+        while way and way[-1] != link.parent:
+            way.pop()
+        assert link.parent in (GROUND_LINK, *way), f"link {k} hangs from {link.parent}, not on the way {way}"
+        way.append(k)
+
+
+@given(graphs())
+def test_freedoms_less_closure_rows_are_coordinates_less_joint_rows(scene: Scene) -> None:
+    tree = spanning_tree(scene)
+    counted = 6 * len(scene.body) - sum(ROWS.get(joint.type, 1) for joint in scene.joint)
+    spins = len(rods(tree))
+    measured = tree.nv - spins - sum(CLOSURE_ROWS[c.kind] for c in tree.closures)
+    assert measured == counted, f"tree gives mobility {measured}, the scene's joints {counted}"
+
+
+@given(graphs())
+def test_links_together_have_the_inertia_of_the_bodies(scene: Scene) -> None:
+    tree = spanning_tree(scene)
+    links = sum(spatial_inertia(k.mass, k.position + k.offset, without_spin(k)) for k in tree.links)
+    for rod in rods(tree):  # an end held by the ground is mass that never moves
+        for body, point in rod.ends:
+            links = links - (spatial_inertia(rod.mass / 2, point, np.zeros((3, 3))) if body < 0 else 0)
+    turned = [rotations.to_matrix(np.array(b.orientation)) for b in scene.body]
+    bodies = sum(
+        spatial_inertia(b.mass, np.array(b.position), r @ np.array(b.inertia) @ r.T)
+        for b, r in zip(scene.body, turned, strict=True)
+    )
+    gap = abs(links - bodies).max()
+    assert gap < 1e-12 * abs(bodies).max(), f"spatial inertia off by {gap:.2e} of {abs(bodies).max():.3g}"
+
+
+def without_spin(link: Link) -> np.ndarray:
+    """A link's inertia; of a rod, which never spins, less its moment about its own axis."""
+    if not link.ends:
+        return link.inertia
+    along = link.ends[1][1] - link.ends[0][1]
+    along = along / np.linalg.norm(along)
+    return link.inertia - (along @ link.inertia @ along) * np.outer(along, along)
+
+
+def spatial_inertia(mass: float, centre: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+    """(4, 4): mass, first and second moments about the world's origin."""
+    second = np.trace(inertia) / 2 * np.eye(3) - inertia + mass * np.outer(centre, centre)
+    return np.block([[second, mass * centre[:, None]], [mass * centre[None], np.array([[mass]])]])
+
+
+@given(graphs())
+def test_every_part_keeps_a_positive_mass_and_inertia(scene: Scene) -> None:
+    for link in spanning_tree(scene).links:
+        least = np.linalg.eigvalsh(link.inertia)[0]
+        assert link.mass > 0 and least > 0, (
+            f"body {link.body}: mass {link.mass:.3g}, least moment {least:.3g}"
+        )
+
+
+@given(graphs(), st.data())
+def test_a_driven_joint_stays_in_the_tree_and_moves_one_coordinate(scene: Scene, data: st.DataObject) -> None:
+    kinds = ("revolute", "cylindrical", "translational")
+    names = [joint.name for joint in scene.joint if joint.type in kinds]
+    if not names:
+        return
+    name = data.draw(st.sampled_from(names))
+    scene = scene.with_(driver=(Driver(joint=name, polynomial=(0.0, 1.0)),))
+    tree = spanning_tree(scene)
+    index = [joint.name for joint in scene.joint].index(name)
+    assert index not in [c.joint for c in tree.closures], f"{name} was cut"
+    assert 0 <= tree.coordinate(scene, name) < tree.nv, (
+        f"coordinate {tree.coordinate(scene, name)} of {tree.nv}"
+    )
+
+
+@pytest.mark.parametrize("kind", ["revolute", "cylindrical", "universal", "spherical"])
+def test_the_loosest_joint_of_a_loop_is_cut(kind: str) -> None:
+    (closure,) = spanning_tree(ring(kind)).closures
+    expected = "point" if kind == "spherical" else "weld"
+    cut = ring(kind).joint[closure.joint]
+    assert closure.kind == expected, f"{kind}: closed by a {closure.kind}, not a {expected}"
+    assert cut.type == kind, f"cut the {cut.type} {cut.name}, not the {kind}"
+
+
+@pytest.mark.parametrize("kind", [Fixed, Translational])
+def test_a_stiff_joint_is_split_when_the_loop_has_no_looser_one(kind: type) -> None:
+    axis = {"axis": (1.0, 0.0, 0.0)} if kind is Translational else {}
+    pairs = (("ground", "a"), ("a", "b"), ("b", "ground"))
+    scene = Scene(
+        name="stiff",
+        body=tuple(Body(name=n, mass=2.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0)) for n in "ab"),
+        joint=tuple(
+            kind(name=f"j{i}", bodies=p, anchor=(0.0, 0.0, 0.0), **axis) for i, p in enumerate(pairs)
+        ),
+    )
+    tree = spanning_tree(scene)
+    masses = [link.mass for link in tree.links if link.body == 1]
+    assert masses == [1.0, 1.0], f"body b is in parts of {masses} kg, expected two equal ones of 1 kg"
+
+
+def test_rods_take_a_share_of_what_their_anchors_can_spare() -> None:
+    scene = every_joint()
+    tree = spanning_tree(scene)
+    (rod,) = rods(tree)
+    whole = spanning_tree(scene.with_(joint=tuple(j for j in scene.joint if j.type != "distance")))
+    spare = min(effective_mass(whole.links[whole.own[b]], point) for b, point in rod.ends)
+    assert rod.mass / 2 < 0.5 * spare, f"an end of {rod.mass / 2:.3g} kg where {spare:.3g} kg are to be had"
+
+
+SCENE_LIST = [*SCENES, "every_joint", "driven", "ring_universal"]
+
+
+@pytest.mark.parametrize("name", SCENE_LIST)
+def test_bodies_start_with_the_consistent_velocities(name: str) -> None:
+    own = {"every_joint": every_joint, "driven": driven, "ring_universal": lambda: ring("universal")}
+    scene = {**SCENES, **own}[name]()
+    tree = spanning_tree(scene)
+    twists = (twist_maps(tree) @ initial_rates(scene, tree))[list(tree.own)]
+    expected = np.hstack(initial_twists(scene))
+    gap = abs(twists - expected).max()
+    assert gap < 1e-11 * (1 + abs(expected).max()), (
+        f"{name}: twists off by {gap:.2e} of {abs(expected).max():.3g}"
+    )
+
+
+@given(
+    st.lists(st.floats(-3, 3), min_size=1, max_size=4), st.floats(-2, 2), st.floats(0.1, 5), st.floats(0, 1)
+)
+def test_driver_rates_are_the_slopes_of_its_values(c, amplitude, frequency, t) -> None:
+    driver = Driver(
+        joint="A", polynomial=(0.0, *c), sine=Sine(amplitude=amplitude, frequency=frequency, phase=0.0)
+    )
+    h = 1e-4
+    values = [motion(driver, t + k * h)[0] for k in (-1, 0, 1)]
+    _, rate, acceleration = motion(driver, t)
+    slope, bend = (values[2] - values[0]) / (2 * h), (values[2] - 2 * values[1] + values[0]) / h**2
+    assert abs(rate - slope) < 1e-4, f"rate {rate} against the slope {slope} of the values"
+    assert abs(acceleration - bend) < 1e-3, f"acceleration {acceleration} against their bend {bend}"
+
+
+def test_a_scene_without_masses_needs_its_whole_motion_driven() -> None:
+    bare = {"mass": None, "inertia": None}
+    prescribed, open_ = (
+        s.with_(body=tuple(b.model_copy(update=bare) for b in s.body))
+        for s in (SCENES["four_bar"](), SCENES["four_bar_gravity"]())
+    )
+    assert lacks_mass(prescribed) is None, f"a driven four-bar was refused: {lacks_mass(prescribed)}"
+    assert "crank" in str(lacks_mass(open_)), f"an undriven four-bar without masses: {lacks_mass(open_)}"

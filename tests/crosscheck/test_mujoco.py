@@ -1,0 +1,154 @@
+"""MuJoCo / truths, and what an adapter must not leave behind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Setting, engine
+from crosscheck.engines._mujoco_model import compiled
+from crosscheck.engines.mujoco import HARD
+from crosscheck.truth import truth_for
+from mbref import rotations
+from mbref.scene import Body, Driver, Scene
+from mbref.scenes import SCENES
+from mbref.trajectory import Outcome, Trajectory
+from tests.crosscheck.tree_scenes import every_joint
+
+mujoco = pytest.importorskip("mujoco")
+
+# scene: (duration, step, beta, error allowed: what the fourth order leaves at that step, times ten)
+PAPER = {
+    "planar_slider_crank": (0.2, 1.2e-5, 2000.0, 1e-8),
+    "spatial_slider_crank": (0.02, 3e-6, 8000.0, 1e-9),
+    "spatial_slider_crank_driven": (0.2, 2e-5, 1200.0, 1e-9),
+    "four_bar": (0.02, 1e-4, 620.0, 1e-9),
+    "five_bar": (0.02, 1e-4, 620.0, 1e-9),
+    "four_bar_gravity": (0.5, 2e-3, 40.0, 1e-8),
+}
+
+
+def error(run: Trajectory, scene: Scene) -> float:
+    """Largest error of a position (m) or an orientation (rad)."""
+    truth = truth_for(scene).poses(run.times)
+    turned = rotations.angle_between(run.orientation, truth.orientation).max()
+    return max(abs(run.position - truth.position).max(), turned)
+
+
+def simulate(scene: Scene, duration: float, family: str, **options) -> Trajectory:
+    return engine("mujoco").run(scene, np.linspace(0, duration, 11), Setting(family, options))
+
+
+@pytest.mark.parametrize("name", PAPER)
+def test_tuned_mujoco_and_truth(name: str) -> None:
+    duration, step, beta, allowed = PAPER[name]
+    scene = SCENES[name]()
+    run = simulate(scene, duration, "tuned", step=step, beta=beta, hard=HARD)
+    assert run.outcome is Outcome.COMPLETED, f"{name}: {run.outcome.label} {run.message}"
+    measured = error(run, scene)
+    assert measured < allowed, f"{name}: {measured:.2e} m or rad from the truth, allowed {allowed:.0e}"
+
+
+@pytest.mark.parametrize(
+    "name", ["planar_slider_crank", "spatial_slider_crank", "spatial_slider_crank_driven"]
+)
+def test_accelerations_of_mujoco_integrated_outside_and_truth(name: str) -> None:
+    duration, _, beta, _ = PAPER[name]
+    scene = SCENES[name]()
+    run = simulate(scene, duration, "forward", rtol=1e-10, min_step=2e-5, beta=beta, hard=1e-7)
+    measured = error(run, scene)
+    assert measured < 1e-8, f"{name}: {measured:.2e} m or rad from the truth, allowed 1e-8"
+
+
+def test_softness_of_each_family_on_the_spatial_slider_crank() -> None:
+    """Defaults are a percent off at any step, stock converges, the scaled regulariser is far below both."""
+    scene = SCENES["spatial_slider_crank"]()
+    options = {"defaults": {}, "stock": {}, "tuned": {"beta": 8000.0, "hard": HARD}}
+    errors = {f: error(simulate(scene, 0.02, f, step=1e-5, **o), scene) for f, o in options.items()}
+    assert errors["tuned"] < 1e-1 * errors["stock"] < 1e-4 * errors["defaults"], f"errors {errors}"
+
+
+def test_error_of_tuned_mujoco_falls_with_the_fourth_power_of_the_step() -> None:
+    scene = SCENES["spatial_slider_crank_driven"]()
+    steps = (2e-4, 1e-4)
+    errors = [error(simulate(scene, 0.05, "tuned", step=h, beta=1200.0, hard=HARD), scene) for h in steps]
+    order = np.log2(errors[0] / errors[1])
+    assert 3.5 < order < 5, f"errors {errors} of steps {steps}: order {order:.2f}, expected 4"
+
+
+def test_a_driver_with_any_motion_is_met_exactly() -> None:
+    """Halved steps, same angle: the prescribed angle has no error of integration to speak of."""
+    base = SCENES["spatial_slider_crank"]()
+    driver = Driver(joint="A", polynomial=(0.0, 3.0, -20.0), sine={"amplitude": 0.4, "frequency": 30.0})
+    scene = base.with_(driver=(driver,), load=(), duration=0.2)
+    run = simulate(scene, 0.2, "tuned", step=1e-4, beta=400.0, hard=HARD)
+    t = run.times
+    angle = 3 * t - 20 * t**2 + 0.4 * np.sin(30 * t)
+    turned = rotations.from_vector(angle[:, None] * np.array([0.0, 1.0, 0.0]))
+    gap = rotations.angle_between(run.orientation[:, 0], turned).max()
+    assert gap < 1e-9, f"the crank is {gap:.2e} rad from where it is driven"
+
+
+def test_samples_are_at_the_times_asked_for() -> None:
+    scene = SCENES["spatial_slider_crank_driven"]()
+    times = np.array([0.0, 0.0101, 0.013, 0.0333])
+    setting = Setting("tuned", {"step": 5e-5, "beta": 1200.0, "hard": HARD})
+    run = engine("mujoco").run(scene, times, setting)
+    assert np.array_equal(run.times, times), f"asked for {times}, got {run.times}"
+    assert error(run, scene) < 1e-7, f"{error(run, scene):.2e} from the truth at those times"
+
+
+def test_a_run_that_blows_up_is_not_finite_and_keeps_what_it_reached() -> None:
+    scene = SCENES["planar_slider_crank"]()
+    run = simulate(scene, 0.4, "tuned", step=4e-3, beta=2000.0, hard=HARD)
+    assert run.outcome is Outcome.NOT_FINITE, f"{run.outcome.label} {run.message}"
+    assert 0 < len(run.times) < 11, f"{len(run.times)} of 11 samples kept"
+    assert np.isfinite(run.position).all(), "samples that are not finite were kept"
+    assert "finite" in run.message, f"message {run.message!r}"
+
+
+def test_nothing_is_left_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd) -> None:
+    monkeypatch.chdir(tmp_path)
+    simulate(SCENES["planar_slider_crank"](), 0.4, "tuned", step=4e-3, beta=2000.0, hard=HARD)
+    simulate(SCENES["four_bar"](), 0.01, "tuned", step=1e-3, beta=600.0, hard=HARD)
+    written, printed = list(tmp_path.iterdir()), capfd.readouterr()
+    assert mujoco.get_mjcb_control() is None, "the driver's callback is still installed"
+    assert not written, f"files written: {written}"
+    assert not printed.out and not printed.err, f"printed: {printed}"
+
+
+def test_masses_written_after_compiling_are_those_of_the_links() -> None:
+    built = compiled(every_joint())
+    model, links = built.model, built.tree.links
+    for link, body in zip(links, built.links, strict=True):
+        moments = np.linalg.eigvalsh(link.inertia)
+        gap = max(abs(model.body_mass[body] - link.mass), abs(model.body_inertia[body] - moments).max())
+        assert gap < 1e-15, f"MuJoCo's body {body} is {gap:.1e} off its link"
+
+
+def test_a_thin_disc_that_rounding_puts_beyond_the_triangle_is_accepted() -> None:
+    inertia = (0.1, 0.1, 0.2 * (1 + 1e-12))
+    disc = Body(
+        name="disc", mass=1.0, inertia=inertia, position=(0.0, 0.0, 0.0), angular_velocity=(0.0, 0.1, 5.0)
+    )
+    scene = Scene(name="disc", body=(disc,))
+    run = simulate(scene, 0.5, "tuned", step=1e-3, beta=100.0, hard=HARD)
+    assert run.outcome is Outcome.COMPLETED, f"{run.outcome.label} {run.message}"
+    assert error(run, scene) < 1e-9, f"{error(run, scene):.2e} rad from the free body's motion"
+
+
+@pytest.mark.parametrize("name", ["four_bar", "spatial_slider_crank_gravity"])
+def test_each_family_is_swept_from_coarse_to_fine(name: str) -> None:
+    sweep = engine("mujoco").settings(SCENES[name]())
+    assert {s.family for s in sweep} == {"defaults", "stock", "tuned", "forward"}, f"families of {sweep}"
+    assert any(s.options.get("step") == 2e-3 for s in sweep if s.family == "defaults"), "no default step"
+    for family in ("defaults", "stock", "tuned", "forward"):
+        knob = [s.options["rtol" if family == "forward" else "step"] for s in sweep if s.family == family]
+        assert knob == sorted(set(knob), reverse=True) and len(knob) > 3, f"{family} sweeps {knob}"
+
+
+def test_an_unknown_family_is_refused() -> None:
+    with pytest.raises(ValueError, match="no family 'best'"):
+        simulate(SCENES["four_bar"](), 0.1, "best")

@@ -1,0 +1,198 @@
+"""Pinocchio / truths, and the traps that give silently wrong answers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Setting, engine
+from crosscheck.engines._pinocchio_model import Loads, Mechanism
+from crosscheck.truth import truth_for
+from mbref import rotations
+from mbref.scene import Driver, Scene
+from mbref.scenes import SCENES
+from mbref.trajectory import Outcome, Trajectory
+from tests.crosscheck.tree_scenes import driven, every_joint
+
+pinocchio = pytest.importorskip("pinocchio")
+
+PAPER = {  # scene: duration, s
+    "planar_slider_crank": 0.2,
+    "planar_slider_crank_equal": 0.2,
+    "planar_slider_crank_gravity": 1.0,
+    "spatial_slider_crank": 0.02,
+    "spatial_slider_crank_driven": 0.2,
+    "four_bar": 0.1,
+    "four_bar_quarter": 0.1,
+    "five_bar": 0.1,
+    "four_bar_gravity": 1.0,
+    "five_bar_gravity": 1.0,
+}
+SINGULAR = ("planar_slider_crank_equal", "four_bar_gravity", "five_bar_gravity")  # passed by their own motion
+
+
+def error(run: Trajectory, scene: Scene) -> float:
+    """Largest error of a position (m) or an orientation (rad)."""
+    truth = truth_for(scene).poses(run.times)
+    turned = rotations.angle_between(run.orientation, truth.orientation).max()
+    return max(abs(run.position - truth.position).max(), turned)
+
+
+def simulate(scene: Scene, duration: float, family: str, **options) -> Trajectory:
+    return engine("pinocchio").run(scene, np.linspace(0, duration, 11), Setting(family, options))
+
+
+@pytest.mark.parametrize("name", PAPER)
+def test_tuned_pinocchio_and_truth(name: str) -> None:
+    scene = SCENES[name]().with_(duration=PAPER[name])
+    finest = [s for s in engine("pinocchio").settings(scene) if s.family == "tuned"][-1]
+    run = engine("pinocchio").run(scene, np.linspace(0, PAPER[name], 11), finest)
+    allowed = 5e-8 if name in SINGULAR else 2e-9
+    assert run.outcome is Outcome.COMPLETED, f"{name}: {run.outcome.label} {run.message}"
+    assert error(run, scene) < allowed, (
+        f"{name}: {error(run, scene):.2e} from the truth, allowed {allowed:.0e}"
+    )
+
+
+@pytest.mark.parametrize("name", ["planar_slider_crank", "four_bar", "five_bar"])
+def test_the_solver_as_it_comes_cannot_bear_redundant_closures(name: str) -> None:
+    run = simulate(SCENES[name](), 0.02, "defaults", step=1e-4)
+    assert run.outcome is Outcome.NOT_FINITE, f"{name}: {run.outcome.label}"
+    assert "redundant" in run.message, f"message {run.message!r}"
+
+
+def test_the_solver_as_it_comes_does_well_without_redundancy() -> None:
+    scene = SCENES["spatial_slider_crank"]()
+    runs = [simulate(scene, 0.02, family, step=4e-6) for family in ("defaults", "proximal")]
+    errors = [error(run, scene) for run in runs]
+    assert max(errors) < 1e-9, f"errors {errors} of the default and the iterated solver"
+
+
+def test_baumgarte_against_the_drift_of_rk4() -> None:
+    scene = SCENES["planar_slider_crank"]()
+    errors = {f: error(simulate(scene, 0.2, f, step=1.5e-4), scene) for f in ("proximal", "baumgarte")}
+    assert errors["baumgarte"] < 0.3 * errors["proximal"], f"errors {errors}"
+
+
+def test_projection_carries_the_driven_four_bar_through_its_singular_position() -> None:
+    """θ = -π is reached at 0.0378 s; without projection nothing holds the branch."""
+    scene = SCENES["four_bar"]()
+    options = {"rtol": 1e-8, "min_step": 2e-4}
+    plain, projected = (simulate(scene, 0.1, family, **options) for family in ("dop853", "tuned"))
+    lost = plain.outcome is not Outcome.COMPLETED or error(plain, scene) > 0.1
+    assert error(projected, scene) < 1e-9, f"projected: {error(projected, scene):.2e} from the truth"
+    assert lost, f"unprojected run: {plain.outcome.label}, {error(plain, scene):.2e} from the truth"
+
+
+@pytest.mark.parametrize("name", [*PAPER, "every_joint"])
+def test_joints_are_in_the_order_the_factorisation_needs(name: str) -> None:
+    scene = every_joint() if name == "every_joint" else SCENES[name]()
+    model = Mechanism(scene).model
+    assert model.check(model.createData()), f"{name}: Pinocchio's own check of the order fails"
+    parents = list(model.parents)
+    assert all(p < k for k, p in enumerate(parents) if k), f"{name}: parents {parents}"
+
+
+def test_mass_matrix_by_two_algorithms() -> None:
+    """What a wrong order of joints gets wrong: composite bodies against columns of the inverse dynamics."""
+    mechanism = Mechanism(every_joint())
+    model, q = mechanism.model, mechanism.q0
+    data = model.createData()
+    upper = pinocchio.crba(model, data, q)
+    composite = np.triu(upper) + np.triu(upper, 1).T
+    rest = pinocchio.rnea(model, data, q, np.zeros(model.nv), np.zeros(model.nv))
+    columns = [pinocchio.rnea(model, data, q, np.zeros(model.nv), e) - rest for e in np.eye(model.nv)]
+    gap = abs(composite - np.array(columns)).max()
+    assert gap < 1e-12, f"mass matrices differ by {gap:.1e}"
+
+
+def test_the_world_the_joints_start_in_is_the_scene() -> None:
+    scene = every_joint()
+    run = engine("pinocchio").run(scene, np.array([0.0]), Setting("tuned", {"rtol": 1e-6, "min_step": 1e-4}))
+    wanted = np.array([body.position for body in scene.body]), np.array([b.orientation for b in scene.body])
+    gaps = (
+        abs(run.position[0] - wanted[0]).max(),
+        rotations.angle_between(run.orientation[0], wanted[1]).max(),
+    )
+    assert max(gaps) < 1e-14, f"first poses {gaps} m, rad from the scene's"
+
+
+def test_drivers_are_met_exactly_whatever_the_tolerance() -> None:
+    scene = driven()
+    run = engine("pinocchio").run(
+        scene, np.linspace(0, 0.4, 5), Setting("tuned", {"rtol": 1e-3, "min_step": 1e-3})
+    )
+    sled = [body.name for body in scene.body].index("sled")
+    axis = np.array([0.3, 1.0, 0.0]) / np.hypot(0.3, 1.0)
+    moved = -(run.position[:, sled] - run.position[0, sled]) @ axis  # the ground is the second body
+    expected = 0.5 * run.times + 0.05 * np.sin(7 * run.times)
+    gap = abs(moved - expected).max()
+    assert gap < 1e-13, f"the sled is {gap:.1e} m from where it is driven"
+
+
+def test_the_driving_moment_is_the_power_of_the_mechanism() -> None:
+    """Crank driven steadily: reaction moment about its axis × rate = slope of the kinetic energy."""
+    scene = SCENES["spatial_slider_crank_driven"]()
+    h, t = 1e-6, 0.013
+    run = engine("pinocchio").run(
+        scene, np.array([t - h, t, t + h]), Setting("tuned", {"rtol": 1e-11, "min_step": 1e-5})
+    )
+    energies = [kinetic(scene, run, k) for k in range(3)]
+    power = (energies[2] - energies[0]) / (2 * h)
+    moment = run.reactions["A"][1, 4]  # about +y, on the crank
+    assert abs(moment * 124.8 - power) < 1e-5 * abs(power), f"{moment * 124.8:.9g} W against {power:.9g} W"
+
+
+def kinetic(scene: Scene, run: Trajectory, k: int) -> float:
+    energy = 0.0
+    for b, body in enumerate(scene.body):
+        spin = rotations.rotate(rotations.conjugate(run.orientation[k, b]), run.angular_velocity[k, b])
+        energy += (body.mass * run.velocity[k, b] @ run.velocity[k, b] + spin**2 @ np.array(body.inertia)) / 2
+    return energy
+
+
+def test_a_moment_about_a_fixed_axis_costs_no_kinematics() -> None:
+    cheap = Loads(Mechanism(SCENES["planar_slider_crank"]()))
+    assert cheap.fixed and cheap.constant[0] == 100.0, (
+        f"constant torques {cheap.constant}, fixed {cheap.fixed}"
+    )
+    assert not Loads(Mechanism(every_joint())).fixed, "loads in space were taken for constant ones"
+
+
+def test_a_kinematic_scene_needs_no_masses() -> None:
+    base = SCENES["spatial_slider_crank_driven"]()
+    bare = base.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in base.body))
+    runs = [simulate(s, 0.1, "tuned", rtol=1e-10, min_step=1e-4) for s in (base, bare)]
+    gap = abs(runs[0].position - runs[1].position).max()
+    assert gap < 1e-11, f"positions with and without masses differ by {gap:.1e} m"
+    assert runs[1].reactions is None, "reactions without masses"
+
+
+def test_an_adaptive_run_without_an_end_is_refused_or_fails_clearly() -> None:
+    """A prescribed motion the joints cannot follow: the slider would have to leave its line's reach."""
+    base = SCENES["spatial_slider_crank"]()
+    scene = base.with_(driver=(Driver(joint="D", polynomial=(0.0, 0.0, 50.0)),), load=())
+    run = simulate(scene, 0.2, "tuned", rtol=1e-6, min_step=1e-4)
+    assert run.outcome in (Outcome.NOT_CONVERGED, Outcome.NOT_FINITE), f"{run.outcome.label} {run.message}"
+    assert run.message and 0 < len(run.times) < 11, f"{len(run.times)} samples, message {run.message!r}"
+
+
+@pytest.mark.parametrize("name", ["four_bar", "spatial_slider_crank_gravity"])
+def test_each_family_is_swept_from_coarse_to_fine(name: str) -> None:
+    sweep = engine("pinocchio").settings(SCENES[name]())
+    families = {
+        "defaults": "step",
+        "proximal": "step",
+        "baumgarte": "step",
+        "dop853": "rtol",
+        "tuned": "rtol",
+    }
+    assert {s.family for s in sweep} == set(families), f"families of {sweep}"
+    for family, knob in families.items():
+        values = [s.options[knob] for s in sweep if s.family == family]
+        assert values == sorted(set(values), reverse=True) and len(values) > 3, f"{family} sweeps {values}"
+
+
+def test_an_unknown_family_is_refused() -> None:
+    with pytest.raises(ValueError, match="no family 'best'"):
+        simulate(SCENES["four_bar"](), 0.1, "best")
