@@ -7,7 +7,7 @@ decomposition by LAPACK.  All work in place on C-contiguous arrays given by the 
 from __future__ import annotations
 
 import numpy as np
-from numpy import sqrt
+from numpy import isfinite, sqrt
 
 from mbref.compiled import kernel
 
@@ -219,11 +219,16 @@ def svd_solve(d, rhs, tolerance, x, dual):
 
     One step of refinement, x += D⁺ (rhs - D x), takes out the rounding that the orthogonal factors
     spread over all of x: a planar motion stays planar.  ``rhs`` (m,) becomes the residual.
+    -1 where an entry of D is not finite, which LAPACK would not survive.
     """
-    u, s, vt = np.linalg.svd(d, full_matrices=False)
-    m, n = d.shape
     x[:] = 0.0
     dual[:] = 0.0
+    if d.size == 0:
+        return 0
+    if not isfinite(np.sum(d)):
+        return -1
+    u, s, vt = np.linalg.svd(d, full_matrices=False)
+    m, n = d.shape
     rank = 0
     while rank < s.size and s[rank] > tolerance * s[0]:
         rank += 1

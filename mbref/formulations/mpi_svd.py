@@ -11,7 +11,7 @@ from __future__ import annotations
 from mbref.compiled import exchangeable
 from mbref.formulations.base import Formulation
 from mbref.linalg import equilibrate, svd_solve
-from mbref.tables import ACCELERATE, FACTORISATIONS, OK, RANK_TOLERANCE, SINGULAR
+from mbref.tables import ACCELERATE, FACTORISATIONS, NOT_FINITE, OK, RANK_TOLERANCE, SINGULAR
 
 
 @exchangeable(ACCELERATE)
@@ -34,7 +34,8 @@ def accelerate(
             b[i] -= jacobian[i, j] * acceleration[j]
         b[i] *= multipliers[i]
     counts[FACTORISATIONS] += 1
-    svd_solve(d, b, settings[RANK_TOLERANCE], x, dual)
+    if svd_solve(d, b, settings[RANK_TOLERANCE], x, dual) < 0:
+        return NOT_FINITE
     for j in range(n):
         acceleration[j] += inverse_root[j] * x[j]
     for i in range(m):

@@ -1,0 +1,38 @@
+# Every target works from a clean checkout with Python >= 3.11, venv and pip.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+.PHONY: help check test lint deep report quick bench clean
+
+help: ## show this list
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+
+$(VENV)/ready: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install -q -c constraints.txt -e '.[dev]'
+	touch $@
+
+check: ## what CI runs: the README's test command, in a fresh clone and environment
+	bash .ci/run
+
+test: $(VENV)/ready ## the tests, in this checkout
+	$(BIN)/pytest -n 2
+
+lint: $(VENV)/ready ## format and lint
+	$(BIN)/ruff format . && $(BIN)/ruff check .
+
+deep: $(VENV)/ready ## the slow tests too, with many more random cases
+	HYPOTHESIS_PROFILE=deep $(BIN)/pytest -n 2 -m "slow or not slow"
+
+report: $(VENV)/ready ## the whole comparison report, into report/
+	$(BIN)/crosscheck report
+
+quick: $(VENV)/ready ## a comparison report in about three minutes, into report/
+	$(BIN)/crosscheck report --quick
+
+bench: $(VENV)/ready ## the benchmarks, printed
+	for script in benchmarks/*.py; do $(BIN)/python $$script; done
+
+clean: ## remove what the targets above made
+	rm -rf $(VENV) report build *.egg-info .pytest_cache .hypothesis .ruff_cache

@@ -1,0 +1,78 @@
+"""Formulations: what they claim works, what they do not claim fails with the right status."""
+
+import numpy as np
+import pytest
+
+from mbref.formulations import FORMULATIONS
+from mbref.scenes import SCENES
+from mbref.simulate import simulate
+from mbref.tables import OK, SINGULAR
+
+RNG = np.random.default_rng(20031)
+
+
+def system(m, n, redundant):
+    """Random M, Φ_q of rank m - redundant, g, consistent γ; and the exact solution by the KKT system."""
+    mass = RNG.uniform(0.1, 10, n)
+    jacobian = RNG.normal(size=(m, n))
+    if redundant:
+        mix = RNG.normal(size=(redundant, m - redundant))
+        jacobian[m - redundant :] = mix @ jacobian[: m - redundant]
+    force, wanted = RNG.normal(size=n), RNG.normal(size=n)
+    gamma = jacobian @ wanted
+    independent = jacobian[: m - redundant]
+    k = len(independent)
+    kkt = np.block([[np.diag(mass), independent.T], [independent, np.zeros((k, k))]])
+    exact = np.linalg.solve(kkt, np.concatenate([force, gamma[:k]]))[:n]
+    return mass, jacobian, force, gamma, exact
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS.values(), ids=FORMULATIONS)
+@pytest.mark.parametrize("redundant", [0, 1, 4])
+def test_claim_of_redundancy_and_exact_solution(formulation, redundant):
+    mass, jacobian, force, gamma, exact = system(12, 18, redundant)
+    status, acceleration, multipliers = formulation.solve(mass, jacobian, force, gamma)
+    if redundant and not formulation.handles_redundancy:
+        assert status == SINGULAR, f"{formulation.name} must refuse redundant rows, status {status}"
+        return
+    assert status == OK
+    error = np.max(np.abs(acceleration - exact))
+    assert error < 1e-9, f"{formulation.name}: acceleration differs by {error:.2e}"
+    balance = np.max(np.abs(mass * acceleration + jacobian.T @ multipliers - force))
+    assert balance < 1e-9, f"{formulation.name}: M q̈ + Φ_qᵀ λ - g = {balance:.2e}"
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS.values(), ids=FORMULATIONS)
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_rescaled_and_repeated_rows_change_nothing(formulation, factor):
+    mass, jacobian, force, gamma, exact = system(8, 15, 0)
+    jacobian, gamma = jacobian.copy(), gamma.copy()
+    jacobian[2] *= factor
+    gamma[2] *= factor
+    if formulation.handles_redundancy:
+        jacobian, gamma = np.vstack([jacobian, jacobian[3]]), np.append(gamma, gamma[3])
+    status, acceleration, multipliers = formulation.solve(mass, jacobian, force, gamma)
+    assert status == OK
+    assert np.max(np.abs(acceleration - exact)) < 1e-9, formulation.name
+    reaction = force - mass * exact
+    assert np.max(np.abs(jacobian.T @ multipliers - reaction)) < 1e-9, formulation.name
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS.values(), ids=FORMULATIONS)
+def test_claim_of_singular_mass_and_exact_solution(formulation):
+    mass, jacobian, force, gamma, _ = system(10, 15, 0)
+    mass[4] = 0.0
+    kkt = np.block([[np.diag(mass), jacobian.T], [jacobian, np.zeros((10, 10))]])
+    exact = np.linalg.solve(kkt, np.concatenate([force, gamma]))[:15]
+    status, acceleration, _ = formulation.solve(mass, jacobian, force, gamma)
+    if not formulation.handles_singular_mass:
+        assert status == SINGULAR, f"{formulation.name} must refuse a singular M, status {status}"
+        return
+    error = np.max(np.abs(acceleration - exact))
+    assert status == OK
+    assert error < 1e-8, f"{formulation.name}: acceleration differs by {error:.2e}"
+
+
+def test_redundant_scene_by_lm1_is_singular_at_once():
+    trajectory = simulate(SCENES["four_bar"](), "lm1+none", [0.0, 0.01])
+    assert (trajectory.outcome.letter, trajectory.t_end, trajectory.times.size) == ("a", 0.0, 0)
