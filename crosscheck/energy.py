@@ -101,7 +101,7 @@ def _work_of_moment(scene: Scene, load: Moment, trajectory: Trajectory) -> np.nd
     spin = trajectory.angular_velocity[:, body]
     if load.body in _turning_about(scene, moment / size):
         turn = rotations.multiply(
-            trajectory.orientation[:, body], rotations.conjugate(scene.body[body].orientation)
+            trajectory.orientation[:, body], rotations.conjugate(np.array(scene.body[body].orientation))
         )
         twist = 2 * np.arctan2(turn[:, 1:] @ moment / size, turn[:, 0])
         return size * counted(trajectory.times, twist, spin @ moment / size)

@@ -63,8 +63,8 @@ def _differences(
     angles = rotations.angle_between(first.orientation[0], second.orientation[0])
     yield "initial orientation", float(angles.max()), SAME_START
     if scene.has_mass():
-        centres = [_centre_of_mass(scene, t) for t in (first, second)]
-        yield "centre of mass", _apart(*centres, length), SAME_START
+        off = _apart(_centre_of_mass(scene, first), _centre_of_mass(scene, second), length)
+        yield "centre of mass", off, SAME_START
     speed = max(_size(first.velocity[0]), length * _size(first.angular_velocity[0]), length / scene.duration)
     yield "initial velocity", _apart(first.velocity[0], second.velocity[0], speed), SAME_START
     spins = (first.angular_velocity[0], second.angular_velocity[0])
@@ -91,16 +91,13 @@ def _changes(
 def _given_accelerations(
     first: Trajectory, second: Trajectory, length: float
 ) -> Iterator[tuple[str, float, float]]:  # fmt: skip
-    if first.acceleration is None or second.acceleration is None:
-        return
+    linear = (first.acceleration, second.acceleration)
     spins = (first.angular_acceleration, second.angular_acceleration)
-    scale = max(_size(first.acceleration[0]), length * _size(spins[0][0]))
+    if linear[0] is None or linear[1] is None or spins[0] is None or spins[1] is None:
+        return
+    scale = max(_size(linear[0][0]), length * _size(spins[0][0]))
     if scale > 0:
-        yield (
-            "initial acceleration",
-            _apart(first.acceleration[0], second.acceleration[0], scale),
-            SAME_CHANGE,
-        )
+        yield "initial acceleration", _apart(linear[0][0], linear[1][0], scale), SAME_CHANGE
         yield "initial angular acceleration", _apart(spins[0][0], spins[1][0], scale / length), SAME_CHANGE
 
 
@@ -125,4 +122,4 @@ def _energy(scene: Scene, trajectory: Trajectory) -> float:
 
 def _energy_unit(scene: Scene) -> float:
     """An energy (J) of the scene's size: all its mass at one length per duration."""
-    return sum(body.mass for body in scene.body) * (scene_length(scene) / scene.duration) ** 2
+    return sum(body.mass or 0.0 for body in scene.body) * (scene_length(scene) / scene.duration) ** 2

@@ -74,8 +74,8 @@ def jacobian(
     """
     n = 6 * len(scene.body)
     twists = np.vstack([np.zeros(n), np.eye(n)]).reshape(n + 1, -1, 6)
-    pose = (np.broadcast_to(a, (n + 1, *np.shape(a))) for a in (position, orientation))
-    rates = closure_rates(scene, np.full(n + 1, float(t)), *pose, twists[..., :3], twists[..., 3:])
+    places, frames = (np.broadcast_to(a, (n + 1, *np.shape(a))) for a in (position, orientation))
+    rates = closure_rates(scene, np.full(n + 1, float(t)), places, frames, twists[..., :3], twists[..., 3:])
     rows = np.concatenate([np.zeros((n + 1, 0)), *rates.values()], axis=1)
     return (rows[1:] - rows[0]).T, -rows[0]
 
@@ -164,7 +164,7 @@ def _root_of_mass(scene: Scene) -> np.ndarray:
         for k, (body, inertia) in enumerate(zip(scene.body, inertia_matrices(scene), strict=True)):
             moments, principal = np.linalg.eigh(inertia)
             half = np.sqrt(np.maximum(moments, 0.0))[:, None] * (axes[k] @ principal).T
-            root[6 * k : 6 * k + 3, 6 * k : 6 * k + 3] *= np.sqrt(body.mass)
+            root[6 * k : 6 * k + 3, 6 * k : 6 * k + 3] *= np.sqrt(body.mass or 1.0)
             root[6 * k + 3 : 6 * k + 6, 6 * k + 3 : 6 * k + 6] = half
     return root
 

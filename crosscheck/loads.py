@@ -5,7 +5,9 @@ Arrays keep the precision they come in (double, or extended for the truths); sam
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -40,13 +42,13 @@ def wrenches(scene: Scene, motion: Motion, axis: np.ndarray) -> tuple[np.ndarray
     return force, moment
 
 
-def attachment(scene: Scene, name: str, point: np.ndarray) -> tuple[int, np.ndarray]:
+def attachment(scene: Scene, name: str, point: Sequence[float]) -> tuple[int, np.ndarray]:
     """Index of a body (-1 ground) and the point, given in the world at t = 0, in its frame."""
     if name == GROUND:
         return -1, np.array(point)
     body = scene.body[scene.body_index(name)]
     arm = np.array(point) - np.array(body.position)
-    return scene.body_index(name), rotations.rotate(rotations.conjugate(body.orientation), arm)
+    return scene.body_index(name), rotations.rotate(rotations.conjugate(np.array(body.orientation)), arm)
 
 
 def _moment(scene, load: Moment, motion: Motion, axis, force, moment) -> None:
@@ -72,7 +74,7 @@ def _spring(scene, load: Spring, motion: Motion, axis, force, moment) -> None:
 
 
 def _torsion_spring(scene, load: TorsionSpring, motion: Motion, axis, force, moment) -> None:
-    joint = next(j for j in scene.joint if j.name == load.joint)
+    joint: Any = next(j for j in scene.joint if j.name == load.joint)
     along = np.array(joint.axis) / np.linalg.norm(joint.axis)
     bodies = [scene.body_index(name) for name in joint.bodies]
     sign = np.round(along @ axis)
@@ -87,7 +89,12 @@ def _torsion_spring(scene, load: TorsionSpring, motion: Motion, axis, force, mom
             moment[:, body] -= side * sign * resistance[:, None] * axis
 
 
-ACTIONS = {Moment: _moment, Force: _force, Spring: _spring, TorsionSpring: _torsion_spring}
+ACTIONS: dict[type, Callable[..., None]] = {
+    Moment: _moment,
+    Force: _force,
+    Spring: _spring,
+    TorsionSpring: _torsion_spring,
+}
 
 
 def _point(motion: Motion, body: int, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -50,7 +50,7 @@ def _mate(scene: Scene, joint: Joint, driver: Driver | None) -> Mate:
     for k, name in enumerate(joint.bodies):
         if name != GROUND:
             body = scene.body[scene.body_index(name)]
-            back = rotations.conjugate(body.orientation)
+            back = rotations.conjugate(np.array(body.orientation))
             points[k] = rotations.rotate(back, anchors[k] - body.position)
             frames[k] = rotations.multiply(back, frames[k])
     indices = tuple(scene.body_index(name) for name in joint.bodies)
@@ -61,7 +61,9 @@ def _mate(scene: Scene, joint: Joint, driver: Driver | None) -> Mate:
 def _axes(joint: Joint) -> Sequence[Sequence[float]]:
     if joint.type == "universal":
         return joint.axes
-    return (joint.axis if joint.type in ("revolute", "translational", "cylindrical") else Z,) * 2
+    if joint.type in ("revolute", "translational", "cylindrical"):
+        return (joint.axis,) * 2
+    return ((0.0, 0.0, 1.0),) * 2
 
 
 def _frame(axis: Sequence[float]) -> np.ndarray:

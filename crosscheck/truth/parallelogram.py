@@ -12,7 +12,7 @@ import numpy as np
 from crosscheck.loads import initial_rotations
 from crosscheck.tolerances import PARALLEL
 from crosscheck.truth.path import Path, Pose, circle, turned
-from mbref.scene import GROUND, Driver, Joint, Scene
+from mbref.scene import GROUND, Cylindrical, Distance, Driver, Revolute, Scene
 
 
 def parallelogram(scene: Scene) -> Path | None:
@@ -23,8 +23,8 @@ def parallelogram(scene: Scene) -> Path | None:
     axis = unit(next(iter(pivots.values())).axis)
     if any(abs(abs(unit(joint.axis) @ axis) - 1) > PARALLEL for joint in pivots.values()):
         return None
-    arms = [_arm(scene, pivots, body.name) for body in scene.body]
-    if any(arm is None for arm in arms):
+    arms = [arm for body in scene.body if (arm := _arm(scene, pivots, body.name)) is not None]
+    if len(arms) < len(scene.body):
         return None
     turns = np.array([float(body.name in pivots) for body in scene.body])
     rotation0 = initial_rotations(scene)
@@ -45,9 +45,9 @@ def parallelogram(scene: Scene) -> Path | None:
     )
 
 
-def pivots_of(scene: Scene) -> dict[str, Joint]:
+def pivots_of(scene: Scene) -> dict[str, Revolute]:
     """Revolute joints to the ground, by the body they hold."""
-    found = [j for j in scene.joint if j.type == "revolute" and GROUND in j.bodies]
+    found = [j for j in scene.joint if isinstance(j, Revolute) and GROUND in j.bodies]
     return {name: joint for joint in found for name in joint.bodies if name != GROUND}
 
 
@@ -56,7 +56,7 @@ def turning_driver(scene: Scene, axis: np.ndarray, turns: np.ndarray):
 
     def sign(driver: Driver) -> float | None:
         joint = next(j for j in scene.joint if j.name == driver.joint)
-        if joint.type == "translational":
+        if not isinstance(joint, Revolute | Cylindrical):
             return None
         first, second = (0.0 if n == GROUND else turns[scene.body_index(n)] for n in joint.bodies)
         along = float(unit(joint.axis) @ axis) * (second - first)
@@ -70,12 +70,12 @@ def unit(vector) -> np.ndarray:
     return np.array(vector, dtype=float) / np.linalg.norm(vector)
 
 
-def _arm(scene: Scene, pivots: dict[str, Joint], name: str) -> np.ndarray | None:
+def _arm(scene: Scene, pivots: dict[str, Revolute], name: str) -> np.ndarray | None:
     """From the pivot to what a body's centre circles with: itself on a crank, its crank pin on a coupler."""
     if name in pivots:
         return np.array(scene.body[scene.body_index(name)].position) - np.array(pivots[name].anchor)
     for joint in scene.joint:
-        if name in joint.bodies and joint.type != "distance":
+        if name in joint.bodies and not isinstance(joint, Distance):
             other = joint.bodies[1 - joint.bodies.index(name)]
             if other in pivots:
                 return np.array(joint.anchor) - np.array(pivots[other].anchor)

@@ -18,10 +18,11 @@ from crosscheck.mates import driver_value
 from crosscheck.tolerances import FREEDOM, ON_PATH, PARALLEL, TRUTH_DRIVEN, TRUTH_DYNAMIC
 from crosscheck.truth.picard import REAL, Solution
 from mbref import rotations
-from mbref.scene import Driver, Scene, TorsionSpring
+from mbref.scene import Cylindrical, Driver, Revolute, Scene, TorsionSpring
 from mbref.trajectory import Trajectory
 
 EYE = np.eye(3)
+TURNS = (Revolute, Cylindrical)  # joints that carry a torsion spring
 PROBES = (0.0, 0.31, -0.83)  # path coordinates (rad, or lengths of the scene) where a path is tried
 
 
@@ -198,7 +199,7 @@ def _torsion_angles_known(scene: Scene, path: Path) -> bool:
     known = np.isfinite(path.poses(np.zeros(1)).turn[0].astype(float))
     for load in scene.load:
         if isinstance(load, TorsionSpring):
-            joint = next(j for j in scene.joint if j.name == load.joint)
+            joint = next(j for j in scene.joint if isinstance(j, TURNS) and j.name == load.joint)
             indices = [scene.body_index(name) for name in joint.bodies]
             aligned = abs(abs(np.dot(joint.axis, path.axis)) - np.linalg.norm(joint.axis)) < PARALLEL
             if not aligned or not all(known[i] for i in indices if i >= 0):

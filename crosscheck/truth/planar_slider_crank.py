@@ -8,6 +8,7 @@ passes the singular positions θ = ±π/2 smoothly is φ = -θ, or φ = π + θ 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from crosscheck.loads import initial_rotations
 from crosscheck.tolerances import ON_PATH, PARALLEL, SAME_LENGTH
 from crosscheck.truth.parallelogram import pivots_of, turning_driver, unit
 from crosscheck.truth.path import Path, Pose, circle, turned
-from mbref.scene import GROUND, Joint, Scene
+from mbref.scene import GROUND, Distance, Revolute, Scene, Translational
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Lengths:
 
 def planar_slider_crank(scene: Scene) -> Path | None:
     """The path of a scene that looks like the family, or None."""
-    parts = parts_of(scene, "revolute")
+    parts = parts_of(scene, Revolute)
     if parts is None:
         return None
     crank, rod, slider, pivot, pin, end, guide = parts
@@ -84,7 +85,7 @@ def planar_slider_crank(scene: Scene) -> Path | None:
         crank_path = circle(axis, q, position0[crank] - centre)
         paths = {
             crank: (centre + crank_path[0], *crank_path[1:]),
-            rod: (centre + pin_path[0] + centre_path[0], *(pin_path[i] + centre_path[i] for i in (1, 2))),
+            rod: (centre + pin_path[0] + centre_path[0], *map(np.add, pin_path[1:], centre_path[1:])),
             slider: tuple(slider_path),
         }
         order = sorted(paths)
@@ -98,25 +99,36 @@ def planar_slider_crank(scene: Scene) -> Path | None:
     return Path("planar_slider_crank", poses, axis, turning_driver(scene, axis, with_q))
 
 
-def parts_of(
-    scene: Scene, pin_type: str
-) -> tuple[int, int, int, Joint, Joint, Joint, Joint] | None:  # fmt: skip
-    """(crank, rod, slider, pivot, pin, end, guide) of three bodies in a chain from ground to ground: body
-    indices, then the joints on the way, pivot revolute, pin of the type asked for, guide translational."""
+class Parts(NamedTuple):
+    """Three bodies in a chain from ground to ground, by index, and the joints on the way."""
+
+    crank: int
+    rod: int
+    slider: int
+    pivot: Revolute
+    pin: Any
+    end: Any
+    guide: Translational
+
+
+def parts_of(scene: Scene, pin_type: type) -> Parts | None:
+    """The parts of a slider-crank whose crank pin is a joint of the type asked for, or None."""
     if len(scene.body) != 3 or len(scene.joint) != 4:
         return None
     pivots = pivots_of(scene)
-    guides = {n: j for j in scene.joint if j.type == "translational" and GROUND in j.bodies for n in j.bodies}
-    guides.pop(GROUND, None)
+    found = [j for j in scene.joint if isinstance(j, Translational) and GROUND in j.bodies]
+    guides = {name: joint for joint in found for name in joint.bodies if name != GROUND}
     if len(pivots) != 1 or len(guides) != 1 or pivots.keys() & guides.keys():
         return None
-    (crank, pivot), (slider, guide) = *pivots.items(), *guides.items()
+    ((crank, pivot),) = pivots.items()
+    ((slider, guide),) = guides.items()
     rod = next(body.name for body in scene.body if body.name not in (crank, slider))
-    pins = [j for j in scene.joint if set(j.bodies) == {crank, rod} and j.type == pin_type]
-    ends = [j for j in scene.joint if set(j.bodies) == {rod, slider} and j.type != "distance"]
+    pins = [j for j in scene.joint if set(j.bodies) == {crank, rod} and isinstance(j, pin_type)]
+    ends = [j for j in scene.joint if set(j.bodies) == {rod, slider} and not isinstance(j, Distance)]
     if len(pins) != 1 or len(ends) != 1:
         return None
-    return (*(scene.body_index(n) for n in (crank, rod, slider)), pivot, pins[0], ends[0], guide)
+    index = scene.body_index
+    return Parts(index(crank), index(rod), index(slider), pivot, pins[0], ends[0], guide)
 
 
 def _chained(path: tuple[np.ndarray, ...], slope: np.ndarray, bend: np.ndarray) -> tuple[np.ndarray, ...]:

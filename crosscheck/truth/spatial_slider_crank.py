@@ -13,12 +13,12 @@ from crosscheck.loads import cross, initial_rotations
 from crosscheck.truth.parallelogram import turning_driver, unit
 from crosscheck.truth.path import Path, Pose, circle, turned
 from crosscheck.truth.planar_slider_crank import parts_of
-from mbref.scene import Scene
+from mbref.scene import Scene, Universal
 
 
 def spatial_slider_crank(scene: Scene) -> Path | None:
     """The path of a scene that looks like the family, or None."""
-    parts = parts_of(scene, "universal")
+    parts = parts_of(scene, Universal)
     if parts is None:
         return None
     crank, rod, slider, pivot, pin, end, guide = parts
@@ -29,8 +29,8 @@ def spatial_slider_crank(scene: Scene) -> Path | None:
     x0 = unit(c0 - b0)
     if abs(z0 @ x0) > 1 - 1e-6 or abs(e0 @ x0) > 1 - 1e-6:
         return None
-    arm, length, lean = b0 - centre, np.linalg.norm(c0 - b0), z0 @ x0
-    side = np.sign((c0 - b0) @ line)
+    arm, length, lean = b0 - centre, float(np.linalg.norm(c0 - b0)), float(z0 @ x0)
+    side = float(np.sign((c0 - b0) @ line))
     hand = np.sign(np.cross(e0, x0) @ z0)
     rotation0 = initial_rotations(scene)
     position0 = np.array([body.position for body in scene.body])

@@ -74,6 +74,18 @@ def test_the_first_field_that_differs_is_named(field):
     assert found.engines == ("truth", "other"), found
 
 
+def test_a_spin_that_changes_otherwise_is_named():
+    scene = MODELS["planar_slider_crank_gravity"]
+    run = short_run(scene)
+    spin = run.angular_velocity.copy()
+    spin[1, 2, 0] += 0.01 * np.abs(spin[1] - spin[0]).max()
+    found = gate(scene, [run, replace(run, angular_velocity=spin)])
+    assert found.field == "change of angular velocity", found
+    assert found.by == pytest.approx(0.01, rel=1e-9), (
+        f"put in one percent of the largest change, found {found}"
+    )
+
+
 def test_a_run_that_did_not_arrive_is_named():
     scene = MODELS["four_bar_gravity"]
     run = short_run(scene)

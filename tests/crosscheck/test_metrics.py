@@ -88,6 +88,15 @@ def test_violations_are_the_gap_and_the_rates_put_in():
     assert series.argmax() == 3 and np.delete(series, 3).max() < 1e-15, series
 
 
+def test_violation_of_an_angle_is_the_angle_put_in():
+    """The slider tilted about its own centre, where its joint with the rod is."""
+    orientation = EXACT.orientation.copy()
+    tilt = rotations.from_vector(np.array([0.0, 0.002, 0.0]))
+    orientation[3, 2] = rotations.multiply(tilt, orientation[3, 2])
+    got = measure(SCENE, replace(EXACT, orientation=orientation))["violation_position"]
+    assert got == pytest.approx(0.002, rel=1e-9), f"put in 0.002 rad, measured {got}"
+
+
 def test_energy_error_is_the_kinetic_energy_put_in():
     push = np.array([0.0, 0.0, 2.0])
     faster = replace(EXACT, velocity=bumped(EXACT.velocity, 8, 0, push))

@@ -31,7 +31,7 @@ VECTOR = st.tuples(*[st.floats(-1.5, 1.5)] * 3)
 @given(vector=VECTOR, name=st.sampled_from(sorted(ALL)))
 def test_truth_of_a_rotated_scene_is_the_rotated_truth(vector, name):
     scene, q = ALL[name], rotations.from_vector(np.array(vector))
-    times = np.linspace(0, min(scene.duration, 0.5), 7)
+    times = np.linspace(0, min(scene.duration, 0.15), 7)
     plain, turned = truth_for(scene).poses(times), truth_for(turned_scene(scene, q))
     assert turned is not None, f"{name} turned by {vector} is not recognised"
     got = turned.poses(times)
