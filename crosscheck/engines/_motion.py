@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from mbref.scene import Driver, Scene, Spring, TorsionSpring
-from mbref.trajectory import Trajectory
+from mbref.trajectory import Outcome, Trajectory
 
 SCOUT = (2000, 16000)  # steps of the coarse run that finds how fast a scene turns
 SCOUT_TURN = 0.5  # rad per step that such a run resolves
@@ -55,11 +55,12 @@ def _middle_moment(inertia: Sequence) -> float:
 
 def fastest_rate(scene: Scene, coarse: Callable[[float], Trajectory]) -> float:
     """The fastest angular velocity (rad/s) of a coarse run, of steps of the length given, or what the
-    scene states if faster; a run too coarse to tell is repeated once with finer steps."""
+    scene states if faster; a run that fails or is too coarse to tell is repeated once with finer steps."""
     for steps in SCOUT:
-        spins = np.linalg.norm(coarse(scene.duration / steps).angular_velocity, axis=2)
+        run = coarse(scene.duration / steps)
+        spins = np.linalg.norm(run.angular_velocity, axis=2)
         resolved = SCOUT_TURN * steps / scene.duration
         rate = max(stated_rate(scene), float(spins.max(initial=0.0)))
-        if rate < resolved:
+        if run.outcome is Outcome.COMPLETED and rate < resolved:
             break
     return min(rate, resolved)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,6 +17,8 @@ from mbref.trajectory import Cost, Outcome, Trajectory
 WIDTHS = {"position": 3, "orientation": 4, "velocity": 3, "angular_velocity": 3, "acceleration": 3,
           "angular_acceleration": 3}  # fmt: skip
 MAX_STEPS = 10**6  # of one interval; beyond it the run is not going to end
+
+JUMPS = (1.0, 1.7, 2.9, 4.9)  # shortest steps, tried where the shortest one fails
 
 Rhs = Callable[[float, np.ndarray], np.ndarray]
 Settle = Callable[[float, np.ndarray], np.ndarray]  # what an accepted state is corrected to
@@ -54,7 +56,7 @@ class Sample:
 
 
 def run_through(
-    scene: Scene, times: Sequence[float], advance: Callable[[float, float], None],
+    scene: Scene, times: np.ndarray, advance: Callable[[float, float], None],
     sample: Callable[[float], Sample], counts: Counts, build_seconds: float, labels: dict[str, Any],
 ) -> Trajectory:  # fmt: skip
     """Advances from sample to sample; the trajectory, complete or as far as it got.
@@ -131,8 +133,9 @@ def rk4(
 class Adaptive:
     """DOP853 from sample to sample, every accepted state settled; keeps its step length between samples.
 
-    A step of ``min_step`` is accepted whatever its error estimate: near a singular position the
-    accelerations are noise, and ever shorter steps would integrate the noise instead of passing it.
+    Near a singular position the accelerations are noise, and ever shorter steps would integrate the noise
+    instead of passing it.  So ``min_step`` is the shortest: where it fails too, some longer steps are
+    tried, and the one with the least error estimate is taken whatever that is.
     """
 
     rhs: Rhs
@@ -145,28 +148,39 @@ class Adaptive:
 
     def advance(self, y: np.ndarray, t0: float, t1: float) -> np.ndarray:
         """The state at t1; raises Failed where the motion stops being finite or does not end."""
-        t, f, taken = t0, self._evaluate(t0, y), 0
+        t, f = t0, self._evaluate(t0, y)
         self.step = self.step or self.min_step
-        while t < t1:
+        for _ in range(MAX_STEPS):
             wanted = min(max(self.step, self.min_step), self.max_step)
             h = t1 - t if t + 1.01 * wanted >= t1 else wanted
             new, slope, error = self._attempt(t, y, f, h)
-            if error <= 1 or (h <= self.min_step and math.isfinite(error)):
-                t = t1 if h == t1 - t else t + h
-                y, f, taken = new, slope, taken + 1
-                if self.settle is not None:
-                    y = self.settle(t, y)
-                    f = self._evaluate(t, y)
-                self.counts.steps += 1
-                self.step = max(h * _growth(error), self.step if h < wanted else 0.0)
-            else:
+            if not error <= 1 and h <= self.min_step:
+                h, new, slope, error = self._jump(t, y, f, t1)
+            elif not error <= 1:
                 self.counts.rejected += 1
                 self.step = h * min(_growth(error), 1.0)
-                if h <= self.min_step:
-                    raise Failed(Outcome.NOT_FINITE, t, f"the motion is not finite after {t:.6g} s")
-            if taken > MAX_STEPS:
-                raise Failed(Outcome.STEP_FAILED, t, f"{MAX_STEPS} steps have only reached {t:.6g} s")
-        return y
+                continue
+            self.counts.steps += 1
+            self.step = max(h * _growth(error), self.step if h < wanted else 0.0)
+            t, y, f = (t1 if h == t1 - t else t + h), new, slope
+            if self.settle is not None:
+                y = self.settle(t, y)
+                f = self._evaluate(t, y)
+            if t == t1:
+                return y
+        raise Failed(Outcome.STEP_FAILED, t, f"{MAX_STEPS} steps have only reached {t:.6g} s")
+
+    def _jump(
+        self, t: float, y: np.ndarray, f: np.ndarray, t1: float
+    ) -> tuple[float, np.ndarray, np.ndarray, float]:
+        """The step, of the shortest and some longer ones, whose error estimate is the least."""
+        lengths = {min(factor * self.min_step, t1 - t) for factor in JUMPS}
+        attempts = [(h, *self._attempt(t, y, f, h)) for h in sorted(lengths)]
+        self.counts.rejected += len(attempts)
+        best = min(attempts, key=lambda attempt: attempt[3] if math.isfinite(attempt[3]) else math.inf)
+        if not math.isfinite(best[3]):
+            raise Failed(Outcome.NOT_FINITE, t, f"the motion is not finite after {t:.6g} s")
+        return best
 
     def _evaluate(self, t: float, y: np.ndarray) -> np.ndarray:
         self.counts.rhs += 1

@@ -111,7 +111,8 @@ def spanning_tree(scene: Scene) -> Tree:
     nodes = [_body_link(b, body) for b, body in enumerate(scene.body)]
     edges = []
     for j, joint in enumerate(scene.joint):
-        pair = tuple(scene.body_index(name) for name in joint.bodies)
+        first, second = joint.bodies
+        pair = (scene.body_index(first), scene.body_index(second))
         if isinstance(joint, Distance):
             edges += _rod(nodes, j, pair, np.array(joint.anchors, dtype=float))
         else:
@@ -136,7 +137,7 @@ def _body_link(index: int, body: Body) -> Link:
 
 def _axes(joint: Joint) -> np.ndarray:
     """Unit axes (n, 3) of a joint, first body's first."""
-    if isinstance(joint, Fixed | Spherical):
+    if isinstance(joint, Fixed | Spherical | Distance):
         return NO_AXES
     axes = np.array(joint.axes if isinstance(joint, Universal) else [joint.axis], dtype=float)
     return axes / np.linalg.norm(axes, axis=1, keepdims=True)
@@ -184,7 +185,8 @@ def _rod(nodes: list[Link], joint: int, pair: tuple[int, int], anchors: np.ndarr
 def _kruskal(count: int, edges: list[_Edge]) -> tuple[list[_Edge], list[_Edge]]:
     """Edges of a maximum-weight spanning forest, ground included, and the edges cut."""
     group = list(range(count + 1))  # the ground, -1, is the last entry
-    kept, cut = [], []
+    kept: list[_Edge] = []
+    cut: list[_Edge] = []
     for edge in sorted(edges, key=lambda edge: -edge.weight):
         a, b = group[edge.nodes[0]], group[edge.nodes[1]]
         (cut if a == b else kept).append(edge)
@@ -194,7 +196,8 @@ def _kruskal(count: int, edges: list[_Edge]) -> tuple[list[_Edge], list[_Edge]]:
 
 def _cut_open(nodes: list[Link], kept: list[_Edge], cut: list[_Edge]) -> list[Closure]:
     """Closures of the cut edges; adds the ghosts to the nodes and their joints to the kept edges."""
-    closures, ghosts = [], {}
+    closures: list[Closure] = []
+    ghosts: dict[int, list[int]] = {}
     for edge in cut:
         if edge.kind == "spherical":
             closures.append(Closure("point", edge.joint, edge.nodes, edge.anchor))
@@ -239,7 +242,7 @@ def _depth_first(nodes: list[Link], edges: list[_Edge], closures: list[Closure],
     starts = np.cumsum([0, *(link.freedoms for link in links)])[:-1]
     return Tree(
         links=tuple(links),
-        closures=tuple(replace(c, links=tuple(number[n] for n in c.links)) for c in closures),
+        closures=tuple(replace(c, links=(number[c.links[0]], number[c.links[1]])) for c in closures),
         own=tuple(number[b] for b in range(bodies)),
         starts=tuple(starts.tolist()),
     )

@@ -88,7 +88,7 @@ class MuJoCo(Engine):
 
     def _coarse(self, scene: Scene, step: float) -> Trajectory:
         times = np.linspace(0, scene.duration, SCOUT_SAMPLES)
-        return self.run(scene, times, Setting("tuned", {"step": step, "beta": 0.1 / step, "hard": HARD}))
+        return self.run(scene, times, Setting("tuned", {"step": step, "beta": 0.5 / step, "hard": HARD}))
 
 
 class _Run:

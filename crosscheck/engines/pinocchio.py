@@ -37,6 +37,7 @@ CLOSED_ENOUGH = 1e-8  # m and rad, beyond which it has failed
 RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10)  # finer ones get lost in the noise at singular positions
 TURN_PER_STEP = 0.25  # rad a driver may move within one adaptive step: closures can fold in between
 LEAST_TURN = 0.03  # rad turned within the shortest adaptive step
+SCOUT_RTOL = 1e-5
 SCOUT_SAMPLES = 41  # of the coarse run that finds how fast a scene turns
 STEPS = (0.2, 0.06, 0.02, 0.006, 0.002)  # rad turned per fixed step
 MAX_FIXED_STEPS = 150_000
@@ -82,7 +83,7 @@ class Pinocchio(Engine):
 
     def _coarse(self, scene: Scene, step: float) -> Trajectory:
         times = np.linspace(0, scene.duration, SCOUT_SAMPLES)
-        return self.run(scene, times, Setting("baumgarte", {"step": step}))
+        return self.run(scene, times, Setting("tuned", {"rtol": SCOUT_RTOL, "min_step": step}))
 
 
 class _Run:

@@ -1,0 +1,88 @@
+"""Stepping between samples / closed forms: the integrators run outside the engines."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import DOP853
+
+from crosscheck.engines._stepping import Adaptive, Counts, Failed, rk4, step_count
+from mbref.trajectory import Outcome
+
+
+def oscillator(t: float, y: np.ndarray) -> np.ndarray:
+    """x'' = -25 x, from x = 1 at rest: x = cos 5t."""
+    return np.array([y[1], -25 * y[0]])
+
+
+def cosine(t: float) -> np.ndarray:
+    return np.array([np.cos(5 * t), -5 * np.sin(5 * t)])
+
+
+def adaptive(rhs, rtol: float = 1e-9, **options) -> Adaptive:
+    limits = {"min_step": 1e-4, "max_step": np.inf} | options
+    return Adaptive(rhs, None, rtol, limits["min_step"], limits["max_step"], Counts())
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-10])
+def test_adaptive_steps_and_cosine(rtol: float) -> None:
+    stepper, y = adaptive(oscillator, rtol), cosine(0.0)
+    for t0, t1 in ((0.0, 0.7), (0.7, 0.701), (0.701, 3.0)):
+        y = stepper.advance(y, t0, t1)
+        gap = abs(y - cosine(t1)).max()
+        assert gap < 100 * rtol, f"{gap:.1e} from the cosine at {t1}, tolerance {rtol:.0e}"
+
+
+def test_right_hand_sides_are_counted() -> None:
+    calls = 0
+
+    def counted(t: float, y: np.ndarray) -> np.ndarray:
+        nonlocal calls
+        calls += 1
+        return oscillator(t, y)
+
+    stepper = adaptive(counted)
+    stepper.advance(cosine(0.0), 0.0, 2.0)
+    expected = 12 * (stepper.counts.steps + stepper.counts.rejected) + 1
+    assert stepper.counts.rhs == calls == expected, f"{calls} calls, {stepper.counts}, expected {expected}"
+
+
+def test_noise_at_one_position_is_stepped_over() -> None:
+    """The slope is garbage where a stage of the first and shortest step evaluates it."""
+    shortest = 1e-3
+    noisy = DOP853.C[5] * shortest
+
+    def rhs(t: float, y: np.ndarray) -> np.ndarray:
+        return np.array([1.0 if abs(y[0] - noisy) > 1e-9 else 1e9])
+
+    stepper = adaptive(rhs, 1e-12, min_step=shortest)
+    y = stepper.advance(np.zeros(1), 0.0, 1.0)
+    assert stepper.counts.rejected >= 4, f"the noise was not met: {stepper.counts}"
+    assert abs(y[0] - 1.0) < 1e-12, f"y(1) = {y[0]}, expected 1"
+
+
+def test_a_motion_that_ends_is_not_finite_and_says_when() -> None:
+    def rhs(t: float, y: np.ndarray) -> np.ndarray:
+        with np.errstate(all="ignore"):
+            return np.sqrt(0.5 - np.array([t])) * 0 + 1
+
+    with pytest.raises(Failed, match="not finite after") as failure:
+        adaptive(rhs).advance(np.zeros(1), 0.0, 1.0)
+    assert failure.value.outcome is Outcome.NOT_FINITE, f"{failure.value.outcome}"
+    assert 0.45 < failure.value.t <= 0.5, f"reached {failure.value.t}, the right-hand side ends at 0.5"
+
+
+def test_fixed_steps_have_fourth_order_and_divide_the_interval() -> None:
+    steps, errors = (0.011, 0.0055), []
+    for h in steps:
+        counts = Counts()
+        y = rk4(oscillator, lambda t, y: y, cosine(0.0), 0.0, 1.0, h, counts)
+        errors.append(abs(y - cosine(1.0)).max())
+        assert counts.steps == step_count(0.0, 1.0, h) and counts.rhs == 4 * counts.steps, f"{counts}"
+    order = np.log2(errors[0] / errors[1])
+    assert 3.8 < order < 4.2, f"errors {errors} of steps {steps}: order {order:.2f}"
+
+
+@pytest.mark.parametrize(("step", "expected"), [(0.1, 10), (0.3, 4), (2.0, 1), (1 / 3, 3)])
+def test_no_step_is_longer_than_asked(step: float, expected: int) -> None:
+    assert step_count(0.0, 1.0, step) == expected, f"{step_count(0.0, 1.0, step)} steps of {step}"
