@@ -38,11 +38,9 @@ class Mechanism:
         self.origin: dict[int, np.ndarray] = {0: np.zeros(3)}
         for k, link in enumerate(self.tree.links):
             self._add(k, link)
-        models = [self._closure(closure) for closure in self.tree.closures]
-        self.closed = [
-            k for k, c in enumerate(models) if c is not None
-        ]  # closures of the tree that are there
-        self.closures = [models[k] for k in self.closed]
+        models = [(k, self._closure(closure)) for k, closure in enumerate(self.tree.closures)]
+        self.closed = [k for k, model in models if model is not None]  # indices of the tree's closures
+        self.closures: list[Any] = [model for _, model in models if model is not None]
         self.driven = [(self.tree.coordinate(scene, d.joint), d) for d in scene.driver]
         self._make_heavy([i for i, _ in self.driven])
         joints = self.model.joints
