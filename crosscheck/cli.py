@@ -11,9 +11,10 @@ from collections.abc import Callable, Sequence
 
 from rich.console import Console
 
-from crosscheck import compare, listing, request
+from crosscheck import compare, listing, request, tables
 from crosscheck.engine import engine_names
 from crosscheck.progress import shown
+from crosscheck.record import public
 from crosscheck.request import RequestError
 from crosscheck.study import TIME_LIMIT, Case, Record, key, study
 from mbref.trajectory import Outcome
@@ -56,7 +57,7 @@ def _run(arguments: argparse.Namespace) -> int:
         if arguments.json:
             print(json.dumps(_by_scene(cases, records), allow_nan=False))
         else:
-            compare.print_runs(_console(), records)
+            tables.print_runs(_console(), records)
     return _status(records)
 
 
@@ -64,14 +65,32 @@ def _compare(arguments: argparse.Namespace) -> int:
     if arguments.repeats < REPEATS:
         raise RequestError(f"--repeats: must be at least {REPEATS}, got {arguments.repeats}")
     cases = _cases(arguments)
+    refused = _refused(cases)
     records = _study(cases, [])
+    same = [i for i, case in enumerate(cases) if case.scene.name not in refused]
     _notice(f"timing: {arguments.repeats} interleaved repeats of the runs that completed")
-    records = compare.timed(cases, records, arguments.repeats, _notice)
+    timed = compare.timed([cases[i] for i in same], [records[i] for i in same], arguments.repeats, _notice)
+    records = [record for record in records if record["scene"] in refused] + timed
     if arguments.json:
         print(json.dumps(_by_scene(cases, records), allow_nan=False))
     else:
-        compare.print_comparison(_console(), records)
-    return _status(records)
+        tables.print_runs(_console(), [r for r in records if r["scene"] in refused])
+        tables.print_comparison(_console(), timed)
+    return OTHERWISE if refused else _status(records)
+
+
+def _refused(cases: Sequence[Case]) -> set[str]:
+    """Names of the scenes that are not the same mechanism in all their engines; each is said why."""
+    scenes = {case.scene.name: case.scene for case in cases}
+    limit = max(case.time_limit for case in cases)
+    engines = {name: dict.fromkeys(c.engine for c in cases if c.scene.name == name) for name in scenes}
+    gates = {n: compare.gate_cases(scene, list(engines[n]), limit) for n, scene in scenes.items()}
+    records = _study([case for group in gates.values() for case in group], [])
+    reasons = {n: compare.difference(s, [r for r in records if r["scene"] == n]) for n, s in scenes.items()}
+    for name, reason in reasons.items():
+        if reason:
+            _notice(f"{name}: times are not compared, the engines simulate different mechanisms: {reason}")
+    return {name for name, reason in reasons.items() if reason}
 
 
 def _report(arguments: argparse.Namespace) -> int:
@@ -115,8 +134,7 @@ def _by_scene(cases: Sequence[Case], records: Sequence[Record]) -> dict | list[d
     """{"scene", "records"} of one scene; a list of them for several."""
     names = dict.fromkeys(case.scene.name for case in cases)
     documents = [
-        {"scene": name, "records": [compare.public(r) for r in records if r["scene"] == name]}
-        for name in names
+        {"scene": name, "records": [public(r) for r in records if r["scene"] == name]} for name in names
     ]
     return documents[0] if len(documents) == 1 else documents
 

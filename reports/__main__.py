@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
+from crosscheck.compare import gate_cases
 from crosscheck.progress import shown
 from crosscheck.request import RequestError, find_engines
-from crosscheck.study import Record, study
-from mbref.scene import Scene
+from crosscheck.study import study
 from reports import plan
+from reports.runs import SceneRuns, by_scene
 from reports.timings import with_timings
 
 NEEDS = ("matplotlib", "jinja2")
@@ -27,19 +28,19 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     arguments = _parser(NAMES).parse_args(argv)
     try:
-        scenes, records = _collect(Path(arguments.out), arguments.quick)
+        groups = _collect(Path(arguments.out), arguments.quick)
     except RequestError as error:
         _notice(str(error))
         return 2
     except KeyboardInterrupt:
         _notice(f"interrupted; what has been run is in {arguments.out}, the same command goes on from there")
         return 130
-    _render(scenes, records, Path(arguments.out), arguments.section or NAMES)
+    _render(groups, Path(arguments.out), arguments.section or NAMES)
     return 0
 
 
-def _collect(out: Path, is_quick: bool) -> tuple[dict[str, Scene], list[Record]]:
-    """Scenes and records of the study; raw records stay in ``out``/records.jsonl."""
+def _collect(out: Path, is_quick: bool) -> list[SceneRuns]:
+    """The runs of the study by scene; raw records stay in ``out``/records.jsonl."""
     engines = find_engines(None, _notice)
     _notice("planning the sweep")
     scenes, cases, unable = (plan.quick if is_quick else plan.whole)(engines)
@@ -48,17 +49,17 @@ def _collect(out: Path, is_quick: bool) -> tuple[dict[str, Scene], list[Record]]
     (out / "scenes").mkdir(parents=True, exist_ok=True)
     for scene in scenes:
         scene.save(out / "scenes" / f"{scene.name}.toml")
-    with shown("running", len(cases)) as progress:
-        records = study(cases, records_path=out / "records.jsonl", progress=progress)
-    records = with_timings(cases, records, out / "timings.jsonl", _notice)
-    return {scene.name: scene for scene in scenes}, records
+    gates = [case for scene in scenes for case in gate_cases(scene, engines, plan.QUICK_LIMIT)]
+    with shown("running", len(cases) + len(gates)) as progress:
+        records = study([*cases, *gates], records_path=out / "records.jsonl", progress=progress)
+    runs = with_timings(cases, records[: len(cases)], out / "timings.jsonl", _notice)
+    return by_scene(runs, {scene.name: scene for scene in scenes}, records[len(cases) :])
 
 
-def _render(scenes: Mapping[str, Scene], records: Sequence[Record], out: Path, names: Sequence[str]) -> None:
+def _render(groups: Sequence[SceneRuns], out: Path, names: Sequence[str]) -> None:
     from reports import render, sections
-    from reports.runs import by_scene
 
-    render.write(sections.blocks(by_scene(records, scenes), names), out)
+    render.write(sections.blocks(groups, names), out)
     _notice(f"written: {out / 'index.html'} and {out / 'report.md'}")
 
 

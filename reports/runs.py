@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
-from crosscheck.compare import swept
+from crosscheck.compare import difference
+from crosscheck.record import swept
+from crosscheck.study import Record
+from crosscheck.tolerances import ERROR_LEVELS, FALSE_SUCCESS
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
-LEVELS = (1e-3, 1e-6, 1e-9)  # errors at which costs are compared
-WRONG = 1e-2  # a run that completes with a larger error has not followed the motion
+LEVELS, WRONG = ERROR_LEVELS, FALSE_SUCCESS
 Curve = tuple[str, str]  # engine, family
 
 
@@ -23,7 +23,7 @@ Curve = tuple[str, str]  # engine, family
 class Run:
     """One record of the study. ``error`` is NaN where no truth could be compared with."""
 
-    record: Mapping[str, Any]
+    record: Record
 
     @property
     def scene(self) -> str:
@@ -83,6 +83,11 @@ class SceneRuns:
 
     scene: Scene
     runs: Sequence[Run]
+    gate: Sequence[Record] = ()  # short runs that show whether the engines simulate the same mechanism
+
+    def difference(self) -> str | None:
+        """The first field in which an engine's mechanism is another one; None when all agree."""
+        return difference(self.scene, self.gate) if self.gate else None
 
     def curves(self) -> dict[Curve, list[Run]]:
         """Runs by engine and family, in the order of the records."""
@@ -108,17 +113,18 @@ def _rank(run: Run) -> tuple[bool, float, float]:
     return not run.completed, 0.0 if run.completed else -run.t_end, error
 
 
-def load(path: Path) -> list[dict[str, Any]]:
-    """The records of a JSON-lines file."""
-    return [json.loads(line) for line in path.read_text().splitlines() if line.strip()]
-
-
-def by_scene(records: Iterable[Mapping[str, Any]], scenes: Mapping[str, Scene]) -> list[SceneRuns]:
-    """Runs grouped by scene, in the order of ``scenes``; scenes without records are left out."""
-    groups: dict[str, list[Run]] = {name: [] for name in scenes}
+def by_scene(
+    records: Iterable[Record], scenes: Mapping[str, Scene], gates: Iterable[Record] = ()
+) -> list[SceneRuns]:
+    """Runs grouped by scene, in the order of ``scenes``, with the scene's records of the gate; scenes
+    without runs are left out."""
+    runs: dict[str, list[Run]] = {name: [] for name in scenes}
+    gate: dict[str, list[Record]] = {name: [] for name in scenes}
     for record in records:
-        groups[record["scene"]].append(Run(record))
-    return [SceneRuns(scenes[name], runs) for name, runs in groups.items() if runs]
+        runs[record["scene"]].append(Run(record))
+    for record in gates:
+        gate[record["scene"]].append(record)
+    return [SceneRuns(scene, runs[name], gate[name]) for name, scene in scenes.items() if runs[name]]
 
 
 def plain(value: Any) -> str:

@@ -1,4 +1,4 @@
-"""Measured order of convergence: how the error falls with the mean step, family by family."""
+"""Measured order of convergence: how the error falls with the step or the tolerance, family by family."""
 
 from __future__ import annotations
 
@@ -9,39 +9,47 @@ from crosscheck.metrics import order_of_convergence
 from reports.blocks import Block, Heading, Table, Text
 from reports.runs import Curve, Run, SceneRuns, number
 
-APART = 1.05  # runs whose mean steps are nearer than this ratio count as one
-HEADER_START = ("Engine", "Family")
-
 
 def render(groups: Sequence[SceneRuns]) -> list[Block]:
     """One table: engines and families down, scenes across."""
     text = (
-        "The slope of log(error) over log(mean step), which is end time / steps, where at least three "
-        "completed runs of a family lie on a line: a method of order p shows p, a slope near zero is a "
-        "floor, and an en dash says that no three do."
+        "The slope of log(error) over log(setting) where at least three completed runs of a family lie on a "
+        "line. Over a fixed step it is the order of the method; over a tolerance, 1 says that the error "
+        "follows what was asked for. A slope near zero is a floor; an en dash: no three runs lie on a line."
     )
-    curves = list(dict.fromkeys(curve for group in groups for curve in group.curves()))
-    rows = [(*curve, *(number(slope(group, curve), 2) for group in groups)) for curve in sorted(curves)]
-    header = (*HEADER_START, *(group.scene.name for group in groups))
-    table = Table(_caption(groups, curves), header, rows, right=frozenset(range(2, len(header))))
+    curves = sorted({curve for group in groups for curve in group.curves()})
+    rows = [_row(groups, curve) for curve in curves]
+    header = ("Engine", "Family", "Over", *(group.scene.name for group in groups))
+    table = Table(_caption(groups, curves), header, rows, right=frozenset(range(3, len(header))))
     return [Heading("Order of convergence", 2), Text(text), table]
 
 
+def _row(groups: Sequence[SceneRuns], curve: Curve) -> tuple[str, ...]:
+    options = dict.fromkeys(swept_option(group.curves().get(curve, ())) for group in groups)
+    return (*curve, ", ".join(filter(None, options)), *(number(slope(group, curve), 2) for group in groups))
+
+
+def swept_option(runs: Sequence[Run]) -> str | None:
+    """The first number among the settings that differs from run to run."""
+    settings = [run.record["settings"] for run in runs]
+    for name in settings[0] if settings else ():
+        values = [s.get(name) for s in settings]
+        if all(isinstance(value, int | float) for value in values) and len(set(values)) > 1:
+            return name
+    return None
+
+
 def slope(group: SceneRuns, curve: Curve) -> float:
-    """The measured order of one family in one scene; NaN where they do not tell."""
-    points = sorted((_step(run), run.error) for run in group.curves().get(curve, ()) if _tells(run))
-    apart = [p for i, p in enumerate(points) if i == 0 or p[0] > APART * points[i - 1][0]]
-    order = order_of_convergence([step for step, _ in apart], [error for _, error in apart])
+    """The measured order of one family in one scene over its swept option; NaN where runs do not tell."""
+    runs = group.curves().get(curve, ())
+    option = swept_option(runs)
+    told = [run for run in runs if run.completed and math.isfinite(run.error) and run.error > 0]
+    if option is None or not told:
+        return math.nan
+    order = order_of_convergence(
+        [run.record["settings"][option] for run in told], [run.error for run in told]
+    )
     return math.nan if order is None else order
-
-
-def _step(run: Run) -> float:
-    """The mean step, s."""
-    return run.t_end / run.record["cost"]["steps"]
-
-
-def _tells(run: Run) -> bool:
-    return run.completed and run.record["cost"]["steps"] > 0 and math.isfinite(run.error) and run.error > 0
 
 
 def _caption(groups: Sequence[SceneRuns], curves: Sequence[Curve]) -> str:
@@ -51,6 +59,6 @@ def _caption(groups: Sequence[SceneRuns], curves: Sequence[Curve]) -> str:
         return "No family has three runs on a line."
     (low, low_scene), (high, high_scene) = min(finite, key=finite.get), max(finite, key=finite.get)
     return (
-        f"Orders from {finite[low, low_scene]:.2g} ({' '.join(low)}, {low_scene}) to "
+        f"Slopes from {finite[low, low_scene]:.2g} ({' '.join(low)}, {low_scene}) to "
         f"{finite[high, high_scene]:.2g} ({' '.join(high)}, {high_scene})."
     )

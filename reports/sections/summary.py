@@ -36,7 +36,17 @@ def _scene(group: SceneRuns) -> list[Block]:
     rows = [_row(group, best[curve], costs[curve], fastest) for curve in order]
     caption = f"To t = {group.scene.duration:g} s. Fastest: {_winners(costs, fastest)}."
     table = Table(caption, HEADER, rows, right=frozenset({2, 3, 5, *range(6, 6 + len(LEVELS))}))
-    return [Heading(group.scene.name), table]
+    return [Heading(group.scene.name), *_gate(group), table]
+
+
+def _gate(group: SceneRuns) -> list[Block]:
+    """Whether the engines start as the same mechanism; nothing where that was not asked."""
+    if not group.gate:
+        return []
+    if reason := group.difference():
+        return [Text(f"The engines do not agree on the mechanism, so beware of comparing them: {reason}.")]
+    engines = ", ".join(dict.fromkeys(record["engine"] for record in group.gate))
+    return [Text(f"The same mechanism in {engines}: start, energy and first accelerations agree.")]
 
 
 def _cost(runs: Sequence[Run], level: float) -> float:

@@ -9,8 +9,9 @@ import pytest
 
 from crosscheck import cli, request, study
 from crosscheck.cli import main
-from crosscheck.compare import PUBLIC, timed
+from crosscheck.compare import timed
 from crosscheck.isolate import ChildFailed
+from crosscheck.record import PUBLIC
 from mbref.scene import Body, Moment, Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Cost, Outcome
@@ -238,6 +239,16 @@ def test_comparison_table_and_ratio_to_the_fastest(capsys, still):
     assert status == 0
     for word in ("ratio", "1.0", "2.0", "5.0", "fake plain"):
         assert word in out, (word, out)
+
+
+def test_another_mechanism_and_a_comparison_refused(capsys, still):
+    asked = ("--engine", FAKE, "--engine", "elsewhere:ENGINE")
+    status, out, err = run_main(capsys, "compare", still, *asked)
+    assert status == 1, err
+    assert "still: times are not compared" in err and "initial position: truth and elsewhere differ" in err, (
+        err
+    )
+    assert "plain" in out and "ratio" not in out, out
 
 
 def test_fewer_than_five_repeats_is_a_fault(capsys, still):

@@ -99,7 +99,8 @@ def test_program_and_a_report_that_is_not_run_twice(tmp_path, of_fakes, capsys):
     names = ("records.jsonl", "timings.jsonl", "scenes/still.toml")
     before = [(out / name).read_text() for name in names]
     assert "fake plain" in (out / "index.html").read_text()
-    assert len(before[0].splitlines()) == 3, before[0]
+    assert len(before[0].splitlines()) == 4, "three runs and the gate"
+    assert "The same mechanism in fake" in (out / "index.html").read_text()
     assert Scene.from_file(out / "scenes" / "still.toml") == still("still")
     assert program.main(["--quick", "--out", str(out), "--section", "provenance"]) == 0
     assert [(out / name).read_text() for name in names] == before, "a stored run was run or timed again"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import pytest
@@ -10,6 +11,8 @@ from synthetic import groups, nothing, record, records, scene
 import crosscheck.isolate
 import crosscheck.study
 import mbref.simulate
+from crosscheck.gate import gate_times
+from crosscheck.truth import truth_for
 from mbref.trajectory import Outcome
 from reports.blocks import Figure, Heading, Table, Text
 from reports.runs import SceneRuns, by_scene, duration, ratio
@@ -107,10 +110,28 @@ def test_order_of_convergence_and_the_synthetic_slopes():
     assert orders["mujoco", "defaults"] == "–", orders
 
 
-def test_equal_mean_steps_and_no_order():
-    same = [record("a", "x", e, 0.1, 100, rtol=e) for e in (1e-3, 1e-5, 1e-7)]
-    [group] = by_scene(same, {scene().name: scene()})
-    assert math.isnan(convergence.slope(group, ("a", "x"))), convergence.slope(group, ("a", "x"))
+def test_order_and_the_setting_it_is_taken_over():
+    [found] = [b for b in convergence.render(groups()[:1]) if isinstance(b, Table)]
+    over = column(found, "Over")
+    assert over["mbref", "mpi-svd+projection"] == over["mujoco", "tuned"] == "step", over
+    assert over["pinocchio", "defaults"] == "", over
+
+
+@pytest.mark.parametrize(
+    ("shifts", "words"), [((0.0,), "The same mechanism in b"), ((0.0, 1e-4), "do not agree")]
+)
+def test_gate_and_what_the_summary_says(shifts, words):
+    gate = [at_gate(shift) for shift in shifts]
+    [group] = by_scene(records()[:3], {scene().name: scene()}, gate)
+    [_, said] = [b.text for b in summary.render([group]) if isinstance(b, Text)]
+    assert words in said, (words, said)
+
+
+def at_gate(shift: float) -> dict:
+    """A record of the gate: the truth, moved."""
+    true = truth_for(scene()).poses(gate_times(scene()))
+    moved = dataclasses.replace(true, engine="b", position=true.position + shift)
+    return {**moved.to_record(), "scene": scene().name}
 
 
 def test_outcome_table_and_outcome_time_and_error_together():
