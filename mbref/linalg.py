@@ -1,13 +1,12 @@
-"""Dense factorisations that decide rank: LU with partial and full pivoting, pivoted QR, pseudo-inverse.
+"""Dense factorisations by elimination: LU with partial and with full pivoting, Cholesky.
 
-Small matrices by hand, because a call of LAPACK costs more than the work; the singular value
-decomposition by LAPACK.  All work in place on C-contiguous arrays given by the caller.
+Small matrices by hand, because a call of LAPACK costs more than the work.  All in place on C-contiguous
+arrays given by the caller.
 """
 
 from __future__ import annotations
 
-import numpy as np
-from numpy import isfinite, sqrt
+from numpy import sqrt
 
 from mbref.compiled import kernel
 
@@ -103,163 +102,73 @@ def exchange_columns(a, m, k, other, columns):
     """Exchange columns k and other of a[:m] and of the record of their order."""
     if other != k:
         columns[k], columns[other] = columns[other], columns[k]
-        for i in range(m):
-            a[i, k], a[i, other] = a[i, other], a[i, k]
+        exchange_entries(a, m, k, other)
 
 
 @kernel
-def qr_pivoted(b, n, m, order, tau, norms, work, tolerance):
-    """Householder QR with column pivoting of b[:n, :m], in place; returns the rank.
-
-    Reflector k stands below the diagonal of column k with scale ``tau[k]``.  A column counts when its
-    remaining norm exceeds ``tolerance`` times the largest column norm.  ``norms`` (2, m), ``work`` (m,).
-    Golub & Van Loan, Matrix Computations, algorithm 5.4.1; norms recomputed when they have cancelled.
-    """
-    for j in range(m):
-        order[j] = j
-        norms[0, j] = 0.0
-    for i in range(n):
-        for j in range(m):
-            norms[0, j] += b[i, j] * b[i, j]
-    norms[1] = norms[0]
-    largest = norms[0, largest_from(norms[0], 0, m)]
-    for k in range(min(m, n)):
-        best = largest_from(norms[0], k, m)
-        if best != k:
-            exchange_columns(b, n, k, best, order)
-            norms[0, best], norms[1, best] = norms[0, k], norms[1, k]
-        square = 0.0
-        for i in range(k, n):
-            square += b[i, k] * b[i, k]
-        if not square > tolerance * tolerance * largest:
-            return k
-        reflect(b, n, m, k, sqrt(square), tau, work)
-        for j in range(k + 1, m):
-            norms[0, j] -= b[k, j] * b[k, j]
-            if norms[0, j] < 1e-4 * norms[1, j]:
-                norms[0, j] = 0.0
-                for i in range(k + 1, n):
-                    norms[0, j] += b[i, j] * b[i, j]
-                norms[1, j] = norms[0, j]
-    return min(m, n)
-
-
-@kernel
-def largest_from(values, start, stop):
-    """Index of the largest entry in values[start:stop]."""
-    best = start
-    for j in range(start + 1, stop):
-        if values[j] > values[best]:
-            best = j
-    return best
-
-
-@kernel
-def reflect(b, n, m, k, norm, tau, work):
-    """Annihilate column k below the diagonal and apply the reflector to the columns right of it."""
-    head = b[k, k]
-    beta = -norm if head > 0.0 else norm
-    tau[k] = (beta - head) / beta
-    inverse = 1.0 / (head - beta)
-    for i in range(k + 1, n):
-        b[i, k] *= inverse
-    b[k, k] = beta
-    for j in range(k + 1, m):
-        work[j] = b[k, j]
-    for i in range(k + 1, n):
-        v = b[i, k]
-        for j in range(k + 1, m):
-            work[j] += v * b[i, j]
-    for j in range(k + 1, m):
-        work[j] *= tau[k]
-        b[k, j] -= work[j]
-    for i in range(k + 1, n):
-        v = b[i, k]
-        for j in range(k + 1, m):
-            b[i, j] -= v * work[j]
-
-
-@kernel
-def minimum_norm(b, n, rank, order, tau, rhs, x):
-    """x (n,) of least norm with D x = rhs in the independent rows of D, from ``qr_pivoted`` of Dᵀ."""
-    for k in range(n):
-        x[k] = 0.0
-    for k in range(rank):
-        value = rhs[order[k]]
-        for i in range(k):
-            value -= b[i, k] * x[i]
-        x[k] = value / b[k, k]
-    for k in range(rank - 1, -1, -1):
-        value = x[k]
-        for i in range(k + 1, n):
-            value += b[i, k] * x[i]
-        value *= tau[k]
-        x[k] -= value
-        for i in range(k + 1, n):
-            x[i] -= value * b[i, k]
-
-
-@kernel
-def equilibrate(jacobian, inverse_root, d, row_scale):
-    """D = R Φ_q M^(-1/2) (m, n) with unit rows; R into ``row_scale`` (m,), so that ranks ignore units."""
-    m, n = jacobian.shape
+def exchange_entries(a, m, k, other):
+    """Exchange the first m entries of columns k and other."""
     for i in range(m):
-        square = 0.0
-        for j in range(n):
-            d[i, j] = jacobian[i, j] * inverse_root[j]
-            square += d[i, j] * d[i, j]
-        row_scale[i] = 1.0 / sqrt(square) if square > 0.0 else 1.0
-        for j in range(n):
-            d[i, j] *= row_scale[i]
+        a[i, k], a[i, other] = a[i, other], a[i, k]
 
 
 @kernel
-def svd_solve(d, rhs, tolerance, x, dual):
-    """x = D⁺ rhs and dual = (Dᵀ)⁺ x by the singular value decomposition (Eqs. 27 and 28); the rank.
+def back_substitute(r, n, x):
+    """Solve R x = x with the upper triangle of r[:n, :n], in place."""
+    for k in range(n - 1, -1, -1):
+        for j in range(k + 1, n):
+            x[k] -= r[k, j] * x[j]
+        x[k] /= r[k, k]
 
-    One step of refinement, x += D⁺ (rhs - D x), takes out the rounding that the orthogonal factors
-    spread over all of x: a planar motion stays planar.  ``rhs`` (m,) becomes the residual.
-    -1 where an entry of D is not finite, which LAPACK would not survive.
-    """
-    x[:] = 0.0
-    dual[:] = 0.0
-    if d.size == 0:
-        return 0
-    if not isfinite(np.sum(d)):
-        return -1
-    u, s, vt = np.linalg.svd(d, full_matrices=False)
+
+@kernel
+def gram(d, s):
+    """The lower half of D Dᵀ."""
     m, n = d.shape
-    rank = 0
-    while rank < s.size and s[rank] > tolerance * s[0]:
-        rank += 1
-    add_pseudo_solution(u, s, vt, rank, rhs, x, dual)
     for i in range(m):
-        for j in range(n):
-            rhs[i] -= d[i, j] * x[j]
-    add_pseudo_solution(u, s, vt, rank, rhs, x, dual)
-    return rank
+        for k in range(i + 1):
+            value = 0.0
+            for j in range(n):
+                value += d[i, j] * d[k, j]
+            s[i, k] = value
 
 
 @kernel
-def add_pseudo_solution(u, s, vt, rank, rhs, x, dual):
-    """x += V S⁺ Uᵀ rhs and dual += U S⁺ S⁺ Uᵀ rhs, of the first ``rank`` singular values."""
-    m, n = u.shape[0], vt.shape[1]
-    for k in range(rank):
-        value = 0.0
-        for i in range(m):
-            value += u[i, k] * rhs[i]
-        value /= s[k]
+def times_transpose(d, y, x):
+    """x = Dᵀ y."""
+    m, n = d.shape
+    x[:] = 0.0
+    for i in range(m):
         for j in range(n):
-            x[j] += vt[k, j] * value
-        for i in range(m):
-            dual[i] += u[i, k] * (value / s[k])
+            x[j] += d[i, j] * y[i]
 
 
-def pinv_svd(d: np.ndarray, tolerance: float = 1e-10) -> tuple[np.ndarray, int]:
-    """Moore–Penrose inverse (n, m) of d (m, n) and its rank, by the SVD (Eqs. 27 and 28).
+@kernel
+def cholesky_factor(a, n, tolerance):
+    """Cholesky factor of the lower half of a[:n, :n], in place; False where a pivot is ≤ tolerance."""
+    for k in range(n):
+        if not a[k, k] > tolerance:
+            return False
+        a[k, k] = sqrt(a[k, k])
+        inverse = 1.0 / a[k, k]
+        for i in range(k + 1, n):
+            a[i, k] *= inverse
+        for i in range(k + 1, n):
+            factor = a[i, k]
+            if factor != 0.0:
+                for j in range(k + 1, i + 1):
+                    a[i, j] -= factor * a[j, k]
+    return True
 
-    Singular values up to ``tolerance`` times the largest count as zero.
-    """
-    u, s, vt = np.linalg.svd(np.asarray(d, dtype=float), full_matrices=False)
-    rank = int(np.sum(s > tolerance * s[0])) if s.size else 0
-    return (vt[:rank].T / s[:rank]) @ u[:, :rank].T, rank
+
+@kernel
+def cholesky_solve(a, n, b):
+    """Solve with the factor of ``cholesky_factor``; b (n,) becomes the solution."""
+    for k in range(n):
+        for j in range(k):
+            b[k] -= a[k, j] * b[j]
+        b[k] /= a[k, k]
+    for k in range(n - 1, -1, -1):
+        b[k] /= a[k, k]
+        for j in range(k):
+            b[j] -= a[k, j] * b[k]

@@ -26,6 +26,7 @@ class Formulation:
     scratch: Callable[[int, int], int]  # numbers of working memory for m rows, n columns
     handles_redundancy: bool
     handles_singular_mass: bool
+    needs_independent_columns: bool = False  # works only where no freedom is left
     iterative: bool = False
     options: Mapping[str, float] = field(default_factory=dict)  # the method's numbers and their defaults
     feedback: Callable[[Mapping[str, float]], tuple[float, float]] | None = None  # gains of Φ' and Φ in γ
@@ -53,6 +54,6 @@ class Formulation:
             mass, inverse_root, np.ascontiguousarray(jacobian, dtype=float),
             np.ascontiguousarray(force, dtype=float), np.ascontiguousarray(gamma, dtype=float),
             self.settings(options, rank_tolerance), np.zeros(self.scratch(m, n)),
-            np.zeros(m + n, dtype=np.int64), np.zeros(6, dtype=np.int64), acceleration, multipliers,
+            np.zeros(2 * (m + n), dtype=np.int64), np.zeros(6, dtype=np.int64), acceleration, multipliers,
         )  # fmt: skip
         return status, acceleration, multipliers

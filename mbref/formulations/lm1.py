@@ -12,7 +12,8 @@ from __future__ import annotations
 
 from mbref.compiled import exchangeable
 from mbref.formulations.base import Formulation
-from mbref.linalg import equilibrate, lu_factor, lu_solve
+from mbref.linalg import lu_factor, lu_solve
+from mbref.orthogonal import equilibrate
 from mbref.tables import ACCELERATE, FACTORISATIONS, OK, SINGULAR
 
 SINGULAR_PIVOT = 1e-12  # of the scaled matrix, whose rows and columns have unit size

@@ -11,7 +11,7 @@ from numpy import cos, sin, sqrt
 
 from mbref.compiled import exchangeable, kernel
 from mbref.evaluation import dense_jacobian, evaluate, violation_rate
-from mbref.linalg import equilibrate, minimum_norm, qr_pivoted
+from mbref.orthogonal import equilibrate, minimum_norm, qr_pivoted
 from mbref.stabilisation.base import Stabilisation
 from mbref.stabilisation.full import copy_state, normalise, rates
 from mbref.tables import (

@@ -6,7 +6,7 @@ import pytest
 from mbref.formulations import FORMULATIONS
 from mbref.scenes import SCENES
 from mbref.simulate import simulate
-from mbref.tables import OK, SINGULAR
+from mbref.tables import NOT_CONVERGED, OK, SINGULAR
 
 RNG = np.random.default_rng(20031)
 
@@ -32,8 +32,8 @@ def system(m, n, redundant):
 def test_claim_of_redundancy_and_exact_solution(formulation, redundant):
     mass, jacobian, force, gamma, exact = system(12, 18, redundant)
     status, acceleration, multipliers = formulation.solve(mass, jacobian, force, gamma)
-    if redundant and not formulation.handles_redundancy:
-        assert status == SINGULAR, f"{formulation.name} must refuse redundant rows, status {status}"
+    if formulation.needs_independent_columns or (redundant and not formulation.handles_redundancy):
+        assert status == SINGULAR, f"{formulation.name} must refuse, status {status}"
         return
     assert status == OK
     error = np.max(np.abs(acceleration - exact))
@@ -52,6 +52,9 @@ def test_rescaled_and_repeated_rows_change_nothing(formulation, factor):
     if formulation.handles_redundancy:
         jacobian, gamma = np.vstack([jacobian, jacobian[3]]), np.append(gamma, gamma[3])
     status, acceleration, multipliers = formulation.solve(mass, jacobian, force, gamma)
+    if formulation.needs_independent_columns:
+        assert status == SINGULAR
+        return
     assert status == OK
     assert np.max(np.abs(acceleration - exact)) < 1e-9, formulation.name
     reaction = force - mass * exact
@@ -76,3 +79,19 @@ def test_claim_of_singular_mass_and_exact_solution(formulation):
 def test_redundant_scene_by_lm1_is_singular_at_once():
     trajectory = simulate(SCENES["four_bar"](), "lm1+none", [0.0, 0.01])
     assert (trajectory.outcome.letter, trajectory.t_end, trajectory.times.size) == ("a", 0.0, 0)
+
+
+def test_literal_gram_schmidt_and_a_driven_mechanism():
+    formulation = FORMULATIONS["mpi-gs-literal"]
+    mass, jacobian, force, gamma, exact = system(16, 12, 4)  # more rows than columns, columns independent
+    status, acceleration, multipliers = formulation.solve(mass, jacobian, force, gamma)
+    assert status == OK
+    assert np.max(np.abs(acceleration - exact)) < 1e-9
+    assert np.max(np.abs(mass * acceleration + jacobian.T @ multipliers - force)) < 1e-9
+
+
+def test_augmented_lagrangian_that_may_not_iterate_enough_says_so():
+    mass, jacobian, force, gamma, _ = system(12, 18, 1)
+    for name in ("alf", "alf-dual"):
+        status, _, _ = FORMULATIONS[name].solve(mass, jacobian, force, gamma, alpha=1e-3, iterations=5.0)
+        assert status == NOT_CONVERGED, name
