@@ -95,7 +95,11 @@ def _refused(cases: Sequence[Case]) -> set[str]:
 
 def _report(arguments: argparse.Namespace) -> int:
     """The report stands above this package, so it is started as a program and never imported."""
-    return subprocess.call([sys.executable, "-m", "reports", *_report_options(arguments)])
+    with subprocess.Popen([sys.executable, "-m", "reports", *_report_options(arguments)]) as program:
+        try:
+            return program.wait()
+        except KeyboardInterrupt:  # the program hears it too, stores what it has and ends by itself
+            return program.wait()
 
 
 def _report_options(arguments: argparse.Namespace) -> list[str]:

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 
 from crosscheck.metrics import cost_at_error
 from reports.blocks import Block, Heading, Table, Text
-from reports.runs import LEVELS, Curve, Run, SceneRuns, duration, power, ratio, short
+from reports.runs import LEVELS, WRONG, Curve, Run, SceneRuns, duration, power, ratio, short
 
 HEADER = ("Engine", "Family", "Completed", "Least error", "Its settings", "Its time",
-          *(f"At {short(level)}" for level in LEVELS), "Ended otherwise")  # fmt: skip
+          *(f"At {short(level)}" for level in LEVELS), "Wrong or failed")  # fmt: skip
 
 Costs = Mapping[Curve, Sequence[float]]  # seconds at each of LEVELS, NaN where it is not reached
 
@@ -77,12 +77,14 @@ def _row(group: SceneRuns, best: Run, costs: Sequence[float], fastest: Sequence[
 
 
 def _otherwise(runs: Sequence[Run]) -> str:
-    """How and when the other runs ended: the earliest of each outcome."""
+    """How many completed and are wrong; how and when the others ended, the earliest of each outcome."""
+    wrong = sum(run.is_false_success for run in runs)
     earliest: dict[str, float] = {}
     for run in runs:
         if not run.completed:
             earliest[run.outcome.label] = min(run.t_end, earliest.get(run.outcome.label, math.inf))
-    return ", ".join(f"{label} from {t:.4g} s" for label, t in earliest.items())
+    ends = [f"{label} from {t:.4g} s" for label, t in earliest.items()]
+    return ", ".join([*([f"{wrong} with error above {short(WRONG)}"] if wrong else []), *ends])
 
 
 def _winners(costs: Costs, fastest: Sequence[float]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from pathlib import Path
 
@@ -270,9 +271,20 @@ def test_timing_that_fails_and_the_seconds_of_single_runs(still, monkeypatch):
 
 def test_report_command_and_the_program_it_starts(monkeypatch):
     started = []
-    monkeypatch.setattr(cli.subprocess, "call", lambda command: started.append(command) or 1)
-    assert main(["report", "--quick", "--out", "x", "--section", "speed"]) == 1
-    assert started[0][1:] == ["-m", "reports", "--out", "x", "--quick", "--section", "speed"], started
+
+    class Program(contextlib.nullcontext):
+        def wait(self) -> int:
+            started.append(self.enter_result)
+            if len(started) == 1:
+                raise KeyboardInterrupt
+            return 130
+
+        def __enter__(self):
+            return self
+
+    monkeypatch.setattr(cli.subprocess, "Popen", Program)
+    assert main(["report", "--quick", "--out", "x", "--section", "speed"]) == 130
+    assert started[1][1:] == ["-m", "reports", "--out", "x", "--quick", "--section", "speed"], started
 
 
 def test_cost_fields_and_the_trajectory_s():

@@ -78,7 +78,8 @@ def test_summary_and_costs_worked_out_by_hand():
     assert at["mbref", "mpi-svd+projection"] == "1.0", at
     assert at["mujoco", "tuned"] == at["mujoco", "defaults"] == "–", at
     assert column(found, "Completed")["exudyn", "tuned"] == "0 of 2", found.rows
-    assert column(found, "Ended otherwise")["exudyn", "tuned"] == "NOT_CONVERGED from 0.01 s", found.rows
+    assert column(found, "Wrong or failed")["exudyn", "tuned"] == "NOT_CONVERGED from 0.01 s", found.rows
+    assert column(found, "Wrong or failed")["mujoco", "defaults"] == "1 with error above 1e-2", found.rows
     assert column(found, "Least error")["mujoco", "tuned"] == "2.0e-03", found.rows
     assert column(found, "Its settings")["mujoco", "tuned"] == "step=0.025", found.rows
     assert "at 1e-3 mbref mpi-svd+projection (10 ms), at 1e-6 none" in found.caption, found.caption
