@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from reports import figures
 from reports.runs import Curve, Run, SceneRuns
 
-SMALLEST = 1e-18  # magnitudes below are drawn here: zero has no place on a logarithmic axis
+SMALLEST = 1e-17  # magnitudes below are drawn here: zero has no place on a logarithmic axis
 
 Panels = Sequence[np.ndarray]
 Series = Mapping[Curve, Panels]  # for every curve one (k,) array a panel

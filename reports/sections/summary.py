@@ -20,8 +20,8 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
     runs = [run for group in groups for run in group.runs]
     completed = sum(run.completed for run in runs)
     text = (
-        f"{len(groups)} scenes, {len(runs)} runs of {len({run.curve[0] for run in runs})} engines; "
-        f"{completed} completed. Under an error level stands the time to reach it, read off the family's "
+        f"Scenes: {len(groups)}; runs: {len(runs)}, in engines: {len({run.curve[0] for run in runs})}; "
+        f"completed: {completed}. Under an error level stands the time to reach it, read off the family's "
         f"curve of time against error, as a multiple of the fastest; an en dash: it never gets there."
     )
     return [Heading("Summary", 2), Text(text), *(block for group in groups for block in _scene(group))]
