@@ -73,6 +73,9 @@ class Engine(ABC):
         """The sweep over this engine's families and accuracies for a scene, coarse to fine in each
         family."""
 
+    def prepare(self, families: Sequence[str]) -> None:  # noqa: B027 - most engines need nothing
+        """What is done once on a machine before runs of these families, such as compiling."""
+
     @abstractmethod
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         """Simulate from t = 0 and sample at ``times`` (k,), increasing, the first may be 0.

@@ -88,13 +88,11 @@ class Exchangeable:
         self.pointer  # noqa: B018
 
     @functools.cached_property
-    def callable(self) -> Callable:
+    def callable(self) -> Entry:
         """The same kernel as a function for Python to call with arrays.
 
         Compiled from a renamed copy: numba's cache tells functions apart by name and signature only.
         """
-        if PLAIN:
-            return self.function
         f = self.function
         copy = types_of_python.FunctionType(f.__code__, f.__globals__, f"{f.__name__}_entry")
         copy.__module__, copy.__qualname__ = f.__module__, f"{f.__qualname__}_entry"

@@ -19,7 +19,7 @@ from mbref.stabilisation import STABILISATIONS
 from mbref.stabilisation.base import Stabilisation
 from mbref.tables import POSITION_GAIN, VELOCITY_GAIN
 
-DEFAULT = "mpi-svd+projection/dop853"
+DEFAULT = "alf-dual+projection/dop853"
 
 
 class MethodError(Exception):

@@ -10,8 +10,15 @@ from crosscheck.engine import Cannot, Engine, Setting, Why
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
-METHODS = ("mpi-svd+projection", "mpi-svd+partitioning", "mpi-svd+none", "lm1+projection")
-TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
+METHODS = (
+    "alf-dual+projection",
+    "mpi-svd+partitioning",
+    "mpi-svd+projection",
+    "mpi-svd+none",
+    "mpi-qr+projection",
+    "lm2+projection",
+)
+TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 
 
 class Mbref(Engine):
@@ -40,6 +47,13 @@ class Mbref(Engine):
             if not redundant or Method.parse(method).formulation.handles_redundancy
             for rtol in TOLERANCES
         ]
+
+    def prepare(self, families: Sequence[str]) -> None:
+        from mbref.method import Method
+        from mbref.simulate import prepare
+
+        for family in families:
+            prepare(Method.parse(family))
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         from mbref.simulate import Limits, simulate
