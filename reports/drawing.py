@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -109,7 +110,7 @@ def path(trajectory: Trajectory, body: int) -> np.ndarray:
 
 def _draw_body(axes: Axes, poses: np.ndarray, colour: str, name: str) -> None:
     link = poses.shape[1] > 1
-    look = {"color": colour, "marker": "o" if link else "s", "markersize": 3.5 if link else 8}
+    look: Any = {"color": colour, "marker": "o" if link else "s", "markersize": 3.5 if link else 8}
     for i, points in enumerate(poses[:-1]):
         axes.plot(*points.T, alpha=0.15 + 0.4 * i / len(poses), linewidth=1.5, zorder=2, **look)
     axes.plot(*poses[-1].T, linewidth=2.6, zorder=3, label=name, **look)
@@ -131,7 +132,9 @@ def _draw_ground(axes: Axes, joint: Joint, guide: np.ndarray, planar: bool) -> N
     at = project(np.array(_anchors(joint)[joint.bodies.index(GROUND)][1]), planar)
     axes.plot(*project(guide, planar).T, color=figures.GREY, linestyle="--", linewidth=0.9, zorder=1)
     axes.plot(*at, marker="^", color=figures.INK, markersize=8, zorder=4)
-    axes.annotate(joint.name, at, (-12, 6), textcoords="offset points", zorder=5, fontweight="bold")
+    axes.annotate(
+        joint.name, (at[0], at[1]), (-12, 6), textcoords="offset points", zorder=5, fontweight="bold"
+    )
 
 
 def _draw_depth(axes: Axes, points: np.ndarray, size: float) -> None:

@@ -57,7 +57,10 @@ def _caption(groups: Sequence[SceneRuns], curves: Sequence[Curve]) -> str:
     finite = {key: value for key, value in slopes.items() if math.isfinite(value)}
     if not finite:
         return "No family has three runs on a line."
-    (low, low_scene), (high, high_scene) = min(finite, key=finite.get), max(finite, key=finite.get)
+    (low, low_scene), (high, high_scene) = (
+        min(finite, key=finite.__getitem__),
+        max(finite, key=finite.__getitem__),
+    )
     return (
         f"Slopes from {finite[low, low_scene]:.2g} ({' '.join(low)}, {low_scene}) to "
         f"{finite[high, high_scene]:.2g} ({' '.join(high)}, {high_scene})."

@@ -86,7 +86,7 @@ def plot(scene_runs: SceneRuns, failures: Failures) -> Drawing:
              ylabel="time of stepping (s)")  # fmt: skip
     if failures:
         times = [run.seconds for run in scene_runs.completed()]
-        _draw_strip(_beside(main), failures, looks, foot=max(min(times, default=UNTIMED), UNTIMED))
+        _draw_strip(_beside(figure, main), failures, looks, foot=max(min(times, default=UNTIMED), UNTIMED))
     main.margins(0.06, 0.09)
     figures.legend_below(figure, main)
     return figure
@@ -98,12 +98,12 @@ def _draw_curve(axes: Axes, curve: Curve, runs: Sequence[Run], look: Mapping) ->
         axes.plot(*points.T, label=" ".join(curve), markersize=5, alpha=0.9, **look)
 
 
-def _beside(main: Axes) -> Axes:
+def _beside(figure: Drawing, main: Axes) -> Axes:
     """A narrow strip at the right of ``main`` with the same time axis."""
-    grid = GridSpec(1, 2, figure=main.figure, width_ratios=(5, 1))
+    grid = GridSpec(1, 2, figure=figure, width_ratios=(5, 1))
     main.set_subplotspec(grid[0])
     with matplotlib.rc_context(figures.STYLE):
-        strip = main.figure.add_subplot(grid[1], sharey=main)
+        strip = figure.add_subplot(grid[1], sharey=main)
     strip.set_facecolor("#f6f0ee")
     strip.spines["left"].set_visible(False)
     strip.tick_params(labelleft=False, which="both", left=False)

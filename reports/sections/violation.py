@@ -18,7 +18,8 @@ def render(scene_runs: SceneRuns) -> list[Block]:
     """Violation of the most accurate run of every family, at position and velocity level."""
 
     def measure(run: Run) -> list[np.ndarray]:
-        return [violation_series(scene_runs.scene, run.trajectory, level) for level in range(len(LABELS))]
+        levels = [violation_series(scene_runs.scene, run.trajectory, i) for i in range(len(LABELS))]
+        return [level for level in levels if level is not None]  # only accelerations can be missing
 
     heading, values = Heading("Constraint violation over time"), histories.series(scene_runs, measure)
     if not values:
