@@ -1,4 +1,4 @@
-"""The command `crosscheck`: list, run, compare and report."""
+"""The command `crosscheck`: list, run, compare, verify and report."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rich.console import Console
 
 from crosscheck import compare, listing, request, tables
 from crosscheck.engine import engine_names
-from crosscheck.progress import shown
+from crosscheck.progress import counted, shown
 from crosscheck.record import public
 from crosscheck.request import RequestError
 from crosscheck.study import TIME_LIMIT, Case, Record, key, study
@@ -93,6 +93,21 @@ def _refused(cases: Sequence[Case]) -> set[str]:
     return {name for name, reason in reasons.items() if reason}
 
 
+def _verify(arguments: argparse.Namespace) -> int:
+    from crosscheck.conformance import suite
+
+    (engine,) = request.find_engines([arguments.engine], _notice)
+    chosen = request.find_specimens(arguments.scene)
+    with counted("verifying", len(chosen) + 1) as advance:
+        found = suite.verify(engine, chosen, arguments.time_limit, advance)
+    if arguments.json:
+        print(json.dumps(found.to_record(), allow_nan=False))
+    else:
+        for block in suite.tables(found):
+            _console().print(block)
+    return COMPLETED if found.conforms else OTHERWISE
+
+
 def _report(arguments: argparse.Namespace) -> int:
     """The report stands above this package, so it is started as a program and never imported."""
     with subprocess.Popen([sys.executable, "-m", "reports", *_report_options(arguments)]) as program:
@@ -164,6 +179,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_list(commands)
     _add_run(commands)
     _add_compare(commands)
+    _add_verify(commands)
     _add_report(commands)
     return parser
 
@@ -193,6 +209,16 @@ def _add_compare(commands) -> None:
     parser = _add(commands, "compare", about, example, _compare)
     _add_selection(parser)
     parser.add_argument("--repeats", type=int, default=REPEATS, help=f"timed runs of each, ≥ {REPEATS}")
+
+
+def _add_verify(commands) -> None:
+    example = "crosscheck verify mujoco"
+    about = "hold an engine against the conformance suite: every property on every scene of the suite"
+    parser = _add(commands, "verify", about, example, _verify)
+    parser.add_argument("engine", metavar="ENGINE", help="a known engine, or module:attribute")
+    parser.add_argument("--scene", action="append", metavar="S", help="only this one of the suite; may repeat")
+    parser.add_argument("--time-limit", type=float, default=TIME_LIMIT, metavar="T", help="of a run (s)")
+    parser.add_argument("--json", action="store_true", help="machine-readable output on standard output")
 
 
 def _add_report(commands) -> None:

@@ -14,12 +14,12 @@ import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 
 from crosscheck import worker
-from crosscheck.engine import Setting, engine_names
+from crosscheck.engine import Cannot, Setting, engine_names
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
@@ -39,6 +39,14 @@ class ChildFailed(Exception):
         super().__init__(message)
 
 
+class Observation(NamedTuple):
+    """What came of a call in a child: its value, what was printed, and files left in its directory."""
+
+    value: Any
+    printed: str
+    files: tuple[str, ...]
+
+
 def run_isolated(
     engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, time_limit: float
 ) -> Trajectory:
@@ -48,11 +56,30 @@ def run_isolated(
     whole child, imports included.  A crash, a hang, an exception and a missing package are outcomes
     CRASHED or TIMED_OUT of a trajectory without states.  Raises LookupError for an unknown engine.
     """
+    return observe(engine_name, scene, times, setting, time_limit).value
+
+
+def observe(
+    engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, time_limit: float
+) -> Observation:
+    """`run_isolated` with what the engine printed and the files it left in its working directory; both
+    empty when the run gave no result, as its message then quotes them."""
     _check(engine_name)
     try:
-        return _in_child(worker.run_once, (engine_name, scene, times, setting), time_limit)
+        return _observed(worker.run_once, (engine_name, scene, times, setting), time_limit)
     except ChildFailed as failure:
-        return worker.failed(engine_name, failure.version, scene, setting, failure.outcome, str(failure))
+        outcome, message = failure.outcome, str(failure)
+        failed = worker.failed(engine_name, failure.version, scene, setting, outcome, message)
+        return Observation(failed, "", ())
+
+
+def offers(engine_name: str, scene: Scene, time_limit: float) -> tuple[str, Cannot | None, list[Setting]]:
+    """An engine's version, what it cannot do with a scene, and else its settings, found out in a child.
+
+    Raises ChildFailed when that fails, LookupError for an unknown engine.
+    """
+    _check(engine_name)
+    return _in_child(worker.offers, (engine_name, scene), time_limit)
 
 
 def time_interleaved(
@@ -81,13 +108,20 @@ def _check(engine_name: str) -> None:
 
 
 def _in_child(function: Callable[..., Any], arguments: tuple, time_limit: float) -> Any:
+    return _observed(function, arguments, time_limit).value
+
+
+def _observed(function: Callable[..., Any], arguments: tuple, time_limit: float) -> Observation:
     with tempfile.TemporaryDirectory(prefix="crosscheck-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
         (folder / "work").mkdir()
         (folder / "job").write_bytes(pickle.dumps((function, arguments, time_limit + ORPHAN_SECONDS)))
         with open(folder / "printed", "wb") as printed:
             status = _wait(_start(folder, printed), time_limit)
-        return _result(folder, status, time_limit)
+        value = _result(folder, status, time_limit)
+        files = {str(path.relative_to(folder / "work")) for path in (folder / "work").rglob("*")}
+        printed = (folder / "printed").read_text(errors="replace")
+        return Observation(value, printed, tuple(sorted(files - {worker.VERSION})))
 
 
 def _start(folder: Path, printed: IO[bytes]) -> subprocess.Popen:
@@ -141,7 +175,7 @@ def _result(folder: Path, status: int | None, time_limit: float) -> Any:
     else:
         why = f"the process {_ending(status)}"
     outcome = Outcome.TIMED_OUT if status is None else Outcome.CRASHED
-    version = folder / "work" / "version"
+    version = folder / "work" / worker.VERSION
     raise ChildFailed(outcome, why + _quote(folder), version.read_text() if version.exists() else "")
 
 

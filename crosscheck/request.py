@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
+from crosscheck.conformance.bench import Specimen, specimens
 from crosscheck.engine import BUILT_IN, Setting, engine, engine_names
 from crosscheck.study import Case, default_cases
 from mbref.scene import Scene, SceneError
@@ -59,6 +60,15 @@ def find_engines(names: Sequence[str] | None, notice: Notice) -> list[str]:
     for reason in missing.values():
         notice(reason)
     return [name for name in wanted if name not in missing]
+
+
+def find_specimens(names: Sequence[str] | None) -> list[Specimen]:
+    """The conformance suite's specimens of those scenes, or all; RequestError for a name it has not."""
+    known = {specimen.scene.name: specimen for specimen in specimens()}
+    if unknown := [name for name in names or () if name not in known]:
+        listed = ", ".join(known)
+        raise RequestError(*(f"unknown scene of the suite {name!r}; known: {listed}" for name in unknown))
+    return [known[name] for name in dict.fromkeys(names or known)]
 
 
 def _unknown_engine(name: str) -> str | None:

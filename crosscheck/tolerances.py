@@ -62,3 +62,23 @@ engine at its finer settings are below 1e-6 over so short a time."""
 GATE_TIME = 1e-3
 """Part of the scene's duration that the gate simulates: long enough that changes are 1e10 roundings,
 short enough that they are accelerations times time."""
+
+UNIT_NORM = 1e-12
+"""How far the length of an orientation's quaternion may be from 1: rounding after a normalisation."""
+
+STAYS_CLOSED = 1e-6
+"""Joint residual (rad, or relative to the scene's length) that a conforming engine may leave at the finest
+of its settings: a hundredth of what accuracy is asked of it, and far below a lost constraint."""
+
+LIKE_TRUTH = 1e-5
+"""Error and energy drift of a conforming engine at its finest setting: one percent of a mass, inertia or
+load, or an axis off by half a degree, leaves 1e-4 or more over the suite's scenes; methods of second order
+reach 1e-6."""
+
+SAME_MOTION = 1e-9
+"""Difference of two runs of a conforming engine that should agree, where its own accuracy (the difference of
+its two finest settings) is better: rounding grows to this over some thousand steps."""
+
+OWN_ACCURACY = 4.0
+"""Multiples of an engine's own accuracy by which such runs may differ: each is off by about one, and what
+the coarser setting adds is not all of it."""

@@ -16,11 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
-from crosscheck.engine import Setting, engine
+from crosscheck.engine import Cannot, Setting, engine
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
 Job = tuple[str, Setting]  # engine name and setting
+VERSION = "version"  # the file that keeps an engine's version should its run crash
 
 
 def run_once(engine_name: str, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
@@ -34,8 +35,15 @@ def run_once(engine_name: str, scene: Scene, times: np.ndarray, setting: Setting
     except ImportError as error:
         message = f"{simulator.package} is not installed: {error}"
         return failed(engine_name, "", scene, setting, Outcome.CRASHED, message)
-    Path("version").write_text(version)
+    Path(VERSION).write_text(version)
     return simulator.run(scene, times, setting)
+
+
+def offers(engine_name: str, scene: Scene) -> tuple[str, Cannot | None, list[Setting]]:
+    """Version, what cannot be done with the scene, and, where nothing hinders, the settings."""
+    simulator = engine(engine_name)
+    version, cannot = simulator.version(), simulator.cannot(scene)
+    return version, cannot, [] if cannot else list(simulator.settings(scene))
 
 
 def run_interleaved(

@@ -1,0 +1,99 @@
+"""Probe scenes: one small scene for every feature a scene may have, named after it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from mbref import rotations
+from mbref.scene import (
+    Body,
+    Cylindrical,
+    Distance,
+    Driver,
+    Fixed,
+    Force,
+    Joint,
+    Moment,
+    Revolute,
+    Scene,
+    Sine,
+    Spherical,
+    Spring,
+    TorsionSpring,
+    Translational,
+    Universal,
+)
+from mbref.scenes import SCENES
+
+PIVOT, PLACE, LINK = (0.0, 0.0, 0.0), (0.3, -0.2, 0.1), ("ground", "body")
+AXIS = (0.2, 0.1, 1.0)
+INERTIA = ((0.02, 0.002, -0.001), (0.002, 0.03, 0.003), (-0.001, 0.003, 0.025))
+BODY = Body(
+    name="body", mass=1.5, inertia=INERTIA, position=PLACE,
+    orientation=tuple(rotations.from_vector([0.3, -0.2, 0.5]).tolist()),
+)  # fmt: skip
+JOINTS: Mapping[str, Joint] = {
+    "fixed": Fixed(name="J", bodies=LINK, anchor=PIVOT),
+    "revolute": Revolute(name="J", bodies=LINK, anchor=PIVOT, axis=AXIS),
+    "universal": Universal(name="J", bodies=LINK, anchor=PIVOT, axes=((0.0, 0.0, 1.0), (1.0, 0.3, 0.0))),
+    "spherical": Spherical(name="J", bodies=LINK, anchor=PIVOT),
+    "translational": Translational(name="J", bodies=LINK, anchor=PIVOT, axis=(1.0, -1.0, 0.5)),
+    "cylindrical": Cylindrical(name="J", bodies=LINK, anchor=PIVOT, axis=AXIS),
+    "distance": Distance(name="J", bodies=LINK, anchors=(PIVOT, (0.4, -0.1, 0.1))),
+}
+PIVOTED, TURNS = JOINTS["revolute"], JOINTS["cylindrical"]
+LOADS = {
+    "moment": Moment(body="body", moment=(0.3, 0.2, -0.4)),
+    "force": Force(body="body", point=(0.5, -0.1, 0.2), force=(1.0, -2.0, 3.0)),
+    "spring": Spring(bodies=LINK, points=((0.0, 0.8, 0.0), (0.4, -0.1, 0.1)), stiffness=30.0, damping=0.5,
+                     natural_length=0.5),
+    "torsion_spring": TorsionSpring(joint="J", stiffness=4.0, damping=0.1, natural_angle=0.4),
+}  # fmt: skip
+POLYNOMIAL, WAVE = (0.0, 0.8, -0.5), Sine(amplitude=0.2, frequency=6.0)
+DRIVERS = {
+    "revolute": Driver(joint="J", polynomial=POLYNOMIAL, sine=WAVE),
+    "translational": Driver(joint="J", polynomial=POLYNOMIAL, sine=WAVE),
+    "cylindrical": Driver(joint="J", polynomial=POLYNOMIAL, sine=WAVE),
+}
+
+
+def feature_scenes() -> dict[str, Scene]:
+    """Scenes by feature: kinds of joint, driver and load; loops; kinematics. None comes
+    to a singular position, from where motions need not be unique."""
+    probes = {f"{kind} joint": _probe(kind, joint) for kind, joint in JOINTS.items()}
+    probes |= {
+        f"{kind} driver": _probe(f"{kind}_driver", JOINTS[kind], driver=(d,)) for kind, d in DRIVERS.items()
+    }
+    probes |= {f"{kind} load": _probe(kind, _carrier(kind), load=(load,)) for kind, load in LOADS.items()}
+    return probes | {
+        "free body": _probe("free_body"),
+        "loop": _short("spatial_slider_crank_gravity", 0.1),
+        "redundant loop": _short("planar_slider_crank_gravity", 0.1),
+        "several loops": _short("five_bar_gravity", 0.12),
+        "driven loop": _short("spatial_slider_crank_driven", 0.02),
+        "kinematics without masses": massless(_short("four_bar", 0.01)),
+    }
+
+
+def undetermined() -> Scene:
+    """A body without mass that nothing moves: dynamics without data, which every engine must refuse."""
+    return massless(_probe("undetermined", PIVOTED))
+
+
+def massless(scene: Scene) -> Scene:
+    """The scene with every mass and inertia left out."""
+    bare = [body.model_copy(update={"mass": None, "inertia": None}) for body in scene.body]
+    return scene.with_(name=f"massless_{scene.name}", body=tuple(bare), load=())
+
+
+def _carrier(load: str) -> Joint:
+    """The joint of the probe of a load: one that leaves its action free to show."""
+    return TURNS if load == "torsion_spring" else JOINTS["spherical"]
+
+
+def _probe(name: str, *joint: Joint, **causes) -> Scene:
+    return Scene(name=name, gravity=(0.0, -9.81, 0.0), duration=0.2, body=(BODY,), joint=joint, **causes)
+
+
+def _short(name: str, duration: float) -> Scene:
+    return SCENES[name]().with_(duration=duration)

@@ -1,0 +1,174 @@
+"""The suite: every property on every specimen of one engine, as verdicts and as a table."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from rich.box import SIMPLE
+from rich.table import Column, Table
+from rich.text import Text
+
+from crosscheck.conformance.bench import Bench, Broken, Specimen, completed, set_up
+from crosscheck.conformance.features import undetermined
+from crosscheck.conformance.properties import PROPERTIES, Finding
+from crosscheck.engine import Cannot
+from crosscheck.isolate import ChildFailed
+
+PASS, FAIL, CANNOT = "pass", "fail", "cannot"
+REFUSAL, RUN = "refusal", "run"
+FIRST = {
+    REFUSAL: "What cannot be run is refused by cannot() with a reason, and what is not refused has settings.",
+    RUN: "The run at the finest setting of the engine's best family completes.",
+}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One property on one scene: ``status`` pass, fail or cannot; ``measured`` against ``allowed`` where a
+    number decides; ``reason`` a sentence where one is needed."""
+
+    property: str
+    scene: str
+    status: str
+    measured: float | None = None
+    allowed: float | None = None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Conformance:
+    """What an engine was found to do."""
+
+    engine: str
+    version: str
+    verdicts: Sequence[Verdict]
+
+    @property
+    def conforms(self) -> bool:
+        """Whether no property failed and some passed."""
+        statuses = {verdict.status for verdict in self.verdicts}
+        return FAIL not in statuses and PASS in statuses
+
+    def to_record(self) -> dict[str, Any]:
+        """What ``verify --json`` prints; numbers that are not finite are null."""
+        verdicts = [{k: _finite(v) for k, v in asdict(verdict).items()} for verdict in self.verdicts]
+        return {**asdict(self), "conforms": self.conforms, "verdicts": verdicts}
+
+
+def verify(
+    engine: str,
+    specimens: Sequence[Specimen],
+    time_limit: float,
+    progress: Callable[[str], None] | None = None,
+) -> Conformance:
+    """Hold the suite against an engine (a name or ``module:attribute``); every run is a process of its own
+    with a ``time_limit`` (s).  ``progress`` is told the scene just done.  Raises LookupError."""
+    versions: set[str] = set()
+
+    def examined(specimen: Specimen) -> list[Verdict]:
+        try:
+            bench = set_up(engine, specimen, time_limit)
+        except ChildFailed as failure:
+            verdicts = [Verdict(REFUSAL, specimen.scene.name, FAIL, reason=str(failure))]
+        else:
+            versions.add(bench.version)
+            verdicts = list(examine(bench))
+        if progress:
+            progress(specimen.scene.name)
+        return verdicts
+
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        groups = threads.map(examined, [Specimen(undetermined()), *specimens])
+        verdicts = [verdict for group in groups for verdict in group]
+    return Conformance(engine, ", ".join(sorted(versions)), verdicts)
+
+
+def examine(bench: Bench) -> Iterator[Verdict]:
+    """The verdicts on one bench."""
+    name = bench.scene.name
+    impossible = bench.scene == undetermined()
+    if bench.cannot:
+        yield Verdict(REFUSAL, name, PASS if impossible else CANNOT, reason=str(bench.cannot))
+    elif impossible or not bench.settings:
+        reason = "cannot() is silent on a motion without masses" if impossible else "it offers no setting"
+        yield Verdict(REFUSAL, name, FAIL, reason=reason)
+    else:
+        yield Verdict(REFUSAL, name, PASS)
+        yield from _run(bench)
+
+
+def _run(bench: Bench) -> Iterator[Verdict]:
+    """Whether the run at the finest setting completes, and what it shows if it does."""
+    try:
+        completed(bench.scene, bench.finest.value)
+    except Broken as broken:
+        yield Verdict(RUN, bench.scene.name, FAIL, reason=str(broken))
+        return
+    yield Verdict(RUN, bench.scene.name, PASS)
+    for label, entry in PROPERTIES.items():
+        if entry.of(bench.specimen) and (found := _judged(label, bench)):
+            yield found
+
+
+def _judged(label: str, bench: Bench) -> Verdict | None:
+    try:
+        found = PROPERTIES[label].check(bench)
+    except Broken as broken:
+        return Verdict(label, bench.scene.name, FAIL, reason=str(broken))
+    if isinstance(found, Finding):
+        status = PASS if found.measured <= found.allowed else FAIL
+        return Verdict(label, bench.scene.name, status, found.measured, found.allowed, found.remark)
+    return Verdict(label, bench.scene.name, CANNOT, reason=str(found)) if isinstance(found, Cannot) else None
+
+
+def tables(conformance: Conformance) -> Iterator[Table | Text]:
+    """A table of scenes × properties, then what the failures and gaps are."""
+    by_place = {(v.scene, v.property): v for v in conformance.verdicts}
+    properties = [n for n in (*FIRST, *PROPERTIES) if any(v.property == n for v in conformance.verdicts)]
+    title = f"{conformance.engine} {conformance.version}: ✓ pass, ✗ fail, – cannot; the number measured"
+    table = Table(Column("scene", no_wrap=True), *properties, title=title, box=SIMPLE, pad_edge=False)
+    for scene in dict.fromkeys(v.scene for v in conformance.verdicts):
+        table.add_row(scene, *(_cell(by_place.get((scene, name))) for name in properties))
+    yield table
+    for verdict in conformance.verdicts:
+        if verdict.status != PASS:
+            yield _sentence(verdict)
+    yield from (Text(f"{name}: {abouts()[name]}", style="dim") for name in properties)
+    yield _summary(conformance)
+
+
+def abouts() -> dict[str, str]:
+    """What every property checks, by name."""
+    return {**FIRST, **{name: entry.about for name, entry in PROPERTIES.items()}}
+
+
+def _cell(verdict: Verdict | None) -> Text:
+    if verdict is None:
+        return Text("")
+    mark, style = {PASS: ("✓", "green"), FAIL: ("✗", "bold red"), CANNOT: ("–", "yellow")}[verdict.status]
+    number = "" if verdict.measured is None else f" {verdict.measured:.0e}" if verdict.measured else " 0"
+    return Text(mark + number, style=style)
+
+
+def _sentence(verdict: Verdict) -> Text:
+    measured = ""
+    if verdict.measured is not None:
+        measured = f" {verdict.measured:.3g}, allowed {verdict.allowed:.3g}"
+    tail = f" ({verdict.reason})" if measured and verdict.reason else verdict.reason
+    return Text(f"{verdict.status}: {verdict.scene}, {verdict.property}:{measured} {tail}".rstrip())
+
+
+def _summary(conformance: Conformance) -> Text:
+    counts = [
+        f"{sum(v.status == status for v in conformance.verdicts)} {status}" for status in (PASS, FAIL, CANNOT)
+    ]
+    return Text(f"{conformance.engine}: {', '.join(counts)}")
+
+
+def _finite(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
