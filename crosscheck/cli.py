@@ -216,7 +216,7 @@ def _add_verify(commands) -> None:
     about = "hold an engine against the conformance suite: every property on every scene of the suite"
     parser = _add(commands, "verify", about, example, _verify)
     parser.add_argument("engine", metavar="ENGINE", help="a known engine, or module:attribute")
-    parser.add_argument("--scene", action="append", metavar="S", help="only this one of the suite; may repeat")
+    parser.add_argument("--scene", action="append", metavar="S", help="one of the suite; may repeat")
     parser.add_argument("--time-limit", type=float, default=TIME_LIMIT, metavar="T", help="of a run (s)")
     parser.add_argument("--json", action="store_true", help="machine-readable output on standard output")
 

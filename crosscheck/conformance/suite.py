@@ -131,7 +131,7 @@ def tables(conformance: Conformance) -> Iterator[Table | Text]:
     by_place = {(v.scene, v.property): v for v in conformance.verdicts}
     properties = [n for n in (*FIRST, *PROPERTIES) if any(v.property == n for v in conformance.verdicts)]
     title = f"{conformance.engine} {conformance.version}: ✓ pass, ✗ fail, – cannot; the number measured"
-    table = Table(Column("scene", no_wrap=True), *properties, title=title, box=SIMPLE, pad_edge=False)
+    table = Table(Column("scene", no_wrap=True), *properties, title=title, box=SIMPLE, padding=(0, 1, 0, 0))
     for scene in dict.fromkeys(v.scene for v in conformance.verdicts):
         table.add_row(scene, *(_cell(by_place.get((scene, name))) for name in properties))
     yield table
@@ -151,7 +151,7 @@ def _cell(verdict: Verdict | None) -> Text:
     if verdict is None:
         return Text("")
     mark, style = {PASS: ("✓", "green"), FAIL: ("✗", "bold red"), CANNOT: ("–", "yellow")}[verdict.status]
-    number = "" if verdict.measured is None else f" {verdict.measured:.0e}" if verdict.measured else " 0"
+    number = "" if verdict.measured is None else f"{verdict.measured:.0e}" if verdict.measured else "0"
     return Text(mark + number, style=style)
 
 

@@ -1,0 +1,127 @@
+"""A complete engine in one short file: planar mechanisms of pins and slides, fixed steps of RK4."""
+
+import time
+
+import numpy as np
+
+from crosscheck.engine import Cannot, Engine, Setting, Why
+from crosscheck.kinematics import inertia_matrices, initial_twists
+from mbref import rotations
+from mbref.trajectory import Cost, Outcome, Trajectory
+
+PINS = ("revolute", "universal", "spherical")
+
+
+class Tiny(Engine):
+    """Coordinates x, y, angle of every body; pins fix a common point, slides a line and the angle."""
+
+    name = "tiny"
+    package = "tiny-engine"
+
+    def version(self):
+        return "0.1"
+
+    def cannot(self, scene):
+        if not scene.has_mass() or scene.driver:
+            return Cannot(Why.UNBUILT, "it has no drivers, and needs masses")
+        if any(joint.type not in (*PINS, "translational") for joint in scene.joint):
+            return Cannot(Why.UNBUILT, "its joints are pins and slides")
+        if any(load.type != "moment" for load in scene.load):
+            return Cannot(Why.UNBUILT, "its loads are gravity and constant moments")
+        return (
+            None
+            if planar(scene)
+            else Cannot(Why.NEVER, "bodies must move in the xy-plane, slides stand on the ground")
+        )
+
+    def settings(self, scene):
+        return [Setting("rk4", {"step": scene.duration / n}) for n in (100, 1000, 4000)]
+
+    def run(self, scene, times, setting):
+        plane, samples, steps, t = Plane(scene), [], 0, 0.0
+        y, began = plane.start, time.process_time()
+        for target in map(float, times):
+            n = max(1, int(np.ceil((target - t) / setting.options["step"])))
+            for _ in range(n):
+                y = rk4(plane.rates, y, (target - t) / n)
+            samples.append(y)
+            steps, t = steps + n, target
+        seconds = time.process_time() - began
+        q, v = np.moveaxis(np.array(samples).reshape(len(times), 2, len(scene.body), 3), 1, 0)
+        outcome = Outcome.COMPLETED if np.isfinite(samples).all() else Outcome.NOT_FINITE
+        flat = [[1.0, 1.0, 0.0]]
+        return Trajectory(
+            scene.name, self.name, self.version(), setting.family, dict(setting.options), np.array(times),
+            tuple(body.name for body in scene.body), q * flat, turned(q[..., 2]), v * flat,
+            v * [[0.0, 0.0, 1.0]], outcome=outcome, t_end=t, cost=Cost(seconds, steps=steps, rhs=4 * steps),
+        )  # fmt: skip
+
+
+def turned(angle):
+    """Quaternions (…, 4) of angles (…) about z."""
+    return rotations.from_vector(angle[..., None] * [0.0, 0.0, 1.0])
+
+
+class Plane:
+    """The equations of a planar scene; a state is (x, y, angle) of all bodies, then their rates."""
+
+    def __init__(self, scene):
+        self.scene, gravity = scene, np.array(scene.gravity)
+        angles = [2 * np.arctan2(body.orientation[3], body.orientation[0]) for body in scene.body]
+        velocity, spin = initial_twists(scene)
+        self.q0 = np.column_stack([np.array([body.position[:2] for body in scene.body]), angles])
+        self.start = np.concatenate([self.q0.ravel(), np.column_stack([velocity[:, :2], spin[:, 2]]).ravel()])
+        moments = inertia_matrices(scene)[:, 2, 2]
+        self.mass = np.column_stack([[[b.mass] * 2 for b in scene.body], moments]).ravel()
+        self.force = np.array([[*(b.mass * gravity[:2]), 0.0] for b in scene.body])
+        for load in scene.load:
+            self.force[scene.body_index(load.body), 2] += load.moment[2]
+
+    def rates(self, y):
+        """M a = f + Jᵀλ, J a = γ; least squares, so that redundant rows do no harm."""
+        q, v = y.reshape(2, -1, 3)
+        free, root = self.force.ravel() / self.mass, np.sqrt(self.mass)
+        if not self.scene.joint:
+            return np.concatenate([v.ravel(), free])
+        rows, gammas = map(np.concatenate, zip(*(self.joint(j, q, v) for j in self.scene.joint), strict=True))
+        jacobian = rows.reshape(len(rows), -1)
+        push = np.linalg.lstsq(jacobian / root, gammas - jacobian @ free, rcond=1e-10)[0]
+        return np.concatenate([v.ravel(), free + push / root])
+
+    def joint(self, joint, q, v):
+        """Rows (2, nb, 3) of J and (2,) of γ: of a pin the point's x and y, of a slide across and angle."""
+        rows, gamma = np.zeros((3, *q.shape)), np.zeros(3)
+        for sign, name in zip((-1.0, 1.0), joint.bodies, strict=True):
+            if (b := self.scene.body_index(name)) >= 0:
+                c, s = np.cos(q[b, 2] - self.q0[b, 2]), np.sin(q[b, 2] - self.q0[b, 2])
+                x, y = [[c, -s], [s, c]] @ (np.array(joint.anchor)[:2] - self.q0[b, :2])
+                rows[:, b] = sign * np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
+                gamma += sign * v[b, 2] ** 2 * np.array([x, y, 0.0])
+        kept = np.eye(3)[:2]
+        if joint.type == "translational":
+            kept = np.array([[-joint.axis[1], joint.axis[0], 0.0], [0.0, 0.0, 1.0]])
+        return np.tensordot(kept, rows, 1), kept @ gamma
+
+
+def rk4(f, y, h):
+    k1 = f(y)
+    k2 = f(y + h / 2 * k1)
+    k3 = f(y + h / 2 * k2)
+    return y + h / 6 * (k1 + 2 * k2 + 2 * k3 + f(y + h * k3))
+
+
+def planar(scene):
+    """Whether pins are along z, slides on the ground and bodies, gravity and moments in the plane."""
+    axes = [j.axis for j in scene.joint if j.type == "revolute"]
+    axes += [max(j.axes, key=lambda a: abs(a[2])) for j in scene.joint if j.type == "universal"]
+    slides = [j for j in scene.joint if j.type == "translational"]
+    across = [*(b.orientation[1:3] for b in scene.body), *(a[:2] for a in axes)]
+    across += [load.moment[:2] for load in scene.load]
+    off = [scene.gravity[2], *(b.position[2] for b in scene.body), *(j.axis[2] for j in slides)]
+    off += [(b.velocity or (0, 0, 0))[2] for b in scene.body]
+    off += [x for b in scene.body for x in (b.angular_velocity or (0, 0, 0))[:2]]
+    off += [x for pair in across for x in pair]
+    return np.abs(off).max() < 1e-12 and all("ground" in j.bodies for j in slides)
+
+
+ENGINE = Tiny()
