@@ -36,7 +36,7 @@ class Start:
 
 def consistent_start(model: Model) -> Start:
     """The nearest consistent state; raises SceneError naming the joint that is grossly violated."""
-    q, position_violation = _correct_positions(model)
+    q, position_violation = corrected_positions(model, model.start())
     v, velocity_violation = _velocities(model, q)
     return Start(q, v, position_violation, velocity_violation)
 
@@ -56,9 +56,13 @@ def _fault(model: Model, row: int, what: str) -> SceneError:
     return SceneError([f"joint[{index}]: {what} at joint {name!r}"])
 
 
-def _correct_positions(model: Model) -> tuple[np.ndarray, float]:
-    """Newton–Raphson on Φ(q, 0) = 0 with the pseudo-inverse, least change in the metric of M."""
-    q, v = model.start(), np.zeros(model.n)
+def corrected_positions(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]:
+    """Consistent coordinates (7 nb,) near q, and the largest |Φ| before: Newton–Raphson on Φ(q, 0) = 0.
+
+    With the pseudo-inverse, so that redundant rows and a singular start do no harm; the change is least
+    in the metric of M.  Raises SceneError naming the joint where q is grossly inconsistent.
+    """
+    v = np.zeros(model.n)
     inverse_root = _inverse_root(model)
     before = 0.0
     for iteration in range(MOST_ITERATIONS):
