@@ -86,17 +86,32 @@ class Engine(ABC):
 
 
 BUILT_IN = ("mbref", "mujoco", "pinocchio", "exudyn")
+OPTIONAL = ("sundials",)  # take part where their packages are installed
 ENTRY_POINTS = "crosscheck.engines"
 
 
 def engine_names() -> tuple[str, ...]:
-    """Names of the built-in engines and of those that installed packages offer."""
-    return (*BUILT_IN, *(point.name for point in metadata.entry_points(group=ENTRY_POINTS)))
+    """Names of the built-in and optional engines and of those that installed packages offer."""
+    return (*BUILT_IN, *OPTIONAL, *(point.name for point in metadata.entry_points(group=ENTRY_POINTS)))
+
+
+def default_engines() -> tuple[str, ...]:
+    """The engines that run when none is named: all but the optional ones that are not installed."""
+    return tuple(name for name in engine_names() if name not in OPTIONAL or installed(name))
+
+
+def installed(name: str) -> bool:
+    """Whether the package of a known engine is installed."""
+    try:
+        engine(name).version()
+    except ImportError:
+        return False
+    return True
 
 
 def engine(name: str) -> Engine:
     """The engine of that name, or at ``module:attribute``; raises LookupError with the known names."""
-    if name in BUILT_IN:
+    if name in BUILT_IN + OPTIONAL:
         return import_module(f"crosscheck.engines.{name}").ENGINE
     for point in metadata.entry_points(group=ENTRY_POINTS):
         if point.name == name:

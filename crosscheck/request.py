@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from crosscheck.conformance.bench import Specimen, specimens
-from crosscheck.engine import BUILT_IN, Setting, engine, engine_names
+from crosscheck.engine import BUILT_IN, Setting, default_engines, engine
 from crosscheck.study import Case, default_cases
 from mbref.scene import Scene, SceneError
 from mbref.scenes import find_scene
@@ -46,11 +46,11 @@ def find_scenes(names: Sequence[str]) -> list[Scene]:
 
 
 def find_engines(names: Sequence[str] | None, notice: Notice) -> list[str]:
-    """The named engines, or all known ones; one whose package is missing is left out with a ``notice``.
+    """The named engines, or the default ones; one whose package is missing is left out with a ``notice``.
 
     Raises RequestError for an unknown name, and when nothing is left.
     """
-    wanted = list(dict.fromkeys(names or engine_names()))
+    wanted = list(dict.fromkeys(names or default_engines()))
     faults = [fault for name in wanted if (fault := _unknown_engine(name))]
     if faults:
         raise RequestError(*faults)

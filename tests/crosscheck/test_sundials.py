@@ -1,0 +1,121 @@
+"""SUNDIALS IDA / truths, Pinocchio, and what it cannot pass."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Setting, engine
+from crosscheck.truth import truth_for
+from mbref import rotations
+from mbref.scene import Driver, Scene
+from mbref.scenes import SCENES
+from mbref.trajectory import Outcome, Trajectory
+from tests.crosscheck.tree_scenes import driven, every_joint, ring
+
+pytest.importorskip("sksundae", reason="the optional engine SUNDIALS needs scikit-sundae")
+
+REGULAR = {  # scene: duration (s) without a singular position
+    "planar_slider_crank": 0.1,
+    "planar_slider_crank_gravity": 0.3,
+    "spatial_slider_crank": 0.01,
+    "spatial_slider_crank_driven": 0.05,
+    "spatial_slider_crank_gravity": 0.3,
+    "four_bar": 0.012,
+    "five_bar": 0.012,
+    "four_bar_gravity": 0.15,
+}
+
+
+def error(run: Trajectory, scene: Scene) -> float:
+    """Largest error of a position (m) or an orientation (rad)."""
+    truth = truth_for(scene).poses(run.times)
+    turned = rotations.angle_between(run.orientation, truth.orientation).max()
+    return max(abs(run.position - truth.position).max(), turned)
+
+
+def simulate(scene: Scene, duration: float, rtol: float, samples: int = 6) -> Trajectory:
+    return engine("sundials").run(scene, np.linspace(0, duration, samples), Setting("ggl", {"rtol": rtol}))
+
+
+@pytest.mark.parametrize("name", REGULAR)
+def test_ida_and_truth(name: str) -> None:
+    """A tolerance of one step: over a thousand of them its errors grow by orders."""
+    scene = SCENES[name]()
+    run = simulate(scene, REGULAR[name], 1e-8)
+    assert run.outcome is Outcome.COMPLETED, f"{name}: {run.outcome.label} {run.message}"
+    assert error(run, scene) < 1e-4, f"{name}: {error(run, scene):.2e} from the truth"
+
+
+def test_tighter_tolerances_and_smaller_errors() -> None:
+    scene = SCENES["spatial_slider_crank"]()
+    errors = [error(simulate(scene, 0.01, rtol), scene) for rtol in (1e-4, 1e-6, 1e-8)]
+    assert errors[1] < errors[0] / 5 and errors[2] < errors[1] / 5, (
+        f"errors {errors} of rtol 1e-4, 1e-6, 1e-8"
+    )
+
+
+@pytest.mark.parametrize("scene", [every_joint(), driven(), ring("universal"), ring("revolute")],
+                         ids=lambda scene: scene.name)  # fmt: skip
+def test_ida_and_pinocchio_move_alike(scene: Scene) -> None:
+    """Every joint, driver and load; redundant loops; joint reactions where they are unique."""
+    pytest.importorskip("pinocchio")
+    run = simulate(scene, scene.duration, 1e-7, 4)
+    other = engine("pinocchio").run(scene, run.times, Setting("tuned", {"rtol": 1e-10, "min_step": 1e-4}))
+    assert run.outcome is other.outcome is Outcome.COMPLETED, (run.message, other.message)
+    for field, allowed in (("position", 2e-5), ("velocity", 4e-4), ("angular_velocity", 1e-3),
+                           ("acceleration", 1e-2), ("angular_acceleration", 2e-2)):  # fmt: skip
+        gap = abs(getattr(run, field) - getattr(other, field)).max()
+        assert gap < allowed, f"{scene.name}: {field} differs by {gap:.2e}, allowed {allowed:.0e}"
+    if not scene.counts().redundant:
+        for joint, wrench in other.reactions.items():
+            gap = abs(run.reactions[joint] - wrench).max() / abs(wrench).max()
+            assert gap < 1e-3, f"reaction in {joint}: relative difference {gap:.2e}"
+
+
+def test_the_end_of_a_run_and_the_singular_position() -> None:
+    """The driven four-bar is first singular where its crank lies on the ground line: quarter turn."""
+    scene = SCENES["four_bar"]()
+    run = simulate(scene, 0.02, 1e-6, 21)
+    singular = math.pi / 2 / 124.8
+    assert run.outcome is not Outcome.COMPLETED, f"completed, {error(run, scene):.2e} from the truth"
+    assert abs(run.t_end - singular) < 1e-4, f"stopped at {run.t_end:.6f} s, singular at {singular:.6f} s"
+    assert error(run, scene) < 1e-5, f"before that: {error(run, scene):.2e} from the truth"
+
+
+def test_a_row_that_only_seemed_redundant_at_the_start_is_told() -> None:
+    run = simulate(SCENES["four_bar_straight"](), 0.02, 1e-6)
+    assert run.outcome is Outcome.VIOLATION, f"{run.outcome.label}: {run.message}"
+
+
+def test_rows_chosen_at_the_start_and_a_full_turn() -> None:
+    """Of the redundant planar mechanism; one choice, or its replacements, must serve in every position."""
+    scene = SCENES["planar_slider_crank"]()
+    run = simulate(scene, 0.25, 1e-6, 26)
+    turned = run.angular_velocity[:, 0, 2].mean() * 0.25
+    assert turned > 2 * math.pi, f"the crank has only turned by {turned:.3g} rad"
+    assert run.outcome is Outcome.COMPLETED and error(run, scene) < 1e-2, (run.message, error(run, scene))
+
+
+def test_the_same_motion_with_and_without_masses() -> None:
+    base = SCENES["spatial_slider_crank_driven"]()
+    bare = base.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in base.body))
+    runs = [simulate(scene, 0.02, 1e-7) for scene in (base, bare)]
+    gap = abs(runs[0].position - runs[1].position).max()
+    assert gap < 1e-5, f"positions with and without masses differ by {gap:.1e} m"
+    assert runs[1].reactions is None, "reactions without masses"
+    assert engine("sundials").cannot(bare.with_(driver=())) is not None, "free motion without masses"
+
+
+def test_drivers_that_no_motion_can_follow_end_the_run() -> None:
+    base = SCENES["spatial_slider_crank"]()
+    scene = base.with_(driver=(Driver(joint="D", polynomial=(0.0, 0.0, 50.0)),), load=())
+    run = simulate(scene, 0.2, 1e-5)
+    assert run.outcome is not Outcome.COMPLETED and run.message, f"{run.outcome.label} {run.message!r}"
+
+
+def test_an_unknown_family_is_refused() -> None:
+    with pytest.raises(ValueError, match="no family 'best'"):
+        engine("sundials").run(SCENES["four_bar"](), np.array([0.0]), Setting("best", {"rtol": 1e-6}))
