@@ -23,36 +23,41 @@ from mbref.tables import (
     COORDINATES,
     CROSSINGS,
     DENSE,
+    FIXED_STEP,
     FRAMES,
+    LARGEST_STEP,
+    LARGEST_TURN,
     LAST,
     LAST_TIME,
     MEMO,
+    MOST_STEPS,
     MULTIPLIERS,
     NOT_FINITE,
     OK,
     OMEGA,
     PHI,
     PROBLEM,
+    PROPOSE,
     RATES,
     REJECTED,
     ROWS,
     SIZES,
+    SMALLEST_STEP,
     STATE,
     STEP,
     STEPS,
+    STEPS_PER_CALL,
     VELOCITIES,
+    VIOLATION,
 )
 
 # how a call ends; evaluation statuses (SINGULAR, …) end it too
 DONE, VIOLATED, STEP_TOO_SMALL, TOO_MANY_STEPS, PAUSED = range(10, 15)
-# clock: the state of the loop between calls
-TIME, NEXT_STEP = range(2)
-# control: what the loop is to keep to
-ORDER, FIXED_STEP, SMALLEST_STEP, LARGEST_STEP, LARGEST_TURN, VIOLATION, MOST_STEPS, STEPS_PER_CALL = range(8)
+# clock: the state of the loop between calls; length and error ratio of the last step, and its length
+# before the sample times cut it
+TIME, LENGTH, SUGGESTED, RATIO = range(4)
 # place: sample to take next, and the violated row
 SAMPLE, ROW = range(2)
-
-SAFETY, SHRINK, GROW, RETRY = 0.9, 0.2, 6.0, 0.25
 
 
 @kernel
@@ -142,28 +147,15 @@ def part_of(interval, h):
     return 0.5 * interval if 2.0 * h > interval else h
 
 
-@kernel
-def first_step(t, control, tolerances, y, y_rate):
-    """A first step from the sizes of y and y' (Hairer, Nørsett & Wanner, section II.4)."""
-    size, rate = 0.0, 0.0
-    for i in range(y.shape[0]):
-        scale = tolerances[1] + tolerances[0] * abs(y[i])
-        size += (y[i] / scale) ** 2
-        rate += (y_rate[i] / scale) ** 2
-    if size < 1e-10 or rate < 1e-10:
-        return 1e-6 * control[LARGEST_STEP]
-    return 0.01 * (size / rate) ** 0.5
-
-
 @entry(
     INT(
-        pointer_to(STEP), pointer_to(RATES), pointer_to(ACCEPT), pointer_to(ACCELERATE),
+        pointer_to(STEP), pointer_to(PROPOSE), pointer_to(RATES), pointer_to(ACCEPT), pointer_to(ACCELERATE),
         VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, VECTOR, INDICES, VECTOR,
         VECTOR, VECTOR, VECTOR, MATRIX, MATRIX, INDICES, *PROBLEM,
     )
 )  # fmt: skip
 def march(
-    step, rates, accept, accelerate,
+    step, propose, rates, accept, accelerate,
     times, sample_q, sample_v, sample_a, sample_m, clock, control, place, tolerances,
     y, y_rate, y_new, memory, history, nodes, ints, floats, work, pivots, settings, counts,
 ):  # fmt: skip
@@ -193,17 +185,21 @@ def march(
                 length, accept, times, sample_q, sample_v, sample_a, sample_m, clock, place,
                 y, y_rate, y_new, history, nodes, ints, floats, work, pivots, settings, counts,
             )  # fmt: skip
+            memory[:] = 0.0
             if place[SAMPLE] == times.shape[0]:
                 return DONE
             if status != OK:
                 return status
             taken += 1
             continue
-        if clock[NEXT_STEP] == 0.0:
-            clock[NEXT_STEP] = first_step(t, control, tolerances, y[:size], y_rate[:size])
+        suggested = propose(
+            clock[LENGTH], clock[SUGGESTED], clock[RATIO], y[:size], y_rate[:size],
+            memory, control, tolerances,
+        )  # fmt: skip
         status = advance(
-            step, rates, accept, accelerate, times[place[SAMPLE]], clock, control, tolerances,
-            y, y_rate, y_new, memory, history, nodes, ints, floats, work, pivots, settings, counts,
+            suggested, step, propose, rates, accept, accelerate, times[place[SAMPLE]], clock, control,
+            tolerances, y, y_rate, y_new, memory, history, nodes, ints, floats, work, pivots, settings,
+            counts,
         )  # fmt: skip
         if status != OK:
             return status
@@ -235,13 +231,13 @@ def leap(
 
 @kernel
 def advance(
-    step, rates, accept, accelerate, target, clock, control, tolerances,
+    suggested, step, propose, rates, accept, accelerate, target, clock, control, tolerances,
     y, y_rate, y_new, memory, history, nodes, ints, floats, work, pivots, settings, counts,
 ):  # fmt: skip
     """One accepted step towards the target time, as many attempts as it takes."""
     t, size, interval = clock[TIME], pivots[SIZES, 1], target - clock[TIME]
     limit = min(largest_step(control, work), to_edge(history, counts[STEPS]))
-    suggested = min(clock[NEXT_STEP], limit)
+    suggested = min(suggested, limit)
     while True:
         if control[FIXED_STEP] > 0.0:
             h = interval / max(1.0, -(-(interval / control[FIXED_STEP] - 1e-6) // 1.0))
@@ -258,14 +254,14 @@ def advance(
             if status == OK or status == CHANGED:  # noqa: SIM109 - no containers in kernels
                 counts[STEPS] += 1
                 y[:] = y_new
-                clock[TIME] = now
-                factor = GROW if ratio == 0.0 else min(GROW, SAFETY * ratio ** (-1.0 / control[ORDER]))
-                clock[NEXT_STEP] = max(suggested, h * factor) if h < suggested else h * factor
+                clock[TIME], clock[LENGTH], clock[SUGGESTED], clock[RATIO] = now, h, suggested, ratio
+                if status == CHANGED:
+                    memory[:] = 0.0
                 return OK
         counts[REJECTED] += 1
         if control[FIXED_STEP] > 0.0:
             return status
-        shrink = RETRY if status != OK else max(SHRINK, SAFETY * ratio ** (-1.0 / control[ORDER]))
-        suggested = h * shrink
+        verdict = ratio if status == OK else -float(status)
+        suggested = propose(h, suggested, verdict, y[:size], y_rate[:size], memory, control, tolerances)
         if suggested < control[SMALLEST_STEP]:
             return STEP_TOO_SMALL if status == OK else status

@@ -13,21 +13,13 @@ from mbref.evaluation import evaluate_all
 from mbref.initial import Start, consistent_start, scene_length
 from mbref.march import (
     DONE,
-    FIXED_STEP,
-    LARGEST_STEP,
-    LARGEST_TURN,
-    MOST_STEPS,
-    ORDER,
     PAUSED,
     ROW,
     SAMPLE,
-    SMALLEST_STEP,
     STEP_TOO_SMALL,
-    STEPS_PER_CALL,
     TIME,
     TOO_MANY_STEPS,
     VIOLATED,
-    VIOLATION,
     march,
 )
 from mbref.method import Method
@@ -39,17 +31,25 @@ from mbref.tables import (
     CROSSINGS,
     EVALUATIONS,
     FACTORISATIONS,
+    FIXED_STEP,
+    LARGEST_STEP,
+    LARGEST_TURN,
+    MOST_STEPS,
     NEWTON,
     NOT_CONVERGED,
     NOT_FINITE,
+    ORDER,
     PHI,
     REJECTED,
     ROWS,
     SINGULAR,
     SIZES,
+    SMALLEST_STEP,
     STATE,
     STEPS,
+    STEPS_PER_CALL,
     VELOCITIES,
+    VIOLATION,
 )
 from mbref.trajectory import Cost, Outcome, Trajectory
 
@@ -91,7 +91,7 @@ def simulate(
 
     Returns the states reached, with accelerations and reactions; a failure of the method is the
     trajectory's outcome.  Raises SceneError for a scene that cannot be simulated, ValueError for times
-    that do not increase, MethodError for an unknown method name.
+    that do not increase or an order the integrator does not have, MethodError for an unknown method name.
     """
     method = Method.parse(method) if isinstance(method, str) else method
     limits = limits or Limits()
@@ -126,8 +126,8 @@ def prepare(method: Method) -> None:
     """Compile what the method needs, or load it from the cache of this machine."""
     integrator, stabilisation = method.integrator, method.stabilisation
     for kernel in (
-        integrator.step, stabilisation.rates, stabilisation.accept, method.formulation.accelerate,
-        march, evaluate_all, stabilisation.enter.callable,
+        integrator.step, integrator.propose, stabilisation.rates, stabilisation.accept,
+        method.formulation.accelerate, march, evaluate_all, stabilisation.enter.callable,
     ):  # fmt: skip
         kernel.prepare()
 
@@ -149,12 +149,11 @@ class _Run:
             model.ints, model.floats, self.work, self.pivots,
             method.settings(limits.rank_tolerance), self.counts,
         )  # fmt: skip
-        self.kernels = tuple(
-            k.pointer
-            for k in (integrator.step, stabilisation.rates, stabilisation.accept, formulation.accelerate)
-        )
+        chart = stabilisation.rates, stabilisation.accept
+        kernels = integrator.step, integrator.propose, *chart, formulation.accelerate
+        self.kernels = tuple(kernel.pointer for kernel in kernels)
         prepare(method)  # so that the run alone is timed
-        self.clock = np.zeros(2)
+        self.clock = np.zeros(4)
         self.place = np.zeros(2, dtype=np.int64)
         self.control = self._control()
         self._enter(stabilisation, self.start)
@@ -164,8 +163,9 @@ class _Run:
         limits, integrator = self.limits, self.method.integrator
         span = float(self.times[-1]) or 1.0
         control = np.zeros(8)
-        control[ORDER] = integrator.order
-        control[FIXED_STEP] = 0.0 if integrator.adaptive else self.method.options_of(integrator)["step"]
+        options = self.method.options_of(integrator)
+        control[ORDER] = integrator.highest_order(options)
+        control[FIXED_STEP] = 0.0 if integrator.adaptive else options["step"]
         control[SMALLEST_STEP] = limits.smallest_step or 1e-12 * span
         control[LARGEST_STEP] = limits.largest_step or span
         control[LARGEST_TURN] = limits.largest_turn

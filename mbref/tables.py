@@ -47,6 +47,9 @@ POINT_I, POINT_J, U_I, W_I, U_J, LENGTH = 0, 3, 6, 9, 12, 15  # columns of GEOME
 POINT, DOT1, DOT2, DISTANCE = range(4)  # kinds of primitives
 MOMENT, FORCE_AT_POINT, SPRING, TORSION_SPRING = range(4)  # kinds of loads
 
+# control, an array of floats: what the loop is to keep to
+ORDER, FIXED_STEP, SMALLEST_STEP, LARGEST_STEP, LARGEST_TURN, VIOLATION, MOST_STEPS, STEPS_PER_CALL = range(8)
+
 # counts, an array of integers that kernels add to
 STEPS, REJECTED, EVALUATIONS, FACTORISATIONS, NEWTON, CROSSINGS = range(6)
 
@@ -71,3 +74,4 @@ ACCEPT = INT(FLOAT, VECTOR, *PROBLEM)
 STEP = FLOAT(
     pointer_to(RATES), pointer_to(ACCELERATE), FLOAT, FLOAT, VECTOR, VECTOR, VECTOR, MATRIX, VECTOR, *PROBLEM
 )  # fmt: skip
+PROPOSE = FLOAT(FLOAT, FLOAT, FLOAT, VECTOR, VECTOR, MATRIX, VECTOR, VECTOR)

@@ -1,7 +1,8 @@
 """Integrators by name."""
 
+from mbref.integrators.adams import ADAMS
 from mbref.integrators.base import Integrator
 from mbref.integrators.dop853 import DOP853
 from mbref.integrators.rk4 import RK4
 
-INTEGRATORS: dict[str, Integrator] = {i.name: i for i in (DOP853, RK4)}
+INTEGRATORS: dict[str, Integrator] = {i.name: i for i in (DOP853, RK4, ADAMS)}

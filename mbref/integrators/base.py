@@ -1,4 +1,4 @@
-"""Integrator: one step of y' = f(t, y) in the compiled loop."""
+"""Integrator: one step of y' = f(t, y) in the compiled loop, and the choice of its length."""
 
 from __future__ import annotations
 
@@ -13,13 +13,29 @@ class Integrator:
     """``step(rates, accelerate, t, h, y, y', y_new, memory, tolerances, …) -> error ratio``.
 
     The kernel writes ``y_new``; its result is the estimated local error over the tolerance (accept up to
-    1; a fixed-step method returns 0), or minus the status of an evaluation that failed.  ``memory`` has
-    ``rows`` rows of the length of y and is the integrator's own.
+    1; a fixed-step method returns 0), or minus the status of an evaluation that failed.
+
+    ``propose(h, suggested, ratio, y, y', memory, control, tolerances) -> next step`` chooses the length of
+    the next attempt once the last, of length h, is judged; ``suggested`` is what h was before the sample
+    times cut it.  Accepted (ratio from 0 to 1): y and y' are the new state and its rates.  Otherwise they
+    are the old ones.  Before the first step h is 0.
+
+    ``memory`` has ``rows`` rows of at least 14 numbers, at least the length of y, and is the integrator's
+    own; the loop fills it with zeros before the first step and whenever y changes its meaning or jumps.
+    An option ``max_order`` bounds the order, which reaches the kernels as ``control[ORDER]``.
     """
 
     name: str
     order: int
     step: Exchangeable
+    propose: Exchangeable
     rows: int
     adaptive: bool
     options: Mapping[str, float] = field(default_factory=dict)
+
+    def highest_order(self, options: Mapping[str, float]) -> int:
+        """The order the options allow; ValueError unless ``max_order`` is a whole number up to ``order``."""
+        wanted = options.get("max_order", self.order)
+        if wanted not in range(1, self.order + 1):
+            raise ValueError(f"{self.name}: max_order must be 1 to {self.order}, got {wanted:g}")
+        return int(wanted)

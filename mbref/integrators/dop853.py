@@ -7,6 +7,7 @@ from numpy import sqrt
 from mbref.compiled import exchangeable
 from mbref.integrators.base import Integrator
 from mbref.integrators.coefficients import ERROR3, ERROR5, STAGES, A, B, C
+from mbref.integrators.one_step import propose
 from mbref.tables import OK, STEP
 
 
@@ -49,4 +50,4 @@ def step(
     return abs(h) * error5 / sqrt((error5 + 0.01 * error3) * n)
 
 
-DOP853 = Integrator("dop853", 8, step, STAGES, adaptive=True)
+DOP853 = Integrator("dop853", 8, step, propose, STAGES, adaptive=True)

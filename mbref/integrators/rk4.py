@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mbref.compiled import exchangeable
 from mbref.integrators.base import Integrator
+from mbref.integrators.one_step import propose
 from mbref.tables import OK, STEP
 
 
@@ -31,4 +32,4 @@ def step(
     return 0.0
 
 
-RK4 = Integrator("rk4", 4, step, 2, adaptive=False, options={"step": 1e-4})
+RK4 = Integrator("rk4", 4, step, propose, 2, adaptive=False, options={"step": 1e-4})

@@ -1,0 +1,33 @@
+"""Step control of one-step methods: the error ratio to the power of -1 / order."""
+
+from __future__ import annotations
+
+from mbref.compiled import exchangeable, kernel
+from mbref.tables import LARGEST_STEP, ORDER, PROPOSE
+
+SAFETY, SHRINK, GROW, RETRY = 0.9, 0.2, 6.0, 0.25
+
+
+@kernel
+def first_step(y, y_rate, control, tolerances):
+    """A first step from the sizes of y and y' (Hairer, Nørsett & Wanner, section II.4)."""
+    size, rate = 0.0, 0.0
+    for i in range(y.shape[0]):
+        scale = tolerances[1] + tolerances[0] * abs(y[i])
+        size += (y[i] / scale) ** 2
+        rate += (y_rate[i] / scale) ** 2
+    if size < 1e-10 or rate < 1e-10:
+        return 1e-6 * control[LARGEST_STEP]
+    return 0.01 * (size / rate) ** 0.5
+
+
+@exchangeable(PROPOSE)
+def propose(h, suggested, ratio, y, y_rate, memory, control, tolerances):
+    if h == 0.0:
+        return first_step(y, y_rate, control, tolerances)
+    if ratio > 1.0:
+        return h * max(SHRINK, SAFETY * ratio ** (-1.0 / control[ORDER]))
+    if not ratio >= 0.0:
+        return h * RETRY
+    factor = GROW if ratio == 0.0 else min(GROW, SAFETY * ratio ** (-1.0 / control[ORDER]))
+    return max(suggested, h * factor) if h < suggested else h * factor

@@ -1,0 +1,255 @@
+"""Integrators against closed forms, truths, SciPy's Adams codes, and themselves without the JIT."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy.integrate import ode
+from scipy.special import ellipj, ellipk
+
+from crosscheck.metrics import measure
+from crosscheck.truth import truth_for
+from mbref import rotations
+from mbref.method import Method
+from mbref.scene import Body, Revolute, Scene, Spring, Translational
+from mbref.scenes import SCENES
+from mbref.simulate import Limits, _Run, simulate
+from mbref.tables import COLUMN_ORDER, CROSSINGS, STEPS_PER_CALL
+
+ROD = {"mass": 2.0, "inertia": (0.1, 0.7, 0.7)}
+OSCILLATOR = Scene(
+    name="oscillator",
+    body=(Body(name="b", position=(1.0, 0.0, 0.0), **ROD),),
+    joint=(Translational(name="S", bodies=("ground", "b"), anchor=(0, 0, 0), axis=(1, 0, 0)),),
+    load=(Spring(bodies=("ground", "b"), points=((0, 0, 0), (1, 0, 0)), stiffness=8, natural_length=0.7),),
+)  # x'' = -4 (x - 0.7)
+PENDULUM = Scene(
+    name="pendulum",
+    gravity=(0.0, -9.81, 0.0),
+    body=(Body(name="b", position=(1.0, 0.0, 0.0), **ROD),),
+    joint=(Revolute(name="H", bodies=("ground", "b"), anchor=(0, 0, 0), axis=(0, 0, 1)),),
+)  # released level: 2.7 φ'' = -2 · 9.81 sin φ, φ from the vertical
+
+
+def ran(scene, method, times, **limits):
+    trajectory = simulate(scene, method, times, Limits(**limits))
+    assert trajectory.outcome.name == "COMPLETED", f"{method}: {trajectory.message}"
+    return trajectory
+
+
+def displacement(times):
+    return 0.7 + 0.3 * np.cos(2 * times)
+
+
+def pendulum_angle(times):
+    """φ from the vertical of a pendulum released at π/2: sin(φ/2) = k sn(K - ω t), k² = ½."""
+    sn = ellipj(ellipk(0.5) - np.sqrt(2.0 * 9.81 / 2.7) * times, 0.5)[0]
+    return 2 * np.arcsin(np.sqrt(0.5) * sn)
+
+
+def oscillator_error(method, times, **limits):
+    trajectory = ran(OSCILLATOR, method, times, **limits)
+    return np.max(np.abs(trajectory.position[:, 0, 0] - displacement(times))), trajectory.cost
+
+
+def pendulum_error(method, times, **limits):
+    trajectory = ran(PENDULUM, method, times, **limits)
+    angle = np.arctan2(trajectory.position[:, 0, 0], -trajectory.position[:, 0, 1])
+    return np.max(np.abs(angle - pendulum_angle(times))), trajectory.cost
+
+
+def judged(scene, trajectory):
+    return measure(scene, trajectory, truth_for(scene))["error"]
+
+
+def slope(sizes, errors):
+    """Exponent of the power law error ~ size^p, by least squares."""
+    return np.polyfit(np.log(sizes), np.log(errors), 1)[0]
+
+
+@pytest.mark.parametrize("error", [oscillator_error, pendulum_error])
+def test_rk4_error_and_its_order(error):
+    steps = np.array([0.01, 0.005, 0.0025])
+    found = [error(f"lm1+none/rk4[step={h}]", np.array([0.0, 2.0]))[0] for h in steps]
+    assert abs(slope(steps, found) - 4) < 0.15, f"errors {found} at steps {steps} are not of order 4"
+
+
+@pytest.mark.parametrize("error", [oscillator_error, pendulum_error])
+def test_dop853_error_and_its_order(error):
+    steps = np.array([0.25, 0.125, 0.0625])  # a loose tolerance: the largest step is what is taken
+    loose = {"rtol": 1.0, "atol": 1e3}
+    found = [
+        error("lm1+none/dop853", np.linspace(0, 4, 3), largest_step=h, largest_turn=9.0, **loose)[0]
+        for h in steps
+    ]
+    assert abs(slope(steps, found) - 8) < 0.8, f"errors {found} at steps {steps} are not of order 8"
+
+
+@pytest.mark.parametrize("order", [1, 2, 4, 6, 8])
+@pytest.mark.parametrize("error", [oscillator_error, pendulum_error])
+def test_adams_error_and_its_order_when_bounded(error, order):
+    # with local extrapolation order k converges like order k + 1 in the number of steps
+    runs = [
+        error(f"lm1+none/adams[max_order={order}]", np.array([0.0, 5.0]), rtol=rtol)
+        for rtol in 10.0 ** -np.arange(5, 8 + min(order, 4))
+    ]
+    errors, steps = [e for e, _ in runs], [cost.steps for _, cost in runs]
+    assert abs(-slope(steps, errors) - (order + 1)) < 0.2 * (order + 1), (
+        f"order {order}: errors {errors} in {steps} steps"
+    )
+
+
+SCENES_AND_TRUTHS = [
+    ("planar_slider_crank_gravity", 0.5, "mpi-svd+projection"),
+    ("spatial_slider_crank", 0.02, "lm1+projection"),
+    ("spatial_slider_crank", 0.02, "lm1+none"),
+]
+
+
+@pytest.mark.parametrize(("name", "end", "method"), SCENES_AND_TRUTHS)
+def test_adams_error_is_proportional_to_the_tolerance(name, end, method):
+    scene, tolerances = SCENES[name](), 10.0 ** -np.arange(4, 13, 2)
+    errors = [
+        judged(scene, ran(scene, f"{method}/adams", np.linspace(0, end, 6), rtol=rtol)) for rtol in tolerances
+    ]
+    assert abs(slope(tolerances, errors) - 1) < 0.15, f"errors {errors} at tolerances {tolerances}"
+    assert np.all(errors < 500 * tolerances), f"errors {errors} at tolerances {tolerances}"
+
+
+CRANK = SCENES["planar_slider_crank_gravity"]()
+CRANK_TRUTH = truth_for(CRANK)
+
+
+def crank_error(method, times, **limits):
+    """Largest error of the crank's angle of ``planar_slider_crank_gravity``."""
+    trajectory = ran(CRANK, method, times, **limits)
+    true = CRANK_TRUTH.poses(times).orientation
+    return np.max(rotations.angle_between(trajectory.orientation[:, 0], true[:, 0])), trajectory.cost
+
+
+def crank_acceleration(q, rate):
+    """The reduced equation of motion, which the truth solves in other variables."""
+    terms = CRANK_TRUTH._reduced._terms(np.array([q]), np.array([rate]))
+    root, push, half_slope = (float(term[0]) for term in terms)
+    return (push - half_slope * rate**2) / root**2
+
+
+# error of a method, the same problem as one second-order equation, its start, its end, what it ends at
+REDUCED = {
+    "oscillator": (oscillator_error, lambda x, _: -4 * (x - 0.7), (1.0, 0.0), 20.0, displacement(20.0)),
+    "pendulum": (
+        pendulum_error, lambda phi, _: -2 * 9.81 / 2.7 * np.sin(phi), (np.pi / 2, 0.0), 10.0,
+        pendulum_angle(10.0),
+    ),
+    "crank": (
+        crank_error, crank_acceleration, (0.0, 30.0), 0.25, CRANK_TRUTH._reduced([0.25])[0][0],
+    ),
+}  # fmt: skip
+
+
+def scipy_run(code, acceleration, start, end, exact, rtol):
+    """Error of one of SciPy's codes at the end, and its evaluations."""
+    calls = []
+
+    def rates(t, y):
+        calls.append(t)
+        return [y[1], acceleration(*y)]
+
+    options = {"method": "adams"} if code == "vode" else {}
+    solver = ode(rates).set_integrator(code, rtol=rtol, atol=rtol, nsteps=100_000, **options)
+    error = abs(solver.set_initial_value(start).integrate(end)[0] - exact)
+    return float(error), len(calls)
+
+
+def evaluations_for(error, runs):
+    """Evaluations at which an error is met: a straight line through log evaluations over log error."""
+    errors, counts = np.log(np.array(runs)).T
+    return float(np.exp(np.polyval(np.polyfit(errors, counts, 1), np.log(error))))
+
+
+@pytest.mark.parametrize("name", REDUCED)
+def test_adams_and_scipy_need_as_many_evaluations_for_an_error(name):
+    error_of, *problem = REDUCED[name]
+    times, tolerances = np.array([0.0, problem[2]]), 10.0 ** -np.arange(4, 12)
+    runs = [error_of("mpi-svd+projection/adams", times, rtol=rtol) for rtol in tolerances]
+    mine = evaluations_for(1e-6, [(error, cost.rhs) for error, cost in runs])
+    for code in ("lsoda", "vode"):
+        theirs = evaluations_for(1e-6, [scipy_run(code, *problem, rtol) for rtol in tolerances])
+        assert mine < 1.25 * theirs, f"{name}: {mine:.0f} evaluations at error 1e-6, {code} {theirs:.0f}"
+    steps = [(cost.rhs, 2 * cost.steps + cost.rejected) for _, cost in runs]
+    assert all(abs(rhs - two) <= 1 for rhs, two in steps), f"not two evaluations a step: {steps}"
+
+
+# stabilisation, its scene and end, error allowed in tolerances.  Partitioning multiplies errors before it
+# changes coordinates, when the one it integrates is close to its turning point.
+STABILISED = [
+    ("lm1+none", "spatial_slider_crank", 0.02, 1e3),
+    ("lm1+baumgarte[alpha=500,beta=500]", "spatial_slider_crank", 0.02, 1e3),
+    ("lm1+projection", "spatial_slider_crank", 0.02, 1e3),
+    ("lm1+partitioning", "spatial_slider_crank", 0.02, 1e5),
+    ("mpi-svd+partitioning", "planar_slider_crank_gravity", 0.5, 1e4),
+    ("lm1+partitioning", "spatial_slider_crank_driven", 0.1, 1e0),  # nothing is left to integrate
+    ("mpi-svd+projection", "four_bar", 0.2, 1e3),
+    ("mpi-svd+projection", "four_bar_gravity", 1.0, 1e3),
+    ("mpi-svd+projection", "planar_slider_crank_equal", 0.2, 1e3),
+    ("mpi-svd+projection", "planar_slider_crank_heavy", 20.0, 1e3),
+]
+
+
+@pytest.mark.parametrize(("method", "name", "end", "allowed"), STABILISED)
+def test_adams_under_every_stabilisation_and_truth(method, name, end, allowed):
+    scene = SCENES[name]()
+    for rtol in (1e-6, 1e-9):  # partitioning changes coordinates, the last four scenes pass singularities
+        error = judged(scene, ran(scene, f"{method}/adams", np.linspace(0, end, 6), rtol=rtol))
+        assert error < allowed * rtol, f"{name}, {method}, rtol {rtol:g}: error {error:.2e}"
+
+
+@pytest.mark.parametrize(
+    ("method", "name", "end"),
+    [
+        ("lm1+partitioning", "spatial_slider_crank", 0.02),
+        ("mpi-svd+projection", "planar_slider_crank_heavy", 20.0),
+    ],
+)
+def test_adams_forgets_its_past_where_coordinates_change_or_jump(method, name, end):
+    run = _Run(SCENES[name](), Method.parse(f"{method}/adams"), np.array([end]), Limits(rtol=1e-9))
+    run.control[STEPS_PER_CALL] = 1
+    before, mismatches, changes = [0, run.pivots[COLUMN_ORDER].copy()], [], 0
+
+    def watch(t):
+        nonlocal changes
+        now = [run.counts[CROSSINGS], run.pivots[COLUMN_ORDER].copy()]
+        changed = now[0] != before[0] or np.any(now[1] != before[1])
+        changes += changed
+        if changed != (not run.memory.any()):
+            mismatches.append(t)
+        before[:] = now
+
+    run.march(watch)
+    assert changes > 0, f"{name}: no new coordinates and no jump"
+    assert not mismatches, f"{name}: {changes} changes; not (only) there forgotten: t = {mismatches} s"
+
+
+@pytest.mark.parametrize("method", ["lm1+projection/adams", "lm1+partitioning/adams[max_order=5]"])
+def test_adams_is_the_same_without_the_jit(method):
+    scene = "spatial_slider_crank"
+    command = [sys.executable, "-m", "mbref", "run", scene, "--method", method, "--times", "0.002", "--json"]
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    finished = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+    plain = json.loads(finished.stdout)["records"][0]
+    compiled = ran(SCENES[scene](), method, [0.002])
+    assert plain["cost"]["steps"] == compiled.cost.steps, f"{plain['cost']} and {compiled.cost}"
+    for b, body in enumerate(compiled.bodies):
+        for key in ("position", "orientation", "velocity", "angular_velocity"):
+            mine, theirs = getattr(compiled, key)[:, b], np.array(plain["bodies"][body][key])
+            error = np.max(np.abs(mine - theirs)) / max(1.0, np.max(np.abs(mine)))
+            assert error < 1e-12, f"{method}: {body}, {key} differs by {error:.2e}"
+
+
+@pytest.mark.parametrize("order", [0, 2.5, 13])
+def test_an_order_that_adams_does_not_have_is_refused(order):
+    with pytest.raises(ValueError, match=r"max_order must be 1 to 12"):
+        simulate(OSCILLATOR, f"lm1+none/adams[max_order={order}]", [1.0])
