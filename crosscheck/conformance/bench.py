@@ -88,11 +88,11 @@ class Bench:
     @cached_property
     def motion(self) -> Trajectory:
         """The completed run at the finest setting; raises Broken when there is none."""
-        return completed(self.scene, self.finest.value)
+        return completed(self.scene, self.finest.value, len(self.times))
 
     def run(self, scene: Scene, times: np.ndarray) -> Trajectory:
         """A completed run of a scene at the finest setting of the specimen; raises Broken."""
-        return completed(scene, self.observed(scene, times, self.settings[-1]).value)
+        return completed(scene, self.observed(scene, times, self.settings[-1]).value, len(times))
 
     def observed(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
         """A run in a process of its own, and what it printed and left behind."""
@@ -103,7 +103,7 @@ class Bench:
         """Largest error that runs which should agree may have between them: multiples of the difference
         of the two finest settings, and no less than SAME_MOTION."""
         coarser = self.observed(self.scene, self.times, self.settings[-2:][0])
-        apart = difference(self.scene, self.motion, completed(self.scene, coarser.value))
+        apart = difference(self.scene, self.motion, completed(self.scene, coarser.value, len(self.times)))
         return max(SAME_MOTION, OWN_ACCURACY * apart)
 
     @cached_property
@@ -121,10 +121,12 @@ def set_up(engine: str, specimen: Specimen, time_limit: float) -> Bench:
     return Bench(engine, specimen, version, cannot, chosen, time_limit)
 
 
-def completed(scene: Scene, run: Trajectory) -> Trajectory:
-    """The run with its bodies in the scene's order; raises Broken unless it completed."""
+def completed(scene: Scene, run: Trajectory, samples: int) -> Trajectory:
+    """The run with its bodies in the scene's order; raises Broken unless it completed with its samples."""
     if run.outcome is not Outcome.COMPLETED:
         raise Broken(f"{run.outcome.label} after {run.t_end:.3g} s: {run.message or run.outcome.sentence}")
+    if len(run.times) != samples:
+        raise Broken(f"it says it completed, with {len(run.times)} of {samples} samples")
     return in_scene_order(scene, run)
 
 

@@ -1,0 +1,89 @@
+"""Examples: scripts from an empty directory / what they print; a plug-in engine / truth, gate, suite."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crosscheck.cli import main
+from crosscheck.compare import difference, gate_cases
+from crosscheck.engine import ENTRY_POINTS, engine_names
+from crosscheck.isolate import run_isolated
+from crosscheck.metrics import measure
+from crosscheck.study import run_case
+from crosscheck.truth import truth_for
+from mbref.scenes import SCENES
+
+ROOT = Path(__file__).parents[2]
+TINY = ROOT / "examples" / "tiny_engine"
+
+
+@pytest.fixture
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The tiny engine as pip leaves it: its module, and metadata with the entry points of its project."""
+    project = tomllib.loads((TINY / "pyproject.toml").read_text())["project"]
+    info = tmp_path / f"tiny_engine-{project['version']}.dist-info"
+    info.mkdir()
+    header = f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
+    (info / "METADATA").write_text(header)
+    points = [f"{name} = {target}" for name, target in project["entry-points"][ENTRY_POINTS].items()]
+    (info / "entry_points.txt").write_text("\n".join([f"[{ENTRY_POINTS}]", *points, ""]))
+    monkeypatch.syspath_prepend(str(TINY))
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+
+def test_installed_plug_in_and_list(installed, capsys):
+    assert "tiny" in engine_names(), engine_names()
+    assert main(["list", "engines"]) == 0
+    out = capsys.readouterr().out
+    assert re.search(r"tiny\s*│\s*tiny-engine\s*│\s*0\.1", out), out
+
+
+def test_plug_in_and_truth_and_gate(installed):
+    scene = SCENES["planar_slider_crank"]().with_(duration=0.1)
+    cases = gate_cases(scene, ["tiny"], 60.0)  # compared with the truth
+    found = difference(scene, [run_case(case) for case in cases])
+    assert [case.engine for case in cases] == ["tiny"] and found is None, found
+    setting = cases[0].setting
+    run = run_isolated("tiny", scene, np.linspace(0, 0.1, 5), setting, 60.0)
+    error = measure(scene, run, truth_for(scene))["error"]
+    assert error is not None and error < 1e-8, f"tiny at {setting}: error {error}, allowed 1e-8"
+
+
+def test_plug_in_and_conformance(installed, capsys):
+    assert main(["verify", "tiny", "--scene", "pendulum", "--scene", "spatial_slider_crank"]) == 0
+    out = capsys.readouterr().out
+    assert "0 fail" in out and "cannot: spatial_slider_crank" in out, out
+
+
+def example(name: str, tmp_path: Path) -> str:
+    """What an example prints when it is run from an empty directory."""
+    run = subprocess.run(
+        [sys.executable, ROOT / "examples" / name],
+        cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
+        timeout=120, check=False,
+    )  # fmt: skip
+    assert run.returncode == 0, f"{name}: status {run.returncode}: {run.stderr[-800:]}"
+    assert not list(tmp_path.iterdir()), f"{name} left {list(tmp_path.iterdir())}"
+    return run.stdout
+
+
+def test_first_example_and_truth(tmp_path):
+    printed = example("01_run_and_compare.py", tmp_path)
+    errors = [float(text) for text in re.findall(r"error (\S+)", printed)]
+    assert "COMPLETED" in printed and errors, printed
+    assert max(errors) < 1e-3, f"engines are off by {errors} where 1e-3 is allowed"
+
+
+def test_door_closer_closes(tmp_path):
+    printed = example("02_own_mechanism.py", tmp_path)
+    angles = [float(text) for text in re.findall(r"closed by +(\S+)°", printed)]
+    assert "1 redundant, 1 free" in printed, printed
+    assert len(angles) == 21 and angles == sorted(angles) and angles[-1] > 40, angles
