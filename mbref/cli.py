@@ -69,7 +69,8 @@ def _parser() -> argparse.ArgumentParser:
 
     diagnose = commands.add_parser(
         "diagnose", help="say what a scene is: counts, rank, redundant rows", formatter_class=text,
-        description="Coordinates, rows by joint, rank, redundant rows, degrees of freedom at t = 0.",
+        description="Counts, rank, redundant rows by joint, unique reactions and the distance to a singular\n"
+        "position, at t = 0.",
         epilog="examples:\n  mbref diagnose five_bar\n  mbref diagnose mechanism.toml --json",
     )  # fmt: skip
     diagnose.add_argument("scene", metavar="SCENE", help=scene_help)
@@ -170,18 +171,35 @@ def _rounded(vector: np.ndarray) -> np.ndarray:
 def _diagnose(options: argparse.Namespace) -> int:
     from dataclasses import asdict
 
+    from mbref.diagnose import diagnose
+
     scene = find_scene(options.scene)
-    counts = scene.counts()
+    found = diagnose(scene)
+    counts = found.counts
     if options.json:
-        print(json.dumps({"scene": scene.name, "ground": scene.ground, **asdict(counts)}))
+        print(json.dumps({"scene": scene.name, "ground": scene.ground, **asdict(counts), **_beyond(found)}))
         return 0
-    rows = ", ".join(f"{name} {number}" for name, number in counts.rows_by_joint.items())
     print(
         f"{scene.name} (ground as a {scene.ground})\n"
         f"  coordinates         {counts.coordinates}\n"
-        f"  constraint rows     {counts.rows}   ({rows})\n"
+        f"  constraint rows     {counts.rows}   ({_listed(counts.rows_by_joint)})\n"
         f"  rank                {counts.rank}\n"
         f"  redundant rows      {counts.redundant}\n"
-        f"  degrees of freedom  {counts.degrees_of_freedom}"
+        f"  degrees of freedom  {counts.degrees_of_freedom}\n"
+        f"  rows in redundancy  {_listed(found.redundant_by_joint)}\n"
+        f"  unique reactions    {', '.join(found.unique_reactions) or 'of no joint'}\n"
+        f"  singular values     {found.smallest_singular_value:.3g} to {found.largest_singular_value:.3g}"
+        " (rows of unit length; the smallest is the distance to a singular position)"
     )
     return 0
+
+
+def _beyond(found) -> dict:
+    """The fields of a diagnosis besides its counts, for JSON."""
+    from dataclasses import asdict
+
+    return {key: value for key, value in asdict(found).items() if key != "counts"}
+
+
+def _listed(numbers: dict[str, int]) -> str:
+    return ", ".join(f"{name} {number}" for name, number in numbers.items()) or "none"

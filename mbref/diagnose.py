@@ -1,4 +1,4 @@
-"""What a scene is: coordinates, rows by joint, rank, redundant rows, degrees of freedom."""
+"""What a scene is: counts, rank, redundant rows, which reactions are unique, how far from singular."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from mbref.model import Model
 from mbref.scene import Scene
 
 RANK_TOLERANCE = 1e-10  # relative to the largest singular value of the scaled Jacobian
+UNIQUE_TOLERANCE = 1e-8  # a row takes part in a redundancy when its weight in it exceeds this
 
 
 @dataclass(frozen=True)
@@ -26,11 +27,48 @@ class Counts:
     degrees_of_freedom: int
 
 
+@dataclass(frozen=True)
+class Diagnosis:
+    """Beyond counts, at t = 0."""
+
+    counts: Counts
+    redundant_by_joint: dict[str, int]  # rows that take part in a redundancy; their reactions are not unique
+    unique_reactions: tuple[str, ...]  # joints all of whose rows have a unique multiplier
+    smallest_singular_value: float  # of Φ_q with unit rows, above rank: the distance to a singular position
+    largest_singular_value: float
+
+
 def counts(scene: Scene) -> Counts:
     """Counts of a scene at its corrected initial positions."""
     model = Model(scene)
-    rank = model.m and rank_of(scaled_jacobian(model, 0.0, consistent_start(model).q))
-    return Counts(model.n, model.m, dict(Counter(model.row_joint)), rank, model.m - rank, model.n - rank)
+    return _counts(model, _jacobian_at_start(model))
+
+
+def diagnose(scene: Scene) -> Diagnosis:
+    """Counts, redundancy joint by joint, and the distance to a singular position, at the initial positions.
+
+    A multiplier is unique where its row takes no part in any vanishing combination of rows: a left null
+    vector of Φ_q (Wojtyra, J. Theor. Appl. Mech. 43, 2005).
+    """
+    model = Model(scene)
+    jacobian = _jacobian_at_start(model)
+    found = _counts(model, jacobian)
+    left, values, _ = np.linalg.svd(jacobian)
+    shared = np.linalg.norm(left[:, found.rank :], axis=1) > UNIQUE_TOLERANCE
+    involved = Counter(name for name, part in zip(model.row_joint, shared, strict=True) if part)
+    unique = tuple(name for name in found.rows_by_joint if name not in involved)
+    smallest = float(values[found.rank - 1]) if found.rank else 0.0
+    return Diagnosis(found, dict(involved), unique, smallest, float(values[0]) if values.size else 0.0)
+
+
+def _counts(model: Model, jacobian: np.ndarray) -> Counts:
+    rank = rank_of(jacobian)
+    by_joint = dict(Counter(model.row_joint))
+    return Counts(model.n, model.m, by_joint, rank, model.m - rank, model.n - rank)
+
+
+def _jacobian_at_start(model: Model) -> np.ndarray:
+    return scaled_jacobian(model, 0.0, consistent_start(model).q)
 
 
 def scaled_jacobian(model: Model, t: float, q: np.ndarray) -> np.ndarray:
@@ -42,4 +80,4 @@ def scaled_jacobian(model: Model, t: float, q: np.ndarray) -> np.ndarray:
 def rank_of(matrix: np.ndarray) -> int:
     """Number of singular values above the rank tolerance times the largest."""
     values = np.linalg.svd(matrix, compute_uv=False)
-    return int(np.sum(values > RANK_TOLERANCE * values[0]))
+    return int(np.sum(values > RANK_TOLERANCE * values[0])) if values.size else 0

@@ -122,42 +122,58 @@ def back_substitute(r, n, x):
 
 
 @kernel
-def gram(d, s):
-    """The lower half of D Dᵀ."""
-    m, n = d.shape
+def gram(dt, s):
+    """The upper half of D Dᵀ from Dᵀ (n, m); rows that a column does not touch cost nothing."""
+    n, m = dt.shape
     for i in range(m):
-        for k in range(i + 1):
-            value = 0.0
-            for j in range(n):
-                value += d[i, j] * d[k, j]
-            s[i, k] = value
+        for k in range(i, m):
+            s[i, k] = 0.0
+    for j in range(n):
+        for i in range(m):
+            value = dt[j, i]
+            if value != 0.0:
+                for k in range(i, m):
+                    s[i, k] += value * dt[j, k]
+
+
+@kernel
+def add_product(dt, x, sign, y):
+    """y += sign D x from Dᵀ (n, m)."""
+    n, m = dt.shape
+    for j in range(n):
+        value = sign * x[j]
+        for i in range(m):
+            y[i] += value * dt[j, i]
 
 
 @kernel
 def times_transpose(d, y, x):
-    """x = Dᵀ y."""
+    """x = Dᵀ y from D (m, n)."""
     m, n = d.shape
-    x[:] = 0.0
+    for j in range(n):
+        x[j] = 0.0
     for i in range(m):
+        value = y[i]
         for j in range(n):
-            x[j] += d[i, j] * y[i]
+            x[j] += value * d[i, j]
 
 
 @kernel
 def cholesky_factor(a, n, tolerance):
-    """Cholesky factor of the lower half of a[:n, :n], in place; False where a pivot is ≤ tolerance."""
+    """Uᵀ U of the upper half of a[:n, :n], in place; False where a pivot is ≤ tolerance."""
     for k in range(n):
         if not a[k, k] > tolerance:
             return False
-        a[k, k] = sqrt(a[k, k])
-        inverse = 1.0 / a[k, k]
+        pivot = sqrt(a[k, k])
+        inverse = 1.0 / pivot
+        a[k, k] = pivot
+        for j in range(k + 1, n):
+            a[k, j] *= inverse
         for i in range(k + 1, n):
-            a[i, k] *= inverse
-        for i in range(k + 1, n):
-            factor = a[i, k]
+            factor = a[k, i]
             if factor != 0.0:
-                for j in range(k + 1, i + 1):
-                    a[i, j] -= factor * a[j, k]
+                for j in range(i, n):
+                    a[i, j] -= factor * a[k, j]
     return True
 
 
@@ -165,10 +181,8 @@ def cholesky_factor(a, n, tolerance):
 def cholesky_solve(a, n, b):
     """Solve with the factor of ``cholesky_factor``; b (n,) becomes the solution."""
     for k in range(n):
-        for j in range(k):
-            b[k] -= a[k, j] * b[j]
         b[k] /= a[k, k]
-    for k in range(n - 1, -1, -1):
-        b[k] /= a[k, k]
-        for j in range(k):
-            b[j] -= a[k, j] * b[k]
+        value = b[k]
+        for j in range(k + 1, n):
+            b[j] -= value * a[k, j]
+    back_substitute(a, n, b)

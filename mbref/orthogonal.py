@@ -110,13 +110,15 @@ def equilibrate(jacobian, inverse_root, d, row_scale):
     """D = R Φ_q M^(-1/2) (m, n) with unit rows; R into ``row_scale`` (m,), so that ranks ignore units."""
     m, n = jacobian.shape
     for i in range(m):
-        square = 0.0
+        row_scale[i] = 0.0
+    for j in range(n):
+        for i in range(m):
+            value = jacobian[i, j] * inverse_root[j]
+            row_scale[i] += value * value
+    for i in range(m):
+        row_scale[i] = 1.0 / sqrt(row_scale[i]) if row_scale[i] > 0.0 else 1.0
         for j in range(n):
-            d[i, j] = jacobian[i, j] * inverse_root[j]
-            square += d[i, j] * d[i, j]
-        row_scale[i] = 1.0 / sqrt(square) if square > 0.0 else 1.0
-        for j in range(n):
-            d[i, j] *= row_scale[i]
+            d[i, j] = jacobian[i, j] * inverse_root[j] * row_scale[i]
 
 
 @kernel

@@ -11,6 +11,8 @@ import numpy as np
 from mbref import __version__, rotations
 from mbref.evaluation import evaluate_all
 from mbref.initial import Start, consistent_start, scene_length
+from mbref.kinematics import NAME as KINEMATIC
+from mbref.kinematics import kinematic_analysis, undriven_freedoms
 from mbref.march import (
     DONE,
     PAUSED,
@@ -89,13 +91,16 @@ def simulate(
 ) -> Trajectory:
     """Simulate from t = 0 and sample at ``times`` (k,), increasing, s; ``progress`` is told the time reached.
 
+    The method "kinematic" is the kinematic analysis of ``kinematics``, which integrates nothing.
     Returns the states reached, with accelerations and reactions; a failure of the method is the
     trajectory's outcome.  Raises SceneError for a scene that cannot be simulated, ValueError for times
     that do not increase or an order the integrator does not have, MethodError for an unknown method name.
     """
+    times = checked_times(times)
+    if method == KINEMATIC:
+        return kinematic_analysis(scene, times)
     method = Method.parse(method) if isinstance(method, str) else method
     limits = limits or Limits()
-    times = checked_times(times)
     began = time.process_time()
     run = _Run(scene, method, times, limits)
     built = time.process_time() - began
@@ -138,7 +143,7 @@ class _Run:
     def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
         self.scene, self.method, self.times, self.limits = scene, method, times, limits
         self.model = model = Model(scene)
-        if model.kinematic and scene.counts().degrees_of_freedom > 0:
+        if model.kinematic and undriven_freedoms(scene) > 0:
             raise SceneError(missing_masses(scene))
         self.start = consistent_start(model)
         formulation, stabilisation, integrator = method.parts

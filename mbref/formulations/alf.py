@@ -41,17 +41,17 @@ def changed(before, now):
 
 @kernel
 def augmented(mass, inverse_root, d, alpha, a):
-    """M^(-1/2) (M + Φ_qᵀ α Φ_q) M^(-1/2) from D, its lower half."""
+    """M^(-1/2) (M + Φ_qᵀ α Φ_q) M^(-1/2) from D, its upper half."""
     m, n = d.shape
     for j in range(n):
-        for k in range(j + 1):
+        for k in range(j, n):
             a[j, k] = 0.0
         a[j, j] = mass[j] * inverse_root[j] * inverse_root[j]
     for i in range(m):
         for j in range(n):
             weight = alpha * d[i, j]
             if weight != 0.0:
-                for k in range(j + 1):
+                for k in range(j, n):
                     a[j, k] += weight * d[i, k]
 
 

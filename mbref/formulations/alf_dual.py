@@ -4,7 +4,8 @@
 
 By the Woodbury identity its iterates are those of Eqs. 17 to 19.  But α enters as 1/α beside S instead of
 multiplying Φ_qᵀ Φ_q beside M, so that a large α costs no digits and few iterations are needed; no rank
-is decided.  Regularised rows are those of unit length in the metric of M.
+is decided.  Regularised rows are those of unit length in the metric of M.  Stops when the next change would
+be ≤ epsilon, relative to the larger of 1 and the acceleration, judged by how the changes shrink.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ from __future__ import annotations
 from mbref.compiled import exchangeable
 from mbref.formulations.alf import changed, feedback
 from mbref.formulations.base import Formulation
-from mbref.formulations.moore_penrose import begin
-from mbref.linalg import cholesky_factor, cholesky_solve, gram, times_transpose
+from mbref.formulations.moore_penrose import begin, transpose
+from mbref.linalg import add_product, cholesky_factor, cholesky_solve, gram, times_transpose
 from mbref.tables import ACCELERATE, FACTORISATIONS, FORMULATION_OPTIONS, NOT_CONVERGED, OK, SINGULAR
 
 OPTIONS = {"alpha": 1e10, "epsilon": 1e-12, "iterations": 20.0, "omega": 0.0, "mu": 1.0}
@@ -27,20 +28,22 @@ def accelerate(
     alpha, epsilon = settings[FORMULATION_OPTIONS], settings[FORMULATION_OPTIONS + 1]
     d = scratch[: m * n].reshape((m, n))
     s = scratch[m * n : m * n + m * m].reshape((m, m))
-    start = m * n + m * m
+    dt = scratch[m * n + m * m : 2 * m * n + m * m].reshape((n, m))
+    start = 2 * m * n + m * m
     b, step = scratch[start : start + m], scratch[start + m : start + 2 * m]
     total, x = scratch[start + 2 * m : start + 3 * m], scratch[start + 3 * m : start + 3 * m + n]
     before = scratch[start + 3 * m + n : start + 3 * m + 2 * n]
     if not begin(mass, inverse_root, jacobian, force, rhs, d, b, acceleration, multipliers):
         return SINGULAR
-    gram(d, s)
+    transpose(d, dt)
+    gram(dt, s)
     for i in range(m):
         s[i, i] += 1.0 / alpha
         total[i] = 0.0
     counts[FACTORISATIONS] += 1
     if not cholesky_factor(s, m, 0.0):
         return SINGULAR
-    status = NOT_CONVERGED
+    status, change = NOT_CONVERGED, 0.0
     for _ in range(int(settings[FORMULATION_OPTIONS + 2])):
         step[:] = b
         cholesky_solve(s, m, step)
@@ -50,11 +53,11 @@ def accelerate(
             acceleration[j] += inverse_root[j] * x[j]
         for i in range(m):
             total[i] -= step[i]
-            for j in range(n):
-                b[i] -= d[i, j] * x[j]
-        if changed(before, acceleration) <= epsilon:
+        last, change = change, changed(before, acceleration)
+        if change <= epsilon or (last > 0.0 and change * change <= epsilon * last):
             status = OK
             break
+        add_product(dt, x, -1.0, b)
     for i in range(m):
         multipliers[i] *= total[i]
     return status
@@ -64,7 +67,7 @@ ALF_DUAL = Formulation(
     name="alf-dual",
     equations="Eqs. 17-19 in the multipliers",
     accelerate=accelerate,
-    scratch=lambda m, n: m * n + m * m + 3 * m + 2 * n,
+    scratch=lambda m, n: 2 * m * n + m * m + 3 * m + 2 * n,
     handles_redundancy=True,
     handles_singular_mass=False,
     iterative=True,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from mbref.compiled import exchangeable
 from mbref.formulations.base import Formulation
-from mbref.formulations.moore_penrose import begin, finish
+from mbref.formulations.moore_penrose import begin, finish, transpose
 from mbref.linalg import cholesky_factor, cholesky_solve, gram, times_transpose
 from mbref.tables import ACCELERATE, FACTORISATIONS, OK, SINGULAR
 
@@ -21,11 +21,13 @@ def accelerate(
     m, n = jacobian.shape
     d = scratch[: m * n].reshape((m, n))
     s = scratch[m * n : m * n + m * m].reshape((m, m))
-    start = m * n + m * m
+    dt = scratch[m * n + m * m : 2 * m * n + m * m].reshape((n, m))
+    start = 2 * m * n + m * m
     b, x = scratch[start : start + m], scratch[start + m : start + m + n]
     if not begin(mass, inverse_root, jacobian, force, rhs, d, b, acceleration, multipliers):
         return SINGULAR
-    gram(d, s)
+    transpose(d, dt)
+    gram(dt, s)
     counts[FACTORISATIONS] += 1
     if not cholesky_factor(s, m, SINGULAR_PIVOT):
         return SINGULAR
@@ -39,7 +41,7 @@ LM2 = Formulation(
     name="lm2",
     equations="Eqs. 6-8",
     accelerate=accelerate,
-    scratch=lambda m, n: m * n + m * m + m + n,
+    scratch=lambda m, n: 2 * m * n + m * m + m + n,
     handles_redundancy=False,
     handles_singular_mass=False,
 )

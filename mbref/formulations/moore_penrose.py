@@ -22,10 +22,21 @@ def begin(mass, inverse_root, jacobian, force, rhs, d, b, acceleration, row_scal
         acceleration[j] = force[j] / mass[j]
     for i in range(m):
         b[i] = rhs[i]
-        for j in range(n):
+    for j in range(n):
+        for i in range(m):
             b[i] -= jacobian[i, j] * acceleration[j]
+    for i in range(m):
         b[i] *= row_scale[i]
     return True
+
+
+@kernel
+def transpose(d, dt):
+    """dt (n, m) := Dᵀ."""
+    m, n = d.shape
+    for j in range(n):
+        for i in range(m):
+            dt[j, i] = d[i, j]
 
 
 @kernel

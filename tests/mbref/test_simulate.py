@@ -116,7 +116,8 @@ def test_drivers_without_masses_follow_their_function(method):
     scene = Scene(
         name="arm", body=(Body(name="arm", position=(0.5, 0, 0)), Body(name="block", position=(1, 0, 0))),
         joint=(hinge, slide),
-        driver=(Driver(joint="H", polynomial=(0.0, 1.0, 0.5), sine=sine), Driver(joint="S", polynomial=(0, 2.0))),
+        driver=(Driver(joint="H", polynomial=(0.0, 1.0, 0.5), sine=sine),
+                Driver(joint="S", polynomial=(0, 2.0))),
     )  # fmt: skip
     t = np.linspace(0, 1, 5)
     angle, reach = t + 0.5 * t**2 + 0.5 * np.sin(3 * t), 1 + 2 * t
