@@ -1,4 +1,4 @@
-"""What `crosscheck list` prints: the tables of scenes, engines, methods and metrics."""
+"""What `crosscheck list` prints: the tables of scenes, engines, methods, metrics and support."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping
 from rich.console import Console
 from rich.table import Table
 
-from crosscheck.engine import engine, engine_names
+from crosscheck import support
+from crosscheck.engine import default_engines, engine, engine_names
 from crosscheck.request import missing_package
 from mbref.scene import Scene
 from mbref.scenes import SCENES
@@ -67,9 +68,21 @@ def _metrics() -> Table:
     return table
 
 
+def _support() -> Table:
+    engines = default_engines()
+    found = support.of_features(engines) | support.of_scenes(engines)
+    notes = found.notes()
+    table = Table("feature or scene", *engines, title="support: ✓ can, – cannot", caption_justify="left")
+    for name in found.answers:
+        table.add_row(name, *found.row(name, notes))
+    table.caption = "\n".join(f"{i}. {note}" for i, note in enumerate(notes, 1))
+    return table
+
+
 TABLES: Mapping[str, Callable[[], Table]] = {
     "scenes": _scenes,
     "engines": _engines,
     "methods": _methods,
     "metrics": _metrics,
+    "support": _support,
 }

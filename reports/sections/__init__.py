@@ -6,7 +6,17 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 
 from reports.blocks import Block, Heading
 from reports.runs import SceneRuns
-from reports.sections import convergence, energy, mechanism, outcomes, provenance, speed, summary, violation
+from reports.sections import (
+    convergence,
+    energy,
+    mechanism,
+    outcomes,
+    provenance,
+    speed,
+    summary,
+    support,
+    violation,
+)
 
 Chapter = Callable[[Sequence[SceneRuns]], list[Block]]
 Part = Callable[[SceneRuns], list[Block]]
@@ -19,7 +29,11 @@ OF_A_SCENE: Mapping[str, Part] = {
     "energy": energy.render,
     "outcomes": outcomes.render,
 }
-CLOSING: Mapping[str, Chapter] = {"convergence": convergence.render, "provenance": provenance.render}
+CLOSING: Mapping[str, Chapter] = {
+    "convergence": convergence.render,
+    "support": support.render,
+    "provenance": provenance.render,
+}
 NAMES = (*OPENING, *OF_A_SCENE, *CLOSING)
 
 

@@ -1,0 +1,25 @@
+"""Which engines of the study can do what: features × engines, from what the engines say, not from runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from crosscheck import support
+from crosscheck.engine import engine_names
+from reports.blocks import Block, Heading, Table, Text
+from reports.runs import SceneRuns
+
+CAPTION = "✓: can; –: cannot, for the reason of that number below."
+
+
+def render(groups: Sequence[SceneRuns]) -> list[Block]:
+    """The support matrix of the engines that have records and are known here; nothing is simulated."""
+    ran = dict.fromkeys(run.curve[0] for group in groups for run in group.runs)
+    engines = [name for name in ran if name in engine_names()]
+    if not engines:
+        return []
+    found = support.of_features(engines)
+    notes = found.notes()
+    rows = [(name, *found.row(name, notes)) for name in found.answers]
+    sentences = [Text(f"{i}. {note}.") for i, note in enumerate(notes, 1)]
+    return [Heading("What the engines can do", 2), Table(CAPTION, ("Feature", *engines), rows), *sentences]

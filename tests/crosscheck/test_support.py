@@ -1,0 +1,66 @@
+"""Support matrix: what engines say / the README's block, the suite's probes, and what they then do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crosscheck import support
+from crosscheck.conformance.features import JOINTS, LOADS, feature_scenes
+from crosscheck.engine import BUILT_IN, Cannot, Why, engine
+from crosscheck.kinematics import initial_poses, jacobian
+from mbref.scene import DRIVEN, Joint, Load, Scene
+from mbref.trajectory import Outcome
+
+README = Path(__file__).parents[2] / "README.md"
+
+
+def test_readme_and_generated_block():
+    block = support.block_of(README.read_text())
+    assert block == support.markdown(support.KNOWN), (
+        "README's support matrix is stale: python -m crosscheck.support README.md renews it"
+    )
+
+
+def test_probes_and_the_kinds_a_scene_may_have():
+    def kinds(union) -> set[str]:
+        return {kind.model_fields["type"].default for kind in union.__args__[0].__args__}
+
+    assert set(JOINTS) == kinds(Joint), set(JOINTS) ^ kinds(Joint)
+    assert set(LOADS) == kinds(Load), set(LOADS) ^ kinds(Load)
+    scenes = feature_scenes()
+    assert {f"{kind} driver" for kind in DRIVEN} <= set(scenes), list(scenes)
+    for name, count in {"loop": 0, "redundant loop": 1, "several loops": 5}.items():
+        rows, _ = jacobian(scenes[name], 0.0, *initial_poses(scenes[name]))
+        redundant = len(rows) - np.linalg.matrix_rank(rows, rtol=1e-9)
+        assert (redundant > 0) == (count > 0), f"{name}: {redundant} redundant rows"
+
+
+@pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
+def test_support_and_a_short_run(name):
+    """What is said to work runs: the probe over a hundredth of its time."""
+    engine_here = engine(name)
+    for feature, scene in feature_scenes().items():
+        if engine_here.cannot(scene) is None:
+            setting = engine_here.settings(scene)[-1]
+            run = engine_here.run(scene, np.array([0.0, scene.duration / 100]), setting)
+            assert run.outcome is Outcome.COMPLETED, f"{feature} at {setting}: {run.outcome} {run.message}"
+
+
+def test_gaps_and_their_sentences():
+    def ask(name: str, scene: Scene) -> Cannot | None:
+        return Cannot(Why.UPSTREAM, f"no {scene.joint[0].type}") if name == "b" and scene.joint else None
+
+    found = support.of_features(["a", "b"], ask)
+    notes = found.notes()
+    assert found.row("free body", notes) == ["✓", "✓"], found.row("free body", notes)
+    assert found.row("fixed joint", notes) == ["✓", "– 1"], found.row("fixed joint", notes)
+    assert notes[0] == "b: no fixed (waits for the engine)", notes
+    assert len(notes) == len(set(notes)), notes
+
+
+def test_every_built_in_engine_and_refusal_of_undetermined_motion():
+    found = support.of_features(BUILT_IN).answers["motion without masses"]
+    assert all(isinstance(gap, Cannot) for gap in found.values()), found
