@@ -1,4 +1,4 @@
-"""The stabilised equations of motion of a scene as a residual F(t, y, y') of index 1, and its iteration matrix."""
+"""The stabilised equations of motion of a scene as a residual of index 1, and its iteration matrix."""
 
 from __future__ import annotations
 

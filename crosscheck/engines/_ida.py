@@ -1,4 +1,4 @@
-"""One run of IDA on a scene's equations: choice of rows, start and restart, stepping, and what is read out."""
+"""One run of IDA on a scene's equations: choice of rows, start and restart, stepping, reading out."""
 
 from __future__ import annotations
 

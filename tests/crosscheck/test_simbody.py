@@ -1,0 +1,141 @@
+"""Simbody / truths, Pinocchio, prescribed motion, and what OpenSim cannot."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Setting, Why, engine
+from crosscheck.kinematics import closure, joint_coordinates
+from crosscheck.truth import truth_for
+from mbref import rotations
+from mbref.scene import Driver, Scene, Sine
+from mbref.scenes import SCENES
+from mbref.trajectory import Outcome, Trajectory
+from tests.crosscheck.tree_scenes import BODIES, every_joint, ring
+
+pytest.importorskip("opensim", reason="the optional engine Simbody needs opensim")
+
+PAPER = {  # scene: duration (s)
+    "planar_slider_crank": 0.2,
+    "planar_slider_crank_gravity": 1.0,
+    "spatial_slider_crank": 0.02,
+    "spatial_slider_crank_driven": 0.1,
+    "spatial_slider_crank_gravity": 0.5,
+    "four_bar": 0.012,
+    "five_bar": 0.012,
+    "four_bar_gravity": 0.15,
+    "five_bar_gravity": 0.15,
+}
+FAMILIES = ("merson", "feldberg", "cpodes")
+
+
+def error(run: Trajectory, scene: Scene) -> float:
+    """Largest error of a position (m) or an orientation (rad)."""
+    truth = truth_for(scene).poses(run.times)
+    turned = rotations.angle_between(run.orientation, truth.orientation).max()
+    return max(abs(run.position - truth.position).max(), turned)
+
+
+def simulate(
+    scene: Scene, duration: float, accuracy: float, family: str = "merson", samples: int = 6
+) -> Trajectory:
+    setting = Setting(family, {"accuracy": accuracy})
+    return engine("simbody").run(scene, np.linspace(0, duration, samples), setting)
+
+
+@pytest.mark.parametrize("name", PAPER)
+def test_simbody_and_truth(name: str) -> None:
+    scene = SCENES[name]()
+    run = simulate(scene, PAPER[name], 1e-9)
+    assert run.outcome is Outcome.COMPLETED, f"{name}: {run.outcome.label} {run.message}"
+    assert error(run, scene) < 1e-6, f"{name}: {error(run, scene):.2e} from the truth"
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_finer_accuracies_and_smaller_errors(family: str) -> None:
+    scene = SCENES["spatial_slider_crank"]()
+    errors = [error(simulate(scene, 0.02, accuracy, family), scene) for accuracy in (1e-4, 1e-6, 1e-8)]
+    assert errors[1] < errors[0] / 5 and errors[2] < errors[1] / 5, f"{family}: errors {errors}"
+
+
+@pytest.mark.parametrize("scene", [every_joint(), *map(ring, ("revolute", "cylindrical", "universal",
+                         "spherical"))], ids=lambda scene: scene.name)  # fmt: skip
+def test_simbody_and_pinocchio_move_alike(scene: Scene) -> None:
+    """Every joint and load; loops cut at joints of every kind; joint reactions where they are unique."""
+    pytest.importorskip("pinocchio")
+    run = simulate(scene, scene.duration, 1e-10, samples=4)
+    other = engine("pinocchio").run(scene, run.times, Setting("tuned", {"rtol": 1e-11, "min_step": 1e-4}))
+    assert run.outcome is other.outcome is Outcome.COMPLETED, (run.message, other.message)
+    for field in ("position", "velocity", "angular_velocity", "acceleration", "angular_acceleration"):
+        ours, theirs = getattr(run, field), getattr(other, field)
+        gap = abs(ours - theirs).max() / max(1.0, abs(theirs).max())
+        assert gap < 1e-7, f"{scene.name}: {field} differs by {gap:.2e}"
+    if not scene.counts().redundant:
+        for joint, wrench in other.reactions.items():
+            gap = abs(run.reactions[joint] - wrench).max() / abs(wrench).max()
+            assert gap < 1e-6, f"reaction in {joint}: relative difference {gap:.2e}"
+
+
+def prescribed(*drivers: Driver) -> Scene:
+    still = tuple(b.model_copy(update={"angular_velocity": None}) for b in BODIES)
+    return every_joint(name="prescribed", body=still, driver=drivers)
+
+
+def test_drivers_and_the_motion_they_prescribe() -> None:
+    """A polynomial and a sine, of a cylindrical and a translational joint."""
+    pytest.importorskip("pinocchio")
+    scene = prescribed(
+        Driver(joint="cyl", polynomial=(0.0, 1.0, -2.0, 3.0)),
+        Driver(joint="tra", polynomial=(-0.05 * np.sin(0.4),),
+               sine=Sine(amplitude=0.05, frequency=7.0, phase=0.4)),
+    )  # fmt: skip
+    run = simulate(scene, 0.4, 1e-10)
+    moved = joint_coordinates(scene, run.times, run.position, run.orientation, run.angular_velocity)
+    t = run.times
+    gaps = (abs(moved["cyl"][:, 0] - (t - 2 * t**2 + 3 * t**3)).max(),
+            abs(moved["tra"][:, 1] - 0.05 * (np.sin(7 * t + 0.4) - np.sin(0.4))).max())  # fmt: skip
+    assert max(gaps) < 1e-9, f"off by {gaps} rad, m"
+    other = engine("pinocchio").run(scene, t, Setting("tuned", {"rtol": 1e-11, "min_step": 1e-4}))
+    gap = abs(run.acceleration - other.acceleration).max()
+    assert gap < 1e-5, f"accelerations differ from Pinocchio's by {gap:.1e} m/s²"
+
+
+def test_joints_stay_closed_at_every_sample() -> None:
+    scene = every_joint()
+    run = simulate(scene, scene.duration, 1e-6)
+    gap = max(abs(rows).max() for rows in closure(scene, run.times, run.position, run.orientation).values())
+    assert gap < 1e-6, f"joints are open by {gap:.1e} m, rad"
+
+
+def test_a_polynomial_with_a_sine_is_refused() -> None:
+    sine = Sine(amplitude=0.1, frequency=3.0)
+    scene = prescribed(Driver(joint="cyl", polynomial=(0.0, 1.0), sine=sine))
+    refusal = engine("simbody").cannot(scene)
+    assert refusal is not None and refusal.why is Why.UPSTREAM and "cyl" in refusal.reason, refusal
+
+
+def test_a_singular_position_and_the_end_of_an_accurate_run() -> None:
+    """Reported as the outcome with the states before it; θ = -π is reached at 0.0378 s."""
+    scene = SCENES["planar_slider_crank_equal"]()
+    run = simulate(scene, 0.2, 1e-10, samples=41)
+    assert run.outcome is Outcome.STEP_FAILED or error(run, scene) > 1e-3, "nothing happened"
+    before = run.times < 0.06  # the crank is at right angles to the line at 0.0612 s
+    truth = truth_for(scene).poses(run.times[before])
+    gap = abs(run.position[before] - truth.position).max()
+    assert gap < 1e-6, f"before the singular position: {gap:.1e} m from the truth"
+
+
+def test_the_same_motion_with_and_without_masses() -> None:
+    base = SCENES["spatial_slider_crank_driven"]()
+    bare = base.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in base.body))
+    runs = [simulate(scene, 0.05, 1e-9) for scene in (base, bare)]
+    gap = abs(runs[0].position - runs[1].position).max()
+    assert gap < 1e-7, f"positions with and without masses differ by {gap:.1e} m"
+    assert runs[1].reactions is None, "reactions without masses"
+    assert engine("simbody").cannot(bare.with_(driver=())) is not None, "free motion without masses"
+
+
+def test_an_unknown_family_is_refused() -> None:
+    with pytest.raises(ValueError, match="no family 'best'"):
+        simulate(SCENES["four_bar"](), 0.1, 1e-6, "best")
