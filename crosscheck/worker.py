@@ -76,6 +76,7 @@ def failed(
 
 
 def main(folder: Path) -> None:
+    """Do the job in the folder: call its function, leave the result or the failure's sentence beside it."""
     function, arguments, last_resort = pickle.loads((folder / "job").read_bytes())
     faulthandler.dump_traceback_later(last_resort, exit=True)
     try:

@@ -45,6 +45,7 @@ def joint_frame(joint: Joint) -> np.ndarray:
 
 
 def unit(vector: np.ndarray | tuple[float, ...]) -> np.ndarray:
+    """v / |v|."""
     return np.asarray(vector, dtype=float) / np.linalg.norm(vector)
 
 

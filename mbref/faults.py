@@ -1,0 +1,194 @@
+"""What is wrong with a scene: one message per fault, under the path of the field."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+GROUND = "ground"
+DRIVEN = ("revolute", "cylindrical", "translational")  # joints a driver can move
+TURNING = ("revolute", "cylindrical")  # joints a torsion spring can act on
+INERTIA_TOLERANCE = 1e-9  # relative; discs and thin rods meet the triangle inequality with equality
+
+
+class SceneError(Exception):
+    """A scene that cannot be used; ``faults`` has one ``path: message`` per fault."""
+
+    def __init__(self, faults: Sequence[str]):
+        self.faults = list(faults)
+        super().__init__("\n".join(self.faults))
+
+
+def checked_inertia(value: Any) -> tuple[Any, ...]:
+    """Three principal moments or a symmetric 3x3, as tuples; ValueError says what is unphysical."""
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError("must be three numbers or a 3x3 matrix") from None
+    if array.shape not in ((3,), (3, 3)):
+        raise ValueError(f"must be three numbers or a 3x3 matrix, got shape {array.shape}")
+    if not np.isfinite(array).all():
+        raise ValueError("must be finite")
+    matrix = np.diag(array) if array.ndim == 1 else array
+    tolerance = INERTIA_TOLERANCE * max(abs(matrix).max(), 1e-300)
+    if abs(matrix - matrix.T).max() > tolerance:
+        raise ValueError("must be symmetric")
+    moments = np.linalg.eigvalsh(matrix)
+    if moments[0] < -tolerance:
+        raise ValueError(f"must have no negative principal moment, got {moments[0]:.6g}")
+    if moments[2] > moments[0] + moments[1] + tolerance:
+        raise ValueError(
+            f"violates the triangle inequality: {moments[2]:.6g} > {moments[0]:.6g} + {moments[1]:.6g}"
+        )
+    return tuple(array.tolist()) if array.ndim == 1 else tuple(map(tuple, array.tolist()))
+
+
+def field_faults(error: ValidationError) -> Iterator[tuple[str, str]]:
+    """(path, message) of every fault pydantic found, in the words of the file."""
+    for fault in error.errors(include_url=False):
+        kind, got = fault["type"], fault["input"]
+        limit = fault.get("ctx", {})
+        messages = {
+            "missing": "is required",
+            "extra_forbidden": "is not a known field",
+            "greater_than": f"must be positive, got {got!r}",
+            "greater_than_equal": f"must not be negative, got {got!r}",
+            "finite_number": f"must be finite, got {got!r}",
+            "float_type": f"must be a number, got {got!r}",
+            "string_type": f"must be a string, got {got!r}",
+            "string_too_short": "must not be empty",
+            "too_short": "must not be empty",
+            "tuple_type": f"must be a list, got {got!r}",
+            "union_tag_not_found": "is required",
+            "union_tag_invalid": f"must be one of {limit.get('expected_tags')}, got {limit.get('tag')!r}",
+            "literal_error": f"must be {limit.get('expected')}, got {got!r}",
+            "model_type": "must be a table",
+            "model_attributes_type": "must be a table",
+            "value_error": str(limit.get("error", "")),
+        }
+        default = f"{fault['msg'][0].lower()}{fault['msg'][1:]}, got {got!r}"
+        if kind == "too_short" and got:
+            continue  # entries are there, but faulty ones were left out
+        path = _path(fault["loc"]) + (".type" if kind.startswith("union_tag") else "")
+        yield path, messages.get(kind, default)
+
+
+def _path(location: Sequence[str | int]) -> str:
+    """body[2].mass; the tag that a union of joint or load types adds to a location is dropped."""
+    parts = list(location)
+    if len(parts) > 2 and parts[0] in ("joint", "load") and isinstance(parts[2], str):
+        del parts[2]
+    text = ""
+    for part in parts:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return text or "scene"
+
+
+def _get(entry: Any, key: str) -> Any:
+    """A field of an entry that may still be a raw table, or already a model."""
+    return entry.get(key) if isinstance(entry, Mapping) else getattr(entry, key, None)
+
+
+def _entries(data: Mapping[str, Any], key: str) -> list[Any]:
+    value = data.get(key, ())
+    return list(value) if isinstance(value, list | tuple) else []
+
+
+def _names(entries: Sequence[Any]) -> list[str]:
+    return [name if isinstance(name := _get(entry, "name"), str) else "" for entry in entries]
+
+
+def reference_faults(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Faults between entries: duplicate names, unknown bodies and joints, drivers of the wrong joint.
+
+    Works on raw tables, so that these are found beside the faults of single fields.
+    """
+    bodies, joints = _entries(data, "body"), _entries(data, "joint")
+    yield from _duplicates("body", _names(bodies), reserved=(GROUND,))
+    yield from _duplicates("joint", _names(joints))
+    for i, body in enumerate(bodies):
+        mass, inertia = _get(body, "mass"), _get(body, "inertia")
+        if (mass is None) != (inertia is None):
+            missing = "inertia" if inertia is None else "mass"
+            yield (
+                f"body[{i}].{missing}",
+                "is missing; give mass and inertia, or neither (kinematics)",
+            )
+    known = {*_names(bodies), GROUND}
+    for i, joint in enumerate(joints):
+        yield from _pair_faults(f"joint[{i}].bodies", _get(joint, "bodies"), known)
+    types = dict(zip(_names(joints), (_get(joint, "type") for joint in joints), strict=True))
+    driven: set[str] = set()
+    for i, driver in enumerate(_entries(data, "driver")):
+        name = _get(driver, "joint")
+        yield from _joint_faults(f"driver[{i}].joint", name, types, DRIVEN, "be driven")
+        if name in driven:
+            yield f"driver[{i}].joint", f"{name!r} already has a driver"
+        driven.add(name if isinstance(name, str) else "")
+        if start := _initial_value(driver):
+            message = f"value(0) must be 0 (it is measured from the initial position), got {start:g}"
+            yield f"driver[{i}].polynomial", message
+    for i, load in enumerate(_entries(data, "load")):
+        kind = _get(load, "type")
+        if kind in ("moment", "force"):
+            name = _get(load, "body")
+            if name == GROUND:
+                yield f"load[{i}].body", "the ground cannot be loaded"
+            elif isinstance(name, str) and name not in known:
+                yield f"load[{i}].body", _unknown("body", name, known - {GROUND})
+        elif kind == "spring":
+            yield from _pair_faults(f"load[{i}].bodies", _get(load, "bodies"), known)
+        elif kind == "torsion_spring":
+            name = _get(load, "joint")
+            yield from _joint_faults(f"load[{i}].joint", name, types, TURNING, "carry a torsion spring")
+
+
+def _initial_value(driver: Any) -> float:
+    """value(0) of a driver; 0 where rounding or where its fields are themselves faulty."""
+    polynomial, sine = _get(driver, "polynomial") or (0.0,), _get(driver, "sine")
+    terms = [polynomial[0] if isinstance(polynomial, list | tuple) else 0.0]
+    if sine is not None:
+        amplitude, phase = _get(sine, "amplitude") or 0.0, _get(sine, "phase") or 0.0
+        if isinstance(amplitude, int | float) and isinstance(phase, int | float):
+            terms.append(amplitude * math.sin(phase))
+    if not all(isinstance(term, int | float) for term in terms):
+        return 0.0
+    start = float(sum(terms))
+    return start if abs(start) > 1e-12 else 0.0
+
+
+def _duplicates(key: str, names: Sequence[str], reserved: Sequence[str] = ()) -> Iterator[tuple[str, str]]:
+    for i, name in enumerate(names):
+        if name in reserved:
+            yield f"{key}[{i}].name", f"{name!r} is reserved for the fixed frame"
+        elif name and name in names[:i]:
+            yield f"{key}[{i}].name", f"{name!r} is already the name of {key}[{names.index(name)}]"
+
+
+def _unknown(what: str, name: str, known: Sequence[str] | set[str]) -> str:
+    return f"unknown {what} {name!r}; known: {', '.join(sorted(filter(None, known))) or 'none'}"
+
+
+def _pair_faults(path: str, pair: Any, known: set[str]) -> Iterator[tuple[str, str]]:
+    if not isinstance(pair, list | tuple) or len(pair) != 2:
+        return  # reported as a field fault
+    for k, name in enumerate(pair):
+        if isinstance(name, str) and name and name not in known:
+            yield f"{path}[{k}]", _unknown("body", name, known)
+    if pair[0] == pair[1]:
+        yield path, f"must be two different bodies, got {pair[0]!r} twice"
+
+
+def _joint_faults(
+    path: str, name: Any, types: Mapping[str, Any], allowed: Sequence[str], what: str
+) -> Iterator[tuple[str, str]]:
+    if not isinstance(name, str) or not name:
+        return  # reported as a field fault
+    if name not in types:
+        yield path, _unknown("joint", name, list(types))
+    elif types[name] not in allowed:
+        yield path, f"{name!r} is {types[name]}; only {', '.join(allowed)} joints can {what}"
