@@ -24,6 +24,7 @@ from mbref.tables import (
     CROSSINGS,
     DENSE,
     FIXED_STEP,
+    FORCED_STEP,
     FRAMES,
     LARGEST_STEP,
     LARGEST_TURN,
@@ -237,7 +238,7 @@ def advance(
     """One accepted step towards the target time, as many attempts as it takes."""
     t, size, interval = clock[TIME], pivots[SIZES, 1], target - clock[TIME]
     limit = min(largest_step(control, work), to_edge(history, counts[STEPS]))
-    suggested = min(suggested, limit)
+    suggested = min(max(suggested, control[FORCED_STEP]), limit)
     while True:
         if control[FIXED_STEP] > 0.0:
             h = interval / max(1.0, -(-(interval / control[FIXED_STEP] - 1e-6) // 1.0))
@@ -249,6 +250,8 @@ def advance(
         )  # fmt: skip
         now = target if h == interval else t + h
         status = OK if ratio >= 0.0 else (int(-ratio) if ratio < 0.0 else NOT_FINITE)
+        if status == OK and h <= control[FORCED_STEP]:
+            ratio = min(ratio, 1.0)
         if status == OK and ratio <= 1.0:
             status = accept(now, y_new, ints, floats, work, pivots, settings, counts)
             if status == OK or status == CHANGED:  # noqa: SIM109 - no containers in kernels
@@ -263,5 +266,7 @@ def advance(
             return status
         verdict = ratio if status == OK else -float(status)
         suggested = propose(h, suggested, verdict, y[:size], y_rate[:size], memory, control, tolerances)
+        if status == OK:
+            suggested = max(suggested, control[FORCED_STEP])
         if suggested < control[SMALLEST_STEP]:
             return STEP_TOO_SMALL if status == OK else status

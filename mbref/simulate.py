@@ -34,6 +34,7 @@ from mbref.tables import (
     EVALUATIONS,
     FACTORISATIONS,
     FIXED_STEP,
+    FORCED_STEP,
     LARGEST_STEP,
     LARGEST_TURN,
     MOST_STEPS,
@@ -77,6 +78,7 @@ class Limits:
     rank_tolerance: float = 1e-10  # relative; a singular value or pivot below it counts as zero
     violation: float = 3e-3  # largest |Φ| tolerated (m or rad), times the scene's length where over 1 m
     smallest_step: float = 0.0  # s; 0 means a million-millionth of the duration
+    forced_step: float = 0.0  # s; a step this short is taken whatever its error estimate; 0: none
     largest_step: float = 0.0  # s; 0 means the duration
     largest_turn: float = 1.0  # rad that the fastest body may turn in an adaptive step
     most_steps: int = 5_000_000
@@ -167,11 +169,12 @@ class _Run:
     def _control(self) -> np.ndarray:
         limits, integrator = self.limits, self.method.integrator
         span = float(self.times[-1]) or 1.0
-        control = np.zeros(8)
+        control = np.zeros(9)
         options = self.method.options_of(integrator)
         control[ORDER] = integrator.highest_order(options)
         control[FIXED_STEP] = 0.0 if integrator.adaptive else options["step"]
         control[SMALLEST_STEP] = limits.smallest_step or 1e-12 * span
+        control[FORCED_STEP] = limits.forced_step
         control[LARGEST_STEP] = limits.largest_step or span
         control[LARGEST_TURN] = limits.largest_turn
         control[VIOLATION] = limits.violation * max(1.0, scene_length(self.model))

@@ -48,7 +48,10 @@ POINT, DOT1, DOT2, DISTANCE = range(4)  # kinds of primitives
 MOMENT, FORCE_AT_POINT, SPRING, TORSION_SPRING = range(4)  # kinds of loads
 
 # control, an array of floats: what the loop is to keep to
-ORDER, FIXED_STEP, SMALLEST_STEP, LARGEST_STEP, LARGEST_TURN, VIOLATION, MOST_STEPS, STEPS_PER_CALL = range(8)
+(
+    ORDER, FIXED_STEP, SMALLEST_STEP, LARGEST_STEP, LARGEST_TURN, VIOLATION, MOST_STEPS, STEPS_PER_CALL,
+    FORCED_STEP,
+) = range(9)  # fmt: skip
 
 # counts, an array of integers that kernels add to
 STEPS, REJECTED, EVALUATIONS, FACTORISATIONS, NEWTON, CROSSINGS = range(6)
