@@ -21,6 +21,7 @@ from mbref.trajectory import Outcome
 
 COMPLETED, OTHERWISE, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 REPEATS = 5
+COMPARED_SAMPLES = 11  # few, because adaptive integrators end a step at every sample time
 PIPED_WIDTH = 180  # characters of a line
 
 
@@ -64,6 +65,8 @@ def _run(arguments: argparse.Namespace) -> int:
 def _compare(arguments: argparse.Namespace) -> int:
     if arguments.repeats < REPEATS:
         raise RequestError(f"--repeats: must be at least {REPEATS}, got {arguments.repeats}")
+    if arguments.times is None and arguments.samples is None:
+        arguments.samples = COMPARED_SAMPLES
     cases = _cases(arguments)
     refused = _refused(cases)
     records = _study(cases, [])

@@ -11,7 +11,8 @@ import numpy as np
 from crosscheck import mates
 from crosscheck.tolerances import CONTRADICTION, RANK
 from mbref import rotations
-from mbref.scene import DRIVEN, Scene, SceneError
+from mbref.faults import DRIVEN
+from mbref.scene import Scene, SceneError
 
 Residuals = dict[str, np.ndarray]
 

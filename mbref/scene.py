@@ -27,7 +27,6 @@ from pydantic import (
     model_validator,
 )
 
-from mbref.faults import DRIVEN as DRIVEN
 from mbref.faults import GROUND, SceneError, checked_inertia, field_faults, reference_faults
 
 if TYPE_CHECKING:
