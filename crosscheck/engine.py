@@ -86,7 +86,7 @@ class Engine(ABC):
 
 
 BUILT_IN = ("mbref", "mujoco", "pinocchio", "exudyn")
-OPTIONAL = ("simbody", "sundials")  # take part where their packages are installed
+OPTIONAL = ("simbody", "sundials", "ondsel")  # take part where their packages are installed
 ENTRY_POINTS = "crosscheck.engines"
 
 

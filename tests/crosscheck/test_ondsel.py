@@ -1,0 +1,186 @@
+"""OndselSolver / truths, Pinocchio, and what it does not offer."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Setting, Why, engine
+from crosscheck.truth import truth_for
+from mbref import rotations
+from mbref.scene import (
+    Body,
+    Cylindrical,
+    Distance,
+    Driver,
+    Fixed,
+    Moment,
+    Revolute,
+    Scene,
+    Sine,
+    Spherical,
+    Translational,
+    Universal,
+)  # fmt: skip
+from mbref.scenes import SCENES
+from mbref.trajectory import Outcome, Trajectory
+from tests.crosscheck.tree_scenes import INERTIA
+
+pytest.importorskip("pyondsel", reason="the optional engine OndselSolver needs pyondsel")
+
+DRIVEN = ("four_bar", "four_bar_quarter", "five_bar", "spatial_slider_crank_driven")
+
+
+def simulate(scene: Scene, times: np.ndarray, step: float) -> Trajectory:
+    return engine("ondsel").run(scene, times, Setting("kinematics", {"step": step}))
+
+
+def error(run: Trajectory, scene: Scene) -> float:
+    """Largest error of a position (m) or an orientation (rad)."""
+    truth = truth_for(scene).poses(run.times)
+    turned = rotations.angle_between(run.orientation, truth.orientation).max()
+    return max(abs(run.position - truth.position).max(), turned)
+
+
+@pytest.mark.parametrize("name", DRIVEN)
+def test_ondsel_and_truth(name: str) -> None:
+    """Through every singular position of the duration: redundant rows are removed, the branch is kept."""
+    scene = SCENES[name]()
+    run = simulate(scene, np.linspace(0, scene.duration, 41), scene.duration / 400)
+    truth = truth_for(scene).poses(run.times)
+    assert run.outcome is Outcome.COMPLETED, f"{name}: {run.outcome.label} {run.message}"
+    assert error(run, scene) < 1e-9, f"{name}: {error(run, scene):.2e} from the truth"
+    centripetal = abs(truth.angular_velocity).max() ** 2  # the size of what cancels in ω' of a steady crank
+    for field, size in (("velocity", 0.0), ("angular_velocity", 0.0), ("acceleration", 0.0),
+                        ("angular_acceleration", centripetal)):  # fmt: skip
+        exact = getattr(truth, field)
+        gap = abs(getattr(run, field) - exact).max() / max(size, abs(exact).max())
+        assert gap < 1e-8, f"{name}: {field} is {gap:.1e} of the largest from the truth"
+
+
+def test_uneven_samples_and_even_samples() -> None:
+    """Every change of spacing is a new analysis, from the pose reached and turns later."""
+    scene = SCENES["four_bar"]()
+    times = np.array([0.003, 0.004, 0.011, 0.02, 0.03, 0.057, 0.0999])
+    run = simulate(scene, times, 5e-4)
+    assert run.outcome is Outcome.COMPLETED and np.array_equal(run.times, times), run.message
+    assert error(run, scene) < 1e-9, f"{error(run, scene):.2e} from the truth"
+
+
+def body(name: str, position: tuple, turned: tuple) -> Body:
+    q = tuple(rotations.from_vector(np.array(turned)).tolist())
+    return Body(name=name, mass=1.5, inertia=INERTIA, position=position, orientation=q)
+
+
+def clockwork(swapped: bool) -> Scene:
+    """Six joint kinds, driven in full: a crank with a lump, a rod to a sled, a piston turned on its stem."""
+
+    def pair(first: str, second: str) -> tuple[str, str]:
+        return (second, first) if swapped else (first, second)
+
+    rod_axes, link_axes = ((0.0, 0.0, 1.0), (0.3, -1.0, 0.0)), ((0.0, 1.0, 0.0), (1.0, 0.0, -0.5))
+    return Scene(
+        name="clockwork", gravity=(0.5, -9.81, 2.0), duration=0.3,
+        body=(
+            body("crank", (0.15, 0.02, 0.1), (0.3, 0.1, 0.9)),
+            body("lump", (0.1, -0.2, 0.3), (0.5, 0.6, 0.7)),
+            body("rod", (0.6, 0.1, 0.1), (0.1, 0.5, -0.2)), body("sled", (1.0, 0.15, 0.2), (-0.4, 0.2, 0.1)),
+            body("piston", (-0.5, 0.6, 0.4), (0.2, 0.2, 0.2)),
+            body("link", (0.0, 0.7, 0.6), (0.4, -0.2, 0.1)),
+        ),
+        joint=(
+            Revolute(name="rev", bodies=pair("ground", "crank"), anchor=(0.0, 0.0, 0.0),
+                     axis=(0.1, 0.0, 2.0)),
+            Fixed(name="fix", bodies=pair("crank", "lump"), anchor=(0.1, 0.0, 0.1)),
+            Universal(name="uni", bodies=pair("crank", "rod"), anchor=(0.3, 0.05, 0.1),
+                      axes=rod_axes[::-1] if swapped else rod_axes),
+            Spherical(name="sph", bodies=pair("rod", "sled"), anchor=(0.9, 0.1, 0.1)),
+            Translational(name="tra", bodies=pair("ground", "sled"), anchor=(1.0, 0.1, 0.2),
+                          axis=(1.0, 0.2, 0.1)),
+            Cylindrical(name="cyl", bodies=pair("ground", "piston"), anchor=(-0.5, 0.5, 0.4),
+                        axis=(0.0, 1.0, 0.2)),
+            Universal(name="pin", bodies=pair("piston", "link"), anchor=(-0.4, 0.7, 0.5),
+                      axes=link_axes[::-1] if swapped else link_axes),
+            Spherical(name="end", bodies=pair("link", "ground"), anchor=(0.4, 0.8, 0.7)),
+        ),
+        driver=(
+            Driver(joint="rev", polynomial=(0.0, 3.0, 4.0)),
+            Driver(joint="cyl", polynomial=(0.0, -1.0), sine=Sine(amplitude=0.3, frequency=5.0)),
+        ),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_ondsel_and_pinocchio_on_every_joint(swapped: bool) -> None:
+    """Kinematics and inverse dynamics of full inertia matrices; either order of the joints' bodies."""
+    pytest.importorskip("pinocchio")
+    scene = clockwork(swapped)
+    times = np.linspace(0, scene.duration, 6)
+    run = simulate(scene, times, 5e-3)
+    other = engine("pinocchio").run(scene, times, Setting("tuned", {"rtol": 1e-11, "min_step": 1e-4}))
+    assert run.outcome is other.outcome is Outcome.COMPLETED, (run.message, other.message)
+    turned = rotations.angle_between(run.orientation, other.orientation).max()
+    assert turned < 1e-8, f"orientations differ by {turned:.1e} rad"
+    for field in ("position", "velocity", "angular_velocity", "acceleration", "angular_acceleration"):
+        ours, theirs = getattr(run, field), getattr(other, field)
+        gap = abs(ours - theirs).max() / abs(theirs).max()
+        assert gap < 1e-7, f"{field}: relative difference {gap:.1e}"
+    for joint, wrench in other.reactions.items():
+        gap = abs(run.reactions[joint] - wrench).max() / abs(wrench).max()
+        assert gap < 1e-6, f"reaction in {joint}: relative difference {gap:.1e}"
+
+
+def test_accelerations_that_the_solver_gets_wrong_are_left_out() -> None:
+    """A cylindrical joint between moving bodies."""
+    base = clockwork(False)
+    arm = body("arm", (-0.4, 0.2, 0.1), (0.1, 0.2, 0.3))
+    joints = {joint.name: joint for joint in base.joint}
+    carried = joints["cyl"].model_copy(update={"bodies": ("arm", "piston")})
+    pivot = Revolute(name="pivot", bodies=("ground", "arm"), anchor=(-0.2, 0.1, 0.1), axis=(0.0, 0.2, 1.0))
+    scene = base.with_(
+        body=(arm, *(b for b in base.body if b.name in ("piston", "link"))),
+        joint=(pivot, carried, joints["pin"], joints["end"]),
+        driver=(Driver(joint="pivot", polynomial=(0.0, 0.5)), base.driver[1]),
+    )
+    run = simulate(scene, np.linspace(0, 0.04, 3), 5e-3)
+    assert run.outcome is Outcome.COMPLETED, run.message
+    assert run.acceleration is None and run.angular_acceleration is None and run.reactions is None
+
+
+def test_a_distance_joint_is_refused() -> None:
+    scene = clockwork(False)
+    cord = Distance(name="cord", bodies=("crank", "sled"), anchors=((0.3, 0.0, 0.0), (1.0, 0.1, 0.2)))
+    refusal = engine("ondsel").cannot(scene.with_(joint=(*scene.joint, cord)))
+    assert refusal is not None and refusal.why is Why.UPSTREAM and "distance" in refusal.reason, refusal
+
+
+@pytest.mark.parametrize("name", ["planar_slider_crank", "four_bar_gravity", "four_bar_straight"])
+def test_open_motion_is_refused(name: str) -> None:
+    """Also what is open at the start only: OndselSolver takes the wrong branch there."""
+    refusal = engine("ondsel").cannot(SCENES[name]())
+    assert refusal is not None and refusal.why is Why.UPSTREAM, refusal
+
+
+def test_reactions_only_where_the_solver_knows_every_force() -> None:
+    base = SCENES["spatial_slider_crank_driven"]()
+    bare = base.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in base.body))
+    loaded = base.with_(load=(Moment(body="crank", moment=(0.0, 1.0, 0.0)),))
+    runs = {scene: simulate(scene, np.array([0.01]), 1e-3) for scene in (base, bare, loaded)}
+    assert runs[base].reactions is not None, "no reactions of a scene without loads"
+    assert runs[bare].reactions is None and runs[loaded].reactions is None, "reactions of unknown forces"
+    gap = max(abs(run.position - runs[base].position).max() for run in runs.values())
+    assert gap < 1e-12, f"masses and loads move a driven mechanism by {gap:.1e} m"
+
+
+def test_a_motion_the_joints_cannot_follow_keeps_the_states_before() -> None:
+    """The slider would have to leave its reach of 0.4 m about the crank's pin."""
+    base = SCENES["spatial_slider_crank"]()
+    scene = base.with_(driver=(Driver(joint="D", polynomial=(0.0, 0.0, 50.0)),), load=())
+    run = simulate(scene, np.linspace(0, 0.2, 21), 2e-3)
+    assert run.outcome is not Outcome.COMPLETED and run.message, f"{run.outcome.label} {run.message!r}"
+    assert 0 < len(run.times) < 21, f"{len(run.times)} samples, ended at {run.t_end}: {run.message}"
+
+
+def test_an_unknown_family_is_refused() -> None:
+    with pytest.raises(ValueError, match="no family 'best'"):
+        engine("ondsel").run(SCENES["four_bar"](), np.array([0.0]), Setting("best", {"step": 1e-3}))
