@@ -115,10 +115,14 @@ class Bench:
 def set_up(engine: str, specimen: Specimen, time_limit: float) -> Bench:
     """A bench with what the engine says of the specimen; raises ChildFailed when it cannot even say."""
     version, cannot, settings = offers(engine, specimen.scene, time_limit)
+    return Bench(engine, specimen, version, cannot, best_family(settings), time_limit)
+
+
+def best_family(settings: Sequence[Setting]) -> list[Setting]:
+    """The settings of the family an engine calls its best, else of its first family, coarse to fine."""
     families = [setting.family for setting in settings]
     best = BEST if BEST in families or not families else families[0]
-    chosen = [setting for setting in settings if setting.family == best]
-    return Bench(engine, specimen, version, cannot, chosen, time_limit)
+    return [setting for setting in settings if setting.family == best]
 
 
 def completed(scene: Scene, run: Trajectory, samples: int) -> Trajectory:

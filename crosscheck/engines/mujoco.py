@@ -5,7 +5,7 @@ What MuJoCo calls hard is a softness of 1e-4 of the inverse mass, ten times that
 - ``defaults``: the library's own options;
 - ``stock``: as stiff as its documentation allows (time constant two steps, impedance 0.9999), RK4;
 - ``tuned``: the regulariser scaled away through ``invweight0``, critically damped closures at five times
-  the fastest rate of the scene, RK4, three Newton iterations;
+  the fastest rate of the scene, RK4, Newton's method iterated to convergence;
 - ``forward``: the tuned model's accelerations (``mj_forward``) integrated by DOP853.
 
 A driver is an equality of one joint whose reference acceleration is rewritten at every evaluation.
@@ -32,6 +32,7 @@ from mbref.trajectory import Outcome, Trajectory
 
 HARD = 1e-8  # factor of the regulariser: its error is gone, and rounding does not yet take over
 HARD_ADAPTIVE = 1e-7  # the rounding left by less would keep an adaptive integrator busy
+CONVERGED, MOST_ITERATIONS = 1e-20, 50  # scaled gain of a Newton iteration; two or three are usual
 BETA = 5.0  # double root of the closure errors, in fastest rates of the scene: survives singular passages
 STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance, as far as it is not clamped
 DEFAULT_STEP = 2e-3  # s
@@ -136,7 +137,7 @@ class _Run:
         model.eq_solref[:], model.eq_solimp[:] = (-(beta**2), -2 * beta), STIFFEST
         model.body_invweight0[:] *= factor
         model.dof_invweight0[:] *= factor
-        model.opt.tolerance, model.opt.iterations = 0.0, 3
+        model.opt.tolerance, model.opt.iterations = CONVERGED, MOST_ITERATIONS
         model.opt.disableflags |= self.mujoco.mjtDisableBit.mjDSBL_REFSAFE
 
     @contextlib.contextmanager

@@ -1,0 +1,69 @@
+"""Random loop mechanisms: initial accelerations of engines and of Gauss's principle / mbref's."""
+
+from __future__ import annotations
+
+import functools
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from crosscheck.kinematics import closure, closure_rates, initial_poses, initial_twists
+from crosscheck.random_mechanisms import KINDS, PRINCIPLE, Comparison, compare, random_mechanism
+
+ENGINES = ("mujoco", "pinocchio", "exudyn")
+EXACT = 1e-9  # of a direct method, times what a singular position nearby magnifies
+CLOSE = 1e-6  # of an engine that solves iteratively or extrapolates
+MANY, SOME = range(200), (1, 3, 5, 9, 10, 11, 12, 14, 15, 16)
+
+
+@functools.cache
+def compared(seed: int) -> Comparison:
+    return compare(random_mechanism(seed), ENGINES)
+
+
+def check(seeds: Sequence[int]) -> None:
+    for found in map(compared, seeds):
+        for name, error in found.errors.items():
+            allowed = EXACT / found.distance if name == PRINCIPLE else CLOSE * max(1.0, 1e-2 / found.distance)
+            assert error <= allowed, (
+                f"{found.scene.name}: {name} and mbref differ by {error:.2e}, allowed {allowed:.0e}; "
+                f"{found.redundant} redundant rows, {found.distance:.1e} from singular"
+            )
+
+
+def test_engines_and_mbref_on_some_mechanisms():
+    check(SOME)
+
+
+@pytest.mark.slow
+def test_engines_and_mbref_on_many_mechanisms():
+    check(MANY)
+
+
+def test_mechanisms_and_what_is_promised_of_them():
+    scenes = [random_mechanism(seed) for seed in range(40)]
+    kinds = Counter(joint.type for scene in scenes for joint in scene.joint)
+    assert set(kinds) == set(KINDS), f"no {set(KINDS) - set(kinds)}"
+    sizes = {len(scene.body) for scene in scenes}
+    loops = {len(scene.joint) - len(scene.body) for scene in scenes}
+    assert sizes == set(range(3, 9)) and loops == {1, 2, 3}, (sizes, loops)
+
+
+def test_drawn_states_and_joint_equations():
+    for scene in map(random_mechanism, SOME):
+        pose, rates = initial_poses(scene), initial_twists(scene)
+        off = max(np.abs(rows).max() for rows in closure(scene, 0.0, *pose).values())
+        drift = max(np.abs(rows).max() for rows in closure_rates(scene, 0.0, *pose, *rates).values())
+        given = np.array([body.velocity for body in scene.body])
+        kept = np.abs(rates[0] - given).max()
+        assert max(off, drift, kept) < 1e-12, (
+            f"{scene.name}: residuals {off:.1e} m, {drift:.1e} m/s; velocities moved by {kept:.1e}"
+        )
+        assert np.abs(given).max() > 0.01, f"{scene.name} rests"
+
+
+def test_same_seed_and_same_scene():
+    assert random_mechanism(7) == random_mechanism(7)
+    assert random_mechanism(7) != random_mechanism(8)
