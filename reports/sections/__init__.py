@@ -7,11 +7,13 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from reports.blocks import Block, Heading
 from reports.runs import SceneRuns
 from reports.sections import (
+    accelerations,
     convergence,
     energy,
     mechanism,
     outcomes,
     provenance,
+    reactions,
     speed,
     summary,
     support,
@@ -27,6 +29,8 @@ OF_A_SCENE: Mapping[str, Part] = {
     "speed": speed.render,
     "violation": violation.render,
     "energy": energy.render,
+    "accelerations": accelerations.render,
+    "reactions": reactions.render,
     "outcomes": outcomes.render,
 }
 CLOSING: Mapping[str, Chapter] = {

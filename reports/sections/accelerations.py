@@ -1,0 +1,42 @@
+"""Initial accelerations of the engines beside those of Gauss's principle; distance to singularity."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crosscheck.gauss import gauss, singular_values, stacked
+from crosscheck.tolerances import RANK
+from reports.blocks import Block, Heading, Table
+from reports.runs import SceneRuns, power
+
+HEADER = ("Engine", "Family", "Difference")
+
+
+def render(scene_runs: SceneRuns) -> list[Block]:
+    """Of every family's best run with accelerations at t = 0, how far they are from the least-constraint
+    ones; nothing for a scene without masses."""
+    if not scene_runs.scene.has_mass():
+        return []
+    exact = gauss(scene_runs.scene)
+    scale = np.linalg.norm(exact, axis=-1).max() or 1.0
+    rows = []
+    for curve, run in scene_runs.best().items():
+        motion = run.trajectory
+        if motion.acceleration is not None and len(motion.times) and motion.times[0] == 0:
+            off = np.linalg.norm(stacked(scene_runs.scene, motion, 0) - exact, axis=-1).max() / scale
+            rows.append((*curve, power(float(off))))
+    caption = (
+        "Largest difference of an initial acceleration (angular ones times the scene's length) from that of "
+        "Gauss's principle with the judge's own joint equations, relative to the largest. "
+        f"{_distance(scene_runs)}"
+    )
+    heading = Heading("Initial accelerations")
+    return [heading, Table(caption, HEADER, rows, right=frozenset({2}), folded=True)] if rows else []
+
+
+def _distance(scene_runs: SceneRuns) -> str:
+    values = singular_values(scene_runs.scene)
+    above = values[values > RANK * values[0]]
+    return (
+        f"Distance to singularity (least singular value of the scaled Jacobian above rank): {above[-1]:.1e}."
+    )

@@ -1,0 +1,68 @@
+"""Joint reactions of the engines compared where unique; the shares of redundant joints side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from crosscheck.reactions import Comparison, compare, side_by_side
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+from reports.blocks import Block, Heading, Table
+from reports.runs import Run, SceneRuns, number, power
+
+CAPTION = (
+    "Largest difference from the reactions of {first}, relative to the largest reaction, over samples of the "
+    "run of least error of every engine; moments count divided by the scene's length. Compared are the "
+    "components that redundancy leaves unique ('open' counts the dimensions it leaves open), and, in the "
+    "last row, the resultant of all joints on a body, which is always unique."
+)
+SHARES = (
+    "The engine's choice: size (N) at t = {t:.3g} s of the components that redundancy leaves open. They need "
+    "not agree, and none of them is wrong."
+)
+
+
+def render(scene_runs: SceneRuns) -> list[Block]:
+    """Tables of differences and of choices; nothing where fewer than two engines report reactions."""
+    runs = {engine: run.trajectory for engine, run in _best(scene_runs).items()}
+    if len(runs) < 2:
+        return []
+    first, *others = runs
+    scene = scene_runs.scene
+    found = {engine: compare(scene, runs[first], runs[engine]) for engine in others}
+    table = Table(
+        CAPTION.format(first=first), ("Joint", "Open", *others), _rows(scene, found), right=_after(0)
+    )
+    return [Heading("Joint reactions"), table, *_choices(scene, runs)]
+
+
+def _best(scene_runs: SceneRuns) -> dict[str, Run]:
+    """Of every engine the completed run with reactions of least error."""
+    best: dict[str, Run] = {}
+    for run in scene_runs.best().values():
+        engine = run.curve[0]
+        if run.completed and run.record["reactions"]:
+            best[engine] = min(best.get(engine, run), run, key=lambda r: (r.error != r.error, r.error))
+    return best
+
+
+def _rows(scene: Scene, found: Mapping[str, Comparison]) -> list[tuple[str, ...]]:
+    rows = []
+    for joint in scene.joint:
+        reactions = [comparison.joints[joint.name] for comparison in found.values()]
+        rows.append((joint.name, str(reactions[0].shared), *(power(r.unique) for r in reactions)))
+    return [*rows, ("on a body", "0", *(power(comparison.resultant) for comparison in found.values()))]
+
+
+def _choices(scene: Scene, runs: Mapping[str, Trajectory]) -> list[Block]:
+    samples = min(len(motion.times) for motion in runs.values())
+    shares = side_by_side(scene, runs, samples // 2)
+    if not shares:
+        return []
+    time = next(iter(runs.values())).times[samples // 2]
+    rows = [(joint, *(number(size, 4) for size in sizes.values())) for joint, sizes in shares.items()]
+    return [Table(SHARES.format(t=time), ("Joint", *runs), rows, right=_after(0))]
+
+
+def _after(column: int) -> frozenset[int]:
+    return frozenset(range(column + 1, 20))

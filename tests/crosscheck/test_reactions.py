@@ -1,0 +1,92 @@
+"""Reactions: unique parts and resultants between engines / each other; what is shared / statics by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from crosscheck.conformance.bench import best_family
+from crosscheck.engine import engine
+from crosscheck.kinematics import initial_poses
+from crosscheck.reactions import compare, resultants, shared_wrenches, side_by_side
+from mbref.scene import Body, Revolute, Scene, Spherical
+from mbref.scenes import SCENES
+from mbref.trajectory import Trajectory
+
+Z = (0.0, 0.0, 1.0)
+TIMES = np.array([0.0, 0.01, 0.02, 0.03])
+AGREE = {  # of the largest reaction, at the finest setting of every engine
+    "mujoco": 1e-3,  # forces of springs of softness 1e-13: rounding of the accelerations shows in them
+    "pinocchio": 1e-6,
+    "exudyn": 1e-6,
+}
+
+
+def run(name: str, scene: Scene) -> Trajectory:
+    simulator = engine(name)
+    return simulator.run(scene, TIMES, best_family(simulator.settings(scene))[-1])
+
+
+def door(kind: type) -> Scene:
+    """A door hung in two joints of one kind on a vertical axis, 1 m apart."""
+    axis = {"axis": Z} if kind is Revolute else {}
+    leaf = Body(name="leaf", mass=10.0, inertia=(1.2, 0.9, 0.4), position=(0.4, 0.0, 1.0))
+    hinges = [kind(name=n, bodies=("ground", "leaf"), anchor=(0.0, 0.0, h), **axis)
+              for n, h in (("low", 0.5), ("high", 1.5))]  # fmt: skip
+    return Scene(name="door", gravity=(0.0, 0.0, -9.81), duration=0.1, body=(leaf,), joint=tuple(hinges))
+
+
+def test_two_ball_hinges_and_the_force_between_them():
+    """Only the force along the line of both is statically open."""
+    shared = shared_wrenches(door(Spherical), 0.0, *initial_poses(door(Spherical)))
+    for name, basis in shared.items():
+        assert basis.shape == (6, 1), f"{name}: {basis.shape[1]} shared wrenches, by hand 1"
+        along = abs(basis[2, 0])
+        assert along == pytest.approx(1.0, abs=1e-12), f"{name}: shared wrench {basis[:, 0]}, by hand along z"
+
+
+def test_two_revolute_hinges_and_the_five_of_them():
+    """Each alone holds the door: all five components of either are open."""
+    shared = shared_wrenches(door(Revolute), 0.0, *initial_poses(door(Revolute)))
+    sizes = {name: basis.shape[1] for name, basis in shared.items()}
+    assert sizes == {"low": 5, "high": 5}, sizes
+    about = max(np.abs(basis[5]).max() for basis in shared.values())
+    assert about < 1e-12, f"a moment of {about:.1e} about the hinge axis is shared, by hand none"
+
+
+@pytest.mark.parametrize("name", ["spatial_slider_crank_gravity", "planar_slider_crank_gravity", "door"])
+def test_engines_and_mbref_where_unique(name):
+    scene = door(Spherical) if name == "door" else SCENES[name]()
+    runs = {name: run(name, scene) for name in ("mbref", *AGREE)}
+    for label, allowed in AGREE.items():
+        found = compare(scene, runs["mbref"], runs[label])
+        worst = max(found.joints, key=lambda joint: found.joints[joint].unique)
+        unique = found.joints[worst].unique
+        assert unique < allowed, f"{label} and mbref: unique reaction of {worst} differs by {unique:.2e}"
+        assert found.resultant < allowed, f"{label} and mbref: resultants differ by {found.resultant:.2e}"
+
+
+def test_redundant_rows_and_shared_dimensions():
+    """One redundant row opens at most one dimension at a joint, no redundant row none."""
+    for name, most in {"spatial_slider_crank_gravity": 0, "planar_slider_crank_gravity": 1}.items():
+        scene = SCENES[name]()
+        sizes = {j: b.shape[1] for j, b in shared_wrenches(scene, 0.0, *initial_poses(scene)).items()}
+        assert max(sizes.values()) == most, f"{name}: {sizes}, by its redundant rows {most} at most"
+
+
+def test_choices_side_by_side_and_weight():
+    """Whatever the shares of the hinges, together they carry the door."""
+    scene = door(Spherical)
+    motion = run("mbref", scene)
+    shares = side_by_side(scene, {"mbref": motion}, 0)
+    assert set(shares) == {"low", "high"}, shares
+    lifted = resultants(scene, motion, 0)[0, 2]
+    assert lifted == pytest.approx(98.1, rel=1e-9), f"hinges carry {lifted} N of 98.1 N"
+    moved = dict(motion.reactions)
+    moved["low"] = moved["low"] + [0.0, 0.0, 7.0, 0.0, 0.0, 0.0]
+    moved["high"] = moved["high"] - [0.0, 0.0, 7.0, 0.0, 0.0, 0.0]
+    found = compare(scene, motion, replace(motion, reactions=moved))
+    assert found.resultant < 1e-12 and max(r.unique for r in found.joints.values()) < 1e-12, found
+    assert min(r.chosen for r in found.joints.values()) > 0.05, found
