@@ -11,7 +11,8 @@ from crosscheck import support
 from crosscheck.conformance.features import JOINTS, LOADS, feature_scenes
 from crosscheck.engine import BUILT_IN, Cannot, Why, engine
 from crosscheck.kinematics import initial_poses, jacobian
-from mbref.scene import DRIVEN, Joint, Load, Scene
+from mbref.faults import DRIVEN
+from mbref.scene import Joint, Load, Scene
 from mbref.trajectory import Outcome
 
 README = Path(__file__).parents[2] / "README.md"
