@@ -1,0 +1,46 @@
+"""Optional engines / installed packages: what is missing is named, listed, and not run by default."""
+
+from __future__ import annotations
+
+from importlib import metadata
+
+import pytest
+
+from crosscheck.engine import BUILT_IN, OPTIONAL, default_engines, engine, engine_names, installed
+from crosscheck.request import RequestError, find_engines, missing_package
+
+
+@pytest.fixture
+def nothing_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An installation without the optional engines' packages."""
+    version, absent = metadata.version, {engine(name).package for name in OPTIONAL}
+
+    def found(package: str) -> str:
+        if package in absent:
+            raise metadata.PackageNotFoundError(package)
+        return version(package)
+
+    monkeypatch.setattr(metadata, "version", found)
+
+
+def test_missing_packages_and_the_engines_that_run(nothing_more: None) -> None:
+    assert set(OPTIONAL) <= set(engine_names()), f"known: {engine_names()}"
+    assert not any(map(installed, OPTIONAL)), f"installed: {[n for n in OPTIONAL if installed(n)]}"
+    assert default_engines()[: len(BUILT_IN)] == BUILT_IN and not set(OPTIONAL) & set(default_engines())
+    notices: list[str] = []
+    assert not set(find_engines(None, notices.append)) & set(OPTIONAL)
+    assert not any(name in notice for notice in notices for name in OPTIONAL), f"said unasked: {notices}"
+
+
+@pytest.mark.parametrize("name", OPTIONAL)
+def test_what_is_asked_for_and_what_to_install(nothing_more: None, name: str) -> None:
+    reason = missing_package(name)
+    assert reason and f"pip install {engine(name).package}" in reason, reason
+    with pytest.raises(RequestError, match="pip install"):
+        find_engines([name], print)
+
+
+@pytest.mark.parametrize("name", OPTIONAL)
+def test_installed_engines_run_by_default(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(metadata, "version", lambda package: "1.0")
+    assert installed(name) and name in default_engines(), f"default: {default_engines()}"
