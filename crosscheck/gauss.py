@@ -73,7 +73,8 @@ def bias(scene: Scene) -> np.ndarray:
     """Acceleration residuals (rows,) of the bodies coasting: J a must be minus these."""
     pose, rates = initial_poses(scene), initial_twists(scene)
     still = np.zeros_like(pose[0])
-    return np.concatenate([*closure_accelerations(scene, 0.0, *pose, *rates, still, still).values()])
+    rows = closure_accelerations(scene, 0.0, *pose, *rates, still, still)
+    return np.concatenate([np.zeros(0), *rows.values()])
 
 
 def stacked(scene: Scene, run: Trajectory, sample: int) -> np.ndarray:

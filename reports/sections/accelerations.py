@@ -28,7 +28,7 @@ def render(scene_runs: SceneRuns) -> list[Block]:
     caption = (
         "Largest difference of an initial acceleration (angular ones times the scene's length) from that of "
         "Gauss's principle with the judge's own joint equations, relative to the largest. "
-        f"{_distance(scene_runs)}"
+        f"{_distance(scene_runs) if scene_runs.scene.joint else ''}"
     )
     heading = Heading("Initial accelerations")
     return [heading, Table(caption, HEADER, rows, right=frozenset({2}), folded=True)] if rows else []
