@@ -9,14 +9,17 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from crosscheck.compare import gate_cases
+from crosscheck.paper import runs
 from crosscheck.progress import shown
 from crosscheck.request import RequestError, find_engines
 from crosscheck.study import study
 from reports import plan
+from reports.blocks import Block
 from reports.runs import SceneRuns, by_scene
 from reports.timings import with_timings
 
 NEEDS = ("matplotlib", "jinja2")
+PAPER = "paper"  # the section whose runs are its own
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -26,17 +29,44 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     from reports.sections import NAMES
 
-    arguments = _parser(NAMES).parse_args(argv)
+    arguments = _parser((*NAMES, PAPER)).parse_args(argv)
+    names = arguments.section or (NAMES if arguments.quick else (*NAMES, PAPER))
     try:
-        groups = _collect(Path(arguments.out), arguments.quick)
+        blocks = _blocks(Path(arguments.out), arguments.quick, names)
     except RequestError as error:
         _notice(str(error))
         return 2
     except KeyboardInterrupt:
         _notice(f"interrupted; what has been run is in {arguments.out}, the same command goes on from there")
         return 130
-    _render(groups, Path(arguments.out), arguments.section or NAMES)
+    _write(blocks, Path(arguments.out))
     return 0
+
+
+def _blocks(out: Path, is_quick: bool, names: Sequence[str]) -> list[Block]:
+    """What the named sections say; only the runs they need are made."""
+    from reports import sections
+    from reports.sections import paper
+
+    out.mkdir(parents=True, exist_ok=True)
+    blocks: list[Block] = []
+    if set(names) - {PAPER}:
+        blocks += sections.blocks(_collect(out, is_quick), names)
+    if PAPER in names:
+        records = _collect_paper(out)
+        print(paper.score(records))
+        blocks += paper.render(records)
+    return blocks
+
+
+def _collect_paper(out: Path) -> runs.Records:
+    """The runs of the paper's tables and figures; raw records stay in ``out``/paper.jsonl."""
+    path, cases = out / "paper.jsonl", runs.cases()
+    with shown("the paper's runs", len(cases)) as progress:
+        records = runs.run(path, cases, progress)
+    more = runs.follow_ups(records)
+    with shown("their errors", len(more)) as progress:
+        return {**records, **runs.run(path, more, progress)}
 
 
 def _collect(out: Path, is_quick: bool) -> list[SceneRuns]:
@@ -52,14 +82,14 @@ def _collect(out: Path, is_quick: bool) -> list[SceneRuns]:
     gates = [case for scene in scenes for case in gate_cases(scene, engines, plan.QUICK_LIMIT)]
     with shown("running", len(cases) + len(gates)) as progress:
         records = study([*cases, *gates], records_path=out / "records.jsonl", progress=progress)
-    runs = with_timings(cases, records[: len(cases)], out / "timings.jsonl", _notice)
-    return by_scene(runs, {scene.name: scene for scene in scenes}, records[len(cases) :])
+    timed = with_timings(cases, records[: len(cases)], out / "timings.jsonl", _notice)
+    return by_scene(timed, {scene.name: scene for scene in scenes}, records[len(cases) :])
 
 
-def _render(groups: Sequence[SceneRuns], out: Path, names: Sequence[str]) -> None:
-    from reports import render, sections
+def _write(blocks: Sequence[Block], out: Path) -> None:
+    from reports import render
 
-    render.write(sections.blocks(groups, names), out)
+    render.write(blocks, out)
     _notice(f"written: {out / 'index.html'} and {out / 'report.md'}")
 
 

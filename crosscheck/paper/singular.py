@@ -1,0 +1,67 @@
+"""Singular positions of the rhombus: its Jacobian along the motion, and the branches that meet there."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from crosscheck import kinematics
+from crosscheck.tolerances import RANK
+from crosscheck.truth import truth_for
+from mbref.scene import Scene
+from mbref.scenes.four_bar import LENGTH, four_bar
+from mbref.scenes.links import CRANK_RATE, about_z
+
+
+def scaled_singular_values(scene: Scene, times: np.ndarray) -> np.ndarray:
+    """Singular values (k, n) of the scaled Jacobian along the true motion at times (k,).
+
+    Angular columns are divided by the scene's length and rows brought to unit length.
+    """
+    truth = truth_for(scene)
+    assert truth is not None, f"{scene.name}: no truth"
+    motion = truth.poses(times)
+    scale = np.tile(np.repeat([1.0, 1 / kinematics.scene_length(scene)], 3), len(scene.body))
+    values = []
+    for t, r, p in zip(motion.times, motion.position, motion.orientation, strict=True):
+        j = kinematics.jacobian(scene, t, r, p)[0] * scale
+        values.append(np.linalg.svd(j / np.linalg.norm(j, axis=1, keepdims=True), compute_uv=False))
+    return np.array(values)
+
+
+def rank(values: np.ndarray) -> int:
+    """Number of singular values (n,) that are not zero."""
+    return int(np.sum(values > RANK * values.max()))
+
+
+def fold_residual(theta: float, turned: float) -> float:
+    """Largest residual (m or rad) of the driven rhombus that leaves θ₂ = theta (0 or π) on its fold.
+
+    The crank has been driven by ``turned`` (rad) further.  At π the coupler turns with the crank about A and
+    the rocker rests; at 0 crank and rocker lie on the ground and on B = D only coupler and rocker could
+    turn, so that the crank rests and its driver is violated.
+    """
+    theta0 = math.pi if theta else math.pi / 2
+    scene = four_bar(theta0)
+    t = (theta0 - theta - turned) / CRANK_RATE
+    if theta:
+        crank, coupler, rocker = theta + turned, turned, theta
+    else:
+        crank, coupler, rocker = theta, turned, turned
+    b, d = _along(crank), _along(0.0)
+    places = [b / 2, b + _along(coupler) / 2, d + _along(rocker) / 2]
+    turns = np.array([about_z(angle) for angle in (crank, coupler, rocker)])
+    residuals = kinematics.closure(scene, np.array(t), np.array(places), turns)
+    return max(float(np.abs(r).max()) for r in residuals.values())
+
+
+def _along(angle: float) -> np.ndarray:
+    return LENGTH * np.array([math.cos(angle), math.sin(angle), 0.0])
+
+
+def crossings(theta0: float, last: float) -> list[tuple[float, int]]:
+    """Times (s) up to ``last`` at which θ₂ = theta0 - 124.8 t is a multiple k of π, and k."""
+    first = math.floor(theta0 / math.pi + 1e-9)
+    out = [((theta0 - k * math.pi) / CRANK_RATE, k) for k in range(first, first - 1000, -1)]
+    return [(t, k) for t, k in out if t <= last]

@@ -1,0 +1,195 @@
+"""The paper's Figures 4, 5, 6, 8 and 11 to 16, from the records of the same methods."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import partial
+
+import numpy as np
+from matplotlib.figure import Figure as Drawing
+
+from crosscheck.metrics import violation_series
+from crosscheck.paper.cells import FIVE_BAR
+from crosscheck.paper.runs import (
+    HEAVY,
+    SPATIAL_DYNAMIC,
+    TRUE_BRANCH,
+    UNEQUAL,
+    Records,
+    dynamic_scene,
+    linkage,
+)
+from mbref.scene import Scene
+from reports import figures
+from reports.blocks import Block, Figure, Heading
+from reports.drawing import moved, shapes
+from reports.runs import Run
+
+HALF = "θ₂ = π/2"
+POSES = 12
+SMALLEST = 1e-17
+Named = Mapping[str, Run]
+
+
+def render(records: Records) -> list[Block]:
+    """The figures in the paper's order."""
+    four, five = _runs(records, "figures", HALF), _runs(records, "figures", FIVE_BAR)
+    heavy, unequal, spatial = (_runs(records, "dynamic", c) for c in (HEAVY, UNEQUAL, SPATIAL_DYNAMIC))
+    four_bar, five_bar = (linkage("MPI (GS)", column, [0.0]).scene for column in (HALF, FIVE_BAR))
+    free = ("MPI (GS)", "MPI (SVD)")
+    partitioned = ("MPI (GS) + CP", "MPI (SVD) + CP")
+    branches = ("MPI (GS)", "MPI (GS) + B", TRUE_BRANCH)
+    plain, held = ("ALF", "MPI (GS)", "MPI (SVD)"), ("ALF + CP", "MPI (GS) + CP", "MPI (SVD) + CP")
+    return [
+        Heading("Figures 4 to 8: kinematic analysis"),
+        _poses(4, four_bar, _only(four, ("ALF", *free, "MPI (GS) + B")), "The four-bar from θ₂ = π/2"),
+        _violations(5, four_bar, _only(four, free), "without partitioning"),
+        _violations(6, four_bar, _only(four, partitioned), "with partitioning"),
+        _poses(8, five_bar, _only(five, (*free, "MPI (SVD) + CP")), "The five-bar"),
+        Heading("Figures 11 to 16: dynamic analysis, 100 N m on the crank"),
+        _rates(11, _only(heavy, branches), "planar slider-crank, a = b: the first singular position comes "
+               "at 1.81 s; after it the methods part, the smooth branch is that of the last one"),
+        _poses(12, dynamic_scene(HEAVY), _only(heavy, ("MPI (GS)", "MPI (GS) + B")),
+               "The slider-crank with a = b, around its first singular positions", (1.4, 3.2)),
+        _accelerations(13, _only(heavy, ("MPI (GS) + CP",))),
+        _rates(14, _only(unequal, held), "planar slider-crank, a ≠ b, partitioning; there is no singular "
+               "position, and all agree"),
+        _rates(15, _only(spatial, plain), "spatial slider-crank without partitioning"),
+        _rates(16, _only(spatial, held), "spatial slider-crank with partitioning"),
+    ]  # fmt: skip
+
+
+def _runs(records: Records, part: str, column: str) -> dict[str, Run]:
+    return {k.row: Run(r) for k, r in records.items() if (k.part, k.column) == (part, column)}
+
+
+def _only(runs: Named, rows: Sequence[str]) -> dict[str, Run]:
+    return {row: runs[row] for row in rows}
+
+
+def _ended(runs: Named) -> str:
+    return ", ".join(
+        f"{name} {'to the end' if run.completed else f'to {run.t_end:.4g} s ({run.outcome.letter})'}"
+        for name, run in runs.items()
+    )
+
+
+def _poses(paper: int, scene: Scene, runs: Named, what: str, span: tuple[float, float] | None = None):
+    caption = (
+        f"Figure {paper}. {what}: poses from the start, light, to the last sample before the end, dark; "
+        f"{_ended(runs)}. Dense samples cut the steps, so that ends may differ from the tables'."
+    )
+    return Figure(f"paper-figure-{paper}", caption, partial(plot_poses, scene, runs, span))
+
+
+def plot_poses(scene: Scene, runs: Named, span: tuple[float, float] | None) -> Drawing:
+    """Poses of the links side by side, one picture a method."""
+    drawing, [first] = figures.canvas(7.4, 3.0)
+    first.remove()
+    axes = drawing.subplots(1, len(runs), sharex=True, sharey=True, squeeze=False)[0]
+    for panel, (name, run) in zip(axes, runs.items(), strict=True):
+        t = run.trajectory.times
+        low, high = span or (0.0, t[-1])
+        inside = np.flatnonzero((t >= low) & (t <= high))
+        chosen = np.unique(inside[np.linspace(0, len(inside) - 1, POSES).astype(int)])
+        for b, shape in enumerate(shapes(scene)):
+            points = moved(shape, run.trajectory, b)[..., :2]
+            colour = figures.COLOURS[b % len(figures.COLOURS)]
+            for i, k in enumerate(chosen):
+                alpha = 1.0 if i == len(chosen) - 1 else 0.12 + 0.4 * i / len(chosen)
+                mark = "o" if points.shape[1] > 1 else "s"
+                panel.plot(*points[k].T, color=colour, marker=mark, markersize=3, linewidth=1.4, alpha=alpha)
+        panel.set(aspect="equal", title=f"{name}\nto {t[chosen[-1]]:.4g} s", xlabel="x (m)")
+        panel.title.set_fontsize(8.5)
+        panel.grid(False)
+        panel.spines[["top", "right"]].set_visible(False)
+    axes[0].set_ylabel("y (m)")
+    return drawing
+
+
+def _violations(paper: int, scene: Scene, runs: Named, what: str) -> Figure:
+    worst = {name: float(np.max(_violation(scene, run))) for name, run in runs.items()}
+    sizes = ", ".join(f"{name} {size:.1e}" for name, size in worst.items())
+    caption = (
+        f"Figure {paper}. The largest violation of a constraint of the four-bar from θ₂ = π/2, MPI {what}; "
+        f"at most: {sizes}. Dashed: θ₂ = kπ."
+    )
+    return Figure(f"paper-figure-{paper}", caption, partial(plot_violations, scene, runs))
+
+
+def _violation(scene: Scene, run: Run) -> np.ndarray:
+    values = violation_series(scene, run.trajectory, 0)
+    assert values is not None
+    return np.maximum(values, SMALLEST)
+
+
+def plot_violations(scene: Scene, runs: Named) -> Drawing:
+    """Largest violation over time, logarithmic."""
+    drawing, (axes,) = figures.canvas(7.2, 3.4)
+    last = 0.0
+    for i, (name, run) in enumerate(runs.items()):
+        t = run.trajectory.times
+        last = max(last, float(t[-1]))
+        axes.plot(
+            t, _violation(scene, run), label=name, color=figures.COLOURS[i], linestyle=figures.DASHES[i]
+        )
+        if not run.completed:
+            axes.plot(
+                t[-1], _violation(scene, run)[-1], figures.FAILED, color=figures.COLOURS[i], markersize=8
+            )
+    for k in range(1, 10):
+        if (t := (2 * k - 1) * math.pi / 2 / 124.8) < last * 1.05:
+            axes.axvline(t, color=figures.GREY, linestyle="--", linewidth=0.8, zorder=0)
+    axes.set(yscale="log", xlabel="t (s)", ylabel="largest violation (rad, or of the length)")
+    figures.legend_below(drawing, axes)
+    return drawing
+
+
+def _rates(paper: int, runs: Named, what: str) -> Figure:
+    caption = f"Figure {paper}. Angular velocity of the crank, {what}; {_ended(runs)}."
+    return Figure(f"paper-figure-{paper}", caption, partial(plot_rates, runs))
+
+
+def _along_axis(run: Run, vectors: np.ndarray) -> np.ndarray:
+    """The crank's component (k,) about its axis: the largest on average, planar z or spatial y."""
+    axis = int(np.argmax(np.abs(vectors[:, 0]).mean(axis=0)))
+    return vectors[:, 0, axis]
+
+
+def plot_rates(runs: Named) -> Drawing:
+    """Crank angular velocity over time."""
+    drawing, (axes,) = figures.canvas(7.2, 3.6)
+    for i, (name, run) in enumerate(runs.items()):
+        motion, look = run.trajectory, {"color": figures.COLOURS[i], "linestyle": figures.DASHES[i]}
+        rates = _along_axis(run, motion.angular_velocity)
+        axes.plot(motion.times, rates, label=name, linewidth=2.4 - 0.6 * i, **look)
+        if not run.completed:
+            axes.plot(motion.times[-1], rates[-1], figures.FAILED, color=look["color"], markersize=8)
+    axes.set(xlabel="t (s)", ylabel="crank angular velocity (rad/s)")
+    figures.legend_below(drawing, axes)
+    return drawing
+
+
+def _accelerations(paper: int, runs: Named) -> Figure:
+    caption = (
+        f"Figure {paper}. Logarithm of the crank's angular acceleration, planar slider-crank with a = b and "
+        f"partitioning: away from singular positions it is 100 N m over the inertia, about 1 rad/s²; "
+        f"{_ended(runs)}."
+    )
+    return Figure(f"paper-figure-{paper}", caption, partial(plot_accelerations, runs))
+
+
+def plot_accelerations(runs: Named) -> Drawing:
+    """Magnitude of the crank's angular acceleration over time, logarithmic."""
+    drawing, (axes,) = figures.canvas(7.2, 3.4)
+    for i, (name, run) in enumerate(runs.items()):
+        motion = run.trajectory
+        assert motion.angular_acceleration is not None
+        values = np.linalg.norm(motion.angular_acceleration[:, 0], axis=-1)
+        axes.plot(
+            motion.times, np.maximum(values, SMALLEST), label=name, color=figures.COLOURS[i], linewidth=1
+        )
+    axes.set(yscale="log", xlabel="t (s)", ylabel="|crank angular acceleration| (rad/s²)")
+    figures.legend_below(drawing, axes)
+    return drawing

@@ -1,0 +1,156 @@
+"""The paper's cells / the paper; a few cells / real runs; singular positions / the fold's closed form."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from crosscheck.paper import runs, settings, singular
+from crosscheck.paper.cells import CELLS, CLOSE, COUNTS_III, COUNTS_IV, Cell, Match, match
+from crosscheck.paper.runs import Label
+from mbref.method import Method
+from mbref.scene import Scene
+from mbref.scenes import SCENES
+from mbref.scenes.four_bar import four_bar
+from mbref.simulate import Limits, simulate
+from mbref.trajectory import Outcome, Trajectory
+
+
+def simulated(label: Label, times: np.ndarray | None = None) -> Trajectory:
+    """The run of a label in this process, at its own times or at others."""
+    case = runs.cases()[label]
+    at = case.times if times is None else times
+    return simulate(case.scene, case.setting.family, at, Limits(**case.setting.options))
+
+
+def test_cells_and_the_size_of_the_papers_tables():
+    found = Counter(cell.table for cell in CELLS)
+    assert found == {"I": 33, "II": 11, "III": 11}, f"cells by table: {found}"
+    assert len({(c.row, c.column) for c in CELLS}) == len(CELLS), "a cell stands twice"
+    letters = Counter(cell.letter for cell in CELLS)
+    assert letters == {"a": 12, "b": 8, "c": 22, "d": 1, "": 12}, f"footnotes: {letters}"
+    assert len(COUNTS_III) == 11 and len(COUNTS_IV) == 8, f"{len(COUNTS_III)}, {len(COUNTS_IV)}"
+
+
+@pytest.mark.parametrize(
+    ("cell", "outcome", "t_end", "expected"),
+    [
+        ("0.031c", Outcome.VIOLATION, 0.0315, Match.SAME),
+        ("0.031c", Outcome.VIOLATION, 0.031 + 1.1 * CLOSE, Match.OTHER_TIME),
+        ("0.031c", Outcome.STEP_FAILED, 0.031, Match.DIFFERENT),
+        ("0.031c", Outcome.COMPLETED, 20.0, Match.DIFFERENT),
+        ("0.031c", Outcome.TIMED_OUT, 0.031, Match.DIFFERENT),
+        ("20", Outcome.COMPLETED, 20.0, Match.SAME),
+        ("20", Outcome.VIOLATION, 19.999, Match.DIFFERENT),
+        ("20", Outcome.TIMED_OUT, 20.0, Match.DIFFERENT),
+    ],
+)
+def test_match_and_outcome_and_time(cell, outcome, t_end, expected):
+    end, letter = (None, "") if cell == "20" else (float(cell[:-1]), cell[-1])
+    mark = match(Cell("I", "a method", "a column", end, letter), outcome, t_end)
+    assert mark is expected, f"{cell} against {outcome.label} at {t_end}: {mark}, expected {expected}"
+
+
+def test_every_cell_and_a_run_of_its_method():
+    tables = runs.tables()
+    for cell in CELLS:
+        case = tables[Label(cell.table, cell.row, cell.column)]
+        method = Method.parse(case.setting.family)
+        assert method.integrator.name == settings.INTEGRATOR, str(method)
+        assert ("CP" in cell.row) == (method.stabilisation.name == "partitioning"), f"{cell.row}: {method}"
+        assert all(body.mass is None for body in case.scene.body), f"{cell.column}: M = I takes no masses"
+    used = {tuple(sorted(case.setting.options.items())) for case in tables.values()}
+    assert len(used) == 1, f"{len(used)} sets of settings, not one for all cells"
+
+
+def test_variants_and_one_thing_changed():
+    default = {f.name for f in dataclasses.fields(Limits)}
+    for variant in settings.SWEEP:
+        assert set(variant.options()) <= default, f"{variant.name}: {set(variant.options()) - default}"
+        changed = {k for k, v in variant.options().items() if v != settings.LIMITS[k]} - {"forced_step"}
+        others = (variant.imperfection != settings.IMPERFECTION) + (variant.integrator != settings.INTEGRATOR)
+        assert len(changed) + others == 1, f"{variant.name} changes {sorted(changed)} and {others} more"
+
+
+def test_imperfection_and_the_anchor_of_one_joint():
+    perfect, moved = SCENES["five_bar"](), settings.imperfect(SCENES["five_bar"](), 1e-3)
+    off = {
+        a.name: np.subtract(b.anchor, a.anchor).tolist()
+        for a, b in zip(perfect.joint, moved.joint, strict=True)
+    }
+    assert [n for n, d in off.items() if any(d)] == ["C"], f"anchors moved: {off}"
+    assert math.isclose(off["C"][0], 1e-3, rel_tol=1e-9) and off["C"][1:] == [0.0, 0.0], f"C by {off['C']}"
+
+
+@pytest.mark.parametrize(
+    ("table", "row", "column"),
+    [
+        ("I", "LM2", "θ₂ = π/4"),
+        ("I", "MPI (SVD)", "θ₂ = π/4"),
+        ("I", "MPI (GS)", "θ₂ = π/2"),
+        ("II", "MPI (GS) + CP", "five-bar"),
+    ],
+)
+def test_cell_and_a_real_run(table, row, column):
+    [cell] = [c for c in CELLS if (c.table, c.row, c.column) == (table, row, column)]
+    run = simulated(Label(table, row, column))
+    mark = match(cell, run.outcome, run.t_end)
+    assert mark is Match.SAME, f"paper {cell}; ours {run.outcome.label} at {run.t_end:.5f} s"
+
+
+def test_forced_step_and_the_outcome_that_ends_a_run():
+    """Without it the step fails where with it the run goes on until its violation ends it."""
+    case = runs.linkage("MPI (SVD)", "θ₂ = π/4", np.array([0.1]))
+    options = dict(case.setting.options)
+    forced = simulate(case.scene, case.setting.family, case.times, Limits(**options))
+    free = simulate(case.scene, case.setting.family, case.times, Limits(**{**options, "forced_step": 0.0}))
+    assert (free.outcome, forced.outcome) == (Outcome.STEP_FAILED, Outcome.VIOLATION), (
+        f"free {free.outcome.label} at {free.t_end}, forced {forced.outcome.label} at {forced.t_end}"
+    )
+
+
+def test_forced_step_and_a_run_that_never_needs_it():
+    scene, times = SCENES["planar_slider_crank"](), [0.05, 0.1]
+    plain = simulate(scene, "mpi-svd+none", times, Limits(rtol=1e-6))
+    forced = simulate(scene, "mpi-svd+none", times, Limits(rtol=1e-6, forced_step=1e-9))
+    assert np.array_equal(plain.position, forced.position), "a forced step far below the steps changed them"
+
+
+def test_rank_and_the_crossings_of_the_rhombus():
+    for theta0 in (math.pi / 4, math.pi / 2):
+        times = [t for t, _ in singular.crossings(theta0, 0.06)]
+        at = [singular.rank(v) for v in singular.scaled_singular_values(four_bar(theta0), np.array(times))]
+        between = singular.scaled_singular_values(four_bar(theta0), np.array(times) + 0.005)
+        beside = [singular.rank(v) for v in between]
+        assert set(at) == {17} and set(beside) == {18}, f"ranks at kπ {at}, beside {beside}"
+
+
+def test_fold_and_the_driver():
+    open_fold, closed = (singular.fold_residual(theta, -0.1) for theta in (math.pi, 0.0))
+    assert open_fold < 1e-14, f"on the fold from π the joints and the driver are off by {open_fold}"
+    assert math.isclose(closed, 0.1, rel_tol=1e-9), (
+        f"on the fold from 0 the driver is off by {closed}, not 0.1"
+    )
+
+
+def test_heavy_crank_and_its_disc():
+    plain = SCENES["spatial_slider_crank"]()
+    heavy: Scene = settings.heavy_crank(plain, 1)
+    more = np.subtract(heavy.body[0].inertia, plain.body[0].inertia)
+    disc = settings.FLYWHEEL * np.array([0.5, 1.0, 0.5])
+    assert np.allclose(more, disc, rtol=1e-12), f"added {more}, a disc about y is {disc}"
+
+
+@pytest.mark.slow
+def test_table_i_and_the_paper():
+    """The whole of Table I: the letter of every cell, and the end time of at least two of three."""
+    marks = Counter()
+    for cell in CELLS:
+        if cell.table == "I":
+            run = simulated(Label("I", cell.row, cell.column))
+            marks[match(cell, run.outcome, run.t_end)] += 1
+    assert marks[Match.DIFFERENT] == 0 and marks[Match.SAME] >= 22, f"marks: {marks}"
