@@ -128,7 +128,8 @@ def _counts(records: Records) -> list[Block]:
         Table(
             f"{about}The paper gives no inertias; ours has the flywheel that puts the first singular "
             "position of the planar mechanism at the paper's 1.81 s, so that the crank turns slower than the "
-            "paper's step counts suggest: compare ratios.",
+            "paper's step counts suggest. Its steps are bounded by the largest step and by samples "
+            "every 0.05 s, which leaves little for partitioning to lengthen.",
             header, iv, right=right,
         ),
     ]  # fmt: skip
@@ -187,6 +188,11 @@ def _where(column: str, run: Run) -> str:
     t, k = min(singular.crossings(theta0, 25.0), key=lambda crossing: abs(crossing[0] - run.t_end))
     near = abs(t - run.t_end) * singular.CRANK_RATE
     if near > NEAR:
-        return f"ends {near:.2g} rad from the crossing θ₂ = {k}π, off the branch since an earlier one"
+        return f"ends {near:.2g} rad from the crossing θ₂ = {_turns(k)}, off the branch since an earlier one"
     others = [time for time, _ in singular.crossings(theta0, t + 0.06)]
-    return f"ends at θ₂ = {k}π, crossing {others.index(t) + 1} of {', '.join(f'{o:.4f}' for o in others)} s"
+    return f"ends at θ₂ = {_turns(k)} ({others.index(t) + 1} of {', '.join(f'{o:.4f}' for o in others)} s)"
+
+
+def _turns(k: int) -> str:
+    """k π as written."""
+    return {0: "0", 1: "π", -1: "-π"}.get(k, f"{k}π")

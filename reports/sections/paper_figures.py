@@ -49,12 +49,12 @@ def render(records: Records) -> list[Block]:
         _poses(8, five_bar, _only(five, (*free, "MPI (SVD) + CP")), "The five-bar"),
         Heading("Figures 11 to 16: dynamic analysis, 100 N m on the crank"),
         _rates(11, _only(heavy, branches), "planar slider-crank, a = b: the first singular position comes "
-               "at 1.81 s; after it the methods part, the smooth branch is that of the last one"),
+               "at 1.81 s. The flywheel outweighs the links, so the branches hardly differ here"),
         _poses(12, dynamic_scene(HEAVY), _only(heavy, ("MPI (GS)", "MPI (GS) + B")),
-               "The slider-crank with a = b, around its first singular positions", (1.4, 3.2)),
+               "The slider-crank with a = b, in the last seconds of both runs", (3.4, 4.8)),
         _accelerations(13, _only(heavy, ("MPI (GS) + CP",))),
         _rates(14, _only(unequal, held), "planar slider-crank, a ≠ b, partitioning; there is no singular "
-               "position, and all agree"),
+               "position"),
         _rates(15, _only(spatial, plain), "spatial slider-crank without partitioning"),
         _rates(16, _only(spatial, held), "spatial slider-crank with partitioning"),
     ]  # fmt: skip
@@ -78,7 +78,7 @@ def _ended(runs: Named) -> str:
 def _poses(paper: int, scene: Scene, runs: Named, what: str, span: tuple[float, float] | None = None):
     caption = (
         f"Figure {paper}. {what}: poses from the start, light, to the last sample before the end, dark; "
-        f"{_ended(runs)}. Dense samples cut the steps, so that ends may differ from the tables'."
+        f"{_ended(runs)}. Steps end at samples, so that the end may differ from the tables'."
     )
     return Figure(f"paper-figure-{paper}", caption, partial(plot_poses, scene, runs, span))
 
