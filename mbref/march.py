@@ -7,6 +7,7 @@ from numpy import isfinite
 from mbref.compiled import INDICES, INT, MATRIX, VECTOR, entry, kernel, pointer_to
 from mbref.loads import remember_angles
 from mbref.singular import (
+    APART,
     choose_nodes,
     extrapolate,
     keep_state,
@@ -214,7 +215,7 @@ def leap(
 ):  # fmt: skip
     """Cross a window by extrapolation and projection; samples inside it are taken as extrapolated."""
     t, size = clock[TIME], pivots[SIZES, 1]
-    found = choose_nodes(history, counts[STEPS], 0.5 * length, nodes)
+    found = choose_nodes(history, counts[STEPS], APART * length, nodes)
     while place[SAMPLE] < times.shape[0] and times[place[SAMPLE]] <= t + length:
         clock[TIME] = times[place[SAMPLE]]
         place_inside(clock[TIME], history, nodes, found, y_new[:size], y_rate[:size], work)

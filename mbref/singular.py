@@ -18,8 +18,9 @@ from mbref.tables import MEMO, REFERENCE_PIVOT, SMALLEST_PIVOT
 
 WINDOW = 1e-3  # relative pivot at the edge: rounding of 1e-16 costs 1e-13 there
 NEAR = 0.05  # below it the relative pivot is taken to fall linearly
-KEPT = 24  # states kept; a leap uses NODES of them, at least half its length apart
+KEPT = 48  # states kept; a leap uses NODES of them, at least APART times its length apart
 NODES = 4
+APART = 2.0  # the extrapolation then magnifies rounding 14-fold; at 0.5 it was a thousandfold
 NEVER = 1e300
 
 
@@ -64,7 +65,7 @@ def leap_length(history, taken):
     slope, pivot = pivot_slope(history, taken), history[taken % KEPT, 1]
     if slope == 0.0 or pivot > WINDOW:
         return 0.0
-    return 1.3 * (pivot + WINDOW) / slope  # the slope is known to a third
+    return 2.0 * (pivot + WINDOW) / slope  # the slope is known to a factor of two
 
 
 @kernel
