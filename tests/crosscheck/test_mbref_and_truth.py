@@ -28,15 +28,16 @@ RUNS = [
     ("five_bar", 0.02, "mpi-svd+partitioning", 1e-11, 1e-11),
 ]
 
-# every crossing of singular positions below must keep the smooth branch
+# scene, end time (s), singular positions passed.  A wrong branch is an error of order one.
 CROSSINGS = [
-    ("four_bar", 0.2),
-    ("four_bar_straight", 0.1),
-    ("five_bar", 0.1),
-    ("four_bar_gravity", 1.0),
-    ("planar_slider_crank_equal", 0.2),
-    ("planar_slider_crank_heavy", 20.0),
+    ("four_bar", 0.2, 8),
+    ("four_bar_straight", 0.1, 4),
+    ("five_bar", 0.1, 4),
+    ("four_bar_gravity", 1.0, 2),
+    ("planar_slider_crank_equal", 0.2, 4),
+    ("planar_slider_crank_heavy", 20.0, 64),
 ]
+PER_CROSSING = 1e-10  # rounding of 1e-16 over the window of 1e-3, magnified by the leap's extrapolation
 
 
 def judged(name, end, method, rtol):
@@ -52,13 +53,13 @@ def test_trajectory_and_truth(name, end, method, rtol, allowed):
     assert measured["error"] < allowed, f"{name}, {method}: error {measured['error']:.2e}, not {allowed:g}"
 
 
-@pytest.mark.parametrize(("name", "end"), CROSSINGS)
+@pytest.mark.parametrize(("name", "end", "crossings"), CROSSINGS)
 @pytest.mark.parametrize("rtol", [1e-5, 1e-7, 1e-9, 1e-11])
-def test_singular_positions_and_truth(name, end, rtol):
-    # the error of a smooth problem grows with the tolerance; a wrong branch is an error of order one
+def test_singular_positions_and_truth(name, end, crossings, rtol):
     measured = judged(name, end, "mpi-svd+projection", rtol)
-    allowed = 1e2 * rtol if rtol < 1e-8 else 1e3 * rtol
-    assert measured["error"] < allowed, f"{name}, rtol {rtol:g}: error {measured['error']:.2e}"
+    smooth = 1e2 * rtol if rtol < 1e-8 else 1e3 * rtol  # coarse steps are further from the asymptotic error
+    allowed = smooth + crossings * PER_CROSSING
+    assert measured["error"] < allowed, f"{name}, rtol {rtol:g}: {measured['error']:.2e}, not {allowed:.1e}"
 
 
 @pytest.mark.parametrize("name", [n for n in SCENES if n != "four_bar_straight"])
