@@ -17,6 +17,7 @@ from crosscheck.progress import counted, shown
 from crosscheck.record import public
 from crosscheck.request import RequestError
 from crosscheck.study import TIME_LIMIT, Case, Record, key, study
+from mbref.scene import SceneError
 from mbref.trajectory import Outcome
 
 COMPLETED, OTHERWISE, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -31,7 +32,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = _parser().parse_args(argv)
     try:
         return arguments.command(arguments)
-    except RequestError as error:
+    except (RequestError, SceneError) as error:
         for fault in error.faults:
             print(fault, file=sys.stderr)
         return BAD_INPUT

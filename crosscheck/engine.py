@@ -118,5 +118,8 @@ def engine(name: str) -> Engine:
             return point.load()
     if ":" in name:
         module, attribute = name.split(":", 1)
-        return getattr(import_module(module), attribute)
+        found = getattr(import_module(module), attribute)
+        if isinstance(found, Engine):
+            return found
+        raise LookupError(f"{name!r} is no engine: it does not implement crosscheck.engine.Engine")
     raise LookupError(f"unknown engine {name!r}; known: {', '.join(engine_names())}")

@@ -143,7 +143,12 @@ def plan(
         raise RequestError(*reasons)
     for reason in reasons:
         notice(reason)
-    cases = cases if families is None else _of_families(cases, families)
+    if families is not None:
+        chosen = _of_families(cases, families)
+        for name in dict.fromkeys(case.engine for case in cases):
+            if all(case.engine != name for case in chosen):
+                notice(f"{name} has no setting {' or '.join(families)} here and is left out")
+        cases = chosen
     return cases if rtol is None else _at_tolerance(cases, rtol)
 
 

@@ -15,6 +15,7 @@ from mbref.scene import Scene, SceneError
 from mbref.scenes import SCENES, find_scene
 
 BAD_INPUT, INCOMPLETE, INTERRUPTED = 2, 1, 130
+PIPED_WIDTH = 160  # characters of a line where no terminal says otherwise
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -103,7 +104,10 @@ def sample_times(options: argparse.Namespace, scene: Scene) -> np.ndarray:
         raise ValueError(f"--times: must be numbers separated by commas, got {options.times!r}") from None
     if not np.isfinite(times).all() or times[0] < 0 or np.any(np.diff(times) <= 0):
         raise ValueError(f"--times: must be finite, not negative and increasing, got {options.times}")
-    return times if options.duration is None else times[times <= duration]
+    times = times if options.duration is None else times[times <= duration]
+    if not times.size:
+        raise ValueError(f"--times: none is within --duration {duration:g}")
+    return times
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -141,7 +145,8 @@ def _show(scene: Scene, trajectory) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    console, cost = Console(), trajectory.cost
+    console = Console() if sys.stdout.isatty() else Console(width=PIPED_WIDTH)
+    cost = trajectory.cost
     ended = trajectory.outcome
     console.print(f"[bold]{scene.name}[/] by {trajectory.method}: {ended.name} at t = {trajectory.t_end:g} s")
     if trajectory.message:
@@ -154,7 +159,7 @@ def _show(scene: Scene, trajectory) -> None:
     if not trajectory.times.size:
         return
     table = Table(title=f"state at t = {trajectory.times[-1]:g} s")
-    table.add_column("body")
+    table.add_column("body", no_wrap=True)
     for heading in ("position, m", "velocity, m/s", "angular velocity, rad/s"):
         table.add_column(heading, justify="right", no_wrap=True)
     for b, name in enumerate(trajectory.bodies):

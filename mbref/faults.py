@@ -130,7 +130,7 @@ def reference_faults(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             yield f"driver[{i}].joint", f"{name!r} already has a driver"
         driven.add(name if isinstance(name, str) else "")
         if start := _initial_value(driver):
-            message = f"value(0) must be 0 (it is measured from the initial position), got {start:g}"
+            message = f"c0 + amplitude·sin(phase) must be 0, motion is measured from t = 0; got {start:g}"
             yield f"driver[{i}].polynomial", message
     for i, load in enumerate(_entries(data, "load")):
         kind = _get(load, "type")

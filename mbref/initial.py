@@ -43,8 +43,8 @@ def consistent_start(model: Model) -> Start:
 
 def scene_length(model: Model) -> float:
     """The largest distance between two of the centres of mass and joint anchors at t = 0 (m)."""
-    points = [body.position for body in model.bodies]
-    for joint in model.joints:
+    points = [body.position for body in model.scene.body]
+    for joint in model.scene.joint:
         points += getattr(joint, "anchors", None) or [joint.anchor]
     array = np.array(points)
     return float(np.max(np.linalg.norm(array[:, None] - array[None], axis=-1))) or 1.0
@@ -115,23 +115,38 @@ def _given(model: Model, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _velocities(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]:
-    """Velocities that meet Φ_q v = ν and the given ones as nearly as that allows; the rest least in M."""
+    """Velocities that meet Φ_q v = ν, and how far the given ones were from that.
+
+    Among the solutions those nearest to the given velocities (angular ones times the scene's length);
+    what they leave open is least in the metric of M.
+    """
     v, given = _given(model, q)
-    if not model.m:
-        return v, 0.0
+    scale = np.tile(np.repeat([1.0, 1 / scene_length(model)], 3), model.nb)
+    wanted = v[given] / scale[given]
     terms = model.terms(0.0, q, v)
-    inverse_root = _inverse_root(model)
-    d = terms.jacobian * inverse_root
-    free = np.flatnonzero(~given)
-    x = _least_norm(d[:, free], terms.nu - terms.jacobian @ v)  # let what is not given do it alone
-    completed = v.copy()
-    completed[free] += inverse_root[free] * x
-    residual = terms.nu - terms.jacobian @ completed
-    violation = float(np.max(np.abs(residual)))
-    speed = max(float(np.max(np.abs(completed))), float(np.max(np.abs(terms.nu))), 1e-12)
-    if given.any() and violation > GROSS * speed:
-        worst = int(np.argmax(np.abs(residual)))
-        raise _fault(model, worst, f"the initial velocities violate the constraint by {violation:.3g}")
-    completed += inverse_root * _least_norm(d, residual)
-    completed += inverse_root * _least_norm(d, terms.nu - terms.jacobian @ completed)
-    return completed, violation if given.any() else 0.0
+    jacobian = terms.jacobian * scale
+    x, open_ = _solutions(jacobian, terms.nu)
+    if np.max(np.abs(jacobian @ x - terms.nu), initial=0.0) > GROSS * np.max(np.abs(x), initial=0.0):
+        worst = int(np.argmax(np.abs(jacobian @ x - terms.nu)))
+        raise _fault(model, worst, "the driver contradicts the joints")
+    step, still_open = _solutions(open_[given], wanted - x[given])
+    x, open_ = x + open_ @ step, open_ @ still_open
+    as_given = x.copy()
+    as_given[given] = wanted
+    residual = np.abs(jacobian @ as_given - terms.nu)
+    if np.max(np.abs(x[given] - wanted), initial=0.0) > GROSS * np.max(np.abs(wanted), initial=0.0):
+        what = f"the initial velocities violate the constraint by {residual.max():.3g}"
+        raise _fault(model, int(np.argmax(residual)), what)
+    if open_.size:
+        weight = np.sqrt(model.mass) * scale
+        x = x - open_ @ _least_norm(weight[:, None] * open_, weight * x)
+    return x * scale, float(np.max(residual, initial=0.0))
+
+
+def _solutions(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The least-norm least-squares solution (n,), and an orthonormal basis (n, k) of what it leaves open."""
+    if not matrix.size:
+        return np.zeros(matrix.shape[1]), np.eye(matrix.shape[1])
+    u, values, vt = np.linalg.svd(matrix)
+    rank = int(np.sum(values > RANK_TOLERANCE * values[0]))
+    return vt[:rank].T @ ((u[:, :rank].T @ rhs) / values[:rank]), vt[rank:].T

@@ -100,9 +100,11 @@ def _part(text: str, table: Mapping, kind: str, options: dict[str, dict[str, flo
         if key not in part.options:
             raise MethodError(f"{kind} {name} has no option {key!r}; it has: {_listed(part.options)}")
         try:
-            options.setdefault(name, {})[key] = float(value)
+            options.setdefault(name, {})[key] = number = float(value)
         except ValueError:
             raise MethodError(f"{kind} {name}: option {key} must be a number, got {value!r}") from None
+        if not number >= 0 or (key == "step" and number == 0):
+            raise MethodError(f"{kind} {name}: option {key} must be positive, got {value}")
     return part
 
 
