@@ -24,7 +24,8 @@ REASONS: Mapping[str, str] = {
     "the spatial slider-crank: it then completes 20 s on the wrong branch, 3.1 rad off",
     "violation = 0.003": "largest |Φ| tolerated, m or rad",
     "rank_tolerance = 1e-10": "relative, of singular values and pivots",
-    "imperfection 1e-10 m": "joint C shifted along x: data of finite precision; the linkages only",
+    "imperfection 1e-10 m": "joint C shifted along x: data of finite precision; the linkages only. Direction "
+    "and size were chosen after trying others, so the number of matches carries that choice",
     "Baumgarte α = β = 5": "as printed",
     "ALF α = 1e4, ω = 10, μ = 1, 100 iterations": "α is not given; it weights rows of unit length here",
     "ALF ε = 1e-6": "relative to |q̈|, about 1e4 in these units in the linkages: 1e-2 absolutely",
