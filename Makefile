@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help check test lint deep report quick bench clean
+.PHONY: help check test lint deep coverage report quick bench clean
 
 help: ## show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -24,6 +24,11 @@ lint: $(VENV)/ready ## format and lint
 
 deep: $(VENV)/ready ## the slow tests too, with many more random cases
 	HYPOTHESIS_PROFILE=deep $(BIN)/pytest -n 2 -m "slow or not slow"
+
+coverage: $(VENV)/ready ## coverage of mbref, its kernels run as plain Python
+	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run --source=mbref -m pytest -q tests/properties \
+	    $(addprefix tests/mbref/test_,formulations.py counts.py scene.py kinematics.py)
+	$(BIN)/coverage report
 
 report: $(VENV)/ready ## the whole comparison report, into report/
 	$(BIN)/crosscheck report
