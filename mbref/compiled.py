@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numba
-from numba import b1, cfunc, f8, i8, njit, types
+from numba import cfunc, f8, i8, njit, types
 
 OPTIONS = {"cache": True, "error_model": "numpy"}  # no fastmath: the same bits with and without the JIT
 PLAIN = bool(numba.config.DISABLE_JIT)
@@ -30,7 +30,6 @@ VECTOR = types.Array(f8, 1, "C")
 MATRIX = types.Array(f8, 2, "C")
 INDICES = types.Array(i8, 1, "C")
 INDEX_TABLE = types.Array(i8, 2, "C")
-BOOL = b1
 FLOAT = f8
 INT = i8
 

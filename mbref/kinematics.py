@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 
-from mbref import __version__, rotations
+from mbref import __version__
 from mbref.diagnose import rank_of, scaled_jacobian
 from mbref.initial import consistent_start, displaced
 from mbref.model import Model, Terms
@@ -116,17 +116,13 @@ class _Analysis:
         self, times: np.ndarray, states: list, outcome: Outcome, message: str, cost: Cost
     ) -> Trajectory:
         """The states in the scene's frames."""
-        nb, own = self.model.nb, slice(0, len(self.scene.body))
+        nb = self.model.nb
         q = np.array([s[0] for s in states]).reshape(-1, nb, 7)
         v = np.array([s[1] for s in states]).reshape(-1, nb, 6)
         a = np.array([s[2] for s in states]).reshape(-1, nb, 6)
-        p = q[..., 3:]
         return Trajectory(
             scene=self.scene.name, engine="mbref", version=__version__, method=NAME, settings={},
-            times=times, bodies=tuple(b.name for b in self.scene.body), position=q[:, own, :3],
-            orientation=rotations.multiply(p, rotations.conjugate(self.model.principal))[:, own],
-            velocity=v[:, own, :3], angular_velocity=rotations.rotate(p, v[..., 3:])[:, own],
-            acceleration=a[:, own, :3], angular_acceleration=rotations.rotate(p, a[..., 3:])[:, own],
+            times=times, bodies=tuple(b.name for b in self.scene.body), **self.model.motion(q, v, a),
             outcome=outcome, t_end=self.t, message=message, cost=cost,
         )  # fmt: skip
 

@@ -116,6 +116,21 @@ class Model:
             return np.array(point)
         return q[b, :3] + rotations.rotate(q[b, 3:], self._point(joint.bodies[1], point))
 
+    def motion(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> dict[str, np.ndarray]:
+        """Poses, velocities and accelerations of the scene's bodies as a Trajectory names them.
+
+        From q (k, nb, 7), v and a (k, nb, 6) of the principal frames to the bodies' own, world axes.
+        """
+        own, p = slice(0, len(self.scene.body)), q[..., 3:]
+        return {
+            "position": q[:, own, :3],
+            "orientation": rotations.multiply(p, rotations.conjugate(self.principal))[:, own],
+            "velocity": v[:, own, :3],
+            "angular_velocity": rotations.rotate(p, v[..., 3:])[:, own],
+            "acceleration": a[:, own, :3],
+            "angular_acceleration": rotations.rotate(p, a[..., 3:])[:, own],
+        }
+
     def _pack_bodies(self) -> None:
         principal = [_principal_axes(body) for body in self.bodies]
         self.principal = rotations.from_matrix(np.array([axes for _, axes in principal]))

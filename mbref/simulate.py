@@ -214,12 +214,10 @@ class _Run:
 
     def trajectory(self, status: int, seconds: float, built: float) -> Trajectory:
         """The samples reached, in the scene's frames and units."""
-        model, reached, n_bodies = self.model, int(self.place[SAMPLE]), len(self.scene.body)
+        model, reached = self.model, int(self.place[SAMPLE])
         q, v, a, multipliers = (sample[:reached] for sample in self.samples)
         nb = model.nb
         q, v, a = q.reshape(reached, nb, 7), v.reshape(reached, nb, 6), a.reshape(reached, nb, 6)
-        p = q[..., 3:]
-        own = slice(0, n_bodies)
         counts = self.counts
         return Trajectory(
             scene=self.scene.name,
@@ -229,12 +227,7 @@ class _Run:
             settings=asdict(self.limits),
             times=self.times[:reached],
             bodies=tuple(body.name for body in self.scene.body),
-            position=q[:, own, :3],
-            orientation=rotations.multiply(p, rotations.conjugate(model.principal))[:, own],
-            velocity=v[:, own, :3],
-            angular_velocity=rotations.rotate(p, v[..., 3:])[:, own],
-            acceleration=a[:, own, :3],
-            angular_acceleration=rotations.rotate(p, a[..., 3:])[:, own],
+            **model.motion(q, v, a),
             reactions=self._reactions(q, v, multipliers),
             outcome=OUTCOMES[status],
             t_end=float(self.clock[TIME]),
