@@ -8,6 +8,7 @@ import hashlib
 import json
 import os
 import platform
+import threading
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor, as_completed, wait
 from importlib import metadata
@@ -31,6 +32,8 @@ PACKAGES = ("numpy", "scipy", "numba")
 
 Record = dict[str, Any]
 Progress = Callable[[int, int, Record], None]  # cases done, cases in all, the record just done
+
+_preparing = threading.Lock()
 
 
 class Case(NamedTuple):
@@ -85,12 +88,13 @@ def study(
 
     Each record is appended to ``records_path`` as its run ends; records that the file already has are
     not run again, unless they ran out of a shorter time limit than the case's.  Runs are spread by
-    ``executor``, by default threads, one a core: each run is a process of its own.
+    ``executor``, by default threads, one a core: each run is a process of its own.  Any executor of
+    concurrent.futures will do, such as a process pool, or a Dask client's ``get_executor()`` for runs on
+    other machines; its workers have to have this package and the engines, and say which machine they are.
     """
     keys = [key(case) for case in cases]
     records = _resumed(records_path, cases, keys)
     left = {k: case for k, case in zip(keys, cases, strict=True) if k not in records}
-    _prepare(list(left.values()))
     with contextlib.closing(_run_all(list(left.values()), executor)) as fresh:
         for record in fresh:
             records[record["key"]] = record
@@ -100,13 +104,10 @@ def study(
     return [records[k] for k in keys]
 
 
-def _prepare(cases: Sequence[Case]) -> None:
-    """Have each engine do once what would otherwise count against the time limit of its first runs."""
-    families: dict[str, set[str]] = {}
-    for case in cases:
-        families.setdefault(case.engine, set()).add(case.setting.family)
-    for name, wanted in families.items():
-        engine(name).prepare(sorted(wanted))
+@functools.cache
+def _prepare(engine_name: str, family: str) -> None:
+    """Have the engine do once what would otherwise count against the time limit of its first run here."""
+    engine(engine_name).prepare([family])
 
 
 def key(case: Case) -> str:
@@ -120,6 +121,8 @@ def key(case: Case) -> str:
 
 def run_case(case: Case) -> Record:
     """The raw record of one run, its metrics included."""
+    with _preparing:
+        _prepare(case.engine, case.setting.family)
     trajectory = run_isolated(case.engine, case.scene, case.times, case.setting, case.time_limit)
     return {
         "schema": SCHEMA,

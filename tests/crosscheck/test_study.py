@@ -13,6 +13,7 @@ import pytest
 from crosscheck.engine import Setting
 from crosscheck.study import Case, default_cases, key, study
 from mbref.scene import Body, Force, Scene
+from mbref.scenes import SCENES
 from mbref.trajectory import Trajectory
 
 TIMES = np.array([0.0, 0.1, 0.3])
@@ -95,10 +96,46 @@ def test_timed_out_case_is_repeated_with_a_longer_limit_only(tmp_path: Path):
     assert (again["key"], again["time_limit"]) == (first["key"], 1.5)
 
 
-def test_process_pool_and_threads_agree():
-    cases = [case("a"), case("b", "RAISE")]
-    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        assert study(cases, pool) == study(cases)
+@pytest.fixture(scope="module")
+def one_after_the_other() -> list[dict]:
+    """Records of EVERYWHERE in this process, one at a time."""
+    with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(1) as one:
+        patch.syspath_prepend(str(Path(__file__).parent))
+        return study(everywhere(), one)
+
+
+def everywhere() -> list[Case]:
+    """A real run, one that completes and one that fails."""
+    scene = SCENES["planar_slider_crank"]()
+    real = Case(scene, np.array([0.0, 0.05]), "mbref", Setting("alf-dual+projection", {"rtol": 1e-6}))
+    return [real, case("a"), case("b", "RAISE")]
+
+
+def test_process_pool_and_serial_run_agree(one_after_the_other: list[dict]):
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        records = study(everywhere(), pool)
+    assert untimed(records) == untimed(one_after_the_other)
+    assert [r["outcome"] for r in records] == ["COMPLETED", "COMPLETED", "CRASHED"]
+
+
+def test_cluster_of_two_workers_and_serial_run_agree(one_after_the_other: list[dict], tmp_path: Path):
+    from distributed import Client, LocalCluster
+
+    path = tmp_path / "records.jsonl"
+    quiet = {"dashboard": False, "dashboard_address": "127.0.0.1:0"}
+    cluster = LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", scheduler_kwargs=quiet)
+    with cluster, Client(cluster) as client:
+        assert len(client.scheduler_info()["workers"]) == 2
+        records = study(everywhere(), client.get_executor(), path)
+    assert untimed(records) == untimed(one_after_the_other)
+    stored = [json.loads(line) for line in path.read_text().splitlines()]
+    assert sorted(stored, key=lambda r: r["key"]) == sorted(records, key=lambda r: r["key"])
+
+
+def untimed(records: list[dict]) -> list[dict]:
+    """The records without the seconds that runs took."""
+    kept = ("steps", "rejected", "rhs", "factorisations", "newton")
+    return [{**r, "cost": {name: r["cost"][name] for name in kept}} for r in records]
 
 
 @pytest.mark.parametrize(
