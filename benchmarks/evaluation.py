@@ -22,11 +22,11 @@ SCENE_NAMES = ("spatial_slider_crank", "planar_slider_crank", "four_bar", "five_
 CALLS, REPEATS = 2000, 15
 
 
-@entry(INT(pointer_to(RATES), pointer_to(ACCELERATE), INT, VECTOR, VECTOR, *PROBLEM))
-def repeat(rates, accelerate, calls, y, y_rate, ints, floats, work, pivots, settings, counts):
+@entry(INT(pointer_to(RATES), pointer_to(ACCELERATE), INT, VECTOR, VECTOR, PROBLEM))
+def repeat(rates, accelerate, calls, y, y_rate, problem):
     status = 0
     for _ in range(calls):
-        status = rates(accelerate, 0.0, y, y_rate, ints, floats, work, pivots, settings, counts)
+        status = rates(accelerate, 0.0, y, y_rate, problem)
     return status
 
 
@@ -47,7 +47,7 @@ def _prepared(formulation: str, scene: str):
     run = _Run(SCENES[scene](), Method.parse(f"{formulation}+none"), np.array([1.0]), Limits())
     rates, accelerate = run.method.stabilisation.rates.pointer, run.method.formulation.accelerate.pointer
     y, y_rate = run.y[: run.pivots[SIZES, 1]], run.y_rate[: run.pivots[SIZES, 1]]
-    return lambda: repeat(rates, accelerate, CALLS, y, y_rate, *run.problem)
+    return lambda: repeat(rates, accelerate, CALLS, y, y_rate, run.problem)
 
 
 def _seconds(call) -> float:

@@ -159,6 +159,16 @@ def times_transpose(d, y, x):
 
 
 @kernel
+def times_columns(dt, y, x):
+    """x = Dᵀ y from Dᵀ (n, m)."""
+    n, m = dt.shape
+    for j in range(n):
+        x[j] = 0.0
+        for i in range(m):
+            x[j] += dt[j, i] * y[i]
+
+
+@kernel
 def cholesky_factor(a, n, tolerance):
     """Uᵀ U of the upper half of a[:n, :n], in place; False where a pivot is ≤ tolerance."""
     for k in range(n):

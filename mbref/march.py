@@ -6,6 +6,7 @@ from numpy import isfinite
 
 from mbref.compiled import INDICES, INT, MATRIX, VECTOR, entry, kernel, pointer_to
 from mbref.loads import remember_angles
+from mbref.problem import opened
 from mbref.singular import (
     APART,
     choose_nodes,
@@ -153,19 +154,20 @@ def part_of(interval, h):
     INT(
         pointer_to(STEP), pointer_to(PROPOSE), pointer_to(RATES), pointer_to(ACCEPT), pointer_to(ACCELERATE),
         VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, VECTOR, INDICES, VECTOR,
-        VECTOR, VECTOR, VECTOR, MATRIX, MATRIX, INDICES, *PROBLEM,
+        VECTOR, VECTOR, VECTOR, MATRIX, MATRIX, INDICES, PROBLEM,
     )
 )  # fmt: skip
 def march(
     step, propose, rates, accept, accelerate,
     times, sample_q, sample_v, sample_a, sample_m, clock, control, place, tolerances,
-    y, y_rate, y_new, memory, history, nodes, ints, floats, work, pivots, settings, counts,
+    y, y_rate, y_new, memory, history, nodes, problem,
 ):  # fmt: skip
     """Advance until the last sample time, a failure, or the number of steps per call; says which."""
+    ints, floats, work, pivots, _settings, counts = opened(problem)
     taken = 0
     while True:
         t, size = clock[TIME], pivots[SIZES, 1]
-        status = rates(accelerate, t, y[:size], y_rate[:size], ints, floats, work, pivots, settings, counts)
+        status = rates(accelerate, t, y[:size], y_rate[:size], problem)
         if status == OK:
             status = judge(y[:size], y_rate[:size], place, control, work)
         if status != OK:
@@ -185,7 +187,7 @@ def march(
         if length > 0.0:
             status = leap(
                 length, accept, times, sample_q, sample_v, sample_a, sample_m, clock, place,
-                y, y_rate, y_new, history, nodes, ints, floats, work, pivots, settings, counts,
+                y, y_rate, y_new, history, nodes, problem,
             )  # fmt: skip
             memory[:] = 0.0
             if place[SAMPLE] == times.shape[0]:
@@ -200,8 +202,7 @@ def march(
         )  # fmt: skip
         status = advance(
             suggested, step, propose, rates, accept, accelerate, times[place[SAMPLE]], clock, control,
-            tolerances, y, y_rate, y_new, memory, history, nodes, ints, floats, work, pivots, settings,
-            counts,
+            tolerances, y, y_rate, y_new, memory, history, nodes, problem,
         )  # fmt: skip
         if status != OK:
             return status
@@ -211,9 +212,10 @@ def march(
 @kernel
 def leap(
     length, accept, times, sample_q, sample_v, sample_a, sample_m, clock, place,
-    y, y_rate, y_new, history, nodes, ints, floats, work, pivots, settings, counts,
+    y, y_rate, y_new, history, nodes, problem,
 ):  # fmt: skip
     """Cross a window by extrapolation and projection; samples inside it are taken as extrapolated."""
+    _ints, _floats, work, pivots, _settings, counts = opened(problem)
     t, size = clock[TIME], pivots[SIZES, 1]
     found = choose_nodes(history, counts[STEPS], APART * length, nodes)
     while place[SAMPLE] < times.shape[0] and times[place[SAMPLE]] <= t + length:
@@ -225,7 +227,7 @@ def leap(
     extrapolate(history, nodes, found, t + length, y_new[:size], y_rate[:size], work[DENSE])
     counts[STEPS] += 1
     counts[CROSSINGS] += 1
-    status = accept(t + length, y_new, ints, floats, work, pivots, settings, counts)
+    status = accept(t + length, y_new, problem)
     if status == OK:
         y[:] = y_new
     return status
@@ -234,9 +236,10 @@ def leap(
 @kernel
 def advance(
     suggested, step, propose, rates, accept, accelerate, target, clock, control, tolerances,
-    y, y_rate, y_new, memory, history, nodes, ints, floats, work, pivots, settings, counts,
+    y, y_rate, y_new, memory, history, nodes, problem,
 ):  # fmt: skip
     """One accepted step towards the target time, as many attempts as it takes."""
+    _ints, _floats, work, pivots, _settings, counts = opened(problem)
     t, size, interval = clock[TIME], pivots[SIZES, 1], target - clock[TIME]
     limit = min(largest_step(control, work), to_edge(history, counts[STEPS]))
     suggested = min(max(suggested, control[FORCED_STEP]), limit)
@@ -247,14 +250,14 @@ def advance(
             h = part_of(interval, suggested)
         ratio = step(
             rates, accelerate, t, h, y[:size], y_rate[:size], y_new[:size], memory, tolerances,
-            ints, floats, work, pivots, settings, counts,
+            problem,
         )  # fmt: skip
         now = target if h == interval else t + h
         status = OK if ratio >= 0.0 else (int(-ratio) if ratio < 0.0 else NOT_FINITE)
         if status == OK and h <= control[FORCED_STEP]:
             ratio = min(ratio, 1.0)
         if status == OK and ratio <= 1.0:
-            status = accept(now, y_new, ints, floats, work, pivots, settings, counts)
+            status = accept(now, y_new, problem)
             if status == OK or status == CHANGED:  # noqa: SIM109 - no containers in kernels
                 counts[STEPS] += 1
                 y[:] = y_new

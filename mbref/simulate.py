@@ -26,6 +26,7 @@ from mbref.march import (
 )
 from mbref.method import Method
 from mbref.model import Model
+from mbref.problem import packed
 from mbref.scene import Scene, SceneError
 from mbref.singular import KEPT, NODES
 from mbref.tables import (
@@ -152,10 +153,11 @@ class _Run:
         self.work = model.workspace(formulation.scratch(model.m, model.n))
         self.pivots = np.zeros((5, 2 * (model.m + 7 * model.nb)), dtype=np.int64)
         self.counts = np.zeros(6, dtype=np.int64)
-        self.problem = (
+        self.arrays = (
             model.ints, model.floats, self.work, self.pivots,
             method.settings(limits.rank_tolerance), self.counts,
         )  # fmt: skip
+        self.problem = packed(*self.arrays)
         chart = stabilisation.rates, stabilisation.accept
         kernels = integrator.step, integrator.propose, *chart, formulation.accelerate
         self.kernels = tuple(kernel.pointer for kernel in kernels)
@@ -187,7 +189,7 @@ class _Run:
         state[COORDINATES] = start.q
         state[VELOCITIES, : start.v.size] = start.v
         self.y = np.zeros(14 * self.model.nb)
-        self.pivots[SIZES, 1] = stabilisation.enter.callable(0.0, self.y, *self.problem)
+        self.pivots[SIZES, 1] = stabilisation.enter.callable(0.0, self.y, self.problem)
 
     def _allocate(self, rows: int) -> None:
         k, nb, n, m = self.times.size, self.model.nb, self.model.n, self.model.m
@@ -203,7 +205,7 @@ class _Run:
         tolerances = np.array([self.limits.rtol, atol])
         arguments = (
             *self.kernels, self.times, *self.samples, self.clock, self.control, self.place, tolerances,
-            self.y, self.y_rate, self.y_new, self.memory, self.history, self.nodes, *self.problem,
+            self.y, self.y_rate, self.y_new, self.memory, self.history, self.nodes, self.problem,
         )  # fmt: skip
         began, status = time.process_time(), PAUSED
         while status == PAUSED:

@@ -67,14 +67,14 @@ INTS = types.UniTuple(INDEX_TABLE, 3)
 FLOATS = types.UniTuple(MATRIX, 5)
 WORK = types.UniTuple(MATRIX, 12)
 PIVOTS = INDEX_TABLE  # (5, ·): orders and exchanges; pivots[SIZES] = rank and length of y
-PROBLEM = (INTS, FLOATS, WORK, PIVOTS, VECTOR, INDICES)  # ints, floats, work, pivots, settings, counts
+PROBLEM = INDEX_TABLE  # all of these, settings and counts behind one argument: see problem.py
 
 # signatures of the exchangeable kernels
 ACCELERATE = INT(VECTOR, VECTOR, MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, INDICES, INDICES, VECTOR, VECTOR)
-ENTER = INT(FLOAT, VECTOR, *PROBLEM)
-RATES = INT(pointer_to(ACCELERATE), FLOAT, VECTOR, VECTOR, *PROBLEM)
-ACCEPT = INT(FLOAT, VECTOR, *PROBLEM)
+ENTER = INT(FLOAT, VECTOR, PROBLEM)
+RATES = INT(pointer_to(ACCELERATE), FLOAT, VECTOR, VECTOR, PROBLEM)
+ACCEPT = INT(FLOAT, VECTOR, PROBLEM)
 STEP = FLOAT(
-    pointer_to(RATES), pointer_to(ACCELERATE), FLOAT, FLOAT, VECTOR, VECTOR, VECTOR, MATRIX, VECTOR, *PROBLEM
+    pointer_to(RATES), pointer_to(ACCELERATE), FLOAT, FLOAT, VECTOR, VECTOR, VECTOR, MATRIX, VECTOR, PROBLEM
 )  # fmt: skip
 PROPOSE = FLOAT(FLOAT, FLOAT, FLOAT, VECTOR, VECTOR, MATRIX, VECTOR, VECTOR)

@@ -1,6 +1,11 @@
-"""Three-vectors as tuples, for the kernels: compiled they cost nothing and allocate nothing."""
+"""Three-vectors as tuples, for the kernels: compiled they cost nothing and allocate nothing.
+
+And ``larger``, for norms.
+"""
 
 from __future__ import annotations
+
+from numpy import isnan
 
 from mbref.compiled import kernel
 from mbref.tables import ROTATION
@@ -10,6 +15,13 @@ from mbref.tables import ROTATION
 def vector(table, row, column):
     """Three consecutive entries of a row."""
     return table[row, column], table[row, column + 1], table[row, column + 2]
+
+
+@kernel
+def larger(size, value):
+    """The larger of a size and a value's magnitude; undefined where either is."""
+    magnitude = abs(value)
+    return magnitude if magnitude > size or isnan(magnitude) else size
 
 
 @kernel

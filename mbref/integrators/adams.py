@@ -107,14 +107,14 @@ def estimate(h, k, y, memory, tolerances):
 @exchangeable(STEP)
 def step(
     rates, accelerate, t, h, y, y_rate, y_new, memory, tolerances,
-    ints, floats, work, pivots, settings, counts,
+    problem,
 ):  # fmt: skip
     n, k = y.shape[0], int(memory[STATE, K])
     memory[STATE, NEXT_K] = k
     coefficients(h, k, memory)
     predict(h, k, y, y_new, memory)
     change = memory[CHANGE, :n]
-    status = rates(accelerate, t + h, y_new, change, ints, floats, work, pivots, settings, counts)
+    status = rates(accelerate, t + h, y_new, change, problem)
     if status != OK:
         return -float(status)
     for i in range(n):

@@ -11,7 +11,7 @@ from mbref.tables import OK, STEP
 @exchangeable(STEP)
 def step(
     rates, accelerate, t, h, y, y_rate, y_new, memory, tolerances,
-    ints, floats, work, pivots, settings, counts,
+    problem,
 ):  # fmt: skip
     n = y.shape[0]
     k, total = memory[0, :n], memory[1, :n]
@@ -21,7 +21,7 @@ def step(
         part = h if s == 2 else 0.5 * h
         for i in range(n):
             y_new[i] = y[i] + part * k[i]
-        status = rates(accelerate, t + part, y_new, k, ints, floats, work, pivots, settings, counts)
+        status = rates(accelerate, t + part, y_new, k, problem)
         if status != OK:
             return -float(status)
         weight = 1.0 if s == 2 else 2.0

@@ -6,6 +6,7 @@ from numpy import sqrt
 
 from mbref.compiled import exchangeable, kernel
 from mbref.evaluation import accelerations, coordinate_rates
+from mbref.problem import opened
 from mbref.tables import (
     ACCELERATION,
     ACCEPT,
@@ -33,12 +34,14 @@ def copy_state(state, y):
 
 
 @exchangeable(ENTER)
-def enter(t, y, ints, floats, work, pivots, settings, counts):
+def enter(t, y, problem):
+    _ints, _floats, work, _pivots, _settings, _counts = opened(problem)
     return copy_state(work[STATE], y)
 
 
 @exchangeable(RATES)
-def rates(accelerate, t, y, y_rate, ints, floats, work, pivots, settings, counts):
+def rates(accelerate, t, y, y_rate, problem):
+    ints, floats, work, pivots, settings, counts = opened(problem)
     state, acceleration = work[STATE], work[COLUMNS][ACCELERATION]
     nq = state.shape[1]
     nv = acceleration.shape[0]
@@ -67,6 +70,7 @@ def normalise(q):
 
 
 @exchangeable(ACCEPT)
-def accept(t, y, ints, floats, work, pivots, settings, counts):
+def accept(t, y, problem):
+    _ints, _floats, work, _pivots, _settings, _counts = opened(problem)
     normalise(y[: work[STATE].shape[1]])
     return OK

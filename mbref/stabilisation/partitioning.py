@@ -14,6 +14,7 @@ from __future__ import annotations
 from mbref.compiled import exchangeable, kernel
 from mbref.evaluation import accelerations, coordinate_rates, evaluate
 from mbref.linalg import full_pivot, lu_factor, lu_solve
+from mbref.problem import opened
 from mbref.stabilisation.base import Stabilisation
 from mbref.tables import (
     ACCELERATION,
@@ -107,7 +108,8 @@ def read(y, work, pivots):
 
 
 @exchangeable(ENTER)
-def enter(t, y, ints, floats, work, pivots, settings, counts):
+def enter(t, y, problem):
+    ints, floats, work, pivots, settings, counts = opened(problem)
     state, last = work[STATE], work[LAST]
     q, v = state[COORDINATES], state[VELOCITIES][: work[COLUMNS].shape[1]]
     coordinate_rates(q, v, state[COORDINATE_RATES])
@@ -222,7 +224,8 @@ def second_rates(work):
 
 
 @exchangeable(RATES)
-def rates(accelerate, t, y, y_rate, ints, floats, work, pivots, settings, counts):
+def rates(accelerate, t, y, y_rate, problem):
+    ints, floats, work, pivots, settings, counts = opened(problem)
     status = solve_positions(t, y, ints, floats, work, pivots, settings, counts)
     if status != OK:
         return status
@@ -239,7 +242,8 @@ def rates(accelerate, t, y, y_rate, ints, floats, work, pivots, settings, counts
 
 
 @exchangeable(ACCEPT)
-def accept(t, y, ints, floats, work, pivots, settings, counts):
+def accept(t, y, problem):
+    ints, floats, work, pivots, settings, counts = opened(problem)
     status = solve_positions(t, y, ints, floats, work, pivots, settings, counts)
     if status != OK:
         return status

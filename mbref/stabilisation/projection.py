@@ -1,17 +1,19 @@
 """Projection of positions and velocities onto the constraints after every accepted step.
 
 Mass-orthogonal: the correction is the least in the metric of M (Bayo & Ledesma, Nonlinear Dynamics 9,
-1996).  Positions by Newton's method with D = Φ_q M^(-1/2), least-norm steps from a pivoted QR of Dᵀ, which
-leaves redundant rows out; velocities with the same factors.
+1996), M^(-1/2) Dᵀ (D Dᵀ)⁻¹ b with the independent rows of D = Φ_q M^(-1/2): positions by Newton's method,
+velocities with the same factor.  A pivoted QR of Dᵀ finds the independent rows; while they stay well
+apart, the Cholesky factor of D Dᵀ is the same R for less work, and its smallest pivot says when they do not.
 """
 
 from __future__ import annotations
 
-from numpy import cos, sin, sqrt
-
 from mbref.compiled import exchangeable, kernel
-from mbref.evaluation import dense_jacobian, evaluate, violation_rate
-from mbref.orthogonal import equilibrate, minimum_norm, qr_pivoted
+from mbref.evaluation import coordinate_rates, dense_jacobian, evaluate, violation_rate
+from mbref.linalg import cholesky_factor, cholesky_solve, gram, times_columns
+from mbref.orthogonal import equilibrate, qr_pivoted
+from mbref.problem import opened
+from mbref.singular import NEAR
 from mbref.stabilisation.base import Stabilisation
 from mbref.stabilisation.full import copy_state, normalise, rates
 from mbref.tables import (
@@ -34,56 +36,113 @@ from mbref.tables import (
     PHI_RATE,
     RANK_TOLERANCE,
     REFERENCE_PIVOT,
-    RHS,
     ROW_SCALE,
     ROWS,
+    SIZES,
     SMALLEST_PIVOT,
     STATE,
     STEP_X,
 )
+from mbref.vectors import larger
 
 MOST_ITERATIONS = 10
-GOOD_REDUCTION = 1e-2  # the same factors serve while each iteration reduces the violation this much
-TAU, NORMS, ROW_WORK = 0, 1, 3  # rows of DENSE_VECTORS; the norms take two
+GOOD_REDUCTION = 1e-2  # the same factor serves while each iteration reduces the violation this much
+TAU, NORMS, ROW_WORK = 0, 1, 3  # rows of DENSE_VECTORS during a QR; the norms take two
+VALUES, CHANGE = 0, 1  # rows of DENSE_VECTORS during a correction
 
 
 @kernel
-def factor(ints, work, pivots, settings, counts):
-    """Pivoted QR of Dᵀ at the state last evaluated; the rank."""
-    dense_jacobian(ints, work)
-    jacobian, rows = work[PHI_Q], work[ROWS]
-    m, n = jacobian.shape
-    equilibrate(jacobian, work[COLUMNS][INVERSE_ROOT], jacobian, rows[ROW_SCALE])
-    b, vectors = work[DENSE], work[DENSE_VECTORS]
+def chosen_rows(work, rank):
+    """Memory for the chosen rows of D as columns (n, rank), and for R (rank, rank)."""
+    memory, (m, n) = work[DENSE].reshape(-1), work[PHI_Q].shape
+    return (
+        memory[: n * rank].reshape((n, rank)),
+        memory[n * m : n * m + rank * rank].reshape((rank, rank)),
+    )
+
+
+@kernel
+def select(d, order, columns):
+    """Rows of D (m, n) in the given order as columns (n, rank)."""
+    n, rank = columns.shape
+    for j in range(n):
+        for i in range(rank):
+            columns[j, i] = d[order[i], j]
+
+
+@kernel
+def choose(work, pivots, settings, counts):
+    """Choose the independent rows of D by a pivoted QR of Dᵀ, which gives R; their number."""
+    d, vectors = work[PHI_Q], work[DENSE_VECTORS]
+    m, n = d.shape
+    b, order = work[DENSE].reshape(-1)[: n * m].reshape((n, m)), pivots[CHART_PIVOTS]
     for i in range(m):
         for j in range(n):
-            b[j, i] = jacobian[i, j]
+            b[j, i] = d[i, j]
     counts[FACTORISATIONS] += 1
     rank = qr_pivoted(
-        b, n, m, pivots[CHART_PIVOTS], vectors[TAU], vectors[NORMS : NORMS + 2], vectors[ROW_WORK],
+        b, n, m, order, vectors[TAU], vectors[NORMS : NORMS + 2], vectors[ROW_WORK],
         settings[RANK_TOLERANCE],
     )  # fmt: skip
-    watch_pivot(rank, work)
+    columns, r = chosen_rows(work, rank)
+    for i in range(rank):
+        for k in range(i, rank):
+            r[i, k] = b[i, k]
+    select(d, order, columns)
+    pivots[SIZES, 0] = rank
+    watch_pivot(abs(r[rank - 1, rank - 1]) if rank > 0 else 0.0, rank, work)
     return rank
 
 
 @kernel
-def watch_pivot(rank, work):
-    """Keep the largest rank seen, its last pivot now, and the largest that pivot has been."""
+def smallest_pivot(columns, r):
+    """R of the chosen rows, D Dᵀ = Rᵀ R, by Cholesky; its smallest pivot, 0 where there is none."""
+    rank = r.shape[0]
+    gram(columns, r)
+    if rank == 0 or not cholesky_factor(r, rank, 0.0):
+        return 0.0
+    smallest = r[0, 0]
+    for i in range(1, rank):
+        smallest = min(smallest, r[i, i])
+    return smallest
+
+
+@kernel
+def factor(ints, work, pivots, settings, counts):
+    """R at the state last evaluated, with the rows chosen before where they serve; their number."""
+    dense_jacobian(ints, work)
+    d, memo, rank = work[PHI_Q], work[MEMO][0], pivots[SIZES, 0]
+    equilibrate(d, work[COLUMNS][INVERSE_ROOT], d, work[ROWS][ROW_SCALE])
+    if rank == 0 or rank != int(memo[GENERIC_RANK]):
+        return choose(work, pivots, settings, counts)
+    columns, r = chosen_rows(work, rank)
+    select(d, pivots[CHART_PIVOTS], columns)
+    counts[FACTORISATIONS] += 1
+    smallest = smallest_pivot(columns, r)
+    if not smallest > NEAR * memo[REFERENCE_PIVOT]:
+        return choose(work, pivots, settings, counts)
+    watch_pivot(smallest, rank, work)
+    return rank
+
+
+@kernel
+def watch_pivot(pivot, rank, work):
+    """Keep the largest rank seen, its smallest pivot now, and the largest that pivot has been."""
     memo = work[MEMO][0]
     if rank > memo[GENERIC_RANK]:
         memo[GENERIC_RANK] = rank
         memo[REFERENCE_PIVOT] = 0.0
-    generic = int(memo[GENERIC_RANK])
-    memo[SMALLEST_PIVOT] = abs(work[DENSE][generic - 1, generic - 1]) if 0 < generic == rank else 0.0
+    memo[SMALLEST_PIVOT] = pivot if rank == int(memo[GENERIC_RANK]) else 0.0
     memo[REFERENCE_PIVOT] = max(memo[REFERENCE_PIVOT], memo[SMALLEST_PIVOT])
 
 
 @exchangeable(ENTER)
-def enter(t, y, ints, floats, work, pivots, settings, counts):
+def enter(t, y, problem):
+    ints, floats, work, pivots, settings, counts = opened(problem)
     size = copy_state(work[STATE], y)
     nq, nv = work[STATE].shape[1], work[COLUMNS].shape[1]
     evaluate(t, y[:nq], y[nq : nq + nv], ints, floats, work)
+    pivots[SIZES, 0] = 0  # no rows are chosen yet
     factor(ints, work, pivots, settings, counts)
     return size
 
@@ -91,48 +150,46 @@ def enter(t, y, ints, floats, work, pivots, settings, counts):
 @kernel
 def correction(which, rank, work, pivots):
     """The least M-norm change of r and π', or of velocities, that cancels row ``which`` of ROWS."""
-    rows, x, inverse_root = work[ROWS], work[COLUMNS][STEP_X], work[COLUMNS][INVERSE_ROOT]
-    for i in range(rows.shape[1]):
-        rows[RHS, i] = -rows[which, i] * rows[ROW_SCALE, i]
-    n = x.shape[0]
-    minimum_norm(work[DENSE], n, rank, pivots[CHART_PIVOTS], work[DENSE_VECTORS][TAU], rows[RHS], x)
-    for j in range(n):
+    rows, x, order = work[ROWS], work[COLUMNS][STEP_X], pivots[CHART_PIVOTS]
+    values = work[DENSE_VECTORS][VALUES][:rank]
+    for i in range(rank):
+        values[i] = -rows[which, order[i]] * rows[ROW_SCALE, order[i]]
+    columns, r = chosen_rows(work, rank)
+    least_change(columns, r, work[COLUMNS][INVERSE_ROOT], values, x)
+
+
+@kernel
+def least_change(columns, r, inverse_root, values, x):
+    """x = M^(-1/2) Dᵀ (Rᵀ R)⁻¹ values; overwrites ``values`` (rank,)."""
+    cholesky_solve(r, r.shape[0], values)
+    times_columns(columns, values, x)
+    for j in range(x.shape[0]):
         x[j] *= inverse_root[j]
 
 
 @kernel
-def displace(q, x):
-    """Move coordinates by (δr, δπ') per body: p becomes p times the rotation of vector δπ'."""
-    for b in range(q.shape[0] // 7):
-        i, j = 7 * b, 6 * b
-        for k in range(3):
-            q[i + k] += x[j + k]
-        a, b_, c = x[j + 3], x[j + 4], x[j + 5]
-        angle = sqrt(a * a + b_ * b_ + c * c)
-        s = 0.5 if angle < 1e-6 else sin(0.5 * angle) / angle
-        e0, e1, e2, e3 = cos(0.5 * angle), s * a, s * b_, s * c
-        w, x_, y, z = q[i + 3], q[i + 4], q[i + 5], q[i + 6]
-        q[i + 3] = w * e0 - x_ * e1 - y * e2 - z * e3
-        q[i + 4] = w * e1 + x_ * e0 + y * e3 - z * e2
-        q[i + 5] = w * e2 - x_ * e3 + y * e0 + z * e1
-        q[i + 6] = w * e3 + x_ * e2 - y * e1 + z * e0
+def displace(q, x, change):
+    """Move coordinates by (δr, δπ') per body: p + ½ Lᵀ δπ', back to unit length."""
+    coordinate_rates(q, x, change)
+    for k in range(q.shape[0]):
+        q[k] += change[k]
     normalise(q)
 
 
 @kernel
 def largest(values):
-    """The largest magnitude of a vector."""
+    """The largest magnitude of a vector; undefined where an entry is."""
     size = 0.0
     for value in values:
-        if not abs(value) <= size:
-            size = abs(value)
+        size = larger(size, value)
     return size
 
 
 @exchangeable(ACCEPT)
-def accept(t, y, ints, floats, work, pivots, settings, counts):
+def accept(t, y, problem):
+    ints, floats, work, pivots, settings, counts = opened(problem)
     nq = work[STATE].shape[1]
-    rows, x = work[ROWS], work[COLUMNS][STEP_X]
+    rows, x, change = work[ROWS], work[COLUMNS][STEP_X], work[DENSE_VECTORS][CHANGE]
     q, v = y[:nq], y[nq : nq + x.shape[0]]
     normalise(q)
     evaluate(t, q, v, ints, floats, work)
@@ -143,7 +200,7 @@ def accept(t, y, ints, floats, work, pivots, settings, counts):
             break
         counts[NEWTON] += 1
         correction(PHI, rank, work, pivots)
-        displace(q, x)
+        displace(q, x, change)
         evaluate(t, q, v, ints, floats, work)
         before, violation = violation, largest(rows[PHI])
         if violation > settings[NEWTON_TOLERANCE] and not violation <= GOOD_REDUCTION * before:
