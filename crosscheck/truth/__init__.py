@@ -11,6 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
+from crosscheck.truth.crankshaft import crankshaft
 from crosscheck.truth.free_body import free_body
 from crosscheck.truth.parallelogram import parallelogram
 from crosscheck.truth.path import Path, one_dof
@@ -24,6 +25,7 @@ from mbref.trajectory import Trajectory
 PATHS: tuple[Callable[[Scene], Path | None], ...] = (
     parallelogram,
     planar_slider_crank,
+    crankshaft,
     spatial_slider_crank,
     slider,
 )

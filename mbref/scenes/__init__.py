@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -10,12 +11,14 @@ from pathlib import Path
 from mbref.scene import Scene, SceneError
 from mbref.scenes.five_bar import five_bar, five_bar_gravity
 from mbref.scenes.four_bar import four_bar, four_bar_gravity
+from mbref.scenes.four_bar_chain import four_bar_chain
 from mbref.scenes.planar_slider_crank import (
     planar_slider_crank,
     planar_slider_crank_equal,
     planar_slider_crank_gravity,
     planar_slider_crank_heavy,
 )
+from mbref.scenes.slider_crank_chain import slider_crank_chain
 from mbref.scenes.spatial_slider_crank import (
     spatial_slider_crank,
     spatial_slider_crank_driven,
@@ -36,6 +39,14 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "planar_slider_crank_equal": planar_slider_crank_equal,
     "planar_slider_crank_heavy": planar_slider_crank_heavy,
     "planar_slider_crank_gravity": planar_slider_crank_gravity,
+    "four_bar_chain": four_bar_chain,
+    "slider_crank_chain": slider_crank_chain,
+}
+
+# of any number of loops, two unless said: four_bar_chain[40]
+CHAINS: dict[str, Callable[[int, str], Scene]] = {
+    "four_bar_chain": four_bar_chain,
+    "slider_crank_chain": slider_crank_chain,
 }
 
 
@@ -43,6 +54,9 @@ def find_scene(name: str) -> Scene:
     """The built-in scene of that name, or the scene in that .toml file; raises SceneError."""
     if name in SCENES:
         return SCENES[name]()
+    chain = re.fullmatch(r"(\w+)\[([1-9]\d*)\]", name)
+    if chain and chain[1] in CHAINS:
+        return CHAINS[chain[1]](int(chain[2]), name)
     if name.endswith(".toml") or Path(name).exists():
         return Scene.from_file(name)
     raise SceneError([f"unknown scene {name!r}; built-in: {', '.join(SCENES)}; or a .toml file"])

@@ -39,6 +39,6 @@ def link(
     )  # fmt: skip
 
 
-def slider(position: tuple[float, float, float], **velocities: tuple[float, float, float]) -> Body:
+def slider(position: tuple[float, float, float], name: str = "slider") -> Body:
     """The slider of both slider-cranks: 1 kg, 0.001 kg m² about every axis."""
-    return Body(name="slider", mass=1.0, inertia=(1e-3, 1e-3, 1e-3), position=position, **velocities)
+    return Body(name=name, mass=1.0, inertia=(1e-3, 1e-3, 1e-3), position=position)

@@ -21,7 +21,7 @@ FLYWHEEL = 104.125  # kg m², puts the first singular position at 1.81 s, as in 
 
 def planar_slider_crank(a: float = 0.304, b: float = 0.4048, name: str = "planar_slider_crank") -> Scene:
     """100 N m on the crank, from rest at θ = 0; crank a, rod b (m)."""
-    return _mechanism(a, b, 0.0, name).with_(load=(Moment(body="crank", moment=TORQUE),), duration=0.4)
+    return slider_crank(a, b, 0.0, name).with_(load=(Moment(body="crank", moment=TORQUE),), duration=0.4)
 
 
 def planar_slider_crank_equal(name: str = "planar_slider_crank_equal") -> Scene:
@@ -41,26 +41,30 @@ def planar_slider_crank_heavy(name: str = "planar_slider_crank_heavy") -> Scene:
 
 def planar_slider_crank_gravity(name: str = "planar_slider_crank_gravity") -> Scene:
     """Under gravity along -y, from θ = 0.3 at 30 rad/s."""
-    return _mechanism(0.304, 0.4048, 0.3, name, rate=30.0).with_(gravity=(0.0, -9.81, 0.0), duration=1.0)
+    return slider_crank(0.304, 0.4048, 0.3, name, rate=30.0).with_(gravity=(0.0, -9.81, 0.0), duration=1.0)
 
 
-def _mechanism(a: float, b: float, theta0: float, name: str, rate: float | None = None) -> Scene:
+def slider_crank(
+    a: float, b: float, theta0: float, name: str, rate: float | None = None, suffix: str = "", z: float = 0.0
+) -> Scene:
+    """Without load: crank a and rod b (m) from θ = theta0 (rad) at ``rate`` (rad/s), in the plane at z."""
     phi = -math.asin(a * math.sin(theta0) / b)
-    pin = (a * math.cos(theta0), a * math.sin(theta0), 0.0)
-    end = (pin[0] + b * math.cos(phi), 0.0, 0.0)
-    origin = (0.0, 0.0, 0.0)
+    pin = (a * math.cos(theta0), a * math.sin(theta0), z)
+    end = (pin[0] + b * math.cos(phi), 0.0, z)
+    origin = (0.0, 0.0, z)
     moving = {} if rate is None else {"angular_velocity": (0.0, 0.0, rate)}
+    crank, rod, piston = (part + suffix for part in ("crank", "rod", "slider"))
     return Scene(
         name=name,
         body=(
-            link("crank", origin, pin, about_z(theta0), a, **moving),
-            link("rod", pin, end, about_z(phi), b),
-            slider(end),
+            link(crank, origin, pin, about_z(theta0), a, **moving),
+            link(rod, pin, end, about_z(phi), b),
+            slider(end, piston),
         ),
         joint=(
-            Revolute(name="A", bodies=("ground", "crank"), anchor=origin, axis=Z),
-            Revolute(name="B", bodies=("crank", "rod"), anchor=pin, axis=Z),
-            Spherical(name="C", bodies=("rod", "slider"), anchor=end),
-            Translational(name="D", bodies=("ground", "slider"), anchor=end, axis=X),
+            Revolute(name=f"A{suffix}", bodies=("ground", crank), anchor=origin, axis=Z),
+            Revolute(name=f"B{suffix}", bodies=(crank, rod), anchor=pin, axis=Z),
+            Spherical(name=f"C{suffix}", bodies=(rod, piston), anchor=end),
+            Translational(name=f"D{suffix}", bodies=("ground", piston), anchor=end, axis=X),
         ),
     )

@@ -26,6 +26,8 @@ RUNS = [
     ("four_bar", 0.02, "mpi-svd+partitioning", 1e-11, 1e-11),
     ("five_bar", 0.02, "mpi-svd+projection", 1e-11, 1e-11),
     ("five_bar", 0.02, "mpi-svd+partitioning", 1e-11, 1e-11),
+    ("four_bar_chain", 0.5, "alf-dual+projection", 1e-11, 1e-9),
+    ("slider_crank_chain", 0.1, "alf-dual+projection", 1e-11, 1e-9),
 ]
 
 # scene, end time (s), singular positions passed.  A wrong branch is an error of order one.

@@ -15,6 +15,7 @@ from tests.crosscheck.truth_scenes import ALL, Z, free, pendulum, turned_scene
 FAMILY = {name: name for name in ("planar_slider_crank", "spatial_slider_crank")} | {
     "four_bar": "parallelogram",
     "five_bar": "parallelogram",
+    "slider_crank_chain": "crankshaft",
 }
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mbref.diagnose import diagnose
-from mbref.scenes import SCENES
+from mbref.scenes import SCENES, find_scene
 from mbref.scenes.four_bar import four_bar
 
 # scene: (coordinates, rows, redundant) with the ground as a body: sections 5.1 and 5.2 of the paper
@@ -22,6 +22,17 @@ def test_counts_and_paper(name):
     counts = SCENES[name]().with_(ground="body").counts()
     found = (counts.coordinates, counts.rows, counts.redundant)
     assert found == PAPER[name], f"{name}: (coordinates, rows, redundant) {found}, the paper {PAPER[name]}"
+
+
+@pytest.mark.parametrize("loops", [1, 2, 5])
+def test_counts_of_chains_and_their_formulas(loops):
+    for name, stated in (
+        ("four_bar_chain", (12 * loops + 6, 13 * loops + 5, loops, 1)),
+        ("slider_crank_chain", (18 * loops, 24 * loops - 6, 6 * loops - 5, 1)),
+    ):
+        counts = find_scene(f"{name}[{loops}]").counts()
+        found = (counts.coordinates, counts.rows, counts.redundant, counts.degrees_of_freedom)
+        assert found == stated, f"{name}: (coordinates, rows, redundant, freedoms) {found}, stated {stated}"
 
 
 @pytest.mark.parametrize("name", PAPER)
