@@ -1,4 +1,4 @@
-"""The command line of mbref: run a scene, or say what it is."""
+"""The command line of mbref: run a scene, run variants of it, or say what it is."""
 
 from __future__ import annotations
 
@@ -61,12 +61,28 @@ def _parser() -> argparse.ArgumentParser:
         "  mbref run mechanism.toml --method lm1+baumgarte[alpha=10,beta=10]/rk4[step=1e-4]",
     )  # fmt: skip
     run.add_argument("scene", metavar="SCENE", help=scene_help)
-    run.add_argument("--method", default=DEFAULT, help=f"or kinematic; default {DEFAULT}")
-    add_time_options(run)
-    run.add_argument("--rtol", type=float, default=1e-9, help="relative tolerance per step (default 1e-9)")
-    run.add_argument("--max-step", type=float, default=0.0, help="largest step, s (default: the duration)")
-    run.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    _add_method_options(run)
     run.set_defaults(action=_run)
+
+    many = commands.add_parser(
+        "ensemble", help="simulate variants of a scene on every core", formatter_class=text,
+        description="Simulate copies of a scene with numbers drawn at random; mean and standard deviation\n"
+        "of every body at the last time. Interrupted, --out keeps what has ended; the same command goes on.",
+        epilog="example:\n"
+        "  mbref ensemble planar_slider_crank --vary 'joint[B].anchor[0]=0.304+-1e-4' \\\n"
+        "      --vary 'body[slider].mass=0.9:1.1' --count 500 --duration 0.1 --out runs.jsonl",
+    )  # fmt: skip
+    many.add_argument("scene", metavar="SCENE", help=scene_help)
+    many.add_argument(
+        "--vary", action="append", required=True, metavar="PATH=LOW:HIGH",
+        help="a number that varies, uniform; PATH=MEAN+-DEVIATION: normal; may repeat",
+    )  # fmt: skip
+    many.add_argument("--count", type=int, default=100, help="variants (default 100)")
+    many.add_argument("--seed", type=int, default=0, help="of the random numbers (default 0)")
+    many.add_argument("--workers", type=int, help="processes (default: one a core)")
+    many.add_argument("--out", metavar="FILE", help="append every trajectory, one JSON line each")
+    _add_method_options(many)
+    many.set_defaults(action=_ensemble)
 
     diagnose = commands.add_parser(
         "diagnose", help="say what a scene is: counts, rank, redundant rows", formatter_class=text,
@@ -78,6 +94,14 @@ def _parser() -> argparse.ArgumentParser:
     diagnose.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     diagnose.set_defaults(action=_diagnose)
     return parser
+
+
+def _add_method_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--method", default=DEFAULT, help=f"or kinematic; default {DEFAULT}")
+    add_time_options(parser)
+    parser.add_argument("--rtol", type=float, default=1e-9, help="relative tolerance per step (default 1e-9)")
+    parser.add_argument("--max-step", type=float, default=0.0, help="largest step, s (default: the duration)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
 
 
 def add_time_options(parser: argparse.ArgumentParser) -> None:
@@ -112,15 +136,10 @@ def sample_times(options: argparse.Namespace, scene: Scene) -> np.ndarray:
 
 def _run(options: argparse.Namespace) -> int:
     scene = find_scene(options.scene)
-    times = sample_times(options, scene)
-    if not 0 < options.rtol < 1:
-        raise ValueError(f"--rtol: must be between 0 and 1, got {options.rtol:g}")
-    if options.max_step < 0:
-        raise ValueError(f"--max-step: must not be negative, got {options.max_step:g}")
-    from mbref.simulate import Limits, simulate
+    times, limits = sample_times(options, scene), _limits(options)
+    from mbref.simulate import simulate
 
-    limits = Limits(rtol=options.rtol, largest_step=options.max_step)
-    with _progress_bar(float(times[-1])) as progress:
+    with _progress_bar("simulating", float(times[-1])) as progress:
         trajectory = simulate(scene, options.method, times, limits, progress)
     if options.json:
         print(json.dumps({"scene": scene.name, "records": [trajectory.to_record()]}))
@@ -129,16 +148,80 @@ def _run(options: argparse.Namespace) -> int:
     return 0 if trajectory.outcome.name == "COMPLETED" else INCOMPLETE
 
 
+def _limits(options: argparse.Namespace):
+    from mbref.simulate import Limits
+
+    if not 0 < options.rtol < 1:
+        raise ValueError(f"--rtol: must be between 0 and 1, got {options.rtol:g}")
+    if options.max_step < 0:
+        raise ValueError(f"--max-step: must not be negative, got {options.max_step:g}")
+    return Limits(rtol=options.rtol, largest_step=options.max_step)
+
+
 @contextmanager
-def _progress_bar(end: float) -> Iterator:
-    """Tells the time reached on stderr, where that is a terminal; appears only on long runs."""
+def _progress_bar(what: str, end: float) -> Iterator:
+    """Tells how far it is on stderr, where that is a terminal; appears only on long runs."""
     from rich.console import Console
     from rich.progress import Progress
 
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("simulating", total=end)
+        task = bar.add_task(what, total=end)
         yield lambda t: bar.update(task, completed=t)
+
+
+def _ensemble(options: argparse.Namespace) -> int:
+    from mbref.ensemble import ensemble, processes
+    from mbref.variants import Variation, variants
+
+    scene = find_scene(options.scene)
+    times, limits = sample_times(options, scene), _limits(options)
+    if options.count < 1 or not (options.workers is None or options.workers > 0):
+        raise ValueError("--count and --workers: must be at least 1")
+    scenes = variants(scene, [Variation.parse(text) for text in options.vary], options.count, options.seed)
+    runs = {}
+    with processes(options.workers) as pool, _progress_bar("simulating", options.count) as progress:
+        for place, run in ensemble(scenes, times, options.method, limits, pool, options.out):
+            runs[place] = run
+            progress(len(runs))
+    completed = [run for _, run in sorted(runs.items()) if run.outcome.name == "COMPLETED"]
+    _show_spread(scene, float(times[-1]), completed, options)
+    return 0 if len(completed) == options.count else INCOMPLETE
+
+
+def _show_spread(scene: Scene, end: float, completed: Sequence, options: argparse.Namespace) -> None:
+    """Mean and standard deviation of every body over the completed runs, at the last time."""
+    from rich.console import Console
+    from rich.table import Table
+
+    keys = ("position", "velocity", "angular_velocity")
+    last = {key: np.array([getattr(run, key)[-1] for run in completed]) for key in keys}
+    if options.json:
+        spread = {
+            f"{what}_{key}": {body.name: a[b].tolist() for b, body in enumerate(scene.body)}
+            for key, values in last.items() if completed
+            for what, a in (("mean", values.mean(axis=0)), ("deviation", values.std(axis=0)))
+        }  # fmt: skip
+        print(json.dumps({"scene": scene.name, "time": end, "completed": len(completed), **spread}))
+        return
+    console = Console() if sys.stdout.isatty() else Console(width=PIPED_WIDTH)
+    seconds = sum(run.cost.seconds for run in completed)
+    console.print(
+        f"[bold]{scene.name}[/]: {len(completed)} of {options.count} variants completed, "
+        f"{seconds:.3g} s of stepping in all"
+    )
+    if not completed:
+        return
+    table = Table(title=f"mean ± standard deviation at t = {end:g} s")
+    for heading in ("body", "position, m", "velocity, m/s", "angular velocity, rad/s"):
+        table.add_column(heading, no_wrap=True)
+    for b, body in enumerate(scene.body):
+        cells = ([_rounded(f(a[:, b], axis=0)) for f in (np.mean, np.std)] for a in last.values())
+        table.add_row(
+            body.name,
+            *("  ".join(f"{m:.5g} ± {d:.2g}" for m, d in zip(*cell, strict=True)) for cell in cells),
+        )
+    console.print(table)
 
 
 def _show(scene: Scene, trajectory) -> None:

@@ -22,6 +22,9 @@ class SceneError(Exception):
         self.faults = list(faults)
         super().__init__("\n".join(self.faults))
 
+    def __reduce__(self) -> tuple[type[SceneError], tuple[list[str]]]:
+        return type(self), (self.faults,)  # so that it comes whole out of another process
+
 
 def checked_inertia(value: Any) -> tuple[Any, ...]:
     """Three principal moments or a symmetric 3x3, as tuples; ValueError says what is unphysical."""

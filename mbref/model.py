@@ -109,12 +109,12 @@ class Model:
         return self._index[name]
 
     def anchor(self, joint: Joint, q: np.ndarray) -> np.ndarray:
-        """World position (3,) of the joint's anchor on its second body at coordinates q (nb, 7)."""
+        """World positions (…, 3) of the joint's anchor on its second body at coordinates q (…, nb, 7)."""
         point = joint.anchors[1] if joint.type == "distance" else joint.anchor
         b = self._index[joint.bodies[1]]
         if b == self.nb:
-            return np.array(point)
-        return q[b, :3] + rotations.rotate(q[b, 3:], self._point(joint.bodies[1], point))
+            return np.broadcast_to(point, (*q.shape[:-2], 3))
+        return q[..., b, :3] + rotations.rotate(q[..., b, 3:], self._point(joint.bodies[1], point))
 
     def motion(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> dict[str, np.ndarray]:
         """Poses, velocities and accelerations of the scene's bodies as a Trajectory names them.

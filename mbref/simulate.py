@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from mbref import __version__, rotations
+from mbref import __version__
 from mbref.evaluation import evaluate_all
 from mbref.initial import Start, consistent_start, scene_length
 from mbref.kinematics import NAME as KINEMATIC
@@ -27,6 +27,7 @@ from mbref.march import (
 from mbref.method import Method
 from mbref.model import Model
 from mbref.problem import packed
+from mbref.reactions import reactions
 from mbref.scene import Scene, SceneError
 from mbref.singular import KEPT, NODES
 from mbref.tables import (
@@ -230,7 +231,7 @@ class _Run:
             times=self.times[:reached],
             bodies=tuple(body.name for body in self.scene.body),
             **model.motion(q, v, a),
-            reactions=self._reactions(q, v, multipliers),
+            reactions=reactions(model, self.times[:reached], q, v, multipliers),
             outcome=OUTCOMES[status],
             t_end=float(self.clock[TIME]),
             message=self._message(status),
@@ -244,28 +245,6 @@ class _Run:
                 int(counts[NEWTON]),
             ),
         )
-
-    def _reactions(
-        self, q: np.ndarray, v: np.ndarray, multipliers: np.ndarray
-    ) -> dict[str, np.ndarray] | None:
-        """-Φ_qᵀ λ of each joint's rows on its second body, moved from the centre of mass to the anchor."""
-        if self.model.kinematic:
-            return None
-        reactions = {joint.name: np.zeros((len(q), 6)) for joint in self.scene.joint}
-        for k in range(len(q)):
-            jacobian = self.model.terms(self.times[k], q[k].ravel(), v[k].ravel()).jacobian
-            for joint in self.scene.joint:
-                reactions[joint.name][k] = self._reaction(joint, jacobian, q[k], multipliers[k])
-        return reactions
-
-    def _reaction(self, joint, jacobian: np.ndarray, q: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-        rows = [row for row, name in enumerate(self.model.row_joint) if name == joint.name]
-        first, second = (self.model.index(name) for name in joint.bodies)
-        b, sign = (second, 1.0) if second < self.model.nb else (first, -1.0)
-        generalised = -sign * jacobian[rows, 6 * b : 6 * b + 6].T @ multipliers[rows]
-        force, moment = generalised[:3], rotations.rotate(q[b, 3:], generalised[3:])
-        anchor = self.model.anchor(joint, q)
-        return np.concatenate([force, moment - np.cross(anchor - q[b, :3], force)])
 
     def _message(self, status: int) -> str:
         """One sentence: what ended the run, where; or what was corrected at its start."""

@@ -87,3 +87,12 @@ def test_door_closer_closes(tmp_path):
     angles = [float(text) for text in re.findall(r"closed by +(\S+)°", printed)]
     assert "1 redundant, 1 free" in printed, printed
     assert len(angles) == 21 and angles == sorted(angles) and angles[-1] > 40, angles
+
+
+def test_tolerances_and_first_order_theory_agree(tmp_path):
+    printed = example("03_tolerances.py", tmp_path)
+    rows = re.findall(r"deviation (\S+) m  \(first order: (\S+) m\)", printed)
+    pairs = np.array(rows, dtype=float)[2:]  # before, too little has moved for one printed digit
+    assert len(pairs) == 4, printed
+    ratio = pairs[:, 0] / pairs[:, 1]
+    assert np.all(abs(ratio - 1) < 0.3), f"200 variants are good to 15 %; measured ratios {ratio}"

@@ -1,0 +1,153 @@
+"""Ensembles: streamed, resumed and spread runs / single runs; variants / what was asked to vary."""
+
+from __future__ import annotations
+
+import json
+import math
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mbref.cli import main
+from mbref.ensemble import ensemble, processes
+from mbref.scene import SceneError
+from mbref.scenes import SCENES
+from mbref.scenes.spatial_slider_crank import OFFSET, RADIUS, ROD
+from mbref.simulate import Limits, simulate
+from mbref.variants import Variation, variants
+
+TIMES = np.array([0.0, 0.004, 0.01])
+LIMITS = Limits(rtol=1e-8)
+METHOD = "alf-dual+projection"
+DRIVEN = SCENES["spatial_slider_crank_driven"]()
+VARY = [Variation("joint[B].anchor[0]", 0.1, 1e-3, normal=True), Variation("body[slider].mass", 0.9, 1.1)]
+
+
+def poses(runs) -> dict[int, list]:
+    """What is compared: samples by place."""
+    return {place: [run.position.tolist(), run.velocity.tolist()] for place, run in runs}
+
+
+def test_two_processes_and_single_runs_agree(tmp_path: Path):
+    scenes = list(variants(DRIVEN, VARY, 5))
+    alone = {k: simulate(scene, METHOD, TIMES, LIMITS) for k, scene in enumerate(scenes)}
+    with processes(2) as pool:
+        spread = poses(ensemble(iter(scenes), TIMES, METHOD, LIMITS, pool))
+    assert spread == poses(alone.items())
+    masses = [scene.body[2].mass for scene in scenes]
+    assert len(set(masses)) == 5, f"the variants are to differ: {masses}"
+
+
+def test_variants_and_closed_form_of_the_varied_lengths_agree():
+    """The slider's place by y_C = sqrt(l² - (r cos θ - d)² - (r sin θ)²) with each variant's r and l."""
+    scenes = list(variants(DRIVEN, VARY[:1], 6))
+    with ThreadPoolExecutor(1) as one:
+        runs = dict(ensemble(scenes, TIMES, METHOD, Limits(rtol=1e-11), one))
+    start = DRIVEN.joint[2].anchor
+    for k, scene in enumerate(scenes):
+        pin = np.array(scene.joint[1].anchor)
+        r, l = np.linalg.norm(pin), np.linalg.norm(np.array(start) - pin)
+        assert r != RADIUS and math.isclose(r, RADIUS, rel_tol=0.1) and math.isclose(l, ROD, rel_tol=0.1)
+        theta = DRIVEN.driver[0].polynomial[1] * TIMES
+        exact = np.sqrt(l**2 - (r * np.cos(theta) - OFFSET) ** 2 - (r * np.sin(theta)) ** 2)
+        off = np.abs(runs[k].position[:, 2, 1] - exact).max()
+        assert off < 1e-9, f"variant {k} with r = {r}: off by {off:.2e} m"
+
+
+def test_interrupted_and_uninterrupted_ensembles_agree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    scenes, path, ran = list(variants(DRIVEN, VARY, 6)), tmp_path / "runs.jsonl", []
+
+    def counted(scene, *arguments):
+        ran.append(scenes.index(scene))
+        return simulate(scene, *arguments)
+
+    monkeypatch.setattr("mbref.ensemble.simulate", counted)
+    with ThreadPoolExecutor(1) as one:
+        whole = dict(ensemble(scenes, TIMES, METHOD, LIMITS, one))
+        ran.clear()
+        with pytest.raises(KeyboardInterrupt):
+            for taken, _ in enumerate(ensemble(scenes, TIMES, METHOD, LIMITS, one, path), 1):
+                if taken == 2:
+                    raise KeyboardInterrupt
+        kept = path.read_text().splitlines()
+        assert len(kept) >= 2, "what had been handed out was not stored"
+        path.write_text("\n".join(kept[:3]) + '\n{"key": "cut sho')
+        ran.clear()
+        again = dict(ensemble(scenes, TIMES, METHOD, LIMITS, one, path))
+        assert len(ran) == 6 - len(kept[:3]), ran
+    assert poses(again.items()) == poses(whole.items())
+    assert len({json.loads(line)["key"] for line in path.read_text().splitlines()}) == 6
+
+
+def test_other_limits_and_stored_results_are_not_confused(tmp_path: Path):
+    path = tmp_path / "runs.jsonl"
+    with ThreadPoolExecutor(1) as one:
+        [(_, rough)] = ensemble([DRIVEN], TIMES, METHOD, Limits(rtol=1e-4), one, path)
+        [(_, fine)] = ensemble([DRIVEN], TIMES, METHOD, Limits(rtol=1e-10), one, path)
+    assert fine.cost.rhs > rough.cost.rhs, (fine.cost, rough.cost)
+    assert len(path.read_text().splitlines()) == 2
+
+
+def test_faulty_scene_is_refused_whole_out_of_another_process():
+    """Three bodies without mass and no driver."""
+    light = tuple(body.model_copy(update={"mass": None, "inertia": None}) for body in DRIVEN.body)
+    undriven = DRIVEN.with_(body=light, driver=())
+    with processes(1) as pool, pytest.raises(SceneError) as raised:
+        list(ensemble([undriven], TIMES, METHOD, LIMITS, pool))
+    with pytest.raises(SceneError) as here:
+        simulate(undriven, METHOD, TIMES, LIMITS)
+    assert raised.value.faults == here.value.faults
+    assert len(raised.value.faults) == 3, raised.value.faults
+
+
+def test_drawn_numbers_and_their_distributions_agree():
+    scenes = list(variants(DRIVEN, VARY, 400, seed=3))
+    x = np.array([scene.joint[1].anchor[0] for scene in scenes])
+    mass = np.array([scene.body[2].mass for scene in scenes])
+    assert abs(x.mean() - 0.1) < 4 * 1e-3 / 20 and abs(x.std() / 1e-3 - 1) < 0.15, (x.mean(), x.std())
+    assert 0.9 <= mass.min() < 0.91 and 1.09 < mass.max() <= 1.1, (mass.min(), mass.max())
+    assert abs(np.corrcoef(x, mass)[0, 1]) < 0.2
+    unchanged = [s.with_(joint=DRIVEN.joint, body=DRIVEN.body) == DRIVEN for s in scenes]
+    assert all(unchanged), "something else was changed too"
+    assert list(variants(DRIVEN, VARY, 10, seed=3)) == scenes[:10], "the k-th depends on seed and k only"
+    assert next(variants(DRIVEN, VARY, 1, seed=4)) != scenes[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("body[0].mass", "is not PATH=LOW:HIGH"),
+        ("body[0].mass=1", "is not PATH=LOW:HIGH"),
+        ("body[0].mass=2:1", "is no interval"),
+        ("body[0].mass=1+--1", "is no interval"),
+        ("body[0].mass=0:inf", "is no interval"),
+        ("bodies[0].mass=1:2", "bodies[0].mass: is not a path"),
+        ("body[nobody].mass=1:2", "body[nobody].mass: the scene has no 'nobody'"),
+        ("body[3].mass=1:2", "body[3].mass: the scene has no '3'"),
+        ("body[0].weight=1:2", "body[0].weight: the scene has no 'weight'"),
+        ("body[0].name=1:2", "body[0].name: is not a number"),
+        ("body[0].mass=-2:-1", "variant 0: body[0].mass: must be positive"),
+    ],
+)
+def test_command_refuses_what_cannot_vary(text: str, says: str, capsys: pytest.CaptureFixture):
+    status = main(["ensemble", "four_bar", "--vary", text, "--workers", "1"])
+    printed = capsys.readouterr()
+    assert (status, printed.out) == (2, "")
+    assert says in printed.err, printed.err
+
+
+def test_command_and_single_runs_agree(tmp_path: Path, capsys: pytest.CaptureFixture):
+    path = tmp_path / "runs.jsonl"
+    status = main([
+        "ensemble", "spatial_slider_crank_driven", "--vary", "joint[B].anchor[0]=0.1+-1e-3", "--count", "4",
+        "--times", "0.01", "--rtol", "1e-8", "--workers", "1", "--out", str(path), "--json",
+    ])  # fmt: skip
+    printed = json.loads(capsys.readouterr().out)
+    assert (status, printed["completed"]) == (0, 4)
+    runs = [simulate(s, METHOD, [0.01], LIMITS) for s in variants(DRIVEN, VARY[:1], 4)]
+    places = np.array([run.position[-1, 2] for run in runs])
+    assert np.allclose(printed["mean_position"]["slider"], places.mean(axis=0), rtol=0, atol=1e-13)
+    assert np.allclose(printed["deviation_position"]["slider"], places.std(axis=0), rtol=0, atol=1e-13)
+    assert len(path.read_text().splitlines()) == 4
