@@ -46,6 +46,10 @@ LEAST_ORDER = 0.5
 ERROR_LEVELS = (1e-3, 1e-6, 1e-9)
 """Errors at which costs are compared: animation, engineering, reference."""
 
+FLOOR = 1e-8
+"""Error that every engine should reach at some setting: beyond what its integrator leaves when used with
+care, and far above rounding, which singular positions magnify to 1e-10."""
+
 FALSE_SUCCESS = 1e-2
 """Error of a completed run that makes it a false success: one percent of the mechanism's size or 0.6
 degrees is beyond any accuracy asked for, and is what a wrong branch or a lost constraint leaves."""

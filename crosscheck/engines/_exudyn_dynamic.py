@@ -1,4 +1,4 @@
-"""Exudyn's implicit solvers over the sample times: single runs and their extrapolation to h = 0.
+"""Exudyn's implicit solvers over the sample times.
 
 The functions take the exudyn module and do not import it.
 """
@@ -9,8 +9,8 @@ import math
 import re
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,10 +18,29 @@ from crosscheck.engines._exudyn_model import System, build
 from mbref.scene import Scene
 from mbref.trajectory import Cost, Outcome
 
-RICHARDSON = {1: 1 / 45, 2: -20 / 45, 4: 64 / 45}  # divisor of the step: weight; cancels h² and h⁴
 SAME = 1e-12  # relative to the end time: sample times nearer than this are the same
 
 Configure = Callable[[Any, Any, bool], Any]  # (exudyn, simulation settings, singular) -> solver type
+
+
+Samples = tuple[np.ndarray, np.ndarray, np.ndarray]  # times (k,), coordinates (3, k, nb, 7), forces (k, ·)
+
+
+class State(NamedTuple):
+    """Initial values of a system at time t (s): node coordinates (nb * 7,), their rates, data coordinates."""
+
+    t: float
+    coordinates: np.ndarray
+    rates: np.ndarray
+    data: np.ndarray
+
+
+class Ending(NamedTuple):
+    """Why a solver stopped at time t (s), and a sentence."""
+
+    t: float
+    outcome: Outcome
+    message: str
 
 
 @dataclass(frozen=True)
@@ -40,52 +59,71 @@ class Motion:
     message: str = ""
 
 
-def integrate(
-    exu: Any, scene: Scene, times: np.ndarray, step: float, configure: Configure, divisor: int = 1
-) -> Motion:
-    """One run whose time steps are the ``divisor``-th part of steps of at most ``step`` (s) that fill the
-    sample intervals; ``configure`` chooses the solver and its settings."""
-    clock = time.process_time()
-    system = build(exu, scene, forces=True)
-    built = time.process_time() - clock
-    pieces, ended, seconds, counts = [], (Outcome.COMPLETED, ""), 0.0, np.zeros(3, dtype=int)
-    for start, end, intervals in stretches(times):
-        settings = exu.SimulationSettings()
-        kind = configure(exu, settings, bool(system.redundant or scene.driver))
-        _cover(settings, start, end, intervals, divisor * step_count((end - start) / intervals, step))
+class Solver:
+    """An Exudyn system moved on in time by Exudyn's implicit solvers; ``now`` (s) is the time of its
+    initial values."""
+
+    def __init__(self, exu: Any, scene: Scene):
         clock = time.process_time()
-        try:
-            system.mbs.SolveDynamic(settings, solverType=kind, updateInitialValues=True)
-        except (exu.SolverError, exu.InternalError) as failure:
-            ended = _failure(system, failure)
-        seconds += time.process_time() - clock
-        counts += _counts(system)
-        pieces.append(system.samples())
-        if ended[0] is not Outcome.COMPLETED:
-            break
-    samples = _join(times, pieces, complete=ended[0] is Outcome.COMPLETED)
-    steps, factorisations, newton = map(int, counts)
-    cost = Cost(seconds, built, steps=steps, factorisations=factorisations, newton=newton)
-    return finite(Motion(*samples, cost, _accepted(system), *ended))
+        self.exu = exu
+        self.system: System = build(exu, scene, forces=True)
+        self.singular = bool(self.system.redundant or scene.driver)
+        self.built, self.seconds, self.counts = time.process_time() - clock, 0.0, np.zeros(3, dtype=int)
+        self.now = self.reached = 0.0
+
+    def run(
+        self, times: np.ndarray, steps: Callable[[float], int], configure: Configure
+    ) -> tuple[Samples, Ending | None]:
+        """Samples at increasing ``times`` (k,) s, none before ``now``; fewer, and why, where it stops.
+
+        Sample intervals are filled with ``steps(interval)`` equal steps; ``configure`` chooses the solver.
+        """
+        pieces, ending = [], None
+        for start, end, intervals in stretches(times, self.now):
+            settings = self.exu.SimulationSettings()
+            kind = configure(self.exu, settings, self.singular)
+            _cover(settings, start, end, intervals, steps((end - start) / intervals))
+            clock = time.process_time()
+            try:
+                self.system.mbs.SolveDynamic(settings, solverType=kind, updateInitialValues=True)
+            except (self.exu.SolverError, self.exu.InternalError) as failure:
+                ending = _failure(self.system, failure)
+            self.seconds += time.process_time() - clock
+            self.counts += _counts(self.system)
+            pieces.append(self.system.samples())
+            self.reached = _accepted(self.system)
+            if ending:
+                break
+            self.now = end
+        return _join(times, pieces, complete=ending is None), ending
+
+    def cost(self) -> Cost:
+        """What building and all runs so far have cost."""
+        steps, factorisations, newton = map(int, self.counts)
+        return Cost(self.seconds, self.built, steps=steps, factorisations=factorisations, newton=newton)
+
+    def state(self) -> State:
+        """The initial values."""
+        data, initial = self.system.mbs.systemData, self.exu.ConfigurationType.Initial
+        reads = (data.GetODE2Coordinates, data.GetODE2Coordinates_t, data.GetDataCoordinates)
+        return State(self.now, *(np.array(read(configuration=initial)) for read in reads))
+
+    def put(self, state: State) -> None:
+        """Makes ``state`` the initial values."""
+        data, initial = self.system.mbs.systemData, self.exu.ConfigurationType.Initial
+        data.SetODE2Coordinates(state.coordinates, configuration=initial)
+        data.SetODE2Coordinates_t(state.rates, configuration=initial)
+        if state.data.size:
+            data.SetDataCoordinates(state.data, configuration=initial)
+        self.now = state.t
 
 
-def extrapolate(exu: Any, scene: Scene, times: np.ndarray, step: float, configure: Configure) -> Motion:
-    """Richardson extrapolation of runs with h, h/2, h/4 for a method whose error is even in h.
-
-    Positions, Euler parameters (normalised when they are read), their rates and the joint sensors'
-    outputs are extrapolated; the samples are those that all three runs reached.
-    """
-    runs = [integrate(exu, scene, times, step, configure, divisor) for divisor in RICHARDSON]
-    k = min(len(run.times) for run in runs)
-    weighted = list(zip(RICHARDSON.values(), runs, strict=True))
-    failed = next((run for run in runs if run.outcome is not Outcome.COMPLETED), runs[-1])
-    return replace(
-        failed,
-        times=times[:k],
-        coordinates=sum(weight * run.coordinates[:, :k] for weight, run in weighted),
-        forces=sum(weight * run.forces[:k] for weight, run in weighted),
-        cost=Cost(*(sum(getattr(run.cost, item.name) for run in runs) for item in fields(Cost))),
-    )
+def integrate(exu: Any, scene: Scene, times: np.ndarray, step: float, configure: Configure) -> Motion:
+    """One run with equal time steps of at most ``step`` (s) that fill the sample intervals."""
+    solver = Solver(exu, scene)
+    samples, ending = solver.run(times, lambda interval: step_count(interval, step), configure)
+    ended = (ending.outcome, ending.message) if ending else ()
+    return finite(Motion(*samples, solver.cost(), solver.reached, *ended))
 
 
 def finite(motion: Motion) -> Motion:
@@ -107,9 +145,9 @@ def said(failure: Exception) -> str:
     return " ".join(re.sub(r"\[Python file .*?\]", "", str(failure)).split())
 
 
-def stretches(times: np.ndarray) -> Iterator[tuple[float, float, int]]:
-    """(start, end, intervals) of the stretches of equally spaced samples, from t = 0 to the last time."""
-    points = np.concatenate([[0.0], times[times > 0]])
+def stretches(times: np.ndarray, begin: float = 0.0) -> Iterator[tuple[float, float, int]]:
+    """(start, end, intervals) of the stretches of equally spaced samples, from ``begin`` (s) to the last."""
+    points = np.concatenate([[begin], times[times > begin]])
     tolerance = SAME * points[-1]
     first = 0
     while first < len(points) - 1:
@@ -142,15 +180,16 @@ def _accepted(system: System) -> float:
     return float(it.currentTime if done else it.currentTime - it.currentStepSize)
 
 
-def _failure(system: System, failure: Exception) -> tuple[Outcome, str]:
-    """The outcome of a failed solve and a sentence, from the solver's own flags."""
+def _failure(system: System, failure: Exception) -> Ending:
+    """Why a solve failed, from the solver's own flags."""
     solver = system.mbs.sys["dynamicSolver"]
-    flags, where = solver.conv, f"at t = {solver.it.currentTime:g} s"
+    t, flags = solver.it.currentTime, solver.conv
     if "not factorized" in str(failure) or flags.linearSolverFailed or flags.massMatrixNotInvertible:
-        return Outcome.SINGULAR_MATRIX, f"singular system matrix {where}: {said(failure)}"
+        return Ending(t, Outcome.SINGULAR_MATRIX, f"singular system matrix at t = {t:g} s: {said(failure)}")
     if not flags.newtonConverged:
-        return Outcome.NOT_CONVERGED, f"Newton's method stopped {where} with residual {flags.residual:.3g}"
-    return Outcome.STEP_FAILED, f"{solver.GetErrorString()} {where}"
+        message = f"Newton's method stopped at t = {t:g} s with residual {flags.residual:.3g}"
+        return Ending(t, Outcome.NOT_CONVERGED, message)
+    return Ending(t, Outcome.STEP_FAILED, f"{solver.GetErrorString()} at t = {t:g} s")
 
 
 def _counts(system: System) -> np.ndarray:
@@ -159,16 +198,13 @@ def _counts(system: System) -> np.ndarray:
     return np.array([it.currentStepIndex - 1, it.newtonJacobiCount, it.newtonStepsCount])
 
 
-Samples = tuple[np.ndarray, np.ndarray, np.ndarray]  # times (k,), coordinates (3, k, nb, 7), forces (k, ·)
-
-
 def _join(times: np.ndarray, pieces: Sequence[Samples], complete: bool) -> Samples:
     """The wanted samples out of what the stretches recorded (each repeats its start)."""
     recorded, values, forces = (
         np.concatenate([part if n == 0 else np.delete(part, 0, axis) for n, part in enumerate(parts)], axis)
         for axis, parts in zip((0, 1, 0), zip(*pieces, strict=True), strict=True)
     )
-    if times[0] > 0:
+    if times[0] > recorded[0]:
         recorded, values, forces = recorded[1:], values[:, 1:], forces[1:]
     wanted = times[: len(recorded)]
     shift = wanted - recorded

@@ -1,8 +1,9 @@
 """Exudyn: rigid bodies with Euler parameters, implicit solvers with multipliers, static driven kinematics.
 
 Families: "defaults" is SolveDynamic as it comes; "trapezoidal" and "alpha" are single runs of the
-trapezoidal rule with index-2 constraints and of generalised alpha; "tuned" extrapolates three
-trapezoidal runs to h = 0; "static" solves a fully driven mechanism pose by pose.
+trapezoidal rule with index-2 constraints and of generalised alpha; "tuned" extrapolates three trapezoidal
+runs to h = 0 and starts anew behind singular positions; "static" solves a fully driven mechanism pose by
+pose.
 """
 
 from __future__ import annotations
@@ -19,9 +20,11 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Setting, Why
-from crosscheck.engines._exudyn_dynamic import RICHARDSON, Motion, extrapolate, integrate
+from crosscheck.engines._exudyn_dynamic import Motion, integrate
+from crosscheck.engines._exudyn_extrapolation import RICHARDSON, extrapolate
 from crosscheck.engines._exudyn_reactions import reactions
 from crosscheck.engines._exudyn_static import drive
+from crosscheck.engines._motion import fastest_rate
 from crosscheck.kinematics import initial_poses, jacobian
 from crosscheck.tolerances import RANK
 from mbref import rotations
@@ -29,9 +32,12 @@ from mbref.scene import Driver, Scene
 from mbref.trajectory import Trajectory
 
 STEPS = (100, 400, 1600, 6400, 25600)  # over a scene's duration
+TUNED_STEPS = (0.4, 0.15, 0.05, 0.015, 0.006)  # rad turned per step
+MOST_TUNED = 25600  # steps over a scene's duration
 STATIC_STEPS = (100, 400, 1600)
 SHORTEST = 5e-6  # s; below, the full-pivoting solver loses rows of the scaled Newton matrix
 SPECTRAL_RADIUS = 0.9
+SCOUT_SAMPLES = 41  # of the coarse run that finds how fast a scene turns
 
 
 class Exudyn(Engine):
@@ -52,12 +58,22 @@ class Exudyn(Engine):
         found = []
         if scene.has_mass():
             found += _sweep("defaults", scene, STEPS, SHORTEST)
-            found += _sweep("tuned", scene, STEPS[:-1], SHORTEST * max(RICHARDSON))
+            found += [Setting("tuned", {"step": step}) for step in self._tuned_steps(scene)]
             found += _sweep("trapezoidal", scene, STEPS, SHORTEST)
             found += _sweep("alpha", scene, STEPS, SHORTEST)
         if _fully_driven(scene):
             found += _sweep("static", scene, STATIC_STEPS, 0.0)
         return found
+
+    def _tuned_steps(self, scene: Scene) -> list[float]:
+        """Steps (s) of the extrapolated family, by the angle turned in one."""
+        rate = fastest_rate(scene, lambda step: self._coarse(scene, step))
+        shortest = max(SHORTEST * max(RICHARDSON), scene.duration / MOST_TUNED)
+        return sorted({max(float(f"{angle / rate:.2g}"), shortest) for angle in TUNED_STEPS}, reverse=True)
+
+    def _coarse(self, scene: Scene, step: float) -> Trajectory:
+        times = np.linspace(0, scene.duration, SCOUT_SAMPLES)
+        return self.run(scene, times, Setting("alpha", {"step": step}))
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         exu = _exudyn()

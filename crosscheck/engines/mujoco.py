@@ -6,6 +6,8 @@ What MuJoCo calls hard is a softness of 1e-4 of the inverse mass, ten times that
 - ``stock``: as stiff as its documentation allows (time constant two steps, impedance 0.9999), RK4;
 - ``tuned``: the regulariser scaled away through ``invweight0``, critically damped closures at five times
   the fastest rate of the scene, RK4, Newton's method iterated to convergence;
+- ``stiff``: the tuned model with closures as stiff as the step bears, which costs an order of convergence
+  and brings a run through singular positions with less left of the closure errors they magnify;
 - ``forward``: the tuned model's accelerations (``mj_forward``) integrated by DOP853.
 
 A driver is an equality of one joint whose reference acceleration is rewritten at every evaluation.
@@ -37,11 +39,13 @@ BETA = 5.0  # double root of the closure errors, in fastest rates of the scene: 
 STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance, as far as it is not clamped
 DEFAULT_STEP = 2e-3  # s
 STEPS = (0.15, 0.05, 0.015, 0.005, 0.0015)  # rad turned per step; 2 beta step stays below 2
+STIFF_STEPS = (0.015, 0.005, 0.0015, 0.0005)
+STIFF = 0.2  # double root of the stiff closures' errors, in 1/step
 RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10)  # finer ones get lost in the noise at singular positions
 TURN_PER_STEP = 0.25  # rad a driver may move within one adaptive step: closures can fold in between
 LEAST_TURN = 0.03  # rad turned within the shortest adaptive step
 SCOUT_SAMPLES = 41  # of the coarse run that finds how fast a scene turns
-MAX_STEPS = 150_000
+MAX_STEPS = 250_000
 
 
 class MuJoCo(Engine):
@@ -64,13 +68,13 @@ class MuJoCo(Engine):
         """Fixed steps by the angle turned in one, adaptive ones by relative tolerance."""
         rate = fastest_rate(scene, lambda step: self._coarse(scene, step))
         beta, least = float(f"{BETA * rate:.2g}"), float(f"{LEAST_TURN / rate:.2g}")
-        steps = [float(f"{angle / rate:.2g}") for angle in STEPS]
-        steps = [h for h in steps if scene.duration / h <= MAX_STEPS] or steps[:1]
+        steps, stiff = (_steps(scene, rate, angles) for angles in (STEPS, STIFF_STEPS))
         plain = sorted({DEFAULT_STEP, *steps}, reverse=True)
         return [
             *(Setting("defaults", {"step": h}) for h in plain),
             *(Setting("stock", {"step": h}) for h in steps),
             *(Setting("tuned", {"step": h, "beta": beta, "hard": HARD}) for h in steps),
+            *(Setting("stiff", {"step": h, "beta": float(f"{STIFF / h:.2g}"), "hard": HARD}) for h in stiff),
             *(
                 Setting("forward", {"rtol": r, "min_step": least, "beta": beta, "hard": HARD_ADAPTIVE})
                 for r in RTOLS
@@ -90,6 +94,12 @@ class MuJoCo(Engine):
     def _coarse(self, scene: Scene, step: float) -> Trajectory:
         times = np.linspace(0, scene.duration, SCOUT_SAMPLES)
         return self.run(scene, times, Setting("tuned", {"step": step, "beta": 0.5 / step, "hard": HARD}))
+
+
+def _steps(scene: Scene, rate: float, angles: Sequence[float]) -> list[float]:
+    """Steps (s) that turn by the angles (rad) at a rate (rad/s), as far as they are not too many."""
+    steps = [float(f"{angle / rate:.2g}") for angle in angles]
+    return [h for h in steps if scene.duration / h <= MAX_STEPS] or steps[:1]
 
 
 class _Run:
@@ -121,7 +131,7 @@ class _Run:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
         if setting.family == "stock":
             model.eq_solref[:], model.eq_solimp[:] = (2 * self.nominal, 1.0), STIFFEST
-        elif setting.family in ("tuned", "forward"):
+        elif setting.family in ("tuned", "stiff", "forward"):
             self._harden(options["beta"], options["hard"])
         else:
             raise ValueError(f"mujoco has no family {setting.family!r}")

@@ -40,7 +40,8 @@ LEAST_TURN = 0.03  # rad turned within the shortest adaptive step
 SCOUT_RTOL = 1e-5
 SCOUT_SAMPLES = 41  # of the coarse run that finds how fast a scene turns
 STEPS = (0.2, 0.06, 0.02, 0.006, 0.002)  # rad turned per fixed step
-MAX_FIXED_STEPS = 150_000
+FINEST = 0.0007  # rad per step, of the stabilised family alone: only there the closure errors allow it
+MAX_FIXED_STEPS = 250_000
 HINTS = {"defaults": ": without regularisation the default solver settings cannot bear redundant closures"}
 FIXED = ("defaults", "proximal", "baumgarte")
 
@@ -64,9 +65,11 @@ class Pinocchio(Engine):
     def settings(self, scene: Scene) -> Sequence[Setting]:
         """Fixed steps by the angle turned in one, adaptive ones by relative tolerance."""
         rate = fastest_rate(scene, lambda step: self._coarse(scene, step))
-        steps = [float(f"{angle / rate:.2g}") for angle in STEPS]
-        steps = [h for h in steps if scene.duration / h <= MAX_FIXED_STEPS] or steps[:1]
-        fixed = [Setting(family, {"step": h}) for family in FIXED for h in steps]
+        fixed = [
+            Setting(family, {"step": h})
+            for family in FIXED
+            for h in _steps(scene, rate, (*STEPS, FINEST) if family == "baumgarte" else STEPS)
+        ]
         least = float(f"{LEAST_TURN / rate:.2g}")
         adaptive = [{"rtol": r, "min_step": least} for r in RTOLS]
         return fixed + [Setting(family, o) for family in ("dop853", "tuned") for o in adaptive]
@@ -84,6 +87,12 @@ class Pinocchio(Engine):
     def _coarse(self, scene: Scene, step: float) -> Trajectory:
         times = np.linspace(0, scene.duration, SCOUT_SAMPLES)
         return self.run(scene, times, Setting("tuned", {"rtol": SCOUT_RTOL, "min_step": step}))
+
+
+def _steps(scene: Scene, rate: float, angles: Sequence[float]) -> list[float]:
+    """Steps (s) that turn by the angles (rad) at a rate (rad/s), as far as they are not too many."""
+    steps = [float(f"{angle / rate:.2g}") for angle in angles]
+    return [h for h in steps if scene.duration / h <= MAX_FIXED_STEPS] or steps[:1]
 
 
 class _Run:

@@ -232,13 +232,13 @@ def test_defaults_on_redundant_constraints_fail_and_say_so():
 
 def test_stop_at_a_singular_position_keeps_the_states_before_it():
     scene = SCENES["planar_slider_crank_equal"]()
-    trajectory = ENGINE.run(scene, np.linspace(0, 0.1, 11), Setting("tuned", {"step": 1e-4}))
+    trajectory = ENGINE.run(scene, np.linspace(0, 0.1, 11), Setting("trapezoidal", {"step": 1e-4}))
     assert trajectory.outcome is Outcome.NOT_CONVERGED, (trajectory.outcome, trajectory.message)
     singular = 0.0612  # s, where the crank has turned to π/2
     assert abs(trajectory.t_end - singular) < 1e-3, trajectory.t_end
     assert trajectory.times[-1] == pytest.approx(0.06), trajectory.times
     measured = measure(scene, trajectory, truth_for(scene))
-    assert measured["error"] < 1e-7, measured
+    assert measured["error"] < 1e-5, measured
 
 
 def test_static_analysis_refuses_a_singular_pose():

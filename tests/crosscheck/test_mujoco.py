@@ -142,11 +142,20 @@ def test_a_thin_disc_that_rounding_puts_beyond_the_triangle_is_accepted() -> Non
 @pytest.mark.parametrize("name", ["four_bar", "spatial_slider_crank_gravity"])
 def test_each_family_is_swept_from_coarse_to_fine(name: str) -> None:
     sweep = engine("mujoco").settings(SCENES[name]())
-    assert {s.family for s in sweep} == {"defaults", "stock", "tuned", "forward"}, f"families of {sweep}"
+    assert {s.family for s in sweep} == {"defaults", "stock", "tuned", "stiff", "forward"}, (
+        f"families of {sweep}"
+    )
     assert any(s.options.get("step") == 2e-3 for s in sweep if s.family == "defaults"), "no default step"
-    for family in ("defaults", "stock", "tuned", "forward"):
+    for family in ("defaults", "stock", "tuned", "stiff", "forward"):
         knob = [s.options["rtol" if family == "forward" else "step"] for s in sweep if s.family == family]
         assert knob == sorted(set(knob), reverse=True) and len(knob) > 3, f"{family} sweeps {knob}"
+
+
+def test_stiff_closures_through_singular_positions_and_truth_agree() -> None:
+    """Four passages of the swinging four-bar."""
+    scene = SCENES["four_bar_gravity"]()
+    run = simulate(scene, 1.0, "stiff", step=2e-4, beta=1000.0, hard=HARD)
+    assert error(run, scene) < 1e-11, f"{error(run, scene):.2e}"
 
 
 def test_an_unknown_family_is_refused() -> None:

@@ -1,0 +1,100 @@
+"""Exudyn's extrapolated runs through singular positions / truths; the leap's projection / joint equations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Setting
+from crosscheck.engines._exudyn_dynamic import stretches
+from crosscheck.engines._exudyn_leap import UPRIGHT, leap, projected
+from crosscheck.engines.exudyn import ENGINE
+from crosscheck.kinematics import closure, closure_rates, initial_poses
+from crosscheck.metrics import error_series, measure
+from crosscheck.truth import truth_for
+from mbref import rotations
+from mbref.scene import Scene
+from mbref.scenes import SCENES
+from mbref.trajectory import Outcome
+
+ROUGH = 1e-4  # of the states that are projected
+SINGULAR = 0.061192068340  # s, where the equal slider-crank's crank has turned to π/2
+
+
+@pytest.mark.parametrize(
+    "name, duration, step",
+    [
+        ("planar_slider_crank_equal", 0.13, 1e-4),  # two singular positions
+        ("four_bar_gravity", 0.45, 1.5e-3),  # one
+        ("five_bar", 0.04, 2e-4),  # two, driven
+    ],
+)
+def test_run_through_singular_positions_and_truth_agree(name: str, duration: float, step: float):
+    scene = SCENES[name]()
+    run = ENGINE.run(scene, np.linspace(0, duration, 14), Setting("tuned", {"step": step}))
+    assert run.outcome is Outcome.COMPLETED, run.message
+    measured = measure(scene, run, truth_for(scene))
+    assert measured["error"] < 1e-8, measured
+    assert measured["violation_velocity"] < 1e-6, measured
+
+
+def test_sample_at_the_singular_position_and_truth_agree():
+    scene = SCENES["planar_slider_crank_equal"]()
+    times = np.array([0.03, SINGULAR - 5e-5, SINGULAR, SINGULAR + 5e-5, 0.08])
+    run = ENGINE.run(scene, times, Setting("tuned", {"step": 1e-4}))
+    assert np.array_equal(run.times, times), (run.times, run.message)
+    errors = error_series(scene, run, truth_for(scene).poses(times))
+    assert errors.max() < 1e-8, f"errors {errors} around the singular position"
+
+
+def true_nodes(scene: Scene, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Exact samples (times, coordinates and rates, no force) as Exudyn's sensors would give them."""
+    start, orientation = initial_poses(scene)
+    exact = truth_for(scene).poses(times)
+    turn = rotations.multiply(exact.orientation, rotations.conjugate(orientation))
+    turn *= np.where(turn[..., :1] < 0, -1.0, 1.0)
+    spin = np.concatenate([0 * exact.angular_velocity[..., :1], exact.angular_velocity], axis=-1)
+    coordinates = np.concatenate([exact.position - start, turn - UPRIGHT], axis=-1)
+    rates = np.concatenate([exact.velocity, rotations.multiply(spin, turn) / 2], axis=-1)
+    return times, np.array([coordinates, rates, 0 * rates]), np.zeros((len(times), 0))
+
+
+def test_leap_and_truth_agree():
+    scene = SCENES["planar_slider_crank_equal"]()
+    nodes = true_nodes(scene, SINGULAR - 2e-4 - 6e-4 * np.arange(12)[::-1])
+    landing = np.array([SINGULAR, SINGULAR + 2e-4])
+    found, exact = leap(scene, nodes, landing)[1], true_nodes(scene, landing)[1]
+    apart = np.abs(found[0] - exact[0]).max(), np.abs(found[1] - exact[1]).max()
+    assert apart[0] < 1e-9 and apart[1] < 1e-6, f"off by {apart[0]:.1e} m and {apart[1]:.1e} m/s"
+
+
+def test_projected_states_and_joint_equations():
+    scene, t = SCENES["five_bar"](), 0.004
+    rng = np.random.default_rng(1)
+    coordinates, rates = true_nodes(scene, np.array([t]))[1][:2, 0]
+    rough = coordinates + ROUGH * rng.normal(size=coordinates.shape)
+    q, v = projected(scene, t, rough, rates + ROUGH * rng.normal(size=rates.shape))
+    start, orientation = initial_poses(scene)
+    turn = q[:, 3:] + UPRIGHT
+    pose = (start + q[:, :3], rotations.multiply(turn, orientation))
+    spin = 2 * rotations.multiply(v[:, 3:], rotations.conjugate(turn))[:, 1:]
+    gap = max(np.abs(rows).max() for rows in closure(scene, t, *pose).values())
+    drift = max(np.abs(rows).max() for rows in closure_rates(scene, t, *pose, v[:, :3], spin).values())
+    assert gap < 1e-13 and drift < 1e-11, f"residuals {gap:.1e} m, {drift:.1e} m/s"
+    assert np.abs(q - coordinates).max() < 10 * ROUGH, f"moved by {np.abs(q - coordinates).max():.1e}"
+
+
+def test_projection_of_a_light_and_a_heavy_body_moves_the_light_one():
+    """A rod off its joint with a flywheel: the flywheel stays where it was."""
+    scene = SCENES["planar_slider_crank_heavy"]()
+    coordinates, rates = true_nodes(scene, np.array([0.5]))[1][:2, 0]
+    rough = coordinates.copy()
+    rough[1, :2] += ROUGH
+    crank = np.abs(projected(scene, 0.5, rough, rates)[0][0] - coordinates[0]).max()
+    assert crank < 1e-3 * ROUGH, f"the flywheel moved by {crank:.1e} of {ROUGH:g}"
+
+
+def test_stretches_and_their_beginning():
+    times = np.array([1.0, 1.1, 1.2, 1.5])
+    found = [(round(a, 12), round(b, 12), n) for a, b, n in stretches(times, 0.9)]
+    assert found == [(0.9, 1.2, 3), (1.2, 1.5, 1)], found

@@ -1,0 +1,40 @@
+"""Floors: rows of the table / records made by hand."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from crosscheck.floors import floors
+
+
+def record(
+    engine: str, family: str, error: float, outcome: str = "COMPLETED", t_end: float = 1.0
+) -> dict[str, Any]:
+    return {
+        "scene": "bar", "engine": engine, "family": family, "settings": {"step": error},
+        "outcome": outcome, "t_end": t_end, "metrics": {"error": error}, "cost": {"seconds": 2.0},
+    }  # fmt: skip
+
+
+RECORDS = [
+    record("good", "coarse", 1e-3),
+    record("good", "fine", 3e-9),
+    record("good", "fine", 2e-10),
+    record("good", "early", 1e-15, "SINGULAR_MATRIX", 0.2),
+    record("good", "early", 1e-15, "NOT_CONVERGED", 0.4),
+    record("bad", "only", 2e-8),
+]
+
+
+def test_rows_and_records():
+    good, bad = floors(RECORDS)
+    assert good.row() == ("bar", "good", "fine", "step=2e-10", "2.0e-10", "2", "fine",
+                          "coarse 1.0e-03, early not converged at 0.4 s")  # fmt: skip
+    assert (good.is_reached, bad.is_reached) == (True, False)
+    assert bad.row()[4:] == ("2.0e-08", "2", "", "only 2.0e-08"), bad.row()
+
+
+def test_engine_without_a_completed_run_and_its_floor():
+    (floor,) = floors([r for r in RECORDS if r["family"] == "early"])
+    assert not floor.is_reached
+    assert floor.best["outcome"] == "NOT_CONVERGED", "the run that got furthest stands for the engine"
