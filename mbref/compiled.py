@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numba
-from numba import cfunc, f8, i8, njit, types
+from numba import cfunc, f8, i8, njit, types, u4
 
 OPTIONS = {"cache": True, "error_model": "numpy"}  # no fastmath: the same bits with and without the JIT
 PLAIN = bool(numba.config.DISABLE_JIT)
@@ -29,6 +29,7 @@ PLAIN = bool(numba.config.DISABLE_JIT)
 VECTOR = types.Array(f8, 1, "C")
 MATRIX = types.Array(f8, 2, "C")
 INDICES = types.Array(i8, 1, "C")
+PLAN = types.Array(u4, 1, "C")
 INDEX_TABLE = types.Array(i8, 2, "C")
 FLOAT = f8
 INT = i8

@@ -118,23 +118,16 @@ def evaluate(t, q, v, ints, floats, work):
 
 @entry(FLOAT(FLOAT, VECTOR, VECTOR, INTS, FLOATS, WORK))
 def evaluate_all(t, q, v, ints, floats, work):
-    """``evaluate`` with the dense Jacobian and Φ', for Python; returns t."""
+    """``evaluate`` with Φ', for Python; returns t."""
     evaluate(t, q, v, ints, floats, work)
-    dense_jacobian(ints, work)
     violation_rate(ints, work, v)
     return t
 
 
 @kernel
-def accelerations(accelerate, t, q, v, ints, floats, work, pivots, settings, counts):
-    """Accelerations and multipliers of the formulation ``accelerate`` at (t, q, v); its status.
-
-    Its right-hand side is γ, less the feedback of Eq. 9 where a stabilisation asks for it.
-    """
-    counts[EVALUATIONS] += 1
-    evaluate(t, q, v, ints, floats, work)
-    dense_jacobian(ints, work)
-    rows, columns = work[ROWS], work[COLUMNS]
+def right_hand_side(v, ints, work, settings):
+    """That of Φ_q q̈ = γ, less the feedback of Eq. 9 where a stabilisation asks for it."""
+    rows = work[ROWS]
     for row in range(rows.shape[1]):
         rows[RHS, row] = rows[GAMMA, row]
     if settings[VELOCITY_GAIN] != 0.0 or settings[POSITION_GAIN] != 0.0:
@@ -142,6 +135,16 @@ def accelerations(accelerate, t, q, v, ints, floats, work, pivots, settings, cou
         for row in range(rows.shape[1]):
             rows[RHS, row] -= settings[VELOCITY_GAIN] * rows[PHI_RATE, row]
             rows[RHS, row] -= settings[POSITION_GAIN] * rows[PHI, row]
+
+
+@kernel
+def accelerations(accelerate, t, q, v, ints, floats, work, pivots, settings, counts):
+    """Accelerations and multipliers of the formulation ``accelerate`` at (t, q, v); its status."""
+    counts[EVALUATIONS] += 1
+    evaluate(t, q, v, ints, floats, work)
+    dense_jacobian(ints, work)
+    right_hand_side(v, ints, work, settings)
+    rows, columns = work[ROWS], work[COLUMNS]
     return accelerate(
         columns[MASS], columns[INVERSE_ROOT], work[PHI_Q], columns[FORCE], rows[RHS], settings,
         work[SCRATCH][0], pivots[FORMULATION_PIVOTS], counts, columns[ACCELERATION], rows[MULTIPLIERS],

@@ -5,14 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_array, vstack
 
 from mbref import rotations
-from mbref.model import Model
+from mbref.model import Model, displaced
 from mbref.scene import SceneError
+from mbref.sparse.least_change import LARGE, LeastChange, sparse_jacobian
 
 RANK_TOLERANCE = 1e-5  # singular values below it (relative) are left alone: rank may drop at the start
 GROSS = 0.05  # of the scene's length, or of its speed: a larger inconsistency is a fault
 MOST_ITERATIONS = 30
+LIGHT, NEARER = 1e-4, 5  # weight of open velocities beside given ones, and how often that error is reduced
 
 
 @dataclass(frozen=True)
@@ -63,10 +66,9 @@ def corrected_positions(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]
     in the metric of M.  Raises SceneError naming the joint where q is grossly inconsistent.
     """
     v = np.zeros(model.n)
-    inverse_root = _inverse_root(model)
     before = 0.0
     for iteration in range(MOST_ITERATIONS):
-        terms = model.terms(0.0, q, v)
+        terms = model.blocks(0.0, q, v)
         if not model.m:
             return q, 0.0
         worst = int(np.argmax(np.abs(terms.phi)))
@@ -77,7 +79,7 @@ def corrected_positions(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]
                 raise _fault(model, worst, f"the initial positions violate the constraint by {before:.3g}")
         if violation <= 1e-14 * max(1.0, scene_length(model)):
             return q, before
-        x = _least_norm(terms.jacobian * inverse_root, -terms.phi) * inverse_root
+        x = _least_change(model, terms.jacobian, -terms.phi)
         if np.max(np.abs(x)) < 1e-15:
             break
         q = displaced(q, x)
@@ -86,23 +88,20 @@ def corrected_positions(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]
     return q, before
 
 
-def displaced(q: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Coordinates (7 nb,) moved by (δr, δπ') per body (6 nb,)."""
-    bodies, change = q.reshape(-1, 7), x.reshape(-1, 6)
-    turned = rotations.multiply(bodies[:, 3:], rotations.from_vector(change[:, 3:]))
-    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
-    return np.concatenate([bodies[:, :3] + change[:, :3], turned], axis=1).ravel()
-
-
-def _inverse_root(model: Model) -> np.ndarray:
-    return 1 / np.sqrt(np.where(model.mass > 0, model.mass, 1.0))
+def _least_change(model: Model, blocks: np.ndarray, rhs: np.ndarray) -> np.ndarray:
+    """The change (6 nb,), least in the metric of M, by which Φ_q grows by rhs (m,)."""
+    mass = np.where(model.mass > 0, model.mass, 1.0)
+    if model.m > LARGE:
+        return LeastChange(sparse_jacobian(model, blocks), mass)(rhs)
+    inverse_root = 1 / np.sqrt(mass)
+    return _least_norm(model.dense(blocks) * inverse_root, rhs) * inverse_root
 
 
 def _least_norm(matrix: np.ndarray, rhs: np.ndarray) -> np.ndarray:
     return np.linalg.lstsq(matrix, rhs, rcond=RANK_TOLERANCE)[0]
 
 
-def _given(model: Model, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def given_velocities(model: Model, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The velocities the scene gives (zero elsewhere) and which those are, both (6 nb,)."""
     v, given = np.zeros((model.nb, 6)), np.zeros((model.nb, 6), dtype=bool)
     for b, body in enumerate(model.bodies):
@@ -120,7 +119,9 @@ def _velocities(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]:
     Among the solutions those nearest to the given velocities (angular ones times the scene's length);
     what they leave open is least in the metric of M.
     """
-    v, given = _given(model, q)
+    v, given = given_velocities(model, q)
+    if model.m > LARGE:
+        return _sparse_velocities(model, q, v, given)
     scale = np.tile(np.repeat([1.0, 1 / scene_length(model)], 3), model.nb)
     wanted = v[given] / scale[given]
     terms = model.terms(0.0, q, v)
@@ -141,6 +142,32 @@ def _velocities(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]:
         weight = np.sqrt(model.mass) * scale
         x = x - open_ @ _least_norm(weight[:, None] * open_, weight * x)
     return x * scale, float(np.max(residual, initial=0.0))
+
+
+def _sparse_velocities(
+    model: Model, q: np.ndarray, v: np.ndarray, given: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """The same by sparse solutions: nearest to the given velocities first, then least where open."""
+    scale = np.tile(np.repeat([1.0, 1 / scene_length(model)], 3), model.nb)
+    terms = model.blocks(0.0, q, v)
+    jacobian, nu = sparse_jacobian(model, terms.jacobian), terms.nu
+    x = LeastChange(jacobian, scale**-2)(nu)
+    if np.max(np.abs(jacobian @ x - nu)) > GROSS * np.max(np.abs(x / scale)):
+        worst = int(np.argmax(np.abs(jacobian @ x - nu)))
+        raise _fault(model, worst, "the driver contradicts the joints")
+    nearest, x, aim = LeastChange(jacobian, np.where(given, 1.0, LIGHT) / scale**2), v, v
+    for _ in range(NEARER):
+        x = aim + nearest(nu - jacobian @ aim)
+        aim = aim + np.where(given, v - x, 0.0)
+    chosen = np.flatnonzero(given)
+    selection = csr_array((np.ones(chosen.size), (np.arange(chosen.size), chosen)), (chosen.size, model.n))
+    x = LeastChange(csr_array(vstack([jacobian, selection])), model.mass)(np.append(nu, x[given]))
+    residual = np.abs(jacobian @ np.where(given, v, x) - nu)
+    miss, wanted = np.abs((x - v) / scale)[given], np.abs(v / scale)[given]
+    if np.max(miss, initial=0.0) > GROSS * np.max(wanted, initial=0.0):
+        what = f"the initial velocities violate the constraint by {residual.max():.3g}"
+        raise _fault(model, int(np.argmax(residual)), what)
+    return x, float(np.max(residual, initial=0.0))
 
 
 def _solutions(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -13,8 +13,8 @@ import numpy as np
 
 from mbref import __version__
 from mbref.diagnose import rank_of, scaled_jacobian
-from mbref.initial import consistent_start, displaced
-from mbref.model import Model, Terms
+from mbref.initial import consistent_start
+from mbref.model import Model, Terms, displaced
 from mbref.scene import Scene, SceneError
 from mbref.trajectory import Cost, Outcome, Trajectory
 

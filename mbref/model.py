@@ -6,7 +6,7 @@ turned back where trajectories are written.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,12 +22,12 @@ from mbref.tables import (
     FORCE_AT_POINT,
     GAMMA,
     INVERSE_ROOT,
+    JACOBIAN,
     LENGTH,
     MASS,
     MOMENT,
     NU,
     PHI,
-    PHI_Q,
     POINT_I,
     POINT_J,
     ROTATION,
@@ -72,12 +72,16 @@ class Model:
         loads, data = self._pack_loads()
         self.ints = (self._primitives, self._row_bodies, loads)
         self.floats = (self._moments, self._geometry, self._drivers(), data, np.array([self._gravity()]))
-        self._work = self.workspace(1)
+        self._work = self.workspace(1, dense=False)
 
-    def workspace(self, scratch: int) -> tuple[np.ndarray, ...]:
-        """Fresh working memory (see ``tables``); ``scratch`` numbers for the formulation."""
+    def workspace(self, scratch: int, dense: bool = True) -> tuple[np.ndarray, ...]:
+        """Fresh working memory (see ``tables``); ``scratch`` numbers for the formulation.
+
+        Not ``dense``: without the matrices whose size is rows times columns.
+        """
         m, n, nb = self.m, self.n, self.nb
         big = max(m + nb, 7 * nb)
+        matrix, jacobian = ((2 * big, big), (m, n)) if dense else ((2, 16), (0, n))
         frames = np.zeros((nb + 1, 18))
         frames[:, ROTATION : ROTATION + 9 : 4] = 1.0
         columns = np.zeros((6, n))
@@ -86,8 +90,8 @@ class Model:
         angles = np.zeros((1, max(1, int(np.sum(self.ints[2][:, 3] >= 0)))))
         return (
             frames, np.zeros((m, 12)), np.zeros((7, m)), columns, np.zeros((4, 7 * nb)),
-            np.zeros((4, 7 * nb)), np.zeros((2 * big, big)), np.zeros((8, big)), np.zeros((1, scratch)),
-            angles, np.zeros((m, n)), np.zeros((1, 4)),
+            np.zeros((4, 7 * nb)), np.zeros(matrix), np.zeros((8, big)), np.zeros((1, scratch)),
+            angles, np.zeros(jacobian), np.zeros((1, 4)),
         )  # fmt: skip
 
     def start(self) -> np.ndarray:
@@ -97,12 +101,28 @@ class Model:
 
     def terms(self, t: float, q: np.ndarray, v: np.ndarray) -> Terms:
         """The terms at time t (s), coordinates q (7 nb,), velocities v (6 nb,)."""
+        found = self.blocks(t, q, v)
+        return replace(found, jacobian=self.dense(found.jacobian))
+
+    def dense(self, blocks: np.ndarray) -> np.ndarray:
+        """Φ_q (m, n) from its blocks (m, 12)."""
+        matrix, rows = np.zeros((self.m, self.nb + 1, 6)), np.arange(self.m)
+        for side in range(2):
+            matrix[rows, self._row_bodies[:, side]] = blocks[:, 6 * side : 6 * side + 6]
+        return matrix[:, : self.nb].reshape(self.m, self.n)
+
+    def blocks(self, t: float, q: np.ndarray, v: np.ndarray) -> Terms:
+        """The terms with the blocks (m, 12) of both bodies' columns in place of the Jacobian."""
         work = self._work
         evaluate_all(float(t), np.ascontiguousarray(q), np.ascontiguousarray(v), self.ints, self.floats, work)
         rows = work[ROWS].copy()
         return Terms(
-            self.mass, work[PHI_Q].copy(), rows[PHI], rows[NU], rows[GAMMA], work[COLUMNS][FORCE].copy()
+            self.mass, work[JACOBIAN].copy(), rows[PHI], rows[NU], rows[GAMMA], work[COLUMNS][FORCE].copy()
         )
+
+    def entry_columns(self) -> np.ndarray:
+        """Column (m, 12) of every entry of the blocks; those of the fixed frame are ≥ n."""
+        return (6 * self._row_bodies[:, :, None] + np.arange(6)).reshape(self.m, 12)
 
     def index(self, name: str) -> int:
         """Index of a body, ``nb`` for the fixed frame."""
@@ -217,6 +237,14 @@ class Model:
                 row[CONSTANTS:] = load.stiffness, load.damping, load.natural_angle
             data.append(row)
         return np.array(index, dtype=np.int64).reshape(-1, 4), np.array(data).reshape(-1, 15)
+
+
+def displaced(q: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Coordinates (7 nb,) moved by (δr, δπ') per body (6 nb,)."""
+    bodies, change = q.reshape(-1, 7), x.reshape(-1, 6)
+    turned = rotations.multiply(bodies[:, 3:], rotations.from_vector(change[:, 3:]))
+    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+    return np.concatenate([bodies[:, :3] + change[:, :3], turned], axis=1).ravel()
 
 
 def _with_ground(scene: Scene) -> tuple[tuple[Body, ...], tuple[Joint, ...]]:

@@ -15,14 +15,19 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from mbref.compiled import INDEX_TABLE, INDICES, MATRIX, PLAIN, VECTOR, kernel
+from mbref.compiled import INDEX_TABLE, INDICES, MATRIX, PLAIN, PLAN, VECTOR, kernel
+
+NO_PLAN = np.zeros(1, dtype=np.uint32)
 
 
-def packed(ints: tuple, floats: tuple, work: tuple, pivots, settings, counts):
-    """The problem of these arrays, which the caller must keep alive: (arrays, 3) addresses, rows, columns."""
+def packed(ints: tuple, floats: tuple, work: tuple, pivots, settings, counts, plan=NO_PLAN):
+    """The problem of these arrays, which the caller must keep alive: (arrays, 3) addresses, rows, columns.
+
+    ``plan`` has the indices of ``sparse.plan`` where a chart needs them.
+    """
     if PLAIN:
-        return ints, floats, work, pivots, settings, counts
-    arrays = (*ints, *floats, *work, pivots, settings, counts)
+        return ints, floats, work, pivots, settings, counts, plan
+    arrays = (*ints, *floats, *work, pivots, settings, counts, plan)
     return np.array([[a.ctypes.data, a.shape[0], a.shape[-1]] for a in arrays], dtype=np.int64)
 
 
@@ -40,7 +45,7 @@ def _array_at(kind: types.Array) -> Callable:
                 return builder.load(builder.gep(base, [place]))
 
             array = context.make_array(kind)(context, builder)
-            columns, size = entry(2), word(8)
+            columns, size = entry(2), word(kind.dtype.bitwidth // 8)
             context.populate_array(
                 array,
                 data=builder.inttoptr(entry(0), array.data.type),
@@ -57,11 +62,15 @@ def _array_at(kind: types.Array) -> Callable:
 
 
 _table_at, _matrix_at = _array_at(INDEX_TABLE), _array_at(MATRIX)
-_vector_at, _indices_at = _array_at(VECTOR), _array_at(INDICES)
+_vector_at, _indices_at, _plan_at = _array_at(VECTOR), _array_at(INDICES), _array_at(PLAN)
 
 
-def _as_it_is(problem):
-    return problem
+def _first_six(problem):
+    return problem[:6]
+
+
+def _last(problem):
+    return problem[6]
 
 
 def _from_addresses(problem):
@@ -79,4 +88,10 @@ def _from_addresses(problem):
     return ints, floats, work, _table_at(problem, 20), _vector_at(problem, 21), _indices_at(problem, 22)
 
 
-opened = _as_it_is if PLAIN else kernel(_from_addresses)
+def _plan_from_address(problem):
+    """The plan, whose row is the last."""
+    return _plan_at(problem, problem.shape[0] - 1)
+
+
+opened = _first_six if PLAIN else kernel(_from_addresses)
+planned = _last if PLAIN else kernel(_plan_from_address)

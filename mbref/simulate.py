@@ -26,10 +26,14 @@ from mbref.march import (
 )
 from mbref.method import Method
 from mbref.model import Model
-from mbref.problem import packed
+from mbref.problem import NO_PLAN, packed
 from mbref.reactions import reactions
 from mbref.scene import Scene, SceneError
 from mbref.singular import KEPT, NODES
+from mbref.sparse.chart import CHARTS
+from mbref.sparse.least_change import LARGE
+from mbref.sparse.moving import moving_entries, moving_primitives
+from mbref.sparse.plan import plan_for
 from mbref.tables import (
     COORDINATES,
     CROSSINGS,
@@ -151,14 +155,23 @@ class _Run:
             raise SceneError(missing_masses(scene))
         self.start = consistent_start(model)
         formulation, stabilisation, integrator = method.parts
-        self.work = model.workspace(formulation.scratch(model.m, model.n))
+        self.plan = NO_PLAN
+        if model.m > LARGE and formulation.sparse and stabilisation.name in CHARTS:
+            stabilisation = CHARTS[stabilisation.name]
+            entries = moving_entries(model, self.start.q, self.start.v)
+            plan = plan_for(entries, model.entry_columns(), model.n)
+            self.plan, self.work = plan.indices, model.workspace(plan.memory, dense=False)
+            ints, floats = moving_primitives(model, entries)
+        else:
+            self.work = model.workspace(formulation.scratch(model.m, model.n))
+            ints, floats = model.ints, model.floats
         self.pivots = np.zeros((5, 2 * (model.m + 7 * model.nb)), dtype=np.int64)
         self.counts = np.zeros(6, dtype=np.int64)
         self.arrays = (
-            model.ints, model.floats, self.work, self.pivots,
+            ints, floats, self.work, self.pivots,
             method.settings(limits.rank_tolerance), self.counts,
         )  # fmt: skip
-        self.problem = packed(*self.arrays)
+        self.problem = packed(*self.arrays, self.plan)
         chart = stabilisation.rates, stabilisation.accept
         kernels = integrator.step, integrator.propose, *chart, formulation.accelerate
         self.kernels = tuple(kernel.pointer for kernel in kernels)

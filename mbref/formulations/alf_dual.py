@@ -71,6 +71,7 @@ ALF_DUAL = Formulation(
     handles_redundancy=True,
     handles_singular_mass=False,
     iterative=True,
+    sparse=True,
     options=OPTIONS,
     feedback=feedback,
 )

@@ -42,11 +42,18 @@ def enter(t, y, problem):
 @exchangeable(RATES)
 def rates(accelerate, t, y, y_rate, problem):
     ints, floats, work, pivots, settings, counts = opened(problem)
-    state, acceleration = work[STATE], work[COLUMNS][ACCELERATION]
-    nq = state.shape[1]
-    nv = acceleration.shape[0]
+    nq, nv = work[STATE].shape[1], work[COLUMNS].shape[1]
     q, v = y[:nq], y[nq : nq + nv]
     status = accelerations(accelerate, t, q, v, ints, floats, work, pivots, settings, counts)
+    write_rates(q, v, y_rate, work)
+    return status
+
+
+@kernel
+def write_rates(q, v, y_rate, work):
+    """y' from the accelerations found, and the state into ``work[STATE]``."""
+    state, acceleration = work[STATE], work[COLUMNS][ACCELERATION]
+    nq, nv = q.shape[0], v.shape[0]
     coordinate_rates(q, v, y_rate)
     for k in range(nv):
         y_rate[nq + k] = acceleration[k]
@@ -54,7 +61,6 @@ def rates(accelerate, t, y, y_rate, problem):
     for k in range(nq):
         state[COORDINATES, k] = q[k]
         state[COORDINATE_RATES, k] = y_rate[k]
-    return status
 
 
 @kernel

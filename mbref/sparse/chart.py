@@ -1,0 +1,236 @@
+"""The chart of all coordinates with accelerations and projection from one sparse factor of S + I/α.
+
+The iteration is that of ALF-dual, for accelerations as for corrections: positions by Newton's method and
+velocities in one go, each change the least in the metric of M, which redundant rows do not disturb.
+Near a singular position the smallest pivot of the factor falls with the distance, so that ``singular``
+can step over it; pivots of redundant rows are told from it by never having been larger than INDEPENDENT.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from numpy import sqrt
+
+from mbref.compiled import exchangeable, kernel
+from mbref.evaluation import evaluate, right_hand_side, violation_rate
+from mbref.problem import opened, planned
+from mbref.sparse.factor import (
+    assemble,
+    factorise,
+    memories,
+    part,
+    smallest_pivot,
+    solve,
+    subtract_product,
+    times_transpose,
+)
+from mbref.sparse.plan import ROW
+from mbref.stabilisation.base import Stabilisation
+from mbref.stabilisation.baumgarte import BAUMGARTE
+from mbref.stabilisation.full import copy_state, write_rates
+from mbref.stabilisation.none import NONE
+from mbref.stabilisation.projection import GOOD_REDUCTION, MOST_ITERATIONS, PROJECTION, displace, largest
+from mbref.tables import (
+    ACCELERATION,
+    ACCEPT,
+    COLUMNS,
+    DENSE_VECTORS,
+    ENTER,
+    EVALUATIONS,
+    FACTORISATIONS,
+    FORCE,
+    FORMULATION_OPTIONS,
+    INVERSE_ROOT,
+    JACOBIAN,
+    MASS,
+    MEMO,
+    MULTIPLIERS,
+    NEWTON,
+    NEWTON_TOLERANCE,
+    NOT_CONVERGED,
+    OK,
+    PHI,
+    PHI_RATE,
+    RATES,
+    REFERENCE_PIVOT,
+    RHS,
+    ROWS,
+    SCRATCH,
+    SINGULAR,
+    SMALLEST_PIVOT,
+    STATE,
+    STEP_X,
+)
+
+INDEPENDENT = 1e-3  # pivot of unit rows; 1/α with the default α leaves 1e-5 of a redundant row
+
+
+@kernel
+def factor(plan, work, settings, counts):
+    """L at the state last evaluated; whether it could be had."""
+    memory, inverse_root = work[SCRATCH][0], work[COLUMNS][INVERSE_ROOT]
+    d, l, diagonal, _, _, _, _, _ = memories(plan, memory, inverse_root.shape[0])
+    counts[FACTORISATIONS] += 1
+    assemble(plan, work[JACOBIAN], inverse_root, settings[FORMULATION_OPTIONS], d, l, diagonal)
+    return factorise(plan, l)
+
+
+@kernel
+def watch_pivot(plan, work):
+    """Remember the smallest pivot of the factor, relative to the largest it has been."""
+    memory, n = work[SCRATCH][0], work[COLUMNS].shape[1]
+    _, l, diagonal, seen, _, _, _, _ = memories(plan, memory, n)
+    work[MEMO][0, SMALLEST_PIVOT] = smallest_pivot(plan, l, diagonal, seen, INDEPENDENT)
+    work[MEMO][0, REFERENCE_PIVOT] = 1.0
+
+
+@kernel
+def settle(plan, work, settings, values, target):
+    """Change ``target`` (n,) by the least in the metric of M that makes Φ_q target grow by the values.
+
+    ``values`` (m,) are in the model's rows and become the sums of Δλ, with the sign of λ.  Returns OK or
+    NOT_CONVERGED.
+    """
+    memory, root = work[SCRATCH][0], work[COLUMNS][INVERSE_ROOT]
+    d, l, _, _, b, step, total, x = memories(plan, memory, root.shape[0])
+    row, epsilon = part(plan, ROW), settings[FORMULATION_OPTIONS + 1]
+    for i in range(row.shape[0]):
+        b[i] = values[row[i]]
+        total[i] = 0.0
+    status, change = NOT_CONVERGED, 0.0
+    for _ in range(int(settings[FORMULATION_OPTIONS + 2])):
+        step[:] = b
+        solve(plan, l, step)
+        times_transpose(plan, d, step, x)
+        last, change = change, add_scaled(root, x, target)
+        for i in range(row.shape[0]):
+            total[i] -= step[i]
+        if change <= epsilon or (last > 0.0 and change * change <= epsilon * last):
+            status = OK
+            break
+        subtract_product(plan, d, x, b)
+    values[:] = 0.0
+    for i in range(row.shape[0]):
+        values[row[i]] = total[i]
+    return status
+
+
+@kernel
+def add_scaled(root, x, target):
+    """target += root x; the norm of that, relative to the larger of 1 and the norm of the target."""
+    change, size = 0.0, 0.0
+    for j in range(x.shape[0]):
+        step = root[j] * x[j]
+        target[j] += step
+        change += step * step
+        size += target[j] * target[j]
+    return sqrt(change / max(1.0, size))
+
+
+@kernel
+def accelerations(plan, work, settings, counts):
+    """Accelerations and multipliers by ALF-dual at the state last evaluated; their status."""
+    rows, columns = work[ROWS], work[COLUMNS]
+    root, force, acceleration = columns[INVERSE_ROOT], columns[FORCE], columns[ACCELERATION]
+    for j in range(root.shape[0]):
+        if not columns[MASS, j] > 0.0:
+            return SINGULAR
+        acceleration[j] = root[j] * root[j] * force[j]
+    if not factor(plan, work, settings, counts):
+        return SINGULAR
+    remainder(plan, work, acceleration, rows[RHS], rows[MULTIPLIERS])
+    return settle(plan, work, settings, rows[MULTIPLIERS], acceleration)
+
+
+@kernel
+def remainder(plan, work, x, rhs, values):
+    """values := rhs - Φ_q x in the rows that move."""
+    root = work[COLUMNS][INVERSE_ROOT]
+    d, _, _, _, b, _, _, scaled = memories(plan, work[SCRATCH][0], root.shape[0])
+    row = part(plan, ROW)
+    mass = work[COLUMNS][MASS]
+    for j in range(x.shape[0]):
+        scaled[j] = mass[j] * root[j] * x[j]
+    for i in range(row.shape[0]):
+        b[i] = rhs[row[i]]
+    subtract_product(plan, d, scaled, b)
+    for i in range(row.shape[0]):
+        values[row[i]] = b[i]
+
+
+@exchangeable(RATES)
+def rates(accelerate, t, y, y_rate, problem):
+    ints, floats, work, _pivots, settings, counts = opened(problem)
+    nq, nv = work[STATE].shape[1], work[COLUMNS].shape[1]
+    q, v = y[:nq], y[nq : nq + nv]
+    counts[EVALUATIONS] += 1
+    evaluate(t, q, v, ints, floats, work)
+    right_hand_side(v, ints, work, settings)
+    status = accelerations(planned(problem), work, settings, counts)
+    write_rates(q, v, y_rate, work)
+    return status
+
+
+@exchangeable(ENTER)
+def enter(t, y, problem):
+    ints, floats, work, _pivots, settings, counts = opened(problem)
+    size = copy_state(work[STATE], y)
+    nq = work[STATE].shape[1]
+    evaluate(t, y[:nq], y[nq:size], ints, floats, work)
+    if factor(planned(problem), work, settings, counts):
+        watch_pivot(planned(problem), work)
+    return size
+
+
+@exchangeable(ACCEPT)
+def accept(t, y, problem):
+    ints, floats, work, _pivots, settings, counts = opened(problem)
+    plan, nq = planned(problem), work[STATE].shape[1]
+    rows, x = work[ROWS], work[COLUMNS][STEP_X]
+    q, v = y[:nq], y[nq : nq + x.shape[0]]
+    status = project_positions(t, q, v, plan, ints, floats, work, settings, counts)
+    if status != OK:
+        return status
+    watch_pivot(plan, work)
+    violation_rate(ints, work, v)
+    for i in range(rows.shape[1]):
+        rows[RHS, i] = -rows[PHI_RATE, i]
+    return settle(plan, work, settings, rows[RHS], v)
+
+
+@kernel
+def project_positions(t, q, v, plan, ints, floats, work, settings, counts):
+    """Newton's method for Φ(q, t) = 0; leaves a factor that serves at q, and its status."""
+    rows, x, change = work[ROWS], work[COLUMNS][STEP_X], work[DENSE_VECTORS][0]
+    tolerance = settings[NEWTON_TOLERANCE]
+    x[:] = 0.0
+    displace(q, x, change)
+    evaluate(t, q, v, ints, floats, work)
+    if not factor(plan, work, settings, counts):
+        return SINGULAR
+    violation = largest(rows[PHI])
+    for _ in range(MOST_ITERATIONS):
+        if violation <= tolerance:
+            break
+        counts[NEWTON] += 1
+        for i in range(rows.shape[1]):
+            rows[RHS, i] = -rows[PHI, i]
+        x[:] = 0.0
+        settle(plan, work, settings, rows[RHS], x)
+        displace(q, x, change)
+        evaluate(t, q, v, ints, floats, work)
+        before, violation = violation, largest(rows[PHI])
+        if violation > tolerance and not violation <= GOOD_REDUCTION * before:
+            if violation <= 1e3 * tolerance and not violation < before:
+                break  # what is left is rounding
+            if not factor(plan, work, settings, counts):
+                return SINGULAR
+    return OK if violation <= 1e3 * tolerance else NOT_CONVERGED
+
+
+CHARTS: dict[str, Stabilisation] = {
+    "none": replace(NONE, rates=rates),
+    "baumgarte": replace(BAUMGARTE, rates=rates),
+    "projection": replace(PROJECTION, enter=enter, rates=rates, accept=accept),
+}

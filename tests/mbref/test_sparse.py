@@ -1,0 +1,165 @@
+"""The sparse factor against dense linear algebra, and large scenes against dense runs and truths."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from crosscheck.truth import truth_for
+from mbref import initial, simulate
+from mbref.model import Model
+from mbref.scenes import find_scene
+from mbref.simulate import Limits
+from mbref.sparse.factor import (
+    assemble,
+    factorise,
+    memories,
+    smallest_pivot,
+    solve,
+    subtract_product,
+    times_transpose,
+)
+from mbref.sparse.moving import moving_entries
+from mbref.sparse.plan import ROW, plan_for
+
+
+@given(bodies=st.integers(1, 12), rows=st.integers(1, 40), seed=st.integers(0, 999))
+def test_factor_and_dense_algebra_on_random_blocks(bodies, rows, seed):
+    rng, n = np.random.default_rng(seed), 6 * bodies
+    columns = 6 * rng.integers(0, bodies, rows)[:, None] + np.arange(6)
+    second = np.where(rng.random(rows) < 0.3, bodies, (columns[:, 0] // 6 + 1) % (bodies + 1))
+    columns = np.hstack([columns, 6 * second[:, None] + np.arange(6)])
+    entries = (rng.random((rows, 12)) < 0.6) & (columns < n)
+    blocks, root, alpha = rng.normal(size=(rows, 12)), rng.uniform(0.5, 2.0, n), 10.0 ** rng.integers(1, 8)
+    plan = plan_for(entries, columns, n)
+    dense = np.zeros((rows, n))
+    dense[np.nonzero(entries)[0], columns[entries]] = (blocks * entries)[entries]
+    d_true = (dense * root)[plan.part(ROW)]
+    s_true = d_true @ d_true.T
+    s_true[np.diag_indices_from(s_true)] *= 1 + 1 / alpha
+    rhs, x = rng.normal(size=len(d_true)), rng.normal(size=n)
+    d, low, diagonal, seen, b, _, _, product = memories(plan.indices, np.zeros(plan.memory), n)
+
+    assemble(plan.indices, blocks, root, alpha, d, low, diagonal)
+    assert factorise(plan.indices, low)
+    b[:] = rhs
+    solve(plan.indices, low, b)
+    left = np.abs(s_true @ b - rhs).max(initial=0) / (
+        1 + np.abs(s_true).max(initial=0) * np.abs(b).max(initial=0)
+    )
+    assert left < 1e-13, f"residual of the solution {left:.1e}"
+    times_transpose(plan.indices, d, rhs, product)
+    assert np.abs(product - d_true.T @ rhs).max() < 1e-12
+    b[:] = rhs
+    subtract_product(plan.indices, d, x, b)
+    assert np.abs(b - (rhs - d_true @ x)).max(initial=0) < 1e-12
+    pivots = np.diag(np.linalg.cholesky(s_true)) / np.sqrt(np.diag(s_true))
+    smallest_pivot(plan.indices, low, diagonal, seen, 0.0)
+    assert np.abs(seen - pivots).max(initial=0) < 1e-6 / np.sqrt(alpha), f"pivots {seen}, dense {pivots}"
+
+
+@pytest.mark.parametrize(
+    ("name", "gravity", "rows"),
+    [
+        ("four_bar_chain[5]", (0.0, -9.81, 0.0), 6 * 5 + 2),  # two a joint: the motion is planar
+        ("four_bar_chain[5]", (0.0, -9.81, 1.0), 13 * 5 + 5),  # loaded out of the plane
+        ("planar_slider_crank", (0.0, 0.0, 0.0), 7),
+        ("spatial_slider_crank", (0.0, 0.0, 0.0), 14),  # the slider and the line never turn: three rows rest
+    ],
+)
+def test_rows_that_move_and_the_plane(name, gravity, rows):
+    model = Model(find_scene(name).with_(gravity=gravity))
+    start = initial.consistent_start(model)
+    moving = moving_entries(model, start.q, start.v).any(axis=1)
+    assert moving.sum() == rows, f"{moving.sum()} of {model.m} rows move"
+
+
+ACCELERATIONS = ("acceleration", "angular_acceleration")  # m/s², rad/s²: lengths are about 1 m
+SIMILAR = dict.fromkeys(ACCELERATIONS, ACCELERATIONS)
+
+
+def both(monkeypatch, scene, method, times, limits):
+    """The run by sparse kernels, and by dense ones."""
+    runs = []
+    for large in (0, 10**9):
+        for module in (simulate, initial):
+            monkeypatch.setattr(module, "LARGE", large)
+        runs.append(simulate.simulate(scene, method, times, limits))
+    return runs
+
+
+@pytest.mark.parametrize("method", ["alf-dual+projection", "alf-dual+baumgarte", "alf-dual[alpha=1e6]+none"])
+@pytest.mark.parametrize(
+    ("name", "gravity"),
+    [
+        ("four_bar_chain[3]", (0.0, -9.81, 0.0)),
+        ("four_bar_chain[3]", (1.0, -9.0, 3.0)),
+        ("slider_crank_chain[2]", (0.0, -9.81, 0.0)),
+        ("five_bar_gravity", (0.0, -9.81, 0.0)),
+        ("five_bar", (0.0, 0.0, 0.0)),
+        ("spatial_slider_crank", (0.0, 0.0, 0.0)),
+    ],
+)
+def test_sparse_and_dense_runs(monkeypatch, name, gravity, method):
+    scene = find_scene(name).with_(gravity=gravity)
+    times = np.linspace(0, 0.01, 4)
+    sparse, dense = both(monkeypatch, scene, method, times, Limits(rtol=1e-10))
+    assert sparse.outcome == dense.outcome
+    for key in ("position", "velocity", "angular_velocity", "acceleration", "angular_acceleration"):
+        size = max(np.abs(getattr(dense, other)).max() for other in SIMILAR.get(key, (key,)))
+        gap = np.abs(getattr(sparse, key) - getattr(dense, key)).max() / (1 + size)
+        assert gap < 1e-10, f"{key}: sparse and dense differ by {gap:.1e}"
+
+
+def test_reactions_of_sparse_and_dense_runs_without_redundancy(monkeypatch):
+    scene = find_scene("spatial_slider_crank")
+    sparse, dense = both(monkeypatch, scene, "alf-dual+projection", [0.005, 0.01], Limits(rtol=1e-10))
+    for joint, theirs in dense.reactions.items():
+        gap = np.abs(sparse.reactions[joint] - theirs).max() / np.abs(theirs).max()
+        assert gap < 1e-9, f"reactions of {joint} differ by {gap:.1e}"
+
+
+def test_sparse_start_and_dense_start(monkeypatch):
+    scene = find_scene("four_bar_chain[3]")
+    bodies = list(scene.body)
+    bodies[1] = bodies[1].model_copy(update={"position": (1.0, 0.5001, 0.0), "velocity": (0.5, 0.0, 0.0)})
+    bodies[0] = bodies[0].model_copy(update={"angular_velocity": None})
+    model, starts = Model(scene.with_(body=tuple(bodies))), []
+    for large in (0, 10**9):
+        monkeypatch.setattr(initial, "LARGE", large)
+        starts.append(initial.consistent_start(model))
+    sparse, dense = starts
+    for key in ("q", "v"):
+        gap = np.abs(getattr(sparse, key) - getattr(dense, key)).max()
+        assert gap < 1e-9, f"{key} of the starts differ by {gap:.1e}"
+    assert sparse.report() == dense.report()
+
+
+@pytest.mark.parametrize(
+    ("name", "end", "passed"), [("four_bar_chain[8]", 2.0, 2), ("slider_crank_chain[6]", 0.1, 0)]
+)
+def test_large_scene_and_truth_past_singular_positions(name, end, passed):
+    scene, times = find_scene(name), np.linspace(0.0, end, 11)
+    run = simulate.simulate(scene, "alf-dual+projection", times, Limits(rtol=1e-11))
+    error = np.abs(run.position - truth_for(scene).poses(times).position).max()
+    assert run.outcome.name == "COMPLETED"
+    assert f"singular positions passed: {passed}" in run.message or not passed, run.message
+    assert error < 1e-8, f"error {error:.1e}"
+
+
+def test_two_hundred_loops_and_their_pendulum():
+    loops, times = 200, np.array([0.25, 0.5])
+    run = simulate.simulate(find_scene(f"four_bar_chain[{loops}]"), "alf-dual+projection", times)
+    one = truth_for(find_scene("four_bar_chain[1]").with_(gravity=(0.0, -9.81 * 1.0 * ratio(loops), 0.0)))
+    offset = one.poses(times).position[:, 0] - np.array([0.0, 0.5, 0.0])
+    found = run.position[:, :: loops // 4][:, :5] - np.array([[i * loops // 4, 0.5, 0.0] for i in range(5)])
+    assert np.abs(found - offset[:, None]).max() < 1e-9
+
+
+def ratio(loops):
+    """How much faster than one loop that many swing: W of the docstring of the scene."""
+
+    def pull(n):
+        return ((n + 1) / 2 + n) / ((n + 1) / 3 + n)
+
+    return pull(loops) / pull(1)
