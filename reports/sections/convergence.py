@@ -1,27 +1,68 @@
-"""Measured order of convergence: how the error falls with the step or the tolerance, family by family."""
+"""How the error falls with the step or the tolerance, family by family, and what is left at h → 0."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 
-from crosscheck.metrics import order_of_convergence
+from crosscheck.limits import limit
+from crosscheck.metrics import error_series, order_of_convergence
+from crosscheck.truth import truth_for
 from reports.blocks import Block, Heading, Table, Text
-from reports.runs import Curve, Run, SceneRuns, number
+from reports.runs import Curve, Run, SceneRuns, number, power
+
+STEP = "step"
+LIMITS = ("Scene", "Engine", "Family", "Finest step (s)", "Order", "Its error", "Discretisation", "Bias",
+          "What outweighs")  # fmt: skip
 
 
 def render(groups: Sequence[SceneRuns]) -> list[Block]:
     """One table: engines and families down, scenes across."""
     text = (
-        "The slope of log(error) over log(setting) where at least three completed runs of a family lie on a "
-        "line. Over a fixed step it is the order of the method; over a tolerance, 1 says that the error "
-        "follows what was asked for. A slope near zero is a floor; an en dash: no three runs lie on a line."
+        "The slope of log(error) over log(setting) where at least three completed runs of a family lie on"
+        " a line. Over a fixed step it is the order of the method; over a tolerance, 1 says that the "
+        "error follows what was asked for. A slope near zero is a floor; an en dash: no three runs lie on"
+        " a line."
     )
     curves = sorted({curve for group in groups for curve in group.curves()})
     rows = [_row(groups, curve) for curve in curves]
     header = ("Engine", "Family", "Over", *(group.scene.name for group in groups))
     table = Table(_caption(groups, curves), header, rows, right=frozenset(range(3, len(header))))
-    return [Heading("Order of convergence", 2), Text(text), table]
+    return [Heading("Order of convergence", 2), Text(text), table, *_limits(groups)]
+
+
+def _limits(groups: Sequence[SceneRuns]) -> list[Block]:
+    """What the fixed-step families tend to as h → 0; nothing where no three runs tell."""
+    text = (
+        "Three runs whose differences shrink as a power of the step have a limit at h = 0 (Richardson), "
+        "found without the truth. How far the finest run is from the limit is its discretisation error; "
+        "how far the limit is from the truth, its bias, is what no smaller step cures: the give of a soft"
+        " constraint, a solver's tolerance. A bias smaller than the discretisation error may be the "
+        "extrapolation's own."
+    )
+    rows = [row for group in groups for row in _limit_rows(group)]
+    if not rows:
+        return []
+    biased = sum(row[-1] == "bias" for row in rows)
+    caption = f"Limits of {len(rows)} sweeps; in {biased} of them bias outweighs discretisation."
+    return [Heading("The limit h → 0"), Text(text),
+            Table(caption, LIMITS, rows, right=frozenset(range(3, 8)), folded=True)]  # fmt: skip
+
+
+def _limit_rows(group: SceneRuns) -> list[tuple[str, ...]]:
+    truth, rows = truth_for(group.scene), []
+    for curve, runs in group.curves().items():
+        told = [run for run in runs if run.completed and math.isfinite(run.error)]
+        if truth is None or swept_option(told) != STEP:
+            continue
+        steps = [run.record["settings"][STEP] for run in told]
+        if found := limit(group.scene, steps, [run.trajectory for run in told]):
+            bias = float(error_series(group.scene, found.motion, truth.poses(found.motion.times)).max())
+            finest = min(told, key=lambda run: run.record["settings"][STEP])
+            more = "bias" if bias > found.discretisation else "discretisation"
+            rows.append((group.scene.name, *curve, f"{min(steps):.2g}", number(found.order, 2),
+                         power(finest.error), power(found.discretisation), power(bias), more))  # fmt: skip
+    return rows
 
 
 def _row(groups: Sequence[SceneRuns], curve: Curve) -> tuple[str, ...]:

@@ -21,6 +21,7 @@ from reports.sections import (
     blocks,
     convergence,
     energy,
+    floors,
     mechanism,
     outcomes,
     provenance,
@@ -53,7 +54,7 @@ def test_every_section_and_a_heading(monkeypatch):
     headings = [part.text for part in parts if isinstance(part, Heading)]
     for heading in ("Summary", "spatial_slider_crank", "The mechanism", "Speed against error",
                     "Constraint violation over time", "Energy balance over time", "Outcomes",
-                    "Order of convergence", "Provenance"):  # fmt: skip
+                    "Order of convergence", "The limit h → 0", "Floors", "Provenance"):  # fmt: skip
         assert heading in headings, (heading, headings)
 
 
@@ -104,7 +105,7 @@ def test_least_error_and_end_times_that_rounding_moves():
 
 
 def test_order_of_convergence_and_the_synthetic_slopes():
-    [found] = [b for b in convergence.render(groups()[:1]) if isinstance(b, Table)]
+    found = table(convergence.render(groups()[:1]), "Over")
     orders = column(found, "spatial_slider_crank")
     assert orders["mbref", "mpi-svd+projection"] == "3", orders
     assert orders["mujoco", "tuned"] == "1", orders
@@ -112,10 +113,32 @@ def test_order_of_convergence_and_the_synthetic_slopes():
 
 
 def test_order_and_the_setting_it_is_taken_over():
-    [found] = [b for b in convergence.render(groups()[:1]) if isinstance(b, Table)]
+    found = table(convergence.render(groups()[:1]), "Over")
     over = column(found, "Over")
     assert over["mbref", "mpi-svd+projection"] == over["mujoco", "tuned"] == "step", over
     assert over["pinocchio", "defaults"] == "", over
+
+
+def test_limits_and_the_bias_put_in():
+    soft = [record("a", "soft", 1e-4 + 1e-2 * h, 0.1, step=h) for h in (0.04, 0.02, 0.001)]
+    true = [record("b", "true", 1e-2 * h**2, 0.1, step=h) for h in (0.04, 0.02, 0.01)]
+    [group] = by_scene([*soft, *true], {scene().name: scene()})
+    found = table(convergence.render([group]), "Bias")
+    cells = {row[1]: dict(zip(found.header, row, strict=True)) for row in found.rows}
+    assert cells["a"]["Bias"] == "1.0e-04" and cells["a"]["What outweighs"] == "bias", cells
+    assert cells["a"]["Discretisation"] == "1.0e-05" and cells["a"]["Order"] == "1", cells
+    assert float(cells["b"]["Bias"]) < 1e-12 and cells["b"]["What outweighs"] == "discretisation", cells
+    assert "1 of them bias" in found.caption, found.caption
+
+
+def test_floors_and_least_errors():
+    found = table(floors.render(groups()), "Within 1e-08")
+    rows = {tuple(row[:2]): dict(zip(found.header, row, strict=True)) for row in found.rows}
+    best = rows["spatial_slider_crank", "mbref"]
+    assert best["Least error"] == "1.6e-05" and best["Settings"] == "step=0.025", best
+    assert best["Within 1e-08"] == "", best
+    assert rows["spatial_slider_crank", "exudyn"]["Least error"] == "not converged at 0.012 s", rows
+    assert found.caption.startswith("0 of 6 pairs"), found.caption
 
 
 @pytest.mark.parametrize(

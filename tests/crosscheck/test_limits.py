@@ -1,0 +1,48 @@
+"""The limit h → 0: the order, bias and discretisation found / those put into made-up runs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from crosscheck.kinematics import scene_length
+from crosscheck.limits import limit
+from crosscheck.metrics import error_series
+from crosscheck.truth import truth_for
+from mbref import rotations
+from mbref.scenes import SCENES
+from mbref.trajectory import Trajectory
+
+SCENE = SCENES["spatial_slider_crank_driven"]()
+TRUTH = truth_for(SCENE).poses(np.linspace(0, 0.02, 5))
+
+
+def made(step: float, order: float, bias: float, constant: float = 1e-2) -> Trajectory:
+    """A run off the truth by bias + constant · step^order, shifted and turned by as much; every second one
+    with the other sign of its quaternions."""
+    off = bias + constant * step**order
+    turn = rotations.from_vector([0.0, off / 2, 0.0])
+    sign = -1.0 if step == 0.1 else 1.0
+    shift = off * scene_length(SCENE) * np.array([1.0, 0.0, 0.0])
+    return replace(TRUTH, position=TRUTH.position + shift,
+                   orientation=sign * rotations.multiply(turn, TRUTH.orientation))  # fmt: skip
+
+
+@pytest.mark.parametrize("order, bias", [(1.0, 1e-4), (2.0, 0.0), (2.0, 3e-5), (4.0, 1e-6)])
+def test_order_and_bias_found_and_put_in(order: float, bias: float):
+    steps = [0.1, 0.3, 1.0, 0.2]
+    found = limit(SCENE, steps, [made(h, order, bias) for h in steps])
+    error = error_series(SCENE, found.motion, TRUTH).max()
+    assert found.order == pytest.approx(order, rel=1e-3), found.order
+    assert found.discretisation == pytest.approx(1e-2 * 0.1**order, rel=1e-2), found.discretisation
+    assert error == pytest.approx(bias, rel=1e-2, abs=1e-8), f"limit off by {error:.2e}, bias put in {bias:g}"
+
+
+def test_runs_off_every_power_and_no_limit():
+    steps = [1.0, 0.5, 0.25]
+    wandering = [made(h, 1.0, off) for h, off in zip(steps, (0.0, 1e-3, -2e-2), strict=True)]
+    assert limit(SCENE, steps, wandering) is None
+    assert limit(SCENE, steps, [made(0.5, 1.0, 1e-3)] * 3) is None, "no difference, no order"
+    assert limit(SCENE, steps[:2], wandering[:2]) is None, "two runs have no order"
