@@ -1,19 +1,24 @@
-"""Microseconds of one right-hand side, for every formulation on the paper's mechanisms.
+"""Microseconds of one right-hand side, for every formulation on the paper's mechanisms, and of the engines.
 
-    python benchmarks/evaluation.py
+    python benchmarks/evaluation.py [SCENE …]
 
-Process CPU time, the least of REPEATS interleaved repeats of CALLS evaluations in the compiled loop.
+Process CPU time, medians of REPEATS interleaved repeats of many evaluations; mbref's in its compiled loop,
+the engines' called from Python.
 """
 
 from __future__ import annotations
 
+import sys
 import time
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
+from forward_dynamics import timed_calls
 
 from mbref.compiled import INT, VECTOR, entry, pointer_to
 from mbref.formulations import FORMULATIONS
 from mbref.method import Method
+from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.simulate import Limits, _Run
 from mbref.tables import ACCELERATE, OK, PROBLEM, RATES, SIZES
@@ -30,31 +35,47 @@ def repeat(rates, accelerate, calls, y, y_rate, problem):
     return status
 
 
-def main() -> None:
-    print(f"{'µs per right-hand side':24}" + "".join(f"{name:>24}" for name in SCENE_NAMES))
-    runs = {(f, s): _prepared(f, s) for s in SCENE_NAMES for f in FORMULATIONS}
-    least = {key: np.inf for key in runs}
+def main(names: Sequence[str]) -> None:
+    """Measure and print."""
+    calls = {
+        (what, name): call
+        for name in names
+        for scene in [SCENES[name]()]
+        for what, call in (*_formulations(scene), *timed_calls(scene))
+    }
+    seconds = {key: np.median(rounds) for key, rounds in _in_turns(calls).items()}
+    print(f"{'µs per right-hand side':32}" + "".join(f"{name:>24}" for name in names))
+    for what in dict.fromkeys(what for what, _ in calls):
+        cells = [seconds.get((what, name), np.nan) for name in names]
+        text = ("fails" if np.isnan(c) else f"{c * 1e6:.2f}" for c in cells)
+        print(f"{what:32}" + "".join(f"{t:>24}" for t in text))
+
+
+def _in_turns(calls: dict[tuple[str, str], Callable[[], float]]) -> dict[tuple[str, str], list[float]]:
+    """REPEATS rounds of every call, after one that warms up."""
+    rounds: dict[tuple[str, str], list[float]] = {key: [] for key in calls}
+    for call in calls.values():
+        call()
     for _ in range(REPEATS):
-        for key, call in runs.items():
-            least[key] = min(least[key], _seconds(call))
-    for f in FORMULATIONS:
-        cells = [least[f, s] for s in SCENE_NAMES]
-        text = ("fails" if np.isinf(c) else f"{c * 1e6 / CALLS:.2f}" for c in cells)
-        print(f"{f:24}" + "".join(f"{t:>24}" for t in text))
+        for key, call in calls.items():
+            rounds[key].append(call())
+    return rounds
 
 
-def _prepared(formulation: str, scene: str):
-    run = _Run(SCENES[scene](), Method.parse(f"{formulation}+none"), np.array([1.0]), Limits())
-    rates, accelerate = run.method.stabilisation.rates.pointer, run.method.formulation.accelerate.pointer
-    y, y_rate = run.y[: run.pivots[SIZES, 1]], run.y_rate[: run.pivots[SIZES, 1]]
-    return lambda: repeat(rates, accelerate, CALLS, y, y_rate, run.problem)
+def _formulations(scene: Scene) -> Iterator[tuple[str, Callable[[], float]]]:
+    """Every formulation's accelerations without stabilisation; NaN seconds where it fails."""
+    for formulation in FORMULATIONS:
+        run = _Run(scene, Method.parse(f"{formulation}+none"), np.array([1.0]), Limits())
+        kernels = run.method.stabilisation.rates.pointer, run.method.formulation.accelerate.pointer
+        y, y_rate = run.y[: run.pivots[SIZES, 1]], run.y_rate[: run.pivots[SIZES, 1]]
 
+        def call(run=run, kernels=kernels, y=y, y_rate=y_rate) -> float:
+            began = time.process_time()
+            status = repeat(*kernels, CALLS, y, y_rate, run.problem)
+            return (time.process_time() - began) / CALLS if status == OK else np.nan
 
-def _seconds(call) -> float:
-    began = time.process_time()
-    status = call()
-    return time.process_time() - began if status == OK else np.nan
+        yield formulation, call
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:] or SCENE_NAMES)

@@ -1,0 +1,157 @@
+"""General-purpose integrators on mbref's own compiled right-hand side: SciPy's, SUNDIALS CVODE and IDA.
+
+The equations are those of a scene in all coordinates, accelerations by ALF, nothing stabilised; what differs
+from mbref is the integrator, called from Python.  IDA is given the residual y' - f(t, y).
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import time
+from abc import abstractmethod
+from collections.abc import Callable, Sequence
+from importlib import metadata
+
+import numpy as np
+from numba import njit
+
+from crosscheck.engine import Cannot, Engine, Setting
+from crosscheck.engines._start import lacks_mass
+from mbref.method import Method
+from mbref.scene import Scene
+from mbref.simulate import Limits, _Run
+from mbref.tables import ACCELERATION, COLUMNS, EVALUATIONS, SIZES
+from mbref.trajectory import Cost, Outcome, Trajectory
+
+METHOD = "alf-dual+none"
+RTOLS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12)
+MOST_STEPS = 10**6
+Solution = tuple[
+    np.ndarray, str, int
+]  # states (k, n) reached, why it ended (empty: at the end), factorisations
+
+
+@functools.cache
+def compiled() -> Callable:
+    """``rates`` of METHOD with its formulation compiled in: to pass a kernel costs more than to call it."""
+    method = Method.parse(METHOD)
+    kernels = method.stabilisation.rates, method.formulation.accelerate
+    rates, accelerate = (njit(error_model="numpy")(kernel.function) for kernel in kernels)
+
+    @njit(error_model="numpy")
+    def call(t, y, y_rate, problem):
+        return rates(accelerate, t, y, y_rate, problem)
+
+    return call
+
+
+class RightHandSide:
+    """y' = f(t, y) of a scene, called from Python: y holds coordinates and velocities."""
+
+    def __init__(self, scene: Scene, times: np.ndarray):
+        self.run = run = _Run(scene, Method.parse(METHOD), times, Limits())
+        self.call = compiled()
+        self.size = int(run.pivots[SIZES, 1])
+        self.start = run.y[: self.size].copy()
+        self(0.0, self.start)  # compiled before anything is timed
+
+    def __call__(self, t: float, y: np.ndarray) -> np.ndarray:
+        rate = np.empty(self.size)
+        self.call(t, np.array(y), rate, self.run.problem)
+        return rate
+
+    def motion(self, times: np.ndarray, states: np.ndarray) -> dict[str, np.ndarray]:
+        """Poses, velocities and accelerations of the states (k, n), as a Trajectory names them."""
+        nb, n = self.run.model.nb, 6 * self.run.model.nb
+        accelerations = np.zeros((len(states), n))
+        for k, (t, y) in enumerate(zip(times, states, strict=True)):
+            self(t, y)
+            accelerations[k] = self.run.work[COLUMNS][ACCELERATION]
+        q = states[:, : 7 * nb].reshape(-1, nb, 7).copy()
+        q[..., 3:] /= np.linalg.norm(q[..., 3:], axis=-1, keepdims=True)
+        rates = (a.reshape(-1, nb, 6) for a in (states[:, 7 * nb :], accelerations))
+        return self.run.model.motion(q, *rates)
+
+
+class GeneralIntegrator(Engine):
+    """A library of integrators; families are its methods, the one option is ``rtol``."""
+
+    families: tuple[str, ...]
+
+    def version(self) -> str:
+        return metadata.version(self.package)
+
+    def cannot(self, scene: Scene) -> Cannot | None:
+        return lacks_mass(scene)
+
+    def settings(self, scene: Scene) -> Sequence[Setting]:
+        return [Setting(family, {"rtol": rtol}) for family in self.families for rtol in RTOLS]
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        began = time.process_time()
+        f = RightHandSide(scene, times)
+        built = time.process_time() - began
+        f.run.counts[:] = 0
+        began = time.process_time()
+        states, message, factorisations = self.solve(setting.family, f, times, setting.options["rtol"])
+        seconds = time.process_time() - began
+        cost = Cost(seconds, built, rhs=int(f.run.counts[EVALUATIONS]), factorisations=factorisations)
+        done = len(states) == len(times) and not message
+        motion = f.motion(times[: len(states)], states)
+        return Trajectory(
+            scene.name, self.name, self.version(), setting.family, dict(setting.options),
+            times[: len(states)], tuple(body.name for body in scene.body), **motion,
+            outcome=Outcome.COMPLETED if done else Outcome.STEP_FAILED, message=message,
+            t_end=float(times[len(states) - 1]) if len(states) else 0.0, cost=cost,
+        )  # fmt: skip
+
+    @abstractmethod
+    def solve(self, family: str, f: RightHandSide, times: np.ndarray, rtol: float) -> Solution:
+        """The states at the times, as far as they were reached."""
+
+
+class SciPy(GeneralIntegrator):
+    """``scipy.integrate.solve_ivp``."""
+
+    name = package = "scipy"
+    families = ("DOP853", "Radau")
+
+    def solve(self, family: str, f: RightHandSide, times: np.ndarray, rtol: float) -> Solution:
+        from scipy.integrate import solve_ivp
+
+        span = (0.0, float(times[-1]))
+        found = solve_ivp(f, span, f.start, method=family, t_eval=times, rtol=rtol, atol=rtol)
+        return found.y.T, "" if found.success else found.message, found.nlu
+
+
+class ScikitSundae(GeneralIntegrator):
+    """SUNDIALS by scikit-sundae."""
+
+    name, package = "sundials", "scikit-sundae"
+    families = ("CVODE Adams", "CVODE BDF", "IDA")
+
+    def solve(self, family: str, f: RightHandSide, times: np.ndarray, rtol: float) -> Solution:
+        os.environ.setdefault("SUNLOGGER_WARNING_FILENAME", os.devnull)  # a run that fails says so itself
+        os.environ.setdefault("SUNLOGGER_ERROR_FILENAME", os.devnull)
+        from sksundae.cvode import CVODE
+        from sksundae.ida import IDA
+
+        options = {"rtol": rtol, "atol": rtol, "max_num_steps": MOST_STEPS}
+
+        def rates(t: float, y: np.ndarray, rate: np.ndarray) -> None:
+            rate[:] = f(t, y)
+
+        def residual(t: float, y: np.ndarray, rate: np.ndarray, res: np.ndarray) -> None:
+            res[:] = rate - f(t, y)
+
+        if family == "IDA":
+            found = IDA(residual, **options).solve(times, f.start, f(0.0, f.start))
+        else:
+            found = CVODE(rates, method=family.split()[1], **options).solve(times, f.start)
+        reached = np.isin(times, found.t)
+        states = np.asarray(found.y)[np.isin(found.t, times)][: int(reached.sum())]
+        return states, "" if found.success else str(found.message), 0
+
+
+SCIPY, SCIKIT_SUNDAE = SciPy(), ScikitSundae()

@@ -1,0 +1,170 @@
+"""The limit: what a mechanism costs when its one equation of motion is derived by hand.
+
+Free scenes: the equation of ``by_hand``, compiled, by mbref's own DOP853 and step control.  Driven scenes:
+their poses in closed form at the sample times, which is all that a perfect method would have to compute.
+"""
+
+from __future__ import annotations
+
+import functools
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from by_hand import BY_HAND
+from numba import njit
+
+from crosscheck.engine import Cannot, Engine, Setting, Why
+from crosscheck.truth import PATHS
+from crosscheck.truth.path import Path, initial_rate
+from mbref import __version__, rotations
+from mbref.integrators import INTEGRATORS
+from mbref.integrators.coefficients import STAGES
+from mbref.scene import Scene
+from mbref.tables import LARGEST_STEP, OK, ORDER
+from mbref.trajectory import Cost, Outcome, Trajectory
+
+OPTIONS = {"error_model": "numpy"}  # as mbref's kernels
+CONTROL = 16  # entries of ``control``, more than there are
+RTOLS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
+REPEATS = 100  # within one reading of the clock: one run is a matter of microseconds
+STEPS, REJECTED, EVALUATIONS = range(3)
+
+
+@functools.cache
+def compiled(rates: Callable) -> Callable:
+    """``repeat`` for an equation: mbref's DOP853 and step control compiled into one piece with it."""
+    integrator = INTEGRATORS["dop853"]
+    step, propose = (njit(**OPTIONS)(kernel.function) for kernel in (integrator.step, integrator.propose))
+
+    @njit(**OPTIONS)
+    def integrate(times, samples, start, control, tolerances, memory, p, counts):
+        """From sample to sample: y(t) into the rows of ``samples``."""
+        y, rate, new = memory[-3, :2], memory[-2, :2], memory[-1, :2]
+        y[:] = start
+        t, h, suggested, ratio = 0.0, 0.0, 0.0, 0.0
+        for k in range(times.shape[0]):
+            while t < times[k]:
+                rates(0, t, y, rate, p)
+                counts[EVALUATIONS] += 1
+                suggested = propose(h, suggested, ratio, y, rate, memory, control, tolerances)
+                while True:
+                    left = times[k] - t
+                    h = left if suggested * (1.0 + 1e-9) >= left else min(suggested, 0.5 * left)
+                    ratio = step(rates, 0, t, h, y, rate, new, memory, tolerances, p)
+                    counts[EVALUATIONS] += STAGES - 1
+                    if not ratio >= 0.0 or h < 1e-14 * times[-1]:
+                        return -1
+                    if ratio <= 1.0:
+                        break
+                    counts[REJECTED] += 1
+                    suggested = propose(h, suggested, ratio, y, rate, memory, control, tolerances)
+                counts[STEPS] += 1
+                y[:] = new
+                t = times[k] if h == left else t + h
+            samples[k] = y
+        return OK
+
+    @njit(**OPTIONS)
+    def repeat(times, samples, start, control, tolerances, memory, p, counts):
+        """Several times: one run is too short for one reading of the clock."""
+        status = OK
+        for _ in range(REPEATS):
+            counts[:] = 0.0
+            status = integrate(times, samples, start, control, tolerances, memory, p, counts)
+        return status
+
+    return repeat
+
+
+class Limit(Engine):
+    """The hand-derived equation of a built-in scene."""
+
+    name = "limit"
+    package = "mbref"
+
+    def version(self) -> str:
+        return __version__
+
+    def cannot(self, scene: Scene) -> Cannot | None:
+        return (
+            None
+            if scene.name in BY_HAND
+            else Cannot(Why.UNBUILT, "its equation has not been derived by hand")
+        )
+
+    def settings(self, scene: Scene) -> Sequence[Setting]:
+        if scene.driver:
+            return [Setting("closed form", {})]
+        return [Setting("equation", {"rtol": rtol}) for rtol in RTOLS]
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        path = next(path for family in PATHS if (path := family(scene)))
+        arm = np.subtract(scene.joint[1].anchor, scene.joint[0].anchor)
+        theta0 = float(np.arctan2(-arm[2] if path.axis[1] else arm[1], arm[0]))
+        if scene.driver:
+            speed = scene.driver[0].polynomial[1]
+            motion = np.column_stack([speed * times, np.full_like(times, speed)])
+            cost = _closed_form(scene, theta0 + motion[:, 0], path)
+        else:
+            motion, cost = _integrated(scene, theta0, times, setting.options["rtol"], path)
+            motion = motion - [theta0, 0.0]
+        return _trajectory(scene, path, times, motion, setting, cost)
+
+
+def _integrated(
+    scene: Scene, theta0: float, times: np.ndarray, rtol: float, path: Path
+) -> tuple[np.ndarray, Cost]:
+    """(k, 2) angle and rate at the times, and what the stepping took."""
+    by_hand, integrator = BY_HAND[scene.name], INTEGRATORS["dop853"]
+    control = np.zeros(CONTROL)
+    control[ORDER], control[LARGEST_STEP] = integrator.order, times[-1]
+    start, samples, counts = (
+        np.array([theta0, initial_rate(scene, path)]),
+        np.zeros((len(times), 2)),
+        np.zeros(3),
+    )
+    memory = np.zeros((integrator.rows + 3, 14))
+    numbers = np.array(by_hand.numbers(scene))
+    arguments = times, samples, start, control, np.full(2, rtol), memory, numbers, counts
+    repeat = compiled(by_hand.equation)
+    repeat(*arguments)
+    began = time.process_time()
+    status = repeat(*arguments)
+    seconds = (time.process_time() - began) / REPEATS
+    if status != OK:
+        raise ArithmeticError(f"{scene.name}: the hand-derived equation could not be integrated at {rtol:g}")
+    return samples, Cost(seconds, 0.0, *(int(count) for count in counts))
+
+
+def _closed_form(scene: Scene, thetas: np.ndarray, path: Path) -> Cost:
+    """What the poses take; they are compared with the truth's path first."""
+    by_hand = BY_HAND[scene.name]
+    numbers, poses = np.array(by_hand.numbers(scene)), np.zeros((len(thetas), 12 * len(scene.body)))
+    by_hand.poses(thetas, numbers, poses)
+    exact, found = path.poses(thetas - thetas[0]), poses.reshape(len(thetas), -1, 12)
+    rotation = found[..., 3:].reshape(*found.shape[:2], 3, 3)
+    off = max(np.abs(found[..., :3] - exact.position).max(), np.abs(rotation - exact.rotation).max())
+    if not off < 1e-12:
+        raise ArithmeticError(f"{scene.name}: the closed form is off by {float(off):.1e}")
+    began = time.process_time()
+    for _ in range(REPEATS):
+        by_hand.poses(thetas, numbers, poses)
+    return Cost((time.process_time() - began) / REPEATS, 0.0, len(thetas))
+
+
+def _trajectory(
+    scene: Scene, path: Path, times: np.ndarray, motion: np.ndarray, setting: Setting, cost: Cost
+) -> Trajectory:
+    """The bodies along the path at coordinates and rates ``motion`` (k, 2)."""
+    pose, rate = path.poses(motion[:, 0]), motion[:, 1, None, None]
+    return Trajectory(
+        scene.name, Limit.name, __version__, setting.family, dict(setting.options), times,
+        tuple(body.name for body in scene.body), np.asarray(pose.position, dtype=float),
+        rotations.from_matrix(pose.rotation), np.asarray(pose.dposition * rate, dtype=float),
+        np.asarray(pose.spin * rate, dtype=float),
+        outcome=Outcome.COMPLETED, t_end=float(times[-1]), cost=cost,
+    )  # fmt: skip
+
+
+LIMIT = Limit()

@@ -1,0 +1,246 @@
+"""What a simulated second costs at errors of 1e-3, 1e-6 and 1e-9: mbref, engines, general integrators, limit.
+
+    python benchmarks/speed.py [SCENE …] [--out FILE.json] [--plot FILE.png]
+
+Every setting of every family is run once, coarse to fine, until it takes too long; then all that count take
+turns in REPEATS rounds of one process.  Times are process CPU seconds of the stepping, medians of the
+rounds; errors are against the scene's truth; the cost at an error is read off the family's curve.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+from general_integrators import SCIKIT_SUNDAE, SCIPY
+from limit import LIMIT
+from rich.console import Console
+from rich.table import Table
+
+from crosscheck.engine import Engine, Setting, engine
+from crosscheck.metrics import cost_at_error, measure
+from crosscheck.study import machine, versions
+from crosscheck.tolerances import ERROR_LEVELS
+from crosscheck.truth import truth_for
+from mbref.scene import Scene
+from mbref.scenes import SCENES
+from mbref.trajectory import Cost, Outcome
+
+OURS, LIMIT_NAME = "mbref", LIMIT.name
+ENGINES = ("mbref", "mujoco", "pinocchio", "exudyn", "sundials")
+PAPER = (
+    "four_bar", "five_bar", "spatial_slider_crank", "spatial_slider_crank_driven", "planar_slider_crank",
+    "planar_slider_crank_equal", "planar_slider_crank_heavy", "four_bar_gravity", "five_bar_gravity",
+    "spatial_slider_crank_gravity", "planar_slider_crank_gravity",
+)  # fmt: skip
+SAMPLES = 11  # few, because adaptive integrators end a step at every sample time
+REPEATS = 5
+LONG = 1.0  # s; a family's finer settings are not tried after a run as long as this
+ENOUGH = 1e-10  # an error at which a family's finer settings are of no interest
+
+
+@dataclass
+class Run:
+    """One setting on one scene: how it ended, its error, its counts, and its seconds in every round."""
+
+    engine: str
+    family: str
+    options: dict[str, Any]
+    outcome: str
+    error: float
+    cost: dict[str, Any]
+    seconds: list[float] = field(default_factory=list)
+
+    @property
+    def median(self) -> float:
+        """Seconds of stepping; of the first run where it was too long to be repeated."""
+        return median(self.seconds) if self.seconds else self.cost["seconds"]
+
+
+Curve = tuple[str, str]  # engine and family
+
+
+def competitors() -> list[Engine]:
+    """All engines whose packages are installed; says which are not."""
+    found: list[Engine] = []
+    for simulator in [*(engine(name) for name in ENGINES), SCIPY, SCIKIT_SUNDAE, LIMIT]:
+        try:
+            simulator.version()
+        except ImportError:
+            print(f"{simulator.name}: left out, {simulator.package} is not installed", file=sys.stderr)
+        else:
+            found.append(simulator)
+    return found
+
+
+def measured(scene: Scene, simulators: Sequence[Engine]) -> list[Run]:
+    """Every run of the scene, those worth it timed in turns."""
+    times = np.linspace(0.0, scene.duration, SAMPLES)
+    able = [simulator for simulator in simulators if simulator.cannot(scene) is None]
+    jobs = [(simulator, run) for simulator in able for run in _sweep(simulator, scene, times)]
+    curves: dict[Curve, list[Run]] = {}
+    for _, run in jobs:
+        curves.setdefault((run.engine, run.family), []).append(run)
+    worth = [job for job in jobs if _is_worth_timing(job[1], curves)]
+    for _ in range(REPEATS):
+        for simulator, run in worth:
+            run.seconds.append(simulator.run(scene, times, Setting(run.family, run.options)).cost.seconds)
+    return [run for _, run in jobs]
+
+
+def _sweep(simulator: Engine, scene: Scene, times: np.ndarray) -> Iterator[Run]:
+    """One run of each setting, coarse to fine, of each family."""
+    truth, finished = truth_for(scene), set()
+    for setting in simulator.settings(scene):
+        if setting.family in finished:
+            continue
+        simulator.prepare([setting.family])
+        trajectory = simulator.run(scene, times, setting)
+        error = measure(scene, trajectory, truth)["error"]
+        error = math.inf if error is None else error
+        cost = asdict(trajectory.cost)
+        yield Run(
+            simulator.name, setting.family, dict(setting.options), trajectory.outcome.label, error, cost
+        )
+        if trajectory.cost.seconds > LONG or error < ENOUGH:
+            finished.add(setting.family)
+
+
+def _is_worth_timing(run: Run, curves: dict[Curve, list[Run]]) -> bool:
+    """mbref and the limit always, of the others what may be an engine's best at one of the levels."""
+    if run.outcome != Outcome.COMPLETED.label or not math.isfinite(run.error) or run.cost["seconds"] > LONG:
+        return False
+    if run.engine in (OURS, LIMIT_NAME):
+        return True
+    own = _costs(curves[run.engine, run.family])
+    rivals = [_costs(runs) for (name, _), runs in curves.items() if name == run.engine]
+    best = [min(costs) for costs in zip(*rivals, strict=True)]
+    return any(cost < 1.5 * least for cost, least in zip(own, best, strict=True))
+
+
+def _costs(runs: Sequence[Run]) -> list[float]:
+    """Seconds at each level of error; infinite where it is not reached."""
+    done = [run for run in runs if run.outcome == Outcome.COMPLETED.label and math.isfinite(run.error)]
+    seconds, errors = [run.median for run in done], [run.error for run in done]
+    found = [cost_at_error(seconds, errors, level) for level in ERROR_LEVELS]
+    return [math.inf if cost is None else cost for cost in found]
+
+
+def rows(scene: Scene, runs: Sequence[Run]) -> list[dict[str, Any]]:
+    """One a curve: seconds per simulated second at each level, and the cheapest run that reaches it."""
+    curves: dict[Curve, list[Run]] = {}
+    for run in runs:
+        curves.setdefault((run.engine, run.family), []).append(run)
+    return [
+        {
+            "engine": name, "family": family, "cost": [c / scene.duration for c in _costs(group)],
+            "runs": [_cheapest(group, level) for level in ERROR_LEVELS],
+        }
+        for (name, family), group in curves.items()
+    ]  # fmt: skip
+
+
+def _cheapest(runs: Sequence[Run], level: float) -> Run | None:
+    able = [run for run in runs if run.outcome == Outcome.COMPLETED.label and run.error <= level]
+    return min(able, key=lambda run: run.median, default=None)
+
+
+def chosen(table: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Every family of mbref, and of every other engine the best at each level."""
+    kept = []
+    for row in table:
+        others = [other for other in table if other["engine"] == row["engine"]]
+        best = [min(costs) for costs in zip(*(other["cost"] for other in others), strict=True)]
+        wins = [c == b < math.inf for c, b in zip(row["cost"], best, strict=True)]
+        if row["engine"] == OURS or any(wins):
+            kept.append(row)
+    return kept
+
+
+def show(console: Console, scene: Scene, table: Sequence[dict[str, Any]]) -> None:
+    """Milliseconds per simulated second, also as multiples of the limit; counts of the nearest run."""
+    limit = next(
+        (row["cost"] for row in table if row["engine"] == LIMIT_NAME), [math.nan] * len(ERROR_LEVELS)
+    )
+    shown = Table(title=f"{scene.name}, {scene.duration:g} s: milliseconds per simulated second")
+    for heading in ("engine", "family"):
+        shown.add_column(heading, no_wrap=True)
+    for level in ERROR_LEVELS:
+        shown.add_column(f"at {level:.0e}", justify="right")
+        shown.add_column("× limit", justify="right")
+    shown.add_column(f"run nearest {ERROR_LEVELS[1]:.0e}: error, evaluations, factorisations, Newton")
+    for row in sorted(chosen(table), key=lambda row: row["cost"][1]):
+        cells = [text for c, l in zip(row["cost"], limit, strict=True) for text in (_ms(c), _multiple(c / l))]
+        shown.add_row(row["engine"], row["family"], *cells, _counts(row["runs"][1]))
+    console.print(shown)
+
+
+def summary(console: Console, tables: dict[str, Sequence[dict[str, Any]]]) -> None:
+    """mbref's best against the best of the engines, of the general integrators and the limit."""
+    shown = Table(title="mbref's best method as a multiple of …")
+    shown.add_column("scene", no_wrap=True)
+    groups = {"engines": ENGINES[1:4], "general": ("sundials", "scipy"), "limit": (LIMIT_NAME,)}
+    for name in groups:
+        for level in ERROR_LEVELS:
+            shown.add_column(f"{name} {level:.0e}", justify="right")
+    for scene, table in tables.items():
+        ours = _best(table, (OURS,))
+        ratios = [c / b for names in groups.values() for c, b in zip(ours, _best(table, names), strict=True)]
+        shown.add_row(scene, *(_multiple(r) for r in ratios))
+    console.print(shown)
+
+
+def _best(table: Sequence[dict[str, Any]], names: Sequence[str]) -> list[float]:
+    found = [row["cost"] for row in table if row["engine"] in names]
+    return [min(costs) for costs in zip(*found, strict=True)] if found else [math.nan] * len(ERROR_LEVELS)
+
+
+def _ms(seconds: float) -> str:
+    return "–" if not math.isfinite(seconds) else f"{seconds * 1e3:.3g}"
+
+
+def _multiple(ratio: float) -> str:
+    return "–" if not math.isfinite(ratio) else f"{ratio:.2g}" if ratio < 100 else f"{ratio:.0f}"
+
+
+def _counts(run: Run | None) -> str:
+    if run is None:
+        return "–"
+    cost = Cost(**run.cost)
+    return f"{run.error:.0e}, {cost.rhs}, {cost.factorisations}, {cost.newton}"
+
+
+def main() -> None:
+    """Measure, print, store, draw."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("scene", nargs="*", default=PAPER, help=f"default: {' '.join(PAPER)}")
+    parser.add_argument("--out", type=Path, help="JSON of every run and of the table")
+    parser.add_argument("--plot", type=Path, help="a picture of the costs")
+    options = parser.parse_args()
+    console = Console(width=None if sys.stdout.isatty() else 180)
+    simulators, tables, data = competitors(), {}, {"machine": machine(), "versions": versions(), "scenes": {}}
+    for name in options.scene:
+        scene = SCENES[name]()
+        runs = measured(scene, simulators)
+        tables[name] = rows(scene, runs)
+        show(console, scene, tables[name])
+        stored = [{"engine": r["engine"], "family": r["family"], "cost": r["cost"]} for r in tables[name]]
+        data["scenes"][name] = {
+            "duration": scene.duration, "levels": ERROR_LEVELS, "runs": [asdict(run) for run in runs],
+            "curves": stored,
+        }  # fmt: skip
+        if options.out:
+            options.out.write_text(json.dumps(data))
+    summary(console, tables)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,73 @@
+"""What the first run costs before it steps: imports, compilation, loading compiled kernels from the cache.
+
+    python benchmarks/startup.py [METHOD …]
+
+Each figure is of fresh processes: process CPU seconds from the start of the interpreter, children of the
+compiler included.  Cold starts have an empty cache folder of their own, warm ones the same folder again.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from statistics import median
+
+from crosscheck.engine import engine
+from mbref.scenes import SCENES
+
+WARM = 3  # processes of each warm figure
+SCENE = "spatial_slider_crank"
+IMPORTS = ("numpy", "mbref.scene", "mbref.simulate", "crosscheck.study", "mujoco", "pinocchio", "exudyn")
+RUN = """
+from crosscheck.engine import Setting, engine
+from mbref.scenes import SCENES
+scene = SCENES[{scene!r}]()
+engine("mbref").prepare([{family!r}])
+engine("mbref").run(scene, [scene.duration], Setting({family!r}, {{"rtol": 1e-6}}))
+"""
+
+
+def main(methods: Sequence[str]) -> None:
+    """Measure and print."""
+    nothing = _median("pass", {})
+    print(f"{'the interpreter alone':32}{nothing:8.2f} s")
+    for module in IMPORTS:
+        if _installed(module):
+            print(f"{'import ' + module:32}{_median(f'import {module}', {}) - nothing:8.2f} s")
+    print(f"\n{'a short run of ' + SCENE:32}{'cold':>10}{'warm':>10}{'cache':>12}")
+    offered = dict.fromkeys(setting.family for setting in engine("mbref").settings(SCENES[SCENE]()))
+    for family in methods or offered:
+        with tempfile.TemporaryDirectory() as folder:
+            code, place = RUN.format(scene=SCENE, family=family), {"NUMBA_CACHE_DIR": folder}
+            cold = _seconds(code, place)
+            warm = _median(code, place)
+            size = sum(path.stat().st_size for path in Path(folder).rglob("*") if path.is_file())
+            print(f"{family:32}{cold:8.2f} s{warm:8.2f} s{size / 1e6:9.1f} MB")
+
+
+def _installed(module: str) -> bool:
+    run = subprocess.run([sys.executable, "-c", f"import {module}"], capture_output=True, check=False)
+    return run.returncode == 0
+
+
+def _median(code: str, environment: dict[str, str]) -> float:
+    return median(_seconds(code, environment) for _ in range(WARM))
+
+
+def _seconds(code: str, environment: dict[str, str]) -> float:
+    """CPU seconds, user and system, of a fresh process that runs the code."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, **environment}, check=True, stderr=subprocess.DEVNULL
+    )
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
