@@ -18,6 +18,7 @@ import time
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from crosscheck.engine import Cannot, Engine, Setting
 from crosscheck.engines._motion import fastest_rate, motion, stated_rate
@@ -33,8 +34,9 @@ CONVERGED = (1e-9, 1e-6, 50)  # change of the forces (N), mu, iterations: forces
 BAUMGARTE = 0.1  # double root of the closure errors, in 1/step
 PROJECTIONS = 10  # Newton iterations at most; two are usual
 CLOSED = 1e-13  # m and rad, where a projection ends
+REDUNDANT = 1e-7  # of the largest singular value: redundant rows of states not quite closed are below
 CLOSED_ENOUGH = 1e-8  # m and rad, beyond which it has failed
-RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10)  # finer ones get lost in the noise at singular positions
+RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-11)  # finer ones get lost in the noise at singular positions
 TURN_PER_STEP = 0.25  # rad a driver may move within one adaptive step: closures can fold in between
 LEAST_TURN = 0.03  # rad turned within the shortest adaptive step
 SCOUT_RTOL = 1e-5
@@ -182,19 +184,28 @@ class _Run:
         return y if self.flat and not self.driven else np.concatenate(self.split(t, y))
 
     def projected(self, t: float, y: np.ndarray) -> np.ndarray:
-        """The nearest state whose positions and velocities satisfy the closures."""
+        """The nearest state, by kinetic energy, whose positions and velocities satisfy the closures: the
+        rounding of a light body is not handed on to a heavy one."""
         q, v = self.split(t, y)
         if not len(self.closures):
             return np.concatenate((q, v))
+        root = self._root_of_mass(t, q)
         for _ in range(PROJECTIONS):
             residual, jacobian = self.closure_errors(q)
             if not abs(residual).max() > CLOSED:
                 break
-            q = self.pin.integrate(self.model, q, self._least_change(t, jacobian, residual))
+            q = self.pin.integrate(self.model, q, self._least_change(t, root, jacobian, residual))
         if not abs(residual).max() < CLOSED_ENOUGH:
             raise Failed(Outcome.NOT_CONVERGED, t, f"the closures could not be met at {t:.6g} s")
-        v = v - self._least_change(t, jacobian, jacobian @ v)
+        v = v - self._least_change(t, root, jacobian, jacobian @ v)
         return np.concatenate((q, v))
+
+    def _root_of_mass(self, t: float, q: np.ndarray) -> np.ndarray:
+        """The lower Cholesky factor of the mass matrix of the coordinates that are not driven."""
+        mass = self.pin.crba(self.model, self.data, q)[np.ix_(self.free, self.free)]
+        if not np.isfinite(mass).all():
+            raise Failed(Outcome.NOT_FINITE, t, f"the state is not finite at {t:.6g} s")
+        return np.linalg.cholesky(mass)
 
     def closure_errors(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Closure residuals (rows,), m and rad, and the Jacobian (rows, nv) with d residual = -J dq."""
@@ -208,12 +219,16 @@ class _Run:
         jacobian = pin.getConstraintsJacobian(self.model, self.data, self.closures, self.closure_data)
         return np.concatenate(residual), jacobian
 
-    def _least_change(self, t: float, jacobian: np.ndarray, target: np.ndarray) -> np.ndarray:
-        """The smallest dv (nv,), zero in driven coordinates, with J dv = target."""
+    def _least_change(
+        self, t: float, root: np.ndarray, jacobian: np.ndarray, target: np.ndarray
+    ) -> np.ndarray:
+        """The dv (nv,) of least kinetic energy, zero in driven coordinates, with J dv = target."""
         change = np.zeros(self.model.nv)
         if not (np.isfinite(jacobian).all() and np.isfinite(target).all()):
             raise Failed(Outcome.NOT_FINITE, t, f"the closure errors are not finite at {t:.6g} s")
-        change[self.free] = np.linalg.lstsq(jacobian[:, self.free], target)[0]
+        spread = solve_triangular(root, jacobian[:, self.free].T, lower=True).T
+        least = np.linalg.lstsq(spread, target, rcond=REDUNDANT)[0]
+        change[self.free] = solve_triangular(root, least, lower=True, trans="T")
         return change
 
     def sample(self, t: float) -> Sample:

@@ -1,0 +1,65 @@
+"""Bricard's linkage, overconstrained in every position: the engines / mbref.
+
+No row is redundant by itself, and away from closed poses none is redundant at all: whoever resolves the rank
+of poses that are not quite closed follows rounding.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Setting, engine
+from crosscheck.metrics import error_series
+from mbref import rotations
+from mbref.scene import Body, Revolute, Scene
+from mbref.trajectory import Outcome
+
+POINTS = np.array([(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)], dtype=float)
+AXES = "yzxyzx"
+INERTIA = (1 / 600, 1.01 / 12, 1.01 / 12)  # a bar of 1 m, 0.1 m square, 1 kg
+TIMES = np.linspace(0.0, 0.6, 7)
+
+
+def bricard() -> Scene:
+    """Five bars on the edges of a cube and the ground, hinged about y, z, x, y, z, x, let go at rest."""
+    names = ["ground", *(f"bar{k}" for k in range(5)), "ground"]
+    unit = dict(zip("xyz", np.eye(3), strict=True))
+    hinges = [
+        Revolute(name=f"J{k}", bodies=(names[k], names[k + 1]), anchor=tuple(p), axis=tuple(unit[axis]))
+        for k, (p, axis) in enumerate(zip(POINTS.tolist(), AXES, strict=True))
+    ]
+    return Scene(name="bricard", gravity=(0.0, -9.81, 0.0), duration=TIMES[-1], joint=tuple(hinges),
+                 body=tuple(bar(k) for k in range(5)))  # fmt: skip
+
+
+def bar(k: int) -> Body:
+    x = POINTS[k + 1] - POINTS[k]
+    y = np.roll(x, 1)
+    turn = rotations.from_matrix(np.column_stack([x, y, np.cross(x, y)]))
+    middle = (POINTS[k] + POINTS[k + 1]) / 2
+    return Body(name=f"bar{k}", mass=1.0, inertia=INERTIA, position=tuple(middle.tolist()),
+                orientation=tuple(turn.tolist()))  # fmt: skip
+
+
+def test_counts_of_the_linkage():
+    counts = bricard().counts()
+    assert (counts.rows, counts.rank, counts.degrees_of_freedom) == (30, 29, 1), counts
+
+
+@pytest.mark.parametrize(
+    "name, setting",
+    [
+        ("mujoco", Setting("forward", {"rtol": 1e-10, "min_step": 0.01, "beta": 10.0, "hard": 1e-7})),
+        ("pinocchio", Setting("proximal", {"step": 1e-3})),
+        ("pinocchio", Setting("tuned", {"rtol": 1e-10, "min_step": 0.01})),
+        ("exudyn", Setting("alpha", {"step": 1e-4})),
+    ],
+)
+def test_engine_and_mbref_agree(name: str, setting: Setting):
+    scene = bricard()
+    found = engine(name).run(scene, TIMES, setting)
+    reference = engine("mbref").run(scene, TIMES, Setting("alf-dual+projection", {"rtol": 1e-11}))
+    assert found.outcome is Outcome.COMPLETED, found.message
+    apart = error_series(scene, found, reference).max()
+    assert apart < 1e-8, f"{name} {setting} and mbref differ by {apart:.1e}"
