@@ -34,10 +34,9 @@ Solution = tuple[
 
 @functools.cache
 def compiled() -> Callable:
-    """``rates`` of METHOD with its formulation compiled in: to pass a kernel costs more than to call it."""
+    """``rates`` of METHOD, its formulation bound: to pass a kernel from Python costs more than its call."""
     method = Method.parse(METHOD)
-    kernels = method.stabilisation.rates, method.formulation.accelerate
-    rates, accelerate = (njit(error_model="numpy")(kernel.function) for kernel in kernels)
+    rates, accelerate = method.stabilisation.rates.pointer, method.formulation.accelerate.pointer
 
     @njit(error_model="numpy")
     def call(t, y, y_rate, problem):

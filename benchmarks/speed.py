@@ -43,7 +43,8 @@ PAPER = (
 )  # fmt: skip
 SAMPLES = 11  # few, because adaptive integrators end a step at every sample time
 REPEATS = 5
-LONG = 1.0  # s; a family's finer settings are not tried after a run as long as this
+LONG = 0.7  # s; a run this long is not repeated, and its family's finer settings are not tried
+NEAR = 1.5  # a family so much dearer than its engine's best after one round may still be the best
 ENOUGH = 1e-10  # an error at which a family's finer settings are of no interest
 
 
@@ -115,20 +116,31 @@ def _sweep(simulator: Engine, scene: Scene, times: np.ndarray) -> Iterator[Run]:
 
 
 def _is_worth_timing(run: Run, curves: dict[Curve, list[Run]]) -> bool:
-    """mbref and the limit always, of the others what may be an engine's best at one of the levels."""
-    if run.outcome != Outcome.COMPLETED.label or not math.isfinite(run.error) or run.cost["seconds"] > LONG:
+    """What the cost at a level is read from: of mbref in every family, of an engine in its best ones."""
+    own = curves[run.engine, run.family]
+    if run.cost["seconds"] > LONG or not any(run in _around(own, level) for level in ERROR_LEVELS):
         return False
     if run.engine in (OURS, LIMIT_NAME):
         return True
-    own = _costs(curves[run.engine, run.family])
     rivals = [_costs(runs) for (name, _), runs in curves.items() if name == run.engine]
     best = [min(costs) for costs in zip(*rivals, strict=True)]
-    return any(cost < 1.5 * least for cost, least in zip(own, best, strict=True))
+    return any(cost < NEAR * least for cost, least in zip(_costs(own), best, strict=True))
+
+
+def _around(runs: Sequence[Run], level: float) -> list[Run]:
+    """The completed runs just below and just above an error; none where it is not reached."""
+    done = sorted((run for run in runs if _is_usable(run)), key=lambda run: run.error)
+    below = [run for run in done if run.error <= level]
+    return [*below[-1:], *done[len(below) : len(below) + 1]] if below else []
+
+
+def _is_usable(run: Run) -> bool:
+    return run.outcome == Outcome.COMPLETED.label and math.isfinite(run.error)
 
 
 def _costs(runs: Sequence[Run]) -> list[float]:
     """Seconds at each level of error; infinite where it is not reached."""
-    done = [run for run in runs if run.outcome == Outcome.COMPLETED.label and math.isfinite(run.error)]
+    done = [run for run in runs if _is_usable(run)]
     seconds, errors = [run.median for run in done], [run.error for run in done]
     found = [cost_at_error(seconds, errors, level) for level in ERROR_LEVELS]
     return [math.inf if cost is None else cost for cost in found]
@@ -149,7 +161,7 @@ def rows(scene: Scene, runs: Sequence[Run]) -> list[dict[str, Any]]:
 
 
 def _cheapest(runs: Sequence[Run], level: float) -> Run | None:
-    able = [run for run in runs if run.outcome == Outcome.COMPLETED.label and run.error <= level]
+    able = [run for run in runs if _is_usable(run) and run.error <= level]
     return min(able, key=lambda run: run.median, default=None)
 
 
@@ -203,6 +215,23 @@ def _best(table: Sequence[dict[str, Any]], names: Sequence[str]) -> list[float]:
     return [min(costs) for costs in zip(*found, strict=True)] if found else [math.nan] * len(ERROR_LEVELS)
 
 
+def _stored(scene: Scene, runs: Sequence[Run], table: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """A scene's runs and curves for JSON, which has no infinity."""
+    return {
+        "duration": scene.duration,
+        "levels": ERROR_LEVELS,
+        "runs": [{**asdict(run), "error": _or_none(run.error)} for run in runs],
+        "curves": [
+            {"engine": row["engine"], "family": row["family"], "cost": [_or_none(c) for c in row["cost"]]}
+            for row in table
+        ],
+    }
+
+
+def _or_none(number: float) -> float | None:
+    return number if math.isfinite(number) else None
+
+
 def _ms(seconds: float) -> str:
     return "–" if not math.isfinite(seconds) else f"{seconds * 1e3:.3g}"
 
@@ -232,14 +261,14 @@ def main() -> None:
         runs = measured(scene, simulators)
         tables[name] = rows(scene, runs)
         show(console, scene, tables[name])
-        stored = [{"engine": r["engine"], "family": r["family"], "cost": r["cost"]} for r in tables[name]]
-        data["scenes"][name] = {
-            "duration": scene.duration, "levels": ERROR_LEVELS, "runs": [asdict(run) for run in runs],
-            "curves": stored,
-        }  # fmt: skip
+        data["scenes"][name] = _stored(scene, runs, tables[name])
         if options.out:
-            options.out.write_text(json.dumps(data))
+            options.out.write_text(json.dumps(data, allow_nan=False))
     summary(console, tables)
+    if options.plot:
+        from reports import costs, figures
+
+        options.plot.write_bytes(figures.png(costs.draw(data)))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,57 @@
+"""Benchmarks: equations derived by hand, and general integrators / truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Setting
+from crosscheck.metrics import measure
+from crosscheck.truth import truth_for
+from mbref.scenes import SCENES
+
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+ERROR = 1e-8  # at the finest tolerances, 1e-11: rounding grows by the sensitivity of the fast scenes
+QUICK = {"four_bar", "spatial_slider_crank_driven"}  # closed forms; equations take seconds to compile
+BY_HAND = (
+    "four_bar", "five_bar", "spatial_slider_crank_driven", "four_bar_gravity", "five_bar_gravity",
+    "planar_slider_crank", "planar_slider_crank_equal", "planar_slider_crank_heavy",
+    "planar_slider_crank_gravity", "spatial_slider_crank", "spatial_slider_crank_gravity",
+)  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _benchmarks_importable(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+
+
+def error_of(simulator, name: str, setting: Setting) -> float:
+    scene = SCENES[name]()
+    run = simulator.run(scene, np.linspace(0, scene.duration, 5), setting)
+    assert run.outcome.name == "COMPLETED", run.message
+    return measure(scene, run, truth_for(scene))["error"]
+
+
+@pytest.mark.parametrize(
+    "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in BY_HAND]
+)
+def test_equation_derived_by_hand_and_truth_agree(name: str):
+    from limit import LIMIT
+
+    scene = SCENES[name]()
+    assert LIMIT.cannot(scene) is None
+    error = error_of(LIMIT, name, LIMIT.settings(scene)[-1])
+    assert error < ERROR, f"{name}: off by {error:.1e}, allowed {ERROR:.0e}"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", ["DOP853", "Radau"])
+def test_general_integrators_and_truth_agree(family: str):
+    from general_integrators import SCIPY
+
+    coarse, fine = (
+        error_of(SCIPY, "spatial_slider_crank_driven", Setting(family, {"rtol": r})) for r in (1e-5, 1e-9)
+    )
+    assert fine < 1e-7 < coarse, f"errors {coarse:.1e} and {fine:.1e} at tolerances of 1e-5 and 1e-9"
