@@ -43,7 +43,7 @@ PAPER = (
 )  # fmt: skip
 SAMPLES = 11  # few, because adaptive integrators end a step at every sample time
 REPEATS = 5
-LONG = 0.7  # s; a run this long is not repeated, and its family's finer settings are not tried
+LONG, TOO_LONG = 0.7, 3.0  # s; such runs are not repeated; of their family nothing finer is tried
 NEAR = 1.5  # a family so much dearer than its engine's best after one round may still be the best
 ENOUGH = 1e-10  # an error at which a family's finer settings are of no interest
 
@@ -111,7 +111,7 @@ def _sweep(simulator: Engine, scene: Scene, times: np.ndarray) -> Iterator[Run]:
         yield Run(
             simulator.name, setting.family, dict(setting.options), trajectory.outcome.label, error, cost
         )
-        if trajectory.cost.seconds > LONG or error < ENOUGH:
+        if trajectory.cost.seconds > TOO_LONG or error < ENOUGH:
             finished.add(setting.family)
 
 
@@ -237,6 +237,8 @@ def _ms(seconds: float) -> str:
 
 
 def _multiple(ratio: float) -> str:
+    if ratio == 0:
+        return "alone"  # no other reaches that error
     return "–" if not math.isfinite(ratio) else f"{ratio:.2g}" if ratio < 100 else f"{ratio:.0f}"
 
 
