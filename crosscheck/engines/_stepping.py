@@ -18,6 +18,7 @@ WIDTHS = {"position": 3, "orientation": 4, "velocity": 3, "angular_velocity": 3,
           "angular_acceleration": 3}  # fmt: skip
 MAX_STEPS = 10**6  # of one interval; beyond it the run is not going to end
 
+STRETCH = 1.01  # by which a step may be longer to end at a sample
 JUMPS = (1.0, 1.7, 2.9, 4.9)  # shortest steps, tried where the shortest one fails
 
 Rhs = Callable[[float, np.ndarray], np.ndarray]
@@ -152,9 +153,9 @@ class Adaptive:
         self.step = self.step or self.min_step
         for _ in range(MAX_STEPS):
             wanted = min(max(self.step, self.min_step), self.max_step)
-            h = t1 - t if t + 1.01 * wanted >= t1 else wanted
+            h = t1 - t if t + STRETCH * wanted >= t1 else wanted
             new, slope, error = self._attempt(t, y, f, h)
-            if not error <= 1 and h <= self.min_step:
+            if not error <= 1 and h <= STRETCH * self.min_step:
                 h, new, slope, error = self._jump(t, y, f, t1)
             elif not error <= 1:
                 self.counts.rejected += 1

@@ -8,7 +8,8 @@ What MuJoCo calls hard is a softness of 1e-4 of the inverse mass, ten times that
   the fastest rate of the scene, RK4, Newton's method iterated to convergence;
 - ``stiff``: the tuned model with closures as stiff as the step bears, which costs an order of convergence
   and brings a run through singular positions with less left of the closure errors they magnify;
-- ``forward``: the tuned model's accelerations (``mj_forward``) integrated by DOP853.
+- ``forward``: the tuned model's accelerations (``mj_forward``) integrated by DOP853;
+- ``projected``: the same, every accepted state projected onto the closures.
 
 A driver is an equality of one joint whose reference acceleration is rewritten at every evaluation.
 """
@@ -25,6 +26,7 @@ import numpy as np
 from crosscheck.engine import Cannot, Engine, Setting
 from crosscheck.engines._motion import fastest_rate, motion, stated_rate
 from crosscheck.engines._mujoco_model import compiled
+from crosscheck.engines._mujoco_projection import projected
 from crosscheck.engines._reactions import LinkMotion, joint_reactions, wrench
 from crosscheck.engines._start import lacks_mass
 from crosscheck.engines._stepping import Adaptive, Counts, Failed, Sample, run_through, step_count
@@ -33,7 +35,6 @@ from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
 HARD = 1e-8  # factor of the regulariser: its error is gone, and rounding does not yet take over
-HARD_ADAPTIVE = 1e-7  # the rounding left by less would keep an adaptive integrator busy
 CONVERGED, MOST_ITERATIONS = 1e-20, 50  # scaled gain of a Newton iteration; two or three are usual
 BETA = 5.0  # double root of the closure errors, in fastest rates of the scene: survives singular passages
 STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance, as far as it is not clamped
@@ -43,6 +44,7 @@ STIFF_STEPS = (0.015, 0.005, 0.0015, 0.0005)
 STIFF = 0.2  # double root of the stiff closures' errors, in 1/step
 RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10)  # finer ones get lost in the noise at singular positions
 TURN_PER_STEP = 0.25  # rad a driver may move within one adaptive step: closures can fold in between
+ADAPTIVE = {"forward": 1e-7, "projected": 1e-9}  # factor of the regulariser: less leaves noise to integrate
 LEAST_TURN = 0.03  # rad turned within the shortest adaptive step
 SCOUT_SAMPLES = 41  # of the coarse run that finds how fast a scene turns
 MAX_STEPS = 250_000
@@ -76,7 +78,8 @@ class MuJoCo(Engine):
             *(Setting("tuned", {"step": h, "beta": beta, "hard": HARD}) for h in steps),
             *(Setting("stiff", {"step": h, "beta": float(f"{STIFF / h:.2g}"), "hard": HARD}) for h in stiff),
             *(
-                Setting("forward", {"rtol": r, "min_step": least, "beta": beta, "hard": HARD_ADAPTIVE})
+                Setting(family, {"rtol": r, "min_step": least, "beta": beta, "hard": hard})
+                for family, hard in ADAPTIVE.items()
                 for r in RTOLS
             ),
         ]
@@ -131,14 +134,15 @@ class _Run:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
         if setting.family == "stock":
             model.eq_solref[:], model.eq_solimp[:] = (2 * self.nominal, 1.0), STIFFEST
-        elif setting.family in ("tuned", "stiff", "forward"):
+        elif setting.family in ("tuned", "stiff", *ADAPTIVE):
             self._harden(options["beta"], options["hard"])
         else:
             raise ValueError(f"mujoco has no family {setting.family!r}")
-        if setting.family == "forward":
+        if setting.family in ADAPTIVE:
             limit = TURN_PER_STEP / stated_rate(scene) if scene.driver else np.inf
             limits = (options["min_step"], limit)
-            self.adaptive = Adaptive(self._rhs, None, options["rtol"], *limits, self.counts)
+            settle = self._settle if setting.family == "projected" else None
+            self.adaptive = Adaptive(self._rhs, settle, options["rtol"], *limits, self.counts)
             self.step = self._adaptively
 
     def _harden(self, beta: float, factor: float) -> None:
@@ -156,11 +160,9 @@ class _Run:
         mujoco = self.mujoco
         mujoco.set_mju_user_warning(lambda _: None)  # they would go to the terminal and MUJOCO_LOG.TXT
         try:
-            if self.compiled.drivers:
-                mujoco.mj_forward(self.model, self.data)
-                self.rows = [
-                    (int(self._rows(equality)[0]), driver) for equality, driver in self.compiled.drivers
-                ]
+            mujoco.mj_forward(self.model, self.data)
+            self.rows = [(int(self._rows(equality)[0]), d) for equality, d in self.compiled.drivers]
+            if self.rows:
                 mujoco.set_mjcb_control(self._drive)
             yield
         finally:
@@ -214,6 +216,9 @@ class _Run:
         self._load(t, y)
         self.mujoco.mj_forward(model, data)
         return np.concatenate((self._position_rates(data.qpos, data.qvel), data.qacc))
+
+    def _settle(self, t: float, y: np.ndarray) -> np.ndarray:
+        return projected(self.mujoco, self.model, self.data, self.rows, t, self._load, y)
 
     def _position_rates(self, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
         model = self.model

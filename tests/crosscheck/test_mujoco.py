@@ -9,7 +9,8 @@ import pytest
 
 from crosscheck.engine import Setting, engine
 from crosscheck.engines._mujoco_model import compiled
-from crosscheck.engines.mujoco import HARD
+from crosscheck.engines.mujoco import ADAPTIVE, HARD
+from crosscheck.metrics import violation_series
 from crosscheck.truth import truth_for
 from mbref import rotations
 from mbref.scene import Body, Driver, Scene
@@ -146,8 +147,8 @@ def test_each_family_is_swept_from_coarse_to_fine(name: str) -> None:
         f"families of {sweep}"
     )
     assert any(s.options.get("step") == 2e-3 for s in sweep if s.family == "defaults"), "no default step"
-    for family in ("defaults", "stock", "tuned", "stiff", "forward"):
-        knob = [s.options["rtol" if family == "forward" else "step"] for s in sweep if s.family == family]
+    for family in ("defaults", "stock", "tuned", "stiff", *ADAPTIVE):
+        knob = [s.options["rtol" if family in ADAPTIVE else "step"] for s in sweep if s.family == family]
         assert knob == sorted(set(knob), reverse=True) and len(knob) > 3, f"{family} sweeps {knob}"
 
 
@@ -156,6 +157,19 @@ def test_stiff_closures_through_singular_positions_and_truth_agree() -> None:
     scene = SCENES["four_bar_gravity"]()
     run = simulate(scene, 1.0, "stiff", step=2e-4, beta=1000.0, hard=HARD)
     assert error(run, scene) < 1e-11, f"{error(run, scene):.2e}"
+
+
+def test_projected_states_through_singular_positions_and_truth_agree() -> None:
+    scene = SCENES["four_bar_gravity"]()
+    run = simulate(scene, 1.0, "projected", rtol=1e-8, min_step=4e-3, beta=40.0, hard=ADAPTIVE["projected"])
+    assert error(run, scene) < 1e-7, f"{error(run, scene):.2e}"
+    assert violation_series(scene, run).max() < 1e-12, f"{violation_series(scene, run).max():.1e}"
+
+
+def test_projected_driver_and_its_prescribed_motion_agree() -> None:
+    scene = SCENES["spatial_slider_crank_driven"]()
+    run = simulate(scene, 0.1, "projected", rtol=1e-8, min_step=1e-4, beta=600.0, hard=ADAPTIVE["projected"])
+    assert error(run, scene) < 1e-10, f"{error(run, scene):.2e}"
 
 
 def test_an_unknown_family_is_refused() -> None:

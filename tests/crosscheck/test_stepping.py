@@ -61,6 +61,20 @@ def test_noise_at_one_position_is_stepped_over() -> None:
     assert abs(y[0] - 1.0) < 1e-12, f"y(1) = {y[0]}, expected 1"
 
 
+def test_noise_before_a_sample_that_a_stretched_step_reaches_is_stepped_over() -> None:
+    """The interval is a little longer than the shortest step, which would be tried for ever."""
+    shortest, calls = 1e-3, 0
+
+    def rhs(t: float, y: np.ndarray) -> np.ndarray:
+        nonlocal calls
+        calls += 1
+        assert calls < 1000, "the same step is tried again and again"
+        return np.array([1.0 + 1e3 * (-1) ** calls])
+
+    y = adaptive(rhs, 1e-12, min_step=shortest).advance(np.zeros(1), 0.0, 1.005 * shortest)
+    assert np.isfinite(y).all(), y
+
+
 def test_a_motion_that_ends_is_not_finite_and_says_when() -> None:
     def rhs(t: float, y: np.ndarray) -> np.ndarray:
         with np.errstate(all="ignore"):
