@@ -143,7 +143,7 @@ def test_a_thin_disc_that_rounding_puts_beyond_the_triangle_is_accepted() -> Non
 @pytest.mark.parametrize("name", ["four_bar", "spatial_slider_crank_gravity"])
 def test_each_family_is_swept_from_coarse_to_fine(name: str) -> None:
     sweep = engine("mujoco").settings(SCENES[name]())
-    assert {s.family for s in sweep} == {"defaults", "stock", "tuned", "stiff", "forward"}, (
+    assert {s.family for s in sweep} == {"defaults", "stock", "tuned", "stiff", *ADAPTIVE}, (
         f"families of {sweep}"
     )
     assert any(s.options.get("step") == 2e-3 for s in sweep if s.family == "defaults"), "no default step"
