@@ -66,7 +66,11 @@ def _collect_paper(out: Path) -> runs.Records:
         records = runs.run(path, cases, progress)
     more = runs.follow_ups(records)
     with shown("their errors", len(more)) as progress:
-        return {**records, **runs.run(path, more, progress)}
+        records |= runs.run(path, more, progress)
+    cases = runs.timed()
+    single = runs.run(path, cases)
+    timed = with_timings(list(cases.values()), list(single.values()), out / "paper-timings.jsonl", _notice)
+    return records | dict(zip(cases, timed, strict=True))
 
 
 def _collect(out: Path, is_quick: bool) -> list[SceneRuns]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,9 +13,9 @@ import numpy as np
 
 from crosscheck.engine import Setting
 from crosscheck.paper import settings
-from crosscheck.paper.cells import CELLS, COUNTS_IV, FIVE_BAR, FOUR_BAR_COLUMNS, SPATIAL
-from crosscheck.paper.settings import BASE, END, SWEEP, Variant
-from crosscheck.study import Case, Record, study
+from crosscheck.paper.cells import CELLS, COUNTS_III, COUNTS_IV, FIVE_BAR, FOUR_BAR_COLUMNS, SPATIAL, Cell
+from crosscheck.paper.settings import BASE, DRAWN, END, SIZED, STRICT, SWEEP, Variant
+from crosscheck.study import Case, Record, run_here, study
 from crosscheck.study import Progress as Advance
 from mbref.formulations import FORMULATIONS
 from mbref.scene import Scene
@@ -20,13 +23,13 @@ from mbref.scenes import SCENES
 from mbref.stabilisation import STABILISATIONS
 from mbref.trajectory import Outcome
 
-LIMIT = 60.0  # s of wall time, of one run
 SHARE = 0.95  # of the end time of a failed run, where its error is taken
 SAMPLES = np.linspace(0.0, END, 101)
 SHORT = np.linspace(0.0, 0.12, 61)  # every 2 ms over two revolutions
 TURNS = np.linspace(0.0, END, 401)
-SWEPT_ROWS = ("ALF", "ALF + CP", "MPI (SVD)", "MPI (SVD) + B", "MPI (GS)", "MPI (GS) + B")
-MPI_CP = "MPI (SVD) + CP"  # swept too where the paper's run fails, in Table II
+SECOND = np.linspace(0.0, 1.0, 6)
+SIZED_ROWS = ("MPI (SVD)", "ALF", "ALF + CP")  # whose end times are shown over the size of the data errors
+FREE = ("LM2", "MPI (SVD)", "MPI (GS)")  # the rows of Table III that drift until they fail
 
 HEAVY, UNEQUAL, SPATIAL_DYNAMIC = "a = b", "a ≠ b", "spatial"
 TRUE_BRANCH = "alf-dual + projection"
@@ -34,11 +37,15 @@ FIGURES: Mapping[str, tuple[str, ...]] = {  # column → rows whose motion is dr
     "θ₂ = π/2": ("ALF", "MPI (GS)", "MPI (SVD)", "MPI (GS) + B", "MPI (GS) + CP", "MPI (SVD) + CP"),
     FIVE_BAR: ("MPI (GS)", "MPI (SVD)", "MPI (SVD) + CP"),
 }
+CROSSING = ("ALF", "MPI (GS)", "MPI (SVD)", "MPI (GS) + B", "MPI (SVD) + B", "ALF + CP", "MPI (GS) + CP",
+            "MPI (SVD) + CP")  # fmt: skip
 DYNAMIC: Mapping[str, tuple[str, ...]] = {
-    HEAVY: ("ALF", "MPI (GS)", "MPI (GS) + B", "MPI (GS) + CP", "MPI (SVD)", "MPI (SVD) + CP"),
+    HEAVY: CROSSING,
     UNEQUAL: ("ALF + CP", "MPI (SVD) + CP", "MPI (GS) + CP", "ALF", "MPI (SVD)", "MPI (GS)"),
     SPATIAL_DYNAMIC: (*COUNTS_IV, "ALF"),
 }
+HEAVY_SWEEP = tuple(v for v in SWEEP if v.name in ("rtol 1e-5", "smallest step 1e-5", "α = 1e4"))
+[RAISED] = [v for v in SWEEP if v.name == "rank 1e-4"]
 ALPHAS = tuple(10.0**k for k in range(2, 13))
 DIGITS_EPSILON = 1e-14  # so that only rounding is left
 EXACT, PENALTY, DUAL = "mpi-svd", "alf", "alf-dual"
@@ -58,8 +65,18 @@ Records = dict[Label, Record]
 
 
 def cases() -> Cases:
-    """Every run but the follow-ups."""
-    return {**tables(), **sweep(), **figures(), **dynamic(), **pairs(), **digits()}
+    """Every run but the follow-ups and the timings."""
+    return {
+        **tables(),
+        **drawn(),
+        **sweep(),
+        **sized(),
+        **strict(),
+        **figures(),
+        **dynamic(),
+        **pairs(),
+        **digits(),
+    }
 
 
 def tables() -> Cases:
@@ -67,13 +84,40 @@ def tables() -> Cases:
     return {Label(c.table, c.row, c.column): linkage(c.row, c.column, SAMPLES) for c in CELLS}
 
 
+def is_drawn(cell: Cell) -> bool:
+    """Whether a cell is run with other random errors in the data too: where they can matter."""
+    return cell.letter != "a" and (cell.table != "III" or cell.row in FREE)
+
+
+def drawn() -> Cases:
+    """The cells again with other random errors in the data."""
+    return _varied("drawn", [(c.row, c.column) for c in CELLS if is_drawn(c)], DRAWN)
+
+
 def sweep() -> Cases:
-    """The cells of Tables I and II that end at singular positions, one setting varied at a time."""
-    places = [(row, column) for column in (*FOUR_BAR_COLUMNS, FIVE_BAR) for row in SWEPT_ROWS]
+    """The cells that fail at singular positions in the paper, one setting varied at a time."""
+    places = [(c.row, c.column) for c in CELLS if c.table != "III" and c.letter not in ("a", "")]
+    return _varied("sweep", places, SWEEP)
+
+
+def sized() -> Cases:
+    """Some rows over the size of the errors in the data, several draws each."""
+    places = [(row, column) for column in (*FOUR_BAR_COLUMNS, FIVE_BAR) for row in SIZED_ROWS]
+    return _varied("sized", places, SIZED, SHORT[[-1]])
+
+
+def strict() -> Cases:
+    """Table III's drifting rows at the tolerances that the paper's step counts suggest."""
+    return _varied("strict", [(row + b, SPATIAL) for row in FREE for b in ("", " + B")], (STRICT,))
+
+
+def _varied(
+    part: str, places: Iterable[tuple[str, str]], variants: Iterable[Variant], times: np.ndarray = SAMPLES
+) -> Cases:
     return {
-        Label("sweep", row, column, variant.name): linkage(row, column, SAMPLES, variant)
-        for variant in SWEEP
-        for row, column in (*places, (MPI_CP, FIVE_BAR))
+        Label(part, row, column, variant.name): linkage(row, column, times, variant)
+        for variant in variants
+        for row, column in places
     }
 
 
@@ -92,18 +136,23 @@ def dynamic_scene(column: str) -> Scene:
         return SCENES["planar_slider_crank_heavy"]()
     if column == UNEQUAL:
         return settings.heavy_crank(SCENES["planar_slider_crank"](), 2)
-    return settings.heavy_crank(SCENES["spatial_slider_crank"](), 1)
+    return settings.heavy_crank(SCENES["spatial_slider_crank"](), 1, settings.SPATIAL_FLYWHEEL)
 
 
 def dynamic() -> Cases:
-    """Figures 11 to 16 and Table IV; for a = b also a run that keeps to the smooth branch."""
+    """Figures 11 to 16 and Table IV; for a = b also other settings, and a run on the smooth branch."""
     out = {
-        Label("dynamic", row, column): _case(dynamic_scene(column), settings.method(row), TURNS)
+        Label("dynamic", row, column): _case(dynamic_scene(column), row, TURNS)
         for column, rows in DYNAMIC.items()
         for row in rows
     }
+    for variant in HEAVY_SWEEP:
+        for row in CROSSING:
+            out[Label("dynamic", row, HEAVY, variant.name)] = _case(dynamic_scene(HEAVY), row, TURNS, variant)
+    raised = _case(dynamic_scene(UNEQUAL), "MPI (SVD)", TURNS, RAISED)
+    out[Label("dynamic", "MPI (SVD)", UNEQUAL, RAISED.name)] = raised
     branch = Setting("alf-dual+projection/dop853", {"rtol": 1e-9})
-    out[Label("dynamic", TRUE_BRANCH, HEAVY)] = Case(dynamic_scene(HEAVY), TURNS, "mbref", branch, LIMIT)
+    out[Label("dynamic", TRUE_BRANCH, HEAVY)] = Case(dynamic_scene(HEAVY), TURNS, "mbref", branch)
     return out
 
 
@@ -111,56 +160,69 @@ def pairs() -> Cases:
     """Every formulation with every stabilisation on the driven spatial slider-crank, 20 s."""
     scene = settings.column_scene(SPATIAL)
     return {
-        Label("pairs", f, s): _case(scene, f"{formulation}+{s}/{settings.INTEGRATOR}", SAMPLES)
+        Label("pairs", f, s): _named(scene, f"{BASE.formulation(f)}+{s}/{settings.INTEGRATOR}", SAMPLES)
         for f in FORMULATIONS
         for s in STABILISATIONS
-        for formulation in (settings.ALF.replace("alf", f, 1) if f.startswith("alf") else f,)
     }
 
 
 def digits() -> Cases:
     """The accelerations at t = 0 of a moving mechanism by ALF and its dual over the penalty."""
     scene, once = SCENES["spatial_slider_crank_gravity"](), np.zeros(1)
-    out = {Label("digits", EXACT, ""): _case(scene, f"{EXACT}+none", once)}
+    out = {Label("digits", EXACT, ""): _named(scene, f"{EXACT}+none", once)}
     for alpha in ALPHAS:
         for name in (PENALTY, DUAL):
             text = f"{name}[alpha={alpha:g},epsilon={DIGITS_EPSILON},iterations=100]+none"
-            out[Label("digits", name, f"{alpha:g}")] = _case(scene, text, once)
+            out[Label("digits", name, f"{alpha:g}")] = _named(scene, text, once)
     return out
 
 
 def follow_ups(records: Records) -> Cases:
-    """Failed runs of the tables again with one sample shortly before the end, to take the error there."""
+    """Runs that failed before the first sample again with one shortly before the end, for the error there."""
     out = {}
     for cell in CELLS:
         record = records[Label(cell.table, cell.row, cell.column)]
-        if record["outcome"] != Outcome.COMPLETED.label and record["t_end"] > 0:
+        if record["outcome"] != Outcome.COMPLETED.label and 0 < record["t_end"] < SAMPLES[1]:
             at = np.array([SHARE * record["t_end"]])
             out[Label("error", cell.row, cell.column)] = linkage(cell.row, cell.column, at)
     return out
 
 
+def timed() -> Cases:
+    """The rows of Tables III and IV whose times are compared: one second of the former, all of the latter."""
+    one = {Label("timed", row, SPATIAL): linkage(row, SPATIAL, SECOND) for row in COUNTS_III}
+    scene = dynamic_scene(SPATIAL_DYNAMIC)
+    return one | {Label("timed", row, SPATIAL_DYNAMIC): _case(scene, row, TURNS) for row in COUNTS_IV}
+
+
 def run(path: str | Path, chosen: Cases, progress: Advance | None = None) -> Records:
-    """Records of the cases, stored at ``path`` as they end and taken from there where they are known."""
-    records = study(list(chosen.values()), records_path=path, progress=progress)
+    """Records of the cases, stored at ``path`` as they end and taken from there where they are known.
+
+    In a process pool: mbref's runs are short, and end by themselves after ``most_steps``.
+    """
+    with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
+        records = study(list(chosen.values()), pool, path, progress, run_here)
     return dict(zip(chosen, records, strict=True))
 
 
-def ends(records: Mapping[Label, Record], row: str, column: str) -> list[tuple[float, str]]:
-    """The different end times (s, rounded to 0.1 ms) and letters of a cell over the sweep, in order."""
-    found = {
-        (round(record["t_end"], 4), Outcome[record["outcome"]].letter)
+def found(records: Mapping[Label, Record], cell: Cell, parts: Iterable[str]) -> dict[str, Record]:
+    """The cell's records of the tables, sweeps … named in ``parts``, by variant."""
+    wanted = {cell.table if part == "tables" else part for part in parts}
+    return {
+        label.variant: record
         for label, record in records.items()
-        if label.part in ("sweep", "I", "II") and (label.row, label.column) == (row, column)
+        if label.part in wanted and (label.row, label.column) == (cell.row, cell.column)
     }
-    return sorted(found)
 
 
 def linkage(row: str, column: str, times: Iterable[float], variant: Variant = BASE) -> Case:
     """The run of a cell of Tables I to III at the given times and settings."""
-    scene = settings.column_scene(column, variant.imperfection)
-    return _case(scene, settings.method(row, variant.integrator), np.asarray(times), variant)
+    return _case(settings.column_scene(column, variant), row, np.asarray(times), variant)
 
 
-def _case(scene: Scene, method: str, times: np.ndarray, variant: Variant = BASE) -> Case:
-    return Case(scene, times, "mbref", Setting(method, variant.options()), LIMIT)
+def _case(scene: Scene, row: str, times: np.ndarray, variant: Variant = BASE) -> Case:
+    return _named(scene, settings.method(row, variant), times, variant)
+
+
+def _named(scene: Scene, method: str, times: np.ndarray, variant: Variant = BASE) -> Case:
+    return Case(scene, times, "mbref", Setting(method, variant.options()))

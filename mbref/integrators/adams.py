@@ -44,11 +44,11 @@ GAMMA_STAR = _gamma_star()
 
 @kernel
 def norm(vector, y, tolerances):
-    """Root mean square of a vector in tolerances of y; 0 when y is empty."""
+    """Euclidean norm of a vector in tolerances of y, as in STEP."""
     total = 0.0
     for i in range(y.shape[0]):
         total += (vector[i] / (tolerances[1] + tolerances[0] * abs(y[i]))) ** 2
-    return sqrt(total / max(1, y.shape[0]))
+    return sqrt(total)
 
 
 @kernel

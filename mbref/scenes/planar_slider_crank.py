@@ -30,7 +30,7 @@ def planar_slider_crank_equal(name: str = "planar_slider_crank_equal") -> Scene:
 
 
 def planar_slider_crank_heavy(name: str = "planar_slider_crank_heavy") -> Scene:
-    """a = b = 0.308 m with a flywheel disc on the crank: 64 singular positions in 20 s."""
+    """a = b = 0.308 m with a flywheel disc on the crank: 61 singular positions in 20 s."""
     base = planar_slider_crank(0.308, 0.308, name)
     crank = base.body[0]
     disc = (FLYWHEEL / 2, FLYWHEEL / 2, FLYWHEEL)

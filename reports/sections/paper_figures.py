@@ -20,6 +20,7 @@ from crosscheck.paper.runs import (
     dynamic_scene,
     linkage,
 )
+from crosscheck.paper.settings import BASE
 from mbref.scene import Scene
 from reports import figures
 from reports.blocks import Block, Figure, Heading
@@ -61,7 +62,11 @@ def render(records: Records) -> list[Block]:
 
 
 def _runs(records: Records, part: str, column: str) -> dict[str, Run]:
-    return {k.row: Run(r) for k, r in records.items() if (k.part, k.column) == (part, column)}
+    return {
+        k.row: Run(r)
+        for k, r in records.items()
+        if (k.part, k.column, k.variant) == (part, column, BASE.name)
+    }
 
 
 def _only(runs: Named, rows: Sequence[str]) -> dict[str, Run]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections import Counter
+from functools import cache
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import pytest
 from crosscheck.paper import runs, settings, singular
 from crosscheck.paper.cells import CELLS, CLOSE, COUNTS_III, COUNTS_IV, Cell, Match, match
 from crosscheck.paper.runs import Label
+from crosscheck.truth import truth_for
 from mbref.method import Method
 from mbref.scene import Scene
 from mbref.scenes import SCENES
@@ -20,9 +22,14 @@ from mbref.simulate import Limits, simulate
 from mbref.trajectory import Outcome, Trajectory
 
 
+@cache
+def all_cases() -> runs.Cases:
+    return runs.cases()
+
+
 def simulated(label: Label, times: np.ndarray | None = None) -> Trajectory:
     """The run of a label in this process, at its own times or at others."""
-    case = runs.cases()[label]
+    case = all_cases()[label]
     at = case.times if times is None else times
     return simulate(case.scene, case.setting.family, at, Limits(**case.setting.options))
 
@@ -72,18 +79,30 @@ def test_variants_and_one_thing_changed():
     for variant in settings.SWEEP:
         assert set(variant.options()) <= default, f"{variant.name}: {set(variant.options()) - default}"
         changed = {k for k, v in variant.options().items() if v != settings.LIMITS[k]} - {"forced_step"}
-        others = (variant.imperfection != settings.IMPERFECTION) + (variant.integrator != settings.INTEGRATOR)
-        assert len(changed) + others == 1, f"{variant.name} changes {sorted(changed)} and {others} more"
+        names = ("size", "seed", "integrator", "penalty")
+        others = [name for name in names if getattr(variant, name) != getattr(settings.BASE, name)]
+        assert len(changed) + len(others) == 1, f"{variant.name} changes {sorted(changed)} and {others}"
 
 
-def test_imperfection_and_the_anchor_of_one_joint():
-    perfect, moved = SCENES["five_bar"](), settings.imperfect(SCENES["five_bar"](), 1e-3)
-    off = {
-        a.name: np.subtract(b.anchor, a.anchor).tolist()
-        for a, b in zip(perfect.joint, moved.joint, strict=True)
-    }
-    assert [n for n, d in off.items() if any(d)] == ["C"], f"anchors moved: {off}"
-    assert math.isclose(off["C"][0], 1e-3, rel_tol=1e-9) and off["C"][1:] == [0.0, 0.0], f"C by {off['C']}"
+def test_errors_in_the_data_and_every_anchor():
+    perfect = SCENES["five_bar"]()
+    drawn = [settings.imprecise(perfect, 1e-3, seed) for seed in (0, 0, 1)]
+    before = np.array([joint.anchor for joint in perfect.joint])
+    off = [np.array([joint.anchor for joint in scene.joint]) - before for scene in drawn]
+    assert np.all(off[0] != 0) and np.abs(off[0]).max() <= 1e-3, f"anchors moved by {off[0]}"
+    assert np.array_equal(off[0], off[1]) and not np.array_equal(off[0], off[2]), "the seed does not decide"
+
+
+def test_rank_tolerance_and_a_row_that_is_redundant_in_the_plane_only():
+    """Without stabilisation a tilt grows; the planar row then counts as independent and brakes the crank."""
+    braked, right = (
+        simulated(Label("dynamic", "MPI (SVD)", runs.UNEQUAL, name), np.linspace(0, 12.2, 62))
+        for name in (settings.BASE.name, runs.RAISED.name)
+    )
+    true = truth_for(runs.dynamic_scene(runs.UNEQUAL)).poses(right.times)
+    rates = [float(run.angular_velocity[-1, 0, 2]) for run in (braked, right, true)]
+    assert rates[0] < 0.5 * rates[2], f"crank at {rates[0]:.3g} rad/s, true {rates[2]:.3g}"
+    assert abs(rates[1] / rates[2] - 1) < 1e-3, f"crank at {rates[1]:.6g} rad/s, true {rates[2]:.6g}"
 
 
 @pytest.mark.parametrize(
@@ -147,10 +166,10 @@ def test_heavy_crank_and_its_disc():
 
 @pytest.mark.slow
 def test_table_i_and_the_paper():
-    """The whole of Table I: the letter of every cell, and the end time of at least two of three."""
+    """The whole of Table I: the letter of every cell, and the end times of all but five."""
     marks = Counter()
     for cell in CELLS:
         if cell.table == "I":
             run = simulated(Label("I", cell.row, cell.column))
             marks[match(cell, run.outcome, run.t_end)] += 1
-    assert marks[Match.DIFFERENT] == 0 and marks[Match.SAME] >= 22, f"marks: {marks}"
+    assert marks[Match.DIFFERENT] == 0 and marks[Match.SAME] >= 28, f"marks: {marks}"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting
-from crosscheck.study import Case, default_cases, key, study
+from crosscheck.study import Case, default_cases, key, run_case, run_here, study
 from mbref.scene import Body, Force, Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Trajectory
@@ -116,6 +116,11 @@ def test_process_pool_and_serial_run_agree(one_after_the_other: list[dict]):
         records = study(everywhere(), pool)
     assert untimed(records) == untimed(one_after_the_other)
     assert [r["outcome"] for r in records] == ["COMPLETED", "COMPLETED", "CRASHED"]
+
+
+def test_run_here_and_run_in_a_child_agree():
+    wanted = Case(SCENES["four_bar"](), TIMES, "mbref", Setting("mpi-svd+projection", {"rtol": 1e-6}))
+    assert untimed([run_here(wanted)]) == untimed([run_case(wanted)])
 
 
 def test_cluster_of_two_workers_and_serial_run_agree(one_after_the_other: list[dict], tmp_path: Path):
