@@ -7,19 +7,16 @@ stays above the floor asked of it.
 
 import argparse
 import sys
-from collections import defaultdict
 
 from rich.console import Console
 from rich.table import Table
 
-from crosscheck.floors import HEADER, floors
+from crosscheck.floors import HEADER, candidates, floors
 from crosscheck.progress import shown
-from crosscheck.study import Case, default_cases, study
+from crosscheck.study import study
 from mbref.scenes import SCENES
 
 ENGINES = ("mujoco", "pinocchio", "exudyn")
-FINEST = 3  # settings of a family
-TIME_LIMIT = 240.0  # s
 
 
 def main() -> int:
@@ -29,7 +26,7 @@ def main() -> int:
     parser.add_argument("--engine", action="append", metavar="NAME")
     parser.add_argument("--records", metavar="FILE")
     arguments = parser.parse_args()
-    cases = [c for name in arguments.scene for c in finest(name, arguments.engine or ENGINES)]
+    cases = [c for name in arguments.scene for c in candidates(SCENES[name](), arguments.engine or ENGINES)]
     with shown("running", len(cases)) as progress:
         found = floors(study(cases, records_path=arguments.records, progress=progress))
     table = Table(*HEADER, title="floors")
@@ -37,14 +34,6 @@ def main() -> int:
         table.add_row(*floor.row())
     Console(width=None if sys.stdout.isatty() else 220).print(table)
     return 0 if all(floor.is_reached for floor in found) else 1
-
-
-def finest(name: str, engines: list[str]) -> list[Case]:
-    """The last settings of every family of the engines that can run the scene."""
-    families = defaultdict(list)
-    for case in default_cases(SCENES[name](), engines, time_limit=TIME_LIMIT)[0]:
-        families[case.engine, case.setting.family].append(case)
-    return [case for group in families.values() for case in group[-FINEST:]]
 
 
 if __name__ == "__main__":

@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from crosscheck.record import by_scene, error, is_completed, swept
-from crosscheck.study import Record
+from crosscheck.study import Case, Record, default_cases
 from crosscheck.tolerances import FLOOR
+from mbref.scene import Scene
 
 HEADER = ("scene", "engine", "family", "settings", "least error", "time (s)", f"within {FLOOR:.0e}", "others")
+
+FINEST = 3  # settings of a family among which its least error is looked for
+TIME_LIMIT = 240.0  # s
+
+
+def candidates(scene: Scene, engines: Sequence[str]) -> list[Case]:
+    """The finest settings of every family of the engines that can run the scene."""
+    families = defaultdict(list)
+    for case in default_cases(scene, engines, time_limit=TIME_LIMIT)[0]:
+        families[case.engine, case.setting.family].append(case)
+    return [case for group in families.values() for case in group[-FINEST:]]
 
 
 @dataclass(frozen=True)
