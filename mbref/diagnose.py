@@ -10,9 +10,12 @@ import numpy as np
 from mbref.initial import consistent_start
 from mbref.model import Model
 from mbref.scene import Scene
+from mbref.sparse.least_change import LARGE, sparse_jacobian
+from mbref.sparse.rank import Redundancy
 
 RANK_TOLERANCE = 1e-10  # relative to the largest singular value of the scaled Jacobian
 UNIQUE_TOLERANCE = 1e-8  # a row takes part in a redundancy when its weight in it exceeds this
+UNIQUE_SHARE = 1e-9  # the same for the squares of a large scene, where other singular values leave 1e-12
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,9 @@ class Diagnosis:
 def counts(scene: Scene) -> Counts:
     """Counts of a scene at its corrected initial positions."""
     model = Model(scene)
-    return _counts(model, _jacobian_at_start(model))
+    if model.m > LARGE:
+        return _counts(model, _redundancy(model).rank)
+    return _counts(model, rank_of(_jacobian_at_start(model)))
 
 
 def diagnose(scene: Scene) -> Diagnosis:
@@ -51,20 +56,31 @@ def diagnose(scene: Scene) -> Diagnosis:
     vector of Φ_q (Wojtyra, J. Theor. Appl. Mech. 43, 2005).
     """
     model = Model(scene)
-    jacobian = _jacobian_at_start(model)
-    found = _counts(model, jacobian)
-    left, values, _ = np.linalg.svd(jacobian)
-    shared = np.linalg.norm(left[:, found.rank :], axis=1) > UNIQUE_TOLERANCE
+    if model.m > LARGE:
+        found = _redundancy(model)
+        rank, shared = found.rank, found.shares > UNIQUE_SHARE
+        smallest, largest = found.singular_values()
+    else:
+        jacobian = _jacobian_at_start(model)
+        left, values, _ = np.linalg.svd(jacobian)
+        rank = rank_of(jacobian)
+        shared = np.linalg.norm(left[:, rank:], axis=1) > UNIQUE_TOLERANCE
+        smallest = float(values[rank - 1]) if rank else 0.0
+        largest = float(values[0]) if values.size else 0.0
+    total = _counts(model, rank)
     involved = Counter(name for name, part in zip(model.row_joint, shared, strict=True) if part)
-    unique = tuple(name for name in found.rows_by_joint if name not in involved)
-    smallest = float(values[found.rank - 1]) if found.rank else 0.0
-    return Diagnosis(found, dict(involved), unique, smallest, float(values[0]) if values.size else 0.0)
+    unique = tuple(name for name in total.rows_by_joint if name not in involved)
+    return Diagnosis(total, dict(involved), unique, smallest, largest)
 
 
-def _counts(model: Model, jacobian: np.ndarray) -> Counts:
-    rank = rank_of(jacobian)
+def _counts(model: Model, rank: int) -> Counts:
     by_joint = dict(Counter(model.row_joint))
     return Counts(model.n, model.m, by_joint, rank, model.m - rank, model.n - rank)
+
+
+def _redundancy(model: Model) -> Redundancy:
+    terms = model.blocks(0.0, consistent_start(model).q, np.zeros(model.n))
+    return Redundancy(sparse_jacobian(model, terms.jacobian))
 
 
 def _jacobian_at_start(model: Model) -> np.ndarray:

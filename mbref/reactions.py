@@ -18,15 +18,15 @@ def reactions(
     if model.kinematic:
         return None
     joints = model.scene.joint
-    body, sign = _acted_on(model)
-    names = [joint.name for joint in joints]
-    rows = np.array([r for r, name in enumerate(model.row_joint) if name in names], dtype=int)
-    of = np.array([names.index(model.row_joint[r]) for r in rows], dtype=int)
+    body, side = _acted_on(model)
+    sign = np.where(side == 1, 1.0, -1.0)
+    number = {joint.name: j for j, joint in enumerate(joints)}
+    rows = np.array([r for r, name in enumerate(model.row_joint) if name in number], dtype=int)
+    of = np.array([number[model.row_joint[r]] for r in rows], dtype=int)
     wrench = np.zeros((len(times), len(joints), 6))  # about the centre of mass, moments in body axes
     for k, t in enumerate(times):
-        jacobian = model.terms(t, q[k].ravel(), v[k].ravel()).jacobian
-        blocks = jacobian.reshape(model.m, model.nb, 6)[rows, body[of]]
-        np.add.at(wrench[k], of, -(sign[of] * multipliers[k, rows])[:, None] * blocks)
+        blocks = model.blocks(t, q[k].ravel(), v[k].ravel()).jacobian.reshape(model.m, 2, 6)
+        np.add.at(wrench[k], of, -(sign[of] * multipliers[k, rows])[:, None] * blocks[rows, side[of]])
     found = {}
     for j, joint in enumerate(joints):
         b, force = body[j], wrench[:, j, :3]
@@ -37,8 +37,8 @@ def reactions(
 
 
 def _acted_on(model: Model) -> tuple[np.ndarray, np.ndarray]:
-    """The body of each joint in whose coordinates its wrench is read, and 1, or -1 for the first body."""
-    pairs = [tuple(map(model.index, joint.bodies)) for joint in model.scene.joint]
-    body = [second if second < model.nb else first for first, second in pairs]
-    sign = [1.0 if second < model.nb else -1.0 for _, second in pairs]
-    return np.array(body, dtype=int), np.array(sign)
+    """The body of each joint in whose coordinates its wrench is read, and its place, 0 or 1, in the joint."""
+    pairs = np.array([tuple(map(model.index, joint.bodies)) for joint in model.scene.joint], dtype=int)
+    pairs = pairs.reshape(-1, 2)
+    side = (pairs[:, 1] < model.nb).astype(int)
+    return pairs[np.arange(len(pairs)), side], side

@@ -2,8 +2,9 @@
 
 The iteration is that of ALF-dual, for accelerations as for corrections: positions by Newton's method and
 velocities in one go, each change the least in the metric of M, which redundant rows do not disturb.
-Near a singular position the smallest pivot of the factor falls with the distance, so that ``singular``
-can step over it; pivots of redundant rows are told from it by never having been larger than INDEPENDENT.
+Near a singular position the last of as many pivots as there are independent rows, in order of size, falls
+with the distance, so that ``singular`` can step over it.  A redundant row has a pivot of α^(-1/2); where two
+rows exchange their roles, the larger of their pivots is still about α^(-1/4).
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from mbref.sparse.factor import (
     factorise,
     memories,
     part,
-    smallest_pivot,
     solve,
+    sorted_pivots,
     subtract_product,
     times_transpose,
 )
@@ -41,6 +42,7 @@ from mbref.tables import (
     FACTORISATIONS,
     FORCE,
     FORMULATION_OPTIONS,
+    GENERIC_RANK,
     INVERSE_ROOT,
     JACOBIAN,
     MASS,
@@ -63,7 +65,7 @@ from mbref.tables import (
     STEP_X,
 )
 
-INDEPENDENT = 1e-3  # pivot of unit rows; 1/α with the default α leaves 1e-5 of a redundant row
+INDEPENDENT = 5.0  # times α^(-1/4): the pivot from which on a row counts as independent
 
 
 @kernel
@@ -77,12 +79,21 @@ def factor(plan, work, settings, counts):
 
 
 @kernel
-def watch_pivot(plan, work):
-    """Remember the smallest pivot of the factor, relative to the largest it has been."""
-    memory, n = work[SCRATCH][0], work[COLUMNS].shape[1]
-    _, l, diagonal, seen, _, _, _, _ = memories(plan, memory, n)
-    work[MEMO][0, SMALLEST_PIVOT] = smallest_pivot(plan, l, diagonal, seen, INDEPENDENT)
-    work[MEMO][0, REFERENCE_PIVOT] = 1.0
+def watch_pivots(plan, work, settings):
+    """Keep the largest rank seen, the smallest of so many pivots now, and the largest that has been."""
+    memory, memo, n = work[SCRATCH][0], work[MEMO][0], work[COLUMNS].shape[1]
+    _, l, diagonal, pivots, _, _, _, _ = memories(plan, memory, n)
+    sorted_pivots(plan, l, diagonal, pivots)
+    independent, rank = INDEPENDENT * settings[FORMULATION_OPTIONS] ** -0.25, 0
+    for k in range(pivots.shape[0]):
+        if pivots[k] > independent:
+            rank += 1
+    if rank > memo[GENERIC_RANK]:
+        memo[GENERIC_RANK] = rank
+        memo[REFERENCE_PIVOT] = 0.0
+    generic = int(memo[GENERIC_RANK])
+    memo[SMALLEST_PIVOT] = pivots[pivots.shape[0] - generic] if generic > 0 else 0.0
+    memo[REFERENCE_PIVOT] = max(memo[REFERENCE_PIVOT], memo[SMALLEST_PIVOT])
 
 
 @kernel
@@ -179,7 +190,7 @@ def enter(t, y, problem):
     nq = work[STATE].shape[1]
     evaluate(t, y[:nq], y[nq:size], ints, floats, work)
     if factor(planned(problem), work, settings, counts):
-        watch_pivot(planned(problem), work)
+        watch_pivots(planned(problem), work, settings)
     return size
 
 
@@ -192,7 +203,7 @@ def accept(t, y, problem):
     status = project_positions(t, q, v, plan, ints, floats, work, settings, counts)
     if status != OK:
         return status
-    watch_pivot(plan, work)
+    watch_pivots(plan, work, settings)
     violation_rate(ints, work, v)
     for i in range(rows.shape[1]):
         rows[RHS, i] = -rows[PHI_RATE, i]

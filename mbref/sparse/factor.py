@@ -32,7 +32,7 @@ def part(plan, k):
 
 @kernel
 def memories(plan, memory, n):
-    """Views of the memory: D, L, S_ii, largest pivots seen, three vectors of rows and one of n columns."""
+    """Views of the memory: D, L, S_ii, pivots, three vectors of rows and one of n columns."""
     d, l, r = part(plan, D_ENTRY).shape[0], part(plan, L_ROW).shape[0], part(plan, ROW).shape[0]
     a = d + l
     return (
@@ -124,16 +124,9 @@ def times_transpose(plan, d, b, x):
 
 
 @kernel
-def smallest_pivot(plan, l, diagonal, largest, independent):
-    """The smallest of the pivots of unit rows, each relative to the largest it has been.
-
-    A pivot is the sine of the angle between a row and the rows before it; rows whose pivot has never
-    exceeded ``independent`` are redundant and left out.  ``largest`` (r,) remembers.
-    """
-    first, smallest = part(plan, L_START), 1.0
+def sorted_pivots(plan, l, diagonal, pivots):
+    """The pivots (r,) of unit rows, ascending: the sine of the angle between each row and those before it."""
+    first = part(plan, L_START)
     for k in range(diagonal.shape[0]):
-        pivot = 1.0 / (l[first[k]] * sqrt(diagonal[k]))
-        largest[k] = max(largest[k], pivot)
-        if largest[k] > independent:
-            smallest = min(smallest, pivot / largest[k])
-    return smallest
+        pivots[k] = 1.0 / (l[first[k]] * sqrt(diagonal[k]))
+    pivots.sort()
