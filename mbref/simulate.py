@@ -88,6 +88,7 @@ class Limits:
     largest_step: float = 0.0  # s; 0 means the duration
     largest_turn: float = 1.0  # rad that the fastest body may turn in an adaptive step
     most_steps: int = 5_000_000
+    sparse_above: int = LARGE  # constraint rows; with more, alf-dual goes through a sparse factor
 
 
 def simulate(
@@ -156,7 +157,7 @@ class _Run:
         self.start = consistent_start(model)
         formulation, stabilisation, integrator = method.parts
         self.plan = NO_PLAN
-        if model.m > LARGE and formulation.sparse and stabilisation.name in CHARTS:
+        if model.m > limits.sparse_above and formulation.sparse and stabilisation.name in CHARTS:
             stabilisation = CHARTS[stabilisation.name]
             entries = moving_entries(model, self.start.q, self.start.v)
             plan = plan_for(entries, model.entry_columns(), model.n)

@@ -26,7 +26,7 @@ from mbref.sparse.factor import (
     subtract_product,
     times_transpose,
 )
-from mbref.sparse.plan import ROW
+from mbref.sparse.plan import COLUMN, ROW
 from mbref.stabilisation.base import Stabilisation
 from mbref.stabilisation.baumgarte import BAUMGARTE
 from mbref.stabilisation.full import copy_state, write_rates
@@ -72,17 +72,17 @@ INDEPENDENT = 5.0  # times α^(-1/4): the pivot from which on a row counts as in
 def factor(plan, work, settings, counts):
     """L at the state last evaluated; whether it could be had."""
     memory, inverse_root = work[SCRATCH][0], work[COLUMNS][INVERSE_ROOT]
-    d, l, diagonal, _, _, _, _, _ = memories(plan, memory, inverse_root.shape[0])
+    d, l, diagonal, _, _, _, _, root, _ = memories(plan, memory)
     counts[FACTORISATIONS] += 1
-    assemble(plan, work[JACOBIAN], inverse_root, settings[FORMULATION_OPTIONS], d, l, diagonal)
+    assemble(plan, work[JACOBIAN], inverse_root, settings[FORMULATION_OPTIONS], d, l, diagonal, root)
     return factorise(plan, l)
 
 
 @kernel
 def watch_pivots(plan, work, settings):
     """Keep the largest rank seen, the smallest of so many pivots now, and the largest that has been."""
-    memory, memo, n = work[SCRATCH][0], work[MEMO][0], work[COLUMNS].shape[1]
-    _, l, diagonal, pivots, _, _, _, _ = memories(plan, memory, n)
+    memo = work[MEMO][0]
+    _, l, diagonal, pivots, _, _, _, _, _ = memories(plan, work[SCRATCH][0])
     sorted_pivots(plan, l, diagonal, pivots)
     independent, rank = INDEPENDENT * settings[FORMULATION_OPTIONS] ** -0.25, 0
     for k in range(pivots.shape[0]):
@@ -97,77 +97,62 @@ def watch_pivots(plan, work, settings):
 
 
 @kernel
-def settle(plan, work, settings, values, target):
-    """Change ``target`` (n,) by the least in the metric of M that makes Φ_q target grow by the values.
+def settle(plan, work, settings, target, multipliers):
+    """Change ``target`` (n,) by the least in the metric of M that makes Φ_q target grow by b of the memory.
 
-    ``values`` (m,) are in the model's rows and become the sums of Δλ, with the sign of λ.  Returns OK or
-    NOT_CONVERGED.
+    ``multipliers`` (m,) become the sums of -Δλ in the rows that move.  Returns OK or NOT_CONVERGED.
     """
-    memory, root = work[SCRATCH][0], work[COLUMNS][INVERSE_ROOT]
-    d, l, _, _, b, step, total, x = memories(plan, memory, root.shape[0])
+    d, l, _, _, b, step, total, root, x = memories(plan, work[SCRATCH][0])
     row, epsilon = part(plan, ROW), settings[FORMULATION_OPTIONS + 1]
-    for i in range(row.shape[0]):
-        b[i] = values[row[i]]
-        total[i] = 0.0
+    total[:] = 0.0
     status, change = NOT_CONVERGED, 0.0
     for _ in range(int(settings[FORMULATION_OPTIONS + 2])):
         step[:] = b
         solve(plan, l, step)
         times_transpose(plan, d, step, x)
-        last, change = change, add_scaled(root, x, target)
+        last, change = change, add_scaled(plan, root, x, target)
         for i in range(row.shape[0]):
             total[i] -= step[i]
         if change <= epsilon or (last > 0.0 and change * change <= epsilon * last):
             status = OK
             break
         subtract_product(plan, d, x, b)
-    values[:] = 0.0
     for i in range(row.shape[0]):
-        values[row[i]] = total[i]
+        multipliers[row[i]] = total[i]
     return status
 
 
 @kernel
-def add_scaled(root, x, target):
-    """target += root x; the norm of that, relative to the larger of 1 and the norm of the target."""
-    change, size = 0.0, 0.0
+def add_scaled(plan, root, x, target):
+    """target (n,) += root x; the norm of that, relative to the larger of 1 and the norm of the target."""
+    column, change, size = part(plan, COLUMN), 0.0, 0.0
     for j in range(x.shape[0]):
-        step = root[j] * x[j]
-        target[j] += step
+        step, k = root[j] * x[j], column[j]
+        value = target[k] + step
+        target[k] = value
         change += step * step
-        size += target[j] * target[j]
+        size += value * value
     return sqrt(change / max(1.0, size))
 
 
 @kernel
 def accelerations(plan, work, settings, counts):
     """Accelerations and multipliers by ALF-dual at the state last evaluated; their status."""
-    rows, columns = work[ROWS], work[COLUMNS]
-    root, force, acceleration = columns[INVERSE_ROOT], columns[FORCE], columns[ACCELERATION]
-    for j in range(root.shape[0]):
-        if not columns[MASS, j] > 0.0:
-            return SINGULAR
-        acceleration[j] = root[j] * root[j] * force[j]
+    rows, columns, column, row = work[ROWS], work[COLUMNS], part(plan, COLUMN), part(plan, ROW)
+    mass, force, acceleration = columns[MASS], columns[FORCE], columns[ACCELERATION]
     if not factor(plan, work, settings, counts):
         return SINGULAR
-    remainder(plan, work, acceleration, rows[RHS], rows[MULTIPLIERS])
-    return settle(plan, work, settings, rows[MULTIPLIERS], acceleration)
-
-
-@kernel
-def remainder(plan, work, x, rhs, values):
-    """values := rhs - Φ_q x in the rows that move."""
-    root = work[COLUMNS][INVERSE_ROOT]
-    d, _, _, _, b, _, _, scaled = memories(plan, work[SCRATCH][0], root.shape[0])
-    row = part(plan, ROW)
-    mass = work[COLUMNS][MASS]
-    for j in range(x.shape[0]):
-        scaled[j] = mass[j] * root[j] * x[j]
+    d, _, _, _, b, _, _, root, x = memories(plan, work[SCRATCH][0])
+    for j in range(column.shape[0]):
+        k = column[j]
+        if not mass[k] > 0.0:
+            return SINGULAR
+        x[j] = root[j] * force[k]
+        acceleration[k] = root[j] * x[j]
     for i in range(row.shape[0]):
-        b[i] = rhs[row[i]]
-    subtract_product(plan, d, scaled, b)
-    for i in range(row.shape[0]):
-        values[row[i]] = b[i]
+        b[i] = rows[RHS, row[i]]
+    subtract_product(plan, d, x, b)
+    return settle(plan, work, settings, acceleration, rows[MULTIPLIERS])
 
 
 @exchangeable(RATES)
@@ -198,16 +183,24 @@ def enter(t, y, problem):
 def accept(t, y, problem):
     ints, floats, work, _pivots, settings, counts = opened(problem)
     plan, nq = planned(problem), work[STATE].shape[1]
-    rows, x = work[ROWS], work[COLUMNS][STEP_X]
+    x = work[COLUMNS][STEP_X]
     q, v = y[:nq], y[nq : nq + x.shape[0]]
     status = project_positions(t, q, v, plan, ints, floats, work, settings, counts)
     if status != OK:
         return status
     watch_pivots(plan, work, settings)
     violation_rate(ints, work, v)
-    for i in range(rows.shape[1]):
-        rows[RHS, i] = -rows[PHI_RATE, i]
-    return settle(plan, work, settings, rows[RHS], v)
+    return cancel(PHI_RATE, plan, work, settings, v)
+
+
+@kernel
+def cancel(which, plan, work, settings, target):
+    """Change ``target`` by the least that takes row ``which`` of ROWS away; OK or NOT_CONVERGED."""
+    rows, row = work[ROWS], part(plan, ROW)
+    _, _, _, _, b, _, _, _, _ = memories(plan, work[SCRATCH][0])
+    for i in range(row.shape[0]):
+        b[i] = -rows[which, row[i]]
+    return settle(plan, work, settings, target, rows[RHS])
 
 
 @kernel
@@ -225,10 +218,8 @@ def project_positions(t, q, v, plan, ints, floats, work, settings, counts):
         if violation <= tolerance:
             break
         counts[NEWTON] += 1
-        for i in range(rows.shape[1]):
-            rows[RHS, i] = -rows[PHI, i]
         x[:] = 0.0
-        settle(plan, work, settings, rows[RHS], x)
+        cancel(PHI, plan, work, settings, x)
         displace(q, x, change)
         evaluate(t, q, v, ints, floats, work)
         before, violation = violation, largest(rows[PHI])

@@ -1,7 +1,7 @@
 """Sparse kernels over a ``Plan``: D, the Cholesky factor of S + I/α, solutions and products.
 
 S = D Dᵀ with D = Φ_q M^(-1/2).  α weighs rows of unit length, S_ii = 1, so that S_ii (1 + 1/α) stands on the
-diagonal; a row without entries has 1 there and changes nothing.  Vectors of rows are in the plan's order.
+diagonal; a row without entries has 1 there and changes nothing.  Vectors of rows and columns are the plan's.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from numpy import sqrt
 
 from mbref.compiled import kernel
 from mbref.sparse.plan import (
+    COLUMN,
     D_COLUMN,
     D_ENTRY,
     D_START,
@@ -31,23 +32,27 @@ def part(plan, k):
 
 
 @kernel
-def memories(plan, memory, n):
-    """Views of the memory: D, L, S_ii, pivots, three vectors of rows and one of n columns."""
+def memories(plan, memory):
+    """Views of the memory: D, L, S_ii, pivots, three vectors of rows, M^(-1/2) and a vector of columns."""
     d, l, r = part(plan, D_ENTRY).shape[0], part(plan, L_ROW).shape[0], part(plan, ROW).shape[0]
+    c = part(plan, COLUMN).shape[0]
     a = d + l
     return (
         memory[:d], memory[d:a], memory[a : a + r], memory[a + r : a + 2 * r], memory[a + 2 * r : a + 3 * r],
-        memory[a + 3 * r : a + 4 * r], memory[a + 4 * r : a + 5 * r], memory[a + 5 * r : a + 5 * r + n],
+        memory[a + 3 * r : a + 4 * r], memory[a + 4 * r : a + 5 * r], memory[a + 5 * r : a + 5 * r + c],
+        memory[a + 5 * r + c : a + 5 * r + 2 * c],
     )  # fmt: skip
 
 
 @kernel
-def assemble(plan, jacobian, inverse_root, alpha, d, l, diagonal):
-    """D from the Jacobian's blocks (m, 12), and S + I/α into the places of L."""
-    entry, column = part(plan, D_ENTRY), part(plan, D_COLUMN)
+def assemble(plan, jacobian, inverse_root, alpha, d, l, diagonal, root):
+    """M^(-1/2) and D from the model's diagonal (n,) and blocks (m, 12), and S + I/α into the places of L."""
+    entry, column, moving = part(plan, D_ENTRY), part(plan, D_COLUMN), part(plan, COLUMN)
     blocks = jacobian.reshape(-1)
+    for j in range(moving.shape[0]):
+        root[j] = inverse_root[moving[j]]
     for k in range(entry.shape[0]):
-        d[k] = blocks[entry[k]] * inverse_root[column[k]]
+        d[k] = blocks[entry[k]] * root[column[k]]
     l[:] = 0.0
     start, target = part(plan, S_START), part(plan, S_TARGET)
     left, right = part(plan, S_LEFT), part(plan, S_RIGHT)

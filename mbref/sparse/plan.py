@@ -2,7 +2,7 @@
 
 Made once per scene.  The order of elimination and the fill are SuperLU's (multiple minimum degree on the
 symmetric pattern); what is added here are the lists of products that the kernels of ``factor`` go through.
-Rows are counted in the order of elimination, columns as in the velocity vector.
+Rows are counted in the order of elimination, columns only where something moves.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from scipy.sparse.linalg import splu
 # parts of the index vector, each from plan[k] to plan[k + 1]
 (
     ROW,  # (r,) the model's row of each row here
+    COLUMN,  # (c,) the velocity vector's column of each column here
     D_START,  # (r + 1,) where each row of D begins
     D_ENTRY,  # (d,) position of each number of D in the Jacobian's blocks
     D_COLUMN,  # (d,) its column
@@ -26,8 +27,8 @@ from scipy.sparse.linalg import splu
     L_START,  # (r + 1,) where each column of L begins, its diagonal first
     L_ROW,  # (l,) row of each number of L
     UPDATE,  # positions in L that the elimination of each column changes, column after column
-) = range(11)
-PARTS = 11
+) = range(12)
+PARTS = 12
 
 
 @dataclass(frozen=True)
@@ -56,15 +57,16 @@ def plan_for(entries: np.ndarray, columns: np.ndarray, n: int) -> Plan:
     l_key = np.repeat(np.arange(order.size), np.diff(l_start)) * order.size + l_row
     target, left, right = _products(row, d_column, l_key, order.size)
     s_target, s_start = np.unique(target, return_index=True)
+    moving, local = np.unique(d_column, return_inverse=True)
     parts = [
-        kept[order], d_start, 12 * original + entry, d_column, np.append(s_start, target.size), s_target,
+        kept[order], moving, d_start, 12 * original + entry, local, np.append(s_start, target.size), s_target,
         left, right, l_start, l_row, _updates(l_start, l_row, l_key, order.size),
     ]  # fmt: skip
     offsets = np.cumsum([PARTS + 1, *(part.size for part in parts)])
     indices = np.concatenate([offsets, *parts])
     if indices.max(initial=0) > np.iinfo(np.uint32).max:
         raise OverflowError("the scene is too large for 32-bit indices")
-    memory = row.size + l_row.size + 5 * order.size + n
+    memory = row.size + l_row.size + 5 * order.size + 2 * moving.size
     return Plan(indices.astype(np.uint32), memory)
 
 
