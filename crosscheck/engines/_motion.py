@@ -53,10 +53,11 @@ def _middle_moment(inertia: Sequence) -> float:
     return float(np.linalg.eigvalsh(np.diag(matrix) if matrix.ndim == 1 else matrix)[1])
 
 
-def fastest_rate(scene: Scene, coarse: Callable[[float], Trajectory]) -> float:
+def fastest_rate(scene: Scene, coarse: Callable[[float], Trajectory], counts: Sequence[int] = SCOUT) -> float:
     """The fastest angular velocity (rad/s) of a coarse run, of steps of the length given, or what the
-    scene states if faster; a run that fails or is too coarse to tell is repeated once with finer steps."""
-    for steps in SCOUT:
+    scene states if faster; ``counts`` are how many steps the run has, and how many it is repeated with
+    when it fails or is too coarse to tell."""
+    for steps in counts:
         run = coarse(scene.duration / steps)
         spins = np.linalg.norm(run.angular_velocity, axis=2)
         resolved = SCOUT_TURN * steps / scene.duration

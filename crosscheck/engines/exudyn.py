@@ -37,7 +37,8 @@ MOST_TUNED = 25600  # steps over a scene's duration
 STATIC_STEPS = (100, 400, 1600)
 SHORTEST = 5e-6  # s; below, the full-pivoting solver loses rows of the scaled Newton matrix
 SPECTRAL_RADIUS = 0.9
-SCOUT_SAMPLES = 41  # of the coarse run that finds how fast a scene turns
+SCOUT = (250, 2000)  # steps of the coarse run that finds how fast a scene turns
+SCOUT_SAMPLES = 26
 
 
 class Exudyn(Engine):
@@ -67,7 +68,7 @@ class Exudyn(Engine):
 
     def _tuned_steps(self, scene: Scene) -> list[float]:
         """Steps (s) of the extrapolated family, by the angle turned in one."""
-        rate = fastest_rate(scene, lambda step: self._coarse(scene, step))
+        rate = fastest_rate(scene, lambda step: self._coarse(scene, step), SCOUT)
         shortest = max(SHORTEST * max(RICHARDSON), scene.duration / MOST_TUNED)
         return sorted({max(float(f"{angle / rate:.2g}"), shortest) for angle in TUNED_STEPS}, reverse=True)
 
