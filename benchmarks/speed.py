@@ -43,7 +43,7 @@ PAPER = (
 )  # fmt: skip
 SAMPLES = 11  # few, because adaptive integrators end a step at every sample time
 REPEATS = 5
-LONG, TOO_LONG = 0.7, 3.0  # s; such runs are not repeated; of their family nothing finer is tried
+LONG, TOO_LONG = 0.7, 2.0  # s; such runs are not repeated; of their family nothing finer is tried
 NEAR = 1.5  # a family so much dearer than its engine's best after one round may still be the best
 ENOUGH = 1e-10  # an error at which a family's finer settings are of no interest
 
@@ -111,7 +111,8 @@ def _sweep(simulator: Engine, scene: Scene, times: np.ndarray) -> Iterator[Run]:
         yield Run(
             simulator.name, setting.family, dict(setting.options), trajectory.outcome.label, error, cost
         )
-        if trajectory.cost.seconds > TOO_LONG or error < ENOUGH:
+        completed = trajectory.outcome is Outcome.COMPLETED
+        if trajectory.cost.seconds > TOO_LONG or (completed and error < ENOUGH):
             finished.add(setting.family)
 
 
