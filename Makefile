@@ -37,7 +37,7 @@ quick: $(VENV)/ready ## a comparison report in about three minutes, into report/
 	$(BIN)/crosscheck report --quick
 
 bench: $(VENV)/ready ## the benchmarks, printed
-	for script in benchmarks/*.py; do $(BIN)/python $$script; done
+	for script in $$(grep -l __main__ benchmarks/*.py); do $(BIN)/python $$script; done
 
 clean: ## remove what the targets above made
 	rm -rf $(VENV) report build *.egg-info .pytest_cache .hypothesis .ruff_cache
