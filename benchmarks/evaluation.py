@@ -18,9 +18,9 @@ from forward_dynamics import timed_calls
 from mbref.compiled import INT, VECTOR, entry, pointer_to
 from mbref.formulations import FORMULATIONS
 from mbref.method import Method
+from mbref.run import Limits, Run
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.simulate import Limits, _Run
 from mbref.tables import ACCELERATE, OK, PROBLEM, RATES, SIZES
 
 SCENE_NAMES = ("spatial_slider_crank", "planar_slider_crank", "four_bar", "five_bar")
@@ -65,7 +65,7 @@ def _in_turns(calls: dict[tuple[str, str], Callable[[], float]]) -> dict[tuple[s
 def _formulations(scene: Scene) -> Iterator[tuple[str, Callable[[], float]]]:
     """Every formulation's accelerations without stabilisation; NaN seconds where it fails."""
     for formulation in FORMULATIONS:
-        run = _Run(scene, Method.parse(f"{formulation}+none"), np.array([1.0]), Limits())
+        run = Run(scene, Method.parse(f"{formulation}+none"), np.array([1.0]), Limits())
         kernels = run.method.stabilisation.rates.pointer, run.method.formulation.accelerate.pointer
         y, y_rate = run.y[: run.pivots[SIZES, 1]], run.y_rate[: run.pivots[SIZES, 1]]
 

@@ -19,8 +19,8 @@ from numba import njit
 from crosscheck.engine import Cannot, Engine, Setting
 from crosscheck.engines._start import lacks_mass
 from mbref.method import Method
+from mbref.run import Limits, Run
 from mbref.scene import Scene
-from mbref.simulate import Limits, _Run
 from mbref.tables import ACCELERATION, COLUMNS, EVALUATIONS, SIZES
 from mbref.trajectory import Cost, Outcome, Trajectory
 
@@ -49,7 +49,7 @@ class RightHandSide:
     """y' = f(t, y) of a scene, called from Python: y holds coordinates and velocities."""
 
     def __init__(self, scene: Scene, times: np.ndarray):
-        self.run = run = _Run(scene, Method.parse(METHOD), times, Limits())
+        self.run = run = Run(scene, Method.parse(METHOD), times, Limits())
         self.call = compiled()
         self.size = int(run.pivots[SIZES, 1])
         self.start = run.y[: self.size].copy()

@@ -100,6 +100,11 @@ def _add_method_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--method", default=DEFAULT, help=f"or kinematic; default {DEFAULT}")
     add_time_options(parser)
     parser.add_argument("--rtol", type=float, default=1e-9, help="relative tolerance per step (default 1e-9)")
+    parser.add_argument(
+        "--code", choices=("auto", "generic", "specialised"), default="auto",
+        help="kernels that serve every scene, machine code of this scene's own, or (default) the latter\n"
+        "once a run is long; results agree to rounding",
+    )  # fmt: skip
     parser.add_argument("--max-step", type=float, default=0.0, help="largest step, s (default: the duration)")
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
 
@@ -155,7 +160,7 @@ def _limits(options: argparse.Namespace):
         raise ValueError(f"--rtol: must be between 0 and 1, got {options.rtol:g}")
     if options.max_step < 0:
         raise ValueError(f"--max-step: must not be negative, got {options.max_step:g}")
-    return Limits(rtol=options.rtol, largest_step=options.max_step)
+    return Limits(rtol=options.rtol, largest_step=options.max_step, code=options.code)
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from mbref.primitives import constraints
 from mbref.tables import (
     ACCELERATION,
     COLUMNS,
+    COORDINATES,
     EVALUATIONS,
     FLOATS,
     FORCE,
@@ -18,6 +19,7 @@ from mbref.tables import (
     INVERSE_ROOT,
     JACOBIAN,
     MASS,
+    MOVING,
     MULTIPLIERS,
     NU,
     OMEGA,
@@ -31,6 +33,8 @@ from mbref.tables import (
     ROW_BODIES,
     ROWS,
     SCRATCH,
+    TURNING,
+    VELOCITIES,
     VELOCITY,
     VELOCITY_GAIN,
     WORK,
@@ -78,6 +82,26 @@ def coordinate_rates(q, v, rates):
         rates[i + 4] = w * a - z * b_ + y * c
         rates[i + 5] = z * a + w * b_ - x * c
         rates[i + 6] = -y * a + x * b_ + w * c
+
+
+@kernel
+def expand(y, live, state):
+    """The whole state of y; coordinates that it does not have stay as they are."""
+    nq, nv = live[0, MOVING], live[0, TURNING]
+    for k in range(nq):
+        state[COORDINATES, live[1, k]] = y[k]
+    for k in range(nv):
+        state[VELOCITIES, live[1, nq + k]] = y[nq + k]
+
+
+@kernel
+def contract(coordinates, velocities, live, y):
+    """The entries of y among all coordinates and velocities, or their rates."""
+    nq, nv = live[0, MOVING], live[0, TURNING]
+    for k in range(nq):
+        y[k] = coordinates[live[1, k]]
+    for k in range(nv):
+        y[nq + k] = velocities[live[1, nq + k]]
 
 
 @kernel

@@ -6,8 +6,6 @@ arrays given by the caller.
 
 from __future__ import annotations
 
-from numpy import sqrt
-
 from mbref.compiled import kernel
 
 
@@ -170,29 +168,34 @@ def times_columns(dt, y, x):
 
 @kernel
 def cholesky_factor(a, n, tolerance):
-    """Uᵀ U of the upper half of a[:n, :n], in place; False where a pivot is ≤ tolerance."""
+    """Uᵀ D U of the upper half of a[:n, :n], in place; False where an entry of D is ≤ tolerance.
+
+    U has a unit diagonal, in whose place 1/D is kept: no roots, and no divisions when solving.
+    """
     for k in range(n):
         if not a[k, k] > tolerance:
             return False
-        pivot = sqrt(a[k, k])
-        inverse = 1.0 / pivot
-        a[k, k] = pivot
-        for j in range(k + 1, n):
-            a[k, j] *= inverse
+        inverse = 1.0 / a[k, k]
+        a[k, k] = inverse
         for i in range(k + 1, n):
-            factor = a[k, i]
+            factor = a[k, i] * inverse
             if factor != 0.0:
                 for j in range(i, n):
                     a[i, j] -= factor * a[k, j]
+        for j in range(k + 1, n):
+            a[k, j] *= inverse
     return True
 
 
 @kernel
 def cholesky_solve(a, n, b):
-    """Solve with the factor of ``cholesky_factor``; b (n,) becomes the solution."""
+    """Solve with the factors of ``cholesky_factor``; b (n,) becomes the solution."""
     for k in range(n):
-        b[k] /= a[k, k]
         value = b[k]
         for j in range(k + 1, n):
             b[j] -= value * a[k, j]
-    back_substitute(a, n, b)
+    for k in range(n):
+        b[k] *= a[k, k]
+    for k in range(n - 1, -1, -1):
+        for j in range(k + 1, n):
+            b[k] -= a[k, j] * b[j]

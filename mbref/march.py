@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from numpy import isfinite
 
+from mbref.addresses import array_at, kernel_at
 from mbref.compiled import INDICES, INT, MATRIX, VECTOR, entry, kernel, pointer_to
+from mbref.evaluation import expand
 from mbref.loads import remember_angles
 from mbref.problem import opened
 from mbref.singular import (
@@ -28,12 +30,15 @@ from mbref.tables import (
     FIXED_STEP,
     FORCED_STEP,
     FRAMES,
+    HANDOVER,
     LARGEST_STEP,
     LARGEST_TURN,
     LAST,
     LAST_TIME,
+    LIVE,
     MEMO,
     MOST_STEPS,
+    MOVING,
     MULTIPLIERS,
     NOT_FINITE,
     OK,
@@ -50,6 +55,7 @@ from mbref.tables import (
     STEP,
     STEPS,
     STEPS_PER_CALL,
+    TURNING,
     VELOCITIES,
     VIOLATION,
 )
@@ -130,16 +136,13 @@ def largest_step(control, work):
 
 
 @kernel
-def place_inside(t, history, nodes, found, y, y_rate, work):
+def place_inside(t, history, nodes, found, y, y_rate, live, work):
     """The extrapolated state and accelerations at a sample time inside a window, for ``take_sample``."""
     extrapolate(history, nodes, found, t, y, y_rate, work[DENSE])
-    state, acceleration = work[STATE], work[COLUMNS][ACCELERATION]
-    nq = state.shape[1]
-    for k in range(nq):
-        state[COORDINATES, k] = y[k]
-    for k in range(acceleration.shape[0]):
-        state[VELOCITIES, k] = y[nq + k]
-        acceleration[k] = y_rate[nq + k]
+    expand(y, live, work[STATE])
+    nq, acceleration = live[0, MOVING], work[COLUMNS][ACCELERATION]
+    for k in range(live[0, TURNING]):
+        acceleration[live[1, nq + k]] = y_rate[nq + k]
 
 
 @kernel
@@ -150,24 +153,35 @@ def part_of(interval, h):
     return 0.5 * interval if 2.0 * h > interval else h
 
 
-@entry(
-    INT(
-        pointer_to(STEP), pointer_to(PROPOSE), pointer_to(RATES), pointer_to(ACCEPT), pointer_to(ACCELERATE),
-        VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, VECTOR, INDICES, VECTOR,
-        VECTOR, VECTOR, VECTOR, MATRIX, MATRIX, INDICES, PROBLEM,
-    )
-)  # fmt: skip
-def march(
-    step, propose, rates, accept, accelerate,
-    times, sample_q, sample_v, sample_a, sample_m, clock, control, place, tolerances,
-    y, y_rate, y_new, memory, history, nodes, problem,
-):  # fmt: skip
-    """Advance until the last sample time, a failure, or the number of steps per call; says which."""
+_step, _propose, _rates = (kernel_at(pointer_to(kind)) for kind in (STEP, PROPOSE, RATES))
+_accept, _accelerate = kernel_at(pointer_to(ACCEPT)), kernel_at(pointer_to(ACCELERATE))
+_vector, _matrix, _indices = array_at(VECTOR), array_at(MATRIX), array_at(INDICES)
+
+
+@entry(INT(PROBLEM, PROBLEM))
+def march(loop, problem):
+    """Advance until the last sample time, a failure, or the number of steps per call; says which.
+
+    ``loop`` is the table of the kernels step, propose, rates, observe, accept and accelerate, then of the
+    arrays named below.
+    """
+    step = _step(loop, 0)
+    propose = _propose(loop, 1)
+    rates = _rates(loop, 2)
+    observe = _rates(loop, 3)
+    accept = _accept(loop, 4)
+    accelerate = _accelerate(loop, 5)
+    times, sample_q, sample_v = _vector(loop, 6), _matrix(loop, 7), _matrix(loop, 8)
+    sample_a, sample_m = _matrix(loop, 9), _matrix(loop, 10)
+    clock, control, place = _vector(loop, 11), _vector(loop, 12), _indices(loop, 13)
+    tolerances, memory, history = _vector(loop, 14), _matrix(loop, 18), _matrix(loop, 19)
+    y, y_rate, y_new, nodes = _vector(loop, 15), _vector(loop, 16), _vector(loop, 17), _indices(loop, 20)
     ints, floats, work, pivots, _settings, counts = opened(problem)
     taken = 0
     while True:
         t, size = clock[TIME], pivots[SIZES, 1]
-        status = rates(accelerate, t, y[:size], y_rate[:size], problem)
+        look = observe if t >= times[place[SAMPLE]] else rates
+        status = look(accelerate, t, y[:size], y_rate[:size], problem)
         if status == OK:
             status = judge(y[:size], y_rate[:size], place, control, work)
         if status != OK:
@@ -215,12 +229,12 @@ def leap(
     y, y_rate, y_new, history, nodes, problem,
 ):  # fmt: skip
     """Cross a window by extrapolation and projection; samples inside it are taken as extrapolated."""
-    _ints, _floats, work, pivots, _settings, counts = opened(problem)
+    ints, _floats, work, pivots, _settings, counts = opened(problem)
     t, size = clock[TIME], pivots[SIZES, 1]
     found = choose_nodes(history, counts[STEPS], APART * length, nodes)
     while place[SAMPLE] < times.shape[0] and times[place[SAMPLE]] <= t + length:
         clock[TIME] = times[place[SAMPLE]]
-        place_inside(clock[TIME], history, nodes, found, y_new[:size], y_rate[:size], work)
+        place_inside(clock[TIME], history, nodes, found, y_new[:size], y_rate[:size], ints[LIVE], work)
         take_sample(place[SAMPLE], work, sample_q, sample_v, sample_a, sample_m)
         place[SAMPLE] += 1
     clock[TIME] = t + length if place[SAMPLE] < times.shape[0] else clock[TIME]
@@ -265,6 +279,8 @@ def advance(
                 if status == CHANGED:
                     memory[:] = 0.0
                 return OK
+        if status == HANDOVER:
+            return status
         counts[REJECTED] += 1
         if control[FIXED_STEP] > 0.0:
             return status

@@ -26,6 +26,7 @@ from mbref.tables import (
     LENGTH,
     MASS,
     MOMENT,
+    MOVING,
     NU,
     PHI,
     POINT_I,
@@ -34,6 +35,7 @@ from mbref.tables import (
     ROWS,
     SPRING,
     TORSION_SPRING,
+    TURNING,
     U_I,
     U_J,
     W_I,
@@ -70,7 +72,12 @@ class Model:
         self._pack_bodies()
         self._pack_primitives()
         loads, data = self._pack_loads()
-        self.ints = (self._primitives, self._row_bodies, loads)
+        self.ints = (
+            self._primitives,
+            self._row_bodies,
+            loads,
+            self.entries(np.arange(7 * self.nb), np.arange(self.n)),
+        )
         self.floats = (self._moments, self._geometry, self._drivers(), data, np.array([self._gravity()]))
         self._work = self.workspace(1, dense=False)
 
@@ -93,6 +100,14 @@ class Model:
             np.zeros((4, 7 * nb)), np.zeros(matrix), np.zeros((8, big)), np.zeros((1, scratch)),
             angles, np.zeros(jacobian), np.zeros((1, 4)),
         )  # fmt: skip
+
+    def entries(self, coordinates: np.ndarray, velocities: np.ndarray) -> np.ndarray:
+        """``ints[LIVE]`` of a y that has these columns of q (7 nb) and v (6 nb)."""
+        columns = np.concatenate([coordinates, velocities])
+        live = np.zeros((2, 6 + columns.size), dtype=np.int64)
+        live[0, MOVING], live[0, TURNING] = coordinates.size, velocities.size
+        live[1, : columns.size] = columns
+        return live
 
     def start(self) -> np.ndarray:
         """Coordinates (7 nb,) of the scene's poses, principal frames."""

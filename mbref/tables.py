@@ -16,6 +16,7 @@ from mbref.compiled import FLOAT, INDEX_TABLE, INDICES, INT, MATRIX, VECTOR, poi
 PRIMITIVES = 0  # (primitives, 5): kind, first body, second body, driver or -1, first row
 ROW_BODIES = 1  # (rows, 2): the two bodies of each row, nb for the fixed frame
 LOADS = 2  # (loads, 4): kind, first body, second body, index of its unwrapped angle
+LIVE = 3  # (2, ·): the entries of y, see below
 # floats
 BODIES = 0  # (nb, 4): mass and principal moments
 GEOMETRY = 1  # (primitives, 16): see the columns below
@@ -42,6 +43,11 @@ COORDINATES, VELOCITIES, COORDINATE_RATES, COORDINATE_SECOND = range(4)  # rows 
 LAST_TIME, REFERENCE_PIVOT, SMALLEST_PIVOT, GENERIC_RANK = range(4)  # entries of MEMO
 ROW_ORDER, COLUMN_ORDER, SIZES, CHART_PIVOTS, FORMULATION_PIVOTS = range(5)  # rows of pivots
 
+# ints[LIVE][0]: how many coordinates and velocities y has; and of machine code of the scene's own (see
+# specialised/chart.py) whether it has redundant rows, and where its pieces are.  ints[LIVE][1]: which
+# coordinates, then which velocities
+MOVING, TURNING, REDUNDANT, RATES_CODE, OBSERVE_CODE, PROJECT_CODE = range(6)
+
 POSITION, ROTATION, VELOCITY, OMEGA = 0, 3, 12, 15  # columns of FRAMES
 POINT_I, POINT_J, U_I, W_I, U_J, LENGTH = 0, 3, 6, 9, 12, 15  # columns of GEOMETRY
 POINT, DOT1, DOT2, DISTANCE = range(4)  # kinds of primitives
@@ -61,9 +67,10 @@ VELOCITY_GAIN, POSITION_GAIN, RANK_TOLERANCE, NEWTON_TOLERANCE = range(4)
 FORMULATION_OPTIONS = 4  # a formulation's own numbers start here
 
 # status of an evaluation or of a step
-OK, SINGULAR, NOT_CONVERGED, NOT_FINITE, CHANGED = range(5)  # CHANGED: the chart chose new coordinates
+OK, SINGULAR, NOT_CONVERGED, NOT_FINITE = range(4)
+CHANGED, HANDOVER = 4, 5  # the chart chose new coordinates; the chart leaves the state to the generic one
 
-INTS = types.UniTuple(INDEX_TABLE, 3)
+INTS = types.UniTuple(INDEX_TABLE, 4)
 FLOATS = types.UniTuple(MATRIX, 5)
 WORK = types.UniTuple(MATRIX, 12)
 PIVOTS = INDEX_TABLE  # (5, ·): orders and exchanges; pivots[SIZES] = rank and length of y

@@ -1,4 +1,4 @@
-"""mbref as an engine: a family is a method, its accuracy the tolerance or the fixed step."""
+"""mbref as an engine: a family is a method and whose code it runs, its accuracy the tolerance."""
 
 from __future__ import annotations
 
@@ -12,12 +12,15 @@ from mbref.trajectory import Trajectory
 
 METHODS = (
     "alf-dual+projection",
+    "alf-dual+projection, own code",
+    "lm2+projection, own code",
     "mpi-svd+partitioning",
     "mpi-svd+projection",
     "mpi-svd+none",
     "mpi-qr+projection",
     "lm2+projection",
 )
+OWN_CODE = ", own code"  # machine code of the scene, made before the clock runs
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 
 
@@ -38,27 +41,38 @@ class Mbref(Engine):
         return None
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
-        from mbref.method import Method
-
-        redundant = scene.counts().redundant > 0
         return [
-            Setting(method, {"rtol": rtol})
-            for method in METHODS
-            if not redundant or Method.parse(method).formulation.handles_redundancy
+            Setting(family, {"rtol": rtol})
+            for family in METHODS
+            if self._serves(family, scene)
             for rtol in TOLERANCES
         ]
 
+    def _serves(self, family: str, scene: Scene) -> bool:
+        from mbref.simulate import why_no_code
+
+        method = _method(family)
+        if family.endswith(OWN_CODE):
+            return not why_no_code(scene, method)
+        return scene.counts().redundant == 0 or method.formulation.handles_redundancy
+
     def prepare(self, families: Sequence[str]) -> None:
-        from mbref.method import Method
         from mbref.simulate import prepare
 
         for family in families:
-            prepare(Method.parse(family))
+            prepare(_method(family))
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         from mbref.simulate import Limits, simulate
 
-        return simulate(scene, setting.family, times, Limits(**setting.options))
+        code = "specialised" if setting.family.endswith(OWN_CODE) else "generic"
+        return simulate(scene, _method(setting.family), times, Limits(code=code, **setting.options))
+
+
+def _method(family: str):
+    from mbref.method import Method
+
+    return Method.parse(family.removesuffix(OWN_CODE))
 
 
 ENGINE = Mbref()

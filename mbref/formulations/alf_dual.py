@@ -17,6 +17,9 @@ from mbref.formulations.moore_penrose import begin, transpose
 from mbref.linalg import add_product, cholesky_factor, cholesky_solve, gram, times_transpose
 from mbref.tables import ACCELERATE, FACTORISATIONS, FORMULATION_OPTIONS, NOT_CONVERGED, OK, SINGULAR
 
+TINY = 1e-300  # of the change before the first
+LEAST = 3  # iterations: enough up to the neighbourhood of a singular position, so that the number is fixed
+
 OPTIONS = {"alpha": 1e10, "epsilon": 1e-12, "iterations": 20.0, "omega": 0.0, "mu": 1.0}
 
 
@@ -44,7 +47,8 @@ def accelerate(
     if not cholesky_factor(s, m, 0.0):
         return SINGULAR
     status, change = NOT_CONVERGED, 0.0
-    for _ in range(int(settings[FORMULATION_OPTIONS + 2])):
+    most = int(settings[FORMULATION_OPTIONS + 2])
+    for k in range(most):
         step[:] = b
         cholesky_solve(s, m, step)
         times_transpose(d, step, x)
@@ -54,7 +58,7 @@ def accelerate(
         for i in range(m):
             total[i] -= step[i]
         last, change = change, changed(before, acceleration)
-        if change <= epsilon or (last > 0.0 and change * change <= epsilon * last):
+        if k + 1 >= min(LEAST, most) and change * min(1.0, change / max(last, TINY)) <= epsilon:
             status = OK
             break
         add_product(dt, x, -1.0, b)

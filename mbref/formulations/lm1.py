@@ -54,6 +54,7 @@ LM1 = Formulation(
     equations="Eq. 5",
     accelerate=accelerate,
     scratch=lambda m, n: (m + n) * (m + n) + m * n + m + n,
+    pivots_by_size=True,
     handles_redundancy=False,
     handles_singular_mass=True,
 )

@@ -41,6 +41,7 @@ MPI_GS = Formulation(
     equations="Eqs. 26, 29, 30",
     accelerate=accelerate,
     scratch=lambda m, n: 2 * m * n + 2 * n * n + 2 * m + 2 * n,
+    pivots_by_size=True,
     handles_redundancy=True,
     handles_singular_mass=False,
 )

@@ -55,6 +55,7 @@ MPI_GS_LITERAL = Formulation(
     equations="Eqs. 26, 29, 30 as printed",
     accelerate=accelerate,
     scratch=lambda m, n: 2 * m * n + n * n + 2 * max(m, n) + n,
+    pivots_by_size=True,
     handles_redundancy=True,
     handles_singular_mass=False,
     needs_independent_columns=True,

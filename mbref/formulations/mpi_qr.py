@@ -44,6 +44,7 @@ MPI_QR = Formulation(
     equations="Eq. 26 with a pivoted QR",
     accelerate=accelerate,
     scratch=lambda m, n: 2 * m * n + 6 * m + n,
+    pivots_by_size=True,
     handles_redundancy=True,
     handles_singular_mass=False,
 )

@@ -36,6 +36,7 @@ MPI_SVD = Formulation(
     equations="Eqs. 26-28",
     accelerate=accelerate,
     scratch=lambda m, n: m * n + 2 * m + n,
+    pivots_by_size=True,
     handles_redundancy=True,
     handles_singular_mass=False,
 )

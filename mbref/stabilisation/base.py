@@ -10,17 +10,19 @@ from mbref.compiled import Exchangeable
 
 @dataclass(frozen=True)
 class Stabilisation:
-    """Feedback in γ and a chart: three kernels between the state and the vector that is integrated.
+    """Feedback in γ and a chart: kernels between the state and the vector that is integrated.
 
     ``enter(t, y, …) -> length of y`` chooses y from the state in ``work[STATE]``;
     ``rates(accelerate, t, y, y', …) -> status`` evaluates y' and leaves the state in ``work[STATE]``;
-    ``accept(t, y, …) -> status`` corrects y after an accepted step (CHANGED: new coordinates, new length).
+    ``accept(t, y, …) -> status`` corrects y after an accepted step (CHANGED: new coordinates, new length);
+    ``observe`` is ``rates`` where a sample is taken: it leaves accelerations and multipliers as well.
     """
 
     name: str
     source: str  # equations of the paper, or the reference
     enter: Exchangeable
     rates: Exchangeable
+    observe: Exchangeable
     accept: Exchangeable
     options: Mapping[str, float] = field(default_factory=dict)
     feedback: Callable[[Mapping[str, float]], tuple[float, float]] | None = None  # gains of Φ' and Φ in γ

@@ -10,4 +10,6 @@ def _feedback(options: Mapping[str, float]) -> tuple[float, float]:
     return 2 * options["alpha"], options["beta"] ** 2
 
 
-BAUMGARTE = Stabilisation("baumgarte", "Eq. 9", enter, rates, accept, {"alpha": 5.0, "beta": 5.0}, _feedback)
+BAUMGARTE = Stabilisation(
+    "baumgarte", "Eq. 9", enter, rates, rates, accept, {"alpha": 5.0, "beta": 5.0}, _feedback
+)

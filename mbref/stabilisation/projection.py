@@ -2,11 +2,13 @@
 
 Mass-orthogonal: the correction is the least in the metric of M (Bayo & Ledesma, Nonlinear Dynamics 9,
 1996), M^(-1/2) Dᵀ (D Dᵀ)⁻¹ b with the independent rows of D = Φ_q M^(-1/2): positions by Newton's method,
-velocities with the same factor.  A pivoted QR of Dᵀ finds the independent rows; while they stay well
-apart, the Cholesky factor of D Dᵀ is the same R for less work, and its smallest pivot says when they do not.
+velocities with the same factors.  A pivoted QR of Dᵀ finds the independent rows, and D Dᵀ = Rᵀ R; while
+they stay well apart, D Dᵀ is factored directly, which is less work and has the same pivots.
 """
 
 from __future__ import annotations
+
+from numpy import sqrt
 
 from mbref.compiled import exchangeable, kernel
 from mbref.evaluation import coordinate_rates, dense_jacobian, evaluate, violation_rate
@@ -53,7 +55,7 @@ VALUES, CHANGE = 0, 1  # rows of DENSE_VECTORS during a correction
 
 @kernel
 def chosen_rows(work, rank):
-    """Memory for the chosen rows of D as columns (n, rank), and for R (rank, rank)."""
+    """Memory for the chosen rows of D as columns (n, rank), and for the factors of D Dᵀ (rank, rank)."""
     memory, (m, n) = work[DENSE].reshape(-1), work[PHI_Q].shape
     return (
         memory[: n * rank].reshape((n, rank)),
@@ -72,7 +74,7 @@ def select(d, order, columns):
 
 @kernel
 def choose(work, pivots, settings, counts):
-    """Choose the independent rows of D by a pivoted QR of Dᵀ, which gives R; their number."""
+    """Choose the independent rows of D by a pivoted QR of Dᵀ, and factor D Dᵀ from R; their number."""
     d, vectors = work[PHI_Q], work[DENSE_VECTORS]
     m, n = d.shape
     b, order = work[DENSE].reshape(-1)[: n * m].reshape((n, m)), pivots[CHART_PIVOTS]
@@ -86,30 +88,30 @@ def choose(work, pivots, settings, counts):
     )  # fmt: skip
     columns, r = chosen_rows(work, rank)
     for i in range(rank):
-        for k in range(i, rank):
-            r[i, k] = b[i, k]
+        r[i, i] = 1.0 / (b[i, i] * b[i, i])
+        for k in range(i + 1, rank):
+            r[i, k] = b[i, k] / b[i, i]
     select(d, order, columns)
     pivots[SIZES, 0] = rank
-    watch_pivot(abs(r[rank - 1, rank - 1]) if rank > 0 else 0.0, rank, work)
+    watch_pivot(1.0 / sqrt(r[rank - 1, rank - 1]) if rank > 0 else 0.0, rank, work)
     return rank
 
 
 @kernel
 def smallest_pivot(columns, r):
-    """R of the chosen rows, D Dᵀ = Rᵀ R, by Cholesky; its smallest pivot, 0 where there is none."""
-    rank = r.shape[0]
+    """The factors of D Dᵀ of the chosen rows; the smallest pivot of their QR, 0 where there is none."""
+    rank, largest_inverse = r.shape[0], 1.0
     gram(columns, r)
     if rank == 0 or not cholesky_factor(r, rank, 0.0):
         return 0.0
-    smallest = r[0, 0]
-    for i in range(1, rank):
-        smallest = min(smallest, r[i, i])
-    return smallest
+    for i in range(rank):
+        largest_inverse = max(largest_inverse, r[i, i])
+    return 1.0 / sqrt(largest_inverse)
 
 
 @kernel
 def factor(ints, work, pivots, settings, counts):
-    """R at the state last evaluated, with the rows chosen before where they serve; their number."""
+    """The factors at the state last evaluated, of the rows chosen before where they serve; their number."""
     dense_jacobian(ints, work)
     d, memo, rank = work[PHI_Q], work[MEMO][0], pivots[SIZES, 0]
     equilibrate(d, work[COLUMNS][INVERSE_ROOT], d, work[ROWS][ROW_SCALE])
@@ -160,7 +162,7 @@ def correction(which, rank, work, pivots):
 
 @kernel
 def least_change(columns, r, inverse_root, values, x):
-    """x = M^(-1/2) Dᵀ (Rᵀ R)⁻¹ values; overwrites ``values`` (rank,)."""
+    """x = M^(-1/2) Dᵀ (D Dᵀ)⁻¹ values; overwrites ``values`` (rank,)."""
     cholesky_solve(r, r.shape[0], values)
     times_columns(columns, values, x)
     for j in range(x.shape[0]):
@@ -214,4 +216,4 @@ def accept(t, y, problem):
     return OK
 
 
-PROJECTION = Stabilisation("projection", "Bayo & Ledesma 1996", enter, rates, accept)
+PROJECTION = Stabilisation("projection", "Bayo & Ledesma 1996", enter, rates, rates, accept)

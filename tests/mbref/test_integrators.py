@@ -14,9 +14,10 @@ from crosscheck.metrics import measure
 from crosscheck.truth import truth_for
 from mbref import rotations
 from mbref.method import Method
+from mbref.run import Run
 from mbref.scene import Body, Revolute, Scene, Spring, Translational
 from mbref.scenes import SCENES
-from mbref.simulate import Limits, _Run, simulate
+from mbref.simulate import Limits, simulate
 from mbref.tables import COLUMN_ORDER, CROSSINGS, STEPS_PER_CALL
 
 ROD = {"mass": 2.0, "inertia": (0.1, 0.7, 0.7)}
@@ -215,7 +216,7 @@ def test_adams_under_every_stabilisation_and_truth(method, name, end, allowed):
     ],
 )
 def test_adams_forgets_its_past_where_coordinates_change_or_jump(method, name, end):
-    run = _Run(SCENES[name](), Method.parse(f"{method}/adams"), np.array([end]), Limits(rtol=1e-9))
+    run = Run(SCENES[name](), Method.parse(f"{method}/adams"), np.array([end]), Limits(rtol=1e-9))
     run.control[STEPS_PER_CALL] = 1
     before, mismatches, changes = [0, run.pivots[COLUMN_ORDER].copy()], [], 0
 

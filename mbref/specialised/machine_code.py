@@ -1,0 +1,143 @@
+"""Machine code of a record: straight-line LLVM IR, compiled once and kept on disk.
+
+A record becomes a function ``i64 f(double t, double* y, double* angles, double* out)`` of the operations
+that its results need; it returns 0 when all its guards held.  Without
+fast-math flags every operation gives the bits that it gives in the kernel.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import llvmlite.binding as llvm
+
+from mbref.specialised.tracing import COMPARISONS, Record, Scalar, Untraceable, operand
+
+MOST_OPERATIONS = 15_000  # LLVM's time grows faster than the length of straight-line code
+BINARY = ("fadd", "fsub", "fmul", "fdiv")
+VECTORS = ("y", "angles")
+CALLS = {
+    "sin": "sin", "cos": "cos", "atan2": "atan2", "sqrt": "llvm.sqrt.f64", "fabs": "llvm.fabs.f64",
+    "floor": "llvm.floor.f64",
+}  # fmt: skip
+SELECTS = {"max": "ogt", "min": "olt"}  # Python's max(a, b) is b only where b > a
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A record and which of its scalars, or numbers, are its results."""
+
+    name: str
+    record: Record
+    outputs: Sequence[Scalar | float]
+
+    def live(self) -> list[int]:
+        """Indices of the operations that outputs and guards need, in order."""
+        texts = [operand(value) for value in self.outputs]
+        texts += [text for _, *pair in self.record.guards for text in pair]
+        live, stack = set(), _indices(texts)
+        while stack:
+            index = stack.pop()
+            if index not in live:
+                live.add(index)
+                stack += _indices(self.record.operations[index][1:])
+        return sorted(live)
+
+    def assembly(self) -> str:
+        """The LLVM IR of the function."""
+        vectors = ", ".join(f"double* noalias %{name}" for name in (*VECTORS, "out"))
+        lines = [f"define i64 @{self.name}(double %t, {vectors}) {{"]
+        for index in self.live():
+            lines += _instructions(f"%v{index}", *self.record.operations[index])
+        held = "true"
+        for k, ((comparison, left, right), outcome) in enumerate(self.record.guards.items()):
+            lines += [
+                f"%c{k} = fcmp {COMPARISONS[comparison]} double {left}, {right}",
+                f"%g{k} = xor i1 %c{k}, {'false' if outcome else 'true'}",
+                f"%h{k} = and i1 {held}, %g{k}",
+            ]
+            held = f"%h{k}"
+        for k, value in enumerate(self.outputs):
+            lines.append(f"%o{k} = getelementptr double, double* %out, i64 {k}")
+            lines.append(f"store double {operand(value)}, double* %o{k}")
+        lines += [
+            f"%failed = xor i1 {held}, true",
+            "%status = zext i1 %failed to i64",
+            "ret i64 %status",
+            "}",
+        ]
+        return "\n".join(lines)
+
+
+def _indices(texts: Sequence[str]) -> list[int]:
+    return [int(text[2:]) for text in texts if text.startswith("%v")]
+
+
+def _instructions(result: str, name: str, *operands: str) -> list[str]:
+    if name == "t 0":
+        return [f"{result} = bitcast double %t to double"]
+    vector, _, index = name.partition(" ")
+    if vector in VECTORS:
+        pointer = f"%i{result[2:]}"
+        place = f"{pointer} = getelementptr double, double* %{vector}, i64 {index}"
+        return [place, f"{result} = load double, double* {pointer}"]
+    if name in BINARY:
+        return [f"{result} = {name} double {operands[0]}, {operands[1]}"]
+    if name == "fneg":
+        return [f"{result} = fneg double {operands[0]}"]
+    if name in CALLS:
+        arguments = ", ".join(f"double {text}" for text in operands)
+        return [f"{result} = call double @{CALLS[name]}({arguments})"]
+    a, b = operands
+    return [
+        f"%s{result[2:]} = fcmp {SELECTS[name]} double {b}, {a}",
+        f"{result} = select i1 %s{result[2:]}, double {b}, double {a}",
+    ]
+
+
+def compiled(pieces: Sequence[Piece]) -> bytes:
+    """Object code of the pieces; raises Untraceable where they are too long to compile in a second."""
+    length = sum(len(piece.live()) for piece in pieces)
+    if length > MOST_OPERATIONS:
+        raise Untraceable(f"{length} operations, more than {MOST_OPERATIONS}")
+    declarations = [
+        f"declare double @{name}(double{', double' if name == 'atan2' else ''})" for name in CALLS.values()
+    ]
+    module = llvm.parse_assembly("\n".join([*declarations, *(piece.assembly() for piece in pieces)]))
+    module.verify()
+    return _target_machine().emit_object(module)
+
+
+class Code:
+    """Object code in memory; ``address(name)`` of a piece is good while this object lives."""
+
+    def __init__(self, data: bytes):
+        empty = llvm.parse_assembly("")
+        self._engine = llvm.create_mcjit_compiler(empty, _target_machine())
+        self._engine.add_object_file(llvm.ObjectFileRef.from_data(data))
+        self._engine.finalize_object()
+
+    def address(self, name: str) -> int:
+        """Where the function of a piece begins."""
+        return self._engine.get_function_address(name)
+
+
+def processor() -> str:
+    """The processor that the code is for."""
+    return f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
+
+
+@functools.cache
+def _target() -> llvm.Target:
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm.Target.from_default_triple()
+
+
+def _target_machine() -> llvm.TargetMachine:
+    """A fresh one each time: an engine takes it over."""
+    return _target().create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2, jit=True
+    )

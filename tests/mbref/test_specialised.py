@@ -1,0 +1,219 @@
+"""Machine code of a scene's own against the kernels it is traced from."""
+
+import ctypes
+import json
+
+import numpy as np
+import pytest
+
+from crosscheck.random_mechanisms import random_mechanism
+from mbref.compiled import CACHE
+from mbref.evaluation import contract, expand
+from mbref.method import Method, MethodError
+from mbref.run import Run
+from mbref.scene import Body, Force, Revolute, Scene, Spring, TorsionSpring
+from mbref.scenes import SCENES
+from mbref.simulate import Limits, simulate
+from mbref.specialised import machine_code
+from mbref.specialised.build import PIECES
+from mbref.specialised.machine_code import Code, Piece, compiled
+from mbref.specialised.tracing import Record, Untraceable, inputs, plain
+from mbref.stabilisation.projection import largest
+from mbref.tables import COORDINATES, OK, RATES_CODE, SIZES, VELOCITIES
+from mbref.vectors import larger
+
+PAPER = ("spatial_slider_crank", "planar_slider_crank", "four_bar", "five_bar")
+CALL = ctypes.CFUNCTYPE(ctypes.c_longlong, ctypes.c_double, *[ctypes.c_void_p] * 3)
+
+
+def runs(scene, method, end=0.02, **limits):
+    """The same run by the kernels and by the scene's own code."""
+    times = np.linspace(0.0, end, 5)
+    return [
+        simulate(scene, method, times, Limits(code=code, **limits)) for code in ("generic", "specialised")
+    ]
+
+
+def apart(one, other):
+    """The largest difference of poses and, relative, accelerations.
+
+    Reactions of redundant rows, which 1/alpha alone determines, hold to alpha times rounding only.
+    """
+    assert one.outcome == other.outcome, f"{one.message} / {other.message}"
+    assert len(one.times) == len(other.times)
+    size = np.abs(one.acceleration).max() + np.abs(one.angular_acceleration).max()
+    force = 1.0 + max(np.abs(reaction).max() for reaction in one.reactions.values())
+    for joint, reaction in one.reactions.items():
+        difference = np.abs(reaction - other.reactions[joint]).max() / force
+        assert difference < 1e-4, f"reaction of {joint}: {difference:.1e}"
+    return max(
+        np.abs(one.position - other.position).max(),
+        np.abs(one.orientation - other.orientation).max(),
+        np.abs(one.acceleration - other.acceleration).max() / (1.0 + size),
+    )
+
+
+@pytest.mark.parametrize("formulation", ("lm2", "alf", "alf-dual"))
+@pytest.mark.parametrize("name", PAPER)
+def test_rates_of_the_code_have_the_bits_of_the_kernels(name, formulation):
+    method = Method.parse(f"{formulation}+projection")
+    try:
+        run = Run(SCENES[name](), method, np.array([1.0]), Limits(code="specialised"))
+    except Untraceable:
+        assert not method.formulation.handles_redundancy, name
+        return
+    generic = Run(SCENES[name](), method, np.array([1.0]), Limits(code="generic"))
+    kernel = method.stabilisation.rates.callable
+    live, rng = run.own.live, np.random.default_rng(7)
+    code, size = CALL(int(live[0, RATES_CODE])), int(run.pivots[SIZES, 1])
+    for scale in (0.0, 1e-4, 1e-3, 1e-3, 1e-2):
+        y = run.y[:size] + scale * rng.normal(size=size)
+        ours, angles = np.zeros(size), np.zeros(1)
+        held = code(scale, y.ctypes.data, angles.ctypes.data, ours.ctypes.data) == OK
+        state = np.zeros((4, 7 * run.model.nb))
+        state[COORDINATES], state[VELOCITIES, : run.model.n] = run.start.q, run.start.v
+        expand(y, live, state)
+        whole = np.concatenate([state[COORDINATES], state[VELOCITIES, : run.model.n]])
+        rates = np.zeros_like(whole)
+        status = kernel(method.formulation.accelerate.pointer, scale, whole, rates, generic.problem)
+        if status != OK:  # the kernels see the redundant rows that the code leaves out
+            assert not method.formulation.handles_redundancy
+            continue
+        if not held:  # the number of iterations of ALF depends on the state
+            assert formulation == "alf" and scale > 0.0, "a guard failed beside the start"
+            continue
+        theirs = np.zeros(size)
+        contract(rates[: 7 * run.model.nb], rates[7 * run.model.nb :], live, theirs)
+        apart = np.abs(ours - theirs).max()  # at the start itself the kernels skip products with zero
+        assert apart == 0.0 if scale > 0.0 else apart < 1e-25, f"{name}: {apart:.1e} apart at {scale}"
+
+
+@pytest.mark.parametrize("name", (*PAPER, "planar_slider_crank_equal", "four_bar_gravity"))
+def test_runs_agree_with_the_kernels_to_rounding(name):
+    end = 0.2 if name.endswith(("equal", "gravity")) else 0.02
+    generic, own = runs(SCENES[name](), "alf-dual+projection", end, rtol=1e-10)
+    assert apart(generic, own) < 1e-9, f"{name}: {apart(generic, own):.1e}"
+    if name == "planar_slider_crank":
+        assert (generic.cost.steps, generic.cost.rejected) == (own.cost.steps, own.cost.rejected)
+
+
+@pytest.mark.parametrize("seed", (3, 16, 17, 35))
+def test_random_mechanisms_agree_with_the_kernels(seed):
+    generic, own = runs(random_mechanism(seed), "alf-dual+projection", 0.05, rtol=1e-9)
+    assert apart(generic, own) < 1e-7, f"seed {seed}: {apart(generic, own):.1e}"
+
+
+def test_loads_agree_with_the_kernels():
+    hinge = Revolute(name="H", bodies=("ground", "b"), anchor=(0, 0, 0), axis=(0, 1, 1))
+    scene = Scene(
+        name="loads", gravity=(0, 0, -9.81), joint=(hinge,),
+        body=(Body(name="b", position=(1.0, 0.2, 0.0), mass=2.0, inertia=(0.1, 0.7, 0.7)),),
+        load=(
+            Spring(
+                bodies=("ground", "b"), points=((0, 0, 1), (1, 0, 0)), stiffness=8, damping=0.1,
+                natural_length=1.0,
+            ),
+            TorsionSpring(joint="H", stiffness=3.0, damping=0.2, natural_angle=4.0),
+            Force(body="b", point=(1, 0, 0), force=(0, 1, 2)),
+        ),
+    )  # fmt: skip
+    generic, own = runs(scene, "alf-dual+projection", 3.0, rtol=1e-10)
+    assert apart(generic, own) < 1e-9, apart(generic, own)
+
+
+def entries(scene):
+    """Coordinates and velocities that the code has."""
+    run = Run(scene, Method.parse("alf-dual+projection"), np.array([0.1]), Limits(code="specialised"))
+    return int(run.own.live[0, 0]), int(run.own.live[0, 1])
+
+
+def test_planar_mechanisms_keep_the_entries_of_their_plane():
+    assert entries(SCENES["planar_slider_crank"]()) == (12, 9)
+    assert entries(SCENES["five_bar"]()) == (16, 12)
+    assert entries(SCENES["spatial_slider_crank"]()) == (21, 18)
+    pushed = SCENES["planar_slider_crank"]()
+    pushed = pushed.with_(load=(*pushed.load, Force(body="rod", point=(0.2, 0, 0), force=(0, 0, 1e-9))))
+    assert entries(pushed) == (21, 18), "a force across the plane, however small"
+
+
+def test_auto_takes_the_code_after_many_steps_and_agrees():
+    times, scene = np.array([0.4]), SCENES["planar_slider_crank"]()
+    generic = simulate(scene, "alf-dual+projection", times, Limits(rtol=1e-12, code="generic"))
+    auto = simulate(scene, "alf-dual+projection", times, Limits(rtol=1e-12))
+    assert auto.cost.steps > 2000
+    assert apart(generic, auto) < 1e-9
+
+
+def test_code_is_kept_and_another_scene_has_its_own():
+    scene = SCENES["four_bar"]()
+    first = Run(scene, Method.parse("alf-dual+projection"), np.array([0.1]), Limits(code="specialised"))
+    before = set((CACHE / "scenes").glob("*.o"))
+    again = Run(scene, Method.parse("alf-dual+projection"), np.array([0.1]), Limits(code="specialised"))
+    assert set((CACHE / "scenes").glob("*.o")) == before
+    assert first.own.operations == again.own.operations
+    heavier = scene.body[0].model_copy(update={"mass": 0.75})
+    Run(scene.with_(body=(heavier, *scene.body[1:])), Method.parse("alf-dual+projection"), np.array([0.1]),
+        Limits(code="specialised"))  # fmt: skip
+    facts = [json.loads(path.with_suffix(".json").read_text()) for path in before]
+    assert all(set(f["operations"]) == set(PIECES) for f in facts)
+
+
+@pytest.mark.parametrize(
+    ("method", "reason"),
+    [
+        ("mpi-svd+projection", "chooses pivots"),
+        ("alf-dual+baumgarte", "baumgarte has no machine code"),
+        ("lm2+partitioning", "partitioning has no machine code"),
+    ],
+)
+def test_what_cannot_be_laid_down_beforehand_is_said(method, reason):
+    with pytest.raises(MethodError, match=reason):
+        simulate(SCENES["four_bar"](), method, (0.01,), Limits(code="specialised"))
+
+
+def test_too_long_a_record_is_refused(monkeypatch):
+    monkeypatch.setattr(machine_code, "MOST_OPERATIONS", 100)
+    scene = SCENES["four_bar"]()
+    scene = scene.with_(body=(scene.body[0].model_copy(update={"mass": 0.8125}), *scene.body[1:]))
+    with pytest.raises(MethodError, match="operations, more than 100"):
+        simulate(scene, "alf-dual+projection", (0.01,), Limits(code="specialised"))
+
+
+def traced(function, *samples):
+    """(call, piece) of a function of scalars by machine code."""
+    record = Record()
+    value = plain(function)(*inputs(record, "y", np.array(samples)))
+    piece = Piece("f", record, [value])
+    code = Code(compiled([piece]))
+
+    def call(*arguments):
+        y, out = np.array(arguments, dtype=float), np.zeros(1)
+        status = CALL(code.address("f"))(0.0, y.ctypes.data, y.ctypes.data, out.ctypes.data)
+        return status, out[0]
+
+    return call, piece
+
+
+def test_a_guard_tells_when_a_branch_goes_the_other_way():
+    def branch(x, y):
+        return x - y if x > y else 2.0 * y
+
+    call, _ = traced(branch, 3.0, 1.0)
+    assert call(5.0, 2.0) == (0, 3.0)
+    assert call(2.0, 5.0)[0] == 1
+
+
+def test_constants_fold_and_equal_operations_are_recorded_once():
+    def expression(x, y):
+        return 0.0 * x + 1.0 * y + (x - x) + (x * y) * (x * y)
+
+    call, piece = traced(expression, 3.0, 1.0)
+    assert [piece.record.operations[k][0] for k in piece.live()] == ["y 0", "y 1", "fmul", "fmul", "fadd"]
+    assert call(2.0, 5.0) == (0, 105.0)
+
+
+def test_the_larger_size_needs_no_guard():
+    call, piece = traced(lambda x, y: largest(np.array([x, y], dtype=object)), 3.0, -4.0)
+    assert piece.record.guards == {}
+    assert [call(*pair)[1] for pair in ((1.0, -2.0), (-3.0, 2.0))] == [2.0, 3.0]
+    assert larger(1.0, -2.0) == 2.0
