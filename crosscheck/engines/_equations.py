@@ -97,9 +97,9 @@ class Equations:
         by_rate[self.at_v, self.at_v] = self.forces.mass
         by_rate[self.at_v, self.at_lambda] = -j.T
         twists = j.reshape(len(j), self.nb, 6)
-        by_rate[self.at_r, self.at_mu] = -twists[..., :3].reshape(len(j), -1).T
+        by_rate[self.at_r, self.at_mu] = -twists[..., :3].reshape(len(j), 3 * self.nb).T
         turned = rotations.multiply(s.p, pure(twists[..., 3:])) / 2
-        by_rate[self.at_p, self.at_mu] = -turned.reshape(len(j), -1).T
+        by_rate[self.at_p, self.at_mu] = -turned.reshape(len(j), 4 * self.nb).T
         return matrix + cj * by_rate
 
     def projected(self, t: float, y: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from crosscheck.conformance.closed_forms import free_fall
 from crosscheck.engine import Setting, engine
 from crosscheck.truth import truth_for
 from mbref import rotations
@@ -47,6 +48,13 @@ def test_ida_and_truth(name: str) -> None:
     run = simulate(scene, REGULAR[name], 1e-8)
     assert run.outcome is Outcome.COMPLETED, f"{name}: {run.outcome.label} {run.message}"
     assert error(run, scene) < 1e-4, f"{name}: {error(run, scene):.2e} from the truth"
+
+
+def test_body_without_joints_and_truth() -> None:
+    scene, _ = free_fall()
+    run = simulate(scene, 0.5, 1e-8)
+    assert run.outcome is Outcome.COMPLETED, run.message
+    assert error(run, scene) < 1e-6, f"{error(run, scene):.2e} from the truth"
 
 
 def test_tighter_tolerances_and_smaller_errors() -> None:
