@@ -1,10 +1,10 @@
-"""Cost against the number of loops: mbref sparse and dense, MuJoCo and Pinocchio, on both chains.
+"""Cost against the number of loops: mbref by size and dense, MuJoCo and Pinocchio, on both chains.
 
     python benchmarks/scaling.py [LOOPS …]
 
 Process CPU time of the stepping, medians of REPEATS rounds in which all take turns; the error, against the
 scene's truth and relative to a link, stands beside every time.  The first tables have milliseconds per step
-at a fixed number of steps, the last what an error costs.
+at STEPS steps or a few more, the last what an error costs.
 """
 
 from __future__ import annotations
@@ -106,12 +106,12 @@ def rivals(chain: str, loops: int) -> list[Rival]:
     scene = find_scene(f"{chain}[{loops}]")
     truth, step = end_of(scene), scene.duration / STEPS
     found = [
-        Rival("mbref sparse", of_mbref(scene, truth, METHOD, largest_step=step, sparse_above=0)),
-        Rival("mbref sparse, RK4", of_mbref(scene, truth, f"{METHOD}/rk4[step={step!r}]", sparse_above=0)),
+        Rival("mbref DOP853", of_mbref(scene, truth, METHOD, largest_step=step)),
+        Rival("mbref RK4", of_mbref(scene, truth, f"{METHOD}/rk4[step={step!r}]")),
     ]
     if loops <= DENSE_LOOPS[chain]:
         dense = of_mbref(scene, truth, METHOD, largest_step=step, sparse_above=NEVER)
-        found.append(Rival("mbref dense", dense))
+        found.append(Rival("dense DOP853", dense))
     if chain == "four_bar_chain":
         found.append(Rival("MuJoCo RK4, planar by hand", of_chain(scene, truth, loops, STEPS)))
     if loops <= SPATIAL_LOOPS:
