@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from mbref.formulations import FORMULATIONS
+from mbref.initial import consistent_start
+from mbref.model import Model
 from mbref.scenes import SCENES
 from mbref.simulate import simulate
 from mbref.tables import NOT_CONVERGED, OK, SINGULAR
@@ -95,3 +97,47 @@ def test_augmented_lagrangian_that_may_not_iterate_enough_says_so():
     for name in ("alf", "alf-dual"):
         status, _, _ = FORMULATIONS[name].solve(mass, jacobian, force, gamma, alpha=1e-3, iterations=5.0)
         assert status == NOT_CONVERGED, name
+
+
+def real_system(name):
+    """M, Φ_q, g and γ of a built-in scene at its consistent start."""
+    model = Model(SCENES[name]())
+    start = consistent_start(model)
+    terms = model.terms(0.0, start.q, start.v)
+    return model.mass, terms.jacobian, terms.force, terms.gamma
+
+
+REAL = ("four_bar", "five_bar", "spatial_slider_crank", "spatial_slider_crank_driven", "planar_slider_crank",
+        "planar_slider_crank_gravity", "four_bar_gravity")  # fmt: skip
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS.values(), ids=FORMULATIONS)
+@pytest.mark.parametrize("name", REAL)
+def test_every_row_of_a_mechanism_repeated_or_rescaled_changes_nothing(formulation, name):
+    mass, jacobian, force, gamma = real_system(name)
+    status, before, multipliers = formulation.solve(mass, jacobian, force, gamma)
+    if status == SINGULAR:
+        full_rows = np.linalg.matrix_rank(jacobian) == len(jacobian)
+        assert not formulation.handles_redundancy or formulation.needs_independent_columns
+        assert not full_rows or formulation.needs_independent_columns, f"{formulation.name} refuses {name}"
+        return
+    reaction = jacobian.T @ multipliers
+    for row in range(len(gamma)):
+        for factor in (1e-6, 1e6):
+            rescaled, rhs = jacobian.copy(), gamma.copy()
+            rescaled[row] *= factor
+            rhs[row] *= factor
+            unchanged(formulation, (mass, rescaled, force, rhs), before, reaction, f"{name}, row {row}")
+        if formulation.handles_redundancy:
+            repeated, rhs = np.vstack([jacobian, jacobian[row]]), np.append(gamma, gamma[row])
+            unchanged(formulation, (mass, repeated, force, rhs), before, reaction, f"{name}, row {row} twice")
+
+
+def unchanged(formulation, system, acceleration, reaction, what):
+    """Accelerations and Φ_qᵀ λ of the system are as they were, to 1e-9 of their size."""
+    status, found, multipliers = formulation.solve(*system)
+    assert status == OK, f"{formulation.name}, {what}: status {status}"
+    now = system[1].T @ multipliers
+    for name, new, old in (("acceleration", found, acceleration), ("reaction", now, reaction)):
+        change = np.max(np.abs(new - old)) / max(1.0, np.max(np.abs(old)))
+        assert change < 1e-9, f"{formulation.name}, {what}: {name} changed by {change:.1e}"
