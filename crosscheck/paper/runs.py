@@ -118,6 +118,7 @@ def _varied(
         Label(part, row, column, variant.name): linkage(row, column, times, variant)
         for variant in variants
         for row, column in places
+        if variant.penalty == BASE.penalty or "ALF" in row
     }
 
 
@@ -148,7 +149,10 @@ def dynamic() -> Cases:
     }
     for variant in HEAVY_SWEEP:
         for row in CROSSING:
-            out[Label("dynamic", row, HEAVY, variant.name)] = _case(dynamic_scene(HEAVY), row, TURNS, variant)
+            if variant.penalty == BASE.penalty or "ALF" in row:
+                out[Label("dynamic", row, HEAVY, variant.name)] = _case(
+                    dynamic_scene(HEAVY), row, TURNS, variant
+                )
     raised = _case(dynamic_scene(UNEQUAL), "MPI (SVD)", TURNS, RAISED)
     out[Label("dynamic", "MPI (SVD)", UNEQUAL, RAISED.name)] = raised
     branch = Setting("alf-dual+projection/dop853", {"rtol": 1e-9})

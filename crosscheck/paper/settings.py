@@ -35,7 +35,7 @@ REASONS: Mapping[str, str] = {
     "Baumgarte α = β = 5": "as printed",
     f"ALF α = {PENALTY:g}, ε = 1e-6, ω = 10, μ = 1, 300 iterations": "the paper gives none of them. α "
     "weights rows of unit length. This α is inferred from the paper's failure times: from 150 to 300 ALF "
-    "ends at the first crossing, above 1000 it passes it (the sweep below)",
+    "without partitioning ends at the first crossing from π/4 and π/2, with 30 or 1e4 not (below)",
     "ALF ε": "relative to |q̈|, about 1e4 in these units in the linkages: 1e-2 absolutely",
     "MPI (GS)": "mpi-gs, Gram–Schmidt for any rank; as printed (mpi-gs-literal) it needs independent "
     "columns and is singular at θ₂ = nπ",
@@ -83,9 +83,11 @@ SWEEP: tuple[Variant, ...] = (
     Variant("rank 1e-4", {"rank_tolerance": 1e-4}),
     Variant("no data errors", size=0.0),
     Variant("data errors 1e-8 m", size=1e-8),
-    Variant("α = 30", penalty=30.0),
-    Variant("α = 1e4", penalty=1e4),
     Variant("integrator dop853", integrator="dop853"),
+    Variant("α = 30", penalty=30.0),
+    Variant("α = 150", penalty=150.0),
+    Variant("α = 300", penalty=300.0),
+    Variant("α = 1e4", penalty=1e4),
 )
 SIZES = (1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8)
 SIZED: tuple[Variant, ...] = tuple(
