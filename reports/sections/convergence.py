@@ -12,6 +12,7 @@ from reports.blocks import Block, Heading, Table, Text
 from reports.runs import Curve, Run, SceneRuns, number, power
 
 STEP = "step"
+TELLING = 5.0  # times the discretisation error: a lesser bias may be the extrapolation's own
 LIMITS = ("Scene", "Engine", "Family", "Finest step (s)", "Order", "Its error", "Discretisation", "Bias",
           "What outweighs")  # fmt: skip
 
@@ -37,8 +38,8 @@ def _limits(groups: Sequence[SceneRuns]) -> list[Block]:
         "Three runs whose differences shrink as a power of the step have a limit at h = 0 (Richardson), "
         "found without the truth. How far the finest run is from the limit is its discretisation error; "
         "how far the limit is from the truth, its bias, is what no smaller step cures: the give of a soft"
-        " constraint, a solver's tolerance. A bias smaller than the discretisation error may be the "
-        "extrapolation's own."
+        " constraint, a solver's tolerance. Up to some times the discretisation error, a bias may be the "
+        "extrapolation's own: then the last column has an en dash."
     )
     rows = [row for group in groups for row in _limit_rows(group)]
     if not rows:
@@ -59,10 +60,16 @@ def _limit_rows(group: SceneRuns) -> list[tuple[str, ...]]:
         if found := limit(group.scene, steps, [run.trajectory for run in told]):
             bias = float(error_series(group.scene, found.motion, truth.poses(found.motion.times)).max())
             finest = min(told, key=lambda run: run.record["settings"][STEP])
-            more = "bias" if bias > found.discretisation else "discretisation"
+            more = _heavier(bias, found.discretisation)
             rows.append((group.scene.name, *curve, f"{min(steps):.2g}", number(found.order, 2),
                          power(finest.error), power(found.discretisation), power(bias), more))  # fmt: skip
     return rows
+
+
+def _heavier(bias: float, discretisation: float) -> str:
+    if bias > TELLING * discretisation:
+        return "bias"
+    return "discretisation" if bias < discretisation else "–"
 
 
 def _row(groups: Sequence[SceneRuns], curve: Curve) -> tuple[str, ...]:
