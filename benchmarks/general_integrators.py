@@ -24,6 +24,9 @@ from mbref.scene import Scene
 from mbref.tables import ACCELERATION, COLUMNS, EVALUATIONS, SIZES
 from mbref.trajectory import Cost, Outcome, Trajectory
 
+for kind in ("WARNING", "ERROR"):  # of SUNDIALS: a run that fails says so itself
+    os.environ.setdefault(f"SUNLOGGER_{kind}_FILENAME", os.devnull)
+
 METHOD = "alf-dual+none"
 RTOLS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12)
 MOST_STEPS = 10**6
@@ -131,8 +134,6 @@ class ScikitSundae(GeneralIntegrator):
     families = ("CVODE Adams", "CVODE BDF", "IDA")
 
     def solve(self, family: str, f: RightHandSide, times: np.ndarray, rtol: float) -> Solution:
-        os.environ.setdefault("SUNLOGGER_WARNING_FILENAME", os.devnull)  # a run that fails says so itself
-        os.environ.setdefault("SUNLOGGER_ERROR_FILENAME", os.devnull)
         from sksundae.cvode import CVODE
         from sksundae.ida import IDA
 
