@@ -8,6 +8,7 @@ the engines' called from Python.
 
 from __future__ import annotations
 
+import functools
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -18,9 +19,11 @@ from forward_dynamics import timed_calls
 from mbref.compiled import INT, VECTOR, entry, pointer_to
 from mbref.formulations import FORMULATIONS
 from mbref.method import Method
-from mbref.run import Limits, Run
+from mbref.run import SPECIALISED, Limits, Run
 from mbref.scene import Scene
 from mbref.scenes import SCENES
+from mbref.simulate import why_no_code
+from mbref.specialised import MOVING_ONLY
 from mbref.tables import ACCELERATE, OK, PROBLEM, RATES, SIZES
 
 SCENE_NAMES = ("spatial_slider_crank", "planar_slider_crank", "four_bar", "five_bar")
@@ -41,7 +44,7 @@ def main(names: Sequence[str]) -> None:
         (what, name): call
         for name in names
         for scene in [SCENES[name]()]
-        for what, call in (*_formulations(scene), *timed_calls(scene))
+        for what, call in (*_formulations(scene), *_own_code(scene), *timed_calls(scene))
     }
     seconds = {key: np.median(rounds) for key, rounds in _in_turns(calls).items()}
     print(f"{'µs per right-hand side':32}" + "".join(f"{name:>24}" for name in names))
@@ -67,14 +70,25 @@ def _formulations(scene: Scene) -> Iterator[tuple[str, Callable[[], float]]]:
     for formulation in FORMULATIONS:
         run = Run(scene, Method.parse(f"{formulation}+none"), np.array([1.0]), Limits())
         kernels = run.method.stabilisation.rates.pointer, run.method.formulation.accelerate.pointer
-        y, y_rate = run.y[: run.pivots[SIZES, 1]], run.y_rate[: run.pivots[SIZES, 1]]
+        yield formulation, functools.partial(_timed, run, *kernels)
 
-        def call(run=run, kernels=kernels, y=y, y_rate=y_rate) -> float:
-            began = time.process_time()
-            status = repeat(*kernels, CALLS, y, y_rate, run.problem)
-            return (time.process_time() - began) / CALLS if status == OK else np.nan
 
-        yield formulation, call
+def _own_code(scene: Scene) -> Iterator[tuple[str, Callable[[], float]]]:
+    """The same by machine code of the scene's own, where a formulation has it."""
+    for formulation in FORMULATIONS:
+        method = Method.parse(f"{formulation}+projection")
+        if not why_no_code(scene, method):
+            run = Run(scene, method, np.array([1.0]), Limits(code=SPECIALISED))
+            kernels = MOVING_ONLY.rates.pointer, method.formulation.accelerate.pointer
+            yield f"{formulation}, own code", functools.partial(_timed, run, *kernels)
+
+
+def _timed(run: Run, rates, accelerate) -> float:
+    """Seconds of one evaluation; NaN where it fails."""
+    y, y_rate = run.y[: run.pivots[SIZES, 1]], run.y_rate[: run.pivots[SIZES, 1]]
+    began = time.process_time()
+    status = repeat(rates, accelerate, CALLS, y, y_rate, run.problem)
+    return (time.process_time() - began) / CALLS if status == OK else np.nan
 
 
 if __name__ == "__main__":
