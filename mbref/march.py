@@ -162,26 +162,29 @@ _vector, _matrix, _indices = array_at(VECTOR), array_at(MATRIX), array_at(INDICE
 def march(loop, problem):
     """Advance until the last sample time, a failure, or the number of steps per call; says which.
 
-    ``loop`` is the table of the kernels step, propose, rates, observe, accept and accelerate, then of the
-    arrays named below.
+    ``loop`` is the table of the kernels step, propose, rates, observe, careful, accept and accelerate, then
+    of the arrays named below.
     """
     step = _step(loop, 0)
     propose = _propose(loop, 1)
     rates = _rates(loop, 2)
     observe = _rates(loop, 3)
-    accept = _accept(loop, 4)
-    accelerate = _accelerate(loop, 5)
-    times, sample_q, sample_v = _vector(loop, 6), _matrix(loop, 7), _matrix(loop, 8)
-    sample_a, sample_m = _matrix(loop, 9), _matrix(loop, 10)
-    clock, control, place = _vector(loop, 11), _vector(loop, 12), _indices(loop, 13)
-    tolerances, memory, history = _vector(loop, 14), _matrix(loop, 18), _matrix(loop, 19)
-    y, y_rate, y_new, nodes = _vector(loop, 15), _vector(loop, 16), _vector(loop, 17), _indices(loop, 20)
+    careful = _rates(loop, 4)
+    accept = _accept(loop, 5)
+    accelerate = _accelerate(loop, 6)
+    times, sample_q, sample_v = _vector(loop, 7), _matrix(loop, 8), _matrix(loop, 9)
+    sample_a, sample_m = _matrix(loop, 10), _matrix(loop, 11)
+    clock, control, place = _vector(loop, 12), _vector(loop, 13), _indices(loop, 14)
+    tolerances, memory, history = _vector(loop, 15), _matrix(loop, 19), _matrix(loop, 20)
+    y, y_rate, y_new, nodes = _vector(loop, 16), _vector(loop, 17), _vector(loop, 18), _indices(loop, 21)
     ints, floats, work, pivots, _settings, counts = opened(problem)
     taken = 0
     while True:
         t, size = clock[TIME], pivots[SIZES, 1]
         look = observe if t >= times[place[SAMPLE]] else rates
         status = look(accelerate, t, y[:size], y_rate[:size], problem)
+        if status == HANDOVER:
+            status = careful(accelerate, t, y[:size], y_rate[:size], problem)
         if status == OK:
             status = judge(y[:size], y_rate[:size], place, control, work)
         if status != OK:
@@ -215,8 +218,8 @@ def march(loop, problem):
             memory, control, tolerances,
         )  # fmt: skip
         status = advance(
-            suggested, step, propose, rates, accept, accelerate, times[place[SAMPLE]], clock, control,
-            tolerances, y, y_rate, y_new, memory, history, nodes, problem,
+            suggested, step, propose, rates, careful, accept, accelerate, times[place[SAMPLE]], clock,
+            control, tolerances, y, y_rate, y_new, memory, history, nodes, problem,
         )  # fmt: skip
         if status != OK:
             return status
@@ -237,11 +240,14 @@ def leap(
         place_inside(clock[TIME], history, nodes, found, y_new[:size], y_rate[:size], ints[LIVE], work)
         take_sample(place[SAMPLE], work, sample_q, sample_v, sample_a, sample_m)
         place[SAMPLE] += 1
-    clock[TIME] = t + length if place[SAMPLE] < times.shape[0] else clock[TIME]
     extrapolate(history, nodes, found, t + length, y_new[:size], y_rate[:size], work[DENSE])
+    status = accept(t + length, y_new, problem)
+    if status == HANDOVER:
+        clock[TIME] = t
+        return status
+    clock[TIME] = t + length if place[SAMPLE] < times.shape[0] else clock[TIME]
     counts[STEPS] += 1
     counts[CROSSINGS] += 1
-    status = accept(t + length, y_new, problem)
     if status == OK:
         y[:] = y_new
     return status
@@ -249,7 +255,7 @@ def leap(
 
 @kernel
 def advance(
-    suggested, step, propose, rates, accept, accelerate, target, clock, control, tolerances,
+    suggested, step, propose, rates, careful, accept, accelerate, target, clock, control, tolerances,
     y, y_rate, y_new, memory, history, nodes, problem,
 ):  # fmt: skip
     """One accepted step towards the target time, as many attempts as it takes."""
@@ -266,6 +272,11 @@ def advance(
             rates, accelerate, t, h, y[:size], y_rate[:size], y_new[:size], memory, tolerances,
             problem,
         )  # fmt: skip
+        if ratio == -float(HANDOVER):  # the chart's own rates leave this step to the careful ones
+            ratio = step(
+                careful, accelerate, t, h, y[:size], y_rate[:size], y_new[:size], memory, tolerances,
+                problem,
+            )  # fmt: skip
         now = target if h == interval else t + h
         status = OK if ratio >= 0.0 else (int(-ratio) if ratio < 0.0 else NOT_FINITE)
         if status == OK and h <= control[FORCED_STEP]:

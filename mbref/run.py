@@ -163,8 +163,8 @@ class Run:
     def _chart(self, kernels: Stabilisation, columns: np.ndarray) -> Chart:
         integrator = self.method.integrator
         functions = (
-            integrator.step, integrator.propose, kernels.rates, kernels.observe, kernels.accept,
-            self.method.formulation.accelerate,
+            integrator.step, integrator.propose, kernels.rates, kernels.observe, kernels.careful,
+            kernels.accept, self.method.formulation.accelerate,
         )  # fmt: skip
         arrays = (
             self.times, *self.samples, self.clock, self.control, self.place, self.tolerances, self.y,
@@ -237,5 +237,5 @@ def prepare(method: Method) -> None:
     ):  # fmt: skip
         kernel.prepare()
     if stabilisation is PROJECTION and not PLAIN:
-        for kernel in (MOVING_ONLY.rates, MOVING_ONLY.observe, MOVING_ONLY.accept):
+        for kernel in (MOVING_ONLY.rates, MOVING_ONLY.observe, MOVING_ONLY.careful, MOVING_ONLY.accept):
             kernel.prepare()

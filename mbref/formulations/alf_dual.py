@@ -17,7 +17,7 @@ from mbref.formulations.moore_penrose import begin, transpose
 from mbref.linalg import add_product, cholesky_factor, cholesky_solve, gram, times_transpose
 from mbref.tables import ACCELERATE, FACTORISATIONS, FORMULATION_OPTIONS, NOT_CONVERGED, OK, SINGULAR
 
-TINY = 1e-300  # of the change before the first
+TINY, NEVER = 1e-300, 1e300
 LEAST = 3  # iterations: enough up to the neighbourhood of a singular position, so that the number is fixed
 
 OPTIONS = {"alpha": 1e10, "epsilon": 1e-12, "iterations": 20.0, "omega": 0.0, "mu": 1.0}
@@ -46,7 +46,7 @@ def accelerate(
     counts[FACTORISATIONS] += 1
     if not cholesky_factor(s, m, 0.0):
         return SINGULAR
-    status, change = NOT_CONVERGED, 0.0
+    status, change, expected = NOT_CONVERGED, 0.0, NEVER
     most = int(settings[FORMULATION_OPTIONS + 2])
     for k in range(most):
         step[:] = b
@@ -58,7 +58,8 @@ def accelerate(
         for i in range(m):
             total[i] -= step[i]
         last, change = change, changed(before, acceleration)
-        if k + 1 >= min(LEAST, most) and change * min(1.0, change / max(last, TINY)) <= epsilon:
+        expected = min(expected, change * min(1.0, change / max(last, TINY)))
+        if k + 1 >= min(LEAST, most) and expected <= epsilon:
             status = OK
             break
         add_product(dt, x, -1.0, b)

@@ -232,7 +232,7 @@ def project_positions(t, q, v, plan, ints, floats, work, settings, counts):
 
 
 CHARTS: dict[str, Stabilisation] = {
-    "none": replace(NONE, rates=rates, observe=rates),
-    "baumgarte": replace(BAUMGARTE, rates=rates, observe=rates),
-    "projection": replace(PROJECTION, enter=enter, rates=rates, observe=rates, accept=accept),
+    "none": replace(NONE, rates=rates, observe=rates, careful=rates),
+    "baumgarte": replace(BAUMGARTE, rates=rates, observe=rates, careful=rates),
+    "projection": replace(PROJECTION, enter=enter, rates=rates, observe=rates, careful=rates, accept=accept),
 }

@@ -1,7 +1,7 @@
 """The chart of the coordinates that can move, by machine code of the scene's own (see ``build``).
 
-Where a guard of that code does not hold, or the rows it was given are no longer independent, it hands over
-to the generic kernels.
+Where a guard of that code does not hold, the kernels that serve every scene give the rates; where the rows
+it was given are no longer independent, it hands over to the generic chart.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from numba import i8
 from numba.extending import intrinsic
 
 from mbref.compiled import exchangeable
-from mbref.evaluation import contract, expand, move, place
+from mbref.evaluation import accelerations, contract, coordinate_rates, expand, move, place
 from mbref.problem import opened
 from mbref.singular import NEAR, WINDOW
 from mbref.stabilisation.base import Stabilisation
@@ -21,6 +21,7 @@ from mbref.tables import (
     ACCEPT,
     ANGLES,
     COLUMNS,
+    COORDINATE_RATES,
     COORDINATES,
     DENSE,
     ENTER,
@@ -107,6 +108,19 @@ def observe(accelerate, t, y, y_rate, problem):
     return OK
 
 
+@exchangeable(RATES)
+def careful(accelerate, t, y, y_rate, problem):
+    """y' by the kernels that serve every scene."""
+    ints, floats, work, pivots, settings, counts = opened(problem)
+    live, state = ints[LIVE], work[STATE]
+    expand(y, live, state)
+    q, v = state[COORDINATES], state[VELOCITIES][: work[COLUMNS].shape[1]]
+    status = accelerations(accelerate, t, q, v, ints, floats, work, pivots, settings, counts)
+    coordinate_rates(q, v, state[COORDINATE_RATES])
+    contract(state[COORDINATE_RATES], work[COLUMNS][ACCELERATION], live, y_rate)
+    return status
+
+
 @exchangeable(ACCEPT)
 def accept(t, y, problem):
     """Project y by the scene's own code, and tell the loop where the bodies are."""
@@ -132,4 +146,4 @@ def accept(t, y, problem):
     return HANDOVER
 
 
-MOVING_ONLY = Stabilisation("projection", "Bayo & Ledesma 1996", enter, rates, observe, accept)
+MOVING_ONLY = Stabilisation("projection", "Bayo & Ledesma 1996", enter, rates, observe, careful, accept)

@@ -16,6 +16,7 @@ class Stabilisation:
     ``rates(accelerate, t, y, y', …) -> status`` evaluates y' and leaves the state in ``work[STATE]``;
     ``accept(t, y, …) -> status`` corrects y after an accepted step (CHANGED: new coordinates, new length);
     ``observe`` is ``rates`` where a sample is taken: it leaves accelerations and multipliers as well.
+    ``careful`` is ``rates`` where these return HANDOVER.
     """
 
     name: str
@@ -23,6 +24,7 @@ class Stabilisation:
     enter: Exchangeable
     rates: Exchangeable
     observe: Exchangeable
+    careful: Exchangeable
     accept: Exchangeable
     options: Mapping[str, float] = field(default_factory=dict)
     feedback: Callable[[Mapping[str, float]], tuple[float, float]] | None = None  # gains of Φ' and Φ in γ

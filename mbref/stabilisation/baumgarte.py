@@ -11,5 +11,5 @@ def _feedback(options: Mapping[str, float]) -> tuple[float, float]:
 
 
 BAUMGARTE = Stabilisation(
-    "baumgarte", "Eq. 9", enter, rates, rates, accept, {"alpha": 5.0, "beta": 5.0}, _feedback
+    "baumgarte", "Eq. 9", enter, rates, rates, rates, accept, {"alpha": 5.0, "beta": 5.0}, _feedback
 )

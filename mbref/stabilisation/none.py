@@ -3,4 +3,4 @@
 from mbref.stabilisation.base import Stabilisation
 from mbref.stabilisation.full import accept, enter, rates
 
-NONE = Stabilisation("none", "Figure 2", enter, rates, rates, accept)
+NONE = Stabilisation("none", "Figure 2", enter, rates, rates, rates, accept)

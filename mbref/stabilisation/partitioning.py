@@ -260,4 +260,4 @@ def accept(t, y, problem):
     return OK
 
 
-PARTITIONING = Stabilisation("partitioning", "Eqs. 10-16", enter, rates, rates, accept)
+PARTITIONING = Stabilisation("partitioning", "Eqs. 10-16", enter, rates, rates, rates, accept)

@@ -110,11 +110,18 @@ def smallest_pivot(columns, r):
 
 
 @kernel
+def scaled_jacobian(ints, work):
+    """D at the state last evaluated, in place of Φ_q."""
+    dense_jacobian(ints, work)
+    d = work[PHI_Q]
+    equilibrate(d, work[COLUMNS][INVERSE_ROOT], d, work[ROWS][ROW_SCALE])
+
+
+@kernel
 def factor(ints, work, pivots, settings, counts):
     """The factors at the state last evaluated, of the rows chosen before where they serve; their number."""
-    dense_jacobian(ints, work)
+    scaled_jacobian(ints, work)
     d, memo, rank = work[PHI_Q], work[MEMO][0], pivots[SIZES, 0]
-    equilibrate(d, work[COLUMNS][INVERSE_ROOT], d, work[ROWS][ROW_SCALE])
     if rank == 0 or rank != int(memo[GENERIC_RANK]):
         return choose(work, pivots, settings, counts)
     columns, r = chosen_rows(work, rank)
@@ -206,7 +213,8 @@ def accept(t, y, problem):
         evaluate(t, q, v, ints, floats, work)
         before, violation = violation, largest(rows[PHI])
         if violation > settings[NEWTON_TOLERANCE] and not violation <= GOOD_REDUCTION * before:
-            rank = factor(ints, work, pivots, settings, counts)
+            scaled_jacobian(ints, work)  # perhaps a row left out is redundant no longer
+            rank = choose(work, pivots, settings, counts)
     if not violation <= 1e3 * settings[NEWTON_TOLERANCE]:
         return NOT_CONVERGED
     violation_rate(ints, work, v)
@@ -216,4 +224,4 @@ def accept(t, y, problem):
     return OK
 
 
-PROJECTION = Stabilisation("projection", "Bayo & Ledesma 1996", enter, rates, rates, accept)
+PROJECTION = Stabilisation("projection", "Bayo & Ledesma 1996", enter, rates, rates, rates, accept)
