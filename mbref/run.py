@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbref.addresses import table_of
-from mbref.compiled import PLAIN
 from mbref.evaluation import evaluate_all
 from mbref.initial import consistent_start, scene_length
 from mbref.kinematics import undriven_freedoms
@@ -236,6 +235,3 @@ def prepare(method: Method) -> None:
         method.formulation.accelerate, march, evaluate_all, stabilisation.enter.callable,
     ):  # fmt: skip
         kernel.prepare()
-    if stabilisation is PROJECTION and not PLAIN:
-        for kernel in (MOVING_ONLY.rates, MOVING_ONLY.observe, MOVING_ONLY.careful, MOVING_ONLY.accept):
-            kernel.prepare()
