@@ -42,17 +42,16 @@ class Chain:
     def __init__(self, loops: int, step: float):
         import mujoco
 
-        self._step = mujoco.mj_step
+        self._step, self._forward = mujoco.mj_step, mujoco.mj_forward
         self.model = mujoco.MjModel.from_xml_string(xml(loops, step))
         self._data = mujoco.MjData
-        self.loops = loops
 
     def run(self, steps: int) -> tuple[float, np.ndarray]:
-        """Process CPU seconds of so many steps, and the centres (loops + 1, 2) of the uprights after them."""
+        """Process CPU seconds of so many steps, and the centres (nb, 3) of uprights and bars after them."""
         data = self._data(self.model)
         data.qvel[:] = np.where(np.arange(self.model.nv) % 2 == 0, -1.0, 1.0)
         began = time.process_time()
         self._step(self.model, data, nstep=steps)
         seconds = time.process_time() - began
-        lean = data.qpos[::2]
-        return seconds, 0.5 * np.column_stack([-np.sin(lean), np.cos(lean)])
+        self._forward(self.model, data)
+        return seconds, np.concatenate([data.xipos[1::2], data.xipos[2::2]])
