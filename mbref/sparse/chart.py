@@ -29,7 +29,7 @@ from mbref.sparse.factor import (
 from mbref.sparse.plan import COLUMN, ROW
 from mbref.stabilisation.base import Stabilisation
 from mbref.stabilisation.baumgarte import BAUMGARTE
-from mbref.stabilisation.full import copy_state, write_rates
+from mbref.stabilisation.full import copy_state, flush, write_rates
 from mbref.stabilisation.none import NONE
 from mbref.stabilisation.projection import GOOD_REDUCTION, MOST_ITERATIONS, PROJECTION, displace, largest
 from mbref.tables import (
@@ -190,7 +190,9 @@ def accept(t, y, problem):
         return status
     watch_pivots(plan, work, settings)
     violation_rate(ints, work, v)
-    return cancel(PHI_RATE, plan, work, settings, v)
+    status = cancel(PHI_RATE, plan, work, settings, v)
+    flush(y)
+    return status
 
 
 @kernel

@@ -17,7 +17,7 @@ from mbref.orthogonal import equilibrate, qr_pivoted
 from mbref.problem import opened
 from mbref.singular import NEAR
 from mbref.stabilisation.base import Stabilisation
-from mbref.stabilisation.full import copy_state, normalise, rates
+from mbref.stabilisation.full import copy_state, flush, normalise, rates
 from mbref.tables import (
     ACCEPT,
     CHART_PIVOTS,
@@ -221,6 +221,7 @@ def accept(t, y, problem):
     correction(PHI_RATE, rank, work, pivots)
     for k in range(x.shape[0]):
         v[k] += x[k]
+    flush(y)
     return OK
 
 

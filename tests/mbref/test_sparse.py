@@ -181,3 +181,12 @@ def ratio(loops):
         return ((n + 1) / 2 + n) / ((n + 1) / 3 + n)
 
     return pull(loops) / pull(1)
+
+
+@pytest.mark.parametrize("rows", [0, 10**9])
+def test_what_decays_out_of_the_plane_is_zero_at_the_end(rows):
+    scene, method = find_scene("four_bar_chain[1]"), "alf-dual+projection/rk4[step=0.01]"
+    run = simulate(scene, method, [0.5], Limits(sparse_above=rows))
+    values = np.abs(np.concatenate([run.velocity, run.angular_velocity], axis=None))
+    left = values[(values > 0) & (values < 1e-90)]
+    assert not left.size, f"{left.size} velocities have decayed to {left.max():.0e}"
