@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -30,7 +31,16 @@ from mbref import rotations
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
-CONVERGED = (1e-9, 1e-6, 50)  # change of the forces (N), mu, iterations: forces to 1e-9, any rank
+CONVERGED = (
+    1e-9,
+    1e-8,
+    50,
+)  # change of the forces (N), mu, iterations: accelerations near singular positions
+FORCES = (
+    1e-9,
+    1e-6,
+    50,
+)  # the same where redundant closures' forces are read, in which rounding grows as 1/mu
 BAUMGARTE = 0.1  # double root of the closure errors, in 1/step
 PROJECTIONS = 10  # Newton iterations at most; two are usual
 CLOSED = 1e-13  # m and rad, where a projection ends
@@ -129,7 +139,8 @@ class _Run:
             raise AssertionError("Pinocchio's joints are not in depth-first order")
         pin.initConstraintDynamics(self.model, self.data, self.closures, self.closure_data)
         self.hint = HINTS.get(family, "")
-        self.solver = pin.ProximalSettings() if family == "defaults" else pin.ProximalSettings(*CONVERGED)
+        given = ((), ()) if family == "defaults" else (CONVERGED, FORCES)
+        self.solver, self.sampler = (pin.ProximalSettings(*options) for options in given)
         if family in FIXED:
             step = setting.options["step"]
             self.step = lambda y, t0, t1: rk4(self.rhs, self.on_spheres, y, t0, t1, step, self.counts)
@@ -168,15 +179,15 @@ class _Run:
     def rhs(self, t: float, y: np.ndarray) -> np.ndarray:
         """Time derivative (nq + nv,) of the state."""
         q, v = self.split(t, y)
-        a = self.accelerations(t, q, v)
+        a = self.accelerations(t, q, v, self.solver)
         rates = v if self.flat else self.pin.tangentMap(self.model, q) @ v
         return np.concatenate((rates, a))
 
-    def accelerations(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def accelerations(self, t: float, q: np.ndarray, v: np.ndarray, solver: Any) -> np.ndarray:
         """Joint accelerations (nv,) from Pinocchio."""
         tau = self.loads.constant if self.still else self.loads.torques(t, q, v)
         return self.pin.constraintDynamics(
-            self.model, self.data, q, v, tau, self.closures, self.closure_data, self.solver
+            self.model, self.data, q, v, tau, self.closures, self.closure_data, solver
         )
 
     def on_spheres(self, t: float, y: np.ndarray) -> np.ndarray:
@@ -251,7 +262,7 @@ class _Run:
     def link_motion(self, t: float, q: np.ndarray, v: np.ndarray) -> LinkMotion:
         """How the links move; leaves the closure forces of this state in the closures' data."""
         pin, model, data = self.pin, self.model, self.data
-        a = self._finite(t, self.accelerations(t, q, v))
+        a = self._finite(t, self.accelerations(t, q, v, self.sampler))
         pin.forwardKinematics(model, data, q, v, a)
         frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         frames = [(j, pin.SE3(np.eye(3), c)) for j, c in self.frames]
