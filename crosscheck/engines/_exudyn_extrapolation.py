@@ -3,6 +3,7 @@
 The trapezoidal rule with index-2 constraints has an error that is even in the step h, as long as steps end
 at regular positions; a step that ends beside a singular one fails.  Where a run fails, all runs are taken up
 to a window about the failure, which the extrapolated states leap, and start again behind it.
+All numbers of steps are even: the multipliers have an error that changes its sign from step to step.
 The functions take the exudyn module and do not import it.
 """
 
@@ -84,7 +85,7 @@ class _Walk:
         for solver, divisor in zip(self.solvers, RICHARDSON, strict=True):
             solver.put(self.state)
             run, ending = solver.run(
-                to, lambda span, n=divisor: n * step_count(span, self.step), self.configure
+                to, lambda span, n=divisor: 2 * n * step_count(span, 2 * self.step), self.configure
             )
             if ending:
                 self.pieces.append(_at(run, times[:0]))  # shows the sizes
