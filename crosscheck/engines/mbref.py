@@ -12,6 +12,7 @@ from mbref.trajectory import Trajectory
 
 METHODS = (
     "alf-dual+projection",
+    "alf-dual+projection, sparse",
     "alf-dual+projection, own code",
     "lm2+projection, own code",
     "mpi-svd+partitioning",
@@ -21,6 +22,7 @@ METHODS = (
     "lm2+projection",
 )
 OWN_CODE = ", own code"  # machine code of the scene, made before the clock runs
+SPARSE = ", sparse"  # the sparse factor that large scenes have by default
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 
 
@@ -65,14 +67,16 @@ class Mbref(Engine):
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         from mbref.simulate import Limits, simulate
 
-        code = "specialised" if setting.family.endswith(OWN_CODE) else "generic"
-        return simulate(scene, _method(setting.family), times, Limits(code=code, **setting.options))
+        how = {"code": "specialised" if setting.family.endswith(OWN_CODE) else "generic"}
+        if setting.family.endswith(SPARSE):
+            how["sparse_above"] = 0
+        return simulate(scene, _method(setting.family), times, Limits(**how, **setting.options))
 
 
 def _method(family: str):
     from mbref.method import Method
 
-    return Method.parse(family.removesuffix(OWN_CODE))
+    return Method.parse(family.removesuffix(OWN_CODE).removesuffix(SPARSE))
 
 
 ENGINE = Mbref()
