@@ -11,9 +11,9 @@ from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
 METHODS = (
+    "alf-dual+projection, own code",
     "alf-dual+projection",
     "alf-dual+projection, sparse",
-    "alf-dual+projection, own code",
     "lm2+projection, own code",
     "mpi-svd+partitioning",
     "mpi-svd+projection",
