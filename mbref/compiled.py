@@ -135,5 +135,5 @@ def pointer_to(signature: types.Type) -> types.Type:
 @functools.cache
 def _announce_once() -> None:
     """Tell the user on stderr why the first run takes long; standard output belongs to results."""
-    message = "mbref: compiling kernels for this machine, once for each method; about 20 s"
+    message = "mbref: compiling kernels for this machine, once for each method; up to a minute"
     print(message, file=sys.stderr, flush=True)

@@ -20,7 +20,7 @@ QUICK_SCENES = {  # name → end time (s)
 QUICK_FAMILIES = ("defaults", "tuned")  # of an engine that has them, else its first ones
 MOST_FAMILIES, MOST_SETTINGS = 2, 3  # in the quick sweep, of an engine and of a family
 QUICK_SAMPLES, SAMPLES = 31, 101
-QUICK_LIMIT, LIMIT = 60.0, 120.0  # s of a run; mbref's kernels, compiled once a machine, take 20 of them
+QUICK_LIMIT, LIMIT = 60.0, 120.0  # s of a run; mbref's kernels, compiled once a machine, take some
 
 Sweep = tuple[list[Scene], list[Case], list[Unable]]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -60,9 +61,13 @@ class Mbref(Engine):
 
     def prepare(self, families: Sequence[str]) -> None:
         from mbref.simulate import prepare
+        from mbref.sparse.chart import CHARTS
 
         for family in families:
-            prepare(_method(family))
+            method = _method(family)
+            if family.endswith(SPARSE):
+                method = replace(method, stabilisation=CHARTS[method.stabilisation.name])
+            prepare(method)
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         from mbref.simulate import Limits, simulate
