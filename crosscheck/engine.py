@@ -74,7 +74,7 @@ class Engine(ABC):
         family."""
 
     def prepare(self, families: Sequence[str]) -> None:  # noqa: B027 - most engines need nothing
-        """What is done once on a machine before runs of these families, such as compiling."""
+        """What a process does before its first run of these families, such as importing and compiling."""
 
     @abstractmethod
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:

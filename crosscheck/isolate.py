@@ -1,50 +1,30 @@
-"""One run = one child process with a time limit: whatever an engine does, a Trajectory comes back.
+"""Runs in child processes with a time limit: whatever an engine does, a Trajectory comes back.
 
-The child works in a temporary directory that is removed, everything printed is captured at
-file-descriptor level, and numerical libraries get one thread.
+Starting a child takes seconds, so it serves the runs of one engine, one after another.  A run that does not
+complete ends it, and the next has a fresh one.
 """
 
 from __future__ import annotations
 
+import atexit
 import os
-import pickle
-import signal
-import subprocess
-import sys
-import tempfile
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import IO, Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
+from threading import Lock
 
 import numpy as np
 
 from crosscheck import worker
+from crosscheck.child import Child, ChildFailed, Observation
 from crosscheck.engine import Cannot, Setting, engine_names
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
-ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-ORPHAN_SECONDS = 10.0  # beyond its limit, a child whose parent has died ends itself
-PRINTED = 200  # characters of the last printed line that a message quotes
+READY_SECONDS = 600.0  # for imports and compiling, before the time of a run begins
 
-_running: set[subprocess.Popen] = set()
-
-
-class ChildFailed(Exception):
-    """A child process gave no result: ``outcome`` TIMED_OUT or CRASHED, and a sentence."""
-
-    def __init__(self, outcome: Outcome, message: str, version: str = ""):
-        self.outcome = outcome
-        self.version = version  # of the engine, when the child got that far
-        super().__init__(message)
-
-
-class Observation(NamedTuple):
-    """What came of a call in a child: its value, what was printed, and files left in its directory."""
-
-    value: Any
-    printed: str
-    files: tuple[str, ...]
+_idle: list[tuple[str, Child]] = []  # with their engines, the one used last at the end
+_lending, _preparing = Lock(), Lock()
+_prepared: set[tuple[str, str]] = set()  # engines and families that a child has made ready
 
 
 def run_isolated(
@@ -53,24 +33,25 @@ def run_isolated(
     """The engine's trajectory at ``times`` (k,), computed in a child process.
 
     ``engine_name`` is a known engine or ``module:attribute``; ``time_limit`` is wall time (s) of the
-    whole child, imports included.  A crash, a hang, an exception and a missing package are outcomes
+    run, without imports and compiling.  A crash, a hang, an exception and a missing package are outcomes
     CRASHED or TIMED_OUT of a trajectory without states.  Raises LookupError for an unknown engine.
     """
-    return observe(engine_name, scene, times, setting, time_limit).value
+    _check(engine_name)
+    with _lent(engine_name) as child:
+        run = _observed(child, engine_name, scene, times, setting, time_limit).value
+        if run.outcome is not Outcome.COMPLETED:
+            child.kill()
+    return run
 
 
 def observe(
     engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, time_limit: float
 ) -> Observation:
-    """`run_isolated` with what the engine printed and the files it left in its working directory; both
-    empty when the run gave no result, as its message then quotes them."""
+    """`run_isolated` in a process of its own, with what it printed from its start on and the files that the
+    run left; both empty when the run gave no result, as its message then quotes what was printed."""
     _check(engine_name)
-    try:
-        return _observed(worker.run_once, (engine_name, scene, times, setting), time_limit)
-    except ChildFailed as failure:
-        outcome, message = failure.outcome, str(failure)
-        failed = worker.failed(engine_name, failure.version, scene, setting, outcome, message)
-        return Observation(failed, "", ())
+    with closing(Child()) as child:
+        return _observed(child, engine_name, scene, times, setting, time_limit)
 
 
 def offers(engine_name: str, scene: Scene, time_limit: float) -> tuple[str, Cannot | None, list[Setting]]:
@@ -79,7 +60,8 @@ def offers(engine_name: str, scene: Scene, time_limit: float) -> tuple[str, Cann
     Raises ChildFailed when that fails, LookupError for an unknown engine.
     """
     _check(engine_name)
-    return _in_child(worker.offers, (engine_name, scene), time_limit)
+    with _lent(engine_name) as child:
+        return child.call(worker.offers, (engine_name, scene), time_limit).value
 
 
 def time_interleaved(
@@ -93,13 +75,21 @@ def time_interleaved(
     """
     for engine_name, _ in jobs:
         _check(engine_name)
-    return _in_child(worker.run_interleaved, (scene, times, list(jobs), repeats), time_limit)
+    with closing(Child()) as child:
+        return child.call(worker.run_interleaved, (scene, times, list(jobs), repeats), time_limit).value
 
 
-def stop_all() -> None:
-    """Kill every running child of this process; their runs come back as CRASHED."""
-    for child in tuple(_running):
-        _kill(child)
+def end_idle() -> None:
+    """End the children that wait for a run."""
+    with _lending:
+        idle = [child for _, child in _idle]
+        _idle.clear()
+    for child in idle:
+        child.close()
+
+
+atexit.register(end_idle)
+os.register_at_fork(after_in_child=_idle.clear)  # they answer the process that started them
 
 
 def _check(engine_name: str) -> None:
@@ -107,87 +97,50 @@ def _check(engine_name: str) -> None:
         raise LookupError(f"unknown engine {engine_name!r}; known: {', '.join(engine_names())}")
 
 
-def _in_child(function: Callable[..., Any], arguments: tuple, time_limit: float) -> Any:
-    return _observed(function, arguments, time_limit).value
-
-
-def _observed(function: Callable[..., Any], arguments: tuple, time_limit: float) -> Observation:
-    with tempfile.TemporaryDirectory(prefix="crosscheck-", ignore_cleanup_errors=True) as name:
-        folder = Path(name)
-        (folder / "work").mkdir()
-        (folder / "job").write_bytes(pickle.dumps((function, arguments, time_limit + ORPHAN_SECONDS)))
-        with open(folder / "printed", "wb") as printed:
-            status = _wait(_start(folder, printed), time_limit)
-        value = _result(folder, status, time_limit)
-        files = {str(path.relative_to(folder / "work")) for path in (folder / "work").rglob("*")}
-        printed = (folder / "printed").read_text(errors="replace")
-        return Observation(value, printed, tuple(sorted(files - {worker.VERSION})))
-
-
-def _start(folder: Path, printed: IO[bytes]) -> subprocess.Popen:
-    return subprocess.Popen(
-        [sys.executable, "-P", "-m", "crosscheck.worker", str(folder)],
-        stdin=subprocess.DEVNULL, stdout=printed, stderr=subprocess.STDOUT,
-        cwd=folder / "work", env=_environment(), start_new_session=True,
-    )  # fmt: skip
-
-
-def _environment() -> dict[str, str]:
-    """The child finds every package this process finds, and computes with one thread."""
-    path = os.pathsep.join(os.path.abspath(entry) for entry in sys.path)
-    return {**os.environ, "PYTHONPATH": path, **dict.fromkeys(ONE_THREAD, "1")}
-
-
-def _wait(child: subprocess.Popen, time_limit: float) -> int | None:
-    """Exit status of the child, None when it had to be killed; an interrupt kills it too."""
-    _running.add(child)
+def _observed(
+    child: Child, engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, time_limit: float
+) -> Observation:
+    version = ""
     try:
-        return child.wait(time_limit)
-    except subprocess.TimeoutExpired:
-        return None
+        version, said, _ = _made_ready(child, engine_name, setting.family)
+        seen = child.call(worker.run_once, (engine_name, scene, times, setting), time_limit)
+    except ChildFailed as failure:
+        outcome, message = failure.outcome, str(failure)
+        return Observation(worker.failed(engine_name, version, scene, setting, outcome, message), "", ())
+    return seen._replace(printed=said + seen.printed)
+
+
+def _made_ready(child: Child, engine_name: str, family: str) -> Observation:
+    """The engine's version; what is compiled once a machine is not compiled by two children at a time."""
+    arguments = worker.get_ready, (engine_name, [family]), READY_SECONDS
+    if (engine_name, family) in _prepared:
+        return child.call(*arguments)
+    with _preparing:
+        ready = child.call(*arguments)
+        _prepared.add((engine_name, family))
+    return ready
+
+
+@contextmanager
+def _lent(engine_name: str) -> Iterator[Child]:
+    """A child that waits for a run of the engine, or a new one."""
+    with _lending:
+        known = [entry for entry in _idle if entry[0] == engine_name and entry[1].is_alive]
+        if known:
+            _idle.remove(known[-1])
+    child = known[-1][1] if known else Child()
+    try:
+        yield child
     finally:
-        _running.discard(child)
-        if child.poll() is None:
-            _kill(child)
+        _put_back(engine_name, child)
 
 
-def _kill(child: subprocess.Popen) -> None:
-    """End the child and what it started."""
-    try:
-        if hasattr(os, "killpg"):
-            os.killpg(child.pid, signal.SIGKILL)
-        else:
-            child.kill()
-    except ProcessLookupError:
-        pass  # it has just ended by itself
-    child.wait()
-
-
-def _result(folder: Path, status: int | None, time_limit: float) -> Any:
-    result = folder / "result"
-    if result.exists():  # complete, even if the process then failed to end properly
-        done, value = pickle.loads(result.read_bytes())
-        if done:
-            return value
-        why = value
-    elif status is None:
-        why = f"no result after {time_limit:g} s"
-    else:
-        why = f"the process {_ending(status)}"
-    outcome = Outcome.TIMED_OUT if status is None else Outcome.CRASHED
-    version = folder / "work" / worker.VERSION
-    raise ChildFailed(outcome, why + _quote(folder), version.read_text() if version.exists() else "")
-
-
-def _ending(status: int) -> str:
-    try:
-        return f"was ended by {signal.Signals(-status).name}"
-    except ValueError:
-        return f"ended with exit status {status}"
-
-
-def _quote(folder: Path) -> str:
-    """The last line the engine printed, for the message."""
-    lines = (folder / "printed").read_text(errors="replace").split("\n")
-    last = next((line.strip() for line in reversed(lines) if line.strip()), "")
-    return f"; last printed: {last[:PRINTED]}" if last else ""
+def _put_back(engine_name: str, child: Child) -> None:
+    """Let the child wait for another run, if it lives, and at most one child a core do so."""
+    with _lending:
+        _idle.append((engine_name, child))
+        waiting = [entry for entry in _idle if entry[1].is_alive][-(os.cpu_count() or 1) :]
+        ended = [entry for entry in _idle if entry not in waiting]
+        _idle[:] = waiting
+    for _, spent in ended:
+        spent.close()

@@ -8,7 +8,6 @@ import hashlib
 import json
 import os
 import platform
-import threading
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor, as_completed, wait
 from importlib import metadata
@@ -19,9 +18,11 @@ import numpy as np
 
 import mbref
 from crosscheck import metrics
+from crosscheck.child import stop_all
 from crosscheck.engine import Cannot, Setting, engine
-from crosscheck.isolate import run_isolated, stop_all
+from crosscheck.isolate import end_idle, run_isolated
 from crosscheck.truth import truth_for
+from mbref.records import append, stored
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
@@ -33,11 +34,9 @@ PACKAGES = ("numpy", "scipy", "numba")
 Record = dict[str, Any]
 Progress = Callable[[int, int, Record], None]  # cases done, cases in all, the record just done
 
-_preparing = threading.Lock()
-
 
 class Case(NamedTuple):
-    """One run of a study; ``time_limit`` is wall time (s) of the whole child process."""
+    """One run of a study; ``time_limit`` is wall time (s), without imports and compiling."""
 
     scene: Scene
     times: np.ndarray
@@ -89,7 +88,7 @@ def study(
 
     Each record is appended to ``records_path`` as its run ends; records that the file already has are
     not run again, unless they ran out of a shorter time limit than the case's.  Runs are spread by
-    ``executor``, by default threads, one a core: each run is a process of its own.  Any executor of
+    ``executor``, by default threads, one a core: the runs are in child processes.  Any executor of
     concurrent.futures will do, such as a process pool, or a Dask client's ``get_executor()`` for runs on
     other machines; its workers have to have this package and the engines, and say which machine they are.
     ``run`` makes the record of one case, by default ``run_case``; many short runs of an engine that neither
@@ -101,16 +100,10 @@ def study(
     with contextlib.closing(_run_all(list(left.values()), executor, run or run_case)) as fresh:
         for record in fresh:
             records[record["key"]] = record
-            _append(records_path, record)
+            append(records_path, record)
             if progress:
                 progress(len(records), len(set(keys)), record)
     return [records[k] for k in keys]
-
-
-@functools.cache
-def _prepare(engine_name: str, family: str) -> None:
-    """Have the engine do once what would otherwise count against the time limit of its first run here."""
-    engine(engine_name).prepare([family])
 
 
 def key(case: Case) -> str:
@@ -124,8 +117,6 @@ def key(case: Case) -> str:
 
 def run_case(case: Case) -> Record:
     """The raw record of one run, its metrics included."""
-    with _preparing:
-        _prepare(case.engine, case.setting.family)
     return _record(case, run_isolated(case.engine, case.scene, case.times, case.setting, case.time_limit))
 
 
@@ -167,8 +158,9 @@ def _run_all(
 ) -> Generator[Record, None, None]:
     """Records as their runs end; when the caller stops early, so do the runs."""
     if executor is None:
-        with ThreadPoolExecutor(os.cpu_count()) as threads:
-            yield from _run_all(cases, threads, run)
+        with contextlib.ExitStack() as stack:
+            stack.callback(end_idle)
+            yield from _run_all(cases, stack.enter_context(ThreadPoolExecutor(os.cpu_count())), run)
         return
     futures = [executor.submit(run, case) for case in cases]
     try:
@@ -183,26 +175,14 @@ def _run_all(
 
 
 def _resumed(path: str | Path | None, cases: Sequence[Case], keys: Sequence[str]) -> dict[str, Record]:
-    """Records of the file that answer the cases; a last line cut short is removed from the file."""
-    if path is None or not Path(path).exists():
-        return {}
-    text = Path(path).read_bytes()
-    whole = text[: text.rfind(b"\n") + 1]
-    if len(whole) < len(text):
-        Path(path).write_bytes(whole)
-    known = {record["key"]: record for record in map(json.loads, whole.splitlines())}
+    """Records of the file that answer the cases."""
+    known = stored(path)
     limits = dict(zip(keys, (case.time_limit for case in cases), strict=True))
     return {k: known[k] for k in limits if k in known and not _worth_repeating(known[k], limits[k])}
 
 
 def _worth_repeating(record: Record, time_limit: float) -> bool:
     return record["outcome"] == Outcome.TIMED_OUT.label and record["time_limit"] < time_limit
-
-
-def _append(path: str | Path | None, record: Record) -> None:
-    if path is not None:
-        with open(path, "a") as file:
-            file.write(json.dumps(record) + "\n")
 
 
 @functools.cache

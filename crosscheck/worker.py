@@ -1,18 +1,21 @@
-"""The child process of `isolate`: calls the function pickled in a folder and leaves the result there.
+"""What a child process does: call after call, each in a directory of its own, until its parent hangs up.
 
-``python -m crosscheck.worker FOLDER`` reads ``FOLDER/job`` (function, arguments, seconds after which
-the child ends itself should its parent have died) and writes ``FOLDER/result``: (True, value) or
-(False, sentence).
+``python -m crosscheck.worker`` has the channel to its parent as standard input.  It is sent
+(directory, seconds after which it ends itself should the parent have died, function, arguments) and
+answers (True, value) or (False, sentence).
 """
 
 from __future__ import annotations
 
+import ctypes
 import faulthandler
+import os
 import pickle
 import sys
 import traceback
-from collections.abc import Sequence
-from pathlib import Path
+import warnings
+from collections.abc import Callable, Sequence
+from multiprocessing.connection import Connection
 
 import numpy as np
 
@@ -21,21 +24,27 @@ from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
 Job = tuple[str, Setting]  # engine name and setting
-VERSION = "version"  # the file that keeps an engine's version should its run crash
 
 
-def run_once(engine_name: str, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-    """One run; a missing package is a failed trajectory that says what to install.
-
-    The version is left in the file ``version`` of the working directory for the case of a crash.
-    """
+def get_ready(engine_name: str, families: Sequence[str]) -> str:
+    """Do what an engine needs once, such as imports and compiling; its version, empty without its package."""
     simulator = engine(engine_name)
     try:
         version = simulator.version()
+    except ImportError:  # which a run will say
+        return ""
+    simulator.prepare(families)
+    return version
+
+
+def run_once(engine_name: str, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+    """One run; a missing package is a failed trajectory that says what to install."""
+    simulator = engine(engine_name)
+    try:
+        simulator.version()
     except ImportError as error:
         message = f"{simulator.package} is not installed: {error}"
         return failed(engine_name, "", scene, setting, Outcome.CRASHED, message)
-    Path(VERSION).write_text(version)
     return simulator.run(scene, times, setting)
 
 
@@ -75,17 +84,35 @@ def failed(
     )  # fmt: skip
 
 
-def main(folder: Path) -> None:
-    """Do the job in the folder: call its function, leave the result or the failure's sentence beside it."""
-    function, arguments, last_resort = pickle.loads((folder / "job").read_bytes())
-    faulthandler.dump_traceback_later(last_resort, exit=True)
+def main() -> None:
+    """Serve the parent at the other end of standard input, which engines see empty."""
+    channel = Connection(os.dup(0))
+    with open(os.devnull) as nothing:
+        os.dup2(nothing.fileno(), 0)
+    while True:
+        try:
+            folder, last_resort, function, arguments = channel.recv()
+        except EOFError:
+            return
+        os.chdir(folder)
+        faulthandler.dump_traceback_later(last_resort, exit=True)
+        answer = _answer(function, arguments)
+        faulthandler.cancel_dump_traceback_later()
+        channel.send_bytes(answer)
+
+
+def _answer(function: Callable, arguments: tuple) -> bytes:
+    """The pickled answer; what the call warned of and printed is not left to the next one."""
     try:
-        result = pickle.dumps((True, function(*arguments)))
+        with warnings.catch_warnings():  # each call warns afresh
+            return pickle.dumps((True, function(*arguments)))
     except Exception as error:  # the parent turns the sentence into an Outcome
-        result = pickle.dumps((False, traceback.format_exception_only(error)[-1].strip()))
-    (folder / "partial").write_bytes(result)
-    (folder / "partial").rename(folder / "result")
+        return pickle.dumps((False, traceback.format_exception_only(error)[-1].strip()))
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        ctypes.CDLL(None).fflush(None)  # what compiled code has printed
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main()

@@ -11,11 +11,10 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExe
 from dataclasses import asdict
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from mbref import __version__
+from mbref import __version__, records
 from mbref.kinematics import NAME as KINEMATIC
 from mbref.method import DEFAULT, Method
 from mbref.scene import Scene
@@ -48,7 +47,7 @@ def ensemble(
         return
     if method != KINEMATIC:
         prepare(Method.parse(method))  # once, not in every process at the same time
-    known = _stored(path)
+    known = records.stored(path)
     pending: dict[Future, tuple[int, str]] = {}
     try:
         for place, scene in enumerate(scenes):
@@ -80,9 +79,7 @@ def _ended(
     for future in wait(pending, return_when=FIRST_COMPLETED).done:
         place, key = pending.pop(future)
         ended.append((place, future.result()))
-        if path is not None:
-            with open(path, "a") as file:
-                file.write(json.dumps({"key": key, **ended[-1][1].to_record()}) + "\n")
+        records.append(path, {"key": key, **ended[-1][1].to_record()})
     yield from ended
 
 
@@ -90,14 +87,3 @@ def _key(scene: Scene, times: np.ndarray, method: str, limits: Limits) -> str:
     """Hash of all that determines a result."""
     identity = [scene.to_dict(), times.tolist(), str(method), asdict(limits), __version__]
     return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
-
-
-def _stored(path: str | Path | None) -> dict[str, dict[str, Any]]:
-    """Records of the file by key; a last line cut short is removed from the file."""
-    if path is None or not Path(path).exists():
-        return {}
-    text = Path(path).read_bytes()
-    whole = text[: text.rfind(b"\n") + 1]
-    if len(whole) < len(text):
-        Path(path).write_bytes(whole)
-    return {record["key"]: record for record in map(json.loads, whole.splitlines())}

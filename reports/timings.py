@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from crosscheck.compare import timed
 from crosscheck.study import Case, Record
+from mbref.records import append, stored
 from mbref.trajectory import Outcome
 
 REPEATS = 5
@@ -19,13 +19,15 @@ def with_timings(
     cases: Sequence[Case], records: Sequence[Record], path: Path, notice: Callable[[str], None]
 ) -> list[Record]:
     """The records with the times of ``path`` (JSON lines); a scene of which one is missing is timed."""
-    done, known = list(records), _stored(path)
+    done, known = list(records), stored(path)
     for name in dict.fromkeys(case.scene.name for case in cases):
         places = [i for i, record in enumerate(records) if record["scene"] == name and _is_short(record)]
         if any(records[i]["key"] not in known for i in places):
             notice(f"{name}: timing, {REPEATS} interleaved repeats")
-            _append(path, timed([cases[i] for i in places], [records[i] for i in places], REPEATS, notice))
-            known = _stored(path)
+            for record in timed([cases[i] for i in places], [records[i] for i in places], REPEATS, notice):
+                if "timing" in record:
+                    append(path, _entry(record))
+            known = stored(path)
         for i in places:
             done[i] = _with_cost(records[i], known)
     return done
@@ -43,18 +45,5 @@ def _with_cost(record: Record, known: dict[str, dict[str, Any]]) -> Record:
     return {**record, "cost": cost, "timing": entry["timing"]}
 
 
-def _stored(path: Path) -> dict[str, dict[str, Any]]:
-    lines = path.read_text().splitlines() if path.exists() else []
-    return {entry["key"]: entry for entry in map(json.loads, lines)}
-
-
-def _append(path: Path, records: Sequence[Record]) -> None:
-    with open(path, "a") as file:
-        for record in records:
-            if "timing" in record:
-                entry = {
-                    "key": record["key"],
-                    "seconds": record["cost"]["seconds"],
-                    "timing": record["timing"],
-                }
-                file.write(json.dumps(entry) + "\n")
+def _entry(record: Record) -> dict[str, Any]:
+    return {"key": record["key"], "seconds": record["cost"]["seconds"], "timing": record["timing"]}

@@ -11,7 +11,7 @@ import numpy as np
 from crosscheck.conformance.closed_forms import CLOSED_FORMS, Exact
 from crosscheck.conformance.features import feature_scenes
 from crosscheck.engine import Cannot, Setting
-from crosscheck.isolate import Observation, observe, offers
+from crosscheck.isolate import Observation, observe, offers, run_isolated
 from crosscheck.metrics import error_series, in_scene_order
 from crosscheck.tolerances import OWN_ACCURACY, SAME_MOTION
 from crosscheck.truth import truth_for
@@ -97,6 +97,13 @@ class Bench:
     def observed(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
         """A run in a process of its own, and what it printed and left behind."""
         return observe(self.engine, scene, times, setting, self.time_limit)
+
+    @property
+    def shared_runs(self) -> list[Trajectory]:
+        """Completed runs at the finest setting, with one at the coarsest between them, in one process."""
+        settings = self.settings[-1], self.settings[0], self.settings[-1]
+        runs = [run_isolated(self.engine, self.scene, self.times, s, self.time_limit) for s in settings]
+        return [completed(self.scene, run, len(self.times)) for run in (runs[0], runs[2])]
 
     @cached_property
     def own_accuracy(self) -> float:

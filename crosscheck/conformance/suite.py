@@ -7,14 +7,12 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
-from threading import Lock
 from typing import Any
 
 from rich.box import SIMPLE
 from rich.table import Column, Table
 from rich.text import Text
 
-from crosscheck import engine as engines
 from crosscheck.conformance.bench import Bench, Broken, Specimen, set_up
 from crosscheck.conformance.features import undetermined
 from crosscheck.conformance.properties import PROPERTIES, Finding
@@ -68,19 +66,9 @@ def verify(
     time_limit: float,
     progress: Callable[[str], None] | None = None,
 ) -> Conformance:
-    """Hold the suite against an engine (a name or ``module:attribute``); every run is a process of its own
-    with a ``time_limit`` (s).  ``progress`` is told the scene just done.  Raises LookupError."""
+    """Hold the suite against an engine (a name or ``module:attribute``); every run is in a child
+    process with a ``time_limit`` (s).  ``progress`` is told the scene just done.  Raises LookupError."""
     versions: set[str] = set()
-    prepared: set[str] = set()
-    one_at_a_time = Lock()
-
-    def prepare(bench: Bench) -> None:
-        """What would otherwise count against the time limit of the first runs."""
-        with one_at_a_time:
-            families = {setting.family for setting in bench.settings} - prepared
-            if families:
-                engines.engine(engine).prepare(sorted(families))
-                prepared.update(families)
 
     def examined(specimen: Specimen) -> list[Verdict]:
         try:
@@ -89,7 +77,6 @@ def verify(
             verdicts = [Verdict(REFUSAL, specimen.scene.name, FAIL, reason=str(failure))]
         else:
             versions.add(bench.version)
-            prepare(bench)
             verdicts = list(examine(bench))
         if progress:
             progress(specimen.scene.name)

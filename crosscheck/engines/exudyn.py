@@ -50,6 +50,9 @@ class Exudyn(Engine):
     def version(self) -> str:
         return metadata.version(self.package)
 
+    def prepare(self, families: Sequence[str]) -> None:
+        _exudyn()
+
     def cannot(self, scene: Scene) -> Cannot | None:
         if not scene.has_mass() and not _fully_driven(scene):
             return Cannot(Why.NEVER, "without masses only a mechanism driven in full can be analysed")

@@ -43,6 +43,9 @@ class Ondsel(Engine):
         """Version of pyondsel; raises ImportError when it is not installed."""
         return metadata.version(self.package)
 
+    def prepare(self, families: Sequence[str]) -> None:
+        import pyondsel.solve_raw  # noqa: F401
+
     def cannot(self, scene: Scene) -> Cannot | None:
         """Only what its drivers move alone: forward dynamics and loads are not exposed."""
         if any(isinstance(joint, Distance) for joint in scene.joint):

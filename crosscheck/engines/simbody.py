@@ -38,6 +38,9 @@ class Simbody(Engine):
         """Version of OpenSim; raises ImportError when it is not installed."""
         return metadata.version(self.package)
 
+    def prepare(self, families: Sequence[str]) -> None:
+        import opensim  # noqa: F401
+
     def cannot(self, scene: Scene) -> Cannot | None:
         """Every joint and load maps; a driver is a polynomial or a sine; without mass all is prescribed."""
         mixed = [d.joint for d in scene.driver if d.sine and any(d.polynomial[1:])]

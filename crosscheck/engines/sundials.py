@@ -41,6 +41,9 @@ class Sundials(Engine):
         """Version of scikit-sundae; raises ImportError when it is not installed."""
         return metadata.version(self.package)
 
+    def prepare(self, families: Sequence[str]) -> None:
+        import sksundae.ida  # noqa: F401
+
     def cannot(self, scene: Scene) -> Cannot | None:
         """Every joint, driver and load is written out; without masses all motion must be prescribed."""
         return lacks_mass(scene)

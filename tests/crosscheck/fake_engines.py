@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import subprocess
 import sys
 import time
+import warnings
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -94,13 +97,43 @@ class Missing(Fake):
 
 
 class Recorder(Fake):
-    """Its runs leave their order in the file that the scene's name gives."""
+    """Its runs leave their order and process in the file that the scene's name gives; the options may have
+    it sleep, raise or send itself a signal after that."""
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         with open(scene.name, "a") as file:
             file.write(f"{setting.family} {os.getpid()}\n")
+        time.sleep(setting.options.get("sleep", 0.0))
+        if "raise" in setting.options:
+            raise ValueError(setting.options["raise"])
+        if "signal" in setting.options:
+            os.kill(os.getpid(), setting.options["signal"])
         return super().run(scene, times, setting)
 
 
+class Slow(Recorder):
+    """Needs two seconds before the first run of a process."""
+
+    is_ready = False
+
+    def prepare(self, families: Sequence[str]) -> None:
+        time.sleep(0.0 if self.is_ready else 2.0)
+        self.is_ready = True
+
+
+class Stuck(Fake):
+    def prepare(self, families: Sequence[str]) -> None:
+        time.sleep(600)
+
+
 FAKE, SEGFAULT, HANG, CHATTER, RAISE, QUIT = Fake(), Segfault(), Hang(), Chatter(), Raise(), Quit()
-THREADS, MISSING, RECORDER = Threads(), Missing(), Recorder()
+THREADS, MISSING, RECORDER, SLOW, STUCK = Threads(), Missing(), Recorder(), Slow(), Stuck()
+
+
+def converse(text: str) -> tuple[str, int]:
+    """Prints by Python, by the C library and to the descriptor, warns and leaves a file; says where it is."""
+    print(text)
+    ctypes.CDLL(None).printf(b"compiled %s\n", text.encode())
+    warnings.warn("careful", stacklevel=1)
+    Path(text).write_text("left behind")
+    return os.getcwd(), os.getpid()

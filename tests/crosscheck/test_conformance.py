@@ -98,6 +98,7 @@ def failed(
         return Observation(engine.run(scene, times, setting), printed, ())
 
     monkeypatch.setattr(bench, "observe", observe)
+    monkeypatch.setattr(bench, "run_isolated", lambda *arguments: observe(*arguments).value)
     monkeypatch.setattr(properties, "engine", lambda name: engine)
     on = bench.Bench(
         "exact", specimen, "1", engine.cannot(specimen.scene), engine.settings(specimen.scene), 9

@@ -8,14 +8,18 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from crosscheck.child import ChildFailed, stop_all
 from crosscheck.engine import Setting
-from crosscheck.isolate import ChildFailed, run_isolated, stop_all, time_interleaved
+from crosscheck.isolate import end_idle, observe, run_isolated, time_interleaved
 from mbref.scene import Body, Scene
+from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
 
 TIMES = np.array([0.0, 0.1, 0.3])
@@ -24,8 +28,11 @@ HERE = Path(__file__).parent
 
 
 @pytest.fixture(autouse=True)
-def _fakes_importable(monkeypatch: pytest.MonkeyPatch) -> None:
+def _fakes_importable(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    end_idle()  # each test has children of its own
     monkeypatch.syspath_prepend(str(HERE))
+    yield
+    end_idle()
 
 
 def still(name: str = "still") -> Scene:
@@ -89,6 +96,102 @@ def test_printing_and_files_of_an_engine_leave_no_trace(
 def test_child_computes_with_one_thread():
     ended = run("THREADS")
     assert ended.version == "11", f"OPENBLAS and OMP threads, one digit each: {ended.version}"
+
+
+def test_runs_of_an_engine_share_a_process_until_one_does_not_complete(tmp_path: Path):
+    """Process of every run, as the engine itself sees it."""
+    log = tmp_path / "log"
+    ways = [{}, {}, {"outcome": "NOT_CONVERGED"}, {}, {"raise": "no such joint"}, {}, {"signal": 11}, {}, {}]
+    outcomes = [
+        run_isolated("fake_engines:RECORDER", still(str(log)), TIMES, Setting("a", way), 60.0).outcome.name
+        for way in ways
+    ]
+    completed, crashed = "COMPLETED", "CRASHED"
+    assert outcomes == [completed, completed, "NOT_CONVERGED", completed, crashed, completed, crashed,
+                        completed, completed], outcomes  # fmt: skip
+    processes = [line.split()[1] for line in log.read_text().splitlines()]
+    alike = [first == second for first, second in pairwise(processes)]
+    assert alike == [True, True, False, True, False, True, False, True], processes
+    assert len(set(processes)) == 4, processes
+
+
+def test_run_after_a_time_out_has_its_whole_time(tmp_path: Path):
+    """Getting ready takes this engine longer than its runs may."""
+    log, limit = tmp_path / "log", 1.5
+    ways = [{}, {"sleep": 60.0}, {}]
+    runs = [
+        run_isolated("fake_engines:SLOW", still(str(log)), TIMES, Setting("a", way), limit) for way in ways
+    ]
+    assert [r.outcome.name for r in runs] == ["COMPLETED", "TIMED_OUT", "COMPLETED"], runs
+    first, second, third = (line.split()[1] for line in log.read_text().splitlines())
+    assert first == second != third, (first, second, third)
+
+
+def test_engine_that_hangs_while_it_gets_ready_times_out(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("crosscheck.isolate.READY_SECONDS", 3.0)
+    ended = run("STUCK", time_limit=60.0)
+    assert (ended.outcome, ended.message) == (Outcome.TIMED_OUT, "no result after 3 s"), ended.message
+
+
+def test_engines_do_not_share_a_process(tmp_path: Path):
+    log, plain = tmp_path / "log", Setting("a")
+    for fake in ("RECORDER", "SLOW", "RECORDER"):
+        run_isolated(f"fake_engines:{fake}", still(str(log)), TIMES, plain, 60.0)
+    first, other, again = (line.split()[1] for line in log.read_text().splitlines())
+    assert first != other, "two engines in one process"
+    assert first == again, "the child of the first engine did not wait for it"
+
+
+def test_child_that_died_while_it_waited_is_replaced(tmp_path: Path):
+    log = tmp_path / "log"
+    for _ in range(2):
+        ended = run("RECORDER", still(str(log)))
+        assert ended.outcome is Outcome.COMPLETED, ended.message
+        pid = int(log.read_text().splitlines()[-1].split()[1])
+        os.kill(pid, signal.SIGKILL)
+        assert gone(pid)
+
+
+def test_no_child_outlives_its_parent(tmp_path: Path):
+    """Neither one that waits after the parent's normal end, nor one whose parent is killed."""
+    log = tmp_path / "log"
+    script = (
+        "import os, sys; sys.path.insert(0, sys.argv[1])\n"
+        "from test_isolate import run, still\n"
+        "run('RECORDER', still(sys.argv[2]))\n"
+        "if sys.argv[3] == 'killed': os.kill(os.getpid(), 9)\n"
+    )
+    for way, status in (("ended", 0), ("killed", -9)):
+        command = [sys.executable, "-W", "error", "-c", script, str(HERE), str(log), way]
+        ended = subprocess.run(command, cwd=HERE.parents[1], capture_output=True, timeout=60, check=False)
+        assert (ended.returncode, ended.stderr) == (status, b""), ended
+        pid = int(log.read_text().splitlines()[-1].split()[1])
+        assert gone(pid), f"parent {way}: its child is still alive"
+
+
+REAL = {  # settings of two families each
+    "mbref": (Setting("alf-dual+projection", {"rtol": 1e-6}), Setting("mpi-svd+none", {"rtol": 1e-6})),
+    "mujoco": (Setting("stock", {"step": 1e-3}), Setting("defaults", {"step": 1e-3})),
+    "pinocchio": (Setting("proximal", {"step": 1e-4}), Setting("baumgarte", {"step": 1e-4})),
+    "exudyn": (Setting("alpha", {"step": 2e-4}), Setting("static", {"step": 1e-3})),
+}
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_runs_in_one_process_and_in_processes_of_their_own_agree(name: str):
+    times = np.linspace(0.0, 0.01, 5)
+    scenes = SCENES["five_bar"](), SCENES["spatial_slider_crank_driven"]()
+    first, second = jobs = list(zip(scenes, REAL[name], strict=True))
+    alone = [observe(name, scene, times, setting, 60.0).value for scene, setting in jobs]
+    shared = [run_isolated(name, scene, times, setting, 60.0) for scene, setting in (first, second, first)]
+    assert all(run.outcome is Outcome.COMPLETED for run in shared), shared
+    assert list(map(untimed, shared)) == [untimed(alone[0]), untimed(alone[1]), untimed(alone[0])]
+
+
+def untimed(run: Trajectory) -> str:
+    """The record of a run without the seconds it took, in bits (NaN equal to NaN)."""
+    record = run.to_record()
+    return repr({**record, "cost": {k: v for k, v in record["cost"].items() if "seconds" not in k}})
 
 
 def test_unknown_engine_is_refused_before_anything_starts():

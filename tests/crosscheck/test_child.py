@@ -1,0 +1,69 @@
+"""Child process: what one call does / what the next one finds."""
+
+from __future__ import annotations
+
+import operator
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from crosscheck.child import Child, ChildFailed
+from mbref.trajectory import Outcome
+
+
+@pytest.fixture
+def child(monkeypatch: pytest.MonkeyPatch) -> Iterator[Child]:
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    with closing(Child()) as made:
+        yield made
+
+
+def test_calls_share_the_process_and_nothing_else(child: Child):
+    from fake_engines import converse
+
+    first, second = (child.call(converse, (text,), 60.0) for text in ("first", "second"))
+    (here, pid), (there, again) = first.value, second.value
+    assert pid == again, "the second call had another process"
+    assert here != there and not Path(here).exists() and not Path(there).exists(), (here, there)
+    for seen, text in ((first, "first"), (second, "second")):
+        lines = set(seen.printed.splitlines())
+        assert {text, f"compiled {text}"} < lines, seen.printed
+        assert any("careful" in line for line in lines), f"{text}: its warning is missing: {seen.printed}"
+        assert seen.files == (text,), seen.files
+    assert "first" not in second.printed, second.printed
+
+
+def test_silent_call_after_one_that_printed_much(child: Child):
+    from fake_engines import converse
+
+    child.call(converse, ("word " * 40,), 60.0)
+    assert child.call(operator.add, (2, 3), 60.0) == (5, "", ())
+
+
+def test_failed_call_and_its_child(child: Child):
+    with pytest.raises(ChildFailed, match="ZeroDivisionError: division by zero") as raised:
+        child.call(operator.truediv, (1, 0), 60.0)
+    assert raised.value.outcome is Outcome.CRASHED
+    assert not child.is_alive, "what is left of a failed call would be there in the next"
+
+
+def test_late_call_and_its_child(child: Child):
+    child.call(operator.add, (2, 3), 60.0)  # it has started
+    with pytest.raises(ChildFailed, match=r"no result after 0\.2 s") as raised:
+        child.call(time.sleep, (60.0,), 0.2)
+    assert raised.value.outcome is Outcome.TIMED_OUT
+    assert not child.is_alive
+
+
+def test_large_answers_arrive_whole(child: Child):
+    many = list(range(1_000_000))
+    assert child.call(sorted, (many,), 60.0).value == many
+
+
+def test_value_that_cannot_be_sent_is_a_failed_call(child: Child):
+    with pytest.raises(ChildFailed, match="cannot pickle"):
+        child.call(threading.Lock, (), 60.0)
