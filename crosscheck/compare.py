@@ -10,7 +10,7 @@ from crosscheck.engine import engine
 from crosscheck.gate import gate, gate_times
 from crosscheck.isolate import ChildFailed, time_interleaved
 from crosscheck.record import is_completed
-from crosscheck.study import Case, Record
+from crosscheck.study import Case, Record, settings
 from crosscheck.truth import truth_for
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
@@ -19,12 +19,8 @@ from mbref.trajectory import Trajectory
 def gate_cases(scene: Scene, engines: Sequence[str], time_limit: float) -> list[Case]:
     """The short runs from which `difference` tells whether all engines simulate the scene: each at the
     finest of its settings."""
-    able = [engine(name) for name in engines]
-    return [
-        Case(scene, gate_times(scene), name, simulator.settings(scene)[-1], time_limit)
-        for name, simulator in zip(engines, able, strict=True)
-        if not simulator.cannot(scene)
-    ]
+    able = [name for name in engines if not engine(name).cannot(scene)]
+    return [Case(scene, gate_times(scene), name, settings(name, scene)[-1], time_limit) for name in able]
 
 
 def difference(scene: Scene, records: Sequence[Record]) -> str | None:

@@ -72,9 +72,15 @@ def default_cases(
         if cannot:
             unable.append(Unable(scene, name, cannot))
             continue
-        wanted = [s for s in simulator.settings(scene) if families is None or s.family in families]
+        wanted = [s for s in settings(name, scene) if families is None or s.family in families]
         cases += [Case(scene, times, name, setting, time_limit) for setting in wanted]
     return cases, unable
+
+
+@functools.lru_cache(maxsize=256)
+def settings(engine_name: str, scene: Scene) -> tuple[Setting, ...]:
+    """An engine's settings for a scene; found out once, as engines try a scene out for them."""
+    return tuple(engine(engine_name).settings(scene))
 
 
 def study(
@@ -95,7 +101,7 @@ def study(
     hangs nor crashes are made sooner by ``run_here`` in a process pool.
     """
     keys = [key(case) for case in cases]
-    records = _resumed(records_path, cases, keys)
+    records = known(cases, records_path)
     left = {k: case for k, case in zip(keys, cases, strict=True) if k not in records}
     with contextlib.closing(_run_all(list(left.values()), executor, run or run_case)) as fresh:
         for record in fresh:
@@ -104,6 +110,13 @@ def study(
             if progress:
                 progress(len(records), len(set(keys)), record)
     return [records[k] for k in keys]
+
+
+def known(cases: Sequence[Case], records_path: str | Path | None) -> dict[str, Record]:
+    """Records of a file that answer the cases, by their keys: those that ``study`` does not run again."""
+    records = stored(records_path)
+    limits = {key(case): case.time_limit for case in cases}
+    return {k: records[k] for k in limits if k in records and not _worth_repeating(records[k], limits[k])}
 
 
 def key(case: Case) -> str:
@@ -172,13 +185,6 @@ def _run_all(
         while isinstance(executor, ThreadPoolExecutor) and wait(futures, timeout=0.1).not_done:
             stop_all()  # again and again: a run may have been about to start
         raise
-
-
-def _resumed(path: str | Path | None, cases: Sequence[Case], keys: Sequence[str]) -> dict[str, Record]:
-    """Records of the file that answer the cases."""
-    known = stored(path)
-    limits = dict(zip(keys, (case.time_limit for case in cases), strict=True))
-    return {k: known[k] for k in limits if k in known and not _worth_repeating(known[k], limits[k])}
 
 
 def _worth_repeating(record: Record, time_limit: float) -> bool:

@@ -12,7 +12,7 @@ from crosscheck.compare import gate_cases
 from crosscheck.paper import runs
 from crosscheck.progress import shown
 from crosscheck.request import RequestError, find_engines
-from crosscheck.study import study
+from crosscheck.study import Case, Record, known, study
 from reports import plan
 from reports.blocks import Block
 from reports.runs import SceneRuns, by_scene
@@ -84,10 +84,15 @@ def _collect(out: Path, is_quick: bool) -> list[SceneRuns]:
     for scene in scenes:
         scene.save(out / "scenes" / f"{scene.name}.toml")
     gates = [case for scene in scenes for case in gate_cases(scene, engines, plan.QUICK_LIMIT)]
-    with shown("running", len(cases) + len(gates)) as progress:
-        records = study([*cases, *gates], records_path=out / "records.jsonl", progress=progress)
+    records = _records([*cases, *gates], out / "records.jsonl")
     timed = with_timings(cases, records[: len(cases)], out / "timings.jsonl", _notice)
     return by_scene(timed, {scene.name: scene for scene in scenes}, records[len(cases) :])
+
+
+def _records(cases: Sequence[Case], path: Path) -> list[Record]:
+    _notice(f"{len(cases)} runs, of which {path} has {len(known(cases, path))}")
+    with shown("running", len(cases)) as progress:
+        return study(cases, records_path=path, progress=progress)
 
 
 def _write(blocks: Sequence[Block], out: Path) -> None:
