@@ -11,9 +11,10 @@ import sys
 from rich.console import Console
 from rich.table import Table
 
-from crosscheck.floors import HEADER, candidates, floors
+from crosscheck.floors import HEADER, Floor, candidates, floors
 from crosscheck.progress import shown
 from crosscheck.study import study
+from mbref.scene import Scene
 from mbref.scenes import SCENES
 
 ENGINES = ("mujoco", "pinocchio", "exudyn")
@@ -21,19 +22,27 @@ ENGINES = ("mujoco", "pinocchio", "exudyn")
 
 def main() -> int:
     """Run and print; returns 1 where a floor is not reached."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("scene", nargs="*", default=list(SCENES), metavar="SCENE")
-    parser.add_argument("--engine", action="append", metavar="NAME")
-    parser.add_argument("--records", metavar="FILE")
-    arguments = parser.parse_args()
-    cases = [c for name in arguments.scene for c in candidates(SCENES[name](), arguments.engine or ENGINES)]
-    with shown("running", len(cases)) as progress:
-        found = floors(study(cases, records_path=arguments.records, progress=progress))
+    _, found, _ = asked_for(__doc__)
     table = Table(*HEADER, title="floors")
     for floor in found:
         table.add_row(*floor.row())
     Console(width=None if sys.stdout.isatty() else 220).print(table)
     return 0 if all(floor.is_reached for floor in found) else 1
+
+
+def asked_for(about: str) -> tuple[dict[str, Scene], list[Floor], str | None]:
+    """The scenes that the command line asks for, by name, the floors of the engines on them, and the file of
+    their records."""
+    parser = argparse.ArgumentParser(description=about)
+    parser.add_argument("scene", nargs="*", default=list(SCENES), metavar="SCENE")
+    parser.add_argument("--engine", action="append", metavar="NAME")
+    parser.add_argument("--records", metavar="FILE")
+    arguments = parser.parse_args()
+    scenes = {name: SCENES[name]() for name in arguments.scene}
+    cases = [c for scene in scenes.values() for c in candidates(scene, arguments.engine or ENGINES)]
+    with shown("finding the floors", len(cases)) as progress:
+        found = floors(study(cases, records_path=arguments.records, progress=progress))
+    return scenes, found, arguments.records
 
 
 if __name__ == "__main__":

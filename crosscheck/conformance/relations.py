@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.tolerances import ROUNDING
 from mbref import rotations
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
@@ -107,6 +108,24 @@ def scaled(scene: Scene, factor: float) -> Scene:
 def reordered(scene: Scene) -> Scene:
     """Bodies, joints and loads listed in reverse: the motion stays the same."""
     return scene.with_(body=scene.body[::-1], joint=scene.joint[::-1], load=scene.load[::-1])
+
+
+def shaken(seed: int) -> Relation:
+    """Every place (m) and direction of a scene is off by rounding, at random."""
+
+    def change(scene: Scene) -> Scene:
+        random = np.random.default_rng(seed)
+
+        def shake(value: Any) -> np.ndarray:
+            return np.asarray(value) + ROUNDING * random.standard_normal(np.shape(value))
+
+        fields = dict.fromkeys(("position", "orientation", "anchor", "anchors", "axis", "axes"), shake)
+        return scene.with_(
+            body=tuple(_with(body, fields) for body in scene.body),
+            joint=tuple(_with(joint, fields) for joint in scene.joint),
+        )
+
+    return Relation("places and directions off by rounding, the motion stays, to rounding", change, _same)
 
 
 def _same(motion: Trajectory) -> Trajectory:

@@ -10,6 +10,7 @@ import sys
 import time
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -111,6 +112,17 @@ class Recorder(Fake):
         return super().run(scene, times, setting)
 
 
+class Aging(Fake):
+    """Moves its bodies a little further in every run of a process."""
+
+    runs = 0
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        self.runs += 1
+        trajectory = super().run(scene, times, setting)
+        return replace(trajectory, position=trajectory.position + 1e-14 * self.runs)
+
+
 class Slow(Recorder):
     """Needs two seconds before the first run of a process."""
 
@@ -127,7 +139,8 @@ class Stuck(Fake):
 
 
 FAKE, SEGFAULT, HANG, CHATTER, RAISE, QUIT = Fake(), Segfault(), Hang(), Chatter(), Raise(), Quit()
-THREADS, MISSING, RECORDER, SLOW, STUCK = Threads(), Missing(), Recorder(), Slow(), Stuck()
+THREADS, MISSING, RECORDER, AGING = Threads(), Missing(), Recorder(), Aging()
+SLOW, STUCK = Slow(), Stuck()
 
 
 def converse(text: str) -> tuple[str, int]:

@@ -14,6 +14,7 @@ from crosscheck.cli import main
 from crosscheck.conformance import bench, properties, suite
 from crosscheck.conformance.bench import Specimen, specimens
 from crosscheck.conformance.features import undetermined
+from crosscheck.conformance.relations import shaken
 from crosscheck.engine import Cannot, Engine, Setting, Why
 from crosscheck.isolate import Observation
 from crosscheck.truth import truth_for
@@ -162,6 +163,26 @@ def test_verify_command_and_an_engine_that_breaks_the_contract(capsys, monkeypat
     assert {"times", "unit", "run"}.isdisjoint(faulty), verdicts
     undone = [v for v in record["verdicts"] if v["scene"] == undetermined().name]
     assert [v["status"] for v in undone] == ["fail"], undone
+
+
+@pytest.mark.parametrize(("fake", "status"), [("FAKE", "pass"), ("AGING", "fail")])
+def test_what_a_run_leaves_to_the_next_and_the_property_that_tells(fake, status, monkeypatch):
+    """Of two engines that repeat themselves in processes of their own one does not within a process."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    found = suite.verify(f"fake_engines:{fake}", [SPECIMENS["pendulum"]], 60.0)
+    verdicts = {v.property: v for v in found.verdicts if v.scene == "pendulum"}
+    assert verdicts["repeated"].status == status, verdicts["repeated"]
+    assert verdicts["reordered"].status == "pass", verdicts["reordered"]
+
+
+def test_shaken_scene_and_truth():
+    for name in ("spatial_slider_crank", "four_bar_gravity"):
+        scene, times = SPECIMENS[name].scene, np.linspace(0, SPECIMENS[name].scene.duration, 5)
+        first, again, other = (shaken(seed).change(scene) for seed in (0, 0, 1))
+        assert first == again and first != other and first != scene, f"{name}: a seed, a scene"
+        exact, moved = (truth_for(s).poses(times) for s in (scene, first))
+        apart = bench.difference(scene, exact, moved)
+        assert 0 < apart < 1e-12, f"{name}: {apart:.1e} from data that are off by rounding"
 
 
 def test_verify_command_and_crashing_engine(capsys, monkeypatch):
