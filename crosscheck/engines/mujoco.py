@@ -4,6 +4,8 @@ What MuJoCo calls hard is a softness of 1e-4 of the inverse mass, ten times that
 
 - ``defaults``: the library's own options;
 - ``stock``: as stiff as its documentation allows (time constant two steps, impedance 0.9999), RK4;
+- ``euler``, ``implicit``, ``implicitfast``: the same with its integrators of first order, the last only where
+  a load damps, for else it moves as ``euler``;
 - ``tuned``: the regulariser scaled away through ``invweight0``, critically damped closures at five times
   the fastest rate of the scene, RK4, Newton's method iterated to convergence;
 - ``stiff``: the tuned model with closures as stiff as the step bears, which costs an order of convergence
@@ -36,6 +38,9 @@ from mbref.trajectory import Outcome, Trajectory
 
 HARD = 1e-8  # factor of the regulariser: its error is gone, and rounding does not yet take over
 CONVERGED, MOST_ITERATIONS = 1e-20, 50  # scaled gain of a Newton iteration; two or three are usual
+RK4 = "mjINT_RK4"
+STOCK = {"stock": RK4, "euler": "mjINT_EULER", "implicit": "mjINT_IMPLICIT",
+         "implicitfast": "mjINT_IMPLICITFAST"}  # fmt: skip
 BETA = 5.0  # double root of the closure errors, in fastest rates of the scene: survives singular passages
 STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance, as far as it is not clamped
 DEFAULT_STEP = 2e-3  # s
@@ -74,7 +79,7 @@ class MuJoCo(Engine):
         plain = sorted({DEFAULT_STEP, *steps}, reverse=True)
         return [
             *(Setting("defaults", {"step": h}) for h in plain),
-            *(Setting("stock", {"step": h}) for h in steps),
+            *(Setting(family, {"step": h}) for family in _stock(scene) for h in steps),
             *(Setting("tuned", {"step": h, "beta": beta, "hard": HARD}) for h in steps),
             *(Setting("stiff", {"step": h, "beta": float(f"{STIFF / h:.2g}"), "hard": HARD}) for h in stiff),
             *(
@@ -97,6 +102,12 @@ class MuJoCo(Engine):
     def _coarse(self, scene: Scene, step: float) -> Trajectory:
         times = np.linspace(0, scene.duration, SCOUT_SAMPLES)
         return self.run(scene, times, Setting("tuned", {"step": step, "beta": 0.5 / step, "hard": HARD}))
+
+
+def _stock(scene: Scene) -> list[str]:
+    """The families of stock closures whose integrators differ on the scene."""
+    is_damped = any(getattr(load, "damping", 0.0) for load in scene.load)
+    return [family for family in STOCK if is_damped or family != "implicitfast"]
 
 
 def _steps(scene: Scene, rate: float, angles: Sequence[float]) -> list[float]:
@@ -129,10 +140,10 @@ class _Run:
         self.step = self._fixed
         if setting.family == "defaults":
             return
-        model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+        model.opt.integrator = getattr(mujoco.mjtIntegrator, STOCK.get(setting.family, RK4))
         model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE  # 4.0.0's sparse factor is wrong for some trees
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
-        if setting.family == "stock":
+        if setting.family in STOCK:
             model.eq_solref[:], model.eq_solimp[:] = (2 * self.nominal, 1.0), STIFFEST
         elif setting.family in ("tuned", "stiff", *ADAPTIVE):
             self._harden(options["beta"], options["hard"])

@@ -10,7 +10,7 @@ import pytest
 from crosscheck.engine import Setting, engine
 from crosscheck.engines._mujoco_model import compiled
 from crosscheck.engines.mujoco import ADAPTIVE, HARD
-from crosscheck.metrics import violation_series
+from crosscheck.metrics import order_of_convergence, violation_series
 from crosscheck.truth import truth_for
 from mbref import rotations
 from mbref.scene import Body, Driver, Scene
@@ -50,6 +50,25 @@ def test_tuned_mujoco_and_truth(name: str) -> None:
     assert run.outcome is Outcome.COMPLETED, f"{name}: {run.outcome.label} {run.message}"
     measured = error(run, scene)
     assert measured < allowed, f"{name}: {measured:.2e} m or rad from the truth, allowed {allowed:.0e}"
+
+
+@pytest.mark.parametrize(("family", "order"), [("stock", 2), ("euler", 1), ("implicit", 1)])
+def test_order_of_the_integrators_and_truth(family: str, order: int) -> None:
+    """Stock closures give less the shorter the step, so that RK4 is of second order with them."""
+    scene = SCENES["spatial_slider_crank"]()
+    steps = [s.options["step"] for s in engine("mujoco").settings(scene) if s.family == family]
+    errors = [error(simulate(scene, 0.02, family, step=step), scene) for step in steps]
+    found = order_of_convergence(steps, errors)
+    assert abs(found - order) < 0.15, f"{family}: order {found:.2f}, errors {errors}"
+
+
+def test_implicitfast_and_euler_move_alike_where_nothing_damps() -> None:
+    scene = SCENES["spatial_slider_crank"]()
+    assert "implicitfast" not in {s.family for s in engine("mujoco").settings(scene)}
+    assert "implicitfast" in {s.family for s in engine("mujoco").settings(every_joint())}
+    fast, euler = (simulate(scene, 0.02, family, step=1.4e-6) for family in ("implicitfast", "euler"))
+    apart = max(abs(fast.position - euler.position).max(), abs(fast.orientation - euler.orientation).max())
+    assert apart < 1e-10, f"apart by {apart:.1e}"
 
 
 @pytest.mark.parametrize(
@@ -143,11 +162,10 @@ def test_a_thin_disc_that_rounding_puts_beyond_the_triangle_is_accepted() -> Non
 @pytest.mark.parametrize("name", ["four_bar", "spatial_slider_crank_gravity"])
 def test_each_family_is_swept_from_coarse_to_fine(name: str) -> None:
     sweep = engine("mujoco").settings(SCENES[name]())
-    assert {s.family for s in sweep} == {"defaults", "stock", "tuned", "stiff", *ADAPTIVE}, (
-        f"families of {sweep}"
-    )
+    families = ["defaults", "stock", "euler", "implicit", "tuned", "stiff", *ADAPTIVE]
+    assert list(dict.fromkeys(s.family for s in sweep)) == families, f"families of {sweep}"
     assert any(s.options.get("step") == 2e-3 for s in sweep if s.family == "defaults"), "no default step"
-    for family in ("defaults", "stock", "tuned", "stiff", *ADAPTIVE):
+    for family in families:
         knob = [s.options["rtol" if family in ADAPTIVE else "step"] for s in sweep if s.family == family]
         assert knob == sorted(set(knob), reverse=True) and len(knob) > 3, f"{family} sweeps {knob}"
 
