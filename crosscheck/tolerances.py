@@ -54,6 +54,10 @@ FALSE_SUCCESS = 1e-2
 """Error of a completed run that makes it a false success: one percent of the mechanism's size or 0.6
 degrees is beyond any accuracy asked for, and is what a wrong branch or a lost constraint leaves."""
 
+EXCESS = 100.0
+"""Multiples of the relative tolerance asked for beyond which the error of a completed run makes it a false
+success too: a tolerance is of one step, and over a motion its errors add up to some ten times that."""
+
 SAME_START = 1e-8
 """Relative difference of initial poses and velocities between engines: joint-coordinate engines rebuild
 them from tree coordinates by Newton iterations that stop at 1e-10 or better."""

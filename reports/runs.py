@@ -11,7 +11,7 @@ from typing import Any
 from crosscheck.compare import difference
 from crosscheck.record import swept
 from crosscheck.study import Record
-from crosscheck.tolerances import ERROR_LEVELS, FALSE_SUCCESS
+from crosscheck.tolerances import ERROR_LEVELS, EXCESS, FALSE_SUCCESS
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
@@ -66,6 +66,12 @@ class Run:
     def is_false_success(self) -> bool:
         """Whether the run says it completed and yet is WRONG."""
         return self.completed and self.error > WRONG
+
+    @property
+    def is_short_of_tolerance(self) -> bool:
+        """Whether the run says it completed and has EXCESS times the error it was asked for, if it was."""
+        rtol = self.record["settings"].get("rtol", math.inf)
+        return self.completed and self.error > EXCESS * rtol
 
     def metric(self, name: str) -> float:
         """A metric of the record; NaN where it has none."""

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from crosscheck.metrics import cost_at_error
+from crosscheck.tolerances import EXCESS
 from reports.blocks import Block, Heading, Table, Text
 from reports.runs import LEVELS, WRONG, Curve, Run, SceneRuns, duration, power, ratio, short
 
@@ -19,10 +20,16 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
     """One table a scene."""
     runs = [run for group in groups for run in group.runs]
     completed = sum(run.completed for run in runs)
+    wrong = sum(run.is_false_success for run in runs)
+    asked = [run for run in runs if run.completed and "rtol" in run.record["settings"]]
+    short_of = sum(run.is_short_of_tolerance for run in asked)
     text = (
         f"Scenes: {len(groups)}; runs: {len(runs)}, in engines: {len({run.curve[0] for run in runs})}; "
         f"completed: {completed}. Under an error level stands the time to reach it, read off the family's "
-        f"curve of time against error, as a multiple of the fastest; an en dash: it never gets there."
+        f"curve of time against error, as a multiple of the fastest; an en dash: it never gets there. "
+        f"False successes: {wrong} of the completed runs have an error above {short(WRONG)}, and of "
+        f"{len(asked)} that were given a relative tolerance {short_of} have an error above {EXCESS:g} times "
+        "that."
     )
     return [Heading("Summary", 2), Text(text), *(block for group in groups for block in _scene(group))]
 
@@ -83,8 +90,10 @@ def _otherwise(runs: Sequence[Run]) -> str:
     for run in runs:
         if not run.completed:
             earliest[run.outcome.label] = min(run.t_end, earliest.get(run.outcome.label, math.inf))
-    ends = [f"{label} from {t:.4g} s" for label, t in earliest.items()]
-    return ", ".join([*([f"{wrong} with error above {short(WRONG)}"] if wrong else []), *ends])
+    found = [f"{wrong} with error above {short(WRONG)}"] if wrong else []
+    if short_of := sum(run.is_short_of_tolerance for run in runs):
+        found.append(f"{short_of} with error above {EXCESS:g} rtol")
+    return ", ".join([*found, *(f"{label} from {t:.4g} s" for label, t in earliest.items())])
 
 
 def _winners(costs: Costs, fastest: Sequence[float]) -> str:

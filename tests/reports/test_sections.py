@@ -15,7 +15,7 @@ from crosscheck.gate import gate_times
 from crosscheck.truth import truth_for
 from mbref.trajectory import Outcome
 from reports.blocks import Figure, Heading, Table, Text
-from reports.runs import SceneRuns, by_scene, duration, ratio
+from reports.runs import Run, SceneRuns, by_scene, duration, ratio
 from reports.sections import (
     NAMES,
     blocks,
@@ -214,6 +214,19 @@ def test_completed_and_failed_runs_apart():
     assert isinstance(group, SceneRuns)
     assert [r.outcome for r in group.completed()] == [Outcome.COMPLETED] * 7
     assert [r.is_false_success for r in group.runs].count(True) == 1
+
+
+def test_errors_and_the_tolerances_asked_for():
+    """100 times the tolerance, just below and just above; none was asked of the last."""
+    asked = [record("a", "b", error, 1.0, rtol=1e-6) for error in (0.9e-4, 1.1e-4)]
+    failed = record("a", "b", 1e-3, 1.0, rtol=1e-6, outcome=Outcome.NOT_CONVERGED)
+    runs = [Run(r) for r in (*asked, failed, record("a", "c", 1e-3, 1.0, step=1e-6))]
+    assert [r.is_short_of_tolerance for r in runs] == [False, True, False, False]
+    found = summary.render([SceneRuns(scene(), runs)])
+    text = next(b.text for b in found if isinstance(b, Text))
+    assert "of 2 that were given a relative tolerance 1 have an error above 100 times that" in text, text
+    table = next(b for b in found if isinstance(b, Table))
+    assert column(table, "Wrong or failed")["a", "b"].startswith("1 with error above 100 rtol, NOT_CONV")
 
 
 @pytest.mark.parametrize(
