@@ -23,7 +23,7 @@ from mbref.run import SPECIALISED, Limits, Run
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.simulate import why_no_code
-from mbref.specialised import MOVING_ONLY
+from mbref.specialised import with_own_code
 from mbref.tables import ACCELERATE, OK, PROBLEM, RATES, SIZES
 
 SCENE_NAMES = ("spatial_slider_crank", "planar_slider_crank", "four_bar", "five_bar")
@@ -69,7 +69,7 @@ def _formulations(scene: Scene) -> Iterator[tuple[str, Callable[[], float]]]:
     """Every formulation's accelerations without stabilisation; NaN seconds where it fails."""
     for formulation in FORMULATIONS:
         run = Run(scene, Method.parse(f"{formulation}+none"), np.array([1.0]), Limits())
-        kernels = run.method.stabilisation.rates.pointer, run.method.formulation.accelerate.pointer
+        kernels = run.chart.rates.pointer, run.method.formulation.accelerate.pointer
         yield formulation, functools.partial(_timed, run, *kernels)
 
 
@@ -79,7 +79,7 @@ def _own_code(scene: Scene) -> Iterator[tuple[str, Callable[[], float]]]:
         method = Method.parse(f"{formulation}+projection")
         if not why_no_code(scene, method):
             run = Run(scene, method, np.array([1.0]), Limits(code=SPECIALISED))
-            kernels = MOVING_ONLY.rates.pointer, method.formulation.accelerate.pointer
+            kernels = with_own_code(run.chart).rates.pointer, method.formulation.accelerate.pointer
             yield f"{formulation}, own code", functools.partial(_timed, run, *kernels)
 
 

@@ -19,7 +19,7 @@ from numba import njit
 from crosscheck.engine import Cannot, Engine, Setting
 from crosscheck.engines._start import lacks_mass
 from mbref.method import Method
-from mbref.run import Limits, Run
+from mbref.run import Limits, Run, chart_of
 from mbref.scene import Scene
 from mbref.tables import ACCELERATION, COLUMNS, EVALUATIONS, SIZES
 from mbref.trajectory import Cost, Outcome, Trajectory
@@ -39,7 +39,7 @@ Solution = tuple[
 def compiled() -> Callable:
     """``rates`` of METHOD, its formulation bound: to pass a kernel from Python costs more than its call."""
     method = Method.parse(METHOD)
-    rates, accelerate = method.stabilisation.rates.pointer, method.formulation.accelerate.pointer
+    rates, accelerate = chart_of(method)[0].rates.pointer, method.formulation.accelerate.pointer
 
     @njit(error_model="numpy")
     def call(t, y, y_rate, problem):

@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 
 from mbref import __version__, records
-from mbref.kinematics import NAME as KINEMATIC
 from mbref.method import DEFAULT, Method
 from mbref.scene import Scene
 from mbref.simulate import Limits, checked_times, prepare, simulate
@@ -45,8 +44,7 @@ def ensemble(
         with processes() as pool:
             yield from ensemble(scenes, times, method, limits, pool, path)
         return
-    if method != KINEMATIC:
-        prepare(Method.parse(method))  # once, not in every process at the same time
+    prepare(Method.parse(method))  # once, not in every process at the same time
     known = records.stored(path)
     pending: dict[Future, tuple[int, str]] = {}
     try:

@@ -157,16 +157,6 @@ def times_transpose(d, y, x):
 
 
 @kernel
-def times_columns(dt, y, x):
-    """x = Dᵀ y from Dᵀ (n, m)."""
-    n, m = dt.shape
-    for j in range(n):
-        x[j] = 0.0
-        for i in range(m):
-            x[j] += dt[j, i] * y[i]
-
-
-@kernel
 def cholesky_factor(a, n, tolerance):
     """Uᵀ D U of the upper half of a[:n, :n], in place; False where an entry of D is ≤ tolerance.
 

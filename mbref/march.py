@@ -13,6 +13,7 @@ from mbref.singular import (
     APART,
     choose_nodes,
     extrapolate,
+    has_fallen_in,
     keep_state,
     leap_length,
     relative_pivot,
@@ -40,6 +41,7 @@ from mbref.tables import (
     MOST_STEPS,
     MOVING,
     MULTIPLIERS,
+    NOT_CONVERGED,
     NOT_FINITE,
     OK,
     OMEGA,
@@ -242,9 +244,6 @@ def leap(
         place[SAMPLE] += 1
     extrapolate(history, nodes, found, t + length, y_new[:size], y_rate[:size], work[DENSE])
     status = accept(t + length, y_new, problem)
-    if status == HANDOVER:
-        clock[TIME] = t
-        return status
     clock[TIME] = t + length if place[SAMPLE] < times.shape[0] else clock[TIME]
     counts[STEPS] += 1
     counts[CROSSINGS] += 1
@@ -283,6 +282,8 @@ def advance(
             ratio = min(ratio, 1.0)
         if status == OK and ratio <= 1.0:
             status = accept(now, y_new, problem)
+            if status == OK and control[FIXED_STEP] == 0.0 and has_fallen_in(history, counts[STEPS], work):
+                status = NOT_CONVERGED
             if status == OK or status == CHANGED:  # noqa: SIM109 - no containers in kernels
                 counts[STEPS] += 1
                 y[:] = y_new
@@ -290,8 +291,6 @@ def advance(
                 if status == CHANGED:
                     memory[:] = 0.0
                 return OK
-        if status == HANDOVER:
-            return status
         counts[REJECTED] += 1
         if control[FIXED_STEP] > 0.0:
             return status

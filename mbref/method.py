@@ -20,6 +20,7 @@ from mbref.stabilisation.base import Stabilisation
 from mbref.tables import POSITION_GAIN, VELOCITY_GAIN
 
 DEFAULT = "alf-dual+projection/dop853"
+KINEMATIC = "alf-dual+projection/predictor"  # Newton–Raphson on Eqs. 1 to 3, see integrators/predictor.py
 
 
 class MethodError(Exception):
@@ -58,7 +59,8 @@ class Method:
 
     @staticmethod
     def parse(name: str) -> Method:
-        """The method of a name; raises MethodError with what is known."""
+        """The method of a name, "kinematic" among them; raises MethodError with what is known."""
+        name = KINEMATIC if name == "kinematic" else name
         head, _, integrator = name.partition("/")
         formulation, plus, stabilisation = _split_outside_brackets(head)
         if not plus:

@@ -91,12 +91,12 @@ class Model:
         matrix, jacobian = ((2 * big, big), (m, n)) if dense else ((2, 16), (0, n))
         frames = np.zeros((nb + 1, 18))
         frames[:, ROTATION : ROTATION + 9 : 4] = 1.0
-        columns = np.zeros((6, n))
+        columns = np.zeros((5, n))
         columns[MASS] = self.mass
         columns[INVERSE_ROOT] = 1 / np.sqrt(np.where(self.mass > 0, self.mass, 1.0))
         angles = np.zeros((1, max(1, int(np.sum(self.ints[2][:, 3] >= 0)))))
         return (
-            frames, np.zeros((m, 12)), np.zeros((7, m)), columns, np.zeros((4, 7 * nb)),
+            frames, np.zeros((m, 12)), np.zeros((6, m)), columns, np.zeros((4, 7 * nb)),
             np.zeros((4, 7 * nb)), np.zeros(matrix), np.zeros((8, big)), np.zeros((1, scratch)),
             angles, np.zeros(jacobian), np.zeros((1, 4)),
         )  # fmt: skip
@@ -104,7 +104,7 @@ class Model:
     def entries(self, coordinates: np.ndarray, velocities: np.ndarray) -> np.ndarray:
         """``ints[LIVE]`` of a y that has these columns of q (7 nb) and v (6 nb)."""
         columns = np.concatenate([coordinates, velocities])
-        live = np.zeros((2, 6 + columns.size), dtype=np.int64)
+        live = np.zeros((2, 4 + columns.size), dtype=np.int64)
         live[0, MOVING], live[0, TURNING] = coordinates.size, velocities.size
         live[1, : columns.size] = columns
         return live

@@ -7,8 +7,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from mbref.kinematics import NAME as KINEMATIC
-from mbref.kinematics import kinematic_analysis
 from mbref.method import Method, MethodError
 from mbref.results import trajectory_of
 from mbref.run import SPECIALISED, Limits, Run, prepare
@@ -28,15 +26,13 @@ def simulate(
 ) -> Trajectory:
     """Simulate from t = 0 and sample at ``times`` (k,), increasing, s; ``progress`` is told the time reached.
 
-    The method "kinematic" is the kinematic analysis of ``kinematics``, which integrates nothing.
+    The method "kinematic" is that of ``kinematics``, which integrates nothing.
     Returns the states reached, with accelerations and reactions; a failure of the method is the
     trajectory's outcome.  Raises SceneError for a scene that cannot be simulated, ValueError for times
     that do not increase or an order the integrator does not have, MethodError for an unknown method name
     and where ``limits`` ask for machine code that the method or the scene cannot have.
     """
     times = checked_times(times)
-    if method == KINEMATIC:
-        return kinematic_analysis(scene, times)
     method = Method.parse(method) if isinstance(method, str) else method
     limits = limits or Limits()
     began = time.process_time()

@@ -52,11 +52,17 @@ def pivot_slope(history, taken):
 
 @kernel
 def to_edge(history, taken):
-    """The step that ends just inside the window ahead; NEVER where none is near."""
+    """The step that ends just inside the window ahead, or nine tenths of the way; NEVER where it is far."""
     slope, pivot = pivot_slope(history, taken), history[taken % KEPT, 1]
     if slope == 0.0 or pivot <= WINDOW:
         return NEVER
-    return (pivot - 0.9 * WINDOW) / slope
+    return (pivot - max(0.9 * WINDOW, 0.1 * pivot)) / slope  # the slope of a long step is a rough one
+
+
+@kernel
+def has_fallen_in(history, taken, work):
+    """Whether a step ends deep in a window that was not near before it."""
+    return history[taken % KEPT, 1] > NEAR and relative_pivot(work) < 0.5 * WINDOW
 
 
 @kernel

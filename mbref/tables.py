@@ -26,8 +26,8 @@ GRAVITY = 4  # (1, 3)
 # work
 FRAMES = 0  # (nb + 1, 18): position 3, rotation matrix 9 by rows, velocity 3, body-fixed angular velocity 3
 JACOBIAN = 1  # (rows, 12): the blocks of both bodies
-ROWS = 2  # (7, rows): see the rows below
-COLUMNS = 3  # (6, 6 nb): see the rows below
+ROWS = 2  # (6, rows): see the rows below
+COLUMNS = 3  # (5, 6 nb): see the rows below
 STATE = 4  # (4, 7 nb): what the chart last made of its coordinates, see the rows below
 LAST = 5  # (4, 7 nb): STATE at the last accepted step
 DENSE = 6  # a matrix for the chart
@@ -37,16 +37,15 @@ ANGLES = 9  # (1, torsion springs): unwrapped angle at the last accepted step
 PHI_Q = 10  # (rows, 6 nb): the dense constraint Jacobian
 MEMO = 11  # (1, 4): what a chart remembers between steps, see below
 
-PHI, NU, GAMMA, PHI_RATE, RHS, MULTIPLIERS, ROW_SCALE = range(7)  # rows of ROWS
-FORCE, ACCELERATION, MASS, INVERSE_ROOT, STEP_X, STEP_Y = range(6)  # rows of COLUMNS
+PHI, NU, GAMMA, PHI_RATE, RHS, MULTIPLIERS = range(6)  # rows of ROWS
+FORCE, ACCELERATION, MASS, INVERSE_ROOT, STEP_X = range(5)  # rows of COLUMNS
 COORDINATES, VELOCITIES, COORDINATE_RATES, COORDINATE_SECOND = range(4)  # rows of STATE and LAST
 LAST_TIME, REFERENCE_PIVOT, SMALLEST_PIVOT, GENERIC_RANK = range(4)  # entries of MEMO
 ROW_ORDER, COLUMN_ORDER, SIZES, CHART_PIVOTS, FORMULATION_PIVOTS = range(5)  # rows of pivots
 
-# ints[LIVE][0]: how many coordinates and velocities y has; and of machine code of the scene's own (see
-# specialised/chart.py) whether it has redundant rows, and where its pieces are.  ints[LIVE][1]: which
-# coordinates, then which velocities
-MOVING, TURNING, REDUNDANT, RATES_CODE, OBSERVE_CODE, PROJECT_CODE = range(6)
+# ints[LIVE][0]: how many coordinates and velocities y has, and where the pieces of machine code of the
+# scene's own are (see specialised/chart.py).  ints[LIVE][1]: which coordinates, then which velocities
+MOVING, TURNING, RATES_CODE, PROJECT_CODE = range(4)
 
 POSITION, ROTATION, VELOCITY, OMEGA = 0, 3, 12, 15  # columns of FRAMES
 POINT_I, POINT_J, U_I, W_I, U_J, LENGTH = 0, 3, 6, 9, 12, 15  # columns of GEOMETRY
@@ -68,7 +67,7 @@ FORMULATION_OPTIONS = 4  # a formulation's own numbers start here
 
 # status of an evaluation or of a step
 OK, SINGULAR, NOT_CONVERGED, NOT_FINITE = range(4)
-CHANGED, HANDOVER = 4, 5  # the chart chose new coordinates; the chart leaves the state to the generic one
+CHANGED, HANDOVER = 4, 5  # the chart chose new coordinates; its rates leave the state to the careful ones
 
 INTS = types.UniTuple(INDEX_TABLE, 4)
 FLOATS = types.UniTuple(MATRIX, 5)

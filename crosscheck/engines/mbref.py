@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -14,16 +13,17 @@ from mbref.trajectory import Trajectory
 METHODS = (
     "alf-dual+projection, own code",
     "alf-dual+projection",
-    "alf-dual+projection, sparse",
     "lm2+projection, own code",
+    "kinematic, own code",
+    "kinematic",
     "mpi-svd+partitioning",
     "mpi-svd+projection",
     "mpi-svd+none",
     "mpi-qr+projection",
     "lm2+projection",
 )
+KINEMATIC = "kinematic"  # of driven scenes; integrates nothing, so has no tolerance
 OWN_CODE = ", own code"  # machine code of the scene, made before the clock runs
-SPARSE = ", sparse"  # the sparse factor that large scenes have by default
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 
 
@@ -45,15 +45,18 @@ class Mbref(Engine):
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
         return [
-            Setting(family, {"rtol": rtol})
+            Setting(family, options)
             for family in METHODS
             if self._serves(family, scene)
-            for rtol in TOLERANCES
+            for options in ([{}] if family.startswith(KINEMATIC) else [{"rtol": rtol} for rtol in TOLERANCES])
         ]
 
     def _serves(self, family: str, scene: Scene) -> bool:
+        from mbref.freedoms import undriven_freedoms
         from mbref.simulate import why_no_code
 
+        if family.startswith(KINEMATIC) and undriven_freedoms(scene) > 0:
+            return False
         method = _method(family)
         if family.endswith(OWN_CODE):
             return not why_no_code(scene, method)
@@ -61,27 +64,21 @@ class Mbref(Engine):
 
     def prepare(self, families: Sequence[str]) -> None:
         from mbref.simulate import prepare
-        from mbref.sparse.chart import CHARTS
 
         for family in families:
-            method = _method(family)
-            if family.endswith(SPARSE):
-                method = replace(method, stabilisation=CHARTS[method.stabilisation.name])
-            prepare(method)
+            prepare(_method(family))
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         from mbref.simulate import Limits, simulate
 
-        how = {"code": "specialised" if setting.family.endswith(OWN_CODE) else "generic"}
-        if setting.family.endswith(SPARSE):
-            how["sparse_above"] = 0
-        return simulate(scene, _method(setting.family), times, Limits(**how, **setting.options))
+        code = "specialised" if setting.family.endswith(OWN_CODE) else "generic"
+        return simulate(scene, _method(setting.family), times, Limits(code=code, **setting.options))
 
 
 def _method(family: str):
     from mbref.method import Method
 
-    return Method.parse(family.removesuffix(OWN_CODE).removesuffix(SPARSE))
+    return Method.parse(family.removesuffix(OWN_CODE))
 
 
 ENGINE = Mbref()

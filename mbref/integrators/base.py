@@ -32,6 +32,7 @@ class Integrator:
     rows: int
     adaptive: bool
     options: Mapping[str, float] = field(default_factory=dict)
+    integrates: bool = True  # otherwise only where drivers leave no freedom
 
     def highest_order(self, options: Mapping[str, float]) -> int:
         """The order the options allow; ValueError unless ``max_order`` is a whole number up to ``order``."""

@@ -1,12 +1,10 @@
-"""Sparse kernels over a ``Plan``: D, the Cholesky factor of S + I/α, solutions and products.
+"""Sparse kernels over a ``Plan``: D, the factors L Δ Lᵀ of S + I/α, solutions and products.
 
 S = D Dᵀ with D = Φ_q M^(-1/2).  α weighs rows of unit length, S_ii = 1, so that S_ii (1 + 1/α) stands on the
 diagonal; a row without entries has 1 there and changes nothing.  Vectors of rows and columns are the plan's.
 """
 
 from __future__ import annotations
-
-from numpy import sqrt
 
 from mbref.compiled import kernel
 from mbref.sparse.plan import (
@@ -33,7 +31,7 @@ def part(plan, k):
 
 @kernel
 def memories(plan, memory):
-    """Views of the memory: D, L, S_ii, pivots, three vectors of rows, M^(-1/2) and a vector of columns."""
+    """Views of the memory: D, L, S_ii, pivots squared, three vectors of rows, M^(-1/2), one of columns."""
     d, l, r = part(plan, D_ENTRY).shape[0], part(plan, L_ROW).shape[0], part(plan, ROW).shape[0]
     c = part(plan, COLUMN).shape[0]
     a = d + l
@@ -70,22 +68,21 @@ def assemble(plan, jacobian, inverse_root, alpha, d, l, diagonal, root):
 
 @kernel
 def factorise(plan, l):
-    """L of S + I/α in its place, the inverse of its diagonal instead of it; False where a pivot is ≤ 0."""
+    """L of S + I/α in its place, 1/Δ instead of its unit diagonal; False where an entry of Δ is ≤ 0."""
     first, update = part(plan, L_START), part(plan, UPDATE)
     u = 0
     for k in range(first.shape[0] - 1):
         start, end = first[k], first[k + 1]
         if not l[start] > 0.0:
             return False
-        inverse = 1.0 / sqrt(l[start])
+        inverse = 1.0 / l[start]
         l[start] = inverse
         for p in range(start + 1, end):
-            l[p] *= inverse
-        for p in range(start + 1, end):
-            value = l[p]
+            value = l[p] * inverse
             for other in range(p, end):
                 l[update[u]] -= value * l[other]
                 u += 1
+            l[p] = value
     return True
 
 
@@ -95,15 +92,14 @@ def solve(plan, l, b):
     first, row = part(plan, L_START), part(plan, L_ROW)
     size = first.shape[0] - 1
     for k in range(size):
-        value = b[k] * l[first[k]]
-        b[k] = value
+        value = b[k]
         for p in range(first[k] + 1, first[k + 1]):
             b[row[p]] -= l[p] * value
     for k in range(size - 1, -1, -1):
-        value = b[k]
+        value = b[k] * l[first[k]]
         for p in range(first[k] + 1, first[k + 1]):
             value -= l[p] * b[row[p]]
-        b[k] = value * l[first[k]]
+        b[k] = value
 
 
 @kernel
@@ -129,9 +125,8 @@ def times_transpose(plan, d, b, x):
 
 
 @kernel
-def sorted_pivots(plan, l, diagonal, pivots):
-    """The pivots (r,) of unit rows, ascending: the sine of the angle between each row and those before it."""
+def squared_pivots(plan, l, diagonal, squares):
+    """Squares (r,) of the pivots of unit rows: the sines of the angle between each row and those before."""
     first = part(plan, L_START)
     for k in range(diagonal.shape[0]):
-        pivots[k] = 1.0 / (l[first[k]] * sqrt(diagonal[k]))
-    pivots.sort()
+        squares[k] = 1.0 / (l[first[k]] * diagonal[k])

@@ -8,7 +8,7 @@ from scipy.sparse.linalg import splu
 
 from mbref.model import Model
 
-LARGE = 40  # rows; above, building the plan pays after some hundred steps (benchmarks/scaling.py)
+LARGE = 40  # rows; above, dense singular values take longer
 ALPHA = 1e10  # singular values below 1e-5 of unit rows are left alone
 ITERATIONS, ROUNDING = 20, 1e-15
 

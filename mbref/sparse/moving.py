@@ -8,21 +8,25 @@ an expression that is not identically zero does not vanish there.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from mbref.initial import Start
 from mbref.model import Model, displaced
 from mbref.tables import GEOMETRY, PRIMITIVES
 
 FIRST_ROW = 4  # column of PRIMITIVES
 STATES = 2  # random states asked, so that an accidental zero at one does no harm
+STILL = 1e-12  # a coordinate this small, or a velocity relative to the largest, is what corrections leave
 
 
-def moving_entries(model: Model, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Which Jacobian entries (m, 12) of the blocks that move can be other than zero; q, v the start.
+def moving_entries(model: Model, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which velocities (n,) can move, and which Jacobian entries (m, 12) of theirs can be other than zero.
 
-    ``v`` (6 nb,) has the given velocities, zero elsewhere.  Columns are those of ``tables.JACOBIAN``.
+    q (7 nb,) and v (6 nb,) are the start.  Columns of entries are those of ``tables.JACOBIAN``.
     """
     rng = np.random.default_rng(1)
     moving = np.zeros(model.n, dtype=bool)
@@ -38,7 +42,7 @@ def moving_entries(model: Model, q: np.ndarray, v: np.ndarray) -> np.ndarray:
             driving_columns |= terms.force != 0
         found, rows = _reached(model, entries, driving_rows, driving_columns)
         if np.array_equal(found, moving):
-            return entries & rows[:, None]
+            return moving, entries & rows[:, None]
         moving = found
 
 
@@ -55,6 +59,36 @@ def _reached(
     driving[label[: model.m][rows]] = True
     driving[label[model.m :][columns]] = True
     return driving[label[model.m :]], driving[label[: model.m]]
+
+
+def without_rounding(start: Start) -> Start:
+    """The start with zero for the roundings of zero in its coordinates and velocities."""
+    q, v = start.q, start.v
+    still = np.abs(v) < STILL * np.max(np.abs(v), initial=0.0)
+    return replace(start, q=np.where(np.abs(q) < STILL, 0.0, q), v=np.where(still, 0.0, v))
+
+
+def moving_coordinates(q: np.ndarray, velocities: np.ndarray) -> np.ndarray:
+    """Which coordinates can move from q (7 nb,) where these columns of v can: indices into q.
+
+    Turning about axis k of a body's own frame mixes the Euler parameters e0 and ek, and the other two.
+    """
+    moves = np.zeros((q.size // 7, 7), dtype=bool)
+    free = np.zeros((q.size // 7, 6), dtype=bool)
+    free.reshape(-1)[velocities] = True
+    moves[:, :3] = free[:, :3]
+    for body, turns, p in zip(moves, free[:, 3:], q.reshape(-1, 7)[:, 3:], strict=True):
+        reached = p != 0
+        while True:
+            found = reached.copy()
+            for k in np.flatnonzero(turns):
+                for pair in ([0, 1 + k], [1 + (k + 1) % 3, 1 + (k + 2) % 3]):
+                    found[pair] |= reached[pair].any()
+            if np.array_equal(found, reached):
+                break
+            reached = found
+        body[3:] = reached & turns.any()
+    return np.flatnonzero(moves)
 
 
 def moving_primitives(model: Model, entries: np.ndarray) -> tuple[tuple, tuple]:

@@ -43,11 +43,11 @@ class Plan:
         return self.indices[self.indices[k] : self.indices[k + 1]]
 
 
-def plan_for(entries: np.ndarray, columns: np.ndarray, n: int) -> Plan:
-    """The plan of D's pattern: ``entries`` (m, 12) and the column (m, 12) of each, of n columns in all."""
+def plan_for(moving: np.ndarray, entries: np.ndarray, columns: np.ndarray) -> Plan:
+    """The plan of D's pattern: velocities that move (n,), ``entries`` (m, 12), and the column of each."""
     kept = np.flatnonzero(entries.any(axis=1))
     row, entry = np.nonzero(entries[kept])
-    d = csr_array((np.ones(row.size), (row, columns[kept[row], entry])), shape=(kept.size, n))
+    d = csr_array((np.ones(row.size), (row, columns[kept[row], entry])), shape=(kept.size, moving.size))
     order, l_start, l_row = _factor_pattern(d)
     place = np.empty_like(order)
     place[order] = np.arange(order.size)
@@ -57,16 +57,17 @@ def plan_for(entries: np.ndarray, columns: np.ndarray, n: int) -> Plan:
     l_key = np.repeat(np.arange(order.size), np.diff(l_start)) * order.size + l_row
     target, left, right = _products(row, d_column, l_key, order.size)
     s_target, s_start = np.unique(target, return_index=True)
-    moving, local = np.unique(d_column, return_inverse=True)
+    column = np.flatnonzero(moving)
     parts = [
-        kept[order], moving, d_start, 12 * original + entry, local, np.append(s_start, target.size), s_target,
-        left, right, l_start, l_row, _updates(l_start, l_row, l_key, order.size),
+        kept[order], column, d_start, 12 * original + entry, np.searchsorted(column, d_column),
+        np.append(s_start, target.size), s_target, left, right, l_start, l_row,
+        _updates(l_start, l_row, l_key, order.size),
     ]  # fmt: skip
     offsets = np.cumsum([PARTS + 1, *(part.size for part in parts)])
     indices = np.concatenate([offsets, *parts])
     if indices.max(initial=0) > np.iinfo(np.uint32).max:
         raise OverflowError("the scene is too large for 32-bit indices")
-    memory = row.size + l_row.size + 5 * order.size + 2 * moving.size
+    memory = row.size + l_row.size + 5 * order.size + 2 * column.size
     return Plan(indices.astype(np.uint32), memory)
 
 

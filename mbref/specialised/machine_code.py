@@ -1,8 +1,8 @@
 """Machine code of a record: straight-line LLVM IR, compiled once and kept on disk.
 
-A record becomes a function ``i64 f(double t, double* y, double* angles, double* out)`` of the operations
-that its results need; it returns 0 when all its guards held.  Without
-fast-math flags every operation gives the bits that it gives in the kernel.
+A record becomes a function ``i64 f(double t, double* y, double* angles, double* out, double* more)`` of the
+operations that its results need; it returns 0 when all its guards held.  Without fast-math flags every
+operation gives the bits that it gives in the kernel.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from mbref.specialised.tracing import COMPARISONS, Record, Scalar, Untraceable, 
 
 MOST_OPERATIONS = 15_000  # LLVM's time grows faster than the length of straight-line code
 BINARY = ("fadd", "fsub", "fmul", "fdiv")
-VECTORS = ("y", "angles")
+VECTORS, RESULTS = ("y", "angles"), ("out", "more")
 CALLS = {
     "sin": "sin", "cos": "cos", "atan2": "atan2", "sqrt": "llvm.sqrt.f64", "fabs": "llvm.fabs.f64",
     "floor": "llvm.floor.f64",
@@ -27,15 +27,16 @@ SELECTS = {"max": "ogt", "min": "olt"}  # Python's max(a, b) is b only where b >
 
 @dataclass(frozen=True)
 class Piece:
-    """A record and which of its scalars, or numbers, are its results."""
+    """A record and which of its scalars, or numbers, are its results: for ``out``, and for ``more``."""
 
     name: str
     record: Record
-    outputs: Sequence[Scalar | float]
+    out: Sequence[Scalar | float]
+    more: Sequence[Scalar | float] = ()
 
     def live(self) -> list[int]:
-        """Indices of the operations that outputs and guards need, in order."""
-        texts = [operand(value) for value in self.outputs]
+        """Indices of the operations that results and guards need, in order."""
+        texts = [operand(value) for value in (*self.out, *self.more)]
         texts += [text for _, *pair in self.record.guards for text in pair]
         live, stack = set(), _indices(texts)
         while stack:
@@ -47,7 +48,7 @@ class Piece:
 
     def assembly(self) -> str:
         """The LLVM IR of the function."""
-        vectors = ", ".join(f"double* noalias %{name}" for name in (*VECTORS, "out"))
+        vectors = ", ".join(f"double* noalias %{name}" for name in (*VECTORS, *RESULTS))
         lines = [f"define i64 @{self.name}(double %t, {vectors}) {{"]
         for index in self.live():
             lines += _instructions(f"%v{index}", *self.record.operations[index])
@@ -59,9 +60,10 @@ class Piece:
                 f"%h{k} = and i1 {held}, %g{k}",
             ]
             held = f"%h{k}"
-        for k, value in enumerate(self.outputs):
-            lines.append(f"%o{k} = getelementptr double, double* %out, i64 {k}")
-            lines.append(f"store double {operand(value)}, double* %o{k}")
+        for vector, values in zip(RESULTS, (self.out, self.more), strict=True):
+            for k, value in enumerate(values):
+                lines.append(f"%{vector}{k} = getelementptr double, double* %{vector}, i64 {k}")
+                lines.append(f"store double {operand(value)}, double* %{vector}{k}")
         lines += [
             f"%failed = xor i1 {held}, true",
             "%status = zext i1 %failed to i64",

@@ -5,11 +5,12 @@ import pytest
 
 from crosscheck.metrics import measure
 from crosscheck.truth import truth_for
+from mbref.freedoms import undriven_freedoms
 from mbref.initial import corrected_positions, displaced
-from mbref.kinematics import kinematic_analysis, undriven_freedoms
 from mbref.model import Model
 from mbref.scene import SceneError
 from mbref.scenes import SCENES
+from mbref.simulate import Limits, simulate
 
 DRIVEN = ["four_bar", "four_bar_quarter", "four_bar_straight", "five_bar", "spatial_slider_crank_driven"]
 
@@ -17,7 +18,7 @@ DRIVEN = ["four_bar", "four_bar_quarter", "four_bar_straight", "five_bar", "spat
 @pytest.mark.parametrize("name", DRIVEN)
 def test_kinematic_analysis_and_truth(name):
     scene, times = SCENES[name](), np.linspace(0, 0.2, 7)  # eight singular positions of the parallelograms
-    trajectory = kinematic_analysis(scene, times)
+    trajectory = simulate(scene, "kinematic", times)
     assert trajectory.outcome.name == "COMPLETED", trajectory.message
     truth = truth_for(scene)
     measured = measure(scene, trajectory, truth)
@@ -30,9 +31,19 @@ def test_kinematic_analysis_and_truth(name):
         assert error < 1e-9, f"{name}, {key}: relative error {error:.2e}"
 
 
+@pytest.mark.parametrize("samples", (2, 31, 101))
+@pytest.mark.parametrize("name", DRIVEN)
+def test_kinematic_analysis_by_code_of_its_own_and_any_samples(name, samples):
+    scene, times = SCENES[name](), np.linspace(0, 0.1, samples)  # of 101 some are singular but for rounding
+    trajectory = simulate(scene, "kinematic", times, Limits(code="specialised"))
+    assert trajectory.outcome.name == "COMPLETED", trajectory.message
+    assert trajectory.cost.steps < max(100, 2 * samples), f"{trajectory.cost.steps} steps"
+    assert measure(scene, trajectory, truth_for(scene))["error"] < 1e-12
+
+
 def test_freedom_without_driver_is_refused():
     with pytest.raises(SceneError, match="1 degrees of freedom"):
-        kinematic_analysis(SCENES["planar_slider_crank"](), np.array([0.1]))
+        simulate(SCENES["planar_slider_crank"](), "kinematic", [0.1])
 
 
 def test_a_singular_start_of_a_driven_mechanism_leaves_no_freedom():
