@@ -7,6 +7,7 @@ from mbref is the integrator, called from Python.  IDA is given the residual y' 
 from __future__ import annotations
 
 import functools
+import math
 import os
 import time
 from abc import abstractmethod
@@ -30,6 +31,7 @@ for kind in ("WARNING", "ERROR"):  # of SUNDIALS: a run that fails says so itsel
 METHOD = "alf-dual+none"
 RTOLS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12)
 MOST_STEPS = 10**6
+LONGEST = 10.0  # s of CPU time after which a run is given up: Radau creeps past singular positions
 Solution = tuple[
     np.ndarray, str, int
 ]  # states (k, n) reached, why it ended (empty: at the end), factorisations
@@ -48,18 +50,28 @@ def compiled() -> Callable:
     return call
 
 
+class TooLong(Exception):
+    """A run has taken LONGEST."""
+
+
 class RightHandSide:
-    """y' = f(t, y) of a scene, called from Python: y holds coordinates and velocities."""
+    """y' = f(t, y) of a scene, called from Python: y holds coordinates and velocities.
+
+    Raises TooLong past ``deadline``, a process CPU time.
+    """
 
     def __init__(self, scene: Scene, times: np.ndarray):
         self.run = run = Run(scene, Method.parse(METHOD), times, Limits())
         self.call = compiled()
         self.size = int(run.pivots[SIZES, 1])
         self.start = run.y[: self.size].copy()
+        self.deadline = math.inf
         self(0.0, self.start)  # compiled before anything is timed
 
     def __call__(self, t: float, y: np.ndarray) -> np.ndarray:
         rate = np.empty(self.size)
+        if time.process_time() > self.deadline:
+            raise TooLong
         self.call(t, np.array(y), rate, self.run.problem)
         return rate
 
@@ -96,8 +108,12 @@ class GeneralIntegrator(Engine):
         built = time.process_time() - began
         f.run.counts[:] = 0
         began = time.process_time()
-        states, message, factorisations = self.solve(setting.family, f, times, setting.options["rtol"])
-        seconds = time.process_time() - began
+        f.deadline = began + LONGEST
+        try:
+            states, message, factorisations = self.solve(setting.family, f, times, setting.options["rtol"])
+        except TooLong:
+            states, message, factorisations = np.zeros((0, f.size)), f"given up after {LONGEST:g} s", 0
+        seconds, f.deadline = time.process_time() - began, math.inf
         cost = Cost(seconds, built, rhs=int(f.run.counts[EVALUATIONS]), factorisations=factorisations)
         done = len(states) == len(times) and not message
         motion = f.motion(times[: len(states)], states)

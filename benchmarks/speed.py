@@ -26,6 +26,7 @@ from rich.console import Console
 from rich.table import Table
 
 from crosscheck.engine import Engine, Setting, engine
+from crosscheck.engines.mbref import OWN_CODE
 from crosscheck.metrics import cost_at_error, measure
 from crosscheck.study import machine, versions
 from crosscheck.tolerances import ERROR_LEVELS
@@ -197,23 +198,30 @@ def show(console: Console, scene: Scene, table: Sequence[dict[str, Any]]) -> Non
 
 
 def summary(console: Console, tables: dict[str, Sequence[dict[str, Any]]]) -> None:
-    """mbref's best against the best of the engines, of the general integrators and the limit."""
-    shown = Table(title="mbref's best method as a multiple of …")
+    """mbref's best by own code and by general kernels, against the best of the others."""
+    shown = Table(title="The best of others as a multiple of mbref's best, at errors of …")
     shown.add_column("scene", no_wrap=True)
+    shown.add_column("mbref by", no_wrap=True)
     groups = {"engines": ENGINES[1:4], "general": ("sundials", "scipy"), "limit": (LIMIT_NAME,)}
     for name in groups:
         for level in ERROR_LEVELS:
             shown.add_column(f"{name} {level:.0e}", justify="right")
     for scene, table in tables.items():
-        ours = _best(table, (OURS,))
-        ratios = [c / b for names in groups.values() for c, b in zip(ours, _best(table, names), strict=True)]
-        shown.add_row(scene, *(_multiple(r) for r in ratios))
+        others = [cost for names in groups.values() for cost in _best(_of(table, names))]
+        for whose, own in (("own code", True), ("general kernels", False)):
+            mine = [row for row in _of(table, (OURS,)) if row["family"].endswith(OWN_CODE) is own]
+            pairs = zip(others, _best(mine) * len(groups), strict=True)
+            shown.add_row(scene, whose, *(_advantage(theirs, ours) for theirs, ours in pairs))
     console.print(shown)
 
 
-def _best(table: Sequence[dict[str, Any]], names: Sequence[str]) -> list[float]:
-    found = [row["cost"] for row in table if row["engine"] in names]
-    return [min(costs) for costs in zip(*found, strict=True)] if found else [math.nan] * len(ERROR_LEVELS)
+def _of(table: Sequence[dict[str, Any]], names: Sequence[str]) -> list[dict[str, Any]]:
+    return [row for row in table if row["engine"] in names]
+
+
+def _best(rows: Sequence[dict[str, Any]]) -> list[float]:
+    costs = [row["cost"] for row in rows]
+    return [min(level) for level in zip(*costs, strict=True)] if costs else [math.nan] * len(ERROR_LEVELS)
 
 
 def _stored(scene: Scene, runs: Sequence[Run], table: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -237,9 +245,13 @@ def _ms(seconds: float) -> str:
     return "–" if not math.isfinite(seconds) else f"{seconds * 1e3:.3g}"
 
 
-def _multiple(ratio: float) -> str:
-    if ratio == 0:
+def _advantage(theirs: float, ours: float) -> str:
+    if math.isinf(theirs) and math.isfinite(ours):
         return "alone"  # no other reaches that error
+    return _multiple(theirs / ours)
+
+
+def _multiple(ratio: float) -> str:
     return "–" if not math.isfinite(ratio) else f"{ratio:.2g}" if ratio < 100 else f"{ratio:.0f}"
 
 
