@@ -11,8 +11,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from mbref.initial import Start
 from mbref.model import Model, displaced
@@ -50,15 +48,15 @@ def _reached(
     model: Model, entries: np.ndarray, rows: np.ndarray, columns: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Columns (n,) and rows (m,) of the blocks that have a driving row or column."""
-    row, entry = np.nonzero(entries)
-    column = model.entry_columns()[row, entry]
-    nodes = model.m + model.n
-    graph = coo_array((np.ones(row.size), (row, model.m + column)), shape=(nodes, nodes))
-    _, label = connected_components(graph, directed=False)
-    driving = np.zeros(nodes, dtype=bool)
-    driving[label[: model.m][rows]] = True
-    driving[label[model.m :][columns]] = True
-    return driving[label[model.m :]], driving[label[: model.m]]
+    column = model.entry_columns()
+    reached = np.append(columns, np.zeros(6, dtype=bool))
+    while True:
+        rows = rows | (entries & reached[column]).any(axis=1)
+        found = reached.copy()
+        found[column[entries & rows[:, None]]] = True
+        if np.array_equal(found, reached):
+            return reached[: model.n], rows
+        reached = found
 
 
 def without_rounding(start: Start) -> Start:
