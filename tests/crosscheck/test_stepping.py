@@ -61,6 +61,27 @@ def test_noise_at_one_position_is_stepped_over() -> None:
     assert abs(y[0] - 1.0) < 1e-12, f"y(1) = {y[0]}, expected 1"
 
 
+def test_step_does_not_go_on_from_where_settling_finds_noise() -> None:
+    """The slope is garbage just where the first and shortest step would be settled."""
+    shortest, moved = 1e-3, 1e-9
+
+    def rhs(t: float, y: np.ndarray) -> np.ndarray:
+        return np.array([1.0 if abs(y[0] - shortest - moved) > moved / 2 else 1e9])
+
+    stepper = Adaptive(rhs, lambda t, y: y + moved, 1e-6, shortest, np.inf, Counts())
+    y = stepper.advance(np.zeros(1), 0.0, 1.0)
+    gap = abs(y[0] - 1.0 - moved * stepper.counts.steps)
+    assert gap < 1e-12, f"{gap:.1e} from the time it is: {stepper.counts}"
+
+
+def test_state_that_cannot_be_settled_says_why() -> None:
+    def refuse(t: float, y: np.ndarray) -> np.ndarray:
+        raise Failed(Outcome.NOT_CONVERGED, t, "no way")
+
+    with pytest.raises(Failed, match="no way"):
+        Adaptive(oscillator, refuse, 1e-6, 1e-3, np.inf, Counts()).advance(cosine(0.0), 0.0, 1.0)
+
+
 def test_noise_before_a_sample_that_a_stretched_step_reaches_is_stepped_over() -> None:
     """The interval is a little longer than the shortest step, which would be tried for ever."""
     shortest, calls = 1e-3, 0
