@@ -28,6 +28,7 @@ from mbref.tables import (
     COORDINATES,
     CROSSINGS,
     DENSE,
+    FIRST_STEP,
     FIXED_STEP,
     FORCED_STEP,
     FRAMES,
@@ -138,6 +139,12 @@ def largest_step(control, work):
 
 
 @kernel
+def chosen(suggested, control, counts):
+    """The step to try: the user's first where one is given, else the integrator's."""
+    return control[FIRST_STEP] if counts[STEPS] == 0 and control[FIRST_STEP] > 0.0 else suggested
+
+
+@kernel
 def place_inside(t, history, nodes, found, y, y_rate, live, work):
     """The extrapolated state and accelerations at a sample time inside a window, for ``take_sample``."""
     extrapolate(history, nodes, found, t, y, y_rate, work[DENSE])
@@ -219,6 +226,7 @@ def march(loop, problem):
             clock[LENGTH], clock[SUGGESTED], clock[RATIO], y[:size], y_rate[:size],
             memory, control, tolerances,
         )  # fmt: skip
+        suggested = chosen(suggested, control, counts)
         status = advance(
             suggested, step, propose, rates, careful, accept, accelerate, times[place[SAMPLE]], clock,
             control, tolerances, y, y_rate, y_new, memory, history, nodes, problem,

@@ -17,7 +17,7 @@ from mbref.integrators import INTEGRATORS
 from mbref.integrators.base import Integrator
 from mbref.stabilisation import STABILISATIONS
 from mbref.stabilisation.base import Stabilisation
-from mbref.tables import POSITION_GAIN, VELOCITY_GAIN
+from mbref.tables import KEPT_PARTITION, POSITION_GAIN, VELOCITY_GAIN
 
 DEFAULT = "alf-dual+projection/dop853"
 KINEMATIC = "alf-dual+projection/predictor"  # Newton–Raphson on Eqs. 1 to 3, see integrators/predictor.py
@@ -55,6 +55,7 @@ class Method:
         for part in (self.formulation, self.stabilisation):
             if part.feedback is not None:
                 values[[VELOCITY_GAIN, POSITION_GAIN]] += part.feedback(self.options_of(part))
+        values[KEPT_PARTITION] = self.options_of(self.stabilisation).get("kept", 0.0)
         return values
 
     @staticmethod

@@ -27,6 +27,7 @@ from mbref.stabilisation import PROJECTION
 from mbref.stabilisation.base import Stabilisation
 from mbref.tables import (
     COORDINATES,
+    FIRST_STEP,
     FIXED_STEP,
     FORCED_STEP,
     LARGEST_STEP,
@@ -56,6 +57,7 @@ class Limits:
     atol: float | None = None  # … and absolute (SI units); None means as rtol
     rank_tolerance: float = 1e-10  # relative; a singular value or pivot below it counts as zero
     violation: float = 3e-3  # largest |Φ| tolerated (m or rad), times the scene's length where over 1 m
+    first_step: float = 0.0  # s, that is tried first; 0: the integrator's own guess
     smallest_step: float = 0.0  # s; 0 means a million-millionth of the duration
     forced_step: float = 0.0  # s; a step this short is taken whatever its error estimate; 0: none
     largest_step: float = 0.0  # s; 0 means the duration
@@ -118,12 +120,13 @@ class Run:
     def _control(self) -> np.ndarray:
         limits, integrator = self.limits, self.method.integrator
         span = float(self.times[-1]) or 1.0
-        control = np.zeros(9)
+        control = np.zeros(10)
         options = self.method.options_of(integrator)
         control[ORDER] = integrator.highest_order(options)
         control[FIXED_STEP] = 0.0 if integrator.adaptive else options["step"]
         control[SMALLEST_STEP] = limits.smallest_step or 1e-12 * span
         control[FORCED_STEP] = limits.forced_step
+        control[FIRST_STEP] = limits.first_step
         control[LARGEST_STEP] = limits.largest_step or span
         control[LARGEST_TURN] = limits.largest_turn
         control[VIOLATION] = limits.violation * max(1.0, scene_length(self.model))

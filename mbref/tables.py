@@ -55,15 +55,15 @@ MOMENT, FORCE_AT_POINT, SPRING, TORSION_SPRING = range(4)  # kinds of loads
 # control, an array of floats: what the loop is to keep to
 (
     ORDER, FIXED_STEP, SMALLEST_STEP, LARGEST_STEP, LARGEST_TURN, VIOLATION, MOST_STEPS, STEPS_PER_CALL,
-    FORCED_STEP,
-) = range(9)  # fmt: skip
+    FORCED_STEP, FIRST_STEP,
+) = range(10)  # fmt: skip
 
 # counts, an array of integers that kernels add to
 STEPS, REJECTED, EVALUATIONS, FACTORISATIONS, NEWTON, CROSSINGS = range(6)
 
 # settings, an array of floats
-VELOCITY_GAIN, POSITION_GAIN, RANK_TOLERANCE, NEWTON_TOLERANCE = range(4)
-FORMULATION_OPTIONS = 4  # a formulation's own numbers start here
+VELOCITY_GAIN, POSITION_GAIN, RANK_TOLERANCE, NEWTON_TOLERANCE, KEPT_PARTITION = range(5)
+FORMULATION_OPTIONS = 5  # a formulation's own numbers start here
 
 # status of an evaluation or of a step
 OK, SINGULAR, NOT_CONVERGED, NOT_FINITE = range(4)

@@ -14,7 +14,7 @@ import numpy as np
 from crosscheck.engine import Setting
 from crosscheck.paper import settings
 from crosscheck.paper.cells import CELLS, COUNTS_III, COUNTS_IV, FIVE_BAR, FOUR_BAR_COLUMNS, SPATIAL, Cell
-from crosscheck.paper.settings import BASE, DRAWN, END, SIZED, STRICT, SWEEP, Variant
+from crosscheck.paper.settings import BASE, DRAWN, END, FEW, SEEDS, SIZED, STRICT, SWEEP, Variant
 from crosscheck.study import Case, Record, run_here, study
 from crosscheck.study import Progress as Advance
 from mbref.formulations import FORMULATIONS
@@ -30,6 +30,7 @@ TURNS = np.linspace(0.0, END, 401)
 SECOND = np.linspace(0.0, 1.0, 6)
 SIZED_ROWS = ("MPI (SVD)", "ALF", "ALF + CP")  # whose end times are shown over the size of the data errors
 FREE = ("LM2", "MPI (SVD)", "MPI (GS)")  # the rows of Table III that drift until they fail
+LASTING = ("MPI (SVD) + CP", "MPI (GS) + CP")  # the rows of Tables I and II whose runs last 20 s
 
 HEAVY, UNEQUAL, SPATIAL_DYNAMIC = "a = b", "a ≠ b", "spatial"
 TRUE_BRANCH = "alf-dual + projection"
@@ -44,8 +45,9 @@ DYNAMIC: Mapping[str, tuple[str, ...]] = {
     UNEQUAL: ("ALF + CP", "MPI (SVD) + CP", "MPI (GS) + CP", "ALF", "MPI (SVD)", "MPI (GS)"),
     SPATIAL_DYNAMIC: (*COUNTS_IV, "ALF"),
 }
-HEAVY_SWEEP = tuple(v for v in SWEEP if v.name in ("rtol 1e-5", "smallest step 1e-5", "α = 1e4"))
+HEAVY_SWEEP = tuple(v for v in SWEEP if v.name in ("rtol 1e-5", "smallest step 1e-5", "α = 1e6"))
 [RAISED] = [v for v in SWEEP if v.name == "rank 1e-4"]
+KEPT, KEPT_RTOLS = (0.6, 0.3, 0.1, 0.03), (1e-6, 1e-7, 1e-8, 1e-9)
 ALPHAS = tuple(10.0**k for k in range(2, 13))
 DIGITS_EPSILON = 1e-14  # so that only rounding is left
 EXACT, PENALTY, DUAL = "mpi-svd", "alf", "alf-dual"
@@ -74,6 +76,7 @@ def cases() -> Cases:
         **strict(),
         **figures(),
         **dynamic(),
+        **kept(),
         **pairs(),
         **digits(),
     }
@@ -84,14 +87,20 @@ def tables() -> Cases:
     return {Label(c.table, c.row, c.column): linkage(c.row, c.column, SAMPLES) for c in CELLS}
 
 
-def is_drawn(cell: Cell) -> bool:
-    """Whether a cell is run with other random errors in the data too: where they can matter."""
-    return cell.letter != "a" and (cell.table != "III" or cell.row in FREE)
+def draws(cell: Cell) -> int:
+    """How many draws of first step and errors in the data a cell has: 1 where they cannot matter."""
+    if cell.letter == "a" or (cell.table == "III" and cell.row not in FREE):
+        return 1
+    return FEW if cell.table == "III" or cell.row in LASTING else SEEDS
 
 
 def drawn() -> Cases:
-    """The cells again with other random errors in the data."""
-    return _varied("drawn", [(c.row, c.column) for c in CELLS if is_drawn(c)], DRAWN)
+    """The cells again with other draws of first step and errors in the data."""
+    return {
+        label: case
+        for cell in CELLS
+        for label, case in _varied("drawn", [(cell.row, cell.column)], DRAWN[: draws(cell) - 1]).items()
+    }
 
 
 def sweep() -> Cases:
@@ -118,7 +127,7 @@ def _varied(
         Label(part, row, column, variant.name): linkage(row, column, times, variant)
         for variant in variants
         for row, column in places
-        if variant.penalty == BASE.penalty or "ALF" in row
+        if not variant.alf or "ALF" in row
     }
 
 
@@ -149,7 +158,7 @@ def dynamic() -> Cases:
     }
     for variant in HEAVY_SWEEP:
         for row in CROSSING:
-            if variant.penalty == BASE.penalty or "ALF" in row:
+            if not variant.alf or "ALF" in row:
                 out[Label("dynamic", row, HEAVY, variant.name)] = _case(
                     dynamic_scene(HEAVY), row, TURNS, variant
                 )
@@ -157,6 +166,17 @@ def dynamic() -> Cases:
     out[Label("dynamic", "MPI (SVD)", UNEQUAL, RAISED.name)] = raised
     branch = Setting("alf-dual+projection/dop853", {"rtol": 1e-9})
     out[Label("dynamic", TRUE_BRANCH, HEAVY)] = Case(dynamic_scene(HEAVY), TURNS, "mbref", branch)
+    return out
+
+
+def kept() -> Cases:
+    """Table IV's mechanism by LM2, free and partitioned, over the tolerance and how long partitions last."""
+    scene, out = dynamic_scene(SPATIAL_DYNAMIC), {}
+    for rtol in KEPT_RTOLS:
+        variant = Variant(f"rtol {rtol:g}", {"rtol": rtol})
+        for name in ("none", *(f"partitioning[kept={share:g}]" for share in KEPT)):
+            method = f"lm2+{name}/{settings.INTEGRATOR}"
+            out[Label("kept", name, SPATIAL_DYNAMIC, variant.name)] = _named(scene, method, TURNS, variant)
     return out
 
 

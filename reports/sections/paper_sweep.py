@@ -10,7 +10,7 @@ from matplotlib.figure import Figure as Drawing
 from crosscheck.paper import singular
 from crosscheck.paper.cells import CELLS, FIVE_BAR, FOUR_BAR_COLUMNS, Cell, Match, match
 from crosscheck.paper.runs import SHARE, SHORT, SIZED_ROWS, Label, Records, found
-from crosscheck.paper.settings import BASE, DRAWN, LINKAGES, SEEDS, SIZE, SIZES, SWEEP
+from crosscheck.paper.settings import BASE, DRAWN, FEW, LINKAGES, SIZE, SIZES, SWEEP
 from reports import figures
 from reports.blocks import Block, Figure, Heading, Table, Text
 from reports.runs import Run
@@ -35,7 +35,7 @@ def render(records: Records) -> list[Block]:
         _scores(records),
         _sizes(records),
         _times(records, "settings", (BASE.name, *(v.name for v in SWEEP))),
-        _times(records, "random errors in the data", ("seed 0", *(v.name for v in DRAWN))),
+        _times(records, "draws of first step and data errors", ("seed 0", *(v.name for v in DRAWN))),
         Figure("paper-failure-times", _caption(), partial(plot, records)),
     ]
 
@@ -62,13 +62,13 @@ def _sizes(records: Records) -> Table:
     for size in SIZES:
         for row in SIZED_ROWS:
             labels = [
-                [Label("sized", row, column, f"{size:g} m, seed {k}") for k in range(SEEDS)]
+                [Label("sized", row, column, f"{size:g} m, seed {k}") for k in range(FEW)]
                 for column in COLUMNS
             ]
             runs = [[Run(records[label]) for label in column if label in records] for column in labels]
             rows.append((f"{size:g}", row, *map(_most, runs)))
     caption = (
-        f"The most frequent end (s, letter) among {SEEDS} random errors in the data of each size; – is "
+        f"The most frequent end (s, letter) among {FEW} draws with data errors of each size; – is "
         f"{SHORT[-1]:g} s reached. MPI without partitioning goes through the first crossing and ends at the "
         f"first bifurcation, as in the paper, while the errors are small, from 1e-12 m to {SIZE:g} m in "
         "most draws; from 1e-9 m it ends at the first crossing. ALF + CP ends at the first crossing from "

@@ -14,11 +14,15 @@ from crosscheck.paper import runs, settings, singular
 from crosscheck.paper.cells import CELLS, CLOSE, COUNTS_III, COUNTS_IV, Cell, Match, match
 from crosscheck.paper.runs import Label
 from crosscheck.truth import truth_for
+from mbref.formulations.alf import ALF
+from mbref.initial import consistent_start
 from mbref.method import Method
+from mbref.model import Model
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.scenes.four_bar import four_bar
 from mbref.simulate import Limits, simulate
+from mbref.tables import OK
 from mbref.trajectory import Outcome, Trajectory
 
 
@@ -78,10 +82,48 @@ def test_variants_and_one_thing_changed():
     default = {f.name for f in dataclasses.fields(Limits)}
     for variant in settings.SWEEP:
         assert set(variant.options()) <= default, f"{variant.name}: {set(variant.options()) - default}"
-        changed = {k for k, v in variant.options().items() if v != settings.LIMITS[k]} - {"forced_step"}
-        names = ("size", "seed", "integrator", "penalty")
+        base = settings.BASE.options()
+        changed = {k for k, v in variant.options().items() if v != base[k]} - {"forced_step"}
+        changed |= {k for k, v in variant.alf.items() if v != settings.ALF[k]}
+        names = ("size", "seed", "integrator")
         others = [name for name in names if getattr(variant, name) != getattr(settings.BASE, name)]
         assert len(changed) + len(others) == 1, f"{variant.name} changes {sorted(changed)} and {others}"
+
+
+def test_draws_and_their_first_steps():
+    steps = [settings.Variant(seed=k).options()["first_step"] for k in range(settings.SEEDS)]
+    low, high = settings.FIRST
+    assert all(low <= step <= high for step in steps), f"first steps {steps} outside {settings.FIRST}"
+    assert len(set(steps)) == settings.SEEDS and steps[3] == settings.first_step(3), (
+        "the seed does not decide"
+    )
+    drawn = Counter((label.row, label.column) for label in runs.drawn())
+    for cell in CELLS:
+        found = drawn[cell.row, cell.column] + 1
+        assert found == runs.draws(cell), f"{cell.row}, {cell.column}: {found} runs, {runs.draws(cell)} draws"
+
+
+def alf_iterations(distance: float, error: float) -> int:
+    """Iterations that ALF takes at θ₂ = distance (rad) with γ off by ``error`` of its size."""
+    scene = settings.kinematic(four_bar(distance))
+    model, options = Model(scene), {**settings.ALF}
+    terms = model.terms(0.0, model.start(), consistent_start(model).v)
+    vanishing = np.linalg.svd(terms.jacobian)[0][:, np.linalg.matrix_rank(terms.jacobian) - 1]
+    gamma = terms.gamma + error * np.linalg.norm(terms.gamma) * vanishing
+    for most in range(1, 1000):
+        options["iterations"] = most
+        if ALF.solve(terms.mass, terms.jacobian, terms.force, gamma, **options)[0] == OK:
+            return most
+    return 1000
+
+
+def test_alf_and_what_errors_make_of_it_near_a_singular_position():
+    """On the true branch it converges anywhere; errors in the vanishing direction shrink by 1 + α σ² only."""
+    exact = [alf_iterations(distance, 0.0) for distance in (1.0, 0.01, 0.001)]
+    wrong = [alf_iterations(distance, 1e-8) for distance in (1.0, 0.1, 0.03, 0.01)]
+    assert max(exact) <= 6, f"iterations on the true branch 1, 0.01 and 0.001 rad from θ₂ = 0: {exact}"
+    assert wrong[0] <= 6 and wrong[0] < wrong[1] < wrong[2] < wrong[3], f"iterations with errors: {wrong}"
+    assert wrong[2] > settings.ALF["iterations"], f"{wrong[2]} iterations 0.03 rad away"
 
 
 def test_errors_in_the_data_and_every_anchor():

@@ -201,6 +201,16 @@ def test_method_name_round_trips(name):
     assert str(Method.parse("lm1+baumgarte[10,3]")) == "lm1+baumgarte[alpha=10,beta=3]/dop853"
 
 
+@pytest.mark.parametrize("integrator", ["dop853", "adams"])
+def test_first_step_and_the_steps_up_to_a_sample(integrator):
+    scene, method = SCENES["planar_slider_crank"](), f"mpi-svd+none/{integrator}"
+    steps = [
+        simulate(scene, method, [1e-4], Limits(rtol=1e-3, first_step=first)).cost.steps
+        for first in (1e-4, 1e-5)
+    ]
+    assert steps[0] == 1 < steps[1], f"{integrator}: {steps} steps with the first of 1e-4 and 1e-5 s"
+
+
 @pytest.mark.parametrize("method", ["mpi-svd+projection", "lm1+partitioning", "lm1+baumgarte/rk4[step=1e-4]"])
 def test_same_result_without_the_jit(method):
     scene = "spatial_slider_crank"
