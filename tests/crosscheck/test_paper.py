@@ -151,6 +151,9 @@ def test_rank_tolerance_and_a_row_that_is_redundant_in_the_plane_only():
     ("table", "row", "column"),
     [
         ("I", "LM2", "θ₂ = π/4"),
+        ("I", "ALF", "θ₂ = nπ"),
+        ("I", "ALF + CP", "θ₂ = nπ"),
+        ("I", "ALF", "θ₂ = π/4"),
         ("I", "MPI (SVD)", "θ₂ = π/4"),
         ("I", "MPI (GS)", "θ₂ = π/2"),
         ("II", "MPI (GS) + CP", "five-bar"),
@@ -208,10 +211,10 @@ def test_heavy_crank_and_its_disc():
 
 @pytest.mark.slow
 def test_table_i_and_the_paper():
-    """The whole of Table I: the letter of every cell, and the end times of all but five."""
+    """The whole of Table I: the letter of every cell, and the end times of all but two."""
     marks = Counter()
     for cell in CELLS:
         if cell.table == "I":
             run = simulated(Label("I", cell.row, cell.column))
             marks[match(cell, run.outcome, run.t_end)] += 1
-    assert marks[Match.DIFFERENT] == 0 and marks[Match.SAME] >= 28, f"marks: {marks}"
+    assert marks[Match.DIFFERENT] == 0 and marks[Match.SAME] >= 31, f"marks: {marks}"
