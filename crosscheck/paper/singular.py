@@ -7,11 +7,18 @@ import math
 import numpy as np
 
 from crosscheck import kinematics
+from crosscheck.paper import settings
 from crosscheck.tolerances import RANK
 from crosscheck.truth import truth_for
+from mbref.formulations.alf import ALF
+from mbref.initial import consistent_start
+from mbref.model import Model
 from mbref.scene import Scene
 from mbref.scenes.four_bar import LENGTH, four_bar
 from mbref.scenes.links import CRANK_RATE, about_z
+from mbref.tables import OK
+
+MOST = 10_000  # iterations counted
 
 
 def scaled_singular_values(scene: Scene, times: np.ndarray) -> np.ndarray:
@@ -65,3 +72,27 @@ def crossings(theta0: float, last: float) -> list[tuple[float, int]]:
     first = math.floor(theta0 / math.pi + 1e-9)
     out = [((theta0 - k * math.pi) / CRANK_RATE, k) for k in range(first, first - 1000, -1)]
     return [(t, k) for t, k in out if t <= last]
+
+
+def alf_iterations(distance: float, error: float) -> int:
+    """Iterations that ALF, as set for the tables, takes at θ₂ = distance (rad); MOST if more are needed.
+
+    γ is off by ``error`` of its size in the direction that vanishes at θ₂ = 0.
+    """
+    model = Model(settings.kinematic(four_bar(distance)))
+    terms = model.terms(0.0, model.start(), consistent_start(model).v)
+    left, values, _ = np.linalg.svd(terms.jacobian)
+    vanishing = left[:, rank(values) - 1]
+    gamma = terms.gamma + error * np.linalg.norm(terms.gamma) * vanishing
+    few, enough = 0, MOST
+    while enough - few > 1:
+        middle = (few + enough) // 2
+        options = {**settings.ALF, "iterations": float(middle)}
+        status = ALF.solve(terms.mass, terms.jacobian, terms.force, gamma, **options)[0]
+        few, enough = (few, middle) if status == OK else (middle, enough)
+    return enough
+
+
+def turns(k: int) -> str:
+    """k π as written."""
+    return {0: "0", 1: "π", -1: "-π"}.get(k, f"{k}π")

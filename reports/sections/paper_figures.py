@@ -90,7 +90,7 @@ def _poses(paper: int, scene: Scene, runs: Named, what: str, span: tuple[float, 
 
 def plot_poses(scene: Scene, runs: Named, span: tuple[float, float] | None) -> Drawing:
     """Poses of the links side by side, one picture a method."""
-    drawing, [first] = figures.canvas(7.4, 3.0)
+    drawing, [first] = figures.canvas(7.4, 2.0 if len(runs) > 3 else 3.0)
     first.remove()
     axes = drawing.subplots(1, len(runs), sharex=True, sharey=True, squeeze=False)[0]
     for panel, (name, run) in zip(axes, runs.items(), strict=True):

@@ -14,15 +14,11 @@ from crosscheck.paper import runs, settings, singular
 from crosscheck.paper.cells import CELLS, CLOSE, COUNTS_III, COUNTS_IV, Cell, Match, match
 from crosscheck.paper.runs import Label
 from crosscheck.truth import truth_for
-from mbref.formulations.alf import ALF
-from mbref.initial import consistent_start
 from mbref.method import Method
-from mbref.model import Model
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.scenes.four_bar import four_bar
 from mbref.simulate import Limits, simulate
-from mbref.tables import OK
 from mbref.trajectory import Outcome, Trajectory
 
 
@@ -103,25 +99,11 @@ def test_draws_and_their_first_steps():
         assert found == runs.draws(cell), f"{cell.row}, {cell.column}: {found} runs, {runs.draws(cell)} draws"
 
 
-def alf_iterations(distance: float, error: float) -> int:
-    """Iterations that ALF takes at θ₂ = distance (rad) with γ off by ``error`` of its size."""
-    scene = settings.kinematic(four_bar(distance))
-    model, options = Model(scene), {**settings.ALF}
-    terms = model.terms(0.0, model.start(), consistent_start(model).v)
-    vanishing = np.linalg.svd(terms.jacobian)[0][:, np.linalg.matrix_rank(terms.jacobian) - 1]
-    gamma = terms.gamma + error * np.linalg.norm(terms.gamma) * vanishing
-    for most in range(1, 1000):
-        options["iterations"] = most
-        if ALF.solve(terms.mass, terms.jacobian, terms.force, gamma, **options)[0] == OK:
-            return most
-    return 1000
-
-
 def test_alf_and_what_errors_make_of_it_near_a_singular_position():
-    """On the true branch it converges anywhere; errors in the vanishing direction shrink by 1 + α σ² only."""
-    exact = [alf_iterations(distance, 0.0) for distance in (1.0, 0.01, 0.001)]
-    wrong = [alf_iterations(distance, 1e-8) for distance in (1.0, 0.1, 0.03, 0.01)]
-    assert max(exact) <= 6, f"iterations on the true branch 1, 0.01 and 0.001 rad from θ₂ = 0: {exact}"
+    """An iteration takes out a factor 1 + α σ² of what errors put into the direction that vanishes."""
+    exact = [singular.alf_iterations(distance, 0.0) for distance in (1.0, 0.001)]
+    wrong = [singular.alf_iterations(distance, 1e-8) for distance in (1.0, 0.1, 0.03, 0.01)]
+    assert max(exact) <= 6, f"iterations with γ exact, 1 and 0.001 rad from θ₂ = 0: {exact}"
     assert wrong[0] <= 6 and wrong[0] < wrong[1] < wrong[2] < wrong[3], f"iterations with errors: {wrong}"
     assert wrong[2] > settings.ALF["iterations"], f"{wrong[2]} iterations 0.03 rad away"
 
