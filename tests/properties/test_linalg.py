@@ -110,6 +110,19 @@ def test_nearly_deficient_rank_and_full_pivoting(case, noise):
     assert smallest > 1e-9, f"the rows and columns chosen are dependent: {smallest:.1e}"
 
 
+@given(case=matrices(condition=1e12))
+def test_rank_and_the_independent_rows_and_columns_of_full_pivoting(case):
+    d, rank, values = case
+    m, n = d.shape
+    rows, columns = np.zeros(m, dtype=np.int64), np.zeros(n, dtype=np.int64)
+    found = full_pivot(d.copy(), m, n, rows, columns, 1e-14)
+    assert found == rank, (
+        f"full pivoting found rank {found}, made with {rank}, condition {1 / values[-1]:.1e}"
+    )
+    smallest = np.linalg.svd(d[np.ix_(rows[:rank], columns[:rank])], compute_uv=False)[-1]
+    assert smallest > 1e-3 * values[-1], f"the block chosen has {smallest:.1e}, the matrix {values[-1]:.1e}"
+
+
 @given(case=matrices(condition=1e6))
 def test_least_norm_by_qr_and_by_svd(case):
     d, rank, _ = case
