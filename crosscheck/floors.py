@@ -45,6 +45,10 @@ class Floor:
         """Whether a run completed within FLOOR."""
         return _reaches(self.best)
 
+    def share(self) -> str:
+        """How many families are within FLOOR, of how many."""
+        return f"{sum(map(_reaches, self.families.values()))} of {len(self.families)}"
+
     def row(self) -> tuple[str, ...]:
         """Cells under HEADER."""
         best = self.best

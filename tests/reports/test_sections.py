@@ -132,13 +132,16 @@ def test_limits_and_the_bias_put_in():
 
 
 def test_floors_and_least_errors():
-    found = table(floors.render(groups()), "Within 1e-08")
-    rows = {tuple(row[:2]): dict(zip(found.header, row, strict=True)) for row in found.rows}
-    best = rows["spatial_slider_crank", "mbref"]
+    found, others = (table(floors.render(groups()), name) for name in ("Families", "Within 1e-08"))
+    rows = {row[1]: dict(zip(found.header, row, strict=True)) for row in found.rows[:3]}
+    assert [row[0] for row in found.rows[:3]] == ["spatial_slider_crank", "", ""], "a scene is named once"
+    best = rows["mbref"]
     assert best["Least error"] == "1.6e-05" and best["Settings"] == "step=0.025", best
-    assert best["Within 1e-08"] == "", best
-    assert rows["spatial_slider_crank", "exudyn"]["Least error"] == "not converged at 0.012 s", rows
+    assert best["Families"].startswith("0 of "), best
+    assert rows["exudyn"]["Least error"] == "not converged at 0.012 s", rows
     assert found.caption.startswith("0 of 6 pairs"), found.caption
+    within = {row[1]: dict(zip(others.header, row, strict=True)) for row in others.rows[:3]}
+    assert within["mbref"]["Within 1e-08"] == "" and "1.6e-05" in within["mbref"]["Others"], within
 
 
 @pytest.mark.parametrize(
