@@ -6,7 +6,7 @@ from mbref.compiled import exchangeable, kernel
 from mbref.tables import LARGEST_STEP, ORDER, PROPOSE
 from mbref.vectors import larger
 
-SAFETY, SHRINK, GROW, RETRY = 0.8, 0.2, 6.0, 0.25  # 0.8 takes 5 to 10 % fewer evaluations than 0.9
+SAFETY, SHRINK, GROW, RETRY = 0.8, 0.2, 100.0, 0.25  # 0.8 takes 5 to 10 % fewer evaluations than 0.9
 
 
 @kernel

@@ -6,6 +6,7 @@ Coordinates that never move, and rows that bear on none that does, are left out.
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import os
@@ -194,8 +195,15 @@ def _keep(path: Path, pieces: list[Piece]) -> None:
         os.replace(file.name, path.with_suffix(suffix))
 
 
+@functools.lru_cache(maxsize=64)
+def _read(path: Path) -> tuple[dict[str, int], Code]:
+    """Operations and code of a scene, loaded once in a process."""
+    facts = json.loads(path.with_suffix(".json").read_text())
+    return facts["operations"], Code(path.with_suffix(".o").read_bytes())
+
+
 def _loaded(path: Path, model: Model, moving: Part) -> Specialised:
-    facts, code = json.loads(path.with_suffix(".json").read_text()), Code(path.with_suffix(".o").read_bytes())
+    operations, code = _read(path)
     live = model.entries(moving.coordinates, moving.velocities)
     live[0, [RATES_CODE, PROJECT_CODE]] = [code.address(name) for name in PIECES]
-    return Specialised(live, facts["operations"], code)
+    return Specialised(live, operations, code)
