@@ -28,6 +28,7 @@ SAMPLES = np.linspace(0.0, END, 101)
 SHORT = np.linspace(0.0, 0.12, 61)  # every 2 ms over two revolutions
 TURNS = np.linspace(0.0, END, 401)
 SECOND = np.linspace(0.0, 1.0, 6)
+FINE = np.linspace(0.0, END, 2001)  # every 10 ms, to see the peaks at singular positions
 SIZED_ROWS = ("MPI (SVD)", "ALF", "ALF + CP")  # whose end times are shown over the size of the data errors
 FREE = ("LM2", "MPI (SVD)", "MPI (GS)")  # the rows of Table III that drift until they fail
 LASTING = ("MPI (SVD) + CP", "MPI (GS) + CP")  # the rows of Tables I and II whose runs last 20 s
@@ -62,6 +63,7 @@ class Label(NamedTuple):
     variant: str = BASE.name
 
 
+PEAKS = Label("peaks", "MPI (GS) + CP", HEAVY)
 Cases = dict[Label, Case]
 Records = dict[Label, Record]
 
@@ -150,7 +152,7 @@ def dynamic_scene(column: str) -> Scene:
 
 
 def dynamic() -> Cases:
-    """Figures 11 to 16 and Table IV; for a = b also other settings, and a run on the smooth branch."""
+    """Figures 11 to 16 and Table IV; for a = b also other settings, finely, and on the smooth branch."""
     out = {
         Label("dynamic", row, column): _case(dynamic_scene(column), row, TURNS)
         for column, rows in DYNAMIC.items()
@@ -162,6 +164,7 @@ def dynamic() -> Cases:
                 out[Label("dynamic", row, HEAVY, variant.name)] = _case(
                     dynamic_scene(HEAVY), row, TURNS, variant
                 )
+    out[PEAKS] = _case(dynamic_scene(HEAVY), PEAKS.row, FINE)
     raised = _case(dynamic_scene(UNEQUAL), "MPI (SVD)", TURNS, RAISED)
     out[Label("dynamic", "MPI (SVD)", UNEQUAL, RAISED.name)] = raised
     branch = Setting("alf-dual+projection/dop853", {"rtol": 1e-9})
