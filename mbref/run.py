@@ -38,14 +38,13 @@ from mbref.tables import (
     SIZES,
     SMALLEST_STEP,
     STATE,
-    STEPS,
     STEPS_PER_CALL,
     VELOCITIES,
     VIOLATION,
 )
 
-CALL = 5_000  # steps between returns to Python, where an interrupt is heard and progress is told
-WORTH_IT = 2_000  # generic steps that take about as long as making the machine code of a scene
+CALL = 5_000  # steps between returns to Python, where an interrupt is heard and progress is told; so many
+# generic steps take about as long as making the machine code of a scene
 AUTO, GENERIC, SPECIALISED = "auto", "generic", "specialised"
 
 
@@ -64,7 +63,7 @@ class Limits:
     largest_turn: float = 1.0  # rad that the fastest body may turn in an adaptive step
     most_steps: int = 5_000_000
     sparse_above: int = 0  # constraint rows; with more, alf-dual goes through a sparse factor
-    code: str = AUTO  # GENERIC kernels, SPECIALISED to the scene, or AUTO: specialised after WORTH_IT steps
+    code: str = AUTO  # GENERIC kernels, SPECIALISED to the scene, or AUTO: specialised after CALL steps
 
 
 class Run:
@@ -158,7 +157,7 @@ class Run:
         before, began, status = self.making, time.process_time(), PAUSED
         while status == PAUSED:
             status = march(self.loop, self.problem)
-            if self.wants_code and self.counts[STEPS] >= WORTH_IT:
+            if self.wants_code and status == PAUSED:
                 self.wants_code = False
                 with contextlib.suppress(Untraceable):  # then the generic kernels go on
                     self._make_code()

@@ -10,6 +10,7 @@ from crosscheck.random_mechanisms import random_mechanism
 from mbref.compiled import CACHE
 from mbref.evaluation import coordinate_rates
 from mbref.method import Method, MethodError
+from mbref.results import trajectory_of
 from mbref.run import Run
 from mbref.scene import Body, Force, Revolute, Scene, Spring, TorsionSpring
 from mbref.scenes import SCENES
@@ -157,11 +158,15 @@ def test_planar_mechanisms_keep_the_entries_of_their_plane():
 
 
 def test_auto_takes_the_code_after_many_steps_and_agrees():
-    times, scene = np.array([0.4]), SCENES["planar_slider_crank"]()
-    generic = simulate(scene, "alf-dual+projection", times, Limits(rtol=1e-12, code="generic"))
-    auto = simulate(scene, "alf-dual+projection", times, Limits(rtol=1e-12))
-    assert auto.cost.steps > 2000
+    times, scene, method = np.array([0.7]), SCENES["planar_slider_crank"](), "alf-dual+projection"
+    generic = simulate(scene, method, times, Limits(rtol=1e-12, code="generic"))
+    run = Run(scene, Method.parse(method), times, Limits(rtol=1e-12))
+    auto = trajectory_of(run, *run.march(None), 0.0)
+    assert run.own is not None, f"{auto.cost.steps} steps by general kernels"
     assert apart(generic, auto) < 1e-9
+    short = Run(scene, Method.parse(method), np.array([0.1]), Limits())
+    short.march(None)
+    assert short.own is None, "a short run does not make code"
 
 
 def test_code_is_kept_and_another_scene_has_its_own():
