@@ -43,8 +43,9 @@ from mbref.tables import (
     VIOLATION,
 )
 
-CALL = 5_000  # steps between returns to Python, where an interrupt is heard and progress is told; so many
-# generic steps take about as long as making the machine code of a scene
+# Steps between returns to Python, where an interrupt is heard and progress is told; as many by general
+# kernels take about as long as making the machine code of a scene.
+CALL = 5_000
 AUTO, GENERIC, SPECIALISED = "auto", "generic", "specialised"
 
 
@@ -74,19 +75,9 @@ class Run:
         self.model = model = Model(scene)
         self._check_freedoms()
         self.start = consistent_start(model)
-        self.chart, sparse = chart_of(method, model.m > limits.sparse_above)
-        ints, floats, self.plan = model.ints, model.floats, NO_PLAN
-        memory = 0 if sparse else method.formulation.scratch(model.m, model.n)
-        if sparse or method.stabilisation is PROJECTION:
-            self.start = without_rounding(self.start)
-            moving, entries = moving_entries(model, self.start.q, self.start.v)
-            plan = plan_for(moving, entries, model.entry_columns())
-            self.plan, memory = plan.indices, max(memory, plan.memory)
-            ints, floats = moving_primitives(model, entries) if sparse else (ints, floats)
-        if method.stabilisation is PROJECTION:
-            self.moving = Part.of(plan, moving_coordinates(self.start.q, plan.part(COLUMN)))
-            ints = (*ints[:LIVE], model.entries(self.moving.coordinates, self.moving.velocities))
-        self.work = model.workspace(memory, dense=not sparse)
+        self.chart, self.sparse = chart_of(method, model.m > limits.sparse_above)
+        ints, floats, memory = self._what_moves()
+        self.work = model.workspace(memory, dense=not self.sparse)
         self.pivots = np.zeros((5, 2 * (model.m + 7 * model.nb)), dtype=np.int64)
         self.counts = np.zeros(6, dtype=np.int64)
         self.settings = method.settings(limits.rank_tolerance)
@@ -115,6 +106,24 @@ class Run:
             raise SceneError([fault])
         if freedoms > 0:
             raise SceneError(missing_masses(self.scene))
+
+    def _what_moves(self) -> tuple[tuple, tuple, int]:
+        """The scene's ``ints`` and ``floats`` as far as they are needed, and how much scratch memory is."""
+        model, formulation = self.model, self.method.formulation
+        ints, floats, self.plan = model.ints, model.floats, NO_PLAN
+        memory = 0 if self.sparse else formulation.scratch(model.m, model.n)
+        projected = self.method.stabilisation is PROJECTION
+        if self.sparse or projected:
+            self.start = without_rounding(self.start)
+            moving, entries = moving_entries(model, self.start.q, self.start.v)
+            plan = plan_for(moving, entries, model.entry_columns())
+            self.plan, memory = plan.indices, max(memory, plan.memory)
+        if self.sparse:
+            ints, floats = moving_primitives(model, entries)
+        if projected:
+            self.moving = Part.of(plan, moving_coordinates(self.start.q, plan.part(COLUMN)))
+            ints = (*ints[:LIVE], model.entries(self.moving.coordinates, self.moving.velocities))
+        return ints, floats, memory
 
     def _control(self) -> np.ndarray:
         limits, integrator = self.limits, self.method.integrator
