@@ -139,7 +139,10 @@ class SciPy(GeneralIntegrator):
         from scipy.integrate import solve_ivp
 
         span = (0.0, float(times[-1]))
-        found = solve_ivp(f, span, f.start, method=family, t_eval=times, rtol=rtol, atol=rtol)
+        try:
+            found = solve_ivp(f, span, f.start, method=family, t_eval=times, rtol=rtol, atol=rtol)
+        except ValueError as error:  # Radau's answer to a Jacobian that is not finite
+            return np.zeros((0, f.size)), str(error), 0
         return found.y.T, "" if found.success else found.message, found.nlu
 
 
