@@ -110,7 +110,7 @@ def rivals(chain: str, loops: int) -> list[Rival]:
     ]
     if loops <= DENSE_LOOPS[chain]:
         dense = of_mbref(scene, truth, METHOD, largest_step=step, sparse_above=NEVER)
-        found.append(Rival("dense DOP853", dense))
+        found.append(Rival("dense accelerations", dense))
     if chain == "four_bar_chain":
         found.append(Rival("MuJoCo RK4, planar by hand", of_chain(scene, truth, loops, STEPS)))
     if loops <= SPATIAL_LOOPS:

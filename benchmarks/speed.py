@@ -248,7 +248,7 @@ def _ms(seconds: float) -> str:
 def _advantage(theirs: float, ours: float) -> str:
     if math.isinf(theirs) and math.isfinite(ours):
         return "alone"  # no other reaches that error
-    return _multiple(theirs / ours)
+    return _multiple(theirs / ours) if math.isfinite(ours) else "–"
 
 
 def _multiple(ratio: float) -> str:

@@ -229,7 +229,7 @@ def march(loop, problem):
         suggested = chosen(suggested, control, counts)
         status = advance(
             suggested, step, propose, rates, careful, accept, accelerate, times[place[SAMPLE]], clock,
-            control, tolerances, y, y_rate, y_new, memory, history, nodes, problem,
+            control, tolerances, y, y_rate, y_new, memory, history, problem,
         )  # fmt: skip
         if status != OK:
             return status
@@ -263,7 +263,7 @@ def leap(
 @kernel
 def advance(
     suggested, step, propose, rates, careful, accept, accelerate, target, clock, control, tolerances,
-    y, y_rate, y_new, memory, history, nodes, problem,
+    y, y_rate, y_new, memory, history, problem,
 ):  # fmt: skip
     """One accepted step towards the target time, as many attempts as it takes."""
     _ints, _floats, work, pivots, _settings, counts = opened(problem)

@@ -15,7 +15,7 @@ from mbref.formulations import FORMULATIONS
 from mbref.formulations.base import Formulation
 from mbref.integrators import INTEGRATORS
 from mbref.integrators.base import Integrator
-from mbref.stabilisation import STABILISATIONS
+from mbref.stabilisation import PROJECTION, STABILISATIONS
 from mbref.stabilisation.base import Stabilisation
 from mbref.tables import KEPT_PARTITION, POSITION_GAIN, VELOCITY_GAIN
 
@@ -67,12 +67,14 @@ class Method:
         if not plus:
             stabilisation = "none"
         options: dict[str, dict[str, float]] = {}
-        return Method(
+        parts = (
             _part(formulation, FORMULATIONS, "formulation", options),
             _part(stabilisation, STABILISATIONS, "stabilisation", options),
             _part(integrator or "dop853", INTEGRATORS, "integrator", options),
-            options,
         )
+        if not parts[2].integrates and parts[1] is not PROJECTION:
+            raise MethodError(f"integrator {parts[2].name} only extrapolates: it goes with projection")
+        return Method(*parts, options)
 
 
 def _split_outside_brackets(text: str) -> tuple[str, str, str]:

@@ -38,14 +38,14 @@ from mbref.tables import (
     SIZES,
     SMALLEST_STEP,
     STATE,
+    STEPS,
     STEPS_PER_CALL,
     VELOCITIES,
     VIOLATION,
 )
 
-# Steps between returns to Python, where an interrupt is heard and progress is told; as many by general
-# kernels take about as long as making the machine code of a scene.
-CALL = 5_000
+CALL = 5_000  # steps between returns to Python, where an interrupt is heard and progress is told
+WORTH_IT = 5_000  # steps by general kernels that take about as long as making the machine code of a scene
 AUTO, GENERIC, SPECIALISED = "auto", "generic", "specialised"
 
 
@@ -63,8 +63,8 @@ class Limits:
     largest_step: float = 0.0  # s; 0 means the duration
     largest_turn: float = 1.0  # rad that the fastest body may turn in an adaptive step
     most_steps: int = 5_000_000
-    sparse_above: int = 0  # constraint rows; with more, alf-dual goes through a sparse factor
-    code: str = AUTO  # GENERIC kernels, SPECIALISED to the scene, or AUTO: specialised after CALL steps
+    sparse_above: int = -1  # constraint rows; with more, alf-dual goes through a sparse factor
+    code: str = AUTO  # GENERIC kernels, SPECIALISED to the scene, or AUTO: specialised after WORTH_IT steps
 
 
 class Run:
@@ -108,13 +108,13 @@ class Run:
             raise SceneError(missing_masses(self.scene))
 
     def _what_moves(self) -> tuple[tuple, tuple, int]:
-        """The scene's ``ints`` and ``floats`` as far as they are needed, and how much scratch memory is."""
+        """Choose ``plan`` and, of a projection, ``moving``; the ``ints`` and ``floats`` needed, scratch."""
         model, formulation = self.model, self.method.formulation
         ints, floats, self.plan = model.ints, model.floats, NO_PLAN
         memory = 0 if self.sparse else formulation.scratch(model.m, model.n)
         projected = self.method.stabilisation is PROJECTION
         if self.sparse or projected:
-            self.start = without_rounding(self.start)
+            self.start = without_rounding(model, self.start)
             moving, entries = moving_entries(model, self.start.q, self.start.v)
             plan = plan_for(moving, entries, model.entry_columns())
             self.plan, memory = plan.indices, max(memory, plan.memory)
@@ -166,7 +166,7 @@ class Run:
         before, began, status = self.making, time.process_time(), PAUSED
         while status == PAUSED:
             status = march(self.loop, self.problem)
-            if self.wants_code and status == PAUSED:
+            if self.wants_code and status == PAUSED and self.counts[STEPS] >= WORTH_IT:
                 self.wants_code = False
                 with contextlib.suppress(Untraceable):  # then the generic kernels go on
                     self._make_code()

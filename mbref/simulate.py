@@ -26,7 +26,7 @@ def simulate(
 ) -> Trajectory:
     """Simulate from t = 0 and sample at ``times`` (k,), increasing, s; ``progress`` is told the time reached.
 
-    The method "kinematic" is that of ``kinematics``, which integrates nothing.
+    The method "kinematic" integrates nothing (``integrators.predictor``).
     Returns the states reached, with accelerations and reactions; a failure of the method is the
     trajectory's outcome.  Raises SceneError for a scene that cannot be simulated, ValueError for times
     that do not increase or an order the integrator does not have, MethodError for an unknown method name
@@ -40,9 +40,9 @@ def simulate(
         run = Run(scene, method, times, limits)
     except Untraceable as reason:
         raise MethodError(f"no machine code for {scene.name!r} by {method}: {reason}") from None
-    built = time.process_time() - began
+    built = time.process_time() - began - run.making
     status, seconds = run.march(progress)
-    return trajectory_of(run, status, seconds, built)
+    return trajectory_of(run, status, seconds, built + run.making)
 
 
 def why_no_code(scene: Scene, method: Method) -> str:

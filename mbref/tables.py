@@ -1,6 +1,6 @@
 """The scene and the working memory as tuples of arrays: what every kernel takes.
 
-``ints`` and ``floats`` hold the scene and never change; ``work`` holds what an evaluation produces.
+``ints`` and ``floats`` hold the scene; no kernel changes them.  ``work`` holds what an evaluation produces.
 The names below are the positions in these tuples and the columns of their tables.
 Columns of the velocity vector: 6 per body, (r', ω') with ω' in the body's principal frame; of the
 coordinate vector: 7 per body, (r, Euler parameters).  Body ``nb`` is the fixed frame.
@@ -30,7 +30,7 @@ ROWS = 2  # (6, rows): see the rows below
 COLUMNS = 3  # (5, 6 nb): see the rows below
 STATE = 4  # (4, 7 nb): what the chart last made of its coordinates, see the rows below
 LAST = 5  # (4, 7 nb): STATE at the last accepted step
-DENSE = 6  # a matrix for the chart
+DENSE = 6  # a matrix for the chart, and the table of extrapolations
 DENSE_VECTORS = 7  # (8, ·) vectors for the chart
 SCRATCH = 8  # (1, ·) memory of the formulation
 ANGLES = 9  # (1, torsion springs): unwrapped angle at the last accepted step
@@ -72,7 +72,7 @@ CHANGED, HANDOVER = 4, 5  # the chart chose new coordinates; its rates leave the
 INTS = types.UniTuple(INDEX_TABLE, 4)
 FLOATS = types.UniTuple(MATRIX, 5)
 WORK = types.UniTuple(MATRIX, 12)
-PIVOTS = INDEX_TABLE  # (5, ·): orders and exchanges; pivots[SIZES] = rank and length of y
+# pivots (5, ·), an index table: orders and exchanges; pivots[SIZES] = rank (of partitioning) and length of y
 PROBLEM = INDEX_TABLE  # all of these, settings and counts behind one argument: see problem.py
 
 # signatures of the exchangeable kernels

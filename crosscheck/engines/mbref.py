@@ -39,7 +39,9 @@ class Mbref(Engine):
         return __version__
 
     def cannot(self, scene: Scene) -> Cannot | None:
-        if not scene.has_mass() and scene.counts().degrees_of_freedom > 0:
+        from mbref.freedoms import undriven_freedoms
+
+        if not scene.has_mass() and undriven_freedoms(scene) > 0:
             return Cannot(Why.NEVER, "bodies without mass move only where every freedom is driven")
         return None
 

@@ -28,7 +28,7 @@ class Formulation:
     handles_singular_mass: bool
     needs_independent_columns: bool = False  # works only where no freedom is left
     iterative: bool = False
-    sparse: bool = False  # large scenes go through the kernels of mbref.sparse, the same iteration
+    sparse: bool = False  # runs go through the kernels of mbref.sparse, the same iteration
     pivots_by_size: bool = False  # its operations depend on the state and cannot be laid down beforehand
     options: Mapping[str, float] = field(default_factory=dict)  # the method's numbers and their defaults
     feedback: Callable[[Mapping[str, float]], tuple[float, float]] | None = None  # gains of Φ' and Φ in γ

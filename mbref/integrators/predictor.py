@@ -17,7 +17,8 @@ from mbref.vectors import larger
 
 NODES = 3
 NEARNESS = 2e-2  # of the step: what the polynomial of a state fewer may be off; the prediction is much nearer
-ORDER = 4  # of the estimate
+ROUNDING = 1e-9  # m or rad; what moves less is at rest but for rounding
+ORDER = 3  # of the estimate as a part of the step
 FOUND, TIMES, OTHER = range(2 * NODES, 2 * NODES + 3)  # rows of the memory after the nodes' states and rates
 
 
@@ -67,7 +68,7 @@ def step(
     off, moved = 0.0, 0.0
     for i in range(opened(problem)[0][LIVE][0, MOVING]):
         off, moved = larger(off, y_new[i] - other[i]), larger(moved, y_new[i] - y[i])
-    return off / (NEARNESS * moved) if moved > 0.0 else 0.0
+    return off / (NEARNESS * max(moved, ROUNDING))
 
 
 PREDICTOR = Integrator("predictor", ORDER, step, propose, 2 * NODES + 3, adaptive=True, integrates=False)

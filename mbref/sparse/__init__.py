@@ -1,1 +1,1 @@
-"""Large scenes: the sparse factor of S + I/α, whose cost grows with the number of joints and no faster."""
+"""The sparse factor of S + I/α over what moves: its cost grows with the number of joints and no faster."""

@@ -59,7 +59,7 @@ def accelerations(plan, work, settings, counts):
 
 @exchangeable(RATES)
 def rates(accelerate, t, y, y_rate, problem):
-    """y' of the entries that move."""
+    """y' of the entries of y."""
     ints, floats, work, _pivots, settings, counts = opened(problem)
     live, state, acceleration = ints[LIVE], work[STATE], work[COLUMNS][ACCELERATION]
     expand(y, live, state)

@@ -12,13 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from mbref.initial import Start
+from mbref.initial import Start, given_velocities, scene_length
 from mbref.model import Model, displaced
 from mbref.tables import GEOMETRY, PRIMITIVES
 
 FIRST_ROW = 4  # column of PRIMITIVES
 STATES = 2  # random states asked, so that an accidental zero at one does no harm
-STILL = 1e-12  # a coordinate this small, or a velocity relative to the largest, is what corrections leave
+STILL = 1e-12  # of the scene's length, of 1, or of the largest velocity: what corrections leave
 
 
 def moving_entries(model: Model, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -59,11 +59,13 @@ def _reached(
         reached = found
 
 
-def without_rounding(start: Start) -> Start:
-    """The start with zero for the roundings of zero in its coordinates and velocities."""
-    q, v = start.q, start.v
-    still = np.abs(v) < STILL * np.max(np.abs(v), initial=0.0)
-    return replace(start, q=np.where(np.abs(q) < STILL, 0.0, q), v=np.where(still, 0.0, v))
+def without_rounding(model: Model, start: Start) -> Start:
+    """The start with zero for the roundings of zero in its coordinates, and in velocities not given."""
+    q, v, small = start.q.reshape(-1, 7), start.v, np.full((model.nb, 7), STILL)
+    small[:, :3] *= scene_length(model)
+    given, _ = given_velocities(model, start.q)
+    still = (np.abs(v) < STILL * np.max(np.abs(v), initial=0.0)) & (given == 0)
+    return replace(start, q=np.where(np.abs(q) < small, 0.0, q).ravel(), v=np.where(still, 0.0, v))
 
 
 def moving_coordinates(q: np.ndarray, velocities: np.ndarray) -> np.ndarray:

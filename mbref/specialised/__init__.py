@@ -1,4 +1,4 @@
-"""Machine code of one scene's own, traced from the kernels that serve every scene."""
+"""Machine code of one scene's own, traced from kernels that serve every scene."""
 
 from mbref.specialised.build import Part, Specialised, specialise
 from mbref.specialised.chart import with_own_code

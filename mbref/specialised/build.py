@@ -1,7 +1,8 @@
 """Specialise: the machine code of one scene, holding only the operations that its constants leave.
 
-Two pieces are traced from the kernels: the rates of the moving coordinates, and the projection of a state.
-Coordinates that never move, and rows that bear on none that does, are left out.
+Two pieces are traced from the kernels: the rates of the moving coordinates, by the formulation's dense kernel
+on the rows and columns that move, and the projection of a state.  Coordinates that never move, and rows that
+bear on none that does, are left out.
 """
 
 from __future__ import annotations
@@ -52,6 +53,7 @@ from mbref.tables import (
     SCRATCH,
 )
 
+MOST_ROWS = 40  # whose record would not be too long (machine_code.MOST_OPERATIONS)
 PIECES = ("rates", "project")  # in the order of their addresses in ints[LIVE]
 
 
@@ -164,6 +166,8 @@ def specialise(
         raise Untraceable("without the JIT there is no machine code")
     if formulation.pivots_by_size:
         raise Untraceable(f"{formulation.name} chooses pivots at every evaluation")
+    if len(moving.rows) > MOST_ROWS:
+        raise Untraceable(f"{len(moving.rows)} rows that move, more than {MOST_ROWS}")
     arrays = (*model.ints, *model.floats, settings, q, v, moving.coordinates, moving.plan.indices)
     kept = CACHE / "scenes" / _key(formulation.name, arrays)
     if not kept.with_suffix(".json").exists():

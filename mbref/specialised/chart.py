@@ -14,10 +14,12 @@ from numba.extending import intrinsic
 from mbref.compiled import exchangeable, kernel
 from mbref.evaluation import expand, move, place
 from mbref.problem import opened, planned
+from mbref.singular import NEVER
 from mbref.sparse.factor import part
 from mbref.sparse.plan import ROW
 from mbref.stabilisation.base import Stabilisation
-from mbref.stabilisation.projection import MOST_ITERATIONS, project, watch
+from mbref.stabilisation.full import flush
+from mbref.stabilisation.projection import MOST_ITERATIONS, ROUNDING, project, watch
 from mbref.tables import (
     ACCELERATION,
     ACCEPT,
@@ -36,6 +38,7 @@ from mbref.tables import (
     NEWTON,
     NEWTON_TOLERANCE,
     OK,
+    PHI,
     PROJECT_CODE,
     RATES,
     RATES_CODE,
@@ -97,14 +100,18 @@ def accept(t, y, problem):
     size, rows = live[0, MOVING] + live[0, TURNING], part(planned(problem), ROW).shape[0]
     memory = work[DENSE_VECTORS].reshape(-1)
     out, more = memory[:size], memory[size : size + 1 + rows]
+    tolerance, violation = settings[NEWTON_TOLERANCE], NEVER
     for _ in range(MOST_ITERATIONS):
         counts[NEWTON] += 1
         counts[FACTORISATIONS] += 1
         if call(live[0, PROJECT_CODE], t, y, work[ANGLES][0], out, more) != OK:
             break
         y[:size] = out
-        if more[0] <= settings[NEWTON_TOLERANCE]:
+        before, violation = violation, more[0]
+        if violation <= tolerance or before <= violation <= ROUNDING * tolerance:
             watch(more[1:], work[MEMO][0])
+            flush(y[:size])
+            work[ROWS][PHI, :] = violation
             expand(y, live, state)
             place(state[COORDINATES], work[FRAMES])
             move(state[VELOCITIES][: work[COLUMNS].shape[1]], work[FRAMES])

@@ -2,7 +2,7 @@
 
 A record becomes a function ``i64 f(double t, double* y, double* angles, double* out, double* more)`` of the
 operations that its results need; it returns 0 when all its guards held.  Without fast-math flags every
-operation gives the bits that it gives in the kernel.
+operation gives the bits that it gives in the kernel it was traced from.
 """
 
 from __future__ import annotations

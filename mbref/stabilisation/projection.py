@@ -54,7 +54,8 @@ ALPHA = 1e10  # of the iteration
 POSITION_ITERATIONS, VELOCITY_ITERATIONS = 1, 2  # Newton's method repeats the first
 INDEPENDENT = (5.0 * ALPHA**-0.25) ** 2  # the squared pivot from which on a row counts as independent
 MOST_ITERATIONS = 10
-SMALL, GOOD_REDUCTION = 1e-8, 1e-2  # a factor serves beside its state: where a violation so small shrinks so
+ROUNDING = 1e3  # tolerances: what is left where iterations no longer reduce it
+SMALL, GOOD_REDUCTION = 1e-8, 1e-2  # a factor is kept while violations are so small and shrink so fast
 CHANGE = 0  # row of DENSE_VECTORS
 
 
@@ -159,11 +160,11 @@ def project_positions(t, q, v, plan, ints, floats, work, settings, counts):
         evaluate(t, q, v, ints, floats, work)
         before, violation = violation, largest(rows[PHI])
         if before > SMALL or (violation > tolerance and not violation <= GOOD_REDUCTION * before):
-            if violation <= 1e3 * tolerance and not violation < before:
+            if violation <= ROUNDING * tolerance and not violation < before:
                 return OK  # what is left is rounding
             if not factor(plan, work, ALPHA, counts):
                 return SINGULAR
-    return OK if violation <= 1e3 * tolerance else NOT_CONVERGED
+    return OK if violation <= ROUNDING * tolerance else NOT_CONVERGED
 
 
 @kernel

@@ -7,6 +7,7 @@ from crosscheck.metrics import measure
 from crosscheck.truth import truth_for
 from mbref.freedoms import undriven_freedoms
 from mbref.initial import corrected_positions, displaced
+from mbref.method import MethodError
 from mbref.model import Model
 from mbref.scene import SceneError
 from mbref.scenes import SCENES
@@ -39,6 +40,22 @@ def test_kinematic_analysis_by_code_of_its_own_and_any_samples(name, samples):
     assert trajectory.outcome.name == "COMPLETED", trajectory.message
     assert trajectory.cost.steps < max(100, 2 * samples), f"{trajectory.cost.steps} steps"
     assert measure(scene, trajectory, truth_for(scene))["error"] < 1e-12
+
+
+def test_kinematic_analysis_of_a_modelled_ground_without_masses():
+    scene = SCENES["four_bar"]()
+    bodies = tuple(body.model_copy(update={"mass": None, "inertia": None}) for body in scene.body)
+    bare = scene.with_(body=bodies, ground="body", load=())
+    start, later = simulate(bare, "kinematic", [0.0]), simulate(bare, "kinematic", [0.02])
+    with_masses = simulate(scene, "kinematic", [0.02])
+    assert np.abs(start.position[0] - [body.position for body in scene.body]).max() < 1e-15
+    assert np.abs(later.position - with_masses.position).max() < 1e-12
+
+
+@pytest.mark.parametrize("stabilisation", ("none", "baumgarte", "partitioning"))
+def test_what_only_extrapolates_needs_projection(stabilisation):
+    with pytest.raises(MethodError, match="predictor only extrapolates"):
+        simulate(SCENES["four_bar"](), f"alf-dual+{stabilisation}/predictor", [0.1])
 
 
 def test_freedom_without_driver_is_refused():
