@@ -5,19 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 
 from mbref.compiled import exchangeable, kernel
-from mbref.evaluation import contract, coordinate_rates, evaluate, expand, right_hand_side
+from mbref.evaluation import evaluate, expand, right_hand_side
 from mbref.problem import opened, planned
 from mbref.sparse.factor import memories, part, subtract_product
 from mbref.sparse.iteration import factor, settle
 from mbref.sparse.plan import COLUMN, ROW
 from mbref.stabilisation.base import Stabilisation
 from mbref.stabilisation.baumgarte import BAUMGARTE
+from mbref.stabilisation.full import write_rates
 from mbref.stabilisation.none import NONE
 from mbref.stabilisation.projection import PROJECTION
 from mbref.tables import (
     ACCELERATION,
     COLUMNS,
-    COORDINATE_RATES,
     COORDINATES,
     EVALUATIONS,
     FORCE,
@@ -61,15 +61,14 @@ def accelerations(plan, work, settings, counts):
 def rates(accelerate, t, y, y_rate, problem):
     """y' of the entries of y."""
     ints, floats, work, _pivots, settings, counts = opened(problem)
-    live, state, acceleration = ints[LIVE], work[STATE], work[COLUMNS][ACCELERATION]
+    live, state = ints[LIVE], work[STATE]
     expand(y, live, state)
-    q, v = state[COORDINATES], state[VELOCITIES][: acceleration.shape[0]]
+    q, v = state[COORDINATES], state[VELOCITIES][: work[COLUMNS].shape[1]]
     counts[EVALUATIONS] += 1
     evaluate(t, q, v, ints, floats, work)
     right_hand_side(v, ints, work, settings)
     status = accelerations(planned(problem), work, settings, counts)
-    coordinate_rates(q, v, state[COORDINATE_RATES])
-    contract(state[COORDINATE_RATES], acceleration, live, y_rate)
+    write_rates(q, v, live, y_rate, work)
     return status
 
 

@@ -1,11 +1,14 @@
-"""The chart of all coordinates: y = (r, Euler parameters of every body; r', ω' of every body)."""
+"""The chart of the entries in ``ints[LIVE]``, which are all unless a projection leaves out what cannot move.
+
+y = (r, Euler parameters; r', ω'), body by body.
+"""
 
 from __future__ import annotations
 
 from numpy import sqrt
 
 from mbref.compiled import exchangeable, kernel
-from mbref.evaluation import accelerations, coordinate_rates
+from mbref.evaluation import accelerations, contract, coordinate_rates, expand
 from mbref.problem import opened
 from mbref.tables import (
     ACCELERATION,
@@ -14,55 +17,43 @@ from mbref.tables import (
     COORDINATE_RATES,
     COORDINATES,
     ENTER,
+    LIVE,
+    MOVING,
     OK,
     RATES,
     STATE,
+    TURNING,
     VELOCITIES,
 )
 
 TINY = 1e-100  # its cube is still a normal number
 
 
-@kernel
-def copy_state(state, y):
-    """Coordinates and velocities of ``work[STATE]`` into y; the length of y."""
-    nq = state.shape[1]
-    nv = 6 * (nq // 7)
-    for k in range(nq):
-        y[k] = state[COORDINATES, k]
-    for k in range(nv):
-        y[nq + k] = state[VELOCITIES, k]
-    return nq + nv
-
-
 @exchangeable(ENTER)
 def enter(t, y, problem):
-    _ints, _floats, work, _pivots, _settings, _counts = opened(problem)
-    return copy_state(work[STATE], y)
+    ints, _floats, work, _pivots, _settings, _counts = opened(problem)
+    live, state = ints[LIVE], work[STATE]
+    contract(state[COORDINATES], state[VELOCITIES][: work[COLUMNS].shape[1]], live, y)
+    return live[0, MOVING] + live[0, TURNING]
 
 
 @exchangeable(RATES)
 def rates(accelerate, t, y, y_rate, problem):
     ints, floats, work, pivots, settings, counts = opened(problem)
-    nq, nv = work[STATE].shape[1], work[COLUMNS].shape[1]
-    q, v = y[:nq], y[nq : nq + nv]
+    live, state = ints[LIVE], work[STATE]
+    expand(y, live, state)
+    q, v = state[COORDINATES], state[VELOCITIES][: work[COLUMNS].shape[1]]
     status = accelerations(accelerate, t, q, v, ints, floats, work, pivots, settings, counts)
-    write_rates(q, v, y_rate, work)
+    write_rates(q, v, live, y_rate, work)
     return status
 
 
 @kernel
-def write_rates(q, v, y_rate, work):
-    """y' from the accelerations found, and the state into ``work[STATE]``."""
-    state, acceleration = work[STATE], work[COLUMNS][ACCELERATION]
-    nq, nv = q.shape[0], v.shape[0]
-    coordinate_rates(q, v, y_rate)
-    for k in range(nv):
-        y_rate[nq + k] = acceleration[k]
-        state[VELOCITIES, k] = v[k]
-    for k in range(nq):
-        state[COORDINATES, k] = q[k]
-        state[COORDINATE_RATES, k] = y_rate[k]
+def write_rates(q, v, live, y_rate, work):
+    """y' of the entries of y, from the accelerations found."""
+    rates_of_q = work[STATE][COORDINATE_RATES]
+    coordinate_rates(q, v, rates_of_q)
+    contract(rates_of_q, work[COLUMNS][ACCELERATION], live, y_rate)
 
 
 @kernel

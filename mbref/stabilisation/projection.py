@@ -12,18 +12,16 @@ from __future__ import annotations
 from numpy import sqrt
 
 from mbref.compiled import exchangeable, kernel
-from mbref.evaluation import accelerations, contract, coordinate_rates, evaluate, expand, violation_rate
+from mbref.evaluation import contract, coordinate_rates, evaluate, expand, violation_rate
 from mbref.problem import opened, planned
 from mbref.sparse.factor import memories, part, squared_pivots
 from mbref.sparse.iteration import correct, factor
 from mbref.sparse.plan import ROW
 from mbref.stabilisation.base import Stabilisation
-from mbref.stabilisation.full import flush, normalise
+from mbref.stabilisation.full import flush, normalise, rates
 from mbref.tables import (
-    ACCELERATION,
     ACCEPT,
     COLUMNS,
-    COORDINATE_RATES,
     COORDINATES,
     DENSE_VECTORS,
     ENTER,
@@ -37,7 +35,6 @@ from mbref.tables import (
     OK,
     PHI,
     PHI_RATE,
-    RATES,
     REFERENCE_PIVOT,
     ROWS,
     SCRATCH,
@@ -70,19 +67,6 @@ def enter(t, y, problem):
         watch_pivots(plan, work)
     contract(q, v, live, y)
     return live[0, MOVING] + live[0, TURNING]
-
-
-@exchangeable(RATES)
-def rates(accelerate, t, y, y_rate, problem):
-    """y' of the entries that move, by the formulation ``accelerate`` on all rows."""
-    ints, floats, work, pivots, settings, counts = opened(problem)
-    live, state, acceleration = ints[LIVE], work[STATE], work[COLUMNS][ACCELERATION]
-    expand(y, live, state)
-    q, v = state[COORDINATES], state[VELOCITIES][: acceleration.shape[0]]
-    status = accelerations(accelerate, t, q, v, ints, floats, work, pivots, settings, counts)
-    coordinate_rates(q, v, state[COORDINATE_RATES])
-    contract(state[COORDINATE_RATES], acceleration, live, y_rate)
-    return status
 
 
 @kernel
