@@ -1,9 +1,9 @@
 """How kernels are compiled: once per machine and source version, cached on disk, replaceable.
 
-``kernel`` marks a helper that other kernels call.  ``exchangeable(signature)`` marks one that is passed
-to another kernel as an argument (a formulation, a chart, an integrator): it is compiled when it is first
-asked for, and the kernels that take it need no compilation of their own for it.
-With NUMBA_DISABLE_JIT=1 both leave the plain Python function.
+``kernel`` marks a helper that other kernels call, ``inlined`` one that becomes part of them.
+``exchangeable(signature)`` marks one that is passed to another kernel as an argument (a formulation, a
+chart, an integrator): it is compiled when it is first asked for, and the kernels that take it need no
+compilation of their own for it.  With NUMBA_DISABLE_JIT=1 all leave the plain Python function.
 
 The cache lives in a folder named after a hash of mbref's sources, because numba does not notice an edit
 in a kernel that another file's kernel calls.
@@ -65,6 +65,12 @@ def kernel(function: Callable) -> Callable:
     """A compiled helper, callable from kernels and from Python."""
     with _own_cache():
         return njit(**OPTIONS)(function)
+
+
+def inlined(function: Callable) -> Callable:
+    """A kernel compiled into each of its callers, where handing tuples of arrays over takes as long as it."""
+    with _own_cache():
+        return njit(forceinline=True, **OPTIONS)(function)
 
 
 class Exchangeable:

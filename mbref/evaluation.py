@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbref.compiled import FLOAT, VECTOR, entry, kernel
+from mbref.compiled import FLOAT, VECTOR, entry, inlined, kernel
 from mbref.loads import forces
 from mbref.primitives import constraints
 from mbref.tables import (
@@ -41,7 +41,7 @@ from mbref.tables import (
 )
 
 
-@kernel
+@inlined
 def place(q, frames):
     """Positions and rotation matrices of coordinates q; A(p) of p / |p|, so that length does not matter."""
     for b in range(q.shape[0] // 7):
@@ -60,7 +60,7 @@ def place(q, frames):
         frames[b, ROTATION + 8] = 1.0 - s * (x * x + y * y)
 
 
-@kernel
+@inlined
 def move(v, frames):
     """Velocities r' and body-fixed ω' of the velocity vector v."""
     for b in range(v.shape[0] // 6):
@@ -69,7 +69,7 @@ def move(v, frames):
             frames[b, OMEGA + k] = v[6 * b + 3 + k]
 
 
-@kernel
+@inlined
 def coordinate_rates(q, v, rates):
     """q' of v: r' and p' = ½ Lᵀ ω'."""
     for b in range(q.shape[0] // 7):
@@ -84,7 +84,7 @@ def coordinate_rates(q, v, rates):
         rates[i + 6] = -y * a + x * b_ + w * c
 
 
-@kernel
+@inlined
 def expand(y, live, state):
     """The whole state of y; coordinates that it does not have stay as they are."""
     nq, nv = live[0, MOVING], live[0, TURNING]
@@ -94,7 +94,7 @@ def expand(y, live, state):
         state[VELOCITIES, live[1, nq + k]] = y[nq + k]
 
 
-@kernel
+@inlined
 def contract(coordinates, velocities, live, y):
     """The entries of y among all coordinates and velocities, or their rates."""
     nq, nv = live[0, MOVING], live[0, TURNING]
@@ -104,7 +104,7 @@ def contract(coordinates, velocities, live, y):
         y[nq + k] = velocities[live[1, nq + k]]
 
 
-@kernel
+@inlined
 def violation_rate(ints, work, v):
     """Φ' = Φ_q v - ν of every row."""
     bodies, jacobian, rows = ints[ROW_BODIES], work[JACOBIAN], work[ROWS]
@@ -131,7 +131,7 @@ def dense_jacobian(ints, work):
                     dense[row, start + k] = jacobian[row, 6 * side + k]
 
 
-@kernel
+@inlined
 def evaluate(t, q, v, ints, floats, work):
     """Φ, Φ_q (blocks), ν, γ and g at (t, q, v)."""
     place(q, work[FRAMES])
@@ -148,7 +148,7 @@ def evaluate_all(t, q, v, ints, floats, work):
     return t
 
 
-@kernel
+@inlined
 def right_hand_side(v, ints, work, settings):
     """That of Φ_q q̈ = γ, less the feedback of Eq. 9 where a stabilisation asks for it."""
     rows = work[ROWS]

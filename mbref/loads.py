@@ -10,7 +10,7 @@ from math import pi
 
 from numpy import arctan2, floor, sqrt
 
-from mbref.compiled import kernel
+from mbref.compiled import inlined, kernel
 from mbref.tables import (
     ANGLES,
     BODIES,
@@ -33,7 +33,7 @@ from mbref.vectors import accumulate, add, cross, dot, scale, subtract, to_body,
 FIRST, SECOND, THIRD, FOURTH, CONSTANTS = 0, 3, 6, 9, 12  # four vectors, then stiffness, damping, natural
 
 
-@kernel
+@inlined
 def forces(ints, floats, work):
     """g at the state in ``work[FRAMES]``, into ``work[COLUMNS][FORCE]``."""
     bodies, gravity, frames, g = floats[BODIES], floats[GRAVITY], work[FRAMES], work[COLUMNS][FORCE]

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from numpy import cos, sin
 
-from mbref.compiled import kernel
+from mbref.compiled import inlined, kernel
 from mbref.tables import (
     DOT1,
     DOT2,
@@ -181,7 +181,7 @@ def distance(p, row, i, j, frames, geometry, jacobian, rows):
     put(jacobian, row, 9, cross(s_j, to_body(frames, j, along)))
 
 
-@kernel
+@inlined
 def constraints(t, ints, floats, work):
     """Φ, Φ_q, ν and γ of every row at the state in ``work[FRAMES]``."""
     primitives, geometry, drivers = ints[PRIMITIVES], floats[GEOMETRY], floats[DRIVERS]

@@ -45,7 +45,7 @@ from mbref.tables import (
 )
 
 CALL = 5_000  # steps between returns to Python, where an interrupt is heard and progress is told
-WORTH_IT = 5_000  # steps by general kernels that take about as long as making the machine code of a scene
+WORTH_IT = 20_000  # steps ahead from which on machine code of the scene's own saves what making it takes
 AUTO, GENERIC, SPECIALISED = "auto", "generic", "specialised"
 
 
@@ -166,13 +166,17 @@ class Run:
         before, began, status = self.making, time.process_time(), PAUSED
         while status == PAUSED:
             status = march(self.loop, self.problem)
-            if self.wants_code and status == PAUSED and self.counts[STEPS] >= WORTH_IT:
+            if self.wants_code and status == PAUSED and self._steps_ahead() >= WORTH_IT:
                 self.wants_code = False
                 with contextlib.suppress(Untraceable):  # then the generic kernels go on
                     self._make_code()
             if progress is not None:
                 progress(float(self.clock[TIME]))
         return status, time.process_time() - began - (self.making - before)
+
+    def _steps_ahead(self) -> float:
+        """Steps to the end at the pace so far."""
+        return self.counts[STEPS] * (self.times[-1] / self.clock[TIME] - 1.0)
 
     def _table(self, chart: Stabilisation) -> np.ndarray | tuple:
         """The first argument of ``march``."""

@@ -18,7 +18,7 @@ from mbref.linalg import add_product, cholesky_factor, cholesky_solve, gram, tim
 from mbref.tables import ACCELERATE, FACTORISATIONS, FORMULATION_OPTIONS, NOT_CONVERGED, OK, SINGULAR
 
 TINY, NEVER = 1e-300, 1e300
-LEAST = 3  # iterations: enough up to the neighbourhood of a singular position, so that the number is fixed
+LEAST = 2  # iterations: enough up to the neighbourhood of a singular position, so that the number is fixed
 
 OPTIONS = {"alpha": 1e10, "epsilon": 1e-12, "iterations": 20.0, "omega": 0.0, "mu": 1.0}
 

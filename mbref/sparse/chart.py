@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from mbref.compiled import exchangeable, kernel
+from mbref.compiled import exchangeable, inlined
 from mbref.evaluation import evaluate, expand, right_hand_side
 from mbref.problem import opened, planned
 from mbref.sparse.factor import memories, part, subtract_product
@@ -35,7 +35,7 @@ from mbref.tables import (
 )
 
 
-@kernel
+@inlined
 def accelerations(plan, work, settings, counts):
     """Accelerations and multipliers by ALF-dual at the state last evaluated; their status."""
     rows, columns, column, row = work[ROWS], work[COLUMNS], part(plan, COLUMN), part(plan, ROW)

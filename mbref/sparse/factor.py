@@ -6,7 +6,7 @@ diagonal; a row without entries has 1 there and changes nothing.  Vectors of row
 
 from __future__ import annotations
 
-from mbref.compiled import kernel
+from mbref.compiled import inlined
 from mbref.sparse.plan import (
     COLUMN,
     D_COLUMN,
@@ -23,13 +23,13 @@ from mbref.sparse.plan import (
 )
 
 
-@kernel
+@inlined
 def part(plan, k):
     """One of the parts of the plan's indices."""
     return plan[plan[k] : plan[k + 1]]
 
 
-@kernel
+@inlined
 def memories(plan, memory):
     """Views of the memory: D, L, S_ii, pivots squared, three vectors of rows, M^(-1/2), one of columns."""
     d, l, r = part(plan, D_ENTRY).shape[0], part(plan, L_ROW).shape[0], part(plan, ROW).shape[0]
@@ -42,7 +42,7 @@ def memories(plan, memory):
     )  # fmt: skip
 
 
-@kernel
+@inlined
 def assemble(plan, jacobian, inverse_root, alpha, d, l, diagonal, root):
     """M^(-1/2) and D from the model's diagonal (n,) and blocks (m, 12), and S + I/α into the places of L."""
     entry, column, moving = part(plan, D_ENTRY), part(plan, D_COLUMN), part(plan, COLUMN)
@@ -66,7 +66,7 @@ def assemble(plan, jacobian, inverse_root, alpha, d, l, diagonal, root):
         l[first[k]] = diagonal[k]
 
 
-@kernel
+@inlined
 def factorise(plan, l):
     """L of S + I/α in its place, 1/Δ instead of its unit diagonal; False where an entry of Δ is ≤ 0."""
     first, update = part(plan, L_START), part(plan, UPDATE)
@@ -86,7 +86,7 @@ def factorise(plan, l):
     return True
 
 
-@kernel
+@inlined
 def solve(plan, l, b):
     """b := (S + I/α)⁻¹ b."""
     first, row = part(plan, L_START), part(plan, L_ROW)
@@ -102,7 +102,7 @@ def solve(plan, l, b):
         b[k] = value
 
 
-@kernel
+@inlined
 def subtract_product(plan, d, x, b):
     """b -= D x."""
     start, column = part(plan, D_START), part(plan, D_COLUMN)
@@ -113,7 +113,7 @@ def subtract_product(plan, d, x, b):
         b[k] = value
 
 
-@kernel
+@inlined
 def times_transpose(plan, d, b, x):
     """x := Dᵀ b."""
     start, column = part(plan, D_START), part(plan, D_COLUMN)
@@ -124,7 +124,7 @@ def times_transpose(plan, d, b, x):
             x[column[p]] += d[p] * value
 
 
-@kernel
+@inlined
 def squared_pivots(plan, l, diagonal, squares):
     """Squares (r,) of the pivots of unit rows: the sines of the angle between each row and those before."""
     first = part(plan, L_START)

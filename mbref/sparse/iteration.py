@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from numpy import sqrt
 
-from mbref.compiled import kernel
+from mbref.compiled import inlined
 from mbref.sparse.factor import (
     assemble,
     factorise,
@@ -24,7 +24,7 @@ from mbref.tables import COLUMNS, FACTORISATIONS, INVERSE_ROOT, JACOBIAN, NOT_CO
 TINY, NEVER = 1e-300, 1e300
 
 
-@kernel
+@inlined
 def factor(plan, work, alpha, counts):
     """L of S + I/α at the state last evaluated; whether it could be had."""
     memory, inverse_root = work[SCRATCH][0], work[COLUMNS][INVERSE_ROOT]
@@ -34,7 +34,7 @@ def factor(plan, work, alpha, counts):
     return factorise(plan, l)
 
 
-@kernel
+@inlined
 def settle(plan, work, epsilon, most, target, multipliers):
     """Change ``target`` (n,) by the least in the metric of M that makes Φ_q target grow by b of the memory.
 
@@ -60,7 +60,7 @@ def settle(plan, work, epsilon, most, target, multipliers):
     return status
 
 
-@kernel
+@inlined
 def correct(plan, work, iterations, target):
     """As ``settle`` with a fixed number of iterations."""
     d, l, _, _, b, step, _, root, x = memories(plan, work[SCRATCH][0])
@@ -70,7 +70,7 @@ def correct(plan, work, iterations, target):
         improve(plan, d, l, b, step, root, x, target)
 
 
-@kernel
+@inlined
 def improve(plan, d, l, b, step, root, x, target):
     """One iteration: target += M^(-1/2) x, x = Dᵀ (S + I/α)⁻¹ b; its size, as of ``add_scaled``."""
     step[:] = b
@@ -79,7 +79,7 @@ def improve(plan, d, l, b, step, root, x, target):
     return add_scaled(plan, root, x, target)
 
 
-@kernel
+@inlined
 def add_scaled(plan, root, x, target):
     """target (n,) += root x; the norm of that, relative to the larger of 1 and the norm of the target."""
     column, change, size = part(plan, COLUMN), 0.0, 0.0

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from numpy import sqrt
 
-from mbref.compiled import exchangeable, kernel
+from mbref.compiled import exchangeable, inlined
 from mbref.evaluation import accelerations, contract, coordinate_rates, expand
 from mbref.problem import opened
 from mbref.tables import (
@@ -48,7 +48,7 @@ def rates(accelerate, t, y, y_rate, problem):
     return status
 
 
-@kernel
+@inlined
 def write_rates(q, v, live, y_rate, work):
     """y' of the entries of y, from the accelerations found."""
     rates_of_q = work[STATE][COORDINATE_RATES]
@@ -56,7 +56,7 @@ def write_rates(q, v, live, y_rate, work):
     contract(rates_of_q, work[COLUMNS][ACCELERATION], live, y_rate)
 
 
-@kernel
+@inlined
 def flush(y):
     """Zero for what has decayed below TINY: with denormal numbers arithmetic is a hundred times slower."""
     for k in range(y.shape[0]):
@@ -64,7 +64,7 @@ def flush(y):
             y[k] = 0.0
 
 
-@kernel
+@inlined
 def normalise(q):
     """Euler parameters of every body back to unit length."""
     for b in range(q.shape[0] // 7):

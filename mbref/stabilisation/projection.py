@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from numpy import sqrt
 
-from mbref.compiled import exchangeable, kernel
+from mbref.compiled import exchangeable, inlined
 from mbref.evaluation import contract, coordinate_rates, evaluate, expand, violation_rate
 from mbref.problem import opened, planned
 from mbref.sparse.factor import memories, part, squared_pivots
@@ -69,7 +69,7 @@ def enter(t, y, problem):
     return live[0, MOVING] + live[0, TURNING]
 
 
-@kernel
+@inlined
 def watch_pivots(plan, work):
     """Watch the pivots of the last factor."""
     _, l, diagonal, squares, _, _, _, _, _ = memories(plan, work[SCRATCH][0])
@@ -77,7 +77,7 @@ def watch_pivots(plan, work):
     watch(squares, work[MEMO][0])
 
 
-@kernel
+@inlined
 def watch(squares, memo):
     """Keep the largest rank seen, the smallest of so many pivots now, and the largest that has been."""
     rank, smallest = 0, 1.0
@@ -96,7 +96,7 @@ def watch(squares, memo):
     memo[REFERENCE_PIVOT] = max(memo[REFERENCE_PIVOT], memo[SMALLEST_PIVOT])
 
 
-@kernel
+@inlined
 def displace(q, x, change):
     """Move coordinates by (δr, δπ') per body: p + ½ Lᵀ δπ', back to unit length."""
     coordinate_rates(q, x, change)
@@ -105,7 +105,7 @@ def displace(q, x, change):
     normalise(q)
 
 
-@kernel
+@inlined
 def largest(values):
     """The largest magnitude of a vector; undefined where an entry is."""
     size = 0.0
@@ -114,7 +114,7 @@ def largest(values):
     return size
 
 
-@kernel
+@inlined
 def cancel(which, iterations, plan, work, target):
     """Change ``target`` by the least that takes row ``which`` of ROWS away."""
     rows, row = work[ROWS], part(plan, ROW)
@@ -124,7 +124,7 @@ def cancel(which, iterations, plan, work, target):
     correct(plan, work, iterations, target)
 
 
-@kernel
+@inlined
 def project_positions(t, q, v, plan, ints, floats, work, settings, counts):
     """Newton's method for Φ(q, t) = 0; leaves a factor that serves at q, and its status."""
     rows, x, change = work[ROWS], work[COLUMNS][STEP_X], work[DENSE_VECTORS][CHANGE]
@@ -151,7 +151,7 @@ def project_positions(t, q, v, plan, ints, floats, work, settings, counts):
     return OK if violation <= ROUNDING * tolerance else NOT_CONVERGED
 
 
-@kernel
+@inlined
 def project(t, y, problem):
     """Project y; OK, SINGULAR or NOT_CONVERGED."""
     ints, floats, work, _pivots, settings, counts = opened(problem)
