@@ -2,9 +2,10 @@
 
     python benchmarks/speed.py [SCENE …] [--out FILE.json] [--plot FILE.png]
 
-Every setting of every family is run once, coarse to fine, until it takes too long; then all that count take
-turns in REPEATS rounds of one process.  Times are process CPU seconds of the stepping, medians of the
-rounds; errors are against the scene's truth; the cost at an error is read off the family's curve.
+Every setting of every family is run once in a child process, coarse to fine, until it takes too long; then
+all that count take turns in REPEATS rounds of this process, brief ones several times a round, so that their
+code is warm.  Times are process CPU seconds of the stepping, medians; errors are against the scene's truth;
+the cost at an error is read off the family's curve.
 """
 
 from __future__ import annotations
@@ -20,13 +21,13 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from general_integrators import SCIKIT_SUNDAE, SCIPY
 from limit import LIMIT
 from rich.console import Console
 from rich.table import Table
 
-from crosscheck.engine import Engine, Setting, engine
+from crosscheck.engine import Setting, engine, installed
 from crosscheck.engines.mbref import OWN_CODE
+from crosscheck.isolate import run_isolated
 from crosscheck.metrics import cost_at_error, measure
 from crosscheck.study import machine, versions
 from crosscheck.tolerances import ERROR_LEVELS
@@ -37,6 +38,7 @@ from mbref.trajectory import Cost, Outcome
 
 OURS, LIMIT_NAME = "mbref", LIMIT.name
 ENGINES = ("mbref", "mujoco", "pinocchio", "exudyn", "sundials")
+OTHERS = ("general_integrators:SCIPY", "general_integrators:SCIKIT_SUNDAE", "limit:LIMIT")
 PAPER = (
     "four_bar", "five_bar", "spatial_slider_crank", "spatial_slider_crank_driven", "planar_slider_crank",
     "planar_slider_crank_equal", "planar_slider_crank_heavy", "four_bar_gravity", "five_bar_gravity",
@@ -45,6 +47,8 @@ PAPER = (
 SAMPLES = 11  # few, because adaptive integrators end a step at every sample time
 REPEATS = 5
 LONG, TOO_LONG = 0.7, 2.0  # s; such runs are not repeated; of their family nothing finer is tried
+BRIEF, MOST_TIMES = 5e-3, 10  # s; shorter runs are repeated within a round, for so long, and so often
+TIME_LIMIT = 60.0  # s of a run; an engine can hang
 NEAR = 1.5  # a family so much dearer than its engine's best after one round may still be the best
 ENOUGH = 1e-10  # an error at which a family's finer settings are of no interest
 
@@ -70,42 +74,42 @@ class Run:
 Curve = tuple[str, str]  # engine and family
 
 
-def competitors() -> list[Engine]:
-    """All engines whose packages are installed; says which are not."""
-    found: list[Engine] = []
-    for simulator in [*(engine(name) for name in ENGINES), SCIPY, SCIKIT_SUNDAE, LIMIT]:
-        try:
-            simulator.version()
-        except ImportError:
-            print(f"{simulator.name}: left out, {simulator.package} is not installed", file=sys.stderr)
+def competitors() -> list[str]:
+    """All whose packages are installed; says which are not."""
+    found = []
+    for name in (*ENGINES, *OTHERS):
+        if installed(name):
+            found.append(name)
         else:
-            found.append(simulator)
+            print(f"{name}: left out, {engine(name).package} is not installed", file=sys.stderr)
     return found
 
 
-def measured(scene: Scene, simulators: Sequence[Engine]) -> list[Run]:
+def measured(scene: Scene, names: Sequence[str]) -> list[Run]:
     """Every run of the scene, those worth it timed in turns."""
     times = np.linspace(0.0, scene.duration, SAMPLES)
-    able = [simulator for simulator in simulators if simulator.cannot(scene) is None]
-    jobs = [(simulator, run) for simulator in able for run in _sweep(simulator, scene, times)]
+    able = [name for name in names if engine(name).cannot(scene) is None]
+    jobs = [(engine(name), run) for name in able for run in _sweep(name, scene, times)]
     curves: dict[Curve, list[Run]] = {}
     for _, run in jobs:
         curves.setdefault((run.engine, run.family), []).append(run)
     worth = [job for job in jobs if _is_worth_timing(job[1], curves)]
+    for simulator, run in worth:
+        simulator.prepare([run.family])
     for _ in range(REPEATS):
         for simulator, run in worth:
-            run.seconds.append(simulator.run(scene, times, Setting(run.family, run.options)).cost.seconds)
+            for _ in range(_times(run)):
+                run.seconds.append(simulator.run(scene, times, Setting(run.family, run.options)).cost.seconds)
     return [run for _, run in jobs]
 
 
-def _sweep(simulator: Engine, scene: Scene, times: np.ndarray) -> Iterator[Run]:
+def _sweep(name: str, scene: Scene, times: np.ndarray) -> Iterator[Run]:
     """One run of each setting, coarse to fine, of each family."""
-    truth, finished = truth_for(scene), set()
+    simulator, truth, finished = engine(name), truth_for(scene), set()
     for setting in simulator.settings(scene):
         if setting.family in finished:
             continue
-        simulator.prepare([setting.family])
-        trajectory = simulator.run(scene, times, setting)
+        trajectory = run_isolated(name, scene, times, setting, TIME_LIMIT)
         error = measure(scene, trajectory, truth)["error"]
         error = math.inf if error is None else error
         cost = asdict(trajectory.cost)
@@ -113,8 +117,14 @@ def _sweep(simulator: Engine, scene: Scene, times: np.ndarray) -> Iterator[Run]:
             simulator.name, setting.family, dict(setting.options), trajectory.outcome.label, error, cost
         )
         completed = trajectory.outcome is Outcome.COMPLETED
-        if trajectory.cost.seconds > TOO_LONG or (completed and error < ENOUGH):
+        is_dear = trajectory.outcome is Outcome.TIMED_OUT or trajectory.cost.seconds > TOO_LONG
+        if is_dear or (completed and error < ENOUGH):
             finished.add(setting.family)
+
+
+def _times(run: Run) -> int:
+    """How often a run is repeated in a round."""
+    return max(1, min(MOST_TIMES, round(BRIEF / max(run.cost["seconds"], 1e-6))))
 
 
 def _is_worth_timing(run: Run, curves: dict[Curve, list[Run]]) -> bool:

@@ -18,7 +18,6 @@ from mbref.linalg import add_product, cholesky_factor, cholesky_solve, gram, tim
 from mbref.tables import ACCELERATE, FACTORISATIONS, FORMULATION_OPTIONS, NOT_CONVERGED, OK, SINGULAR
 
 TINY, NEVER = 1e-300, 1e300
-LEAST = 2  # iterations: enough up to the neighbourhood of a singular position, so that the number is fixed
 
 OPTIONS = {"alpha": 1e10, "epsilon": 1e-12, "iterations": 20.0, "omega": 0.0, "mu": 1.0}
 
@@ -47,8 +46,7 @@ def accelerate(
     if not cholesky_factor(s, m, 0.0):
         return SINGULAR
     status, change, expected = NOT_CONVERGED, 0.0, NEVER
-    most = int(settings[FORMULATION_OPTIONS + 2])
-    for k in range(most):
+    for _ in range(int(settings[FORMULATION_OPTIONS + 2])):
         step[:] = b
         cholesky_solve(s, m, step)
         times_transpose(d, step, x)
@@ -59,7 +57,7 @@ def accelerate(
             total[i] -= step[i]
         last, change = change, changed(before, acceleration)
         expected = min(expected, change * min(1.0, change / max(last, TINY)))
-        if k + 1 >= min(LEAST, most) and expected <= epsilon:
+        if expected <= epsilon:
             status = OK
             break
         add_product(dt, x, -1.0, b)

@@ -1,7 +1,7 @@
 """Specialise: the machine code of one scene, holding only the operations that its constants leave.
 
-Two pieces are traced from the kernels: the rates of the moving coordinates, by the formulation's dense kernel
-on the rows and columns that move, and the projection of a state.  Coordinates that never move, and rows that
+Two pieces are traced from the kernels: the rates of the moving coordinates, by the formulation's kernel on
+the rows and columns that move, and the projection of a state.  Coordinates that never move, and rows that
 bear on none that does, are left out.
 """
 
@@ -22,6 +22,7 @@ from mbref.compiled import CACHE, PLAIN
 from mbref.evaluation import coordinate_rates, dense_jacobian, evaluate, right_hand_side, violation_rate
 from mbref.formulations.base import Formulation
 from mbref.model import Model
+from mbref.sparse.chart import accelerations
 from mbref.sparse.factor import memories, squared_pivots
 from mbref.sparse.iteration import factor
 from mbref.sparse.plan import COLUMN, ROW, Plan
@@ -37,11 +38,13 @@ from mbref.stabilisation.projection import (
     largest,
 )
 from mbref.tables import (
+    ACCELERATION,
     ANGLES,
     COLUMNS,
     FORCE,
     INVERSE_ROOT,
     MASS,
+    MULTIPLIERS,
     OK,
     PHI,
     PHI_Q,
@@ -102,37 +105,42 @@ class State:
     def evaluate(self, settings: np.ndarray) -> None:
         """All terms of the equations of motion."""
         plain(evaluate)(self.t, self.q, self.v, *self.problem)
+        plain(right_hand_side)(self.v, self.model.ints, self.work, settings)
+
+    def accelerate(self, formulation: Formulation, settings: np.ndarray) -> int:
+        """Accelerations and multipliers of what moves, into the workspace; the status."""
+        if formulation.sparse:
+            return plain(accelerations)(self.moving.plan.indices, self.work, settings, no_counts())
         plain(dense_jacobian)(self.model.ints, self.work)
-        plain(right_hand_side)(self.v, self.model.ints, self.work, numbers(settings))
+        velocities, rows = self.moving.velocities, self.moving.rows
+        columns, of_rows = self.work[COLUMNS][:, velocities], self.work[ROWS][:, rows]
+        (m, n), pivots = (len(rows), len(velocities)), np.zeros(2 * (len(rows) + len(velocities)), dtype=int)
+        scratch = np.zeros(formulation.scratch(m, n)).astype(object)
+        status = plain(formulation.accelerate)(
+            columns[MASS], columns[INVERSE_ROOT], self.work[PHI_Q][np.ix_(rows, velocities)], columns[FORCE],
+            of_rows[RHS], settings, scratch, pivots, no_counts(), columns[ACCELERATION], of_rows[MULTIPLIERS],
+        )  # fmt: skip
+        self.work[COLUMNS][ACCELERATION, velocities] = columns[ACCELERATION]
+        self.work[ROWS][MULTIPLIERS, rows] = of_rows[MULTIPLIERS]
+        return status
 
-    def of_moving(self, column: int) -> np.ndarray:
-        """Entries of ``work[COLUMNS]`` at the moving velocities."""
-        return self.work[COLUMNS][column, self.moving.velocities]
 
-    def jacobian(self) -> np.ndarray:
-        """Φ_q of the moving velocities in the rows that bear on them."""
-        return self.work[PHI_Q][np.ix_(self.moving.rows, self.moving.velocities)]
+def no_counts() -> np.ndarray:
+    """Room for counts that nobody reads: those of a piece are known beforehand."""
+    return np.zeros(6, dtype=np.int64)
 
 
 def rates_piece(state: State, formulation: Formulation, settings: np.ndarray) -> Piece:
     """y' of the moving coordinates by the formulation, and the multipliers of all rows."""
-    settings = numbers(settings)
+    settings, moving = numbers(settings), state.moving
     state.evaluate(settings)
-    jacobian, (m, n) = state.jacobian(), (len(state.moving.rows), len(state.moving.velocities))
-    scratch = np.zeros(formulation.scratch(m, n)).astype(object)
-    acceleration, multipliers = np.zeros(n, dtype=object), np.zeros(m, dtype=object)
-    status = plain(formulation.accelerate)(
-        state.of_moving(MASS), state.of_moving(INVERSE_ROOT), jacobian, state.of_moving(FORCE),
-        state.work[ROWS][RHS, state.moving.rows], settings, scratch,
-        np.zeros(2 * (m + n), dtype=np.int64), np.zeros(6, dtype=np.int64), acceleration, multipliers,
-    )  # fmt: skip
-    if status != OK:
+    if state.accelerate(formulation, settings) != OK:
         raise Untraceable(f"{formulation.name} fails at the start")
     rates = np.zeros(state.q.size, dtype=object)
     plain(coordinate_rates)(state.q, state.v, rates)
-    of_all_rows = np.zeros(state.model.m, dtype=object)
-    of_all_rows[state.moving.rows] = multipliers
-    return Piece(PIECES[0], state.record, [*rates[state.moving.coordinates], *acceleration], of_all_rows)
+    acceleration, multipliers = state.work[COLUMNS][ACCELERATION], state.work[ROWS][MULTIPLIERS]
+    out = [*rates[moving.coordinates], *acceleration[moving.velocities]]
+    return Piece(PIECES[0], state.record, out, multipliers)
 
 
 def project_piece(state: State) -> Piece:
@@ -141,7 +149,7 @@ def project_piece(state: State) -> Piece:
     plan, rows = moving.plan.indices, work[ROWS]
     plain(normalise)(q)
     plain(evaluate)(state.t, q, v, *state.problem)
-    if not plain(factor)(plan, work, ALPHA, np.zeros(6, dtype=np.int64)):
+    if not plain(factor)(plan, work, ALPHA, no_counts()):
         raise Untraceable("the constraint rows cannot be factored at the start")
     _, l, diagonal, squares, *_ = plain(memories)(plan, work[SCRATCH][0])
     plain(squared_pivots)(plan, l, diagonal, squares)

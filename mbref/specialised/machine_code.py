@@ -1,8 +1,8 @@
 """Machine code of a record: straight-line LLVM IR, compiled once and kept on disk.
 
 A record becomes a function ``i64 f(double t, double* y, double* angles, double* out, double* more)`` of the
-operations that its results need; it returns 0 when all its guards held.  Without fast-math flags every
-operation gives the bits that it gives in the kernel it was traced from.
+operations that its results need; it returns 0 when all its guards held.  A sum may take a product in before
+it is rounded (``contract``); nothing else differs from the kernel that it was traced from.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def _instructions(result: str, name: str, *operands: str) -> list[str]:
         place = f"{pointer} = getelementptr double, double* %{vector}, i64 {index}"
         return [place, f"{result} = load double, double* {pointer}"]
     if name in BINARY:
-        return [f"{result} = {name} double {operands[0]}, {operands[1]}"]
+        return [f"{result} = {name} contract double {operands[0]}, {operands[1]}"]
     if name == "fneg":
         return [f"{result} = fneg double {operands[0]}"]
     if name in CALLS:
