@@ -1,6 +1,6 @@
 """How kernels are compiled: once per machine and source version, cached on disk, replaceable.
 
-``kernel`` marks a helper that other kernels call, ``inlined`` one that becomes part of them.
+``kernel`` marks a helper that other kernels call, ``inlined`` and ``view`` one that becomes part of them.
 ``exchangeable(signature)`` marks one that is passed to another kernel as an argument (a formulation, a
 chart, an integrator): it is compiled when it is first asked for, and the kernels that take it need no
 compilation of their own for it.  With NUMBA_DISABLE_JIT=1 all leave the plain Python function.
@@ -23,7 +23,11 @@ from pathlib import Path
 import numba
 from numba import cfunc, f8, i8, njit, types, u4
 
-OPTIONS = {"cache": True, "error_model": "numpy"}  # no fastmath: the same bits with and without the JIT
+OPTIONS = {
+    "cache": True,
+    "error_model": "numpy",
+    "_nrt": False,  # no kernel can allocate, and none counts references to its arrays, which takes time
+}  # no fastmath: the same bits with and without the JIT
 PLAIN = bool(numba.config.DISABLE_JIT)
 
 VECTOR = types.Array(f8, 1, "C")
@@ -71,6 +75,17 @@ def inlined(function: Callable) -> Callable:
     """A kernel compiled into each of its callers, where handing tuples of arrays over takes as long as it."""
     with _own_cache():
         return njit(forceinline=True, **OPTIONS)(function)
+
+
+def allocating(function: Callable) -> Callable:
+    """A kernel that allocates: numpy's decompositions do."""
+    with _own_cache():
+        return njit(**{**OPTIONS, "_nrt": True})(function)
+
+
+def view(function: Callable) -> Callable:
+    """A kernel that returns arrays, parts of its arguments: its source becomes part of its callers'."""
+    return njit(inline="always")(function)
 
 
 class Exchangeable:

@@ -62,6 +62,7 @@ from mbref.tables import (
     VELOCITIES,
     VIOLATION,
 )
+from mbref.vectors import copy, copy_rows
 
 # how a call ends; evaluation statuses (SINGULAR, …) end it too
 DONE, VIOLATED, STEP_TOO_SMALL, TOO_MANY_STEPS, PAUSED = range(10, 15)
@@ -76,10 +77,10 @@ SAMPLE, ROW = range(2)
 def take_sample(k, work, sample_q, sample_v, sample_a, sample_m):
     """Record state, accelerations and multipliers as the last evaluation left them."""
     state, columns = work[STATE], work[COLUMNS]
-    sample_q[k] = state[COORDINATES]
-    sample_v[k] = state[VELOCITIES][: columns.shape[1]]
-    sample_a[k] = columns[ACCELERATION]
-    sample_m[k] = work[ROWS][MULTIPLIERS]
+    copy(state[COORDINATES], sample_q[k])
+    copy(state[VELOCITIES], sample_v[k])
+    copy(columns[ACCELERATION], sample_a[k])
+    copy(work[ROWS][MULTIPLIERS], sample_m[k])
 
 
 @kernel
@@ -125,7 +126,7 @@ def fastest_turn(work):
 @kernel
 def keep(t, ints, floats, work):
     """Remember the accepted state, from which charts predict and angles unwrap."""
-    work[LAST][:] = work[STATE]
+    copy_rows(work[STATE], work[LAST])
     work[MEMO][0, LAST_TIME] = t
     remember_angles(ints, floats, work)
 
@@ -256,7 +257,7 @@ def leap(
     counts[STEPS] += 1
     counts[CROSSINGS] += 1
     if status == OK:
-        y[:] = y_new
+        copy(y_new, y)
     return status
 
 
@@ -294,7 +295,7 @@ def advance(
                 status = NOT_CONVERGED
             if status == OK or status == CHANGED:  # noqa: SIM109 - no containers in kernels
                 counts[STEPS] += 1
-                y[:] = y_new
+                copy(y_new, y)
                 clock[TIME], clock[LENGTH], clock[SUGGESTED], clock[RATIO] = now, h, suggested, ratio
                 if status == CHANGED:
                     memory[:] = 0.0

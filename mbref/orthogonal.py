@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy import isfinite, sqrt
 
-from mbref.compiled import kernel
+from mbref.compiled import allocating, kernel
 from mbref.linalg import back_substitute, exchange_columns, exchange_entries, exchange_rows
+from mbref.vectors import copy
 
 
 @kernel
@@ -27,7 +28,7 @@ def qr_pivoted(b, n, m, order, tau, norms, work, tolerance):
     for i in range(n):
         for j in range(m):
             norms[0, j] += b[i, j] * b[i, j]
-    norms[1] = norms[0]
+    copy(norms[0], norms[1])
     largest = norms[0, largest_from(norms[0], 0, m)]
     for k in range(min(m, n)):
         best = largest_from(norms[0], k, m)
@@ -246,7 +247,7 @@ def gram_schmidt_solve(d, b, tolerance, columns, r, l, pivots, c, x, dual):
     return rank
 
 
-@kernel
+@allocating
 def svd_solve(d, rhs, tolerance, x, dual):
     """x = D⁺ rhs and dual = (Dᵀ)⁺ x by the singular value decomposition (Eqs. 27 and 28); the rank.
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mbref.addresses import array_at, table_of
-from mbref.compiled import INDEX_TABLE, INDICES, MATRIX, PLAN, VECTOR
+from mbref.compiled import INDEX_TABLE, INDICES, MATRIX, PLAN, VECTOR, view
 
 _table_at, _matrix_at = array_at(INDEX_TABLE), array_at(MATRIX)
 _vector_at, _indices_at, _plan_at = array_at(VECTOR), array_at(INDICES), array_at(PLAN)
@@ -30,7 +29,7 @@ def packed(
     return table_of((*ints, *floats, *work, pivots, settings, counts, plan))
 
 
-@njit(inline="always")
+@view
 def opened(problem):
     """ints, floats, work, pivots, settings, counts; the numbers of arrays are those of ``tables``."""
     ints = (
@@ -48,7 +47,7 @@ def opened(problem):
     return ints, floats, work, _table_at(problem, 21), _vector_at(problem, 22), _indices_at(problem, 23)
 
 
-@njit(inline="always")
+@view
 def planned(problem):
     """The plan of the sparse factor."""
     return _plan_at(problem, 24)

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from mbref.compiled import kernel
 from mbref.tables import MEMO, REFERENCE_PIVOT, SMALLEST_PIVOT
+from mbref.vectors import copy
 
 WINDOW = 1e-3  # relative pivot at the edge: rounding of 1e-16 costs 1e-13 there
 NEAR = 0.05  # below it the relative pivot is taken to fall linearly
@@ -37,8 +38,8 @@ def keep_state(history, taken, t, pivot, y, y_rate):
     row, n = taken % KEPT, y.shape[0]
     history[row, 0] = t
     history[row, 1] = pivot
-    history[row, 2 : 2 + n] = y
-    history[row, 2 + n : 2 + 2 * n] = y_rate
+    copy(y, history[row, 2 : 2 + n])
+    copy(y_rate, history[row, 2 + n : 2 + 2 * n])
 
 
 @kernel

@@ -25,6 +25,31 @@ def larger(size, value):
 
 
 @kernel
+def copy(source, target):
+    """The first entries of ``target`` := ``source``."""
+    for k in range(min(source.shape[0], target.shape[0])):
+        target[k] = source[k]
+
+
+@kernel
+def copy_rows(source, target):
+    """``target`` := ``source``, two matrices of one shape."""
+    for k in range(source.shape[0]):
+        copy(source[k], target[k])
+
+
+@kernel
+def sort(values):
+    """Put few values in increasing order, in place."""
+    for k in range(1, values.shape[0]):
+        value, place = values[k], k
+        while place > 0 and values[place - 1] > value:
+            values[place] = values[place - 1]
+            place -= 1
+        values[place] = value
+
+
+@kernel
 def add(a, b):
     """a + b."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]

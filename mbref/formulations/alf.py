@@ -20,6 +20,7 @@ from mbref.formulations.base import Formulation
 from mbref.linalg import cholesky_factor, cholesky_solve
 from mbref.orthogonal import equilibrate
 from mbref.tables import ACCELERATE, FACTORISATIONS, FORMULATION_OPTIONS, NOT_CONVERGED, OK, SINGULAR
+from mbref.vectors import copy
 
 OPTIONS = {"alpha": 1e5, "epsilon": 1e-9, "iterations": 100.0, "omega": 10.0, "mu": 1.0}
 
@@ -96,7 +97,7 @@ def accelerate(
             load[j] = mass[j] * inverse_root[j] * inverse_root[j] * x[j]
             x[j] *= inverse_root[j]
         change = changed(acceleration, x)
-        acceleration[:] = x
+        copy(x, acceleration)
         if change <= epsilon:
             status = OK
             break

@@ -16,6 +16,7 @@ from mbref.formulations.base import Formulation
 from mbref.formulations.moore_penrose import begin, transpose
 from mbref.linalg import add_product, cholesky_factor, cholesky_solve, gram, times_transpose
 from mbref.tables import ACCELERATE, FACTORISATIONS, FORMULATION_OPTIONS, NOT_CONVERGED, OK, SINGULAR
+from mbref.vectors import copy
 
 TINY, NEVER = 1e-300, 1e300
 
@@ -47,10 +48,10 @@ def accelerate(
         return SINGULAR
     status, change, expected = NOT_CONVERGED, 0.0, NEVER
     for _ in range(int(settings[FORMULATION_OPTIONS + 2])):
-        step[:] = b
+        copy(b, step)
         cholesky_solve(s, m, step)
         times_transpose(d, step, x)
-        before[:] = acceleration
+        copy(acceleration, before)
         for j in range(n):
             acceleration[j] += inverse_root[j] * x[j]
         for i in range(m):

@@ -16,6 +16,7 @@ from numpy import sqrt
 from mbref.compiled import exchangeable, kernel
 from mbref.integrators.base import Integrator
 from mbref.tables import LARGEST_STEP, OK, ORDER, PROPOSE, STEP
+from mbref.vectors import copy
 
 HIGHEST = 12
 # rows of memory: STATE, φ_1 to φ_(HIGHEST + 2), then
@@ -127,7 +128,7 @@ def step(
 def start(y, y_rate, memory, control, tolerances):
     """Forget the past; a first step of order 1, its error guessed from the sizes of y and y'."""
     memory[STATE, K] = 1.0
-    memory[1, : y.shape[0]] = y_rate
+    copy(y_rate, memory[1, : y.shape[0]])
     rate, least = norm(y_rate, y, tolerances), 1e-6 * control[LARGEST_STEP]
     return max(least, 0.25 * sqrt(max(1.0, norm(y, y, tolerances))) / rate) if rate > 0.0 else least
 
@@ -143,7 +144,7 @@ def remember(h, k, y_rate, memory):
         for j in range(k, 0, -1):
             difference += beta[j] * memory[j, i]
             memory[j, i] = difference
-    memory[PAST_PSI, 1 : HIGHEST + 2] = memory[PSI, 1 : HIGHEST + 2]
+    copy(memory[PSI, 1 : HIGHEST + 2], memory[PAST_PSI, 1 : HIGHEST + 2])
     equal = state[EQUAL] if h == state[LAST_H] else 0.0
     state[EQUAL] = min(equal, state[LAST_K]) + 1.0
     state[LAST_K], state[LAST_H], state[FAILED] = k, h, 0.0

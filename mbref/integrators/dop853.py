@@ -12,7 +12,7 @@ from mbref.integrators.base import Integrator
 from mbref.integrators.coefficients import ERROR3, ERROR5, STAGES, A, B, C
 from mbref.integrators.one_step import propose
 from mbref.tables import OK, STEP
-from mbref.vectors import larger
+from mbref.vectors import copy, larger
 
 
 @kernel
@@ -58,7 +58,7 @@ def step(
     problem,
 ):  # fmt: skip
     n = y.shape[0]
-    memory[0, :n] = y_rate
+    copy(y_rate, memory[0, :n])
     for s in range(1, STAGES):
         to_stage(s, h, y, memory, y_new)
         status = rates(accelerate, t + C[s] * h, y_new, memory[s, :n], problem)

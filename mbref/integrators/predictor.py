@@ -13,7 +13,7 @@ from mbref.integrators.base import Integrator
 from mbref.integrators.one_step import propose
 from mbref.problem import opened
 from mbref.tables import LIVE, MOVING, STEP
-from mbref.vectors import larger
+from mbref.vectors import copy, larger
 
 NODES = 3
 NEARNESS = 2e-2  # of the step: what the polynomial of a state fewer may be off; the prediction is much nearer
@@ -29,10 +29,12 @@ def remember(t, y, y_rate, memory):
     if found > 0 and times[0] == t:
         return found
     for k in range(min(found, NODES - 1), 0, -1):
-        memory[2 * k, :n] = memory[2 * k - 2, :n]
-        memory[2 * k + 1, :n] = memory[2 * k - 1, :n]
+        copy(memory[2 * k - 2, :n], memory[2 * k, :n])
+        copy(memory[2 * k - 1, :n], memory[2 * k + 1, :n])
         times[k] = times[k - 1]
-    memory[0, :n], memory[1, :n], times[0] = y, y_rate, t
+    copy(y, memory[0, :n])
+    copy(y_rate, memory[1, :n])
+    times[0] = t
     memory[FOUND, 0] = min(found + 1, NODES)
     return int(memory[FOUND, 0])
 

@@ -6,6 +6,7 @@ from mbref.compiled import exchangeable
 from mbref.integrators.base import Integrator
 from mbref.integrators.one_step import propose
 from mbref.tables import OK, STEP
+from mbref.vectors import copy
 
 
 @exchangeable(STEP)
@@ -15,8 +16,8 @@ def step(
 ):  # fmt: skip
     n = y.shape[0]
     k, total = memory[0, :n], memory[1, :n]
-    k[:] = y_rate
-    total[:] = y_rate
+    copy(y_rate, k)
+    copy(y_rate, total)
     for s in range(3):
         part = h if s == 2 else 0.5 * h
         for i in range(n):

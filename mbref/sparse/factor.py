@@ -6,7 +6,7 @@ diagonal; a row without entries has 1 there and changes nothing.  Vectors of row
 
 from __future__ import annotations
 
-from mbref.compiled import inlined
+from mbref.compiled import inlined, view
 from mbref.sparse.plan import (
     COLUMN,
     D_COLUMN,
@@ -23,13 +23,13 @@ from mbref.sparse.plan import (
 )
 
 
-@inlined
+@view
 def part(plan, k):
     """One of the parts of the plan's indices."""
     return plan[plan[k] : plan[k + 1]]
 
 
-@inlined
+@view
 def memories(plan, memory):
     """Views of the memory: D, L, S_ii, pivots squared, three vectors of rows, M^(-1/2), one of columns."""
     d, l, r = part(plan, D_ENTRY).shape[0], part(plan, L_ROW).shape[0], part(plan, ROW).shape[0]

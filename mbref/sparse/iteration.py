@@ -20,6 +20,7 @@ from mbref.sparse.factor import (
 )
 from mbref.sparse.plan import COLUMN, ROW
 from mbref.tables import COLUMNS, FACTORISATIONS, INVERSE_ROOT, JACOBIAN, NOT_CONVERGED, OK, SCRATCH
+from mbref.vectors import copy
 
 TINY, NEVER = 1e-300, 1e300
 
@@ -73,7 +74,7 @@ def correct(plan, work, iterations, target):
 @inlined
 def improve(plan, d, l, b, step, root, x, target):
     """One iteration: target += M^(-1/2) x, x = Dᵀ (S + I/α)⁻¹ b; its size, as of ``add_scaled``."""
-    step[:] = b
+    copy(b, step)
     solve(plan, l, step)
     times_transpose(plan, d, step, x)
     return add_scaled(plan, root, x, target)

@@ -53,6 +53,7 @@ from mbref.tables import (
     STATE,
     VELOCITIES,
 )
+from mbref.vectors import copy_rows
 
 MOST_ITERATIONS = 20
 OPTIONS = {"kept": 0.6}
@@ -117,7 +118,7 @@ def enter(t, y, problem):
     coordinate_rates(q, v, state[COORDINATE_RATES])
     evaluate(t, q, v, ints, floats, work)
     choose(ints, work, pivots, settings, counts)
-    last[:] = state
+    copy_rows(state, last)
     work[MEMO][0, LAST_TIME] = t
     return read(y, work, pivots)
 
@@ -250,7 +251,7 @@ def accept(t, y, problem):
     if status != OK:
         return status
     solve_velocities(y, work, pivots)
-    work[LAST][:] = work[STATE]
+    copy_rows(work[STATE], work[LAST])
     work[MEMO][0, LAST_TIME] = t
     memo = work[MEMO]
     if memo[0, REFERENCE_PIVOT] == 0.0:

@@ -45,7 +45,7 @@ from mbref.tables import (
     TURNING,
     VELOCITIES,
 )
-from mbref.vectors import larger
+from mbref.vectors import larger, sort
 
 ALPHA = 1e10  # of the iteration
 POSITION_ITERATIONS, VELOCITY_ITERATIONS = 1, 2  # Newton's method repeats the first
@@ -90,7 +90,7 @@ def watch(squares, memo):
         memo[REFERENCE_PIVOT] = 0.0
     generic = int(memo[GENERIC_RANK])
     if rank < generic:
-        squares.sort()
+        sort(squares)
         smallest = squares[squares.shape[0] - generic]
     memo[SMALLEST_PIVOT] = sqrt(smallest) if generic > 0 else 0.0
     memo[REFERENCE_PIVOT] = max(memo[REFERENCE_PIVOT], memo[SMALLEST_PIVOT])
