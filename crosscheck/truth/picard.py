@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from threading import Lock
 
 import numpy as np
 
@@ -31,7 +32,7 @@ class NoSolution(ArithmeticError):
 class Solution:
     """y' = f(y), y(0) = y0, for any t ≥ 0; f maps (n, m) states to (n, m) derivatives.
 
-    Panels are computed when first asked for and kept.
+    Panels are computed when first asked for and kept; threads may ask at once.
     """
 
     def __init__(self, derivative: Derivative, start: np.ndarray, first_panel: float):
@@ -40,25 +41,24 @@ class Solution:
         self._values: list[np.ndarray] = []  # (NODES, m) per panel
         self._state = np.asarray(start, dtype=REAL)
         self._next = REAL(first_panel)
+        self._asked = Lock()
 
     def __call__(self, times: np.ndarray) -> np.ndarray:
         """States (k, m) at times (k,) ≥ 0; raises NoSolution when the solution ends before."""
         times = np.asarray(times, dtype=REAL)
-        while not self._values or self._edges[-1] < times.max(initial=0):
-            self._add_panel()
-        edges = np.array(self._edges)
-        panel = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(self._values) - 1)
+        edges, values = self._panels(lambda: self._edges[-1] >= times.max(initial=0))
+        panel = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(values) - 1)
         x = 2 * (times - edges[panel]) / (edges[panel + 1] - edges[panel]) - 1
-        return np.einsum("kn,knm->km", _cardinal(x), np.stack(self._values)[panel])
+        return np.einsum("kn,knm->km", _cardinal(x), values[panel])
 
     def where(self, component: int, wanted: np.ndarray) -> np.ndarray:
         """States (k, m) at which a component that grows from 0 has the wanted values (k,)."""
         wanted = np.asarray(wanted, dtype=REAL)
-        while not self._values or self._state[component] < wanted.max(initial=0):
-            self._add_panel()
-        edges = np.array(self._edges)
-        nodes = edges[:-1, None] + (_nodes() + 1) / 2 * np.diff(edges)[:, None]
-        reached = np.stack(self._values)[:, :, component]
+        edges, values = self._panels(lambda: self._state[component] >= wanted.max(initial=0))
+        nodes, reached = (
+            edges[:-1, None] + (_nodes() + 1) / 2 * np.diff(edges)[:, None],
+            values[..., component],
+        )
         at = np.interp(wanted.astype(float), reached.ravel().astype(float), nodes.ravel().astype(float))
         at = at.astype(REAL)
         for _ in range(ROOT_STEPS):
@@ -68,6 +68,13 @@ class Solution:
             if np.abs(step).max(initial=0) <= SETTLED * edges[-1]:
                 break
         return self(np.clip(at, 0, edges[-1]))
+
+    def _panels(self, reach: Callable[[], bool]) -> tuple[np.ndarray, np.ndarray]:
+        """Edges (p + 1,) and values (p, NODES, m) of the panels, as many as it takes."""
+        with self._asked:
+            while not self._values or not reach():
+                self._add_panel()
+            return np.array(self._edges), np.stack(self._values)
 
     def _add_panel(self) -> None:
         while True:

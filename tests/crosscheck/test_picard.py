@@ -1,5 +1,8 @@
 """The solver of the truths against solutions known in closed form."""
 
+from concurrent.futures import ThreadPoolExecutor
+from time import sleep
+
 import numpy as np
 import pytest
 
@@ -18,3 +21,18 @@ def test_panels_reach_rounding_error_over_many_periods():
     got = Solution(lambda y: np.stack([y[:, 1], -y[:, 0]], axis=1), np.array([0.0, 1.0]), 0.1)(t)
     off = np.abs(got[:, 0].astype(float) - np.sin(t)).max()
     assert off < 1e-14, f"sine off by {off} after {t[-1]} rad"
+
+
+def test_threads_that_ask_at_once_get_the_same_states():
+    """Runs of a study share the truth of a scene; at every call of f here another thread goes on."""
+
+    def derivative(y):
+        sleep(0)
+        return np.stack([y[:, 1], -np.sin(y[:, 0])], axis=-1)
+
+    times, start = np.linspace(0.0, 20.0, 41), np.array([1.0, 0.0])
+    alone, shared = (Solution(derivative, start, 0.3) for _ in range(2))
+    with ThreadPoolExecutor(8) as threads:
+        answers = list(threads.map(lambda _: shared(times), range(8)))
+    for answer in answers:
+        np.testing.assert_array_equal(answer, alone(times))
