@@ -92,7 +92,8 @@ def test_rates_of_the_code_are_those_of_the_kernels(name, formulation):
 @pytest.mark.parametrize("name", (*PAPER, "planar_slider_crank_equal", "four_bar_gravity"))
 def test_runs_agree_with_the_kernels_to_rounding(name):
     end = 0.2 if name.endswith(("equal", "gravity")) else 0.02
-    generic, own = runs(SCENES[name](), "alf-dual+projection", end, rtol=1e-10)
+    first = 5e-4  # s; of a shorter one the error estimate, from which the next follows, is rounding
+    generic, own = runs(SCENES[name](), "alf-dual+projection", end, rtol=1e-10, first_step=first)
     assert apart(generic, own) < 1e-9, f"{name}: {apart(generic, own):.1e}"
     if name == "planar_slider_crank":
         assert (generic.cost.steps, generic.cost.rejected) == (own.cost.steps, own.cost.rejected)
