@@ -1,6 +1,7 @@
 """How kernels are compiled: once per machine and source version, cached on disk, replaceable.
 
-``kernel`` marks a helper that other kernels call, ``inlined`` and ``view`` one that becomes part of them.
+``kernel`` marks a helper that other kernels call, ``inlined`` and ``view`` one that becomes part of them,
+``allocating`` one that makes arrays: no other can.
 ``exchangeable(signature)`` marks one that is passed to another kernel as an argument (a formulation, a
 chart, an integrator): it is compiled when it is first asked for, and the kernels that take it need no
 compilation of their own for it.  With NUMBA_DISABLE_JIT=1 all leave the plain Python function.
