@@ -14,8 +14,11 @@ import numpy as np
 from numba import njit
 from numpy import cos, sin, sqrt
 
+from mbref.compiled import OPTIONS
 from mbref.scene import Scene
 from mbref.tables import OK
+
+AS_MBREF = {**OPTIONS, "cache": False}  # how mbref's kernels are compiled
 
 
 class ByHand(NamedTuple):
@@ -26,7 +29,7 @@ class ByHand(NamedTuple):
     poses: Callable | None
 
 
-@njit(error_model="numpy")
+@njit(**AS_MBREF)
 def swing(accelerate, t, y, y_rate, p):
     """Parallelogram under gravity: I and the first moment of mass do not change."""
     inertia, moment = p[0], p[1]
@@ -44,7 +47,7 @@ def swing_numbers(scene: Scene) -> list[float]:
     return [inertia, g * sum(body.mass * arm for body, arm, _ in bodies)]
 
 
-@njit(error_model="numpy")
+@njit(**AS_MBREF)
 def planar(accelerate, t, y, y_rate, p):
     """Slider-crank in a plane; phi the rod's angle, s = dphi/dθ and c its derivative."""
     a, b, crank, rod, spin = p[0], p[1], p[2], p[3], p[4]
@@ -65,7 +68,7 @@ def planar(accelerate, t, y, y_rate, p):
     return OK
 
 
-@njit(error_model="numpy")
+@njit(**AS_MBREF)
 def planar_equal(accelerate, t, y, y_rate, p):
     """Slider-crank, crank and rod of equal length: the rod's angle is -θ, the slider's place 2 a cos θ."""
     a, crank, rod, spin = p[0], p[2], p[3], p[4]
@@ -88,7 +91,7 @@ def planar_numbers(scene: Scene) -> list[float]:
     return [a, b, about_pivot, rod.mass, rod.inertia[2], slider.mass, torque, first, weight]
 
 
-@njit(error_model="numpy")
+@njit(**AS_MBREF)
 def spatial(accelerate, t, y, y_rate, p):
     """Slider-crank in space: h the slider's height, h1 and h2 its derivatives by θ; k the rod's spin
     about itself per crank angle, that keeps its universal joint's axes perpendicular."""
@@ -119,7 +122,7 @@ def spatial_numbers(scene: Scene) -> list[float]:
     return [r, l, slider.position[0], about_pivot, across, rod.inertia[0], slider.mass, torque, weight]
 
 
-@njit(error_model="numpy")
+@njit(**AS_MBREF)
 def parallelogram_poses(thetas, numbers, poses):
     """Crank, coupler, rocker, bar of a rhombus with sides of numbers[0] at angles θ."""
     length = numbers[0]
@@ -138,7 +141,7 @@ def parallelogram_poses(thetas, numbers, poses):
     return OK
 
 
-@njit(error_model="numpy")
+@njit(**AS_MBREF)
 def spatial_poses(thetas, numbers, poses):
     """Crank, rod and slider of the spatial slider-crank at angles θ."""
     r, l, d = numbers[:3]

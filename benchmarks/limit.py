@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from by_hand import BY_HAND
+from by_hand import AS_MBREF, BY_HAND
 from numba import njit
 
 from crosscheck.engine import Cannot, Engine, Setting, Why
@@ -24,7 +24,6 @@ from mbref.scene import Scene
 from mbref.tables import LARGEST_STEP, OK, ORDER
 from mbref.trajectory import Cost, Outcome, Trajectory
 
-OPTIONS = {"error_model": "numpy"}  # as mbref's kernels
 CONTROL = 16  # entries of ``control``, more than there are
 RTOLS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
 REPEATS = 100  # within one reading of the clock: one run is a matter of microseconds
@@ -35,9 +34,9 @@ STEPS, REJECTED, EVALUATIONS = range(3)
 def compiled(rates: Callable) -> Callable:
     """``repeat`` for an equation: mbref's DOP853 and step control compiled into one piece with it."""
     integrator = INTEGRATORS["dop853"]
-    step, propose = (njit(**OPTIONS)(kernel.function) for kernel in (integrator.step, integrator.propose))
+    step, propose = (njit(**AS_MBREF)(kernel.function) for kernel in (integrator.step, integrator.propose))
 
-    @njit(**OPTIONS)
+    @njit(**AS_MBREF)
     def integrate(times, samples, start, control, tolerances, memory, p, counts):
         """From sample to sample: y(t) into the rows of ``samples``."""
         y, rate, new = memory[-3, :2], memory[-2, :2], memory[-1, :2]
@@ -65,7 +64,7 @@ def compiled(rates: Callable) -> Callable:
             samples[k] = y
         return OK
 
-    @njit(**OPTIONS)
+    @njit(**AS_MBREF)
     def repeat(times, samples, start, control, tolerances, memory, p, counts):
         """Several times: one run is too short for one reading of the clock."""
         status = OK

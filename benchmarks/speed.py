@@ -55,7 +55,7 @@ ENOUGH = 1e-10  # an error at which a family's finer settings are of no interest
 
 @dataclass
 class Run:
-    """One setting on one scene: how it ended, its error, its counts, and its seconds in every round."""
+    """One setting on one scene: how it ended, its error, its counts, and its seconds in all rounds."""
 
     engine: str
     family: str

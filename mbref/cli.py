@@ -103,7 +103,7 @@ def _add_method_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--code", choices=("auto", "generic", "specialised"), default="auto",
         help="kernels that serve every scene, machine code of this scene's own, or (default) the latter\n"
-        "once a run is long; results agree to rounding",
+        "where 20 000 steps are ahead; evaluations agree to rounding",
     )  # fmt: skip
     parser.add_argument("--max-step", type=float, default=0.0, help="largest step, s (default: the duration)")
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")

@@ -24,11 +24,9 @@ from pathlib import Path
 import numba
 from numba import cfunc, f8, i8, njit, types, u4
 
-OPTIONS = {
-    "cache": True,
-    "error_model": "numpy",
-    "_nrt": False,  # no kernel can allocate, and none counts references to its arrays, which takes time
-}  # no fastmath: the same bits with and without the JIT
+# No fastmath: the same bits with and without the JIT.  Without numba's runtime (``_nrt``, undocumented there)
+# no kernel can allocate, and none counts references to its arrays, which takes time.
+OPTIONS = {"cache": True, "error_model": "numpy", "_nrt": False}
 PLAIN = bool(numba.config.DISABLE_JIT)
 
 VECTOR = types.Array(f8, 1, "C")
@@ -73,7 +71,7 @@ def kernel(function: Callable) -> Callable:
 
 
 def inlined(function: Callable) -> Callable:
-    """A kernel compiled into each of its callers, where handing tuples of arrays over takes as long as it."""
+    """A kernel compiled into each of its callers: of an evaluation, half of whose time calls would take."""
     with _own_cache():
         return njit(forceinline=True, **OPTIONS)(function)
 

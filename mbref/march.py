@@ -78,7 +78,7 @@ def take_sample(k, work, sample_q, sample_v, sample_a, sample_m):
     """Record state, accelerations and multipliers as the last evaluation left them."""
     state, columns = work[STATE], work[COLUMNS]
     copy(state[COORDINATES], sample_q[k])
-    copy(state[VELOCITIES], sample_v[k])
+    copy(state[VELOCITIES][: columns.shape[1]], sample_v[k])
     copy(columns[ACCELERATION], sample_a[k])
     copy(work[ROWS][MULTIPLIERS], sample_m[k])
 

@@ -63,8 +63,10 @@ class Limits:
     largest_step: float = 0.0  # s; 0 means the duration
     largest_turn: float = 1.0  # rad that the fastest body may turn in an adaptive step
     most_steps: int = 5_000_000
-    sparse_above: int = -1  # constraint rows; with more, alf-dual goes through a sparse factor
-    code: str = AUTO  # GENERIC kernels, SPECIALISED to the scene, or AUTO: specialised after WORTH_IT steps
+    sparse_above: int = -1  # constraint rows; with more, alf-dual's general kernels have a sparse factor
+    code: str = (
+        AUTO  # GENERIC kernels, SPECIALISED to the scene, or AUTO: that where WORTH_IT steps are ahead
+    )
 
 
 class Run:
@@ -175,8 +177,9 @@ class Run:
         return status, time.process_time() - began - (self.making - before)
 
     def _steps_ahead(self) -> float:
-        """Steps to the end at the pace so far."""
-        return self.counts[STEPS] * (self.times[-1] / self.clock[TIME] - 1.0)
+        """Steps to the end at the pace so far, or to the limit of steps."""
+        taken = self.counts[STEPS]
+        return min(taken * (self.times[-1] / self.clock[TIME] - 1.0), self.control[MOST_STEPS] - taken)
 
     def _table(self, chart: Stabilisation) -> np.ndarray | tuple:
         """The first argument of ``march``."""

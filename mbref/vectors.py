@@ -1,6 +1,6 @@
 """Three-vectors as tuples, for the kernels: compiled they cost nothing and allocate nothing.
 
-And ``larger``, for norms.
+And what kernels do with whole vectors: copies, for which numba's slices allocate, order, and ``larger``.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ def larger(size, value):
 
 @kernel
 def copy(source, target):
-    """The first entries of ``target`` := ``source``."""
-    for k in range(min(source.shape[0], target.shape[0])):
+    """``target`` := ``source``, two vectors of one length."""
+    for k in range(target.shape[0]):
         target[k] = source[k]
 
 
@@ -40,7 +40,7 @@ def copy_rows(source, target):
 
 @kernel
 def sort(values):
-    """Put few values in increasing order, in place."""
+    """Put values in increasing order, in place, by insertion."""
     for k in range(1, values.shape[0]):
         value, place = values[k], k
         while place > 0 and values[place - 1] > value:

@@ -14,7 +14,7 @@ import numpy as np
 from crosscheck.engine import Setting
 from crosscheck.paper import settings
 from crosscheck.paper.cells import CELLS, COUNTS_III, COUNTS_IV, FIVE_BAR, FOUR_BAR_COLUMNS, SPATIAL, Cell
-from crosscheck.paper.settings import BASE, DRAWN, END, FEW, SEEDS, SIZED, STRICT, SWEEP, Variant
+from crosscheck.paper.settings import BASE, DRAWN, END, FEW, SEEDS, SIZED, STRICT, SWEEP, TIGHT, Variant
 from crosscheck.study import Case, Record, run_here, study
 from crosscheck.study import Progress as Advance
 from mbref.formulations import FORMULATIONS
@@ -49,7 +49,6 @@ DYNAMIC: Mapping[str, tuple[str, ...]] = {
 HEAVY_SWEEP = tuple(v for v in SWEEP if v.name in ("rtol 1e-5", "smallest step 1e-5", "α = 1e6"))
 [RAISED] = [v for v in SWEEP if v.name == "rank 1e-4"]
 KEPT, KEPT_RTOLS = (0.6, 0.3, 0.1, 0.03), (1e-6, 1e-7, 1e-8, 1e-9)
-TIGHT = Variant("rtol 1e-9", {"rtol": 1e-9})
 ALPHAS = tuple(10.0**k for k in range(2, 13))
 DIGITS_EPSILON = 1e-14  # so that only rounding is left
 EXACT, PENALTY, DUAL = "mpi-svd", "alf", "alf-dual"

@@ -106,6 +106,7 @@ SIZED: tuple[Variant, ...] = tuple(
     Variant(f"{size:g} m, seed {k}", size=size, seed=k) for size in SIZES for k in range(FEW)
 )
 STRICT = Variant("rtol 1e-9", {"rtol": 1e-9, "violation": 1.6e-5})
+TIGHT = Variant("rtol 1e-9", {"rtol": 1e-9})
 
 
 def method(row: str, variant: Variant = BASE) -> str:

@@ -46,7 +46,7 @@ class Solution:
     def __call__(self, times: np.ndarray) -> np.ndarray:
         """States (k, m) at times (k,) ≥ 0; raises NoSolution when the solution ends before."""
         times = np.asarray(times, dtype=REAL)
-        edges, values = self._panels(lambda: self._edges[-1] >= times.max(initial=0))
+        edges, values = self._panels(lambda: self._edges[-1] < times.max(initial=0))
         panel = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(values) - 1)
         x = 2 * (times - edges[panel]) / (edges[panel + 1] - edges[panel]) - 1
         return np.einsum("kn,knm->km", _cardinal(x), values[panel])
@@ -54,7 +54,7 @@ class Solution:
     def where(self, component: int, wanted: np.ndarray) -> np.ndarray:
         """States (k, m) at which a component that grows from 0 has the wanted values (k,)."""
         wanted = np.asarray(wanted, dtype=REAL)
-        edges, values = self._panels(lambda: self._state[component] >= wanted.max(initial=0))
+        edges, values = self._panels(lambda: self._state[component] < wanted.max(initial=0))
         nodes, reached = (
             edges[:-1, None] + (_nodes() + 1) / 2 * np.diff(edges)[:, None],
             values[..., component],
@@ -69,10 +69,10 @@ class Solution:
                 break
         return self(np.clip(at, 0, edges[-1]))
 
-    def _panels(self, reach: Callable[[], bool]) -> tuple[np.ndarray, np.ndarray]:
-        """Edges (p + 1,) and values (p, NODES, m) of the panels, as many as it takes."""
+    def _panels(self, is_short: Callable[[], bool]) -> tuple[np.ndarray, np.ndarray]:
+        """Edges (p + 1,) and values (p, NODES, m) of the panels, of which there are added while too few."""
         with self._asked:
-            while not self._values or not reach():
+            while not self._values or is_short():
                 self._add_panel()
             return np.array(self._edges), np.stack(self._values)
 

@@ -11,7 +11,7 @@ SAFETY, SHRINK, GROW, RETRY = 0.8, 0.2, 100.0, 0.25  # 0.8 takes 5 to 10 % fewer
 
 @kernel
 def first_step(y, y_rate, control, tolerances):
-    """A first step from the sizes of y and y' (Hairer, Nørsett & Wanner, section II.4)."""
+    """A first step from the sizes of y and y': the first guess of Hairer, Nørsett & Wanner, section II.4."""
     size, rate = 0.0, 0.0
     for i in range(y.shape[0]):
         scale = tolerances[1] + tolerances[0] * abs(y[i])

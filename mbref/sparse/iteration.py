@@ -23,6 +23,7 @@ from mbref.tables import COLUMNS, FACTORISATIONS, INVERSE_ROOT, JACOBIAN, NOT_CO
 from mbref.vectors import copy
 
 TINY, NEVER = 1e-300, 1e300
+LEAST = 2  # iterations of ``settle``: enough but near singular positions, so that their number is fixed
 
 
 @inlined
@@ -53,7 +54,7 @@ def settle(plan, work, epsilon, most, target, multipliers):
         for i in range(row.shape[0]):
             total[i] -= step[i]
         expected = min(expected, change * min(1.0, change / max(last, TINY)))
-        if expected <= epsilon:
+        if k + 1 >= min(LEAST, most) and expected <= epsilon:
             status = OK
             break
     for i in range(row.shape[0]):

@@ -107,7 +107,7 @@ def accept(t, y, problem):
         counts[FACTORISATIONS] += 1
         if call(live[0, PROJECT_CODE], t, y, work[ANGLES][0], out, more) != OK:
             break
-        copy(out, y)
+        copy(out, y[:size])
         before, violation = violation, more[0]
         if violation <= tolerance or before <= violation <= ROUNDING * tolerance:
             watch(more[1:], work[MEMO][0])

@@ -2,7 +2,7 @@
 
 A record becomes a function ``i64 f(double t, double* y, double* angles, double* out, double* more)`` of the
 operations that its results need; it returns 0 when all its guards held.  A sum may take a product in before
-it is rounded (``contract``); nothing else differs from the kernel that it was traced from.
+it is rounded (``contract``); no other operation is rounded differently from the kernel's.
 """
 
 from __future__ import annotations

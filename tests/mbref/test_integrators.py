@@ -13,6 +13,8 @@ from scipy.special import ellipj, ellipk
 from crosscheck.metrics import measure
 from crosscheck.truth import truth_for
 from mbref import rotations
+from mbref.integrators.coefficients import ERROR3, ERROR5, STAGES, A, B
+from mbref.integrators.dop853 import to_stage, weighted
 from mbref.method import Method
 from mbref.run import Run
 from mbref.scene import Body, Revolute, Scene, Spring, Translational
@@ -254,3 +256,14 @@ def test_adams_is_the_same_without_the_jit(method):
 def test_an_order_that_adams_does_not_have_is_refused(order):
     with pytest.raises(ValueError, match=r"max_order must be 1 to 12"):
         simulate(OSCILLATOR, f"lm1+none/adams[max_order={order}]", [1.0])
+
+
+def test_sums_of_stages_have_all_coefficients():
+    rng, n = np.random.default_rng(4), 7
+    y, k, state = rng.normal(size=n), rng.normal(size=(STAGES, n)), np.zeros(n)
+    for s in range(1, STAGES):
+        to_stage(s, 0.3, y, k, state)
+        np.testing.assert_allclose(state, y + 0.3 * A[s, :s] @ k[:s], rtol=1e-13, atol=1e-13)
+    for weights in (B, ERROR3, ERROR5):
+        found = [weighted(weights, k, i) for i in range(n)]
+        np.testing.assert_allclose(found, weights @ k, rtol=1e-13, atol=1e-13)

@@ -277,3 +277,13 @@ def test_the_larger_size_needs_no_guard():
     assert piece.record.guards == {}
     assert [call(*pair)[1] for pair in ((1.0, -2.0), (-3.0, 2.0))] == [2.0, 3.0]
     assert larger(1.0, -2.0) == 2.0
+
+
+def test_a_driver_that_starts_smoothly_does_not_spoil_the_code():
+    """At rest without forces the start itself needs no iteration; what moves later does."""
+    scene = SCENES["four_bar"]()
+    smooth = scene.driver[0].model_copy(update={"polynomial": (0.0, 0.0, 0.0, 1e4)})
+    body = tuple(b.model_copy(update={"velocity": None, "angular_velocity": None}) for b in scene.body)
+    generic, own = runs(scene.with_(driver=(smooth,), body=body), "alf-dual+projection", 0.05)
+    assert own.cost.rhs <= 1.1 * generic.cost.rhs, "steps went over to the general kernels"
+    assert apart(generic, own) < 1e-9
