@@ -23,6 +23,7 @@ from mbref.integrators.coefficients import STAGES
 from mbref.scene import Scene
 from mbref.tables import LARGEST_STEP, OK, ORDER
 from mbref.trajectory import Cost, Outcome, Trajectory
+from mbref.vectors import copy
 
 CONTROL = 16  # entries of ``control``, more than there are
 RTOLS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
@@ -40,7 +41,7 @@ def compiled(rates: Callable) -> Callable:
     def integrate(times, samples, start, control, tolerances, memory, p, counts):
         """From sample to sample: y(t) into the rows of ``samples``."""
         y, rate, new = memory[-3, :2], memory[-2, :2], memory[-1, :2]
-        y[:] = start
+        copy(start, y)
         t, h, suggested, ratio = 0.0, 0.0, 0.0, 0.0
         for k in range(times.shape[0]):
             while t < times[k]:
@@ -59,9 +60,9 @@ def compiled(rates: Callable) -> Callable:
                     counts[REJECTED] += 1
                     suggested = propose(h, suggested, ratio, y, rate, memory, control, tolerances)
                 counts[STEPS] += 1
-                y[:] = new
+                copy(new, y)
                 t = times[k] if h == left else t + h
-            samples[k] = y
+            copy(y, samples[k])
         return OK
 
     @njit(**AS_MBREF)
