@@ -66,25 +66,27 @@ def _own_cache() -> Iterator[None]:
 
 def kernel(function: Callable) -> Callable:
     """A compiled helper, callable from kernels and from Python."""
-    with _own_cache():
-        return njit(**OPTIONS)(function)
+    return _compiled(function)
 
 
 def inlined(function: Callable) -> Callable:
     """A kernel compiled into each of its callers: of an evaluation, half of whose time calls would take."""
-    with _own_cache():
-        return njit(forceinline=True, **OPTIONS)(function)
+    return _compiled(function, forceinline=True)
 
 
 def allocating(function: Callable) -> Callable:
     """A kernel that allocates: numpy's decompositions do."""
-    with _own_cache():
-        return njit(**{**OPTIONS, "_nrt": True})(function)
+    return _compiled(function, _nrt=True)
 
 
 def view(function: Callable) -> Callable:
     """A kernel that returns arrays, parts of its arguments: its source becomes part of its callers'."""
     return njit(inline="always")(function)
+
+
+def _compiled(function: Callable, **options: bool) -> Callable:
+    with _own_cache():
+        return njit(**{**OPTIONS, **options})(function)
 
 
 class Exchangeable:

@@ -64,9 +64,7 @@ class Limits:
     largest_turn: float = 1.0  # rad that the fastest body may turn in an adaptive step
     most_steps: int = 5_000_000
     sparse_above: int = -1  # constraint rows; with more, alf-dual's general kernels have a sparse factor
-    code: str = (
-        AUTO  # GENERIC kernels, SPECIALISED to the scene, or AUTO: that where WORTH_IT steps are ahead
-    )
+    code: str = AUTO  # GENERIC kernels, SPECIALISED to the scene, or AUTO: where WORTH_IT steps are ahead
 
 
 class Run:

@@ -55,10 +55,8 @@ class Solution:
         """States (k, m) at which a component that grows from 0 has the wanted values (k,)."""
         wanted = np.asarray(wanted, dtype=REAL)
         edges, values = self._panels(lambda: self._state[component] < wanted.max(initial=0))
-        nodes, reached = (
-            edges[:-1, None] + (_nodes() + 1) / 2 * np.diff(edges)[:, None],
-            values[..., component],
-        )
+        nodes = edges[:-1, None] + (_nodes() + 1) / 2 * np.diff(edges)[:, None]
+        reached = values[..., component]
         at = np.interp(wanted.astype(float), reached.ravel().astype(float), nodes.ravel().astype(float))
         at = at.astype(REAL)
         for _ in range(ROOT_STEPS):
