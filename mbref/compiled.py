@@ -70,8 +70,11 @@ def kernel(function: Callable) -> Callable:
 
 
 def inlined(function: Callable) -> Callable:
-    """A kernel compiled into each of its callers: of an evaluation, half of whose time calls would take."""
-    return _compiled(function, forceinline=True)
+    """A kernel compiled into each of its callers: of an evaluation, half of whose time calls would take.
+
+    A closure is not kept on disk, where numba would not find it again.
+    """
+    return _compiled(function, forceinline=True, cache=function.__closure__ is None)
 
 
 def allocating(function: Callable) -> Callable:

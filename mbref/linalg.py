@@ -168,10 +168,9 @@ def cholesky_factor(a, n, tolerance):
         inverse = 1.0 / a[k, k]
         a[k, k] = inverse
         for i in range(k + 1, n):
-            factor = a[k, i] * inverse
-            if factor != 0.0:
+            if a[k, i] != 0.0:
                 for j in range(i, n):
-                    a[i, j] -= factor * a[k, j]
+                    a[i, j] -= a[k, i] * a[k, j] * inverse  # products need not wait for the division
         for j in range(k + 1, n):
             a[k, j] *= inverse
     return True

@@ -1,17 +1,16 @@
 """LM2: multipliers from (Φ_q M⁻¹ Φ_qᵀ) λ = Φ_q M⁻¹ g - γ, then q̈ = M⁻¹ (g - Φ_qᵀ λ) (Eqs. 6 to 8).
 
-By Cholesky, in rows scaled to unit diagonal.  Fails on redundant rows and on a singular M.
+By Cholesky, which the scale of rows does not disturb.  Fails on redundant rows and on a singular M.
 """
 
 from __future__ import annotations
 
 from mbref.compiled import exchangeable
 from mbref.formulations.base import Formulation
-from mbref.formulations.moore_penrose import begin, finish, transpose
-from mbref.linalg import cholesky_factor, cholesky_solve, gram, times_transpose
+from mbref.linalg import cholesky_factor, cholesky_solve, gram
 from mbref.tables import ACCELERATE, FACTORISATIONS, OK, SINGULAR
 
-SINGULAR_PIVOT = 1e-13  # of a matrix with unit diagonal; rounding leaves about 1e-15 of a redundant row
+SINGULAR_PIVOT = 1e-11  # of its diagonal entry; rounding leaves 1e-16 to 5e-12 of a redundant row
 
 
 @exchangeable(ACCELERATE)
@@ -19,21 +18,36 @@ def accelerate(
     mass, inverse_root, jacobian, force, rhs, settings, scratch, pivots, counts, acceleration, multipliers
 ):
     m, n = jacobian.shape
-    d = scratch[: m * n].reshape((m, n))
-    s = scratch[m * n : m * n + m * m].reshape((m, m))
-    dt = scratch[m * n + m * m : 2 * m * n + m * m].reshape((n, m))
-    start = 2 * m * n + m * m
-    b, x = scratch[start : start + m], scratch[start + m : start + m + n]
-    if not begin(mass, inverse_root, jacobian, force, rhs, d, b, acceleration, multipliers):
-        return SINGULAR
-    transpose(d, dt)
+    dt = scratch[: n * m].reshape((n, m))  # the transpose of D = Φ_q M^(-1/2)
+    s = scratch[n * m : n * m + m * m].reshape((m, m))
+    start = n * m + m * m
+    b, diagonal = scratch[start : start + m], scratch[start + m : start + 2 * m]
+    for i in range(m):
+        b[i] = -rhs[i]
+    for j in range(n):
+        if not mass[j] > 0.0:
+            return SINGULAR
+        acceleration[j] = force[j] / mass[j]
+        for i in range(m):
+            b[i] += jacobian[i, j] * acceleration[j]
+            dt[j, i] = jacobian[i, j] * inverse_root[j]
     gram(dt, s)
+    for i in range(m):
+        diagonal[i] = s[i, i]
     counts[FACTORISATIONS] += 1
-    if not cholesky_factor(s, m, SINGULAR_PIVOT):
+    if not cholesky_factor(s, m, 0.0):
         return SINGULAR
+    for i in range(m):
+        if not s[i, i] * diagonal[i] < 1.0 / SINGULAR_PIVOT:
+            return SINGULAR
     cholesky_solve(s, m, b)
-    times_transpose(d, b, x)
-    finish(inverse_root, x, b, acceleration, multipliers)
+    for j in range(n):
+        reaction = 0.0
+        for i in range(m - 1, -1, -1):  # as the solution comes about
+            reaction += dt[j, i] * b[i]
+        acceleration[j] -= inverse_root[j] * reaction
+    for i in range(m):
+        multipliers[i] = b[i]
     return OK
 
 
@@ -41,7 +55,7 @@ LM2 = Formulation(
     name="lm2",
     equations="Eqs. 6-8",
     accelerate=accelerate,
-    scratch=lambda m, n: 2 * m * n + m * m + m + n,
+    scratch=lambda m, n: n * m + m * m + 2 * m,
     handles_redundancy=False,
     handles_singular_mass=False,
 )

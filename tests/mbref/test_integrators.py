@@ -14,7 +14,7 @@ from crosscheck.metrics import measure
 from crosscheck.truth import truth_for
 from mbref import rotations
 from mbref.integrators.coefficients import ERROR3, ERROR5, STAGES, A, B
-from mbref.integrators.dop853 import to_stage, weighted
+from mbref.integrators.dop853 import sum_with
 from mbref.method import Method
 from mbref.run import Run
 from mbref.scene import Body, Revolute, Scene, Spring, Translational
@@ -107,14 +107,14 @@ def test_adams_error_and_its_order_when_bounded(error, order):
 
 SCENES_AND_TRUTHS = [
     ("planar_slider_crank_gravity", 0.5, "mpi-svd+projection"),
-    ("spatial_slider_crank", 0.02, "lm1+projection"),
-    ("spatial_slider_crank", 0.02, "lm1+none"),
+    ("spatial_slider_crank", 0.05, "lm1+projection"),
+    ("spatial_slider_crank", 0.05, "lm1+none"),
 ]
 
 
 @pytest.mark.parametrize(("name", "end", "method"), SCENES_AND_TRUTHS)
 def test_adams_error_is_proportional_to_the_tolerance(name, end, method):
-    scene, tolerances = SCENES[name](), 10.0 ** -np.arange(4, 13, 2)
+    scene, tolerances = SCENES[name](), 10.0 ** -np.arange(4, 13)
     errors = [
         judged(scene, ran(scene, f"{method}/adams", np.linspace(0, end, 6), rtol=rtol)) for rtol in tolerances
     ]
@@ -258,12 +258,9 @@ def test_an_order_that_adams_does_not_have_is_refused(order):
         simulate(OSCILLATOR, f"lm1+none/adams[max_order={order}]", [1.0])
 
 
-def test_sums_of_stages_have_all_coefficients():
-    rng, n = np.random.default_rng(4), 7
-    y, k, state = rng.normal(size=n), rng.normal(size=(STAGES, n)), np.zeros(n)
-    for s in range(1, STAGES):
-        to_stage(s, 0.3, y, k, state)
-        np.testing.assert_allclose(state, y + 0.3 * A[s, :s] @ k[:s], rtol=1e-13, atol=1e-13)
-    for weights in (B, ERROR3, ERROR5):
-        found = [weighted(weights, k, i) for i in range(n)]
-        np.testing.assert_allclose(found, weights @ k, rtol=1e-13, atol=1e-13)
+@pytest.mark.parametrize("weights", [*(A[s, :s] for s in range(1, STAGES)), B, ERROR3, ERROR5])
+def test_sums_of_stages_have_all_coefficients(weights):
+    k = np.random.default_rng(4).normal(size=(STAGES, 7))
+    weighted = sum_with(weights)
+    found = [weighted(k, i) for i in range(7)]
+    np.testing.assert_allclose(found, weights @ k[: len(weights)], rtol=1e-13, atol=1e-13)
