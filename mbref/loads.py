@@ -115,6 +115,15 @@ def torsion_spring(k, i, j, slot, frames, data, angles, g):
 
 
 @kernel
+def has_angles(loads):
+    """Whether there is a torsion spring, whose angle unwraps."""
+    for k in range(loads.shape[0]):  # noqa: SIM110 - numba compiles no generator expression
+        if loads[k, 3] >= 0:
+            return True
+    return False
+
+
+@kernel
 def remember_angles(ints, floats, work):
     """Keep the torsion springs' angles of the accepted state, so that they unwrap over many turns."""
     loads, frames, angles = ints[LOADS], work[FRAMES], work[ANGLES]

@@ -31,7 +31,6 @@ from mbref.tables import (
     FIRST_STEP,
     FIXED_STEP,
     FORCED_STEP,
-    FRAMES,
     HANDOVER,
     LARGEST_STEP,
     LARGEST_TURN,
@@ -45,7 +44,6 @@ from mbref.tables import (
     NOT_CONVERGED,
     NOT_FINITE,
     OK,
-    OMEGA,
     PHI,
     PROBLEM,
     PROPOSE,
@@ -116,10 +114,10 @@ def judge(y, y_rate, place, control, work):
 @kernel
 def fastest_turn(work):
     """The largest component of a body's angular velocity (rad/s)."""
-    frames, fastest = work[FRAMES], 0.0
-    for b in range(frames.shape[0]):
-        for k in range(3):
-            fastest = max(fastest, abs(frames[b, OMEGA + k]))
+    v, fastest = work[STATE][VELOCITIES], 0.0
+    for b in range(v.shape[0] // 7):
+        for k in range(3, 6):
+            fastest = max(fastest, abs(v[6 * b + k]))
     return fastest
 
 

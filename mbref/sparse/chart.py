@@ -8,6 +8,7 @@ from mbref.compiled import exchangeable, inlined
 from mbref.evaluation import evaluate, expand, right_hand_side
 from mbref.problem import opened, planned
 from mbref.sparse.factor import memories, part, subtract_product
+from mbref.sparse.held import bear
 from mbref.sparse.iteration import factor, settle
 from mbref.sparse.plan import COLUMN, ROW
 from mbref.stabilisation.base import Stabilisation
@@ -54,7 +55,9 @@ def accelerations(plan, work, settings, counts):
     for i in range(row.shape[0]):
         b[i] = rows[RHS, row[i]]
     subtract_product(plan, d, x, b)
-    return settle(plan, work, epsilon, most, acceleration, rows[MULTIPLIERS])
+    status = settle(plan, work, epsilon, most, acceleration, rows[MULTIPLIERS])
+    bear(plan, work)
+    return status
 
 
 @exchangeable(RATES)

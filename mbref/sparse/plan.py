@@ -7,7 +7,9 @@ Rows are counted in the order of elimination, columns only where something moves
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array, eye_array
@@ -27,8 +29,21 @@ from scipy.sparse.linalg import splu
     L_START,  # (r + 1,) where each column of L begins, its diagonal first
     L_ROW,  # (l,) row of each number of L
     UPDATE,  # positions in L that the elimination of each column changes, column after column
-) = range(12)
-PARTS = 12
+    HELD_ROW,  # (h,) rows that hold columns at rest, those found last first
+    HELD_START,  # (h + 1,) where the entries of each begin
+    HELD_ENTRY,  # (e,) their positions in the blocks
+    HELD_COLUMN,  # (e,) and their columns
+    OTHER_START,  # (e + 1,) where the entries of other rows in that column begin
+    HELD_OTHER,  # positions of these in the blocks
+) = range(18)
+PARTS = 18
+
+
+class Held(NamedTuple):
+    """Rows and the columns that they hold at rest, as many."""
+
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -43,8 +58,16 @@ class Plan:
         return self.indices[self.indices[k] : self.indices[k + 1]]
 
 
-def plan_for(moving: np.ndarray, entries: np.ndarray, columns: np.ndarray) -> Plan:
-    """The plan of D's pattern: velocities that move (n,), ``entries`` (m, 12), and the column of each."""
+def plan_for(moving: np.ndarray, entries: np.ndarray, columns: np.ndarray, held: Sequence[Held] = ()) -> Plan:
+    """The plan of D's pattern: velocities that move (n,), ``entries`` (m, 12), and the column of each.
+
+    Of them all that rows hold at rest stays out, and rows that are then empty.
+    """
+    of_held = _held_parts(entries, columns, held)
+    moving, entries = moving.copy(), entries.copy()
+    for each in held:
+        moving[list(each.columns)] = False
+    entries &= np.append(moving, np.zeros(6, dtype=bool))[columns]
     kept = np.flatnonzero(entries.any(axis=1))
     row, entry = np.nonzero(entries[kept])
     d = csr_array((np.ones(row.size), (row, columns[kept[row], entry])), shape=(kept.size, moving.size))
@@ -61,7 +84,7 @@ def plan_for(moving: np.ndarray, entries: np.ndarray, columns: np.ndarray) -> Pl
     parts = [
         kept[order], column, d_start, 12 * original + entry, np.searchsorted(column, d_column),
         np.append(s_start, target.size), s_target, left, right, l_start, l_row,
-        _updates(l_start, l_row, l_key, order.size),
+        _updates(l_start, l_row, l_key, order.size), *of_held,
     ]  # fmt: skip
     offsets = np.cumsum([PARTS + 1, *(part.size for part in parts)])
     indices = np.concatenate([offsets, *parts])
@@ -69,6 +92,25 @@ def plan_for(moving: np.ndarray, entries: np.ndarray, columns: np.ndarray) -> Pl
         raise OverflowError("the scene is too large for 32-bit indices")
     memory = row.size + l_row.size + 5 * order.size + 2 * column.size
     return Plan(indices.astype(np.uint32), memory)
+
+
+def _held_parts(entries: np.ndarray, columns: np.ndarray, held: Sequence[Held]) -> list[np.ndarray]:
+    """The parts of the rows that hold: a column's other entries are of rows whose multipliers are known."""
+    row, entry = np.nonzero(entries)
+    in_column: dict[int, list[int]] = {}
+    for r, e in zip(row, entry, strict=True):
+        in_column.setdefault(int(columns[r, e]), []).append(12 * int(r) + int(e))
+    rows, starts, own, own_columns, firsts, others = [], [0], [], [], [0], []
+    for each in reversed(held):
+        for r in each.rows:
+            for column in each.columns:
+                own += [place for place in in_column[column] if place // 12 == r]
+                own_columns.append(column)
+                others += [place for place in in_column[column] if place // 12 not in each.rows]
+                firsts.append(len(others))
+            rows.append(r)
+            starts.append(len(own))
+    return [np.array(part, dtype=int) for part in (rows, starts, own, own_columns, firsts, others)]
 
 
 def _factor_pattern(d: csr_array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -24,6 +24,7 @@ from mbref.formulations.base import Formulation
 from mbref.model import Model
 from mbref.sparse.chart import accelerations
 from mbref.sparse.factor import memories, squared_pivots
+from mbref.sparse.held import bear
 from mbref.sparse.iteration import factor
 from mbref.sparse.plan import COLUMN, ROW, Plan
 from mbref.specialised.machine_code import Code, Piece, compiled, processor
@@ -122,6 +123,7 @@ class State:
         )  # fmt: skip
         self.work[COLUMNS][ACCELERATION, velocities] = columns[ACCELERATION]
         self.work[ROWS][MULTIPLIERS, rows] = of_rows[MULTIPLIERS]
+        plain(bear)(self.moving.plan.indices, self.work)
         return status
 
 
@@ -147,8 +149,8 @@ def project_piece(state: State) -> Piece:
     """One Newton step of the projection: y after it; the violation before it and the squared pivots."""
     moving, model, q, v, work = state.moving, state.model, state.q, state.v, state.work
     plan, rows = moving.plan.indices, work[ROWS]
-    plain(normalise)(q)
     plain(evaluate)(state.t, q, v, *state.problem)
+    plain(normalise)(q)
     if not plain(factor)(plan, work, ALPHA, no_counts()):
         raise Untraceable("the constraint rows cannot be factored at the start")
     _, l, diagonal, squares, *_ = plain(memories)(plan, work[SCRATCH][0])

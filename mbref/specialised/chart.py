@@ -12,7 +12,8 @@ from numba import i8
 from numba.extending import intrinsic
 
 from mbref.compiled import exchangeable, kernel
-from mbref.evaluation import expand, move, place
+from mbref.evaluation import expand, place
+from mbref.loads import has_angles
 from mbref.problem import opened, planned
 from mbref.singular import NEVER
 from mbref.sparse.factor import part
@@ -32,6 +33,7 @@ from mbref.tables import (
     FRAMES,
     HANDOVER,
     LIVE,
+    LOADS,
     MEMO,
     MOVING,
     MULTIPLIERS,
@@ -45,7 +47,6 @@ from mbref.tables import (
     ROWS,
     STATE,
     TURNING,
-    VELOCITIES,
 )
 from mbref.vectors import copy
 
@@ -114,8 +115,8 @@ def accept(t, y, problem):
             flush(y[:size])
             work[ROWS][PHI, :] = violation
             expand(y, live, state)
-            place(state[COORDINATES], work[FRAMES])
-            move(state[VELOCITIES][: work[COLUMNS].shape[1]], work[FRAMES])
+            if has_angles(ints[LOADS]):
+                place(state[COORDINATES], work[FRAMES])
             return OK
     return project(t, y, problem)
 

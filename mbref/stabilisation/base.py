@@ -28,3 +28,4 @@ class Stabilisation:
     accept: Exchangeable
     options: Mapping[str, float] = field(default_factory=dict)
     feedback: Callable[[Mapping[str, float]], tuple[float, float]] | None = None  # gains of Φ' and Φ in γ
+    largest_turn: float = 1.0  # rad that a body may turn in an adaptive step unless the user says

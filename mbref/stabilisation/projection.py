@@ -53,6 +53,7 @@ INDEPENDENT = (5.0 * ALPHA**-0.25) ** 2  # the squared pivot from which on a row
 MOST_ITERATIONS = 10
 ROUNDING = 1e3  # tolerances: what is left where iterations no longer reduce it
 SMALL, GOOD_REDUCTION = 1e-8, 1e-2  # a factor is kept while violations are so small and shrink so fast
+LARGEST_TURN = 2.5  # rad: less than half a turn, after which the next singular position may come
 CHANGE = 0  # row of DENSE_VECTORS
 
 
@@ -129,8 +130,8 @@ def project_positions(t, q, v, plan, ints, floats, work, settings, counts):
     """Newton's method for Φ(q, t) = 0; leaves a factor that serves at q, and its status."""
     rows, x, change = work[ROWS], work[COLUMNS][STEP_X], work[DENSE_VECTORS][CHANGE]
     tolerance = settings[NEWTON_TOLERANCE]
-    normalise(q)
     evaluate(t, q, v, ints, floats, work)
+    normalise(q)
     if not factor(plan, work, ALPHA, counts):
         return SINGULAR
     violation = largest(rows[PHI])
@@ -174,4 +175,6 @@ def accept(t, y, problem):
     return project(t, y, problem)
 
 
-PROJECTION = Stabilisation("projection", "Bayo & Ledesma 1996", enter, rates, rates, rates, accept)
+PROJECTION = Stabilisation(
+    "projection", "Bayo & Ledesma 1996", enter, rates, rates, rates, accept, largest_turn=LARGEST_TURN
+)
