@@ -1,7 +1,8 @@
 """The limit: what a mechanism costs when its one equation of motion is derived by hand.
 
-Free scenes: the equation of ``by_hand``, compiled, by mbref's own DOP853 and step control.  Driven scenes:
-their poses in closed form at the sample times, which is all that a perfect method would have to compute.
+Free scenes: the equation of ``by_hand``, compiled, by mbref's own DOP853 and step control at the tolerances
+of mbref.  Driven scenes: their poses in closed form at the sample times, which is all that a perfect method
+would have to compute.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from by_hand import AS_MBREF, BY_HAND
 from numba import njit
 
 from crosscheck.engine import Cannot, Engine, Setting, Why
+from crosscheck.engines.mbref import TOLERANCES
 from crosscheck.truth import PATHS
 from crosscheck.truth.path import Path, initial_rate
 from mbref import __version__, rotations
@@ -26,7 +28,6 @@ from mbref.trajectory import Cost, Outcome, Trajectory
 from mbref.vectors import copy
 
 CONTROL = 16  # entries of ``control``, more than there are
-RTOLS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
 REPEATS = 100  # within one reading of the clock: one run is a matter of microseconds
 STEPS, REJECTED, EVALUATIONS = range(3)
 
@@ -96,7 +97,7 @@ class Limit(Engine):
     def settings(self, scene: Scene) -> Sequence[Setting]:
         if scene.driver:
             return [Setting("closed form", {})]
-        return [Setting("equation", {"rtol": rtol}) for rtol in RTOLS]
+        return [Setting("equation", {"rtol": rtol}) for rtol in TOLERANCES]
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         path = next(path for family in PATHS if (path := family(scene)))

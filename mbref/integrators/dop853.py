@@ -74,11 +74,13 @@ def step(
         return -float(status)
     for i in range(y.shape[0]):
         y_new[i] = y[i] + h * solution(memory, i)
-    error3, error5 = 0.0, 0.0
+    errors3, errors5, error3, error5 = memory[1], memory[2], 0.0, 0.0  # those stages have no weight
     for i in range(y.shape[0]):
         weight = 1.0 / (tolerances[1] + tolerances[0] * max(abs(y[i]), abs(y_new[i])))
-        error3 = larger(error3, third_order(memory, i) * weight)
-        error5 = larger(error5, fifth_order(memory, i) * weight)
+        errors3[i] = third_order(memory, i) * weight
+        errors5[i] = fifth_order(memory, i) * weight
+    for i in range(y.shape[0]):
+        error3, error5 = larger(error3, errors3[i]), larger(error5, errors5[i])
     if error5 == 0.0:
         return 0.0  # nothing is integrated, or nothing changes
     return abs(h) * error5 * error5 / sqrt(error5 * error5 + 0.01 * error3 * error3)
