@@ -57,7 +57,7 @@ from mbref.tables import (
     SCRATCH,
 )
 
-MOST_ROWS = 40  # whose record would not be too long (machine_code.MOST_OPERATIONS)
+MOST_ROWS = 60  # whose record would not be too long (machine_code.MOST_OPERATIONS)
 PIECES = ("rates", "project")  # in the order of their addresses in ints[LIVE]
 
 

@@ -212,7 +212,7 @@ def test_what_cannot_be_laid_down_beforehand_is_said(method, reason):
 
 
 def test_a_long_chain_has_no_code_of_its_own_and_says_so_at_once():
-    with pytest.raises(MethodError, match="122 rows that move, more than 40"):
+    with pytest.raises(MethodError, match="122 rows that move, more than 60"):
         simulate(find_scene("four_bar_chain[20]"), "alf-dual+projection", (0.01,), Limits(code="specialised"))
 
 
