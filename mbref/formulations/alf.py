@@ -35,8 +35,9 @@ def changed(before, now):
     """Norm of the change relative to the larger of 1 and the norm of ``now`` (Eq. 20)."""
     change, size = 0.0, 0.0
     for j in range(now.shape[0]):
-        change += (now[j] - before[j]) ** 2
-        size += now[j] ** 2
+        step = now[j] - before[j]
+        change += step * step
+        size += now[j] * now[j]
     return sqrt(change / max(1.0, size))
 
 

@@ -48,7 +48,8 @@ def norm(vector, y, tolerances):
     """Euclidean norm of a vector in tolerances of y, as in STEP."""
     total = 0.0
     for i in range(y.shape[0]):
-        total += (vector[i] / (tolerances[1] + tolerances[0] * abs(y[i]))) ** 2
+        ratio = vector[i] / (tolerances[1] + tolerances[0] * abs(y[i]))
+        total += ratio * ratio
     return sqrt(total)
 
 

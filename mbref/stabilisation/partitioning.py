@@ -152,7 +152,8 @@ def residual(q, work, pivots, b):
             b[i] = work[ROWS][PHI, row]
         else:
             j = 7 * (row - m) + 3
-            b[i] = q[j] ** 2 + q[j + 1] ** 2 + q[j + 2] ** 2 + q[j + 3] ** 2 - 1.0
+            w, x, y, z = q[j], q[j + 1], q[j + 2], q[j + 3]
+            b[i] = w * w + x * x + y * y + z * z - 1.0
         if not abs(b[i]) <= size:
             size = abs(b[i])
     return size
@@ -221,7 +222,7 @@ def second_rates(work):
     coordinate_rates(q, acceleration, second)
     for body in range(q.shape[0] // 7):
         j = 6 * body
-        square = 0.25 * (v[j + 3] ** 2 + v[j + 4] ** 2 + v[j + 5] ** 2)
+        square = 0.25 * (v[j + 3] * v[j + 3] + v[j + 4] * v[j + 4] + v[j + 5] * v[j + 5])
         for k in range(3, 7):
             second[7 * body + k] -= square * q[7 * body + k]
 
