@@ -24,7 +24,7 @@ METHODS = (
 )
 KINEMATIC = "kinematic"  # of driven scenes; integrates nothing, so has no tolerance
 OWN_CODE = ", own code"  # machine code of the scene, made before the clock runs
-TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
+TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-10, 1e-11)
 
 
 class Mbref(Engine):
