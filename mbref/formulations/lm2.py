@@ -42,10 +42,8 @@ def accelerate(
             return SINGULAR
     cholesky_solve(s, m, b)
     for j in range(n):
-        reaction = 0.0
         for i in range(m - 1, -1, -1):  # as the solution comes about
-            reaction += dt[j, i] * b[i]
-        acceleration[j] -= inverse_root[j] * reaction
+            acceleration[j] -= inverse_root[j] * dt[j, i] * b[i]
     for i in range(m):
         multipliers[i] = b[i]
     return OK

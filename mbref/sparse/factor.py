@@ -78,11 +78,11 @@ def factorise(plan, l):
         inverse = 1.0 / l[start]
         l[start] = inverse
         for p in range(start + 1, end):
-            value = l[p] * inverse
             for other in range(p, end):
-                l[update[u]] -= value * l[other]
+                l[update[u]] -= l[p] * l[other] * inverse
                 u += 1
-            l[p] = value
+        for p in range(start + 1, end):
+            l[p] *= inverse
     return True
 
 
@@ -97,7 +97,7 @@ def solve(plan, l, b):
             b[row[p]] -= l[p] * value
     for k in range(size - 1, -1, -1):
         value = b[k] * l[first[k]]
-        for p in range(first[k] + 1, first[k + 1]):
+        for p in range(first[k + 1] - 1, first[k], -1):  # what was found last comes last, also below
             value -= l[p] * b[row[p]]
         b[k] = value
 
@@ -118,7 +118,7 @@ def times_transpose(plan, d, b, x):
     """x := Dᵀ b."""
     start, column = part(plan, D_START), part(plan, D_COLUMN)
     x[:] = 0.0
-    for k in range(b.shape[0]):
+    for k in range(b.shape[0] - 1, -1, -1):
         value = b[k]
         for p in range(start[k], start[k + 1]):
             x[column[p]] += d[p] * value
