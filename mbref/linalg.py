@@ -157,13 +157,13 @@ def times_transpose(d, y, x):
 
 
 @kernel
-def cholesky_factor(a, n, tolerance):
-    """Uᵀ D U of the upper half of a[:n, :n], in place; False where an entry of D is ≤ tolerance.
+def cholesky_factor(a, n):
+    """Uᵀ D U of the upper half of a[:n, :n], in place; False where an entry of D is ≤ 0.
 
     U has a unit diagonal, in whose place 1/D is kept: no roots, and no divisions when solving.
     """
     for k in range(n):
-        if not a[k, k] > tolerance:
+        if not a[k, k] > 0.0:
             return False
         inverse = 1.0 / a[k, k]
         a[k, k] = inverse

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from numpy import isfinite
+from numpy import isfinite, sqrt
 
 from mbref.addresses import array_at, kernel_at
 from mbref.compiled import INDICES, INT, MATRIX, VECTOR, entry, kernel, pointer_to
@@ -113,12 +113,12 @@ def judge(y, y_rate, place, control, work):
 
 @kernel
 def fastest_turn(work):
-    """The largest component of a body's angular velocity (rad/s)."""
-    v, fastest = work[STATE][VELOCITIES], 0.0
-    for b in range(v.shape[0] // 7):
-        for k in range(3, 6):
-            fastest = max(fastest, abs(v[6 * b + k]))
-    return fastest
+    """The largest angular velocity of a body (rad/s)."""
+    v, square = work[STATE][VELOCITIES][: work[COLUMNS].shape[1]], 0.0
+    for b in range(v.shape[0] // 6):
+        a, b_, c = v[6 * b + 3], v[6 * b + 4], v[6 * b + 5]
+        square = max(square, a * a + b_ * b_ + c * c)
+    return sqrt(square)
 
 
 @kernel

@@ -49,7 +49,7 @@ from mbref.tables import (
 
 CALL = 5_000  # steps between returns to Python, where an interrupt is heard and progress is told
 WORTH_IT = 20_000  # steps ahead from which on machine code of the scene's own saves what making it takes
-UNWRAPPED = 1.0  # rad that a body may turn in a step where springs are wound: two turn less than π apart
+UNWRAPPED = 1.0  # rad that a body may turn in a step where springs wind up: two turn less than π apart
 AUTO, GENERIC, SPECIALISED = "auto", "generic", "specialised"
 
 
@@ -65,7 +65,7 @@ class Limits:
     smallest_step: float = 0.0  # s; 0 means a million-millionth of the duration
     forced_step: float = 0.0  # s; a step this short is taken whatever its error estimate; 0: none
     largest_step: float = 0.0  # s; 0 means the duration
-    largest_turn: float = 0.0  # rad that the fastest body may turn in an adaptive step; 0: stabilisation's
+    largest_turn: float = 0.0  # rad that the fastest body may turn in an adaptive step; 0: what is safe
     most_steps: int = 5_000_000
     sparse_above: int = -1  # constraint rows; with more, alf-dual's general kernels have a sparse factor
     code: str = AUTO  # GENERIC kernels, SPECIALISED to the scene, or AUTO: where WORTH_IT steps are ahead
@@ -120,7 +120,7 @@ class Run:
         if self.sparse or projected:
             self.start = without_rounding(model, self.start)
             moving, entries = moving_entries(model, self.start.q, self.start.v)
-            held, entries = held_by_rows(model, self.start.q, moving, entries)
+            held, entries = held_by_rows(model, self.start, moving, entries)
             plan = plan_for(moving, entries, model.entry_columns(), held)
             self.start = at_rest(self.start, held)
             self.plan, memory = plan.indices, max(memory, plan.memory)
@@ -142,8 +142,8 @@ class Run:
         control[FORCED_STEP] = limits.forced_step
         control[FIRST_STEP] = limits.first_step
         control[LARGEST_STEP] = limits.largest_step or span
-        turn = limits.largest_turn or self.method.stabilisation.largest_turn
-        control[LARGEST_TURN] = min(turn, UNWRAPPED) if has_angles(self.model.ints[LOADS]) else turn
+        turn = UNWRAPPED if has_angles(self.model.ints[LOADS]) else self.method.stabilisation.largest_turn
+        control[LARGEST_TURN] = limits.largest_turn or turn
         control[VIOLATION] = limits.violation * max(1.0, scene_length(self.model))
         control[MOST_STEPS] = limits.most_steps
         control[STEPS_PER_CALL] = CALL

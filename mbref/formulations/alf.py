@@ -74,7 +74,7 @@ def accelerate(
     equilibrate(jacobian, inverse_root, d, multipliers)
     augmented(mass, inverse_root, d, alpha, a)
     counts[FACTORISATIONS] += 1
-    if not cholesky_factor(a, n, 0.0):
+    if not cholesky_factor(a, n):
         return SINGULAR
     for j in range(n):
         load[j] = force[j] * inverse_root[j]

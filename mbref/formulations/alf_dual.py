@@ -44,7 +44,7 @@ def accelerate(
         s[i, i] += 1.0 / alpha
         total[i] = 0.0
     counts[FACTORISATIONS] += 1
-    if not cholesky_factor(s, m, 0.0):
+    if not cholesky_factor(s, m):
         return SINGULAR
     status, change, expected = NOT_CONVERGED, 0.0, NEVER
     for _ in range(int(settings[FORMULATION_OPTIONS + 2])):

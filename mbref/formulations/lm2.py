@@ -1,6 +1,8 @@
 """LM2: multipliers from (Φ_q M⁻¹ Φ_qᵀ) λ = Φ_q M⁻¹ g - γ, then q̈ = M⁻¹ (g - Φ_qᵀ λ) (Eqs. 6 to 8).
 
-By Cholesky, which the scale of rows does not disturb.  Fails on redundant rows and on a singular M.
+By Cholesky, which the scale of rows does not disturb.  Fails on redundant rows and on a singular M.  What
+rounding leaves of a redundant row is ε over the pivots before it, 1e-16 to 5e-12 on the paper's mechanisms at
+random poses; so a row nearer than 3e-6 rad to dependent counts as redundant.
 """
 
 from __future__ import annotations
@@ -10,7 +12,7 @@ from mbref.formulations.base import Formulation
 from mbref.linalg import cholesky_factor, cholesky_solve, gram
 from mbref.tables import ACCELERATE, FACTORISATIONS, OK, SINGULAR
 
-SINGULAR_PIVOT = 1e-11  # of its diagonal entry; rounding leaves 1e-16 to 5e-12 of a redundant row
+SINGULAR_PIVOT = 1e-11  # of its diagonal entry: the square of the sine between a row and those before
 
 
 @exchangeable(ACCELERATE)
@@ -35,14 +37,14 @@ def accelerate(
     for i in range(m):
         diagonal[i] = s[i, i]
     counts[FACTORISATIONS] += 1
-    if not cholesky_factor(s, m, 0.0):
+    if not cholesky_factor(s, m):
         return SINGULAR
     for i in range(m):
         if not s[i, i] * diagonal[i] < 1.0 / SINGULAR_PIVOT:
             return SINGULAR
     cholesky_solve(s, m, b)
     for j in range(n):
-        for i in range(m - 1, -1, -1):  # as the solution comes about
+        for i in range(m - 1, -1, -1):  # the solution's last entry is found first
             acceleration[j] -= inverse_root[j] * dt[j, i] * b[i]
     for i in range(m):
         multipliers[i] = b[i]

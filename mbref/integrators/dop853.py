@@ -74,7 +74,7 @@ def step(
         return -float(status)
     for i in range(y.shape[0]):
         y_new[i] = y[i] + h * solution(memory, i)
-    errors3, errors5, error3, error5 = memory[1], memory[2], 0.0, 0.0  # those stages have no weight
+    errors3, errors5, error3, error5 = memory[1], memory[2], 0.0, 0.0  # stages of no weight in these sums
     for i in range(y.shape[0]):
         weight = 1.0 / (tolerances[1] + tolerances[0] * max(abs(y[i]), abs(y_new[i])))
         errors3[i] = third_order(memory, i) * weight

@@ -8,7 +8,7 @@ from mbref.compiled import exchangeable, inlined
 from mbref.evaluation import evaluate, expand, right_hand_side
 from mbref.problem import opened, planned
 from mbref.sparse.factor import memories, part, subtract_product
-from mbref.sparse.held import bear
+from mbref.sparse.held import add_multipliers_of_held
 from mbref.sparse.iteration import factor, settle
 from mbref.sparse.plan import COLUMN, ROW
 from mbref.stabilisation.base import Stabilisation
@@ -56,7 +56,7 @@ def accelerations(plan, work, settings, counts):
         b[i] = rows[RHS, row[i]]
     subtract_product(plan, d, x, b)
     status = settle(plan, work, epsilon, most, acceleration, rows[MULTIPLIERS])
-    bear(plan, work)
+    add_multipliers_of_held(plan, work)
     return status
 
 

@@ -2,7 +2,7 @@
 
 Made once per scene.  The order of elimination and the fill are SuperLU's (multiple minimum degree on the
 symmetric pattern); what is added here are the lists of products that the kernels of ``factor`` go through.
-Rows are counted in the order of elimination, columns only where something moves.
+Rows are counted in the order of elimination, columns only where something moves that no row of its own holds.
 """
 
 from __future__ import annotations
@@ -104,7 +104,8 @@ def _held_parts(entries: np.ndarray, columns: np.ndarray, held: Sequence[Held]) 
     for each in reversed(held):
         for r in each.rows:
             for column in each.columns:
-                own += [place for place in in_column[column] if place // 12 == r]
+                (place,) = (place for place in in_column[column] if place // 12 == r)
+                own.append(place)
                 own_columns.append(column)
                 others += [place for place in in_column[column] if place // 12 not in each.rows]
                 firsts.append(len(others))

@@ -15,24 +15,24 @@ from mbref.sparse.least_change import ALPHA, LeastChange
 COLUMNS = 256  # of the identity solved for at a time
 
 
+def null_shares(change: LeastChange, rows: np.ndarray) -> np.ndarray:
+    """Share of each of these rows in the left null space of the Jacobian of ``change``, from 0 to 1."""
+    shares = np.zeros(rows.size)
+    for start in range(0, rows.size, COLUMNS):
+        some = rows[start : start + COLUMNS]
+        identity = np.zeros((change.d.shape[0], some.size))
+        identity[some, np.arange(some.size)] = 1.0
+        shares[start : start + COLUMNS] = np.sum((change.regularised.solve(identity) / ALPHA) ** 2, axis=0)
+    return shares
+
+
 class Redundancy:
     """Rank and ``shares`` of a Jacobian (m, n); singular values from 1e-4 of the rows' length count fully."""
 
     def __init__(self, jacobian: csr_array):
         self._change = LeastChange(jacobian, np.ones(jacobian.shape[1]))
-        self.shares = self._shares()
+        self.shares = null_shares(self._change, np.arange(jacobian.shape[0]))
         self.rank = jacobian.shape[0] - round(float(np.sum(self.shares)))
-
-    def _shares(self) -> np.ndarray:
-        """Share (m,) of each row in the left null space, from 0 to 1."""
-        m = self._change.d.shape[0]
-        shares = np.zeros(m)
-        for start in range(0, m, COLUMNS):
-            columns = np.arange(start, min(start + COLUMNS, m))
-            identity = np.zeros((m, columns.size))
-            identity[columns, np.arange(columns.size)] = 1.0
-            shares[columns] = np.sum((self._change.regularised.solve(identity) / ALPHA) ** 2, axis=0)
-        return shares
 
     def singular_values(self) -> tuple[float, float]:
         """The smallest above rank, and the largest, of the rows at unit length."""

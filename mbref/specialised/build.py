@@ -24,7 +24,7 @@ from mbref.formulations.base import Formulation
 from mbref.model import Model
 from mbref.sparse.chart import accelerations
 from mbref.sparse.factor import memories, squared_pivots
-from mbref.sparse.held import bear
+from mbref.sparse.held import add_multipliers_of_held
 from mbref.sparse.iteration import factor
 from mbref.sparse.plan import COLUMN, ROW, Plan
 from mbref.specialised.machine_code import Code, Piece, compiled, processor
@@ -109,7 +109,7 @@ class State:
         plain(right_hand_side)(self.v, self.model.ints, self.work, settings)
 
     def accelerate(self, formulation: Formulation, settings: np.ndarray) -> int:
-        """Accelerations and multipliers of what moves, into the workspace; the status."""
+        """Accelerations of what moves and multipliers, into the workspace; the status."""
         if formulation.sparse:
             return plain(accelerations)(self.moving.plan.indices, self.work, settings, no_counts())
         plain(dense_jacobian)(self.model.ints, self.work)
@@ -123,7 +123,7 @@ class State:
         )  # fmt: skip
         self.work[COLUMNS][ACCELERATION, velocities] = columns[ACCELERATION]
         self.work[ROWS][MULTIPLIERS, rows] = of_rows[MULTIPLIERS]
-        plain(bear)(self.moving.plan.indices, self.work)
+        plain(add_multipliers_of_held)(self.moving.plan.indices, self.work)
         return status
 
 

@@ -96,7 +96,7 @@ def observe(accelerate, t, y, y_rate, problem):
 
 @exchangeable(ACCEPT)
 def accept(t, y, problem):
-    """Project y by the scene's own code, and tell the loop where the bodies are."""
+    """Project y by the scene's own code; the bodies' frames only where the loop needs them."""
     ints, _floats, work, _pivots, settings, counts = opened(problem)
     live, state = ints[LIVE], work[STATE]
     size, rows = live[0, MOVING] + live[0, TURNING], part(planned(problem), ROW).shape[0]

@@ -2,9 +2,10 @@
 
 Mass-orthogonal: the correction is the least in the metric of M (Bayo & Ledesma, Nonlinear Dynamics 9,
 1996): positions by Newton's method, velocities with the same factor.  Only coordinates that can move are
-integrated (``sparse.moving``).  Near a singular position the last of as many pivots as there are independent
-rows, in order of size, falls with the distance, so that ``singular`` can step over it.  A redundant row has a
-pivot of α^(-1/2); where two rows exchange their roles, the larger of their pivots is still about α^(-1/4).
+integrated (``sparse.moving``, ``sparse.held``).  Near a singular position the last of as many pivots as there
+are independent rows, in order of size, falls with the distance, so that ``singular`` can step over it.  A
+redundant row has a pivot of α^(-1/2); where two rows exchange their roles, the larger of their pivots is
+still about α^(-1/4).
 """
 
 from __future__ import annotations
@@ -130,7 +131,7 @@ def project_positions(t, q, v, plan, ints, floats, work, settings, counts):
     """Newton's method for Φ(q, t) = 0; leaves a factor that serves at q, and its status."""
     rows, x, change = work[ROWS], work[COLUMNS][STEP_X], work[DENSE_VECTORS][CHANGE]
     tolerance = settings[NEWTON_TOLERANCE]
-    evaluate(t, q, v, ints, floats, work)
+    evaluate(t, q, v, ints, floats, work)  # which does not depend on the length of Euler parameters
     normalise(q)
     if not factor(plan, work, ALPHA, counts):
         return SINGULAR

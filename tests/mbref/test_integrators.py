@@ -264,3 +264,7 @@ def test_sums_of_stages_have_all_coefficients(weights):
     weighted = sum_with(weights)
     found = [weighted(k, i) for i in range(7)]
     np.testing.assert_allclose(found, weights @ k[: len(weights)], rtol=1e-13, atol=1e-13)
+
+
+def test_slopes_whose_rows_hold_errors_have_no_weight_in_them():
+    assert not np.any([weights[1:3] for weights in (B, ERROR3, ERROR5)])
