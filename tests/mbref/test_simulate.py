@@ -86,6 +86,21 @@ def test_torsion_spring_over_many_turns_and_closed_form():
     near(sign * measured, expected, 1e-9, "torsion spring")
 
 
+@pytest.mark.parametrize(
+    ("stabilisation", "wound", "asked", "turn"),
+    [("projection", False, 0.0, 2.5), ("projection", True, 0.0, 1.0), ("none", False, 0.0, 1.0),
+     ("projection", True, 2.0, 2.0), ("projection", False, 0.5, 0.5)],
+)  # fmt: skip
+def test_a_step_turns_no_body_farther_than_is_safe_or_asked(stabilisation, wound, asked, turn):
+    hinge = Revolute(name="H", bodies=("ground", "b"), anchor=(1, 0, 0), axis=(1, 0, 0))
+    spring = (TorsionSpring(joint="H", stiffness=1e-9),) if wound else ()
+    scene = one_body((hinge,), spring)
+    spun = scene.with_(body=(scene.body[0].model_copy(update={"angular_velocity": (10.0, 0.0, 0.0)}),))
+    limits = Limits(rtol=1.0, largest_turn=asked, first_step=1e-3)
+    steps = completed(spun, f"lm1+{stabilisation}", [10.0], limits).cost.steps
+    assert 100 / turn <= steps < 100 / turn + 12, f"{steps} steps over 100 rad"
+
+
 def test_force_at_a_point_and_its_moment():
     ball = Spherical(name="S", bodies=("ground", "b"), anchor=(1, 0, 0))
     force = Force(body="b", point=(1.5, 0, 0), force=(0, 0, 0.7))
