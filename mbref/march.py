@@ -215,10 +215,10 @@ def march(loop, problem):
                 y, y_rate, y_new, history, nodes, problem,
             )  # fmt: skip
             memory[:] = 0.0
-            if place[SAMPLE] == times.shape[0]:
-                return DONE
             if status != OK:
                 return status
+            if place[SAMPLE] == times.shape[0]:
+                return DONE
             taken += 1
             continue
         suggested = propose(
