@@ -158,7 +158,7 @@ def project_piece(state: State) -> Piece:
     violation, x = plain(largest)(rows[PHI, moving.rows]), np.zeros(model.n, dtype=object)
     plain(cancel)(PHI, POSITION_ITERATIONS, plan, work, x)
     plain(violation_rate)(model.ints, work, v)
-    plain(cancel)(PHI_RATE, VELOCITY_ITERATIONS, plan, work, v)
+    plain(cancel)(PHI_RATE, POSITION_ITERATIONS, plan, work, v)
     plain(displace)(q, x, np.zeros(q.size, dtype=object))
     y = [*q[moving.coordinates], *v[moving.velocities]]
     return Piece(PIECES[1], state.record, y, [violation, *squares])
