@@ -32,8 +32,7 @@ from mbref.specialised.tracing import Record, Untraceable, inputs, numbers, plai
 from mbref.stabilisation.full import normalise
 from mbref.stabilisation.projection import (
     ALPHA,
-    POSITION_ITERATIONS,
-    VELOCITY_ITERATIONS,
+    REPEATED,
     cancel,
     displace,
     largest,
@@ -146,7 +145,10 @@ def rates_piece(state: State, formulation: Formulation, settings: np.ndarray) ->
 
 
 def project_piece(state: State) -> Piece:
-    """One Newton step of the projection: y after it; the violation before it and the squared pivots."""
+    """One Newton step of the projection: y after it; the violation before it and the squared pivots.
+
+    Velocities are corrected in every step; where one is enough they need next to no correction.
+    """
     moving, model, q, v, work = state.moving, state.model, state.q, state.v, state.work
     plan, rows = moving.plan.indices, work[ROWS]
     plain(evaluate)(state.t, q, v, *state.problem)
@@ -156,9 +158,9 @@ def project_piece(state: State) -> Piece:
     _, l, diagonal, squares, *_ = plain(memories)(plan, work[SCRATCH][0])
     plain(squared_pivots)(plan, l, diagonal, squares)
     violation, x = plain(largest)(rows[PHI, moving.rows]), np.zeros(model.n, dtype=object)
-    plain(cancel)(PHI, POSITION_ITERATIONS, plan, work, x)
+    plain(cancel)(PHI, REPEATED, plan, work, x)
     plain(violation_rate)(model.ints, work, v)
-    plain(cancel)(PHI_RATE, POSITION_ITERATIONS, plan, work, v)
+    plain(cancel)(PHI_RATE, REPEATED, plan, work, v)
     plain(displace)(q, x, np.zeros(q.size, dtype=object))
     y = [*q[moving.coordinates], *v[moving.velocities]]
     return Piece(PIECES[1], state.record, y, [violation, *squares])

@@ -49,7 +49,7 @@ from mbref.tables import (
 from mbref.vectors import larger, sort
 
 ALPHA = 1e10  # of the iteration
-POSITION_ITERATIONS, VELOCITY_ITERATIONS = 1, 2  # Newton's method repeats the first
+REPEATED, ALONE = 1, 2  # iterations of a correction that Newton's method repeats, and of one made once
 INDEPENDENT = (5.0 * ALPHA**-0.25) ** 2  # the squared pivot from which on a row counts as independent
 MOST_ITERATIONS = 10
 ROUNDING = 1e3  # tolerances: what is left where iterations no longer reduce it
@@ -139,7 +139,7 @@ def project_positions(t, q, v, plan, ints, floats, work, settings, counts):
     for _ in range(MOST_ITERATIONS):
         counts[NEWTON] += 1
         x[:] = 0.0
-        cancel(PHI, POSITION_ITERATIONS, plan, work, x)
+        cancel(PHI, REPEATED, plan, work, x)
         displace(q, x, change)
         if violation <= tolerance:
             return OK
@@ -165,7 +165,7 @@ def project(t, y, problem):
         return status
     watch_pivots(plan, work)
     violation_rate(ints, work, v)
-    cancel(PHI_RATE, VELOCITY_ITERATIONS, plan, work, v)
+    cancel(PHI_RATE, ALONE, plan, work, v)
     contract(q, v, live, y)
     flush(y)
     return OK
