@@ -149,10 +149,10 @@ def _perpendicular(rows: np.ndarray) -> list[int]:
     chosen: list[int] = []
     lengths = np.sqrt((rows**2).sum(axis=2))
     for k, (row, length) in enumerate(zip(rows, lengths, strict=True)):
-        constant = np.ptp(length) <= ROUNDING * length.max() and length.min() > SMALL
-        cosines = [(row * rows[j]).sum(axis=1) / (length * lengths[j]) for j in chosen]
-        if constant and (np.abs(cosines) < ROUNDING).all():
-            chosen.append(k)
+        if length.min() > SMALL and np.ptp(length) <= ROUNDING * length.max():
+            cosines = [(row * rows[j]).sum(axis=1) / (length * lengths[j]) for j in chosen]
+            if (np.abs(cosines) < ROUNDING).all():
+                chosen.append(k)
     return chosen
 
 

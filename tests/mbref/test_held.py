@@ -115,6 +115,7 @@ def test_rows_of_changing_length_or_at_an_angle_do_not_hold():
     assert _perpendicular(np.array([constant, constant[:, ::-1] + 1e-6])) == [0]
     assert _perpendicular(np.array([1e-6 * constant, 1e-6 * constant[:, ::-1] + 1e-12])) == [0]
     assert _perpendicular(np.array([0.1 * SMALL * constant])) == []
+    assert _perpendicular(np.array([constant, [[0, 0], [1, 0], [0, 1]]])) == [0], "a row that vanishes"
 
 
 @pytest.mark.parametrize(
