@@ -22,7 +22,17 @@ from mbref.initial import Start
 from mbref.model import Model, displaced
 from mbref.sparse.factor import part
 from mbref.sparse.least_change import LeastChange, sparse_jacobian
-from mbref.sparse.plan import HELD_COLUMN, HELD_ENTRY, HELD_OTHER, HELD_ROW, HELD_START, OTHER_START, Held
+from mbref.sparse.plan import (
+    HELD_COLUMN,
+    HELD_ENTRY,
+    HELD_OTHER,
+    HELD_ROW,
+    HELD_START,
+    OTHER_START,
+    Held,
+    columns_held,
+    lies_in,
+)
 from mbref.sparse.rank import null_shares
 from mbref.tables import COLUMNS, FORCE, JACOBIAN, MULTIPLIERS, ROWS
 
@@ -51,12 +61,8 @@ def held_by_rows(
 def at_rest(start: Start, held: Sequence[Held]) -> Start:
     """The start with zero for the roundings of zero in the velocities held."""
     v = start.v.copy()
-    v[_columns(held)] = 0.0
+    v[columns_held(held)] = 0.0
     return replace(start, v=v)
-
-
-def _columns(held: Sequence[Held]) -> list[int]:
-    return [column for each in held for column in each.columns]
 
 
 def _found(
@@ -68,7 +74,7 @@ def _found(
         samples, driven = _samples(model, q, moving & ~resting)
         left = entries & (samples != 0).any(axis=0)
         held = list(_holding(model, samples, left, driven, moving, can_rest))
-        found = np.isin(np.arange(model.n), _columns(held))
+        found = np.isin(np.arange(model.n), columns_held(held))
         if not (resting & ~found).any():
             works_against = driven & left.any(axis=1) & ~_bears_on(model, left, moving & ~found)
             return ([], entries) if works_against.any() else (held, left)
@@ -89,12 +95,12 @@ def _samples(model: Model, q: np.ndarray, displacing: np.ndarray) -> tuple[np.nd
 
 def _bears_on(model: Model, entries: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Which rows (m,) have an entry (m, 12) in one of these columns (n,)."""
-    return (entries & np.append(columns, np.zeros(6, dtype=bool))[model.entry_columns()]).any(axis=1)
+    return (entries & lies_in(model.entry_columns(), columns)).any(axis=1)
 
 
 def _shared(model: Model, start: Start, entries: np.ndarray, held: Sequence[Held]) -> np.ndarray:
     """Columns (n,) among those held in which a row has an entry that is redundant at the start."""
-    columns, of_held = np.zeros(model.n + 6, dtype=bool), np.isin(np.arange(model.n), _columns(held))
+    columns, of_held = np.zeros(model.n + 6, dtype=bool), np.isin(np.arange(model.n), columns_held(held))
     rows = np.flatnonzero(_bears_on(model, entries, of_held))
     if rows.size:
         blocks = model.blocks(0.0, start.q, start.v).jacobian
@@ -117,14 +123,13 @@ def _holding(
     From Jacobian blocks (STATES, m, 12), which entries (m, 12) are other than zero, which rows (m,) prescribe
     a motion, and which columns (n,) move and can rest.
     """
-    column_of, free = model.entry_columns(), np.append(moving, np.zeros(6, dtype=bool))
-    can_rest = np.append(can_rest, np.zeros(6, dtype=bool))
-    found = True
+    column_of, free, found = model.entry_columns(), moving.copy(), True
+    cannot_rest = lies_in(column_of, moving & ~can_rest)
     while found:
-        bears = left & free[column_of]
+        bears = left & lies_in(column_of, free)
         few = ~driven & bears.any(axis=1) & (bears.sum(axis=1) <= MOST)
         groups: dict[tuple[int, ...], list[int]] = {}
-        for row in np.flatnonzero(few & ~(bears & ~can_rest[column_of]).any(axis=1)):
+        for row in np.flatnonzero(few & ~(bears & cannot_rest).any(axis=1)):
             groups.setdefault(tuple(np.sort(column_of[row, bears[row]]).tolist()), []).append(int(row))
         found = False
         for columns, rows in groups.items():

@@ -46,6 +46,16 @@ class Held(NamedTuple):
     columns: tuple[int, ...]
 
 
+def columns_held(held: Sequence[Held]) -> list[int]:
+    """The columns of all groups."""
+    return [column for each in held for column in each.columns]
+
+
+def lies_in(columns: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Which entries, in these columns (m, 12), are in those wanted (n,); the fixed frame's are not."""
+    return np.append(wanted, np.zeros(6, dtype=bool))[columns]
+
+
 @dataclass(frozen=True)
 class Plan:
     """Indices for the kernels (uint32: signed ones cost a test each), and how much memory they need."""
@@ -64,10 +74,8 @@ def plan_for(moving: np.ndarray, entries: np.ndarray, columns: np.ndarray, held:
     Of them all that rows hold at rest stays out, and rows that are then empty.
     """
     of_held = _held_parts(entries, columns, held)
-    moving, entries = moving.copy(), entries.copy()
-    for each in held:
-        moving[list(each.columns)] = False
-    entries &= np.append(moving, np.zeros(6, dtype=bool))[columns]
+    moving = moving & ~np.isin(np.arange(moving.size), columns_held(held))
+    entries = entries & lies_in(columns, moving)
     kept = np.flatnonzero(entries.any(axis=1))
     row, entry = np.nonzero(entries[kept])
     d = csr_array((np.ones(row.size), (row, columns[kept[row], entry])), shape=(kept.size, moving.size))
