@@ -14,9 +14,9 @@ import numpy as np
 from numba import njit
 from numpy import cos, sin, sqrt
 
-from mbref.compiled import OPTIONS
+from mbref.kernels.compilation import OPTIONS
+from mbref.kernels.layout import OK
 from mbref.scene import Scene
-from mbref.tables import OK
 
 AS_MBREF = {**OPTIONS, "cache": False}  # how mbref's kernels are compiled
 

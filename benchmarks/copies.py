@@ -16,12 +16,12 @@ from rich.table import Table
 
 from crosscheck.conformance.relations import RELATIONS, Relation, shaken
 from crosscheck.engine import Setting
-from crosscheck.floors import TIME_LIMIT, Floor
-from crosscheck.metrics import error_series, in_scene_order
-from crosscheck.progress import shown
-from crosscheck.record import is_completed
-from crosscheck.study import Case, Record, study
-from crosscheck.tolerances import FLOOR
+from crosscheck.judge.metrics import error_series, in_scene_order
+from crosscheck.judge.tolerances import FLOOR
+from crosscheck.study.grid import Case, Record, study
+from crosscheck.study.least_errors import TIME_LIMIT, Floor
+from crosscheck.study.progress import shown
+from crosscheck.study.record_view import is_completed
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 

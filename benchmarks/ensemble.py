@@ -18,11 +18,11 @@ from statistics import median
 
 import numpy as np
 
-from mbref.ensemble import ensemble, processes
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.simulate import Limits
-from mbref.variants import Variation, variants
+from mbref.simulation.ensemble import ensemble, processes
+from mbref.simulation.simulate import Limits
+from mbref.variation import Variation, variants
 
 REPEATS = 5
 LIMITS = Limits(rtol=1e-6)

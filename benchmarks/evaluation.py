@@ -16,15 +16,15 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from forward_dynamics import timed_calls
 
-from mbref.compiled import INT, VECTOR, entry, pointer_to
 from mbref.formulations import FORMULATIONS
-from mbref.method import Method
-from mbref.run import SPECIALISED, Limits, Run
+from mbref.kernels.compilation import INT, VECTOR, entry, pointer_to
+from mbref.kernels.layout import ACCELERATE, OK, PROBLEM, RATES, SIZES
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.simulate import why_no_code
+from mbref.simulation.method import Method
+from mbref.simulation.run import SPECIALISED, Limits, Run
+from mbref.simulation.simulate import why_no_code
 from mbref.specialised import with_own_code
-from mbref.tables import ACCELERATE, OK, PROBLEM, RATES, SIZES
 
 SCENE_NAMES = ("spatial_slider_crank", "planar_slider_crank", "four_bar", "five_bar")
 CALLS, REPEATS = 2000, 15

@@ -11,9 +11,9 @@ import sys
 from rich.console import Console
 from rich.table import Table
 
-from crosscheck.floors import HEADER, Floor, candidates, floors
-from crosscheck.progress import shown
-from crosscheck.study import study
+from crosscheck.study.grid import study
+from crosscheck.study.least_errors import HEADER, Floor, candidates, floors
+from crosscheck.study.progress import shown
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 

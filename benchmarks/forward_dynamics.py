@@ -45,7 +45,7 @@ def _repeated(call: Callable[[], object]) -> float:
 def _mujoco(scene: Scene) -> Iterator[tuple[str, Timed]]:
     import mujoco
 
-    from crosscheck.engines.mujoco import _Run
+    from crosscheck.engines.mujoco.adapter import _Run
 
     for family in ("defaults", "tuned"):
         run = _Run(scene, _coarsest("mujoco", scene, family))
@@ -58,7 +58,7 @@ def _mujoco(scene: Scene) -> Iterator[tuple[str, Timed]]:
 
 
 def _pinocchio(scene: Scene) -> Iterator[tuple[str, Timed]]:
-    from crosscheck.engines.pinocchio import _Run
+    from crosscheck.engines.pinocchio.adapter import _Run
 
     for family in ("defaults", "tuned"):
         run = _Run(scene, _coarsest("pinocchio", scene, family))

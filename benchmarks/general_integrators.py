@@ -18,11 +18,11 @@ import numpy as np
 from numba import njit
 
 from crosscheck.engine import Cannot, Engine, Setting
-from crosscheck.engines._start import lacks_mass
-from mbref.method import Method
-from mbref.run import Limits, Run, chart_of
+from crosscheck.engines.initial_velocities import lacks_mass
+from mbref.kernels.layout import ACCELERATION, COLUMNS, EVALUATIONS, SIZES
 from mbref.scene import Scene
-from mbref.tables import ACCELERATION, COLUMNS, EVALUATIONS, SIZES
+from mbref.simulation.method import Method
+from mbref.simulation.run import Limits, Run, chart_of
 from mbref.trajectory import Cost, Outcome, Trajectory
 
 for kind in ("WARNING", "ERROR"):  # of SUNDIALS: a run that fails says so itself

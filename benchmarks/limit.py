@@ -17,15 +17,15 @@ from numba import njit
 
 from crosscheck.engine import Cannot, Engine, Setting, Why
 from crosscheck.engines.mbref import TOLERANCES
-from crosscheck.truth import PATHS
-from crosscheck.truth.path import Path, initial_rate
+from crosscheck.judge.truth import PATHS
+from crosscheck.judge.truth.one_dof import Path, initial_rate
 from mbref import __version__, rotations
 from mbref.integrators import INTEGRATORS
 from mbref.integrators.coefficients import STAGES
+from mbref.kernels.layout import LARGEST_STEP, OK, ORDER
+from mbref.linear_algebra.vectors import copy
 from mbref.scene import Scene
-from mbref.tables import LARGEST_STEP, OK, ORDER
 from mbref.trajectory import Cost, Outcome, Trajectory
-from mbref.vectors import copy
 
 CONTROL = 16  # entries of ``control``, more than there are
 REPEATS = 100  # within one reading of the clock: one run is a matter of microseconds

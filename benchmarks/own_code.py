@@ -18,10 +18,10 @@ from statistics import median
 
 import numpy as np
 
-from mbref.method import Method
 from mbref.scene import Scene
 from mbref.scenes import find_scene
-from mbref.simulate import Limits, simulate, why_no_code
+from mbref.simulation.method import Method
+from mbref.simulation.simulate import Limits, simulate, why_no_code
 
 METHOD = "alf-dual+projection"
 SCENE_NAMES = ("spatial_slider_crank", "planar_slider_crank", "four_bar", "five_bar")
@@ -30,7 +30,7 @@ CODES = ("generic", "specialised")
 BUILD = """
 import sys
 from mbref.scene import Scene
-from mbref.simulate import Limits, simulate
+from mbref.simulation.simulate import Limits, simulate
 scene = Scene.from_file(sys.argv[1])
 for code in ("generic", "generic", "specialised"):
     print(simulate(scene, sys.argv[2], [1e-9], Limits(code=code)).cost.build_seconds)

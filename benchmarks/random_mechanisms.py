@@ -11,7 +11,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from crosscheck.random_mechanisms import PRINCIPLE, Comparison, compare, random_mechanism
+from crosscheck.conformance.random_mechanisms import PRINCIPLE, Comparison, compare, random_mechanism
 
 ENGINES = ("mujoco", "pinocchio", "exudyn")
 EXPECTED = 1e-6  # above, the distance to singularity has to explain it

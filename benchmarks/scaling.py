@@ -22,14 +22,14 @@ from rich.console import Console
 from rich.table import Table
 
 from crosscheck.engine import Setting, engine
-from crosscheck.metrics import cost_at_error
-from crosscheck.tolerances import ERROR_LEVELS
-from crosscheck.truth.crankshaft import crankshaft
-from crosscheck.truth.parallelogram import parallelogram
-from crosscheck.truth.path import OneDof
+from crosscheck.judge.metrics import cost_at_error
+from crosscheck.judge.tolerances import ERROR_LEVELS
+from crosscheck.judge.truth.crankshaft import crankshaft
+from crosscheck.judge.truth.one_dof import OneDof
+from crosscheck.judge.truth.parallelogram import parallelogram
 from mbref.scene import Scene
 from mbref.scenes import find_scene
-from mbref.simulate import Limits, simulate
+from mbref.simulation.simulate import Limits, simulate
 
 LOOPS = (1, 2, 5, 10, 20, 50, 100, 200)
 REPEATS, STEPS = 5, 100

@@ -27,11 +27,11 @@ from rich.table import Table
 
 from crosscheck.engine import Setting, engine, installed
 from crosscheck.engines.mbref import OWN_CODE
-from crosscheck.isolate import run_isolated
-from crosscheck.metrics import cost_at_error, measure
-from crosscheck.study import machine, versions
-from crosscheck.tolerances import ERROR_LEVELS
-from crosscheck.truth import truth_for
+from crosscheck.judge.metrics import cost_at_error, measure
+from crosscheck.judge.tolerances import ERROR_LEVELS
+from crosscheck.judge.truth import truth_for
+from crosscheck.processes.pool import run_isolated
+from crosscheck.study.grid import machine, versions
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Cost, Outcome
@@ -291,9 +291,9 @@ def main() -> None:
             options.out.write_text(json.dumps(data, allow_nan=False))
     summary(console, tables)
     if options.plot:
-        from reports import costs, figures
+        from reports import benchmark_plot, figures
 
-        options.plot.write_bytes(figures.png(costs.draw(data)))
+        options.plot.write_bytes(figures.png(benchmark_plot.draw(data)))
 
 
 if __name__ == "__main__":

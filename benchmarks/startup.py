@@ -22,7 +22,15 @@ from mbref.scenes import SCENES
 
 WARM = 3  # processes of each warm figure
 SCENE = "spatial_slider_crank"
-IMPORTS = ("numpy", "mbref.scene", "mbref.simulate", "crosscheck.study", "mujoco", "pinocchio", "exudyn")
+IMPORTS = (
+    "numpy",
+    "mbref.scene",
+    "mbref.simulation.simulate",
+    "crosscheck.study.grid",
+    "mujoco",
+    "pinocchio",
+    "exudyn",
+)
 RUN = """
 from crosscheck.engine import Setting, engine
 from mbref.scenes import SCENES

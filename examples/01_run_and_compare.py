@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from crosscheck.cli.request import find_engines
 from crosscheck.engine import engine
-from crosscheck.isolate import run_isolated
-from crosscheck.metrics import measure
-from crosscheck.request import find_engines
-from crosscheck.truth import truth_for
+from crosscheck.judge.metrics import measure
+from crosscheck.judge.truth import truth_for
+from crosscheck.processes.pool import run_isolated
 from mbref.scenes import find_scene
 
 scene = find_scene("spatial_slider_crank").with_(duration=0.02)

@@ -6,7 +6,7 @@ import numpy as np
 
 from mbref import rotations
 from mbref.scene import Scene
-from mbref.simulate import simulate
+from mbref.simulation.simulate import simulate
 
 scene = Scene.from_file(Path(__file__).with_name("door_closer.toml"))
 counts = scene.counts()

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from mbref.ensemble import ensemble
 from mbref.scenes import find_scene
-from mbref.simulate import simulate
-from mbref.variants import Variation, variants
+from mbref.simulation.ensemble import ensemble
+from mbref.simulation.simulate import simulate
+from mbref.variation import Variation, variants
 
 METHOD, COUNT = "alf-dual+projection", 200
 TIMES = np.linspace(0.0, 0.1, 6)

@@ -1,3 +1,56 @@
-"""mbref: reference implementation of the constraint-handling methods of multibody dynamics."""
+"""mbref: reference implementation of the constraint-handling methods of multibody dynamics.
+
+The names below are loaded when they are first used, so that ``import mbref`` costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mbref.equations.diagnosis import Diagnosis, counts, diagnose
+    from mbref.scene import Scene, SceneError
+    from mbref.scenes import SCENES, find_scene
+    from mbref.simulation.ensemble import ensemble
+    from mbref.simulation.method import Method, MethodError
+    from mbref.simulation.simulate import Limits, simulate
+    from mbref.trajectory import Cost, Outcome, Trajectory
+    from mbref.variation import Variation, variants
 
 __version__ = "0.1.0"
+
+_MODULE_OF = {
+    "Cost": "mbref.trajectory",
+    "Diagnosis": "mbref.equations.diagnosis",
+    "Limits": "mbref.simulation.simulate",
+    "Method": "mbref.simulation.method",
+    "MethodError": "mbref.simulation.method",
+    "Outcome": "mbref.trajectory",
+    "SCENES": "mbref.scenes",
+    "Scene": "mbref.scene",
+    "SceneError": "mbref.scene",
+    "Trajectory": "mbref.trajectory",
+    "Variation": "mbref.variation",
+    "counts": "mbref.equations.diagnosis",
+    "diagnose": "mbref.equations.diagnosis",
+    "ensemble": "mbref.simulation.ensemble",
+    "find_scene": "mbref.scenes",
+    "simulate": "mbref.simulation.simulate",
+    "variants": "mbref.variation",
+}
+
+__all__ = [
+    "SCENES", "Cost", "Diagnosis", "Limits", "Method", "MethodError", "Outcome", "Scene", "SceneError",
+    "Trajectory", "Variation", "counts", "diagnose", "ensemble", "find_scene", "simulate", "variants",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name in _MODULE_OF:
+        return getattr(import_module(_MODULE_OF[name]), name)
+    raise AttributeError(f"module 'mbref' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_MODULE_OF])

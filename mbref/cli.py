@@ -10,9 +10,9 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from mbref.method import DEFAULT, MethodError
 from mbref.scene import Scene, SceneError
 from mbref.scenes import SCENES, find_scene
+from mbref.simulation.method import DEFAULT, MethodError
 
 BAD_INPUT, INCOMPLETE, INTERRUPTED = 2, 1, 130
 PIPED_WIDTH = 160  # characters of a line where no terminal says otherwise
@@ -142,7 +142,7 @@ def sample_times(options: argparse.Namespace, scene: Scene) -> np.ndarray:
 def _run(options: argparse.Namespace) -> int:
     scene = find_scene(options.scene)
     times, limits = sample_times(options, scene), _limits(options)
-    from mbref.simulate import simulate
+    from mbref.simulation.simulate import simulate
 
     with _progress_bar("simulating", float(times[-1])) as progress:
         trajectory = simulate(scene, options.method, times, limits, progress)
@@ -154,7 +154,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _limits(options: argparse.Namespace):
-    from mbref.simulate import Limits
+    from mbref.simulation.simulate import Limits
 
     if not 0 < options.rtol < 1:
         raise ValueError(f"--rtol: must be between 0 and 1, got {options.rtol:g}")
@@ -176,8 +176,8 @@ def _progress_bar(what: str, end: float) -> Iterator:
 
 
 def _ensemble(options: argparse.Namespace) -> int:
-    from mbref.ensemble import ensemble, processes
-    from mbref.variants import Variation, variants
+    from mbref.simulation.ensemble import ensemble, processes
+    from mbref.variation import Variation, variants
 
     scene = find_scene(options.scene)
     times, limits = sample_times(options, scene), _limits(options)
@@ -264,7 +264,7 @@ def _rounded(vector: np.ndarray) -> np.ndarray:
 def _diagnose(options: argparse.Namespace) -> int:
     from dataclasses import asdict
 
-    from mbref.diagnose import diagnose
+    from mbref.equations.diagnosis import diagnose
 
     scene = find_scene(options.scene)
     found = diagnose(scene)

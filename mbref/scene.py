@@ -27,10 +27,10 @@ from pydantic import (
     model_validator,
 )
 
-from mbref.faults import GROUND, SceneError, checked_inertia, field_faults, reference_faults
+from mbref.scene_validation import GROUND, SceneError, checked_inertia, field_faults, reference_faults
 
 if TYPE_CHECKING:
-    from mbref.diagnose import Counts
+    from mbref.equations.diagnosis import Counts
 
 UNIT_TOLERANCE = 1e-6  # a quaternion further than this from unit length is a fault, nearer is rounding
 
@@ -273,7 +273,7 @@ class Scene(_Data):
 
     def counts(self) -> Counts:
         """Coordinates, rows by joint, rank, redundant rows and degrees of freedom at t = 0."""
-        from mbref.diagnose import counts
+        from mbref.equations.diagnosis import counts
 
         return counts(self)
 

@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
-from crosscheck.compare import gate_cases
+from crosscheck.cli.request import RequestError, find_engines
 from crosscheck.paper import runs
-from crosscheck.progress import shown
-from crosscheck.request import RequestError, find_engines
-from crosscheck.study import Case, Record, known, study
-from reports import plan
+from crosscheck.study.fair_timing import gate_cases
+from crosscheck.study.grid import Case, Record, known, study
+from crosscheck.study.progress import shown
+from reports import sweep
 from reports.blocks import Block
 from reports.runs import SceneRuns, by_scene
 from reports.timings import with_timings
@@ -77,13 +77,13 @@ def _collect(out: Path, is_quick: bool) -> list[SceneRuns]:
     """The runs of the study by scene; raw records stay in ``out``/records.jsonl."""
     engines = find_engines(None, _notice)
     _notice("planning the sweep")
-    scenes, cases, unable = (plan.quick if is_quick else plan.whole)(engines)
+    scenes, cases, unable = (sweep.quick if is_quick else sweep.whole)(engines)
     for pair in unable:
         _notice(f"{pair.engine} cannot run {pair.scene.name}: {pair.cannot}")
     (out / "scenes").mkdir(parents=True, exist_ok=True)
     for scene in scenes:
         scene.save(out / "scenes" / f"{scene.name}.toml")
-    gates = [case for scene in scenes for case in gate_cases(scene, engines, plan.QUICK_LIMIT)]
+    gates = [case for scene in scenes for case in gate_cases(scene, engines, sweep.QUICK_LIMIT)]
     records = _records([*cases, *gates], out / "records.jsonl")
     timed = with_timings(cases, records[: len(cases)], out / "timings.jsonl", _notice)
     return by_scene(timed, {scene.name: scene for scene in scenes}, records[len(cases) :])

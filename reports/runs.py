@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from crosscheck.compare import difference
-from crosscheck.record import swept
-from crosscheck.study import Record
-from crosscheck.tolerances import ERROR_LEVELS, EXCESS, FALSE_SUCCESS
+from crosscheck.judge.tolerances import ERROR_LEVELS, EXCESS, FALSE_SUCCESS
+from crosscheck.study.fair_timing import difference
+from crosscheck.study.grid import Record
+from crosscheck.study.record_view import swept
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 

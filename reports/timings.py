@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from crosscheck.compare import timed
-from crosscheck.study import Case, Record
+from crosscheck.study.fair_timing import timed
+from crosscheck.study.grid import Case, Record
 from mbref.records import append, stored
 from mbref.trajectory import Outcome
 

@@ -9,13 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crosscheck.conformance.bench import Bench, Specimen, difference
 from crosscheck.conformance.relations import RELATIONS
-from crosscheck.energy import energy_series
+from crosscheck.conformance.trial import Bench, Specimen, difference
 from crosscheck.engine import Cannot, engine
-from crosscheck.kinematics import scene_length
-from crosscheck.metrics import in_scene_order, violation_series
-from crosscheck.tolerances import LIKE_TRUTH, SAME_MOTION, STAYS_CLOSED, UNIT_NORM
+from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.energy import energy_series
+from crosscheck.judge.metrics import in_scene_order, violation_series
+from crosscheck.judge.tolerances import LIKE_TRUTH, SAME_MOTION, STAYS_CLOSED, UNIT_NORM
 from mbref import rotations
 from mbref.trajectory import Trajectory
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.tolerances import ROUNDING
+from crosscheck.judge.tolerances import ROUNDING
 from mbref import rotations
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory

@@ -13,11 +13,11 @@ from rich.box import SIMPLE
 from rich.table import Column, Table
 from rich.text import Text
 
-from crosscheck.conformance.bench import Bench, Broken, Specimen, set_up
 from crosscheck.conformance.features import undetermined
 from crosscheck.conformance.properties import PROPERTIES, Finding
+from crosscheck.conformance.trial import Bench, Broken, Specimen, set_up
 from crosscheck.engine import Cannot
-from crosscheck.isolate import ChildFailed
+from crosscheck.processes.pool import ChildFailed
 
 PASS, FAIL, CANNOT = "pass", "fail", "cannot"
 REFUSAL, RUN = "refusal", "run"

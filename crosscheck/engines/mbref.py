@@ -39,7 +39,7 @@ class Mbref(Engine):
         return __version__
 
     def cannot(self, scene: Scene) -> Cannot | None:
-        from mbref.freedoms import undriven_freedoms
+        from mbref.equations.degrees_of_freedom import undriven_freedoms
 
         if not scene.has_mass() and undriven_freedoms(scene) > 0:
             return Cannot(Why.NEVER, "bodies without mass move only where every freedom is driven")
@@ -54,8 +54,8 @@ class Mbref(Engine):
         ]
 
     def _serves(self, family: str, scene: Scene) -> bool:
-        from mbref.freedoms import undriven_freedoms
-        from mbref.simulate import why_no_code
+        from mbref.equations.degrees_of_freedom import undriven_freedoms
+        from mbref.simulation.simulate import why_no_code
 
         if family.startswith(KINEMATIC) and undriven_freedoms(scene) > 0:
             return False
@@ -65,20 +65,20 @@ class Mbref(Engine):
         return scene.counts().redundant == 0 or method.formulation.handles_redundancy
 
     def prepare(self, families: Sequence[str]) -> None:
-        from mbref.simulate import prepare
+        from mbref.simulation.simulate import prepare
 
         for family in families:
             prepare(_method(family))
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        from mbref.simulate import Limits, simulate
+        from mbref.simulation.simulate import Limits, simulate
 
         code = "specialised" if setting.family.endswith(OWN_CODE) else "generic"
         return simulate(scene, _method(setting.family), times, Limits(code=code, **setting.options))
 
 
 def _method(family: str):
-    from mbref.method import Method
+    from mbref.simulation.method import Method
 
     return Method.parse(family.removesuffix(OWN_CODE))
 

@@ -15,8 +15,8 @@ from crosscheck.engine import Setting
 from crosscheck.paper import settings
 from crosscheck.paper.cells import CELLS, COUNTS_III, COUNTS_IV, FIVE_BAR, FOUR_BAR_COLUMNS, SPATIAL, Cell
 from crosscheck.paper.settings import BASE, DRAWN, END, FEW, SEEDS, SIZED, STRICT, SWEEP, TIGHT, Variant
-from crosscheck.study import Case, Record, run_here, study
-from crosscheck.study import Progress as Advance
+from crosscheck.study.grid import Case, Record, run_here, study
+from crosscheck.study.grid import Progress as Advance
 from mbref.formulations import FORMULATIONS
 from mbref.scene import Scene
 from mbref.scenes import SCENES

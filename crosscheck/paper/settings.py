@@ -74,7 +74,7 @@ class Variant:
     alf: Mapping[str, float] = field(default_factory=dict)
 
     def options(self) -> dict[str, float]:
-        """All numbers of ``mbref.simulate.Limits``."""
+        """All numbers of ``mbref.simulation.simulate.Limits``."""
         return {**LIMITS, "first_step": first_step(self.seed), **self.limits}
 
     def formulation(self, name: str) -> str:

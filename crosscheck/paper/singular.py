@@ -6,17 +6,17 @@ import math
 
 import numpy as np
 
-from crosscheck import kinematics
+from crosscheck.judge import constraints
+from crosscheck.judge.tolerances import RANK
+from crosscheck.judge.truth import truth_for
 from crosscheck.paper import settings
-from crosscheck.tolerances import RANK
-from crosscheck.truth import truth_for
+from mbref.equations.initial_state import consistent_start
+from mbref.equations.model import Model
 from mbref.formulations.alf import ALF
-from mbref.initial import consistent_start
-from mbref.model import Model
+from mbref.kernels.layout import OK
 from mbref.scene import Scene
 from mbref.scenes.four_bar import LENGTH, four_bar
 from mbref.scenes.links import CRANK_RATE, about_z
-from mbref.tables import OK
 
 MOST = 10_000  # iterations counted
 
@@ -29,10 +29,10 @@ def scaled_singular_values(scene: Scene, times: np.ndarray) -> np.ndarray:
     truth = truth_for(scene)
     assert truth is not None, f"{scene.name}: no truth"
     motion = truth.poses(times)
-    scale = np.tile(np.repeat([1.0, 1 / kinematics.scene_length(scene)], 3), len(scene.body))
+    scale = np.tile(np.repeat([1.0, 1 / constraints.scene_length(scene)], 3), len(scene.body))
     values = []
     for t, r, p in zip(motion.times, motion.position, motion.orientation, strict=True):
-        j = kinematics.jacobian(scene, t, r, p)[0] * scale
+        j = constraints.jacobian(scene, t, r, p)[0] * scale
         values.append(np.linalg.svd(j / np.linalg.norm(j, axis=1, keepdims=True), compute_uv=False))
     return np.array(values)
 
@@ -59,7 +59,7 @@ def fold_residual(theta: float, turned: float) -> float:
     b, d = _along(crank), _along(0.0)
     places = [b / 2, b + _along(coupler) / 2, d + _along(rocker) / 2]
     turns = np.array([about_z(angle) for angle in (crank, coupler, rocker)])
-    residuals = kinematics.closure(scene, np.array(t), np.array(places), turns)
+    residuals = constraints.closure(scene, np.array(t), np.array(places), turns)
     return max(float(np.abs(r).max()) for r in residuals.values())
 
 

@@ -5,7 +5,7 @@ import time
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Setting, Why
-from crosscheck.kinematics import inertia_matrices, initial_twists
+from crosscheck.judge.constraints import inertia_matrices, initial_twists
 from mbref import rotations
 from mbref.trajectory import Cost, Outcome, Trajectory
 

@@ -15,12 +15,12 @@ from collections.abc import Mapping
 
 from numpy import sqrt
 
-from mbref.compiled import exchangeable, kernel
 from mbref.formulations.base import Formulation
-from mbref.linalg import cholesky_factor, cholesky_solve
-from mbref.orthogonal import equilibrate
-from mbref.tables import ACCELERATE, FACTORISATIONS, FORMULATION_OPTIONS, NOT_CONVERGED, OK, SINGULAR
-from mbref.vectors import copy
+from mbref.kernels.compilation import exchangeable, kernel
+from mbref.kernels.layout import ACCELERATE, FACTORISATIONS, FORMULATION_OPTIONS, NOT_CONVERGED, OK, SINGULAR
+from mbref.linear_algebra.elimination import cholesky_factor, cholesky_solve
+from mbref.linear_algebra.orthogonal_factorisations import equilibrate
+from mbref.linear_algebra.vectors import copy
 
 OPTIONS = {"alpha": 1e5, "epsilon": 1e-9, "iterations": 100.0, "omega": 10.0, "mu": 1.0}
 

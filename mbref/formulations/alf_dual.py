@@ -10,13 +10,19 @@ be ≤ epsilon, relative to the larger of 1 and the acceleration, judged by how 
 
 from __future__ import annotations
 
-from mbref.compiled import exchangeable
 from mbref.formulations.alf import changed, feedback
 from mbref.formulations.base import Formulation
 from mbref.formulations.moore_penrose import begin, transpose
-from mbref.linalg import add_product, cholesky_factor, cholesky_solve, gram, times_transpose
-from mbref.tables import ACCELERATE, FACTORISATIONS, FORMULATION_OPTIONS, NOT_CONVERGED, OK, SINGULAR
-from mbref.vectors import copy
+from mbref.kernels.compilation import exchangeable
+from mbref.kernels.layout import ACCELERATE, FACTORISATIONS, FORMULATION_OPTIONS, NOT_CONVERGED, OK, SINGULAR
+from mbref.linear_algebra.elimination import (
+    add_product,
+    cholesky_factor,
+    cholesky_solve,
+    gram,
+    times_transpose,
+)
+from mbref.linear_algebra.vectors import copy
 
 TINY, NEVER = 1e-300, 1e300
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mbref.compiled import Exchangeable
-from mbref.tables import FORMULATION_OPTIONS, NEWTON_TOLERANCE, RANK_TOLERANCE
+from mbref.kernels.compilation import Exchangeable
+from mbref.kernels.layout import FORMULATION_OPTIONS, NEWTON_TOLERANCE, RANK_TOLERANCE
 
 
 @dataclass(frozen=True)

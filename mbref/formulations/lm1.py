@@ -10,11 +10,11 @@ allowed where the constraints hold them.
 
 from __future__ import annotations
 
-from mbref.compiled import exchangeable
 from mbref.formulations.base import Formulation
-from mbref.linalg import lu_factor, lu_solve
-from mbref.orthogonal import equilibrate
-from mbref.tables import ACCELERATE, FACTORISATIONS, OK, SINGULAR
+from mbref.kernels.compilation import exchangeable
+from mbref.kernels.layout import ACCELERATE, FACTORISATIONS, OK, SINGULAR
+from mbref.linear_algebra.elimination import lu_factor, lu_solve
+from mbref.linear_algebra.orthogonal_factorisations import equilibrate
 
 SINGULAR_PIVOT = 1e-12  # of the scaled matrix, whose rows and columns have unit size
 

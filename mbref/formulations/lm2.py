@@ -7,10 +7,10 @@ random poses; so a row nearer than 3e-6 rad to dependent counts as redundant.
 
 from __future__ import annotations
 
-from mbref.compiled import exchangeable
 from mbref.formulations.base import Formulation
-from mbref.linalg import cholesky_factor, cholesky_solve, gram
-from mbref.tables import ACCELERATE, FACTORISATIONS, OK, SINGULAR
+from mbref.kernels.compilation import exchangeable
+from mbref.kernels.layout import ACCELERATE, FACTORISATIONS, OK, SINGULAR
+from mbref.linear_algebra.elimination import cholesky_factor, cholesky_solve, gram
 
 SINGULAR_PIVOT = 1e-11  # of its diagonal entry: the square of the sine between a row and those before
 

@@ -7,8 +7,8 @@ with the rows of D scaled to unit length, so that the rank does not depend on un
 
 from __future__ import annotations
 
-from mbref.compiled import kernel
-from mbref.orthogonal import equilibrate
+from mbref.kernels.compilation import kernel
+from mbref.linear_algebra.orthogonal_factorisations import equilibrate
 
 
 @kernel

@@ -7,11 +7,11 @@ orthogonalisation of the rows of R gives R = L Zᵀ: D⁺ = P Z L⁻¹ Qᵀ, the
 
 from __future__ import annotations
 
-from mbref.compiled import exchangeable
 from mbref.formulations.base import Formulation
 from mbref.formulations.moore_penrose import begin, finish
-from mbref.orthogonal import gram_schmidt_solve
-from mbref.tables import ACCELERATE, FACTORISATIONS, OK, RANK_TOLERANCE, SINGULAR
+from mbref.kernels.compilation import exchangeable
+from mbref.kernels.layout import ACCELERATE, FACTORISATIONS, OK, RANK_TOLERANCE, SINGULAR
+from mbref.linear_algebra.orthogonal_factorisations import gram_schmidt_solve
 
 
 @exchangeable(ACCELERATE)

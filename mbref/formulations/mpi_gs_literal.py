@@ -6,12 +6,12 @@ coordinates, which only a fully driven mechanism has.  Fails as SINGULAR otherwi
 
 from __future__ import annotations
 
-from mbref.compiled import exchangeable
 from mbref.formulations.base import Formulation
 from mbref.formulations.moore_penrose import begin, finish
-from mbref.linalg import back_substitute
-from mbref.orthogonal import gram_schmidt
-from mbref.tables import ACCELERATE, FACTORISATIONS, OK, RANK_TOLERANCE, SINGULAR
+from mbref.kernels.compilation import exchangeable
+from mbref.kernels.layout import ACCELERATE, FACTORISATIONS, OK, RANK_TOLERANCE, SINGULAR
+from mbref.linear_algebra.elimination import back_substitute
+from mbref.linear_algebra.orthogonal_factorisations import gram_schmidt
 
 
 @exchangeable(ACCELERATE)

@@ -7,11 +7,11 @@ Trans. Aut. Des. 108, 1986, use the same factorisation).  Redundant rows get no 
 
 from __future__ import annotations
 
-from mbref.compiled import exchangeable
 from mbref.formulations.base import Formulation
 from mbref.formulations.moore_penrose import begin, finish
-from mbref.orthogonal import minimum_norm, qr_pivoted, row_multipliers
-from mbref.tables import ACCELERATE, FACTORISATIONS, OK, RANK_TOLERANCE, SINGULAR
+from mbref.kernels.compilation import exchangeable
+from mbref.kernels.layout import ACCELERATE, FACTORISATIONS, OK, RANK_TOLERANCE, SINGULAR
+from mbref.linear_algebra.orthogonal_factorisations import minimum_norm, qr_pivoted, row_multipliers
 
 
 @exchangeable(ACCELERATE)

@@ -6,11 +6,11 @@ rank tolerance times the largest count as zero.  The multipliers are those of le
 
 from __future__ import annotations
 
-from mbref.compiled import exchangeable
 from mbref.formulations.base import Formulation
 from mbref.formulations.moore_penrose import begin, finish
-from mbref.orthogonal import svd_solve
-from mbref.tables import ACCELERATE, FACTORISATIONS, NOT_FINITE, OK, RANK_TOLERANCE, SINGULAR
+from mbref.kernels.compilation import exchangeable
+from mbref.kernels.layout import ACCELERATE, FACTORISATIONS, NOT_FINITE, OK, RANK_TOLERANCE, SINGULAR
+from mbref.linear_algebra.orthogonal_factorisations import svd_solve
 
 
 @exchangeable(ACCELERATE)

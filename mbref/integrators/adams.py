@@ -13,10 +13,10 @@ from __future__ import annotations
 import numpy as np
 from numpy import sqrt
 
-from mbref.compiled import exchangeable, kernel
 from mbref.integrators.base import Integrator
-from mbref.tables import LARGEST_STEP, OK, ORDER, PROPOSE, STEP
-from mbref.vectors import copy
+from mbref.kernels.compilation import exchangeable, kernel
+from mbref.kernels.layout import LARGEST_STEP, OK, ORDER, PROPOSE, STEP
+from mbref.linear_algebra.vectors import copy
 
 HIGHEST = 12
 # rows of memory: STATE, φ_1 to φ_(HIGHEST + 2), then

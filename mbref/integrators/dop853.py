@@ -9,12 +9,12 @@ from collections.abc import Callable, Sequence
 
 from numpy import sqrt
 
-from mbref.compiled import exchangeable, inlined
 from mbref.integrators.base import Integrator
 from mbref.integrators.coefficients import ERROR3, ERROR5, STAGES, A, B, C
 from mbref.integrators.one_step import propose
-from mbref.tables import OK, STEP
-from mbref.vectors import copy, larger
+from mbref.kernels.compilation import exchangeable, inlined
+from mbref.kernels.layout import OK, STEP
+from mbref.linear_algebra.vectors import copy, larger
 
 
 def sum_with(weights: Sequence[float]) -> Callable:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from mbref.compiled import exchangeable, kernel
-from mbref.tables import LARGEST_STEP, ORDER, PROPOSE
-from mbref.vectors import larger
+from mbref.kernels.compilation import exchangeable, kernel
+from mbref.kernels.layout import LARGEST_STEP, ORDER, PROPOSE
+from mbref.linear_algebra.vectors import larger
 
 SAFETY, SHRINK, GROW, RETRY = 0.8, 0.2, 100.0, 0.25  # 0.8 takes 5 to 10 % fewer evaluations than 0.9
 

@@ -8,12 +8,12 @@ is off is judged by the one through a state fewer, so that Newton's method stays
 
 from __future__ import annotations
 
-from mbref.compiled import exchangeable, kernel
 from mbref.integrators.base import Integrator
 from mbref.integrators.one_step import propose
-from mbref.problem import opened
-from mbref.tables import LIVE, MOVING, STEP
-from mbref.vectors import copy, larger
+from mbref.kernels.arguments import opened
+from mbref.kernels.compilation import exchangeable, kernel
+from mbref.kernels.layout import LIVE, MOVING, STEP
+from mbref.linear_algebra.vectors import copy, larger
 
 NODES = 3
 NEARNESS = 2e-2  # of the step: what the polynomial of a state fewer may be off; the prediction is much nearer

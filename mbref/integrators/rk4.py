@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from mbref.compiled import exchangeable
 from mbref.integrators.base import Integrator
 from mbref.integrators.one_step import propose
-from mbref.tables import OK, STEP
-from mbref.vectors import copy
+from mbref.kernels.compilation import exchangeable
+from mbref.kernels.layout import OK, STEP
+from mbref.linear_algebra.vectors import copy
 
 
 @exchangeable(STEP)

@@ -18,26 +18,19 @@ from pathlib import Path
 
 import numpy as np
 
-from mbref.compiled import CACHE, PLAIN
-from mbref.evaluation import coordinate_rates, dense_jacobian, evaluate, right_hand_side, violation_rate
-from mbref.formulations.base import Formulation
-from mbref.model import Model
-from mbref.sparse.chart import accelerations
-from mbref.sparse.factor import memories, squared_pivots
-from mbref.sparse.held import add_multipliers_of_held
-from mbref.sparse.iteration import factor
-from mbref.sparse.plan import COLUMN, ROW, Plan
-from mbref.specialised.machine_code import Code, Piece, compiled, processor
-from mbref.specialised.tracing import Record, Untraceable, inputs, numbers, plain
-from mbref.stabilisation.full import normalise
-from mbref.stabilisation.projection import (
-    ALPHA,
-    REPEATED,
-    cancel,
-    displace,
-    largest,
+from mbref.equations.evaluation import (
+    coordinate_rates,
+    dense_jacobian,
+    evaluate,
+    right_hand_side,
+    violation_rate,
 )
-from mbref.tables import (
+from mbref.equations.model import Model
+from mbref.equations.static_constraints import add_multipliers_of_held
+from mbref.formulations.augmented_lagrangian import factor
+from mbref.formulations.base import Formulation
+from mbref.kernels.compilation import CACHE, PLAIN
+from mbref.kernels.layout import (
     ACCELERATION,
     ANGLES,
     COLUMNS,
@@ -55,6 +48,19 @@ from mbref.tables import (
     ROWS,
     SCRATCH,
 )
+from mbref.linear_algebra.sparse_cholesky import memories, squared_pivots
+from mbref.linear_algebra.symbolic_factorisation import COLUMN, ROW, Plan
+from mbref.specialised.machine_code import Code, Piece, compiled, processor
+from mbref.specialised.tracing import Record, Untraceable, inputs, numbers, plain
+from mbref.stabilisation.all_coordinates import normalise
+from mbref.stabilisation.projection import (
+    ALPHA,
+    REPEATED,
+    cancel,
+    displace,
+    largest,
+)
+from mbref.stabilisation.sparse_chart import accelerations
 
 MOST_ROWS = 60  # whose record would not be too long (machine_code.MOST_OPERATIONS)
 PIECES = ("rates", "project")  # in the order of their addresses in ints[LIVE]

@@ -11,17 +11,11 @@ from llvmlite import ir
 from numba import i8
 from numba.extending import intrinsic
 
-from mbref.compiled import exchangeable, kernel
-from mbref.evaluation import expand, place
-from mbref.loads import has_angles
-from mbref.problem import opened, planned
-from mbref.singular import NEVER
-from mbref.sparse.factor import part
-from mbref.sparse.plan import ROW
-from mbref.stabilisation.base import Stabilisation
-from mbref.stabilisation.full import flush
-from mbref.stabilisation.projection import MOST_ITERATIONS, ROUNDING, project, watch
-from mbref.tables import (
+from mbref.equations.evaluation import expand, place
+from mbref.equations.loads import has_angles
+from mbref.kernels.arguments import opened, planned
+from mbref.kernels.compilation import exchangeable, kernel
+from mbref.kernels.layout import (
     ACCELERATION,
     ACCEPT,
     ANGLES,
@@ -48,7 +42,13 @@ from mbref.tables import (
     STATE,
     TURNING,
 )
-from mbref.vectors import copy
+from mbref.linear_algebra.sparse_cholesky import part
+from mbref.linear_algebra.symbolic_factorisation import ROW
+from mbref.linear_algebra.vectors import copy
+from mbref.simulation.singular_crossing import NEVER
+from mbref.stabilisation.all_coordinates import flush
+from mbref.stabilisation.base import Stabilisation
+from mbref.stabilisation.projection import MOST_ITERATIONS, ROUNDING, project, watch
 
 
 @intrinsic

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from mbref.compiled import Exchangeable
+from mbref.kernels.compilation import Exchangeable
 
 
 @dataclass(frozen=True)

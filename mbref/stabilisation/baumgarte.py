@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
+from mbref.stabilisation.all_coordinates import accept, enter, rates
 from mbref.stabilisation.base import Stabilisation
-from mbref.stabilisation.full import accept, enter, rates
 
 
 def _feedback(options: Mapping[str, float]) -> tuple[float, float]:

@@ -12,12 +12,10 @@ partitions last near turning points of a coordinate: errors 10 to 1000 times tho
 
 from __future__ import annotations
 
-from mbref.compiled import exchangeable, kernel
-from mbref.evaluation import accelerations, coordinate_rates, evaluate
-from mbref.linalg import full_pivot, lu_factor, lu_solve
-from mbref.problem import opened
-from mbref.stabilisation.base import Stabilisation
-from mbref.tables import (
+from mbref.equations.evaluation import accelerations, coordinate_rates, evaluate
+from mbref.kernels.arguments import opened
+from mbref.kernels.compilation import exchangeable, kernel
+from mbref.kernels.layout import (
     ACCELERATION,
     ACCEPT,
     CHANGED,
@@ -53,7 +51,9 @@ from mbref.tables import (
     STATE,
     VELOCITIES,
 )
-from mbref.vectors import copy_rows
+from mbref.linear_algebra.elimination import full_pivot, lu_factor, lu_solve
+from mbref.linear_algebra.vectors import copy_rows
+from mbref.stabilisation.base import Stabilisation
 
 MOST_ITERATIONS = 20
 OPTIONS = {"kept": 0.6}

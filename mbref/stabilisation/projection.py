@@ -12,15 +12,11 @@ from __future__ import annotations
 
 from numpy import sqrt
 
-from mbref.compiled import exchangeable, inlined
-from mbref.evaluation import contract, coordinate_rates, evaluate, expand, violation_rate
-from mbref.problem import opened, planned
-from mbref.sparse.factor import memories, part, squared_pivots
-from mbref.sparse.iteration import correct, factor
-from mbref.sparse.plan import ROW
-from mbref.stabilisation.base import Stabilisation
-from mbref.stabilisation.full import flush, normalise, rates
-from mbref.tables import (
+from mbref.equations.evaluation import contract, coordinate_rates, evaluate, expand, violation_rate
+from mbref.formulations.augmented_lagrangian import correct, factor
+from mbref.kernels.arguments import opened, planned
+from mbref.kernels.compilation import exchangeable, inlined
+from mbref.kernels.layout import (
     ACCEPT,
     COLUMNS,
     COORDINATES,
@@ -46,7 +42,11 @@ from mbref.tables import (
     TURNING,
     VELOCITIES,
 )
-from mbref.vectors import larger, sort
+from mbref.linear_algebra.sparse_cholesky import memories, part, squared_pivots
+from mbref.linear_algebra.symbolic_factorisation import ROW
+from mbref.linear_algebra.vectors import larger, sort
+from mbref.stabilisation.all_coordinates import flush, normalise, rates
+from mbref.stabilisation.base import Stabilisation
 
 ALPHA = 1e10  # of the iteration
 REPEATED, ALONE = 1, 2  # iterations of a correction that Newton's method repeats, and of one made once

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.gauss import gauss, singular_values, stacked
-from crosscheck.tolerances import RANK
+from crosscheck.judge.gauss_principle import gauss, singular_values, stacked
+from crosscheck.judge.tolerances import RANK
 from reports.blocks import Block, Heading, Table
 from reports.runs import SceneRuns, power
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from crosscheck.limits import limit
-from crosscheck.metrics import error_series, order_of_convergence
-from crosscheck.truth import truth_for
+from crosscheck.judge.metrics import error_series, order_of_convergence
+from crosscheck.judge.richardson import limit
+from crosscheck.judge.truth import truth_for
 from reports.blocks import Block, Heading, Table, Text
 from reports.runs import Curve, Run, SceneRuns, number, power
 

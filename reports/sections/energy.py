@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 
-from crosscheck.energy import energy_series
-from reports import histories
+from crosscheck.judge.energy import energy_series
+from reports import time_series
 from reports.blocks import Block, Figure, Heading, Text
 from reports.runs import Run, SceneRuns, power
 
@@ -24,14 +24,14 @@ def render(scene_runs: SceneRuns) -> list[Block]:
         drift = energy_series(scene_runs.scene, run.trajectory)
         return None if drift is None else [drift]
 
-    heading, values = Heading("Energy balance over time"), histories.series(scene_runs, measure)
+    heading, values = Heading("Energy balance over time"), time_series.series(scene_runs, measure)
     if not values:
         return [heading, Text(NO_BALANCE)]
-    (low, least), (high, most) = histories.largest(values)
+    (low, least), (high, most) = time_series.largest(values)
     caption = (
         "Energy gained less the work of loads and drivers, as a fraction of the largest energy seen, in the "
         f"most accurate run of every family; zero is exact. The least maximum is {power(least)} "
         f"({' '.join(low)}), the greatest {power(most)} ({' '.join(high)})."
     )
-    draw = partial(histories.plot, scene_runs, values, ("energy error",))
+    draw = partial(time_series.plot, scene_runs, values, ("energy error",))
     return [heading, Figure(f"{scene_runs.scene.name}-energy", caption, draw)]

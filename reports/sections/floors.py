@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from crosscheck.floors import HEADER, floors
-from crosscheck.tolerances import FLOOR
+from crosscheck.judge.tolerances import FLOOR
+from crosscheck.study.least_errors import HEADER, floors
 from reports.blocks import Block, Heading, Table, Text
 from reports.runs import SceneRuns, short
 

@@ -7,8 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from crosscheck.judge.truth import truth_for
 from crosscheck.paper.runs import HEAVY, RAISED, TRUE_BRANCH, UNEQUAL, Label, Records, dynamic_scene
-from crosscheck.truth import truth_for
 from mbref.trajectory import Trajectory
 from reports.blocks import Block, Heading, Table, Text
 from reports.runs import Run, number, power

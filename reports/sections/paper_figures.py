@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from crosscheck.metrics import violation_series
+from crosscheck.judge.metrics import violation_series
 from crosscheck.paper.cells import FIVE_BAR
 from crosscheck.paper.runs import (
     FINE,

@@ -8,10 +8,10 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
+from crosscheck.judge.truth import truth_for
 from crosscheck.paper import runs, settings, singular
 from crosscheck.paper.cells import SPATIAL
 from crosscheck.paper.runs import ALPHAS, DUAL, EXACT, PENALTY, Label, Records
-from crosscheck.truth import truth_for
 from mbref.formulations import FORMULATIONS
 from mbref.scenes import SCENES
 from mbref.scenes.four_bar import four_bar

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from crosscheck.reactions import Comparison, compare, side_by_side
+from crosscheck.judge.joint_reactions import Comparison, compare, side_by_side
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 from reports.blocks import Block, Heading, Table

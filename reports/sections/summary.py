@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from crosscheck.metrics import cost_at_error
-from crosscheck.tolerances import EXCESS
+from crosscheck.judge.metrics import cost_at_error
+from crosscheck.judge.tolerances import EXCESS
 from reports.blocks import Block, Heading, Table, Text
 from reports.runs import LEVELS, WRONG, Curve, Run, SceneRuns, duration, power, ratio, short
 

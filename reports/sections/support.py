@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from crosscheck import support
+from crosscheck.cli import support
 from crosscheck.engine import engine_names
 from reports.blocks import Block, Heading, Table, Text
 from reports.runs import SceneRuns

@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 
-from crosscheck.metrics import violation_series
-from reports import histories
+from crosscheck.judge.metrics import violation_series
+from reports import time_series
 from reports.blocks import Block, Figure, Heading, Text
 from reports.runs import Run, SceneRuns, power
 
@@ -21,15 +21,15 @@ def render(scene_runs: SceneRuns) -> list[Block]:
         levels = [violation_series(scene_runs.scene, run.trajectory, i) for i in range(len(LABELS))]
         return [level for level in levels if level is not None]  # only accelerations can be missing
 
-    heading, values = Heading("Constraint violation over time"), histories.series(scene_runs, measure)
+    heading, values = Heading("Constraint violation over time"), time_series.series(scene_runs, measure)
     if not values:
         return [heading, Text("No run reached a second sample.")]
-    (low, least), (high, most) = histories.largest(values)
+    (low, least), (high, most) = time_series.largest(values)
     caption = (
         "Largest violation of any joint in the most accurate run of every family; lower is better, a rising "
         "line is drift, a cross where a run ended early. At position level the least maximum is "
         f"{power(least)} "
         f"({' '.join(low)}), the greatest {power(most)} ({' '.join(high)})."
     )
-    draw = partial(histories.plot, scene_runs, values, LABELS)
+    draw = partial(time_series.plot, scene_runs, values, LABELS)
     return [heading, Figure(f"{scene_runs.scene.name}-violation", caption, draw)]

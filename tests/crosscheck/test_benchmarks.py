@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting
-from crosscheck.metrics import measure
-from crosscheck.truth import truth_for
+from crosscheck.judge.metrics import measure
+from crosscheck.judge.truth import truth_for
 from mbref.scenes import SCENES
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"

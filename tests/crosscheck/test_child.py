@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from crosscheck.child import Child, ChildFailed
+from crosscheck.processes.child import Child, ChildFailed
 from mbref.trajectory import Outcome
 
 

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from crosscheck import cli, request, study
-from crosscheck.cli import main
-from crosscheck.compare import timed
+from crosscheck.cli import commands, request
+from crosscheck.cli.commands import main
 from crosscheck.engine import engine
-from crosscheck.isolate import ChildFailed
-from crosscheck.record import PUBLIC
+from crosscheck.processes.pool import ChildFailed
+from crosscheck.study import grid
+from crosscheck.study.fair_timing import timed
+from crosscheck.study.record_view import PUBLIC
 from mbref.scene import Body, Moment, Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Cost, Outcome
@@ -175,7 +176,7 @@ def test_missing_engine_of_ours_and_the_extra(monkeypatch):
 def test_tolerance_and_one_run_of_a_family_that_has_one(still):
     scene = Scene.from_file(still)
     sweep = (("a", {"rtol": 1e-3}), ("a", {"rtol": 1e-6}), ("b", {"step": 0.1}))
-    cases = [study.Case(scene, [0, 1], "e", study.Setting(family, options)) for family, options in sweep]
+    cases = [grid.Case(scene, [0, 1], "e", grid.Setting(family, options)) for family, options in sweep]
     chosen = request._at_tolerance(cases, 1e-5)
     settings = [(c.setting.family, dict(c.setting.options)) for c in chosen]
     assert settings == [("a", {"rtol": 1e-5}), ("b", {"step": 0.1})], settings
@@ -198,10 +199,10 @@ def test_method_that_means_nothing_and_the_known_ones(capsys, still):
 
 def test_interrupt_and_the_records_finished_before(capsys, still, monkeypatch):
     def interrupted(cases, progress):
-        progress(1, len(cases), study.run_case(cases[1]))
+        progress(1, len(cases), grid.run_case(cases[1]))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli, "study", interrupted)
+    monkeypatch.setattr(commands, "study", interrupted)
     status, out, err = run_main(capsys, "run", still, "--engine", FAKE, "--json")
     [record] = json.loads(out)["records"]
     assert status == 130 and "interrupted" in err, (status, err)
@@ -211,7 +212,7 @@ def test_interrupt_and_the_records_finished_before(capsys, still, monkeypatch):
 @pytest.mark.parametrize("what", ["scenes", "engines", "methods", "metrics"])
 def test_list_and_the_tables(capsys, what):
     from crosscheck.engine import engine_names
-    from crosscheck.metrics import METRICS
+    from crosscheck.judge.metrics import METRICS
     from mbref.formulations import FORMULATIONS
 
     known = {"scenes": SCENES, "engines": engine_names(), "methods": FORMULATIONS, "metrics": METRICS}[what]
@@ -263,8 +264,8 @@ def test_timing_that_fails_and_the_seconds_of_single_runs(still, monkeypatch):
     def dies(*_):
         raise ChildFailed(Outcome.CRASHED, "the process was ended by SIGSEGV")
 
-    monkeypatch.setattr("crosscheck.compare.time_interleaved", dies)
-    case = study.Case(Scene.from_file(still), [0, 1], FAKE, study.Setting("plain", {"seconds": 0.3}))
+    monkeypatch.setattr("crosscheck.study.fair_timing.time_interleaved", dies)
+    case = grid.Case(Scene.from_file(still), [0, 1], FAKE, grid.Setting("plain", {"seconds": 0.3}))
     record = {"scene": "still", "outcome": "COMPLETED", "cost": {"seconds": 0.3}}
     sentences: list[str] = []
     assert timed([case], [record], 5, sentences.append) == [record]
@@ -284,7 +285,7 @@ def test_report_command_and_the_program_it_starts(monkeypatch):
         def __enter__(self):
             return self
 
-    monkeypatch.setattr(cli.subprocess, "Popen", Program)
+    monkeypatch.setattr(commands.subprocess, "Popen", Program)
     assert main(["report", "--quick", "--out", "x", "--section", "speed"]) == 130
     assert started[1][1:] == ["-m", "reports", "--out", "x", "--quick", "--section", "speed"], started
 

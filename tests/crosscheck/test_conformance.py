@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crosscheck.cli import main
-from crosscheck.conformance import bench, properties, suite
-from crosscheck.conformance.bench import Specimen, specimens
+from crosscheck.cli.commands import main
+from crosscheck.conformance import properties, suite, trial
 from crosscheck.conformance.features import undetermined
 from crosscheck.conformance.relations import shaken
+from crosscheck.conformance.trial import Specimen, specimens
 from crosscheck.engine import Cannot, Engine, Setting, Why
-from crosscheck.isolate import Observation
-from crosscheck.truth import truth_for
+from crosscheck.judge.truth import truth_for
+from crosscheck.processes.pool import Observation
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
@@ -98,10 +98,10 @@ def failed(
     def observe(name: str, scene: Scene, times: np.ndarray, setting: Setting, limit: float) -> Observation:
         return Observation(engine.run(scene, times, setting), printed, ())
 
-    monkeypatch.setattr(bench, "observe", observe)
-    monkeypatch.setattr(bench, "run_isolated", lambda *arguments: observe(*arguments).value)
+    monkeypatch.setattr(trial, "observe", observe)
+    monkeypatch.setattr(trial, "run_isolated", lambda *arguments: observe(*arguments).value)
     monkeypatch.setattr(properties, "engine", lambda name: engine)
-    on = bench.Bench(
+    on = trial.Bench(
         "exact", specimen, "1", engine.cannot(specimen.scene), engine.settings(specimen.scene), 9
     )
     return {verdict.property for verdict in suite.examine(on) if verdict.status == suite.FAIL}
@@ -146,8 +146,8 @@ def test_closed_form_and_its_own_equation():
         specimen = SPECIMENS[name]
         solved, times = truth_for(specimen.scene), np.linspace(0, specimen.scene.duration, 7)
         assert solved is not None, f"{name} is of no family"
-        written = bench.exact_motion(specimen, times)
-        apart = bench.difference(specimen.scene, written, solved.poses(times))
+        written = trial.exact_motion(specimen, times)
+        apart = trial.difference(specimen.scene, written, solved.poses(times))
         assert apart < 1e-12, f"{name}: formula and {solved.name} differ by {apart:.3g}, allowed 1e-12"
 
 
@@ -181,7 +181,7 @@ def test_shaken_scene_and_truth():
         first, again, other = (shaken(seed).change(scene) for seed in (0, 0, 1))
         assert first == again and first != other and first != scene, f"{name}: a seed, a scene"
         exact, moved = (truth_for(s).poses(times) for s in (scene, first))
-        apart = bench.difference(scene, exact, moved)
+        apart = trial.difference(scene, exact, moved)
         assert 0 < apart < 1e-12, f"{name}: {apart:.1e} from data that are off by rounding"
 
 

@@ -12,12 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import block_diag
 
-from crosscheck import kinematics
-from crosscheck.engines._constraints import Constraints, frames
-from crosscheck.engines._equations import Equations
-from crosscheck.engines._forces import Forces
+from crosscheck.engines.constraint_equations import Constraints, frames
+from crosscheck.engines.generalised_forces import Forces
+from crosscheck.engines.sundials.equations import Equations
+from crosscheck.judge import constraints
 from mbref import rotations
-from mbref.model import Model
+from mbref.equations.model import Model
 from mbref.scene import (
     Cylindrical,
     Distance,
@@ -46,7 +46,7 @@ class Consistent:
         rng = np.random.default_rng(seed)
         self.scene, self.t, nb = scene, t, len(scene.body)
         equations = Equations(scene)
-        r, p = kinematics.initial_poses(scene)
+        r, p = constraints.initial_poses(scene)
         r = r + far * rng.normal(size=(nb, 3))
         p = rotations.multiply(p, rotations.from_vector(far * rng.normal(size=(nb, 3))))
         twist = rng.normal(size=6 * nb)
@@ -79,10 +79,10 @@ class Consistent:
         """The same of the judge's joint equations."""
         place = (self.scene, self.t, self.r, self.p)
         still = np.zeros_like(self.r)
-        phi = kinematics.closure(*place)
-        bias = kinematics.closure_accelerations(*place, self.v, self.w, still, still)
+        phi = constraints.closure(*place)
+        bias = constraints.closure_accelerations(*place, self.v, self.w, still, still)
         none = np.zeros(0)
-        return (np.concatenate([none, *phi.values()]), kinematics.jacobian(*place)[0],
+        return (np.concatenate([none, *phi.values()]), constraints.jacobian(*place)[0],
                 -np.concatenate([none, *bias.values()]))  # fmt: skip
 
 

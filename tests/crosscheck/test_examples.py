@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crosscheck.cli import main
-from crosscheck.compare import difference, gate_cases
+from crosscheck.cli.commands import main
 from crosscheck.engine import ENTRY_POINTS, engine_names
-from crosscheck.isolate import run_isolated
-from crosscheck.metrics import measure
-from crosscheck.study import run_case
-from crosscheck.truth import truth_for
+from crosscheck.judge.metrics import measure
+from crosscheck.judge.truth import truth_for
+from crosscheck.processes.pool import run_isolated
+from crosscheck.study.fair_timing import difference, gate_cases
+from crosscheck.study.grid import run_case
 from mbref.scenes import SCENES
 
 ROOT = Path(__file__).parents[2]

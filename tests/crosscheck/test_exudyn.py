@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting
-from crosscheck.engines.exudyn import ENGINE
-from crosscheck.metrics import measure
-from crosscheck.truth import truth_for
+from crosscheck.engines.exudyn.adapter import ENGINE
+from crosscheck.judge.metrics import measure
+from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import (
     Body,

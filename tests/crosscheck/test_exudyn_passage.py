@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting
-from crosscheck.engines._exudyn_dynamic import stretches
-from crosscheck.engines._exudyn_leap import UPRIGHT, leap, projected
-from crosscheck.engines.exudyn import ENGINE
-from crosscheck.kinematics import closure, closure_rates, initial_poses
-from crosscheck.metrics import error_series, measure
-from crosscheck.truth import truth_for
+from crosscheck.engines.exudyn.adapter import ENGINE
+from crosscheck.engines.exudyn.dynamic import stretches
+from crosscheck.engines.exudyn.leap import UPRIGHT, leap, projected
+from crosscheck.judge.constraints import closure, closure_rates, initial_poses
+from crosscheck.judge.metrics import error_series, measure
+from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import Scene
 from mbref.scenes import SCENES

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting
-from crosscheck.engines.exudyn import ENGINE
+from crosscheck.engines.exudyn.adapter import ENGINE
 from mbref import rotations
 from mbref.scene import (
     Body,

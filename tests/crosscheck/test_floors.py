@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from crosscheck.floors import floors
+from crosscheck.study.least_errors import floors
 
 
 def record(

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crosscheck.gate import gate, gate_times
-from crosscheck.truth import truth_for
+from crosscheck.judge.model_identity import gate, gate_times
+from crosscheck.judge.truth import truth_for
 from mbref.scene import Body
 from mbref.scenes import SCENES
 from tests.crosscheck.truth_scenes import ALL

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from crosscheck.conformance.closed_forms import free_fall, oscillator, torsion
-from crosscheck.gauss import gauss, singular_values, stacked
-from crosscheck.truth import truth_for
+from crosscheck.judge.gauss_principle import gauss, singular_values, stacked
+from crosscheck.judge.truth import truth_for
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 

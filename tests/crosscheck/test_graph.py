@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crosscheck.engines._motion import motion
-from crosscheck.engines._start import initial_rates, lacks_mass, twist_maps
-from crosscheck.engines.graph import GROUND_LINK, ROWS, Link, Tree, effective_mass, spanning_tree
-from crosscheck.kinematics import initial_twists
+from crosscheck.engines.driver_motion import motion
+from crosscheck.engines.initial_velocities import initial_rates, lacks_mass, twist_maps
+from crosscheck.engines.spanning_tree import GROUND_LINK, ROWS, Link, Tree, effective_mass, spanning_tree
+from crosscheck.judge.constraints import initial_twists
 from mbref import rotations
 from mbref.scene import (
     Body,

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crosscheck.child import ChildFailed, stop_all
 from crosscheck.engine import Setting
-from crosscheck.isolate import end_idle, observe, run_isolated, time_interleaved
+from crosscheck.processes.child import ChildFailed, stop_all
+from crosscheck.processes.pool import end_idle, observe, run_isolated, time_interleaved
 from mbref.scene import Body, Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
@@ -128,7 +128,7 @@ def test_run_after_a_time_out_has_its_whole_time(tmp_path: Path):
 
 
 def test_engine_that_hangs_while_it_gets_ready_times_out(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("crosscheck.isolate.READY_SECONDS", 3.0)
+    monkeypatch.setattr("crosscheck.processes.pool.READY_SECONDS", 3.0)
     ended = run("STUCK", time_limit=60.0)
     assert (ended.outcome, ended.message) == (Outcome.TIMED_OUT, "no result after 3 s"), ended.message
 

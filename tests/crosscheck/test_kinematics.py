@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crosscheck import kinematics
+from crosscheck.judge import constraints
 from mbref import rotations
 from mbref.scene import (
     Body,
@@ -63,8 +63,8 @@ def jointed(kind, bodies=PAIR, driver=()):
 def constrained_motion(scene, seed):
     """Poses, twists and twist rates at t = 0 that satisfy the joints at velocity and acceleration level."""
     rng = np.random.default_rng(seed)
-    pose = kinematics.initial_poses(scene)
-    j, b = kinematics.jacobian(scene, 0.0, *pose)
+    pose = constraints.initial_poses(scene)
+    j, b = constraints.jacobian(scene, 0.0, *pose)
     start = rng.normal(size=j.shape[1])
     twist = (start + np.linalg.pinv(j) @ (b - j @ start)).reshape(-1, 6)
     return (*pose, twist[:, :3], twist[:, 3:]), rng.normal(size=(2, len(scene.body), 3))
@@ -82,7 +82,7 @@ def moved(motion, rates, h):
 @pytest.mark.parametrize("kind", ROWS)
 def test_joint_closes_at_start_and_has_its_rows(kind, bodies):
     scene = jointed(kind, bodies)
-    residual = kinematics.closure(scene, 0.0, *kinematics.initial_poses(scene))["j"]
+    residual = constraints.closure(scene, 0.0, *constraints.initial_poses(scene))["j"]
     assert residual.shape == (ROWS[kind],), f"{kind}: {residual.shape} rows, expected {ROWS[kind]}"
     assert np.abs(residual).max() < 1e-15 * 8, f"{kind}: residual {residual} at t = 0"
 
@@ -100,12 +100,12 @@ CASES = [*((kind, False) for kind in ROWS), *((kind, True) for kind in DRIVERS)]
 def test_jacobian_is_finite_difference_of_closure(kind, bodies, driven):
     scene = jointed(kind, bodies, (DRIVERS[kind],) if driven else ())
     motion, rates = constrained_motion(scene, 3)
-    j, b = kinematics.jacobian(scene, 0.0, *motion[:2])
+    j, b = constraints.jacobian(scene, 0.0, *motion[:2])
     direction = np.random.default_rng(5).normal(size=(len(scene.body), 6))
     h = 1e-5
     ends = [moved((*motion[:2], direction[:, :3], direction[:, 3:]), 0 * rates, s * h)[:2] for s in (1, -1)]
     plus, minus = (
-        kinematics.closure(scene, s * h, *pose)["j"] for s, pose in zip((1, -1), ends, strict=True)
+        constraints.closure(scene, s * h, *pose)["j"] for s, pose in zip((1, -1), ends, strict=True)
     )
     difference, predicted = (plus - minus) / (2 * h), j @ direction.ravel() - b
     assert np.allclose(difference, predicted, atol=1e-8), f"{kind}: {difference} against {predicted}"
@@ -117,23 +117,25 @@ def test_acceleration_residual_is_finite_difference_of_rates(kind, bodies, drive
     scene = jointed(kind, bodies, (DRIVERS[kind],) if driven else ())
     motion, rates = constrained_motion(scene, 11)
     h = 1e-5
-    plus, minus = (kinematics.closure_rates(scene, s * h, *moved(motion, rates, s * h))["j"] for s in (1, -1))
+    plus, minus = (
+        constraints.closure_rates(scene, s * h, *moved(motion, rates, s * h))["j"] for s in (1, -1)
+    )
     difference = (plus - minus) / (2 * h)
-    residual = kinematics.closure_accelerations(scene, 0.0, *motion, *rates)["j"]
+    residual = constraints.closure_accelerations(scene, 0.0, *motion, *rates)["j"]
     assert np.allclose(difference, residual, atol=1e-7), f"{kind}: {difference} against {residual}"
 
 
 @given(vector=st.tuples(*[st.floats(-1.7, 1.7)] * 3), shift=st.tuples(*[st.floats(-1, 1)] * 3))
 def test_fixed_joint_residual_is_the_displacement_put_in(vector, shift):
     scene = jointed("fixed", ("ground", "second"))
-    position, orientation = kinematics.initial_poses(scene)
+    position, orientation = constraints.initial_poses(scene)
     turn = rotations.from_vector(np.array(vector))
     moved_body = POINT + rotations.rotate(turn, position[1] - POINT) + np.array(shift)
     poses = (
         np.array([position[0], moved_body]),
         np.array([orientation[0], rotations.multiply(turn, orientation[1])]),
     )
-    residual = kinematics.closure(scene, 0.0, *poses)["j"]
+    residual = constraints.closure(scene, 0.0, *poses)["j"]
     sizes = [np.linalg.norm(part) for part in (residual[:3], residual[3:], shift, vector)]
     assert np.allclose(sizes[:2], sizes[2:], atol=1e-12), f"measured {sizes[:2]}, put in {sizes[2:]}"
 
@@ -141,22 +143,22 @@ def test_fixed_joint_residual_is_the_displacement_put_in(vector, shift):
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.4, 3.0, np.pi])
 def test_revolute_residual_is_the_tilt_of_its_axis(angle):
     scene = jointed("revolute", ("ground", "second"))
-    position, orientation = kinematics.initial_poses(scene)
+    position, orientation = constraints.initial_poses(scene)
     turn = rotations.from_vector(angle * np.array(SIDE) / np.linalg.norm(SIDE))
     place = POINT + rotations.rotate(turn, position[1] - POINT)
     poses = (
         np.array([position[0], place]),
         np.array([orientation[0], rotations.multiply(turn, orientation[1])]),
     )
-    tilt = np.linalg.norm(kinematics.closure(scene, 0.0, *poses)["j"][3:])
+    tilt = np.linalg.norm(constraints.closure(scene, 0.0, *poses)["j"][3:])
     assert abs(tilt - angle) < 1e-8 * angle + 1e-15, f"tilt {tilt}, put in {angle}"
 
 
 @pytest.mark.parametrize("name", [n for n in SCENES if n != "four_bar_straight"])
 def test_initial_twists_obey_joints_and_what_the_scene_gives(name):
     scene = SCENES[name]()
-    velocity, spin = kinematics.initial_twists(scene)
-    rates = kinematics.closure_rates(scene, 0.0, *kinematics.initial_poses(scene), velocity, spin)
+    velocity, spin = constraints.initial_twists(scene)
+    rates = constraints.closure_rates(scene, 0.0, *constraints.initial_poses(scene), velocity, spin)
     worst = {joint: np.abs(r).max() for joint, r in rates.items()}
     scale = max(1.0, np.abs(spin).max())
     assert max(worst.values()) < 1e-14 * scale * 4, f"{name}: velocity residuals {worst}"
@@ -173,7 +175,7 @@ def test_what_is_left_open_has_the_least_kinetic_energy():
         name="tip", mass=1e-9, inertia=(1e-12,) * 3, position=(1.0, 0.0, 0.0), velocity=(0.0, 1.0, 0.0)
     )
     ball = Spherical(name="ball", bodies=("rod", "tip"), anchor=(1.0, 0.0, 0.0))
-    velocity, spin = kinematics.initial_twists(Scene(name="pushed", body=(rod, tip), joint=(ball,)))
+    velocity, spin = constraints.initial_twists(Scene(name="pushed", body=(rod, tip), joint=(ball,)))
     impulse = 1 / (1 / 2.0 + 0.25 / 0.4)
     assert np.allclose(velocity[0], [0, impulse / 2, 0], atol=1e-8), f"{velocity[0]} against {impulse / 2}"
     assert np.allclose(spin[0], [0, 0, impulse * 0.5 / 0.4], atol=1e-8), f"{spin[0]} against {impulse * 1.25}"
@@ -183,14 +185,14 @@ def test_contradicting_velocities_name_the_joint():
     scene = SCENES["four_bar_gravity"]()
     moving = scene.body[1].model_copy(update={"velocity": (0.0, 0.0, 1.0)})
     with pytest.raises(SceneError, match=r"joint\[[12]\] '[BC]'"):
-        kinematics.initial_twists(scene.with_(body=(scene.body[0], moving, scene.body[2])))
+        constraints.initial_twists(scene.with_(body=(scene.body[0], moving, scene.body[2])))
 
 
 def test_driver_against_a_closed_loop_names_the_joint():
     scene = SCENES["four_bar"]()
     second = Driver(joint="D", polynomial=(0.0, 124.8))
     with pytest.raises(SceneError, match=r"joint\[\d\] '[ABCD]': its driver contradicts the joints"):
-        kinematics.initial_twists(scene.with_(driver=(*scene.driver, second)))
+        constraints.initial_twists(scene.with_(driver=(*scene.driver, second)))
 
 
 @pytest.mark.parametrize("order", [("ground", "second"), ("second", "ground")])
@@ -200,17 +202,17 @@ def test_joint_coordinates_count_the_turns_put_in(order):
     angle, shift = 9.0 * times + 3 * np.sin(4 * times), 0.4 * times**2
     axis = np.array(AXIS) / np.linalg.norm(AXIS)
     turn = rotations.from_vector(angle[:, None] * axis)
-    position, orientation = kinematics.initial_poses(scene)
+    position, orientation = constraints.initial_poses(scene)
     place = POINT + rotations.rotate(turn, position[1] - POINT) + shift[:, None] * axis
     poses = np.stack([np.broadcast_to(position[0], place.shape), place], axis=1)
     turned = rotations.multiply(turn, orientation[1])
     frames = np.stack([np.broadcast_to(orientation[0], turned.shape), turned], axis=1)
     spin = np.stack([0 * place, (9.0 + 12 * np.cos(4 * times))[:, None] * axis], axis=1)
     sign = 1 if order[0] == "ground" else -1
-    got = kinematics.joint_coordinates(scene, times, poses, frames, spin)["j"]
+    got = constraints.joint_coordinates(scene, times, poses, frames, spin)["j"]
     wanted = sign * np.stack([angle, shift], axis=1)
     assert np.abs(got - wanted).max() < 1e-12, f"off by {np.abs(got - wanted).max()} after {angle[-1]} rad"
-    sparse = kinematics.joint_coordinates(scene, times[::20], poses[::20], frames[::20], spin[::20])["j"]
+    sparse = constraints.joint_coordinates(scene, times[::20], poses[::20], frames[::20], spin[::20])["j"]
     assert np.isnan(sparse[-1, 0]), f"samples {times[20]} s apart cannot tell the turn, got {sparse[-1, 0]}"
 
 
@@ -220,10 +222,10 @@ def test_driver_derivatives_are_finite_differences(order):
     t, h = np.linspace(0, 2, 5), 1e-5
     if order == 0:
         got, wanted = (
-            kinematics.mates.driver_value(driver, t),
+            constraints.mates.driver_value(driver, t),
             t - 2 * t**2 + 0.5 * t**3 + 0.3 * np.sin(3 * t),
         )
     else:
-        ends = [kinematics.mates.driver_value(driver, t + s * h, order - 1) for s in (1, -1)]
-        got, wanted = kinematics.mates.driver_value(driver, t, order), (ends[0] - ends[1]) / (2 * h)
+        ends = [constraints.mates.driver_value(driver, t + s * h, order - 1) for s in (1, -1)]
+        got, wanted = constraints.mates.driver_value(driver, t, order), (ends[0] - ends[1]) / (2 * h)
     assert np.allclose(got, wanted, atol=1e-8), f"order {order}: {got} against {wanted}"

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crosscheck.kinematics import scene_length
-from crosscheck.limits import limit
-from crosscheck.metrics import error_series
-from crosscheck.truth import truth_for
+from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.metrics import error_series
+from crosscheck.judge.richardson import limit
+from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scenes import SCENES
 from mbref.trajectory import Trajectory

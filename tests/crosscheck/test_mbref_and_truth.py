@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from crosscheck.metrics import measure
-from crosscheck.truth import truth_for
+from crosscheck.judge.metrics import measure
+from crosscheck.judge.truth import truth_for
 from mbref.scenes import SCENES
-from mbref.simulate import Limits, simulate
+from mbref.simulation.simulate import Limits, simulate
 
 # scene, end time (s), method, rtol, largest error allowed.  A tenth of what is asked of each in the
 # comparison; measured errors are another ten to a thousand times smaller.

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crosscheck import metrics
-from crosscheck.energy import energy_series, kinetic_energy
-from crosscheck.kinematics import scene_length
-from crosscheck.metrics import METRICS, cost_at_error, false_success, measure, order_of_convergence
-from crosscheck.truth import truth_for
+from crosscheck.judge import metrics
+from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.energy import energy_series, kinetic_energy
+from crosscheck.judge.metrics import METRICS, cost_at_error, false_success, measure, order_of_convergence
+from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import Moment
 from mbref.scenes import SCENES

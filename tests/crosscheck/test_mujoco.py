@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting, engine
-from crosscheck.engines._mujoco_model import compiled
-from crosscheck.engines.mujoco import ADAPTIVE, HARD
-from crosscheck.metrics import order_of_convergence, violation_series
-from crosscheck.truth import truth_for
+from crosscheck.engines.mujoco.adapter import ADAPTIVE, HARD
+from crosscheck.engines.mujoco.model import compiled
+from crosscheck.judge.metrics import order_of_convergence, violation_series
+from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import Body, Driver, Scene
 from mbref.scenes import SCENES

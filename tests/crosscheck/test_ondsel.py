@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting, Why, engine
-from crosscheck.truth import truth_for
+from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import (
     Body,

@@ -6,8 +6,8 @@ from importlib import metadata
 
 import pytest
 
+from crosscheck.cli.request import RequestError, find_engines, missing_package
 from crosscheck.engine import BUILT_IN, OPTIONAL, default_engines, engine, engine_names, installed
-from crosscheck.request import RequestError, find_engines, missing_package
 
 
 @pytest.fixture

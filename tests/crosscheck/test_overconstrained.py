@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting, engine
-from crosscheck.metrics import error_series
+from crosscheck.judge.metrics import error_series
 from mbref import rotations
 from mbref.scene import Body, Revolute, Scene
 from mbref.trajectory import Outcome

@@ -6,7 +6,7 @@ from time import sleep
 import numpy as np
 import pytest
 
-from crosscheck.truth.picard import NoSolution, Solution
+from crosscheck.judge.truth.picard import NoSolution, Solution
 
 
 def test_equations_of_motion_that_end_say_so():

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting, engine
-from crosscheck.engines._pinocchio_model import Loads, Mechanism
-from crosscheck.truth import truth_for
+from crosscheck.engines.pinocchio.model import Loads, Mechanism
+from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import Driver, Scene
 from mbref.scenes import SCENES

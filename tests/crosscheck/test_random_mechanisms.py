@@ -9,8 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from crosscheck.kinematics import closure, closure_rates, initial_poses, initial_twists
-from crosscheck.random_mechanisms import KINDS, PRINCIPLE, Comparison, compare, random_mechanism
+from crosscheck.conformance.random_mechanisms import KINDS, PRINCIPLE, Comparison, compare, random_mechanism
+from crosscheck.judge.constraints import closure, closure_rates, initial_poses, initial_twists
 
 ENGINES = ("mujoco", "pinocchio", "exudyn")
 EXACT = 1e-9  # of a direct method, times what a singular position nearby magnifies

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crosscheck.conformance.bench import best_family
+from crosscheck.conformance.trial import best_family
 from crosscheck.engine import engine
-from crosscheck.kinematics import initial_poses
-from crosscheck.reactions import compare, resultants, shared_wrenches, side_by_side
+from crosscheck.judge.constraints import initial_poses
+from crosscheck.judge.joint_reactions import compare, resultants, shared_wrenches, side_by_side
 from mbref.scene import Body, Revolute, Scene, Spherical
 from mbref.scenes import SCENES
 from mbref.trajectory import Trajectory

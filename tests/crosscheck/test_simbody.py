@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting, Why, engine
-from crosscheck.kinematics import closure, joint_coordinates
-from crosscheck.truth import truth_for
+from crosscheck.judge.constraints import closure, joint_coordinates
+from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import Driver, Scene, Sine
 from mbref.scenes import SCENES

@@ -9,7 +9,7 @@ import pytest
 
 from crosscheck.conformance.closed_forms import free_fall
 from crosscheck.engine import Setting, engine
-from crosscheck.truth import truth_for
+from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import Driver, Scene
 from mbref.scenes import SCENES

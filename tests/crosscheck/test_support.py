@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crosscheck import support
+from crosscheck.cli import support
 from crosscheck.conformance.features import JOINTS, LOADS, feature_scenes
 from crosscheck.engine import BUILT_IN, Cannot, Why, engine
-from crosscheck.kinematics import initial_poses, jacobian
-from mbref.faults import DRIVEN
+from crosscheck.judge.constraints import initial_poses, jacobian
 from mbref.scene import Joint, Load, Scene
+from mbref.scene_validation import DRIVEN
 from mbref.trajectory import Outcome
 
 README = Path(__file__).parents[2] / "README.md"
@@ -21,7 +21,7 @@ README = Path(__file__).parents[2] / "README.md"
 def test_readme_and_generated_block():
     block = support.block_of(README.read_text())
     assert block == support.markdown(support.KNOWN), (
-        "README's support matrix is stale: python -m crosscheck.support README.md renews it"
+        "README's support matrix is stale: python -m crosscheck.cli.support README.md renews it"
     )
 
 

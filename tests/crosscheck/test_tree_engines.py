@@ -7,8 +7,8 @@ import functools
 import numpy as np
 import pytest
 
-from crosscheck import kinematics
 from crosscheck.engine import Setting, engine
+from crosscheck.judge import constraints
 from mbref import rotations
 from mbref.scene import (
     Body,
@@ -138,8 +138,8 @@ def test_mujoco_and_pinocchio_feel_the_same_reactions(name: str) -> None:
 def test_bodies_of_tree_engines_obey_the_joint_equations(name: str, setting: str) -> None:
     run, scene = trajectory(name, setting), ALL[name]
     levels = {
-        "position": kinematics.closure(scene, run.times, run.position, run.orientation),
-        "velocity": kinematics.closure_rates(
+        "position": constraints.closure(scene, run.times, run.position, run.orientation),
+        "velocity": constraints.closure_rates(
             scene, run.times, run.position, run.orientation, run.velocity, run.angular_velocity
         ),
     }
@@ -154,7 +154,7 @@ def test_reactions_do_no_work_and_balance_the_accelerations(name: str) -> None:
     """d'Alembert: what inertia, weight and loads leave over is Jᵀλ of the independent joint equations."""
     scene, run = ALL[name], trajectory(name, "pinocchio")
     for k, t in enumerate(run.times):
-        rows, _ = kinematics.jacobian(scene, t, run.position[k], run.orientation[k])
+        rows, _ = constraints.jacobian(scene, t, run.position[k], run.orientation[k])
         free = null_space(rows, 6 * len(scene.body))
         left = free.T @ (inertial_wrenches(scene, run, k) - applied_wrenches(scene, run, k)).ravel()
         scale = 1 + abs(inertial_wrenches(scene, run, k)).max()
@@ -226,7 +226,7 @@ def applied_wrenches(scene: Scene, run: Trajectory, k: int) -> np.ndarray:
 def torsion(scene: Scene, run: Trajectory, k: int, load: TorsionSpring, wrenches: np.ndarray) -> None:
     joint = next(j for j in scene.joint if j.name == load.joint)
     poses = (run.times, run.position, run.orientation, run.angular_velocity)
-    angle = kinematics.joint_coordinates(scene, *poses)[load.joint][k, 0]
+    angle = constraints.joint_coordinates(scene, *poses)[load.joint][k, 0]
     first, second = map(scene.body_index, joint.bodies)
     axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
     if first >= 0:

@@ -8,11 +8,11 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.special import ellipj, ellipk
 
-from crosscheck import kinematics
-from crosscheck.energy import energy_series
-from crosscheck.loads import Motion, world_inertia, wrenches
-from crosscheck.metrics import measure
-from crosscheck.truth import truth_for
+from crosscheck.judge import constraints
+from crosscheck.judge.energy import energy_series
+from crosscheck.judge.loads import Motion, world_inertia, wrenches
+from crosscheck.judge.metrics import measure
+from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import (
     Body,
@@ -41,14 +41,14 @@ def test_truth_satisfies_the_joints_at_three_levels(name):
 def test_truth_starts_where_the_scene_does(name):
     scene = ALL[name]
     motion = truth_for(scene).poses(np.zeros(1))
-    position, orientation = kinematics.initial_poses(scene)
+    position, orientation = constraints.initial_poses(scene)
     off = (
         np.abs(motion.position[0] - position).max(),
         rotations.angle_between(motion.orientation[0], orientation).max(),
     )
     assert max(off) < 1e-15 * 8, f"{name}: starts {off} away"
     if name != "four_bar_straight" and scene.joint:  # there the joints alone do not tell the velocities
-        velocity, spin = kinematics.initial_twists(scene)
+        velocity, spin = constraints.initial_twists(scene)
         got = np.abs(motion.velocity[0] - velocity).max(), np.abs(motion.angular_velocity[0] - spin).max()
         assert max(got) < 1e-14 * max(1, np.abs(spin).max()) * 4, f"{name}: initial velocities {got} away"
 
@@ -102,8 +102,8 @@ def multipliers_rhs(scene):
         motion = Motion(r, rotation, v, w, np.zeros((1, nb)))
         force, moment = wrenches(scene, motion, np.array(Z))
         inertia = world_inertia(scene, rotation)[0]
-        j, _ = kinematics.jacobian(scene, 0.0, r[0], p[0])
-        gamma = kinematics.closure_accelerations(scene, 0.0, r, p, v, w, 0 * v, 0 * w).values()
+        j, _ = constraints.jacobian(scene, 0.0, r[0], p[0])
+        gamma = constraints.closure_accelerations(scene, 0.0, r, p, v, w, 0 * v, 0 * w).values()
         inverse = np.zeros((6 * nb, 6 * nb))
         push = np.zeros(6 * nb)
         for b in range(nb):
@@ -132,7 +132,7 @@ def multipliers_rhs(scene):
 def test_truth_is_the_motion_of_the_multiplier_equations(name, end):
     scene = ALL[name]
     start = np.concatenate(
-        [a.ravel() for a in (*kinematics.initial_poses(scene), *kinematics.initial_twists(scene))]
+        [a.ravel() for a in (*constraints.initial_poses(scene), *constraints.initial_twists(scene))]
     )
     end_state = solve_ivp(multipliers_rhs(scene), (0, end), start, method="DOP853", rtol=1e-11, atol=1e-12).y[
         :, -1
@@ -142,7 +142,7 @@ def test_truth_is_the_motion_of_the_multiplier_equations(name, end):
     position = np.abs(end_state[: 3 * nb].reshape(nb, 3) - exact.position[0]).max()
     spin = np.abs(end_state[10 * nb :].reshape(nb, 3) - exact.angular_velocity[0]).max()
     scale = np.abs(exact.angular_velocity).max() + 1
-    moved = np.abs(exact.position[0] - kinematics.initial_poses(scene)[0]).max()
+    moved = np.abs(exact.position[0] - constraints.initial_poses(scene)[0]).max()
     assert moved > 1e-2, f"{name}: moved only {moved}"
     assert position < 1e-9 and spin < 1e-8 * scale, (
         f"{name}: position off by {position}, spin by {spin} of {scale}"

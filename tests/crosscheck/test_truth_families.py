@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crosscheck.truth import truth_for
+from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import Body, Driver, Revolute, Scene, Spherical, Translational
 from mbref.scenes import SCENES

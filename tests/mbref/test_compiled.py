@@ -4,7 +4,7 @@ import numba
 import numpy as np
 import pytest
 
-from mbref.compiled import PLAIN, allocating, kernel
+from mbref.kernels.compilation import PLAIN, allocating, kernel
 
 
 @allocating

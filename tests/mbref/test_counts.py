@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mbref.diagnose import diagnose
+from mbref.equations.diagnosis import diagnose
 from mbref.scenes import SCENES, find_scene
 from mbref.scenes.four_bar import four_bar
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from mbref.cli import main
-from mbref.ensemble import ensemble, processes
 from mbref.scene import SceneError
 from mbref.scenes import SCENES
 from mbref.scenes.spatial_slider_crank import OFFSET, RADIUS, ROD
-from mbref.simulate import Limits, simulate
-from mbref.variants import Variation, variants
+from mbref.simulation.ensemble import ensemble, processes
+from mbref.simulation.simulate import Limits, simulate
+from mbref.variation import Variation, variants
 
 TIMES = np.array([0.0, 0.004, 0.01])
 LIMITS = Limits(rtol=1e-8)
@@ -63,7 +63,7 @@ def test_interrupted_and_uninterrupted_ensembles_agree(tmp_path: Path, monkeypat
         ran.append(scenes.index(scene))
         return simulate(scene, *arguments)
 
-    monkeypatch.setattr("mbref.ensemble.simulate", counted)
+    monkeypatch.setattr("mbref.simulation.ensemble.simulate", counted)
     with ThreadPoolExecutor(1) as one:
         whole = dict(ensemble(scenes, TIMES, METHOD, LIMITS, one))
         ran.clear()

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from mbref.equations.initial_state import consistent_start
+from mbref.equations.model import Model
 from mbref.formulations import FORMULATIONS
-from mbref.initial import consistent_start
-from mbref.model import Model
+from mbref.kernels.layout import NOT_CONVERGED, OK, SINGULAR
 from mbref.scenes import SCENES
-from mbref.simulate import simulate
-from mbref.tables import NOT_CONVERGED, OK, SINGULAR
+from mbref.simulation.simulate import simulate
 
 RNG = np.random.default_rng(20031)
 

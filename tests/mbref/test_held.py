@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from crosscheck.random_mechanisms import random_mechanism
-from mbref.method import Method
-from mbref.run import Run
+from crosscheck.conformance.random_mechanisms import random_mechanism
+from mbref.equations.active_coordinates import moving_entries
+from mbref.equations.static_constraints import SMALL, _perpendicular, held_by_rows
 from mbref.scene import Body, Driver, Fixed, Revolute, Scene, Spring, Translational
 from mbref.scenes import SCENES, find_scene
-from mbref.simulate import Limits, simulate
-from mbref.sparse.held import SMALL, _perpendicular, held_by_rows
-from mbref.sparse.moving import moving_entries
+from mbref.simulation.method import Method
+from mbref.simulation.run import Run
+from mbref.simulation.simulate import Limits, simulate
 
 METHOD = "alf-dual+projection"
 ORIGIN, X, Z = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)

@@ -10,17 +10,17 @@ import pytest
 from scipy.integrate import ode
 from scipy.special import ellipj, ellipk
 
-from crosscheck.metrics import measure
-from crosscheck.truth import truth_for
+from crosscheck.judge.metrics import measure
+from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.integrators.coefficients import ERROR3, ERROR5, STAGES, A, B
 from mbref.integrators.dop853 import sum_with
-from mbref.method import Method
-from mbref.run import Run
+from mbref.kernels.layout import COLUMN_ORDER, CROSSINGS, STEPS_PER_CALL
 from mbref.scene import Body, Revolute, Scene, Spring, Translational
 from mbref.scenes import SCENES
-from mbref.simulate import Limits, simulate
-from mbref.tables import COLUMN_ORDER, CROSSINGS, STEPS_PER_CALL
+from mbref.simulation.method import Method
+from mbref.simulation.run import Run
+from mbref.simulation.simulate import Limits, simulate
 
 ROD = {"mass": 2.0, "inertia": (0.1, 0.7, 0.7)}
 OSCILLATOR = Scene(

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from crosscheck.metrics import measure
-from crosscheck.truth import truth_for
-from mbref.freedoms import undriven_freedoms
-from mbref.initial import corrected_positions, displaced
-from mbref.method import MethodError
-from mbref.model import Model
+from crosscheck.judge.metrics import measure
+from crosscheck.judge.truth import truth_for
+from mbref.equations.degrees_of_freedom import undriven_freedoms
+from mbref.equations.initial_state import corrected_positions, displaced
+from mbref.equations.model import Model
 from mbref.scene import SceneError
 from mbref.scenes import SCENES
-from mbref.simulate import Limits, simulate
+from mbref.simulation.method import MethodError
+from mbref.simulation.simulate import Limits, simulate
 
 DRIVEN = ["four_bar", "four_bar_quarter", "four_bar_straight", "five_bar", "spatial_slider_crank_driven"]
 

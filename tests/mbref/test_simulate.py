@@ -8,7 +8,6 @@ import sys
 import numpy as np
 import pytest
 
-from mbref.method import Method, MethodError
 from mbref.scene import (
     Body,
     Cylindrical,
@@ -26,7 +25,8 @@ from mbref.scene import (
     Universal,
 )
 from mbref.scenes import SCENES
-from mbref.simulate import Limits, simulate
+from mbref.simulation.method import Method, MethodError
+from mbref.simulation.simulate import Limits, simulate
 
 FINE = Limits(rtol=1e-11)
 ROD = {"mass": 2.0, "inertia": (0.1, 0.7, 0.7)}

@@ -5,12 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crosscheck.truth import truth_for
-from mbref import diagnose, initial
-from mbref.model import Model
-from mbref.scenes import find_scene
-from mbref.simulate import Limits, simulate
-from mbref.sparse.factor import (
+from crosscheck.judge.truth import truth_for
+from mbref.equations import diagnosis, initial_state
+from mbref.equations.active_coordinates import moving_entries
+from mbref.equations.model import Model
+from mbref.linear_algebra.sparse_cholesky import (
     assemble,
     factorise,
     memories,
@@ -19,8 +18,9 @@ from mbref.sparse.factor import (
     subtract_product,
     times_transpose,
 )
-from mbref.sparse.moving import moving_entries
-from mbref.sparse.plan import COLUMN, ROW, plan_for
+from mbref.linear_algebra.symbolic_factorisation import COLUMN, ROW, plan_for
+from mbref.scenes import find_scene
+from mbref.simulation.simulate import Limits, simulate
 
 
 @given(bodies=st.integers(1, 12), rows=st.integers(1, 40), seed=st.integers(0, 999))
@@ -71,7 +71,7 @@ def test_factor_and_dense_algebra_on_random_blocks(bodies, rows, seed):
 )
 def test_rows_that_move_and_the_plane(name, gravity, rows):
     model = Model(find_scene(name).with_(gravity=gravity))
-    start = initial.consistent_start(model)
+    start = initial_state.consistent_start(model)
     moving = moving_entries(model, start.q, start.v)[1].any(axis=1)
     assert moving.sum() == rows, f"{moving.sum()} of {model.m} rows move"
 
@@ -124,8 +124,8 @@ def test_sparse_start_and_dense_start(monkeypatch):
     bodies[0] = bodies[0].model_copy(update={"angular_velocity": None})
     model, starts = Model(scene.with_(body=tuple(bodies))), []
     for large in (0, 10**9):
-        monkeypatch.setattr(initial, "LARGE", large)
-        starts.append(initial.consistent_start(model))
+        monkeypatch.setattr(initial_state, "LARGE", large)
+        starts.append(initial_state.consistent_start(model))
     sparse, dense = starts
     for key in ("q", "v"):
         gap = np.abs(getattr(sparse, key) - getattr(dense, key)).max()
@@ -139,8 +139,8 @@ def test_sparse_start_and_dense_start(monkeypatch):
 def test_redundancy_by_regularised_inverse_and_by_singular_values(monkeypatch, name):
     found = []
     for large in (0, 10**9):
-        monkeypatch.setattr(diagnose, "LARGE", large)
-        found.append(diagnose.diagnose(find_scene(name)))
+        monkeypatch.setattr(diagnosis, "LARGE", large)
+        found.append(diagnosis.diagnose(find_scene(name)))
     sparse, dense = found
     assert (sparse.counts, sparse.redundant_by_joint) == (dense.counts, dense.redundant_by_joint)
     assert sparse.unique_reactions == dense.unique_reactions

@@ -6,23 +6,23 @@ import json
 import numpy as np
 import pytest
 
-from crosscheck.random_mechanisms import random_mechanism
-from mbref.compiled import CACHE
-from mbref.evaluation import coordinate_rates
-from mbref.method import Method, MethodError
-from mbref.results import trajectory_of
-from mbref.run import Run
+from crosscheck.conformance.random_mechanisms import random_mechanism
+from mbref.equations.evaluation import coordinate_rates
+from mbref.kernels.compilation import CACHE
+from mbref.kernels.layout import COLUMNS, FORCE, OK, PHI_Q, RATES_CODE, RHS, ROWS, SIZES
+from mbref.linear_algebra.symbolic_factorisation import HELD_COLUMN, HELD_ROW
+from mbref.linear_algebra.vectors import larger
 from mbref.scene import Body, Fixed, Force, Revolute, Scene, Spring, TorsionSpring
 from mbref.scenes import SCENES, find_scene
-from mbref.simulate import Limits, simulate
-from mbref.sparse.plan import HELD_COLUMN, HELD_ROW
+from mbref.simulation.method import Method, MethodError
+from mbref.simulation.outcome import trajectory_of
+from mbref.simulation.run import Run
+from mbref.simulation.simulate import Limits, simulate
 from mbref.specialised import machine_code
 from mbref.specialised.build import PIECES, State
 from mbref.specialised.machine_code import Code, Piece, compiled
 from mbref.specialised.tracing import Record, Scalar, Untraceable, inputs, plain
 from mbref.stabilisation.projection import largest
-from mbref.tables import COLUMNS, FORCE, OK, PHI_Q, RATES_CODE, RHS, ROWS, SIZES
-from mbref.vectors import larger
 
 PAPER = ("spatial_slider_crank", "planar_slider_crank", "four_bar", "five_bar")
 CALL = ctypes.CFUNCTYPE(ctypes.c_longlong, ctypes.c_double, *[ctypes.c_void_p] * 4)

@@ -8,9 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mbref.formulations import FORMULATIONS
-from mbref.linalg import cholesky_factor, cholesky_solve, full_pivot, lu_factor, lu_solve
-from mbref.orthogonal import minimum_norm, pinv_gram_schmidt, pinv_svd, qr_pivoted
-from mbref.tables import OK
+from mbref.kernels.layout import OK
+from mbref.linear_algebra.elimination import cholesky_factor, cholesky_solve, full_pivot, lu_factor, lu_solve
+from mbref.linear_algebra.orthogonal_factorisations import (
+    minimum_norm,
+    pinv_gram_schmidt,
+    pinv_svd,
+    qr_pivoted,
+)
 
 RATIO = 30.0  # LAPACK's customary bound for ‖residual‖ / (ε n ‖…‖) of a stable algorithm
 PSEUDO_INVERSES = {"svd": pinv_svd, "gram_schmidt": pinv_gram_schmidt}

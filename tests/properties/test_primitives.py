@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mbref.initial import displaced
-from mbref.model import Model
+from mbref.equations.initial_state import displaced
+from mbref.equations.model import Model
 from mbref.scene import Cylindrical, Distance, Fixed, Revolute, Spherical, Translational, Universal
 from tests.strategies import DRIVABLE, one_joint_scenes, states
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.kinematics import scene_length
-from crosscheck.metrics import measure
-from crosscheck.truth import truth_for
+from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.metrics import measure
+from crosscheck.judge.truth import truth_for
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Cost, Outcome, Trajectory

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck.engine import Setting
-from crosscheck.gauss import gauss
-from crosscheck.study import Case, run_case
+from crosscheck.judge.gauss_principle import gauss
+from crosscheck.study.grid import Case, run_case
 from mbref.scenes import SCENES
 from reports.blocks import Block, Table
 from reports.runs import SceneRuns, by_scene

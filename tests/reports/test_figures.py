@@ -12,7 +12,7 @@ from synthetic import exact, groups, scene
 
 from crosscheck.engine import BUILT_IN
 from mbref.scenes import SCENES
-from reports import drawing, figures, histories
+from reports import drawing, figures, time_series
 from reports.blocks import Figure
 from reports.sections import blocks, speed
 
@@ -68,8 +68,8 @@ def test_speed_plot_and_one_mark_a_run():
 
 def test_history_and_a_cross_where_a_run_ended_early():
     group = groups()[0]
-    values = histories.series(group, lambda run: [np.ones_like(run.trajectory.times)])
-    [axes] = histories.plot(group, values, ["one"]).axes
+    values = time_series.series(group, lambda run: [np.ones_like(run.trajectory.times)])
+    [axes] = time_series.plot(group, values, ["one"]).axes
     crosses = [line.get_xdata()[0] for line in axes.lines if line.get_marker() == figures.FAILED]
     assert len(crosses) == 1, crosses
     assert 0 < crosses[0] <= 0.6 * group.scene.duration, crosses

@@ -5,19 +5,19 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
+import crosscheck.isolate
+import mbref.simulate
 import numpy as np
 import pytest
 from synthetic import MADE_OF
 
-import crosscheck.isolate
 import crosscheck.study
-import mbref.simulate
-from crosscheck.metrics import measure
+from crosscheck.judge.metrics import measure
+from crosscheck.judge.truth import truth_for
 from crosscheck.paper import runs
 from crosscheck.paper.cells import CELLS
 from crosscheck.paper.runs import Label, Records
-from crosscheck.study import Case
-from crosscheck.truth import truth_for
+from crosscheck.study.grid import Case
 from mbref.scene import Scene
 from mbref.trajectory import Cost, Outcome, Trajectory
 from reports.blocks import Figure, Table
@@ -151,8 +151,10 @@ def test_figures_and_no_simulation(blocks, monkeypatch):
     def simulated(*_, **__):
         raise AssertionError("a section simulated")
 
-    for module, name in ((crosscheck.study, "study"), (crosscheck.isolate, "run_isolated"),
-                         (mbref.simulate, "simulate"), (crosscheck.study, "run_isolated")):  # fmt: skip
+    for module, name in (
+        (crosscheck.study.grid, "study"), (crosscheck.processes.pool, "run_isolated"),
+        (mbref.simulation.simulate, "simulate"), (crosscheck.study.grid, "run_isolated"),
+    ):  # fmt: skip
         monkeypatch.setattr(module, name, simulated)
     drawn = [block.name for block in blocks if isinstance(block, Figure) and block.draw().axes]
     for number in (4, 5, 6, 8, 11, 12, 13, 14, 15, 16):

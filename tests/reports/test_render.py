@@ -10,10 +10,11 @@ import pytest
 from synthetic import groups
 
 from crosscheck.engine import Setting
-from crosscheck.study import Case, default_cases, study
+from crosscheck.study.grid import Case, default_cases, study
 from mbref.scene import Body, Scene
 from reports import __main__ as program
-from reports import plan, render
+from reports import render
+from reports import sweep as sweeps
 from reports.blocks import Heading, Table
 from reports.sections import blocks
 from reports.timings import LONG, with_timings
@@ -82,7 +83,7 @@ def still(name: str) -> Scene:
     return Scene(name=name, body=(block,), duration=0.5)
 
 
-def sweep(engines) -> plan.Sweep:
+def few(engines) -> sweeps.Sweep:
     cases, unable = default_cases(still("still"), engines, None, np.linspace(0, 0.5, 4))
     return [still("still")], cases, unable
 
@@ -90,7 +91,7 @@ def sweep(engines) -> plan.Sweep:
 @pytest.fixture
 def of_fakes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(program, "find_engines", lambda names, notice: [FAKE])
-    monkeypatch.setattr(plan, "quick", sweep)
+    monkeypatch.setattr(sweeps, "quick", few)
 
 
 def test_program_and_a_report_that_is_not_run_twice(tmp_path, of_fakes, capsys):
@@ -125,7 +126,7 @@ def test_program_without_its_packages_and_what_to_install(capsys, monkeypatch):
 
 
 def test_short_runs_and_interleaved_times(tmp_path):
-    _, cases, _ = sweep([FAKE])
+    _, cases, _ = few([FAKE])
     long = cases[0]._replace(setting=Setting("plain", {"seconds": 2 * LONG}))
     cases = [*cases, long]
     timed = with_timings(cases, study(cases), tmp_path / "timings.jsonl", lambda _: None)
@@ -139,8 +140,8 @@ def case(family: str, k: int) -> Case:
 
 def test_thinned_sweep_and_the_ends_of_every_family():
     named = [case(family, k) for family in ("other", "defaults", "tuned") for k in range(7)]
-    kept = [(c.setting.family, c.setting.options["k"]) for c in plan.thinned(named)]
+    kept = [(c.setting.family, c.setting.options["k"]) for c in sweeps.thinned(named)]
     assert kept == [(f, k) for f in ("defaults", "tuned") for k in (0, 3, 6)], kept
     unnamed = [case(family, k) for family in ("a", "b", "c", "d") for k in range(2)]
-    kept = [(c.setting.family, c.setting.options["k"]) for c in plan.thinned(unnamed)]
+    kept = [(c.setting.family, c.setting.options["k"]) for c in sweeps.thinned(unnamed)]
     assert kept == [(f, k) for f in ("a", "b") for k in (0, 1)], kept

@@ -5,14 +5,14 @@ from __future__ import annotations
 import dataclasses
 import math
 
+import crosscheck.isolate
+import mbref.simulate
 import pytest
 from synthetic import groups, nothing, record, records, scene
 
-import crosscheck.isolate
 import crosscheck.study
-import mbref.simulate
-from crosscheck.gate import gate_times
-from crosscheck.truth import truth_for
+from crosscheck.judge.model_identity import gate_times
+from crosscheck.judge.truth import truth_for
 from mbref.trajectory import Outcome
 from reports.blocks import Figure, Heading, Table, Text
 from reports.runs import Run, SceneRuns, by_scene, duration, ratio
@@ -44,8 +44,10 @@ def test_every_section_and_a_heading(monkeypatch):
     def simulated(*_, **__):
         raise AssertionError("a section simulated")
 
-    for module, name in ((crosscheck.study, "study"), (crosscheck.isolate, "run_isolated"),
-                         (mbref.simulate, "simulate"), (crosscheck.study, "run_isolated")):  # fmt: skip
+    for module, name in (
+        (crosscheck.study.grid, "study"), (crosscheck.processes.pool, "run_isolated"),
+        (mbref.simulation.simulate, "simulate"), (crosscheck.study.grid, "run_isolated"),
+    ):  # fmt: skip
         monkeypatch.setattr(module, name, simulated)
     parts = blocks(groups())
     for part in parts:

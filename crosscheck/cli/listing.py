@@ -1,0 +1,88 @@
+"""What `crosscheck list` prints: the tables of scenes, engines, methods, metrics and support."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from rich.console import Console
+from rich.table import Table
+
+from crosscheck.cli import support
+from crosscheck.cli.request import missing_package
+from crosscheck.engine import default_engines, engine, engine_names
+from mbref.scene import Scene
+from mbref.scenes import SCENES
+
+
+def show(console: Console, what: str | None) -> None:
+    """Print one of TABLES, or all of them."""
+    for name in [what] if what else TABLES:
+        console.print(TABLES[name]())
+
+
+def _scenes() -> Table:
+    table = Table("scene", "bodies", "joints", "drivers, loads", "end (s)", title="scenes")
+    for name, make in SCENES.items():
+        scene = make()
+        joints = ", ".join(f"{joint.name} {joint.type}" for joint in scene.joint)
+        table.add_row(
+            name, ", ".join(body.name for body in scene.body), joints, _causes(scene), f"{scene.duration:g}"
+        )
+    return table
+
+
+def _causes(scene: Scene) -> str:
+    gravity = ["gravity"] if any(scene.gravity) else []
+    drivers = [f"driver of {driver.joint}" for driver in scene.driver]
+    return ", ".join(gravity + drivers + [load.type for load in scene.load])
+
+
+def _engines() -> Table:
+    table = Table("engine", "package", "version", title="engines")
+    for name in engine_names():
+        found = engine(name)
+        table.add_row(name, found.package, missing_package(name) or found.version())
+    return table
+
+
+def _methods() -> Table:
+    from mbref.formulations import FORMULATIONS
+    from mbref.integrators import INTEGRATORS
+    from mbref.stabilisation import STABILISATIONS
+
+    table = Table("part", "name", "options", title="methods: formulation+stabilisation/integrator")
+    parts = {"formulation": FORMULATIONS, "stabilisation": STABILISATIONS, "integrator": INTEGRATORS}
+    for part, entries in parts.items():
+        for name, entry in entries.items():
+            table.add_row(part, name, ", ".join(f"{k}={v:g}" for k, v in entry.options.items()))
+        table.add_section()
+    return table
+
+
+def _metrics() -> Table:
+    from crosscheck.judge.metrics import METRICS
+
+    table = Table("metric", "unit", "what it is", title="metrics")
+    for name, metric in METRICS.items():
+        table.add_row(name, metric.unit, metric.label)
+    return table
+
+
+def _support() -> Table:
+    engines = default_engines()
+    found = support.of_features(engines) | support.of_scenes(engines)
+    notes = found.notes()
+    table = Table("feature or scene", *engines, title="support: ✓ can, – cannot", caption_justify="left")
+    for name in found.answers:
+        table.add_row(name, *found.row(name, notes))
+    table.caption = "\n".join(f"{i}. {note}" for i, note in enumerate(notes, 1))
+    return table
+
+
+TABLES: Mapping[str, Callable[[], Table]] = {
+    "scenes": _scenes,
+    "engines": _engines,
+    "methods": _methods,
+    "metrics": _metrics,
+    "support": _support,
+}

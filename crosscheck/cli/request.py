@@ -1,0 +1,194 @@
+"""What a command line asks for: scenes, engines, settings and sample times, checked before anything runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+from crosscheck.conformance.trial import Specimen, specimens
+from crosscheck.engine import BUILT_IN, Setting, default_engines, engine
+from crosscheck.study.grid import Case, default_cases
+from mbref.scene import Scene, SceneError
+from mbref.scenes import find_scene
+
+SAMPLES = 101
+METHODS_OF = "mbref"  # the engine whose families are method names, more of them than its sweep has
+
+
+class RequestError(Exception):
+    """A request that cannot be carried out; ``faults`` has one line each."""
+
+    def __init__(self, *faults: str):
+        self.faults = faults
+        super().__init__("\n".join(faults))
+
+
+Notice = Callable[[str], None]  # takes one sentence for the user
+
+
+def find_scenes(names: Sequence[str]) -> list[Scene]:
+    """The scenes; RequestError with every fault of every scene, and when two have the same name."""
+    scenes, faults = [], []
+    for name in names:
+        try:
+            scenes.append(find_scene(name))
+        except SceneError as error:
+            several = f"{name}: " if len(names) > 1 else ""
+            faults += [several + fault for fault in error.faults]
+    if faults:
+        raise RequestError(*faults)
+    called = [scene.name for scene in scenes]
+    if twice := sorted({name for name in called if called.count(name) > 1}):
+        raise RequestError(*(f"scene {name!r} is asked for twice" for name in twice))
+    return scenes
+
+
+def find_engines(names: Sequence[str] | None, notice: Notice) -> list[str]:
+    """The named engines, or the default ones; one whose package is missing is left out with a ``notice``.
+
+    Raises RequestError for an unknown name, and when nothing is left.
+    """
+    wanted = list(dict.fromkeys(names or default_engines()))
+    faults = [fault for name in wanted if (fault := _unknown_engine(name))]
+    if faults:
+        raise RequestError(*faults)
+    missing = {name: reason for name in wanted if (reason := missing_package(name))}
+    if len(missing) == len(wanted):
+        raise RequestError(*missing.values())
+    for reason in missing.values():
+        notice(reason)
+    return [name for name in wanted if name not in missing]
+
+
+def find_specimens(names: Sequence[str] | None) -> list[Specimen]:
+    """The conformance suite's specimens of those scenes, or all; RequestError for a name it has not."""
+    known = {specimen.scene.name: specimen for specimen in specimens()}
+    if unknown := [name for name in names or () if name not in known]:
+        listed = ", ".join(known)
+        raise RequestError(*(f"unknown scene of the suite {name!r}; known: {listed}" for name in unknown))
+    return [known[name] for name in dict.fromkeys(names or known)]
+
+
+def _unknown_engine(name: str) -> str | None:
+    """The fault of an engine name that leads to no engine; ``module:attribute`` is a name too."""
+    try:
+        engine(name)
+    except LookupError as error:
+        return str(error.args[0])
+    except (ImportError, AttributeError, ValueError) as error:
+        return f"engine {name!r} cannot be loaded: {error}"
+    return None
+
+
+def missing_package(name: str) -> str | None:
+    """The sentence that says what to install, or None when the engine is there."""
+    try:
+        engine(name).version()
+    except ImportError:
+        package = engine(name).package
+        what = "'mbref[engines]'" if name in BUILT_IN else package
+        return f"{name}: the package {package} is not installed: pip install {what}"
+    return None
+
+
+def sample_times(
+    scene: Scene, times: Sequence[float] | None, samples: int | None, duration: float | None
+) -> np.ndarray:
+    """Sample times (k,) in s: those given, or ``samples`` equally spaced from 0 to ``duration``.
+
+    Raises RequestError when they are not finite, not ≥ 0 or do not increase.
+    """
+    if times is None:
+        return _equally_spaced(scene, SAMPLES if samples is None else samples, duration)
+    if samples is not None or duration is not None:
+        raise RequestError("--times says when to sample; --samples and --duration cannot be added to it")
+    for before, after in zip((-math.inf, *times), times, strict=False):
+        if not (math.isfinite(after) and after >= 0):
+            raise RequestError(f"--times: must be finite and not negative, got {after:g}")
+        if after <= before:
+            raise RequestError(f"--times: must increase, got {after:g} after {before:g}")
+    if times[-1] == 0:
+        raise RequestError("--times: must have a time after 0")
+    return np.array(times)
+
+
+def _equally_spaced(scene: Scene, samples: int, duration: float | None) -> np.ndarray:
+    end = scene.duration if duration is None else duration
+    if samples < 2:
+        raise RequestError(f"--samples: must be at least 2, got {samples}")
+    if not (math.isfinite(end) and end > 0):
+        raise RequestError(f"--duration: must be positive, got {end:g}")
+    return np.linspace(0.0, end, samples)
+
+
+def plan(
+    scenes: Sequence[Scene], engines: Sequence[str], families: Sequence[str] | None, rtol: float | None,
+    times: Sequence[np.ndarray], time_limit: float, notice: Notice,
+) -> list[Case]:  # fmt: skip
+    """The runs of every scene in every engine that can, with its settings of ``families`` (default all).
+
+    ``times`` has one array a scene.  An engine that cannot run a scene is left out with a ``notice``.
+    Raises RequestError for families that no engine has, and with the reasons when nothing is left.
+    """
+    if not time_limit > 0:
+        raise RequestError(f"--time-limit: must be positive, got {time_limit:g}")
+    cases, reasons = [], []
+    for scene, when in zip(scenes, times, strict=True):
+        able, unable = default_cases(scene, engines, None, when, time_limit)
+        cases += able
+        reasons += [f"{u.engine} cannot run {scene.name}: {u.cannot}" for u in unable]
+    if not cases:
+        raise RequestError(*reasons)
+    for reason in reasons:
+        notice(reason)
+    if families is not None:
+        chosen = _of_families(cases, families)
+        for name in dict.fromkeys(case.engine for case in cases):
+            if all(case.engine != name for case in chosen):
+                notice(f"{name} has no setting {' or '.join(families)} here and is left out")
+        cases = chosen
+    return cases if rtol is None else _at_tolerance(cases, rtol)
+
+
+def _of_families(cases: Sequence[Case], families: Sequence[str]) -> list[Case]:
+    """The cases of these families; those of a method of mbref that its sweep leaves out are added."""
+    offered = dict.fromkeys(case.setting.family for case in cases)
+    unknown = [family for family in families if family not in offered]
+    sweep = [case for case in cases if case.engine == METHODS_OF]
+    if faults := [
+        _unknown_family(family, offered) for family in unknown if not (sweep and _is_method(family))
+    ]:
+        raise RequestError(*faults)
+    first = [case for case in sweep if case.setting.family == sweep[0].setting.family]
+    added = [c._replace(setting=Setting(f, c.setting.options)) for f in dict.fromkeys(unknown) for c in first]
+    return [case for case in cases if case.setting.family in families] + added
+
+
+def _is_method(name: str) -> bool:
+    from mbref.simulation.method import Method, MethodError
+
+    try:
+        Method.parse(name)
+    except MethodError:
+        return False
+    return True
+
+
+def _unknown_family(name: str, offered: Iterable[str]) -> str:
+    return f"unknown method or setting {name!r}; known: {', '.join(offered)}"
+
+
+def _at_tolerance(cases: Sequence[Case], rtol: float) -> list[Case]:
+    """One run of every family that has a tolerance, at this one; the others keep their sweep."""
+    if not (math.isfinite(rtol) and rtol > 0):
+        raise RequestError(f"--rtol: must be positive, got {rtol:g}")
+    chosen: dict[tuple, Case] = {}
+    for case in cases:
+        options = dict(case.setting.options)
+        if "rtol" in options:
+            options["rtol"] = rtol
+        setting = Setting(case.setting.family, options)
+        chosen.setdefault((case.scene.name, case.engine, str(setting)), case._replace(setting=setting))
+    return list(chosen.values())

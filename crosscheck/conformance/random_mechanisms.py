@@ -1,0 +1,222 @@
+"""Random loop mechanisms from seeds, and their initial accelerations in several engines beside mbref's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.conformance.trial import best_family
+from crosscheck.engine import engine
+from crosscheck.judge.constraints import initial_poses, jacobian
+from crosscheck.judge.gauss_principle import bias, gauss, singular_values, stacked
+from crosscheck.judge.tolerances import RANK
+from mbref import rotations
+from mbref.scene import (
+    GROUND,
+    Body,
+    Cylindrical,
+    Distance,
+    Fixed,
+    Force,
+    Joint,
+    Moment,
+    Revolute,
+    Scene,
+    Spherical,
+    Spring,
+    Translational,
+    Universal,
+)
+from mbref.trajectory import Outcome
+
+REFERENCE, PRINCIPLE = "mbref", "Gauss's principle"
+KINDS = ("revolute", "universal", "spherical", "translational", "cylindrical", "distance", "fixed")
+TREE = (0.34, 0.14, 0.14, 0.12, 0.12, 0.09, 0.05)  # how often each kind joins a body to the tree
+CLOSING = (0.4, 0.15, 0.2, 0.05, 0.1, 0.1, 0.0)  # and closes a loop
+PLANAR = 0.65  # part of the mechanisms whose axes are parallel, so that their loops are redundant
+HINGED = 0.25  # part of the loops that are a second hinge on the axis of the first
+TRIES = 60
+DURATION = 0.01  # s
+CONTINUES = 1e-9  # relative residual of the acceleration equations where a mobility is not of the instant
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One mechanism: redundant rows, ``distance`` to singularity (the least singular value above the rank
+    of the Jacobian with rows of unit length and lengths over the scene's), and error by engine."""
+
+    scene: Scene
+    redundant: int
+    distance: float
+    errors: dict[str, float]  # largest relative difference of an acceleration from mbref's; inf if none
+
+
+def random_mechanism(seed: int) -> Scene:
+    """A mechanism of 3 to 8 bodies and 1 to 3 loops that can move, with loads and velocities.
+
+    Poses are consistent by construction, velocities by projection; a mobility that would not outlast
+    the instant (a singular position) is drawn again.  The same seed gives the same scene.
+    """
+    rng = np.random.default_rng(seed)
+    while (scene := _Draw(rng).scene(f"random_{seed}")) is None:
+        pass
+    return scene
+
+
+def compare(scene: Scene, engines: Sequence[str]) -> Comparison:
+    """Initial accelerations of a scene in the engines, each at the finest setting of its best family,
+    and by Gauss's principle with the judge's own equations, against mbref's; runs in this process."""
+    reference = initial_accelerations(scene, REFERENCE)
+    values = singular_values(scene)
+    rank = int(np.sum(values > RANK * values[0]))
+    if reference is None:
+        raise RuntimeError(f"{scene.name}: mbref gives no initial acceleration")
+    scale = np.linalg.norm(reference, axis=-1).max()
+    others = {name: initial_accelerations(scene, name) for name in engines}
+    others[PRINCIPLE] = gauss(scene)
+    errors = {name: _apart(found, reference) / scale for name, found in others.items()}
+    rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
+    return Comparison(scene, len(rows) - rank, float(values[rank - 1]), errors)
+
+
+def initial_accelerations(scene: Scene, name: str) -> np.ndarray | None:
+    """Accelerations at t = 0 and angular ones times the scene's length (2 nb, 3), m/s², world, as the
+    engine's own output; None when the run ends otherwise or reports none."""
+    simulator = engine(name)
+    setting = best_family(simulator.settings(scene))[-1]
+    run = simulator.run(scene, np.array([0.0, scene.duration / 100]), setting)
+    if run.outcome is not Outcome.COMPLETED or run.acceleration is None:
+        return None
+    return stacked(scene, run, 0)
+
+
+def _apart(found: np.ndarray | None, reference: np.ndarray) -> float:
+    return np.inf if found is None else float(np.linalg.norm(found - reference, axis=-1).max())
+
+
+class _Draw:
+    """One drawing: random numbers, the direction planar mechanisms share, and what is drawn so far."""
+
+    def __init__(self, rng: np.random.Generator):
+        self.rng = rng
+        self.axis = self.direction()
+        self.planar = rng.random() < PLANAR
+        self.bodies = tuple(self.body(f"b{k}") for k in range(rng.integers(3, 9)))
+        self.joints: list[Joint] = []
+
+    def scene(self, name: str) -> Scene | None:
+        """The mechanism; None when no loop could be closed or its mobility is of the instant."""
+        places = {GROUND: np.zeros(3), **{body.name: np.array(body.position) for body in self.bodies}}
+        names = list(places)
+        for k in range(1, len(names)):
+            self.joints.append(self.joint(str(self.rng.choice(names[:k])), names[k], places, TREE))
+        loops = int(self.rng.integers(1, 4))
+        closed = sum(self.close(names, places) for _ in range(loops))
+        return self.moving(name) if closed == loops else None
+
+    def close(self, names: Sequence[str], places: dict[str, np.ndarray]) -> bool:
+        """Whether a joint could be added that leaves some motion."""
+        for _ in range(TRIES):
+            first, second = map(str, self.rng.choice(names, 2, replace=False))
+            hinges = [j for j in self.joints if isinstance(j, Revolute)]
+            if hinges and self.rng.random() < HINGED:
+                joint = self.second_hinge(hinges[self.rng.integers(len(hinges))])
+            else:
+                joint = self.joint(first, second, places, CLOSING)
+            if _freedoms(Scene(name="trial", body=self.bodies, joint=(*self.joints, joint))) > 0:
+                self.joints.append(joint)
+                return True
+        return False
+
+    def moving(self, name: str) -> Scene | None:
+        """The scene with random velocities and loads; None when the motion cannot go on."""
+        scene = Scene(name=name, gravity=(0.0, 0.0, -9.81), duration=DURATION, body=self.bodies,
+                      joint=tuple(self.joints), load=self.loads())  # fmt: skip
+        free = _null_space(scene)
+        twists = (free @ (free.T @ self.rng.normal(size=len(free)))).reshape(-1, 6)
+        moving = [
+            body.model_copy(
+                update={"velocity": tuple(x[:3].tolist()), "angular_velocity": tuple(x[3:].tolist())}
+            )
+            for body, x in zip(self.bodies, twists, strict=True)
+        ]
+        scene = scene.with_(body=tuple(moving))
+        coasting = bias(scene)
+        rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
+        left = rows @ np.linalg.lstsq(rows, coasting, rcond=RANK)[0] - coasting
+        return scene if np.linalg.norm(left) <= CONTINUES * max(1.0, np.linalg.norm(coasting)) else None
+
+    def loads(self) -> tuple[Moment | Force | Spring, ...]:
+        first, second = self.rng.choice(len(self.bodies), 2, replace=False)
+        a, b = self.bodies[first], self.bodies[second]
+        ends = (self.point(np.array(a.position)), self.point(np.array(b.position)))
+        return (
+            Moment(body=a.name, moment=_triple(self.rng.normal(size=3))),
+            Force(body=b.name, point=ends[1], force=_triple(self.rng.normal(size=3))),
+            Spring(bodies=(a.name, b.name), points=ends, stiffness=20.0, damping=0.5, natural_length=0.3),
+        )
+
+    def body(self, name: str) -> Body:
+        moments = self.rng.uniform(0.01, 0.04, 3)
+        turn = rotations.to_matrix(rotations.from_vector(self.rng.normal(size=3)))
+        inertia = turn @ np.diag(moments.sum() - moments) @ turn.T
+        return Body(
+            name=name, mass=float(self.rng.uniform(0.5, 3.0)), inertia=((inertia + inertia.T) / 2).tolist(),
+            position=_triple(self.rng.uniform(-1, 1, 3)),
+            orientation=tuple(rotations.from_vector(self.rng.normal(size=3)).tolist()),
+        )  # fmt: skip
+
+    def joint(
+        self, first: str, second: str, places: dict[str, np.ndarray], weights: Sequence[float]
+    ) -> Joint:
+        """A joint of a random kind between two bodies, about half-way; along the shared axis if planar."""
+        kind = str(self.rng.choice(KINDS, p=weights))
+        middle = self.point((places[first] + places[second]) / 2)
+        along, across = self.axis if self.planar else self.direction(), self.direction()
+        across = np.cross(along, across) / np.linalg.norm(np.cross(along, across))
+        common = {"name": f"J{len(self.joints)}", "bodies": (first, second)}
+        if kind == "distance":
+            far = np.array(middle) + self.rng.uniform(0.3, 0.8) * across
+            return Distance(**common, anchors=(middle, _triple(far)))
+        made = {
+            "fixed": lambda: Fixed(**common, anchor=middle),
+            "spherical": lambda: Spherical(**common, anchor=middle),
+            "universal": lambda: Universal(**common, anchor=middle, axes=(_triple(along), _triple(across))),
+            "revolute": lambda: Revolute(**common, anchor=middle, axis=_triple(along)),
+            "cylindrical": lambda: Cylindrical(**common, anchor=middle, axis=_triple(along)),
+            "translational": lambda: Translational(**common, anchor=middle, axis=_triple(across)),
+        }
+        return made[kind]()
+
+    def second_hinge(self, hinge: Revolute) -> Joint:
+        """Another joint on the axis of a revolute one, between the same bodies: redundant."""
+        axis = np.array(hinge.axis)
+        anchor = _triple(np.array(hinge.anchor) + self.rng.uniform(0.2, 0.6) * axis)
+        common = {"name": f"J{len(self.joints)}", "bodies": hinge.bodies, "anchor": anchor}
+        if self.rng.random() < 0.3:
+            return Spherical(**common)
+        return (Revolute if self.rng.random() < 0.5 else Cylindrical)(**common, axis=hinge.axis)
+
+    def point(self, near: np.ndarray) -> tuple[float, ...]:
+        return _triple(near + self.rng.uniform(-0.3, 0.3, 3))
+
+    def direction(self) -> np.ndarray:
+        v = self.rng.normal(size=3)
+        return v / np.linalg.norm(v)
+
+
+def _triple(v: np.ndarray) -> tuple[float, ...]:
+    return tuple(np.asarray(v, dtype=float).tolist())
+
+
+def _null_space(scene: Scene) -> np.ndarray:
+    """Orthonormal basis (6 nb, freedoms) of the twists that the joints allow at t = 0."""
+    rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
+    _, s, vt = np.linalg.svd(rows, full_matrices=True)
+    return vt[int(np.sum(s > RANK * s[0])) :].T
+
+
+def _freedoms(scene: Scene) -> int:
+    return _null_space(scene).shape[1]

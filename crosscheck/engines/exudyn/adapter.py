@@ -1,0 +1,202 @@
+"""Exudyn: rigid bodies with Euler parameters, implicit solvers with multipliers, static driven kinematics.
+
+Families: "defaults" is SolveDynamic as it comes; "trapezoidal" and "alpha" are single runs of the
+trapezoidal rule with index-2 constraints and of generalised alpha; "tuned" extrapolates three trapezoidal
+runs to h = 0 and starts anew behind singular positions; "static" solves a fully driven mechanism pose by
+pose.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engine import Cannot, Engine, Setting, Why
+from crosscheck.engines.driver_motion import fastest_rate
+from crosscheck.engines.exudyn.dynamic import Motion, integrate
+from crosscheck.engines.exudyn.extrapolation import RICHARDSON, extrapolate
+from crosscheck.engines.exudyn.reactions import reactions
+from crosscheck.engines.exudyn.static import drive
+from crosscheck.judge.constraints import initial_poses, jacobian
+from crosscheck.judge.tolerances import RANK
+from mbref import rotations
+from mbref.scene import Driver, Scene
+from mbref.trajectory import Trajectory
+
+STEPS = (100, 400, 1600, 6400, 25600)  # over a scene's duration
+TUNED_STEPS = (0.4, 0.15, 0.05, 0.015, 0.006)  # rad turned per step
+MOST_TUNED = 25600  # steps over a scene's duration
+STATIC_STEPS = (100, 400, 1600)
+SHORTEST = 5e-6  # s; below, the full-pivoting solver loses rows of the scaled Newton matrix
+SPECTRAL_RADIUS = 0.9
+SCOUT = (250, 2000)  # steps of the coarse run that finds how fast a scene turns
+SCOUT_SAMPLES = 26
+
+
+class Exudyn(Engine):
+    """The Exudyn engine; its one option ``step`` (s) is the largest time step."""
+
+    name = "exudyn"
+    package = "exudyn"
+
+    def version(self) -> str:
+        return metadata.version(self.package)
+
+    def prepare(self, families: Sequence[str]) -> None:
+        _exudyn()
+
+    def cannot(self, scene: Scene) -> Cannot | None:
+        if not scene.has_mass() and not _fully_driven(scene):
+            return Cannot(Why.NEVER, "without masses only a mechanism driven in full can be analysed")
+        return None
+
+    def settings(self, scene: Scene) -> Sequence[Setting]:
+        found = []
+        if scene.has_mass():
+            found += _sweep("defaults", scene, STEPS, SHORTEST)
+            found += [Setting("tuned", {"step": step}) for step in self._tuned_steps(scene)]
+            found += _sweep("trapezoidal", scene, STEPS, SHORTEST)
+            found += _sweep("alpha", scene, STEPS, SHORTEST)
+        if _fully_driven(scene):
+            found += _sweep("static", scene, STATIC_STEPS, 0.0)
+        return found
+
+    def _tuned_steps(self, scene: Scene) -> list[float]:
+        """Steps (s) of the extrapolated family, by the angle turned in one."""
+        rate = fastest_rate(scene, lambda step: self._coarse(scene, step), SCOUT)
+        shortest = max(SHORTEST * max(RICHARDSON), scene.duration / MOST_TUNED)
+        return sorted({max(float(f"{angle / rate:.2g}"), shortest) for angle in TUNED_STEPS}, reverse=True)
+
+    def _coarse(self, scene: Scene, step: float) -> Trajectory:
+        times = np.linspace(0, scene.duration, SCOUT_SAMPLES)
+        return self.run(scene, times, Setting("alpha", {"step": step}))
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        exu = _exudyn()
+        times, step = np.array(times, dtype=float), float(setting.options["step"])
+        with _warnings(exu) as warnings:
+            if setting.family == "static":
+                motion = drive(exu, scene, times, step)
+            elif setting.family == "tuned":
+                motion = extrapolate(exu, scene, times, step, _trapezoidal)
+            else:
+                motion = integrate(exu, scene, times, step, DYNAMIC[setting.family])
+        message = "; ".join([motion.message, *warnings] if motion.message else warnings)
+        return self._trajectory(scene, setting, replace(motion, message=message))
+
+    def _trajectory(self, scene: Scene, setting: Setting, motion: Motion) -> Trajectory:
+        q, rates, *seconds = motion.coordinates
+        turned = q[..., 3:] + [1.0, 0.0, 0.0, 0.0]
+        turn = _normalised(turned)
+        start, orientation = initial_poses(scene)
+        known = bool(seconds) and not any(_accelerates(driver) for driver in scene.driver)
+        return Trajectory(
+            scene.name, self.name, self.version(), setting.family, dict(setting.options), motion.times,
+            tuple(body.name for body in scene.body),
+            position=start + q[..., :3],
+            orientation=rotations.multiply(turn, orientation),
+            velocity=rates[..., :3],
+            angular_velocity=_spin(turned, rates[..., 3:]),
+            acceleration=seconds[0][..., :3] if known else None,
+            angular_acceleration=_spin(turned, seconds[0][..., 3:]) if known else None,
+            reactions=reactions(scene, q[..., :3], turn, motion.forces) if known else None,
+            outcome=motion.outcome, message=motion.message, cost=motion.cost,
+            t_end=motion.t_end,
+        )  # fmt: skip
+
+
+def _exudyn() -> Any:
+    """The module with its item classes; no user file is read, nothing is printed."""
+    os.environ["EXUDYN_NO_USER_SETTINGS"] = "1"
+    import exudyn
+    import exudyn.itemInterface
+
+    exudyn.special.userInterface.SuppressAll(True)
+    exudyn.config.printToConsole = False
+    return exudyn
+
+
+@contextlib.contextmanager
+def _warnings(exu: Any) -> Iterator[list[str]]:
+    """Collects the different warnings that Exudyn prints while the block runs."""
+    found: list[str] = []
+    with tempfile.TemporaryDirectory() as folder:
+        printed = Path(folder) / "printed"
+        exu.SetWriteToFile(str(printed), flagWriteToFile=True, flagAppend=False, flagFlushAlways=True)
+        try:
+            yield found
+        finally:
+            exu.SetWriteToFile("", False)
+            lines = printed.read_text().splitlines() if printed.exists() else []
+            found += dict.fromkeys(line.strip() for line in lines if line.startswith("WARNING:"))
+
+
+def _defaults(exu: Any, settings: Any, singular: bool) -> Any:
+    """What a user gets who sets nothing."""
+    return exu.DynamicSolverType.GeneralizedAlpha
+
+
+def _trapezoidal(exu: Any, settings: Any, singular: bool) -> Any:
+    settings.timeIntegration.newton.relativeTolerance = 1e-10
+    settings.timeIntegration.newton.absoluteTolerance = 1e-12
+    _plain(exu, settings, singular)
+    return exu.DynamicSolverType.TrapezoidalIndex2
+
+
+def _alpha(exu: Any, settings: Any, singular: bool) -> Any:
+    """Looser Newton tolerances than the trapezoidal rule's: only so it passes singular positions."""
+    settings.timeIntegration.newton.relativeTolerance = 1e-6
+    settings.timeIntegration.newton.absoluteTolerance = 1e-8
+    settings.timeIntegration.generalizedAlpha.spectralRadius = SPECTRAL_RADIUS
+    _plain(exu, settings, singular)
+    return exu.DynamicSolverType.GeneralizedAlpha
+
+
+DYNAMIC = {"defaults": _defaults, "trapezoidal": _trapezoidal, "alpha": _alpha}
+
+
+def _plain(exu: Any, settings: Any, singular: bool) -> None:
+    """Fixed steps, and full pivoting that ignores zero pivots where the constraints are redundant."""
+    settings.timeIntegration.adaptiveStep = False
+    if singular:
+        settings.linearSolver.solverType = exu.LinearSolverType.EigenDense
+        settings.linearSolver.ignoreSingularJacobian = True
+
+
+def _sweep(family: str, scene: Scene, counts: Sequence[int], shortest: float) -> list[Setting]:
+    steps = [scene.duration / n for n in counts]
+    return [Setting(family, {"step": step}) for step in steps if step >= shortest]
+
+
+def _fully_driven(scene: Scene) -> bool:
+    """Whether joints and drivers leave no freedom in the assembled configuration."""
+    if not scene.driver:
+        return False
+    matrix, _ = jacobian(scene, 0.0, *initial_poses(scene))
+    return np.linalg.matrix_rank(matrix, tol=None, rtol=RANK) == matrix.shape[1]
+
+
+def _accelerates(driver: Driver) -> bool:
+    """Whether a driver's rate changes; Exudyn's initial accelerations leave that out."""
+    return any(driver.polynomial[2:]) or bool(driver.sine and driver.sine.amplitude)
+
+
+def _normalised(p: np.ndarray) -> np.ndarray:
+    return p / np.linalg.norm(p, axis=-1, keepdims=True)
+
+
+def _spin(p: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """World angular velocity (…, 3) of Euler parameters and their rates, or acceleration of second rates."""
+    product = rotations.multiply(rates, rotations.conjugate(p))
+    return 2 * product[..., 1:] / np.sum(p * p, axis=-1, keepdims=True)
+
+
+ENGINE = Exudyn()

@@ -1,0 +1,67 @@
+"""A leap over a singular position: Exudyn's states before it extrapolated, and put back onto the joints."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import BarycentricInterpolator
+from scipy.linalg import block_diag
+
+from crosscheck.engines.exudyn.dynamic import Samples
+from crosscheck.judge.constraints import closure, inertia_matrices, initial_poses, jacobian
+from crosscheck.judge.tolerances import RANK
+from mbref import rotations
+from mbref.scene import Scene
+
+CLOSED = 1e-15  # m and rad, where a projection ends
+ITERATIONS = 8  # Newton iterations at most; two are usual
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])  # Euler parameters of a node that has not turned
+
+
+def leap(scene: Scene, nodes: Samples, times: np.ndarray) -> Samples:
+    """Samples at ``times`` (k,) beyond those at the nodes, extrapolated by one polynomial through all of
+    them; coordinates and rates are then the nearest that satisfy the judge's joint equations."""
+    known, values, forces = nodes
+    unit = np.ptp(known)
+    at, wanted = (known - known[-1]) / unit, (times - known[-1]) / unit
+    values = BarycentricInterpolator(at, values, axis=1)(wanted)
+    forces = BarycentricInterpolator(at, forces)(wanted)
+    for k, t in enumerate(times):
+        values[:2, k] = projected(scene, float(t), *values[:2, k])
+    return times, values, forces
+
+
+def projected(
+    scene: Scene, t: float, coordinates: np.ndarray, rates: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The nearest node coordinates and rates (nb, 7) that satisfy joints and drivers at time t (s)."""
+    start, orientation = initial_poses(scene)
+    position, turn = start + coordinates[:, :3], coordinates[:, 3:] + UPRIGHT
+    turn = turn / np.linalg.norm(turn, axis=1, keepdims=True)
+    for _ in range(ITERATIONS):
+        pose = (position, rotations.multiply(turn, orientation))
+        residual = np.concatenate(list(closure(scene, t, *pose).values()))
+        if np.abs(residual).max(initial=0.0) < CLOSED:
+            break
+        moved = _least(scene, pose[1], jacobian(scene, t, *pose)[0], -residual)
+        position = position + moved[:, :3]
+        turn = rotations.multiply(rotations.from_vector(moved[:, 3:]), turn)
+    spin = 2 * rotations.multiply(rates[:, 3:], rotations.conjugate(turn))[:, 1:]
+    twist = np.hstack([rates[:, :3], spin])
+    oriented = rotations.multiply(turn, orientation)
+    rows, wanted = jacobian(scene, t, position, oriented)
+    twist = twist + _least(scene, oriented, rows, wanted - rows @ twist.ravel())
+    pure = np.hstack([np.zeros((len(twist), 1)), twist[:, 3:]])
+    turning = rotations.multiply(pure, turn) / 2
+    return np.hstack([position - start, turn - UPRIGHT]), np.hstack([twist[:, :3], turning])
+
+
+def _least(scene: Scene, orientation: np.ndarray, rows: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """The change (nb, 6) of the bodies' twists with these values of the rows and the least kinetic energy:
+    the noise of a light body is not handed on to a heavy one."""
+    root = np.zeros((len(scene.body), 6, 6))  # one root a body of the mass matrix's inverse
+    for k, (body, inertia) in enumerate(zip(scene.body, inertia_matrices(scene), strict=True)):
+        moments, principal = np.linalg.eigh(inertia)
+        root[k, :3, :3] = np.eye(3) / np.sqrt(body.mass)
+        root[k, 3:, 3:] = rotations.to_matrix(orientation[k]) @ principal / np.sqrt(moments)
+    spread = block_diag(*root)
+    return (spread @ np.linalg.lstsq(rows @ spread, wanted, rcond=RANK)[0]).reshape(-1, 6)

@@ -1,0 +1,221 @@
+"""A Scene as an Exudyn system: nodes and bodies, native joints, driver constraints, loads, sensors.
+
+Body frames are parallel to the world in the assembled configuration (the inertia is rotated instead):
+a relative rotation marker measures the angle between body frames, and must read zero at the start.
+The joint's special classes are preferred to the generic one, whose rows for free axes upset the rank
+of the scaled Newton matrix at small steps.  The functions take the exudyn module and do not import it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.driver_motion import motion
+from crosscheck.engines.exudyn.reactions import joint_frame, sensed, unit
+from crosscheck.judge.constraints import initial_twists
+from mbref import rotations
+from mbref.scene import GROUND, Driver, Joint, Load, Scene
+
+SENSED = ("Coordinates", "Coordinates_t", "Coordinates_tt")
+GENERIC = {  # constrained axes (three translations, three rotations) in a frame with z along the axis
+    "fixed": [1, 1, 1, 1, 1, 1],
+    "cylindrical": [1, 1, 0, 1, 1, 0],
+    "universal": [1, 1, 1, 0, 0, 1],
+}
+
+
+@dataclass(frozen=True)
+class System:
+    """An assembled Exudyn system and the numbers of its items, in the order of the scene."""
+
+    mbs: Any
+    nodes: list[int]
+    sensors: list[list[int]]  # per node: coordinates (7), their rates and second rates
+    drivers: list[int]  # objects of the driver constraints
+    joint_sensors: list[int]  # joint by joint: what `sensed` names; then the drivers' forces
+    redundant: int  # redundant constraints in the assembled configuration
+
+    def samples(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What the last run recorded: times (k,), node coordinates (3, k, nb, 7) - values, rates, second
+        rates -, and the outputs (k, ·) of the joints' sensors side by side."""
+        rows = np.array([[self.mbs.GetSensorStoredData(s) for s in node] for node in self.sensors])
+        times = rows[0, 0, :, 0]
+        forces = [self.mbs.GetSensorStoredData(s)[:, 1:] for s in self.joint_sensors]
+        forces = np.concatenate([np.zeros((len(times), 0)), *forces], axis=1)
+        return times, rows[..., 1:].transpose(1, 2, 0, 3), forces
+
+
+def build(exu: Any, scene: Scene, forces: bool) -> System:
+    """The scene's system at t = 0; without ``forces`` it has no mass, no load and no velocity."""
+    items = exu.itemInterface
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    parts = _Parts(exu, items, scene, mbs, mbs.AddObject(items.ObjectGround()))
+    nodes = parts.bodies(forces)
+    joints = [parts.joint(joint) for joint in scene.joint]
+    drivers = [parts.driver(driver) for driver in scene.driver]
+    of_joints = [
+        parts.sensor(number, output)
+        for joint, number in zip(scene.joint, joints, strict=True)
+        for output in sensed(joint)
+    ]
+    of_joints += [parts.sensor(number, "Force") for number in drivers]
+    if forces:
+        for load in scene.load:
+            parts.load(load)
+    sensors = [parts.sensors(node) for node in nodes]
+    mbs.Assemble()
+    redundant = int(mbs.ComputeSystemDegreeOfFreedom()["redundantConstraints"])
+    return System(mbs, nodes, sensors, drivers, of_joints, redundant)
+
+
+class _Parts:
+    """Adds items to one system; ``number`` gives the object of a body's name."""
+
+    def __init__(self, exu: Any, items: Any, scene: Scene, mbs: Any, ground: int):
+        self.exu, self.items, self.scene, self.mbs = exu, items, scene, mbs
+        self.number = {GROUND: ground}
+        self.position = {GROUND: np.zeros(3)} | {b.name: np.array(b.position) for b in scene.body}
+        self.joints = {joint.name: joint for joint in scene.joint}
+
+    def bodies(self, forces: bool) -> list[int]:
+        nb = len(self.scene.body)
+        v, w = initial_twists(self.scene) if forces else (np.zeros((nb, 3)), np.zeros((nb, 3)))
+        nodes = []
+        for k, body in enumerate(self.scene.body):
+            node = self.items.NodeRigidBodyEP(
+                referenceCoordinates=[*body.position, 1, 0, 0, 0], initialVelocities=[*v[k], 0, *w[k] / 2]
+            )
+            nodes.append(self.mbs.AddNode(node))
+            inertia = _world_inertia(body) if forces else np.zeros(6)
+            rigid = self.items.ObjectRigidBody(
+                mass=body.mass if forces else 0.0, inertia=inertia, nodeNumber=nodes[-1]
+            )
+            self.number[body.name] = self.mbs.AddObject(rigid)
+            if forces and any(self.scene.gravity):
+                self._gravity(self.number[body.name])
+        return nodes
+
+    def _gravity(self, body: int) -> None:
+        marker = self.mbs.AddMarker(self.items.MarkerBodyMass(bodyNumber=body))
+        self.mbs.AddLoad(self.items.LoadMassProportional(markerNumber=marker, loadVector=self.scene.gravity))
+
+    def marker(self, body: str, point: Any, frame: np.ndarray | None = None) -> int:
+        """A marker on a body at a world point, its frame's columns the world axes given."""
+        frame = np.eye(3) if frame is None else frame
+        local = self.exu.HT(rotation=frame, translation=np.asarray(point) - self.position[body])
+        return self.mbs.AddMarker(self.items.MarkerBodyRigid(bodyNumber=self.number[body], localHT=local))
+
+    def joint(self, joint: Joint) -> int:
+        items, bodies = self.items, joint.bodies
+        if joint.type == "distance":
+            markers = [self.marker(b, p) for b, p in zip(bodies, joint.anchors, strict=True)]
+            length = float(np.linalg.norm(np.subtract(*joint.anchors)))
+            return self.mbs.AddObject(items.ObjectConnectorDistance(markerNumbers=markers, distance=length))
+        frame = joint_frame(joint)
+        markers = [self.marker(body, joint.anchor, frame) for body in bodies]
+        if joint.type in GENERIC:
+            axes = GENERIC[joint.type]
+            return self.mbs.AddObject(items.ObjectJointGeneric(markerNumbers=markers, constrainedAxes=axes))
+        native = {
+            "revolute": items.ObjectJointRevoluteZ,
+            "spherical": items.ObjectJointSpherical,
+            "translational": items.ObjectJointPrismaticX,
+        }
+        return self.mbs.AddObject(native[joint.type](markerNumbers=markers))
+
+    def sensor(self, number: int, output: str) -> int:
+        """A sensor of an output variable of a joint or constraint."""
+        kind = getattr(self.exu.OutputVariableType, output)
+        sensor = self.items.SensorObject(
+            objectNumber=number, outputVariableType=kind, storeInternal=True, writeToFile=False
+        )
+        return self.mbs.AddSensor(sensor)
+
+    def driver(self, driver: Driver) -> int:
+        """A coordinate constraint: relative coordinate of the joint's bodies = the driver's value."""
+        fixed = self.mbs.AddNode(self.items.NodePointGround())
+        markers = [self.mbs.AddMarker(self.items.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0))]
+        joint = self.joints[driver.joint]
+        turning = joint.type != "translational"
+        markers.append(self._rotation(joint) if turning else self._translation(joint))
+        constraint = self.items.ObjectConnectorCoordinate(
+            markerNumbers=markers,
+            offsetUserFunction=lambda mbs, t, item, offset: motion(driver, t)[0],
+            offsetUserFunction_t=lambda mbs, t, item, offset: motion(driver, t)[1],
+        )
+        return self.mbs.AddObject(constraint)
+
+    def _relative(self, joint: Joint) -> dict[str, Any]:
+        local = [np.asarray(joint.anchor) - self.position[body] for body in joint.bodies]
+        return {
+            "bodyNumbers": [self.number[body] for body in joint.bodies],
+            "localPosition0": local[0],
+            "localPosition1": local[1],
+            "axis0": unit(joint.axis),
+        }
+
+    def _turns(self) -> int:
+        """A data node in which a relative angle is continued beyond half a turn."""
+        return self.mbs.AddNode(self.items.NodeGenericData(initialCoordinates=[0], numberOfDataCoordinates=1))
+
+    def _rotation(self, joint: Joint) -> int:
+        marker = self.items.MarkerBodiesRelativeRotationCoordinate(
+            nodeNumber=self._turns(), **self._relative(joint)
+        )
+        return self.mbs.AddMarker(marker)
+
+    def _translation(self, joint: Joint) -> int:
+        return self.mbs.AddMarker(
+            self.items.MarkerBodiesRelativeTranslationCoordinate(**self._relative(joint))
+        )
+
+    def load(self, load: Load) -> None:
+        getattr(self, f"_{load.type}")(load)
+
+    def _moment(self, load: Any) -> None:
+        marker = self.marker(load.body, self.position[load.body])
+        self.mbs.AddLoad(self.items.LoadTorqueVector(markerNumber=marker, loadVector=load.moment))
+
+    def _force(self, load: Any) -> None:
+        marker = self.marker(load.body, load.point)
+        self.mbs.AddLoad(self.items.LoadForceVector(markerNumber=marker, loadVector=load.force))
+
+    def _spring(self, load: Any) -> None:
+        spring = self.items.ObjectConnectorSpringDamper(
+            markerNumbers=[self.marker(b, p) for b, p in zip(load.bodies, load.points, strict=True)],
+            referenceLength=load.natural_length, stiffness=load.stiffness, damping=load.damping,
+        )  # fmt: skip
+        self.mbs.AddObject(spring)
+
+    def _torsion_spring(self, load: Any) -> None:
+        joint = self.joints[load.joint]
+        frame = joint_frame(joint)
+        spring = self.items.ObjectConnectorTorsionalSpringDamper(
+            markerNumbers=[self.marker(body, joint.anchor, frame) for body in joint.bodies],
+            nodeNumber=self._turns(), stiffness=load.stiffness, damping=load.damping,
+            offset=load.natural_angle,
+        )  # fmt: skip
+        self.mbs.AddObject(spring)
+
+    def sensors(self, node: int) -> list[int]:
+        kinds = [getattr(self.exu.OutputVariableType, name) for name in SENSED]
+        return [
+            self.mbs.AddSensor(
+                self.items.SensorNode(
+                    nodeNumber=node, outputVariableType=kind, storeInternal=True, writeToFile=False
+                )
+            )
+            for kind in kinds
+        ]
+
+
+def _world_inertia(body: Any) -> np.ndarray:
+    """xx, yy, zz, yz, xz, xy of the inertia along the world axes at t = 0."""
+    local = np.array(body.inertia)
+    turn = rotations.to_matrix(np.array(body.orientation))
+    j = turn @ (np.diag(local) if local.ndim == 1 else local) @ turn.T
+    return np.array([j[0, 0], j[1, 1], j[2, 2], j[1, 2], j[0, 2], j[0, 1]])

@@ -1,0 +1,120 @@
+"""Gravity, loads and gyroscopic moments of a scene as generalised forces in (v, ω') coordinates.
+
+Arrays may have leading shape (…); vectors are columns, as in the constraints' Frames.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crosscheck.engines.constraint_equations import Frames, in_body, joint_frame, point_in_body
+from crosscheck.judge.constraints import inertia_matrices
+from mbref.scene import Force, Moment, Scene, Spring, TorsionSpring
+
+
+class Forces:
+    """The forces of a scene on its bodies, and the mass matrix; masses of 1 and no forces without masses.
+
+    A torsion spring counts turns: its angle is the one nearest to an estimate its user keeps, whose rate is
+    given by ``turning``.
+    """
+
+    def __init__(self, scene: Scene):
+        self.scene, self.nb = scene, len(scene.body)
+        weighed = scene.has_mass()
+        mass = [body.mass if weighed else 1.0 for body in scene.body]
+        self.inertia = inertia_matrices(scene) if weighed else np.array([np.eye(3)] * self.nb)
+        self.weight = np.outer(mass, scene.gravity)[..., None] if weighed else np.zeros((self.nb, 3, 1))
+        self.mass = np.zeros((6 * self.nb, 6 * self.nb))
+        for b in range(self.nb):
+            self.mass[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = mass[b] * np.eye(3)
+            self.mass[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = self.inertia[b]
+        loads = scene.load if weighed else ()
+        self.moments = [
+            (scene.body_index(x.body), np.array(x.moment)[:, None]) for x in loads if isinstance(x, Moment)
+        ]
+        self.pulls = [
+            (self._end(x.body, x.point), np.array(x.force)[:, None]) for x in loads if isinstance(x, Force)
+        ]
+        self.springs = [
+            (x, [self._end(*end) for end in zip(x.bodies, x.points, strict=True)])
+            for x in loads if isinstance(x, Spring)
+        ]  # fmt: skip
+        self.twists = [(x, *self._hinge(x.joint)) for x in loads if isinstance(x, TorsionSpring)]
+
+    def _end(self, name: str, point: tuple) -> tuple[int, np.ndarray]:
+        place = point_in_body(self.scene, name, np.array(point))
+        return self.scene.body_index(name), place[:, None]
+
+    def _hinge(self, name: str) -> tuple[tuple[int, ...], list[np.ndarray]]:
+        """Bodies of a joint, and the axes (3, 3, columns) of its frame on either."""
+        joint = next(joint for joint in self.scene.joint if joint.name == name)
+        frame = joint_frame(joint.axis).T
+        axes = [in_body(self.scene, body, frame).T for body in joint.bodies]
+        return tuple(self.scene.body_index(body) for body in joint.bodies), axes
+
+    def __call__(self, f: Frames, spin: np.ndarray, angles: np.ndarray) -> np.ndarray:
+        """Generalised forces (…, 6 nb) with body-fixed ``spin`` (…, nb, 3) and the torsion springs'
+        estimated ``angles`` (…, springs)."""
+        total = np.zeros((*f.r.shape[:-3], self.nb + 1, 6, 1))
+        total[..., : self.nb, :3, :] += self.weight
+        momentum = np.einsum("bij,...bj->...bi", self.inertia, spin)
+        total[..., : self.nb, 3:, 0] -= np.cross(spin, momentum)
+        for body, moment in self.moments:
+            total[..., body, 3:, :] += _to_body(f, body, moment)
+        for end, force in self.pulls:
+            _pull(f, end, force, total)
+        for spring, ends in self.springs:
+            force = _tension(f, spring, ends)
+            _pull(f, ends[0], force, total)
+            _pull(f, ends[1], -force, total)
+        for k, (load, bodies, axes) in enumerate(self.twists):
+            angle = _near(self.angle(f, k), angles[..., k])
+            back = load.stiffness * (angle - load.natural_angle) + load.damping * self.turning(f)[..., k]
+            for body, axis, sign in zip(bodies, axes, (1, -1), strict=True):
+                total[..., body, 3:, 0] += sign * back[..., None] * axis[:, 2]
+        return total[..., : self.nb, :, 0].reshape(*total.shape[:-3], 6 * self.nb)
+
+    def angle(self, f: Frames, k: int) -> np.ndarray:
+        """Angle (…,) of the joint of torsion spring k, up to turns."""
+        _, (i, j), (on_i, on_j) = self.twists[k]
+        turned = np.swapaxes(f.a[..., i, :, :] @ on_i, -1, -2) @ f.a[..., j, :, :] @ on_j
+        return np.arctan2(turned[..., 1, 0], turned[..., 0, 0])
+
+    def turning(self, f: Frames) -> np.ndarray:
+        """Rates (…, springs) of the angles."""
+        rates = np.zeros((*f.r.shape[:-3], len(self.twists)))
+        for k, (_, (i, j), (on_i, _)) in enumerate(self.twists):
+            axis = f.a[..., i, :, :] @ on_i
+            change = f.a1[..., j, :, :] @ np.swapaxes(f.a[..., j, :, :], -1, -2)
+            change = change - f.a1[..., i, :, :] @ np.swapaxes(f.a[..., i, :, :], -1, -2)
+            seen = np.swapaxes(axis, -1, -2) @ change @ axis
+            rates[..., k] = seen[..., 1, 0]
+        return rates
+
+
+def _near(angle: np.ndarray, estimate: np.ndarray) -> np.ndarray:
+    """The angle (…,), known up to turns, nearest to the estimate."""
+    return angle + 2 * np.pi * np.round((estimate - angle) / (2 * np.pi))
+
+
+def _to_body(f: Frames, body: int, vector: np.ndarray) -> np.ndarray:
+    return np.swapaxes(f.a[..., body, :, :], -1, -2) @ vector
+
+
+def _pull(f: Frames, end: tuple[int, np.ndarray], force: np.ndarray, total: np.ndarray) -> None:
+    """Adds a world force (…, 3, 1) at a body-fixed point."""
+    body, place = end
+    local = _to_body(f, body, force)
+    total[..., body, :3, :] += force
+    total[..., body, 3:, 0] += np.cross(place[:, 0], local[..., 0])
+
+
+def _tension(f: Frames, spring: Spring, ends: list[tuple[int, np.ndarray]]) -> np.ndarray:
+    """World force (…, 3, 1) of a spring on its first body."""
+    p, q = (f.r[..., b, :, :] + f.a[..., b, :, :] @ s for b, s in ends)
+    u, v = (f.v[..., b, :, :] + f.a1[..., b, :, :] @ s for b, s in ends)
+    length = np.sqrt(np.sum((q - p) ** 2, axis=-2, keepdims=True))
+    along = (q - p) / length
+    rate = np.sum((v - u) * along, axis=-2, keepdims=True)
+    return (spring.stiffness * (length - spring.natural_length) + spring.damping * rate) * along

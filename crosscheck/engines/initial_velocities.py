@@ -1,0 +1,91 @@
+"""Where a tree starts: joint velocities that give the bodies the scene's consistent velocities."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crosscheck.engine import Cannot, Why
+from crosscheck.engines.driver_motion import motion
+from crosscheck.engines.spanning_tree import GROUND_LINK, Link, Tree, cross_matrix
+from crosscheck.judge.constraints import initial_poses, initial_twists, jacobian
+from mbref.scene import Scene
+
+RANK_TOLERANCE = 1e-9  # relative to the largest singular value
+
+
+def lacks_mass(scene: Scene) -> Cannot | None:
+    """A scene without masses whose drivers leave some of the motion open has no dynamics."""
+    if scene.has_mass():
+        return None
+    rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
+    if np.linalg.matrix_rank(rows, RANK_TOLERANCE) == 6 * len(scene.body):
+        return None
+    without = ", ".join(body.name for body in scene.body if body.mass is None)
+    return Cannot(Why.NEVER, f"the drivers leave the motion open, and there is no mass on {without}")
+
+
+def initial_rates(scene: Scene, tree: Tree) -> np.ndarray:
+    """Joint velocities (nv,) at t = 0, in the order of the tree's links.
+
+    The bodies move with `kinematics.initial_twists`, ghosts with their bodies, rods without spin about
+    their own axes.  Raises SceneError where those velocities contradict the joints.
+    """
+    if tree.nv == 0:
+        return np.zeros(0)
+    twists = np.hstack(initial_twists(scene))
+    rows, values = [], []
+    for link, of_rates in zip(tree.links, twist_maps(tree), strict=True):
+        if link.body >= 0:
+            rows.append(of_rates)
+            values.append(twists[link.body])
+        else:
+            ends = link.ends
+            rows += [_at(of_rates, link, point)[:3] for _, point in ends]
+            values += [_velocity(scene, twists, body, point) for body, point in ends]
+            rows.append((ends[1][1] - ends[0][1])[None] @ of_rates[3:])
+            values.append(np.zeros(1))
+    rates = np.linalg.lstsq(np.vstack(rows), np.concatenate(values))[0]
+    for driver in scene.driver:
+        rates[tree.coordinate(scene, driver.joint)] = motion(driver, 0.0)[1]
+    return rates
+
+
+def twist_maps(tree: Tree) -> np.ndarray:
+    """(links, 6, nv): velocity of each link's frame and angular velocity (world) at t = 0, of the joint
+    velocities."""
+    maps = np.zeros((len(tree.links), 6, tree.nv))
+    for k, link in enumerate(tree.links):
+        if link.parent != GROUND_LINK:
+            maps[k] = _at(maps[link.parent], tree.links[link.parent], link.position)
+        maps[k, :, tree.starts[k] : tree.starts[k] + link.freedoms] = _joint_map(link)
+    return maps
+
+
+def _at(twist_map: np.ndarray, link: Link, point: np.ndarray) -> np.ndarray:
+    """(6, nv): the twist of a link at a point (world) instead of at its frame."""
+    linear, angular = twist_map[:3], twist_map[3:]
+    return np.vstack([linear - cross_matrix(point - link.position) @ angular, angular])
+
+
+def _joint_map(link: Link) -> np.ndarray:
+    """(6, freedoms): the twist of the link's frame of its own joint's velocities."""
+    turning = np.vstack([-cross_matrix(link.position - link.anchor), np.eye(3)])
+    sliding = np.vstack([np.eye(3), np.zeros((3, 3))])
+    along = link.axes.T
+    return {
+        "fixed": lambda: np.zeros((6, 0)),
+        "revolute": lambda: turning @ along,
+        "universal": lambda: turning @ along,
+        "translational": lambda: sliding @ along,
+        "cylindrical": lambda: np.hstack([sliding @ along, turning @ along]),
+        "spherical": lambda: turning,
+        "free": lambda: np.eye(6),
+    }[link.kind]()
+
+
+def _velocity(scene: Scene, twists: np.ndarray, body: int, point: np.ndarray) -> np.ndarray:
+    """Velocity (3,) of a point (world) of a body; of the ground for -1."""
+    if body < 0:
+        return np.zeros(3)
+    arm = point - np.array(scene.body[body].position)
+    return twists[body, :3] + np.cross(twists[body, 3:], arm)

@@ -1,0 +1,5 @@
+"""MuJoCo as an engine."""
+
+from crosscheck.engines.mujoco.adapter import ENGINE
+
+__all__ = ["ENGINE"]

@@ -1,0 +1,308 @@
+"""MuJoCo: joint coordinates, loops closed by soft equality constraints.
+
+What MuJoCo calls hard is a softness of 1e-4 of the inverse mass, ten times that by default.  Families:
+
+- ``defaults``: the library's own options;
+- ``stock``: as stiff as its documentation allows (time constant two steps, impedance 0.9999), RK4;
+- ``euler``, ``implicit``, ``implicitfast``: the same with its integrators of first order, the last only where
+  a load damps, for else it moves as ``euler``;
+- ``tuned``: the regulariser scaled away through ``invweight0``, critically damped closures at five times
+  the fastest rate of the scene, RK4, Newton's method iterated to convergence;
+- ``stiff``: the tuned model with closures as stiff as the step bears, which costs an order of convergence
+  and brings a run through singular positions with less left of the closure errors they magnify;
+- ``forward``: the tuned model's accelerations (``mj_forward``) integrated by DOP853;
+- ``projected``: the same, every accepted state projected onto the closures.
+
+A driver is an equality of one joint whose reference acceleration is rewritten at every evaluation.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engine import Cannot, Engine, Setting
+from crosscheck.engines.driver_motion import fastest_rate, motion, stated_rate
+from crosscheck.engines.initial_velocities import lacks_mass
+from crosscheck.engines.mujoco.model import compiled
+from crosscheck.engines.mujoco.projection import projected
+from crosscheck.engines.sampling import Adaptive, Counts, Failed, Sample, run_through, step_count
+from crosscheck.engines.tree_reactions import LinkMotion, joint_reactions, wrench
+from mbref import rotations
+from mbref.scene import Scene
+from mbref.trajectory import Outcome, Trajectory
+
+HARD = 1e-8  # factor of the regulariser: its error is gone, and rounding does not yet take over
+CONVERGED, MOST_ITERATIONS = 1e-20, 50  # scaled gain of a Newton iteration; two or three are usual
+RK4 = "mjINT_RK4"
+STOCK = {"stock": RK4, "euler": "mjINT_EULER", "implicit": "mjINT_IMPLICIT",
+         "implicitfast": "mjINT_IMPLICITFAST"}  # fmt: skip
+BETA = 5.0  # double root of the closure errors, in fastest rates of the scene: survives singular passages
+STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance, as far as it is not clamped
+DEFAULT_STEP = 2e-3  # s
+STEPS = (0.15, 0.05, 0.015, 0.005, 0.0015)  # rad turned per step; 2 beta step stays below 2
+STIFF_STEPS = (0.015, 0.005, 0.0015, 0.0005)
+STIFF = 0.2  # double root of the stiff closures' errors, in 1/step
+RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10)  # finer ones get lost in the noise at singular positions
+TURN_PER_STEP = 0.25  # rad a driver may move within one adaptive step: closures can fold in between
+ADAPTIVE = {"forward": 1e-7, "projected": 1e-9}  # factor of the regulariser: less leaves noise to integrate
+LEAST_TURN = 0.03  # rad turned within the shortest adaptive step
+SCOUT_SAMPLES = 41  # of the coarse run that finds how fast a scene turns
+MAX_STEPS = 250_000
+
+
+class MuJoCo(Engine):
+    """MuJoCo 4."""
+
+    name = "mujoco"
+    package = "mujoco"
+
+    def version(self) -> str:
+        """Version of MuJoCo; raises ImportError when it is not installed."""
+        import mujoco
+
+        return mujoco.__version__
+
+    def cannot(self, scene: Scene) -> Cannot | None:
+        """Every joint, driver and load maps exactly; what has no mass needs its whole motion prescribed."""
+        return lacks_mass(scene)
+
+    def settings(self, scene: Scene) -> Sequence[Setting]:
+        """Fixed steps by the angle turned in one, adaptive ones by relative tolerance."""
+        rate = fastest_rate(scene, lambda step: self._coarse(scene, step))
+        beta, least = float(f"{BETA * rate:.2g}"), float(f"{LEAST_TURN / rate:.2g}")
+        steps, stiff = (_steps(scene, rate, angles) for angles in (STEPS, STIFF_STEPS))
+        plain = sorted({DEFAULT_STEP, *steps}, reverse=True)
+        return [
+            *(Setting("defaults", {"step": h}) for h in plain),
+            *(Setting(family, {"step": h}) for family in _stock(scene) for h in steps),
+            *(Setting("tuned", {"step": h, "beta": beta, "hard": HARD}) for h in steps),
+            *(Setting("stiff", {"step": h, "beta": float(f"{STIFF / h:.2g}"), "hard": HARD}) for h in stiff),
+            *(
+                Setting(family, {"rtol": r, "min_step": least, "beta": beta, "hard": hard})
+                for family, hard in ADAPTIVE.items()
+                for r in RTOLS
+            ),
+        ]
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        """Simulate; raises ValueError for a family it does not have."""
+        start = time.process_time()
+        run = _Run(scene, setting)
+        labels = {"engine": self.name, "version": self.version(), "method": setting.family,
+                  "settings": dict(setting.options)}  # fmt: skip
+        built = time.process_time() - start
+        with run.installed(), np.errstate(all="ignore"):
+            return run_through(scene, times, run.advance, run.sample, run.counts, built, labels)
+
+    def _coarse(self, scene: Scene, step: float) -> Trajectory:
+        times = np.linspace(0, scene.duration, SCOUT_SAMPLES)
+        return self.run(scene, times, Setting("tuned", {"step": step, "beta": 0.5 / step, "hard": HARD}))
+
+
+def _stock(scene: Scene) -> list[str]:
+    """The families of stock closures whose integrators differ on the scene."""
+    is_damped = any(getattr(load, "damping", 0.0) for load in scene.load)
+    return [family for family in STOCK if is_damped or family != "implicitfast"]
+
+
+def _steps(scene: Scene, rate: float, angles: Sequence[float]) -> list[float]:
+    """Steps (s) that turn by the angles (rad) at a rate (rad/s), as far as they are not too many."""
+    steps = [float(f"{angle / rate:.2g}") for angle in angles]
+    return [h for h in steps if scene.duration / h <= MAX_STEPS] or steps[:1]
+
+
+class _Run:
+    """One simulation: model, data and how they are advanced."""
+
+    def __init__(self, scene: Scene, setting: Setting):
+        import mujoco
+
+        self.mujoco, self.scene = mujoco, scene
+        self.compiled = compiled(scene)
+        self.model = self.compiled.model
+        self.counts = Counts()
+        self.turned = np.array([body.orientation for body in scene.body])
+        self._configure(setting, scene)
+        self.data = mujoco.MjData(self.model)
+        self.data.qvel[:] = self.compiled.rates
+        self.data.xfrc_applied[:] = self.compiled.applied
+
+    def _configure(self, setting: Setting, scene: Scene) -> None:
+        model, options, mujoco = self.model, setting.options, self.mujoco
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        self.nominal = options.get("step", DEFAULT_STEP)
+        model.opt.timestep = self.nominal
+        self.step = self._fixed
+        if setting.family == "defaults":
+            return
+        model.opt.integrator = getattr(mujoco.mjtIntegrator, STOCK.get(setting.family, RK4))
+        model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE  # 4.0.0's sparse factor is wrong for some trees
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
+        if setting.family in STOCK:
+            model.eq_solref[:], model.eq_solimp[:] = (2 * self.nominal, 1.0), STIFFEST
+        elif setting.family in ("tuned", "stiff", *ADAPTIVE):
+            self._harden(options["beta"], options["hard"])
+        else:
+            raise ValueError(f"mujoco has no family {setting.family!r}")
+        if setting.family in ADAPTIVE:
+            limit = TURN_PER_STEP / stated_rate(scene) if scene.driver else np.inf
+            limits = (options["min_step"], limit)
+            settle = self._settle if setting.family == "projected" else None
+            self.adaptive = Adaptive(self._rhs, settle, options["rtol"], *limits, self.counts)
+            self.step = self._adaptively
+
+    def _harden(self, beta: float, factor: float) -> None:
+        """Closure errors decay as exp(-beta t), and the regulariser is scaled by a factor."""
+        model = self.model
+        model.eq_solref[:], model.eq_solimp[:] = (-(beta**2), -2 * beta), STIFFEST
+        model.body_invweight0[:] *= factor
+        model.dof_invweight0[:] *= factor
+        model.opt.tolerance, model.opt.iterations = CONVERGED, MOST_ITERATIONS
+        model.opt.disableflags |= self.mujoco.mjtDisableBit.mjDSBL_REFSAFE
+
+    @contextlib.contextmanager
+    def installed(self) -> Iterator[None]:
+        """MuJoCo's process-wide hooks are this run's, until the run is over."""
+        mujoco = self.mujoco
+        mujoco.set_mju_user_warning(lambda _: None)  # they would go to the terminal and MUJOCO_LOG.TXT
+        try:
+            mujoco.mj_forward(self.model, self.data)
+            self.rows = [(int(self._rows(equality)[0]), d) for equality, d in self.compiled.drivers]
+            if self.rows:
+                mujoco.set_mjcb_control(self._drive)
+            yield
+        finally:
+            mujoco.set_mjcb_control(None)
+            mujoco.set_mju_user_warning(None)
+
+    def _rows(self, equality: int) -> np.ndarray:
+        """The constraint rows of an equality; none between two bodies that cannot move."""
+        data, kind = self.data, int(self.mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+        return np.flatnonzero((data.efc_type == kind) & (data.efc_id == equality))
+
+    def _drive(self, model: Any, data: Any) -> None:
+        """Adds the prescribed motion to the reference accelerations of the drivers' rows."""
+        reference, gains = data.efc_aref, data.efc_KBIP
+        for row, driver in self.rows:
+            value, rate, acceleration = motion(driver, data.time)
+            stiffness, damping, impedance, _ = gains[row]
+            reference[row] += acceleration + damping * rate + stiffness * impedance * value
+
+    def advance(self, t0: float, t1: float) -> None:
+        """Moves the data from t0 to t1; raises Failed."""
+        try:
+            self.step(t0, t1)
+        except self.mujoco.FatalError as error:
+            raise Failed(Outcome.STEP_FAILED, t0, f"MuJoCo stopped after {t0:.6g} s: {error}") from error
+        self.data.time = t1
+        if not (np.isfinite(self.data.qpos).all() and np.isfinite(self.data.qvel).all()):
+            message = f"the state stopped being finite between {t0:.6g} s and {t1:.6g} s"
+            raise Failed(Outcome.NOT_FINITE, t0, message)
+
+    def _fixed(self, t0: float, t1: float) -> None:
+        n = step_count(t0, t1, self.nominal)
+        self.model.opt.timestep = (t1 - t0) / n
+        self.mujoco.mj_step(self.model, self.data, nstep=n)
+        rk4 = self.model.opt.integrator == self.mujoco.mjtIntegrator.mjINT_RK4
+        self.counts.steps += n
+        self.counts.rhs += 4 * n if rk4 else n
+
+    def _adaptively(self, t0: float, t1: float) -> None:
+        y = self.adaptive.advance(np.concatenate((self.data.qpos, self.data.qvel)), t0, t1)
+        self._load(t1, y)
+        self.mujoco.mj_normalizeQuat(self.model, self.data.qpos)
+
+    def _load(self, t: float, y: np.ndarray) -> None:
+        self.data.time = t
+        self.data.qpos[:], self.data.qvel[:] = y[: self.model.nq], y[self.model.nq :]
+
+    def _rhs(self, t: float, y: np.ndarray) -> np.ndarray:
+        """Time derivative (nq + nv,) of positions and velocities."""
+        model, data = self.model, self.data
+        self._load(t, y)
+        self.mujoco.mj_forward(model, data)
+        return np.concatenate((self._position_rates(data.qpos, data.qvel), data.qacc))
+
+    def _settle(self, t: float, y: np.ndarray) -> np.ndarray:
+        return projected(self.mujoco, self.model, self.data, self.rows, t, self._load, y)
+
+    def _position_rates(self, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
+        model = self.model
+        if model.nq == model.nv:
+            return qvel
+        rates = np.empty(model.nq)
+        free, ball = (int(k) for k in (self.mujoco.mjtJoint.mjJNT_FREE, self.mujoco.mjtJoint.mjJNT_BALL))
+        places = (model.jnt_type.tolist(), model.jnt_qposadr.tolist(), model.jnt_dofadr.tolist())
+        for kind, q, v in zip(*places, strict=True):
+            moved = {free: 3, ball: 0}.get(kind, 1)
+            rates[q : q + moved] = qvel[v : v + moved]
+            if kind in (free, ball):
+                spin = np.concatenate(([0.0], qvel[v + moved : v + moved + 3]))
+                unit = qpos[q + moved : q + moved + 4]
+                rates[q + moved : q + moved + 4] = rotations.multiply(unit / np.linalg.norm(unit), spin) / 2
+        return rates
+
+    def sample(self, t: float) -> Sample:
+        """Poses, velocities and reactions of the scene's bodies and joints."""
+        scene, tree = self.scene, self.compiled.tree
+        motion = self.link_motion()
+        own = list(tree.own)
+        quaternions = self.data.xquat[self.compiled.links]
+        return Sample(
+            position=motion.position[own],
+            orientation=rotations.multiply(quaternions[own], self.turned),
+            velocity=motion.velocity[own],
+            angular_velocity=motion.angular_velocity[own],
+            acceleration=motion.acceleration[own],
+            angular_acceleration=motion.angular_acceleration[own],
+            reactions=joint_reactions(scene, tree, motion, self.closing()) if scene.has_mass() else {},
+        )
+
+    def link_motion(self) -> LinkMotion:
+        """How the links move; the data's forces are those of this state."""
+        mujoco, model, data, links = self.mujoco, self.model, self.data, self.compiled.links
+        mujoco.mj_forward(model, data)
+        mujoco.mj_rnePostConstraint(model, data)
+        twists, changes = np.zeros((2, len(links), 6))
+        for twist, change, body in zip(twists, changes, links, strict=True):
+            mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, body, twist, 0)
+            mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_XBODY, body, change, 0)
+        return LinkMotion(
+            rotation=data.xmat[links].reshape(-1, 3, 3),
+            position=data.xpos[links],
+            velocity=twists[:, 3:],
+            angular_velocity=twists[:, :3],
+            acceleration=changes[:, 3:] + model.opt.gravity,  # MuJoCo's world falls upwards
+            angular_acceleration=changes[:, :3],
+            coordinates=self._coordinates(),
+            rates=data.qvel.copy(),
+        )
+
+    def _coordinates(self) -> np.ndarray:
+        """(nv,): coordinates by the velocity they belong to; zero where a joint has no angles."""
+        model, coordinates = self.model, np.zeros(self.model.nv)
+        single = np.isin(model.jnt_type, [int(k) for k in self.compiled.single])
+        coordinates[model.jnt_dofadr[single]] = self.data.qpos[model.jnt_qposadr[single]]
+        return coordinates
+
+    def closing(self) -> list[np.ndarray]:
+        """Per closure of the tree, the wrench on its second link."""
+        data, tree, wrenches = self.data, self.compiled.tree, []
+        for k, closure in enumerate(tree.closures):
+            if closure.kind == "point":
+                rows = self._rows(self.model.equality(f"closure {k}").id)
+                point = data.site(f"closure {k}.1").xpos
+                wrenches.append(wrench(-data.efc_force[rows] if len(rows) else np.zeros(3), point))
+            else:
+                ghost = self.compiled.links[closure.links[1]]
+                about = data.subtree_com[self.model.body_rootid[ghost]]
+                wrenches.append(wrench(data.cfrc_ext[ghost, 3:], about, data.cfrc_ext[ghost, :3]))
+        return wrenches
+
+
+ENGINE = MuJoCo()

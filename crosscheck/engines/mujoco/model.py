@@ -1,0 +1,169 @@
+"""A scene's tree as a MuJoCo model: bodies and joints, closures and drivers as equalities, loads.
+
+Every body frame has its origin at the centre of mass of the scene's body and world-aligned axes at t = 0.
+Masses are written after compilation, because the compiler refuses thin discs and rods by rounding; what
+it sees before has nothing special (no coinciding frames, no equal moments) that it could simplify by.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.initial_velocities import initial_rates
+from crosscheck.engines.spanning_tree import GROUND_LINK, Link, Tree, spanning_tree
+from mbref import rotations
+from mbref.scene import Driver, Force, Moment, Scene, Spring, TorsionSpring
+
+UNIT = (1.0, 0.0, 0.0, 0.0)
+GENERAL = ((1.0, 1.1, 1.2), (0.1, 0.2, 0.3), (0.5, 0.5, 0.1, 0.7))  # moments, centre, axes until compiled
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A compiled model with what the run needs to know of it."""
+
+    model: Any
+    tree: Tree
+    links: np.ndarray  # MuJoCo's body of each link
+    single: tuple[Any, ...]  # kinds of MuJoCo joints with one coordinate
+    drivers: list[tuple[int, Driver]]  # equality and motion
+    applied: np.ndarray  # (nbody, 6) constant world forces and moments at the centres of mass
+    rates: np.ndarray  # joint velocities at t = 0
+
+
+def compiled(scene: Scene) -> Compiled:
+    """The scene as a MuJoCo model with the library's default options and softness."""
+    import mujoco
+
+    tree = spanning_tree(scene)
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    spec.option.gravity = scene.gravity
+    built = _Builder(mujoco, scene, tree, spec)
+    for k, link in enumerate(tree.links):
+        built.add_link(k, link)
+    for k, closure in enumerate(tree.closures):
+        built.add_closure(k, closure)
+    for driver in scene.driver:
+        built.add_driver(driver)
+    for k, load in enumerate(scene.load):
+        built.add_load(k, load)
+    model = spec.compile()
+    _write_masses(mujoco, model, tree)
+    applied = np.zeros((model.nbody, 6))
+    for name, wrench in built.applied:
+        applied[model.body(name).id] += wrench
+    return Compiled(
+        model=model, tree=tree, applied=applied, rates=initial_rates(scene, tree),
+        links=np.array([model.body(_name(k)).id for k in range(len(tree.links))]),
+        single=(mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE),
+        drivers=[(model.equality(f"driver {d.joint}").id, d) for d in scene.driver],
+    )  # fmt: skip
+
+
+def _name(link: int) -> str:
+    return "world" if link == GROUND_LINK else f"link {link}"
+
+
+class _Builder:
+    """Adds a tree's parts to a MjSpec."""
+
+    def __init__(self, mujoco: Any, scene: Scene, tree: Tree, spec: Any):
+        self.mujoco, self.scene, self.tree, self.spec = mujoco, scene, tree, spec
+        self.body = {GROUND_LINK: spec.worldbody}
+        self.joint: dict[int, Any] = {}  # by first joint velocity
+        self.applied: list[tuple[str, np.ndarray]] = []
+
+    def centre(self, link: int) -> np.ndarray:
+        """Origin of a link's frame (world) at t = 0."""
+        return self.tree.links[link].position if link != GROUND_LINK else np.zeros(3)
+
+    def add_link(self, k: int, link: Link) -> None:
+        body = self.body[link.parent].add_body(name=_name(k), pos=link.position - self.centre(link.parent))
+        _inertial(body, 1.0, *GENERAL)
+        self.body[k] = body
+        hinge, slide = self.mujoco.mjtJoint.mjJNT_HINGE, self.mujoco.mjtJoint.mjJNT_SLIDE
+        if link.kind == "free":
+            body.add_freejoint(name=f"free {k}")
+            return
+        kinds = {
+            "fixed": [], "revolute": [hinge], "universal": [hinge, hinge], "translational": [slide],
+            "cylindrical": [slide, hinge], "spherical": [self.mujoco.mjtJoint.mjJNT_BALL],
+        }[link.kind]  # fmt: skip
+        axes = np.resize(link.axes, (len(kinds), 3)) if len(link.axes) else np.full((len(kinds), 3), 1.0)
+        for i, (kind, axis) in enumerate(zip(kinds, axes, strict=True)):
+            name, anchor = f"joint {k}.{i}", link.anchor - link.position
+            self.joint[self.tree.starts[k] + i] = body.add_joint(name=name, type=kind, pos=anchor, axis=axis)
+
+    def site(self, link: int, point: np.ndarray, name: str) -> str:
+        """A point (world at t = 0) of a link, as a site."""
+        self.body[link].add_site(name=name, pos=point - self.centre(link))
+        return name
+
+    def add_closure(self, k: int, closure: Any) -> None:
+        kinds = self.mujoco.mjtEq
+        kind, point = kinds.mjEQ_CONNECT, closure.anchor
+        if closure.kind == "weld":
+            kind, point = kinds.mjEQ_WELD, self.centre(closure.links[0])
+        names = [self.site(link, point, f"closure {k}.{i}") for i, link in enumerate(closure.links)]
+        self._equality(kind, self.mujoco.mjtObj.mjOBJ_SITE, f"closure {k}", *names)
+
+    def add_driver(self, driver: Driver) -> None:
+        joint = self.joint[self.tree.coordinate(self.scene, driver.joint)]
+        kind = self.mujoco.mjtEq.mjEQ_JOINT
+        equality = self._equality(
+            kind, self.mujoco.mjtObj.mjOBJ_JOINT, f"driver {driver.joint}", joint.name, ""
+        )
+        equality.data[:5] = 0.0
+
+    def _equality(self, kind: Any, objects: Any, name: str, first: str, second: str) -> Any:
+        return self.spec.add_equality(type=kind, objtype=objects, name=name, name1=first, name2=second)
+
+    def add_load(self, k: int, load: Any) -> None:
+        if isinstance(load, Moment):
+            wrench = np.concatenate([np.zeros(3), load.moment])
+            self.applied.append((_name(self.link_of(load.body)), wrench))
+        elif isinstance(load, Force):
+            self._force(k, load)
+        elif isinstance(load, Spring):
+            self._spring(k, load)
+        elif isinstance(load, TorsionSpring):
+            joint = self.joint[self.tree.coordinate(self.scene, load.joint)]
+            joint.stiffness[0], joint.springref = joint.stiffness[0] + load.stiffness, load.natural_angle
+            joint.damping[0] += load.damping
+
+    def link_of(self, body: str) -> int:
+        """The link of a scene's body, by name."""
+        return self.tree.link_of(self.scene.body_index(body))
+
+    def _force(self, k: int, load: Force) -> None:
+        """A massless body fixed at the point of attack: what is applied acts at a centre of mass."""
+        link = self.link_of(load.body)
+        body = self.body[link].add_body(name=f"force {k}", pos=np.array(load.point) - self.centre(link))
+        _inertial(body, 0.0, np.zeros(3), np.zeros(3), UNIT)
+        self.applied.append((f"force {k}", np.concatenate([load.force, np.zeros(3)])))
+
+    def _spring(self, k: int, load: Spring) -> None:
+        tendon = self.spec.add_tendon(name=f"spring {k}", springlength=[load.natural_length] * 2)
+        tendon.stiffness[0], tendon.damping[0] = load.stiffness, load.damping
+        for i, (body, point) in enumerate(zip(load.bodies, load.points, strict=True)):
+            tendon.wrap_site(self.site(self.link_of(body), np.array(point), f"spring {k}.{i}"))
+
+
+def _inertial(body: Any, mass: float, inertia: Any, position: Any, orientation: Any) -> None:
+    body.explicitinertial = True
+    body.mass, body.inertia, body.ipos, body.iquat = mass, inertia, position, orientation
+
+
+def _write_masses(mujoco: Any, model: Any, tree: Tree) -> None:
+    """The true masses, centres of mass and principal moments; constants that follow from them."""
+    for k, link in enumerate(tree.links):
+        b = model.body(_name(k)).id
+        moments, axes = np.linalg.eigh(link.inertia)
+        axes[:, 2] *= np.sign(np.linalg.det(axes))
+        model.body_mass[b], model.body_ipos[b] = link.mass, link.offset
+        model.body_inertia[b], model.body_iquat[b] = moments, rotations.from_matrix(axes)
+    mujoco.mj_setConst(model, mujoco.MjData(model))

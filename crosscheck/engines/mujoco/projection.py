@@ -1,0 +1,65 @@
+"""MuJoCo's states put back onto its equality constraints, by the least kinetic energy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from crosscheck.engines.driver_motion import motion
+from crosscheck.engines.sampling import Failed
+from mbref.scene import Driver
+from mbref.trajectory import Outcome
+
+ITERATIONS = 10  # of Newton's method at most; two are usual
+CLOSED = 1e-13  # m and rad, where it ends
+CLOSED_ENOUGH = 1e-8  # m and rad, beyond which it has failed
+REDUNDANT = 1e-7  # of the largest singular value: redundant rows of states not quite closed are below
+
+Rows = Sequence[tuple[int, Driver]]  # the driven constraint rows
+
+
+def projected(
+    mujoco: Any, model: Any, data: Any, drivers: Rows, t: float, load: Callable[[float, np.ndarray], None],
+    y: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """The state (nq + nv,) nearest to ``y``, by kinetic energy, whose positions and velocities satisfy the
+    equality constraints at time t (s); ``load`` puts a state into the data.  Raises Failed."""
+    load(t, y)
+    mujoco.mj_forward(model, data)
+    q, v, root = data.qpos.copy(), data.qvel.copy(), _root_of_mass(mujoco, model, data, t)
+    for _ in range(ITERATIONS):
+        load(t, np.concatenate((q, v)))
+        mujoco.mj_forward(model, data)
+        jacobian = data.efc_J[: data.ne * model.nv].reshape(data.ne, model.nv)
+        values, rates = data.efc_pos[: data.ne].copy(), np.zeros(data.ne)
+        for row, driver in drivers:
+            value, rate, _ = motion(driver, t)
+            values[row] -= value
+            rates[row] = rate
+        if not abs(values).max(initial=0.0) > CLOSED:
+            break
+        mujoco.mj_integratePos(model, q, _least(root, jacobian, -values, t), 1.0)
+    if not abs(values).max(initial=0.0) < CLOSED_ENOUGH:
+        raise Failed(Outcome.NOT_CONVERGED, t, f"the closures could not be met at {t:.6g} s")
+    return np.concatenate((q, v + _least(root, jacobian, rates - jacobian @ v, t)))
+
+
+def _root_of_mass(mujoco: Any, model: Any, data: Any, t: float) -> np.ndarray:
+    """The lower Cholesky factor (nv, nv) of the mass matrix."""
+    mass = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    if not np.isfinite(mass).all():
+        raise Failed(Outcome.NOT_FINITE, t, f"the state is not finite at {t:.6g} s")
+    return np.linalg.cholesky(mass)
+
+
+def _least(root: np.ndarray, jacobian: np.ndarray, wanted: np.ndarray, t: float) -> np.ndarray:
+    """The change (nv,) of the velocities of least kinetic energy with these values of the rows."""
+    if not (np.isfinite(jacobian).all() and np.isfinite(wanted).all()):
+        raise Failed(Outcome.NOT_FINITE, t, f"the closure errors are not finite at {t:.6g} s")
+    spread = solve_triangular(root, jacobian.T, lower=True).T
+    least = np.linalg.lstsq(spread, wanted, rcond=REDUNDANT)[0]
+    return solve_triangular(root, least, lower=True, trans="T")

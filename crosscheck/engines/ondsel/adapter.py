@@ -1,0 +1,205 @@
+"""OndselSolver: the paper's own coordinates and joints; kinematics and inverse dynamics of driven scenes.
+
+Positions, velocities, accelerations and reactions follow from the drivers pose by pose, by Newton's method;
+redundant constraints are removed by the solver.  The one option ``step`` (s) is the largest step from pose
+to pose; it decides which of several assemblies is found, not how accurate it is.  Equally spaced samples
+are one analysis; where the spacing changes, a new one starts from the pose reached.  With a cylindrical
+joint between moving bodies OndselSolver's accelerations do not satisfy the joint's own equations, by 1e-3
+of their size; they and the reactions are then left out.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from importlib import metadata
+
+import numpy as np
+
+from crosscheck.engine import Cannot, Engine, Setting, Why
+from crosscheck.engines.ondsel.model import Assembly, Table, is_reversed, table
+from crosscheck.engines.sampling import Counts, Failed, Sample, run_through, step_count
+from crosscheck.judge.constraints import initial_poses, jacobian
+from crosscheck.judge.tolerances import RANK
+from mbref import rotations
+from mbref.scene import GROUND, Distance, Joint, Scene
+from mbref.trajectory import Outcome, Trajectory
+
+FAMILY = "kinematics"
+STEPS = (100, 400, 1600)  # over a scene's duration
+BRYANT = ("Bryantx", "Bryanty", "Bryantz")
+LOCKED = 1e-3  # cosine of the second angle below which the other two lose digits
+EVEN = 1e-9  # relative difference of sample intervals that are one analysis
+
+
+class Ondsel(Engine):
+    """OndselSolver (PyPI ``pyondsel``)."""
+
+    name = "ondsel"
+    package = "pyondsel"
+
+    def version(self) -> str:
+        """Version of pyondsel; raises ImportError when it is not installed."""
+        return metadata.version(self.package)
+
+    def prepare(self, families: Sequence[str]) -> None:
+        import pyondsel.solve_raw  # noqa: F401
+
+    def cannot(self, scene: Scene) -> Cannot | None:
+        """Only what its drivers move alone: forward dynamics and loads are not exposed."""
+        if any(isinstance(joint, Distance) for joint in scene.joint):
+            return Cannot(Why.UPSTREAM, "OndselSolver does not implement its joint of constant distance")
+        rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
+        if not scene.driver or np.linalg.matrix_rank(rows, rtol=RANK) < rows.shape[1]:
+            why = "OndselSolver offers no forward dynamics, and the drivers leave motion open at the start"
+            return Cannot(Why.UPSTREAM, why)
+        return None
+
+    def settings(self, scene: Scene) -> Sequence[Setting]:
+        """Steps over the scene's duration."""
+        return [Setting(FAMILY, {"step": scene.duration / n}) for n in STEPS]
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        """Simulate; raises ValueError for a family it does not have."""
+        if setting.family != FAMILY:
+            raise ValueError(f"ondsel has no family {setting.family!r}")
+        start = time.process_time()
+        run = _Run(scene, np.array(times, dtype=float), setting.options["step"])
+        labels = {"engine": self.name, "version": self.version(), "method": setting.family,
+                  "settings": dict(setting.options)}  # fmt: skip
+        built = time.process_time() - start
+        trajectory = run_through(scene, times, run.advance, run.sample, run.counts, built, labels)
+        if any(joint.type == "cylindrical" and GROUND not in joint.bodies for joint in scene.joint):
+            return replace(trajectory, acceleration=None, angular_acceleration=None, reactions=None)
+        return trajectory
+
+
+class _Run:
+    """One simulation: the samples computed so far, and the pose the next analysis starts from."""
+
+    def __init__(self, scene: Scene, times: np.ndarray, step: float):
+        from pyondsel.solve_raw import solve_asmt_raw
+
+        self.solve, self.scene, self.times, self.step = solve_asmt_raw, scene, times, step
+        self.assemblies = [Assembly(scene), Assembly(scene, tilted=True)]
+        self.counts = Counts()
+        self.samples: dict[float, Sample] = {}
+        self.pose = initial_poses(scene)
+        self.hindered = False  # an analysis has failed: from then on sample by sample, as far as it goes
+
+    def advance(self, t0: float, t1: float) -> None:
+        """Has the sample at t1, and those after it at the same spacing, computed; raises Failed."""
+        if t1 in self.samples:
+            return
+        later = self.times[self.times >= t1]
+        even = abs(np.diff(later, prepend=t0) - (t1 - t0)) <= EVEN * (t1 - t0)
+        many = later[: int(np.argmin(even)) if not even.all() else len(later)]
+        if self.hindered:
+            many = many[:1]
+        try:
+            self._analyse(t0, many)
+        except Failed:
+            if len(many) == 1:
+                raise
+            self.hindered = True
+            self._analyse(t0, many[:1])
+
+    def _analyse(self, t0: float, targets: np.ndarray, keep_start: bool = False) -> None:
+        """Samples at ``targets``, equally spaced from t0, of which the pose is known."""
+        each = step_count(t0, float(targets[0]), self.step)
+        frames = each * len(targets)
+        taken = [0] if keep_start else list(range(each, frames + 1, each))
+        samples = self._samples(t0, float(targets[-1]), frames, taken)
+        self.samples |= dict(zip([t0] if keep_start else map(float, targets), samples, strict=True))
+        if not keep_start:
+            self.pose = (samples[-1].position, samples[-1].orientation)
+
+    def _samples(self, t0: float, t1: float, frames: int, taken: Sequence[int]) -> list[Sample]:
+        """The frames ``taken`` of an analysis in a world where all their orientations can be told."""
+        names = [f"b{k}" for k in range(len(self.scene.body))]
+        for assembly in self.assemblies:
+            text = assembly.text(t0, t1, frames, *self.pose)
+            try:
+                answer = table(self.solve(text), frames)
+            except (RuntimeError, ValueError) as error:
+                message = f"no pose after {t0:.6g} s: {error}"
+                raise Failed(Outcome.NOT_CONVERGED, t0, message) from None
+            self.counts.steps += frames
+            middle = [answer.three(name, *BRYANT)[taken, 1] for name in names]
+            if np.abs(np.cos(middle)).min() > LOCKED:
+                return [_Reader(assembly, answer, frame).sample() for frame in taken]
+        raise Failed(Outcome.NOT_FINITE, t0, f"orientations after {t0:.6g} s cannot be told from the angles")
+
+    def sample(self, t: float) -> Sample:
+        """The sample computed at t; at 0, of the first step."""
+        if t not in self.samples:
+            self._analyse(t, np.array([t + self.step]), keep_start=True)
+        return self.samples[float(t)]
+
+
+class _Reader:
+    """One frame of an answer, in the scene's world."""
+
+    def __init__(self, assembly: Assembly, answer: Table, frame: int):
+        self.assembly, self.scene = assembly, assembly.scene
+        self.answer, self.frame = answer, frame
+        self.back = rotations.conjugate(assembly.world)
+
+    def sample(self) -> Sample:
+        """The bodies' motion and the joints' reactions."""
+        turned = _bryant(self._raw(BRYANT))
+        body = rotations.multiply(turned, rotations.conjugate(self.assembly.principal))
+        position, orientation = self._vectors("X", "Y", "Z"), rotations.multiply(self.back, body)
+        return Sample(
+            position=position, orientation=orientation, velocity=self._vectors("VX", "VY", "VZ"),
+            angular_velocity=self._vectors("OmegaX", "OmegaY", "OmegaZ"),
+            acceleration=self._vectors("AX", "AY", "AZ"),
+            angular_acceleration=self._vectors("AlphaX", "AlphaY", "AlphaZ"),
+            reactions=self._reactions(position, orientation),
+        )  # fmt: skip
+
+    def _raw(self, labels: Sequence[str]) -> np.ndarray:
+        names = [f"b{k}" for k in range(len(self.scene.body))]
+        return np.array([self.answer.three(name, *labels)[self.frame] for name in names])
+
+    def _vectors(self, *labels: str) -> np.ndarray:
+        return rotations.rotate(self.back, self._raw(labels))
+
+    def _reactions(self, position: np.ndarray, orientation: np.ndarray) -> dict[str, np.ndarray]:
+        """Force and moment (6,) on each joint's second body at the anchor on it, the driver's included;
+        none without masses, or with loads, of which the solver does not know."""
+        if self.scene.load or not self.scene.has_mass():
+            return {}
+        found = {}
+        for k, joint in enumerate(self.scene.joint):
+            force, moment = (
+                rotations.rotate(
+                    self.back, sum(self.answer.three(f"{s}{k}", *three)[self.frame] for s in "jd")
+                )
+                for three in (("FXonI", "FYonI", "FZonI"), ("TXonI", "TYonI", "TZonI"))
+            )
+            first, second = self._anchors(joint, position, orientation)
+            if is_reversed(joint):
+                found[joint.name] = np.concatenate([force, moment])
+            else:
+                found[joint.name] = -np.concatenate([force, moment + np.cross(first - second, force)])
+        return found
+
+    def _anchors(self, joint: Joint, position: np.ndarray, orientation: np.ndarray) -> list[np.ndarray]:
+        """Anchors (3,) of a joint on its two bodies, world."""
+        places = []
+        for name, point, _ in self.assembly.ends(joint):
+            b = self.scene.body_index(name)
+            principal = rotations.multiply(orientation[b], self.assembly.principal[b])
+            places.append(point if name == GROUND else position[b] + rotations.rotate(principal, point))
+        return places
+
+
+def _bryant(angles: np.ndarray) -> np.ndarray:
+    """Quaternions (…, 4) of turns about body-fixed x, y and z, one after another (…, 3)."""
+    x, y, z = (rotations.from_vector(angles[..., n, None] * np.eye(3)[n]) for n in range(3))
+    return rotations.multiply(rotations.multiply(x, y), z)
+
+
+ENGINE = Ondsel()

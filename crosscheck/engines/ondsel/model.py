@@ -1,0 +1,187 @@
+"""A driven scene as an assembly of OndselSolver, and the tables of its answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.constraint_equations import in_body, joint_frame, point_in_body
+from crosscheck.engines.driver_motion import motion
+from crosscheck.judge.constraints import inertia_matrices
+from mbref import rotations
+from mbref.scene import GROUND, Driver, Joint, Scene
+
+End = tuple[str, np.ndarray, np.ndarray]  # of a joint: body, point, axes (columns)
+NAME = "scene"
+TOLERANCE = 1e-9
+TILT = rotations.from_vector(np.array([0.5, -0.4, 0.3]))
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of the answer by series, such as ``"b0"`` or ``"j1"``, and label, such as ``"VX"``: (frames,)."""
+
+    series: dict[str, dict[str, np.ndarray]]
+
+    def three(self, name: str, *labels: str) -> np.ndarray:
+        """(frames, 3) of three rows, in the assembly's world; zero for a series the answer has not."""
+        rows = self.series.get(name)
+        if rows is None:
+            frames = len(next(iter(self.series.values()))["X"])
+            return np.zeros((frames, 3))
+        return np.column_stack([rows[label] for label in labels])
+
+
+class Assembly:
+    """A scene in a turned world, with bodies in their principal axes.
+
+    The solver tells orientations as angles that lose their meaning where a body's third axis is along the
+    first of the world.  So ``world`` (4,) first turns the scene such that the first driver's axis is the
+    third; ``tilted``, another turn follows.  ``principal`` (nb, 4) turns principal to body axes, the third
+    of them the nearest to the driver's axis.
+    """
+
+    def __init__(self, scene: Scene, tilted: bool = False):
+        self.scene = scene
+        driven = next(joint for joint in scene.joint if joint.name == scene.driver[0].joint)
+        upright = rotations.from_matrix(joint_frame(driven.axis).T)
+        self.world = rotations.multiply(TILT, upright) if tilted else upright
+        inertia = inertia_matrices(scene) if scene.has_mass() else np.array([np.eye(3)] * len(scene.body))
+        found = [
+            _principal(matrix, in_body(scene, body.name, np.array(driven.axis)))
+            for matrix, body in zip(inertia, scene.body, strict=True)
+        ]
+        self.moments = [moments for moments, _ in found]
+        self.axes = [axes for _, axes in found]
+        self.principal = rotations.from_matrix(np.array(self.axes))
+
+    def text(self, t0: float, t1: float, frames: int, position: np.ndarray, orientation: np.ndarray) -> str:
+        """The assembly from poses (nb, 3), (nb, 4; body axes) at t0, to be moved to t1 in equal steps."""
+        from pyondsel.model.asmt_model import AsmtModel
+        from pyondsel.model.simulation import Simulation
+
+        end = t1 - t0
+        simulation = Simulation(0.0, end, frames, end * 1e-9, end, TOLERANCE)
+        gravity = rotations.rotate(self.world, np.array(self.scene.gravity))
+        model = AsmtModel(NAME, gravity=_tuple(gravity), simulation=simulation)
+        parts = self._parts(position, orientation)
+        for part in parts:
+            model.add_part(part)
+        drivers = {driver.joint: driver for driver in self.scene.driver}
+        for k, joint in enumerate(self.scene.joint):
+            self._join(model, parts, k, joint, drivers.get(joint.name), t0)
+        return model.to_asmt()
+
+    def _parts(self, position: np.ndarray, orientation: np.ndarray) -> list[Any]:
+        from pyondsel.model.part import Part
+
+        position = rotations.rotate(self.world, position)
+        turned = rotations.multiply(self.world, rotations.multiply(orientation, self.principal))
+        turned = rotations.to_matrix(turned)
+        return [
+            Part(f"b{k}", _tuple(position[k]), _matrix(turned[k]), body.mass or 1.0,
+                 moments_of_inertia=_tuple(self.moments[k]))
+            for k, body in enumerate(self.scene.body)
+        ]  # fmt: skip
+
+    def _join(self, model: Any, parts: list, k: int, joint: Joint, driver: Driver | None, t0: float) -> None:
+        from pyondsel.model.joint import Joint as OndselJoint
+        from pyondsel.model.marker import Marker
+        from pyondsel.model.motion import Motion
+
+        paths = []
+        sign = -1.0 if is_reversed(joint) else 1.0
+        turned = sign * motion(driver, t0)[0] if driver and joint.type != "translational" else 0.0
+        ends = self.ends(joint)[:: int(sign)]
+        for side, (name, point, frame) in enumerate([ends[0], _turned_back(*ends[1], turned)]):
+            world = rotations.to_matrix(self.world) if name == GROUND else np.eye(3)
+            marker = Marker(f"m{k}{side}", _tuple(world @ point), _matrix(world @ frame))
+            if name == GROUND:
+                model.add_ground_marker(marker)
+                paths.append(model.ground_path(marker.name))
+            else:
+                part = parts[self.scene.body_index(name)]
+                part.add_marker(marker)
+                paths.append(model.part_path(part.name, marker.name))
+        model.add_joint(OndselJoint(f"j{k}", joint.type, *paths))
+        if driver:
+            kind = "translational" if joint.type == "translational" else "rotational"
+            model.add_motion(Motion(f"d{k}", f"j{k}", _expression(driver, t0, turned, sign), kind))
+
+    def ends(self, joint: Joint) -> list[End]:
+        """Body, point and axes (3, 3, columns) of a joint's two markers, in principal axes."""
+        ends = []
+        for name, frame in zip(joint.bodies, _frames(joint), strict=True):
+            point, axes = point_in_body(self.scene, name, joint.anchor), in_body(self.scene, name, frame.T).T
+            if name != GROUND:
+                own = self.axes[self.scene.body_index(name)]
+                point, axes = own.T @ point, own.T @ axes
+            ends.append((name, point, axes))
+        return ends
+
+
+def is_reversed(joint: Joint) -> bool:
+    """Whether the solver has the joint's second body first: of a cylindrical joint the accelerations are
+    right only where the first body is at rest."""
+    return joint.type == "cylindrical" and joint.bodies[1] == GROUND
+
+
+def _turned_back(name: str, point: np.ndarray, axes: np.ndarray, angle: float) -> End:
+    """A marker turned back about its third axis by what its driver has turned: angles start at zero."""
+    c, s = np.cos(angle), np.sin(angle)
+    return name, point, axes @ [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]
+
+
+def _principal(inertia: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Principal moments and axes (3, 3, columns) of an inertia, the last the nearest to ``axis`` (3,)."""
+    moments, axes = np.linalg.eigh(inertia)
+    last = int(np.argmax(np.abs(axes.T @ axis)))
+    order = [(last + 1) % 3, (last + 2) % 3, last]
+    axes = axes[:, order]
+    return moments[order], axes * [1.0, 1.0, np.sign(np.linalg.det(axes))]
+
+
+def _frames(joint: Joint) -> list[np.ndarray]:
+    """Axes (3, 3, columns, world at t = 0) of the two markers; the joint's axis is the third."""
+    if joint.type in ("fixed", "spherical"):
+        return [np.eye(3)] * 2
+    if joint.type == "universal":
+        return [joint_frame(axis) for axis in joint.axes]
+    return [joint_frame(joint.axis)] * 2
+
+
+def _expression(driver: Driver, t0: float, turned: float, sign: float) -> str:
+    """The driver's value times ``sign``, less what is ``turned``, in OndselSolver's syntax."""
+    t = f"(time + {t0!r})"
+    terms = ["*".join([f"({sign * c!r})"] + [t] * n) for n, c in enumerate(driver.polynomial)]
+    if s := driver.sine:
+        terms.append(f"({sign * s.amplitude!r})*sin(({s.frequency!r})*{t} + ({s.phase!r}))")
+    return " + ".join([*terms, f"({-float(turned)!r})"])
+
+
+def table(answer: str, frames: int) -> Table:
+    """The time series of an answer; its first column, the poses as given, is left out.
+
+    Raises ValueError when the analysis ended before all its frames.
+    """
+    series: dict[str, dict[str, np.ndarray]] = {}
+    rows: dict[str, np.ndarray] = {}
+    for line in answer[answer.index("TimeSeries") :].splitlines()[3:]:
+        label, *cells = line.rstrip("\t").split("\t")
+        if cells and cells[0].startswith("/"):
+            rows = series.setdefault(cells[0].rsplit("/", 1)[-1], {})
+        elif len(cells) != frames + 2:
+            raise ValueError(f"the analysis ended after {max(len(cells) - 2, 0)} of {frames} steps")
+        else:
+            rows[label] = np.array(cells[1:], dtype=float)
+    return Table(series)
+
+
+def _tuple(values: Any) -> tuple:
+    return tuple(map(float, values))
+
+
+def _matrix(values: np.ndarray) -> tuple:
+    return tuple(map(_tuple, values))

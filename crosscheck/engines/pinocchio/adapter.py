@@ -1,0 +1,292 @@
+"""Pinocchio: rigid-body dynamics in joint coordinates, closed by its proximal constraint solver.
+
+Pinocchio has no integrator of its own; the families differ in what is put around
+``constraintDynamics``:
+
+- ``defaults``: the solver as it comes (no regularisation, one iteration), fixed-step RK4;
+- ``proximal``: the same with the solver iterated to convergence, which redundant closures need;
+- ``baumgarte``: RK4 with the closures' own Baumgarte terms, double root 0.1/step;
+- ``dop853``: DOP853 without stabilisation;
+- ``tuned``: DOP853, every accepted state projected onto the closures.
+
+A driven coordinate has an armature of 1e18 and the torque that goes with it: exact to rounding.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from crosscheck.engine import Cannot, Engine, Setting
+from crosscheck.engines.driver_motion import fastest_rate, motion, stated_rate
+from crosscheck.engines.initial_velocities import lacks_mass
+from crosscheck.engines.pinocchio.model import Loads, Mechanism
+from crosscheck.engines.sampling import Adaptive, Counts, Failed, Sample, rk4, run_through
+from crosscheck.engines.tree_reactions import LinkMotion, joint_reactions
+from mbref import rotations
+from mbref.scene import Scene
+from mbref.trajectory import Outcome, Trajectory
+
+CONVERGED = (
+    1e-9,
+    1e-8,
+    50,
+)  # change of the forces (N), mu, iterations: accelerations near singular positions
+FORCES = (
+    1e-9,
+    1e-6,
+    50,
+)  # the same where redundant closures' forces are read, in which rounding grows as 1/mu
+BAUMGARTE = 0.1  # double root of the closure errors, in 1/step
+PROJECTIONS = 10  # Newton iterations at most; two are usual
+CLOSED = 1e-13  # m and rad, where a projection ends
+REDUNDANT = 1e-7  # of the largest singular value: redundant rows of states not quite closed are below
+CLOSED_ENOUGH = 1e-8  # m and rad, beyond which it has failed
+RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-11)  # finer ones get lost in the noise at singular positions
+TURN_PER_STEP = 0.25  # rad a driver may move within one adaptive step: closures can fold in between
+LEAST_TURN = 0.03  # rad turned within the shortest adaptive step
+SCOUT_RTOL = 1e-5
+SCOUT_SAMPLES = 41  # of the coarse run that finds how fast a scene turns
+STEPS = (0.2, 0.06, 0.02, 0.006, 0.002)  # rad turned per fixed step
+FINEST = 0.0007  # rad per step, of the stabilised family alone: only there the closure errors allow it
+MAX_FIXED_STEPS = 250_000
+HINTS = {"defaults": ": without regularisation the default solver settings cannot bear redundant closures"}
+FIXED = ("defaults", "proximal", "baumgarte")
+
+
+class Pinocchio(Engine):
+    """Pinocchio (PyPI ``pin``)."""
+
+    name = "pinocchio"
+    package = "pin"
+
+    def version(self) -> str:
+        """Version of Pinocchio; raises ImportError when it is not installed."""
+        import pinocchio
+
+        return pinocchio.__version__
+
+    def cannot(self, scene: Scene) -> Cannot | None:
+        """Every joint, driver and load maps exactly; what has no mass needs its whole motion prescribed."""
+        return lacks_mass(scene)
+
+    def settings(self, scene: Scene) -> Sequence[Setting]:
+        """Fixed steps by the angle turned in one, adaptive ones by relative tolerance."""
+        rate = fastest_rate(scene, lambda step: self._coarse(scene, step))
+        fixed = [
+            Setting(family, {"step": h})
+            for family in FIXED
+            for h in _steps(scene, rate, (*STEPS, FINEST) if family == "baumgarte" else STEPS)
+        ]
+        least = float(f"{LEAST_TURN / rate:.2g}")
+        adaptive = [{"rtol": r, "min_step": least} for r in RTOLS]
+        return fixed + [Setting(family, o) for family in ("dop853", "tuned") for o in adaptive]
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        """Simulate; raises ValueError for a family it does not have."""
+        start = time.process_time()
+        run = _Run(scene, setting)
+        labels = {"engine": self.name, "version": self.version(), "method": setting.family,
+                  "settings": dict(setting.options)}  # fmt: skip
+        built = time.process_time() - start
+        with np.errstate(all="ignore"):
+            return run_through(scene, times, run.advance, run.sample, run.counts, built, labels)
+
+    def _coarse(self, scene: Scene, step: float) -> Trajectory:
+        times = np.linspace(0, scene.duration, SCOUT_SAMPLES)
+        return self.run(scene, times, Setting("tuned", {"rtol": SCOUT_RTOL, "min_step": step}))
+
+
+def _steps(scene: Scene, rate: float, angles: Sequence[float]) -> list[float]:
+    """Steps (s) that turn by the angles (rad) at a rate (rad/s), as far as they are not too many."""
+    steps = [float(f"{angle / rate:.2g}") for angle in angles]
+    return [h for h in steps if scene.duration / h <= MAX_FIXED_STEPS] or steps[:1]
+
+
+class _Run:
+    """One simulation: the state, its right-hand side and how it is advanced."""
+
+    def __init__(self, scene: Scene, setting: Setting):
+        self.mechanism = mechanism = Mechanism(scene)
+        self.pin, self.model = mechanism.pin, mechanism.model
+        self.counts = Counts()
+        self.loads = Loads(mechanism)
+        self.nq = self.model.nq
+        self.flat = self.nq == self.model.nv  # no quaternions: dq/dt = v
+        self.driven = [(mechanism.q_of_v[i], self.nq + i, driver) for i, driver in mechanism.driven]
+        self.free = np.setdiff1d(np.arange(self.model.nv), [i for i, _ in mechanism.driven])
+        self.frames = [mechanism.frame(k) for k in range(len(mechanism.tree.links))]
+        self.start = np.array([body.orientation for body in scene.body])
+        self.still = self.loads.fixed and not self.loads.torsion and not self.driven
+        self.y = np.concatenate([mechanism.q0, mechanism.v0])
+        self._configure(setting)
+
+    def _configure(self, setting: Setting) -> None:
+        pin, family = self.pin, setting.family
+        for closure in self.mechanism.closures:
+            root = BAUMGARTE / setting.options["step"] if family == "baumgarte" else 0.0
+            closure.setBaumgarteCorrectorParameters(pin.BaumgarteCorrectorParameters(root**2, 2 * root))
+        self.closures = pin.StdVec_RigidConstraintModel()
+        self.closures.extend(self.mechanism.closures)
+        self.closure_data = pin.StdVec_RigidConstraintData()
+        self.closure_data.extend([c.createData() for c in self.closures])
+        self.data = self.model.createData()
+        if not self.model.check(self.data):
+            raise AssertionError("Pinocchio's joints are not in depth-first order")
+        pin.initConstraintDynamics(self.model, self.data, self.closures, self.closure_data)
+        self.hint = HINTS.get(family, "")
+        given = ((), ()) if family == "defaults" else (CONVERGED, FORCES)
+        self.solver, self.sampler = (pin.ProximalSettings(*options) for options in given)
+        if family in FIXED:
+            step = setting.options["step"]
+            self.step = lambda y, t0, t1: rk4(self.rhs, self.on_spheres, y, t0, t1, step, self.counts)
+        elif family in ("dop853", "tuned"):
+            settle = self.projected if family == "tuned" else None
+            limits = (setting.options["min_step"], self._max_step())
+            adaptive = Adaptive(self.rhs, settle, setting.options["rtol"], *limits, self.counts)
+            self.step = adaptive.advance
+        else:
+            raise ValueError(f"pinocchio has no family {family!r}")
+
+    def _max_step(self) -> float:
+        if not self.driven:
+            return np.inf
+        return TURN_PER_STEP / stated_rate(self.mechanism.scene)
+
+    def advance(self, t0: float, t1: float) -> None:
+        """Moves the state from t0 to t1; raises Failed."""
+        self._finite(t0, self.rhs(t0, self.y))
+        self.y = self.step(self.y, t0, t1)
+
+    def _finite(self, t: float, rates: np.ndarray) -> np.ndarray:
+        if not np.isfinite(rates).all():
+            raise Failed(Outcome.NOT_FINITE, t, f"the accelerations are not finite at {t:.6g} s{self.hint}")
+        return rates
+
+    def split(self, t: float, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Configuration and velocity of a state vector; driven coordinates as prescribed at t."""
+        if self.driven:
+            y = y.copy()
+            for iq, iv, driver in self.driven:
+                y[iq], y[iv], _ = motion(driver, t)
+        q, v = y[: self.nq], y[self.nq :]
+        return (q if self.flat else self.pin.normalize(self.model, q)), v
+
+    def rhs(self, t: float, y: np.ndarray) -> np.ndarray:
+        """Time derivative (nq + nv,) of the state."""
+        q, v = self.split(t, y)
+        a = self.accelerations(t, q, v, self.solver)
+        rates = v if self.flat else self.pin.tangentMap(self.model, q) @ v
+        return np.concatenate((rates, a))
+
+    def accelerations(self, t: float, q: np.ndarray, v: np.ndarray, solver: Any) -> np.ndarray:
+        """Joint accelerations (nv,) from Pinocchio."""
+        tau = self.loads.constant if self.still else self.loads.torques(t, q, v)
+        return self.pin.constraintDynamics(
+            self.model, self.data, q, v, tau, self.closures, self.closure_data, solver
+        )
+
+    def on_spheres(self, t: float, y: np.ndarray) -> np.ndarray:
+        """The state with unit quaternions and driven coordinates as prescribed."""
+        return y if self.flat and not self.driven else np.concatenate(self.split(t, y))
+
+    def projected(self, t: float, y: np.ndarray) -> np.ndarray:
+        """The nearest state, by kinetic energy, whose positions and velocities satisfy the closures: the
+        rounding of a light body is not handed on to a heavy one."""
+        q, v = self.split(t, y)
+        if not len(self.closures):
+            return np.concatenate((q, v))
+        root = self._root_of_mass(t, q)
+        for _ in range(PROJECTIONS):
+            residual, jacobian = self.closure_errors(q)
+            if not abs(residual).max() > CLOSED:
+                break
+            q = self.pin.integrate(self.model, q, self._least_change(t, root, jacobian, residual))
+        if not abs(residual).max() < CLOSED_ENOUGH:
+            raise Failed(Outcome.NOT_CONVERGED, t, f"the closures could not be met at {t:.6g} s")
+        v = v - self._least_change(t, root, jacobian, jacobian @ v)
+        return np.concatenate((q, v))
+
+    def _root_of_mass(self, t: float, q: np.ndarray) -> np.ndarray:
+        """The lower Cholesky factor of the mass matrix of the coordinates that are not driven."""
+        mass = self.pin.crba(self.model, self.data, q)[np.ix_(self.free, self.free)]
+        if not np.isfinite(mass).all():
+            raise Failed(Outcome.NOT_FINITE, t, f"the state is not finite at {t:.6g} s")
+        return np.linalg.cholesky(mass)
+
+    def closure_errors(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Closure residuals (rows,), m and rad, and the Jacobian (rows, nv) with d residual = -J dq."""
+        pin = self.pin
+        pin.computeJointJacobians(self.model, self.data, q)
+        residual = []
+        for closure, data in zip(self.closures, self.closure_data, strict=True):
+            closure.calc(self.model, self.data, data)
+            point = closure.type == pin.ContactType.CONTACT_3D
+            residual.append(data.c1Mc2.translation if point else pin.log6(data.c1Mc2).vector)
+        jacobian = pin.getConstraintsJacobian(self.model, self.data, self.closures, self.closure_data)
+        return np.concatenate(residual), jacobian
+
+    def _least_change(
+        self, t: float, root: np.ndarray, jacobian: np.ndarray, target: np.ndarray
+    ) -> np.ndarray:
+        """The dv (nv,) of least kinetic energy, zero in driven coordinates, with J dv = target."""
+        change = np.zeros(self.model.nv)
+        if not (np.isfinite(jacobian).all() and np.isfinite(target).all()):
+            raise Failed(Outcome.NOT_FINITE, t, f"the closure errors are not finite at {t:.6g} s")
+        spread = solve_triangular(root, jacobian[:, self.free].T, lower=True).T
+        least = np.linalg.lstsq(spread, target, rcond=REDUNDANT)[0]
+        change[self.free] = solve_triangular(root, least, lower=True, trans="T")
+        return change
+
+    def sample(self, t: float) -> Sample:
+        """Poses, velocities and reactions of the scene's bodies and joints."""
+        q, v = self.split(t, self.y)
+        motion = self.link_motion(t, q, v)
+        own = list(self.mechanism.tree.own)
+        turned = rotations.from_matrix(motion.rotation[own])
+        scene, tree = self.mechanism.scene, self.mechanism.tree
+        return Sample(
+            position=motion.position[own],
+            orientation=rotations.multiply(turned, self.start),
+            velocity=motion.velocity[own],
+            angular_velocity=motion.angular_velocity[own],
+            acceleration=motion.acceleration[own],
+            angular_acceleration=motion.angular_acceleration[own],
+            reactions=joint_reactions(scene, tree, motion, self.closing()) if scene.has_mass() else {},
+        )
+
+    def link_motion(self, t: float, q: np.ndarray, v: np.ndarray) -> LinkMotion:
+        """How the links move; leaves the closure forces of this state in the closures' data."""
+        pin, model, data = self.pin, self.model, self.data
+        a = self._finite(t, self.accelerations(t, q, v, self.sampler))
+        pin.forwardKinematics(model, data, q, v, a)
+        frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        frames = [(j, pin.SE3(np.eye(3), c)) for j, c in self.frames]
+        poses = [data.oMi[j] * place for j, place in frames]
+        twists = [pin.getFrameVelocity(model, data, j, place, frame) for j, place in frames]
+        changes = [pin.getFrameClassicalAcceleration(model, data, j, place, frame) for j, place in frames]
+        return LinkMotion(
+            rotation=np.array([pose.rotation for pose in poses]),
+            position=np.array([pose.translation for pose in poses]),
+            velocity=np.array([twist.linear for twist in twists]),
+            angular_velocity=np.array([twist.angular for twist in twists]),
+            acceleration=np.array([change.linear for change in changes]),
+            angular_acceleration=np.array([change.angular for change in changes]),
+            coordinates=self.mechanism.coordinates(q),
+            rates=v,
+        )
+
+    def closing(self) -> list[np.ndarray]:
+        """Per closure of the tree, the wrench on its second link."""
+        wrenches = [np.zeros(6) for _ in self.mechanism.tree.closures]
+        for k, closure, data in zip(self.mechanism.closed, self.closures, self.closure_data, strict=True):
+            place, force = self.data.oMi[closure.joint1_id] * closure.joint1_placement, data.contact_force
+            wrenches[k] = -place.act(force).vector
+        return wrenches
+
+
+ENGINE = Pinocchio()

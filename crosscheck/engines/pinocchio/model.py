@@ -1,0 +1,217 @@
+"""A scene's tree as a Pinocchio model: joints, closures, drivers and loads.
+
+Every joint frame has its origin at the joint's anchor and world-aligned axes at t = 0, so the neutral
+configuration is the scene's.  Joints are added depth first: in any other order Pinocchio's Cholesky
+factorisation is silently wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.driver_motion import motion
+from crosscheck.engines.initial_velocities import initial_rates, twist_maps
+from crosscheck.engines.spanning_tree import GROUND_LINK, Link, Tree, spanning_tree
+from mbref.scene import Force, Moment, Scene, Spring, TorsionSpring
+
+DRIVEN_ARMATURE = 1e18  # inertia of a driven coordinate: it then moves with its torque alone
+
+
+class Mechanism:
+    """A scene in Pinocchio: ``model``, ``closures`` (RigidConstraintModels), and its state at t = 0.
+
+    ``joint`` and ``origin`` give, per link, the Pinocchio joint it hangs from and where (world, t = 0)
+    that joint's frame started.
+    """
+
+    def __init__(self, scene: Scene):
+        import pinocchio as pin
+
+        self.pin, self.scene = pin, scene
+        self.tree = spanning_tree(scene)
+        self.model = pin.Model()
+        self.model.gravity = pin.Motion(np.array(scene.gravity), np.zeros(3))
+        self.joint: list[int] = []
+        self.origin: dict[int, np.ndarray] = {0: np.zeros(3)}
+        for k, link in enumerate(self.tree.links):
+            self._add(k, link)
+        models = [(k, self._closure(closure)) for k, closure in enumerate(self.tree.closures)]
+        self.closed = [k for k, model in models if model is not None]  # indices of the tree's closures
+        self.closures: list[Any] = [model for _, model in models if model is not None]
+        self.driven = [(self.tree.coordinate(scene, d.joint), d) for d in scene.driver]
+        self._make_heavy([i for i, _ in self.driven])
+        joints = self.model.joints
+        simple = [joints[j] for j in range(1, self.model.njoints) if joints[j].nq == 1]
+        self.q_of_v = {joint.idx_v: joint.idx_q for joint in simple}
+        self.q0 = pin.neutral(self.model)
+        self.v0 = initial_rates(scene, self.tree)
+
+    def _add(self, k: int, link: Link) -> None:
+        pin, model = self.pin, self.model
+        joint = self.joint[link.parent] if link.parent != GROUND_LINK else 0
+        for i, motions in enumerate(_joint_models(pin, link)):
+            placement = pin.SE3(np.eye(3), link.anchor - self.origin[joint])
+            joint = model.addJoint(joint, motions, placement, f"{k}.{i}")
+            self.origin[joint] = link.anchor
+        lever = link.position + link.offset - self.origin[joint]
+        model.appendBodyToJoint(joint, pin.Inertia(link.mass, lever, link.inertia), pin.SE3.Identity())
+        self.joint.append(joint)
+
+    def _closure(self, closure) -> Any | None:
+        """The RigidConstraintModel of a closure; None where both links hang from one joint."""
+        pin = self.pin
+        joints = [self.joint[k] if k != GROUND_LINK else 0 for k in closure.links]
+        if joints[0] == joints[1]:
+            return None
+        kind = pin.ContactType.CONTACT_3D if closure.kind == "point" else pin.ContactType.CONTACT_6D
+        first, second = (pin.SE3(np.eye(3), closure.anchor - self.origin[j]) for j in joints)
+        return pin.RigidConstraintModel(
+            kind, self.model, joints[0], first, joints[1], second, pin.ReferenceFrame.LOCAL
+        )
+
+    def _make_heavy(self, coordinates: list[int]) -> None:
+        armature = self.model.armature.copy()
+        armature[coordinates] = DRIVEN_ARMATURE
+        self.model.armature = armature
+
+    def frame(self, link: int) -> tuple[int, np.ndarray]:
+        """Joint that carries a link (or the ground), and where in its frame the link's sits (3,)."""
+        if link == GROUND_LINK:
+            return 0, np.zeros(3)
+        joint = self.joint[link]
+        return joint, self.tree.links[link].position - self.origin[joint]
+
+    def coordinates(self, q: np.ndarray) -> np.ndarray:
+        """(nv,): coordinates by the velocity they belong to; zero where a joint has no angles."""
+        coordinates = np.zeros(self.model.nv)
+        for iv, iq in self.q_of_v.items():
+            coordinates[iv] = q[iq]
+        return coordinates
+
+
+def _joint_models(pin: Any, link: Link) -> list[Any]:
+    """The chain of Pinocchio joints that carries a link."""
+    turn, slide = pin.JointModelRevoluteUnaligned, pin.JointModelPrismaticUnaligned
+    return {
+        "fixed": lambda: [],
+        "revolute": lambda: [turn(a) for a in link.axes],
+        "universal": lambda: [turn(a) for a in link.axes],
+        "translational": lambda: [slide(a) for a in link.axes],
+        "cylindrical": lambda: [joint(a) for a in link.axes for joint in (slide, turn)],
+        "spherical": lambda: [pin.JointModelSpherical()],
+        "free": lambda: [pin.JointModelFreeFlyer()],
+    }[link.kind]()
+
+
+@dataclass(frozen=True)
+class _PointForce:
+    """A constant world force at a point of a joint's frame."""
+
+    joint: int
+    point: Any  # SE3
+    force: np.ndarray
+
+
+class Loads:
+    """Generalised forces of a scene's loads, and of its drivers' heavy coordinates.
+
+    What never changes (a moment on a body that turns about one direction) is evaluated once; the rest is
+    brought to joint torques by Pinocchio's static torque of a model without gravity.
+    """
+
+    def __init__(self, mechanism: Mechanism):
+        pin = self.pin = mechanism.pin
+        self.mechanism = mechanism
+        self.model = mechanism.model.copy()
+        self.model.gravity = pin.Motion.Zero()
+        self.data = self.model.createData()
+        self.constant = np.zeros(self.model.nv)
+        self.moments: list[tuple[int, np.ndarray]] = []
+        self.forces: list[_PointForce] = []
+        self.springs: list[tuple[Spring, list[tuple[int, Any]]]] = []
+        self.torsion: list[tuple[int, int, TorsionSpring]] = []
+        maps = twist_maps(mechanism.tree)
+        for load in mechanism.scene.load:
+            self._add(load, maps)
+        self.fixed = not (self.moments or self.forces or self.springs)
+
+    def _add(self, load: Any, maps: np.ndarray) -> None:
+        mechanism, scene = self.mechanism, self.mechanism.scene
+        if isinstance(load, Moment):
+            body = scene.body_index(load.body)
+            link = mechanism.tree.link_of(body)
+            if _turns_about_one_direction(mechanism.tree, link):
+                self.constant += maps[link, 3:].T @ np.array(load.moment)
+            else:
+                self.moments.append((mechanism.joint[link], np.array(load.moment)))
+        elif isinstance(load, Force):
+            joint, point = self._point(scene.body_index(load.body), load.point)
+            self.forces.append(_PointForce(joint, point, np.array(load.force)))
+        elif isinstance(load, Spring):
+            pairs = zip(load.bodies, load.points, strict=True)
+            self.springs.append((load, [self._point(scene.body_index(b), p) for b, p in pairs]))
+        elif isinstance(load, TorsionSpring):
+            i = mechanism.tree.coordinate(scene, load.joint)
+            self.torsion.append((mechanism.q_of_v[i], i, load))
+
+    def _point(self, body: int, point: Any) -> tuple[int, Any]:
+        joint, _ = self.mechanism.frame(self.mechanism.tree.link_of(body))
+        return joint, self.pin.SE3(np.eye(3), np.array(point) - self.mechanism.origin[joint])
+
+    def torques(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Generalised forces (nv,) at time t (s), configuration q and velocity v."""
+        tau = self.constant.copy()
+        for iq, iv, load in self.torsion:
+            tau[iv] -= load.stiffness * (q[iq] - load.natural_angle) + load.damping * v[iv]
+        if not self.fixed:
+            tau -= self.pin.computeStaticTorque(self.model, self.data, q, self._external(q, v))
+        for i, driver in self.mechanism.driven:
+            tau[i] = DRIVEN_ARMATURE * motion(driver, t)[2]
+        return tau
+
+    def _external(self, q: np.ndarray, v: np.ndarray) -> Any:
+        """Forces on the joints' frames, each in its own axes."""
+        pin, data = self.pin, self.data
+        pin.forwardKinematics(self.model, data, q, v)
+        external = pin.StdVec_Force()
+        external.extend([pin.Force.Zero()] * self.model.njoints)
+        for joint, moment in self.moments:
+            external[joint] += pin.Force(np.zeros(3), data.oMi[joint].rotation.T @ moment)
+        for load in self.forces:
+            external[load.joint] += self._pull(load.joint, load.point, load.force)
+        for spring, ends in self.springs:
+            force = self._tension(spring, ends)
+            for (joint, point), sign in zip(ends, (1.0, -1.0), strict=True):
+                external[joint] += self._pull(joint, point, sign * force)
+        return external
+
+    def _pull(self, joint: int, point: Any, force: np.ndarray) -> Any:
+        rotation = self.data.oMi[joint].rotation
+        return point.act(self.pin.Force(rotation.T @ force, np.zeros(3)))
+
+    def _tension(self, spring: Spring, ends: list[tuple[int, Any]]) -> np.ndarray:
+        """World force (3,) of a spring on its first body."""
+        pin, data = self.pin, self.data
+        frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        first, second = (data.oMi[j].act(point.translation) for j, point in ends)
+        rates = [pin.getFrameVelocity(self.model, data, j, point, frame).linear for j, point in ends]
+        along = second - first
+        length = np.sqrt(along @ along)
+        along = along / length
+        rate = along @ (rates[1] - rates[0])
+        return (spring.stiffness * (length - spring.natural_length) + spring.damping * rate) * along
+
+
+def _turns_about_one_direction(tree: Tree, link: int) -> bool:
+    """Whether every rotation between the ground and a link is about parallel axes."""
+    axes: list[np.ndarray] = []
+    while link != GROUND_LINK:
+        item = tree.links[link]
+        if item.kind in ("spherical", "free"):
+            return False
+        axes += list(item.axes) if item.kind in ("revolute", "universal", "cylindrical") else []
+        link = item.parent
+    return all(abs(a @ axes[0]) > 1 - 1e-14 for a in axes)

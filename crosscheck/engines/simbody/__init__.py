@@ -1,0 +1,5 @@
+"""Simbody through OpenSim as an engine."""
+
+from crosscheck.engines.simbody.adapter import ENGINE
+
+__all__ = ["ENGINE"]

@@ -1,0 +1,155 @@
+"""Simbody, through OpenSim: joint coordinates, constraints met to the tolerance at every accepted step.
+
+Redundant closures are borne (least-norm multipliers).  The families are Simbody's error-controlled
+integrators; the one option is their ``accuracy``, a tolerance of one step.  OpenSim tells no counts of
+steps, so the cost has none.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engine import Cannot, Engine, Setting, Why
+from crosscheck.engines.initial_velocities import lacks_mass
+from crosscheck.engines.sampling import Counts, Failed, Sample, run_through
+from crosscheck.engines.simbody.model import Mechanism
+from crosscheck.engines.spanning_tree import GROUND_LINK
+from crosscheck.engines.tree_reactions import LinkMotion, joint_reactions, wrench
+from mbref import rotations
+from mbref.scene import Scene
+from mbref.trajectory import Outcome, Trajectory
+
+INTEGRATORS = {"merson": "RungeKuttaMerson", "feldberg": "RungeKuttaFeldberg", "cpodes": "CPodes"}
+ACCURACIES = (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10)
+
+
+class Simbody(Engine):
+    """Simbody as it comes with OpenSim (PyPI ``opensim``)."""
+
+    name = "simbody"
+    package = "opensim"
+
+    def version(self) -> str:
+        """Version of OpenSim; raises ImportError when it is not installed."""
+        return metadata.version(self.package)
+
+    def prepare(self, families: Sequence[str]) -> None:
+        import opensim  # noqa: F401
+
+    def cannot(self, scene: Scene) -> Cannot | None:
+        """Every joint and load maps; a driver is a polynomial or a sine; without mass all is prescribed."""
+        mixed = [d.joint for d in scene.driver if d.sine and any(d.polynomial[1:])]
+        if mixed:
+            why = "OpenSim has no sum of a polynomial and a sine with a right second derivative"
+            return Cannot(Why.UPSTREAM, f"{why}, which drives {', '.join(mixed)}")
+        return lacks_mass(scene)
+
+    def settings(self, scene: Scene) -> Sequence[Setting]:
+        """Integrators by accuracy."""
+        return [Setting(family, {"accuracy": a}) for family in INTEGRATORS for a in ACCURACIES]
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        """Simulate; raises ValueError for a family it does not have."""
+        if setting.family not in INTEGRATORS:
+            raise ValueError(f"simbody has no family {setting.family!r}")
+        start = time.process_time()
+        run = _Run(scene, INTEGRATORS[setting.family], setting.options["accuracy"])
+        labels = {"engine": self.name, "version": self.version(), "method": setting.family,
+                  "settings": dict(setting.options)}  # fmt: skip
+        built = time.process_time() - start
+        return run_through(scene, times, run.advance, run.sample, Counts(), built, labels)
+
+
+class _Run:
+    """One simulation: the mechanism, its state and the integrator."""
+
+    def __init__(self, scene: Scene, integrator: str, accuracy: float):
+        self.scene, self.mechanism = scene, Mechanism(scene)
+        self.state = self.mechanism.start()
+        opensim = self.mechanism.opensim
+        self.manager = manager = opensim.Manager(self.mechanism.model)
+        manager.setIntegratorMethod(getattr(opensim.Manager, f"IntegratorMethod_{integrator}"))
+        manager.setIntegratorAccuracy(accuracy)
+        manager.setWriteToStorage(False)
+        manager.setPerformAnalyses(False)
+        manager.setRecordStatesTrajectory(False)
+        manager.initialize(self.state)
+        self.start = np.array([body.orientation for body in scene.body])
+
+    def advance(self, t0: float, t1: float) -> None:
+        """Moves the state from t0 to t1; raises Failed."""
+        try:
+            self.state = self.manager.integrate(t1)
+        except RuntimeError as error:
+            reached = self.manager.getState().getTime()
+            raise Failed(Outcome.STEP_FAILED, reached, _sentence(error)) from None
+
+    def sample(self, t: float) -> Sample:
+        """Poses, velocities, accelerations and reactions."""
+        motion = self._motion()
+        own = list(self.mechanism.tree.own)
+        weighed = self.scene.has_mass()
+        closing = self._closing(motion) if weighed else []
+        return Sample(
+            position=motion.position[own],
+            orientation=rotations.multiply(rotations.from_matrix(motion.rotation[own]), self.start),
+            velocity=motion.velocity[own],
+            angular_velocity=motion.angular_velocity[own],
+            acceleration=motion.acceleration[own],
+            angular_acceleration=motion.angular_acceleration[own],
+            reactions=joint_reactions(self.scene, self.mechanism.tree, motion, closing) if weighed else {},
+        )
+
+    def _motion(self) -> LinkMotion:
+        """How the links move."""
+        state, bodies = self.state, self.mechanism.bodies
+        self.mechanism.model.realizeAcceleration(state)
+        of = {name: np.array([_three(getattr(body, f"get{name}InGround")(state)) for body in bodies])
+              for name in ("Position", "LinearVelocity", "AngularVelocity", "LinearAcceleration",
+                           "AngularAcceleration")}  # fmt: skip
+        coordinates = [self.mechanism.coordinates[k] for k in range(self.mechanism.tree.nv)]
+        return LinkMotion(
+            rotation=np.array([_matrix(body.getTransformInGround(state).R()) for body in bodies]),
+            position=of["Position"],
+            velocity=of["LinearVelocity"],
+            angular_velocity=of["AngularVelocity"],
+            acceleration=of["LinearAcceleration"],
+            angular_acceleration=of["AngularAcceleration"],
+            coordinates=np.array([coordinate.getValue(state) for coordinate in coordinates]),
+            rates=np.array([coordinate.getSpeedValue(state) for coordinate in coordinates]),
+        )
+
+    def _closing(self, motion: LinkMotion) -> list[np.ndarray]:
+        """Per closure of the tree, the wrench on its second link about the world's origin."""
+        found = []
+        for closure, constraint in zip(self.mechanism.tree.closures, self.mechanism.closures, strict=True):
+            second = closure.links[1]
+            labels, values = constraint.getRecordLabels(), constraint.getRecordValues(self.state)
+            name = f"_{self.mechanism.frame(second).getName()}_Fx"
+            at = next(k for k in range(labels.getSize()) if labels.get(k).endswith(name))
+            force, moment = np.array([values.get(at + k) for k in range(6)]).reshape(2, 3)
+            origin = motion.position[second] if second != GROUND_LINK else np.zeros(3)
+            found.append(-wrench(force, origin, moment))  # OpenSim records what the bodies exert
+        return found
+
+
+def _three(vector: Any) -> list[float]:
+    return [vector.get(n) for n in range(3)]
+
+
+def _matrix(rotation: Any) -> list[list[float]]:
+    return [[rotation.get(i, j) for j in range(3)] for i in range(3)]
+
+
+def _sentence(error: RuntimeError) -> str:
+    """The line of OpenSim's report that says what happened."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return next((line for line in lines if "advance" in line or "rror" in line), lines[0])
+
+
+ENGINE = Simbody()

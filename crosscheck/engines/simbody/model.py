@@ -1,0 +1,202 @@
+"""A scene's tree as an OpenSim model on Simbody: bodies, joints, closures, drivers and loads.
+
+Every body frame has the link's origin and world-aligned axes at t = 0; coordinates start at zero.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.constraint_equations import joint_frame
+from crosscheck.engines.initial_velocities import initial_rates
+from crosscheck.engines.spanning_tree import GROUND_LINK, Closure, Link, spanning_tree
+from mbref.scene import Driver, Force, Moment, Scene, Spring, TorsionSpring
+
+UNLIMITED = 1e9  # rad or m; coordinates have a range
+LOCKED = 1e-12  # cosine of the second angle below which the first and third are one
+
+
+class Mechanism:
+    """A scene in OpenSim: ``model``, its ``bodies`` and ``closures`` in the tree's order."""
+
+    def __init__(self, scene: Scene):
+        import opensim
+
+        opensim.Logger.setLevelString("off")
+        self.opensim, self.scene, self.tree = opensim, scene, spanning_tree(scene)
+        self.model = opensim.Model()
+        self.model.setGravity(opensim.Vec3(*scene.gravity))
+        self.bodies: list[Any] = []
+        self.coordinates: dict[int, Any] = {}  # by joint velocity of the tree
+        for k, link in enumerate(self.tree.links):
+            self._add(k, link)
+        self.closures = [self._close(k, closure) for k, closure in enumerate(self.tree.closures)]
+        for driver in scene.driver:
+            self._drive(driver)
+        for k, load in enumerate(scene.load if scene.has_mass() else ()):
+            self.model.addForce(self._force(f"load{k}", load))
+        self.model.finalizeConnections()
+
+    def start(self) -> Any:
+        """The state at t = 0."""
+        state = self.model.initSystem()
+        for k, rate in enumerate(initial_rates(self.scene, self.tree)):
+            self.coordinates[k].setSpeedValue(state, float(rate))
+        return state
+
+    def vector(self, values: Any) -> Any:
+        """Three numbers as OpenSim's vector."""
+        return self.opensim.Vec3(*map(float, values))
+
+    def frame(self, link: int) -> Any:
+        """OpenSim's frame of a link or the ground."""
+        return self.model.getGround() if link == GROUND_LINK else self.bodies[link]
+
+    def place(self, link: int, point: Any) -> Any:
+        """A point (world at t = 0) in the frame of a link."""
+        origin = np.zeros(3) if link == GROUND_LINK else self.tree.links[link].position
+        return self.vector(np.array(point) - origin)
+
+    def _add(self, k: int, link: Link) -> None:
+        o, i = self.opensim, link.inertia
+        inertia = o.Inertia(i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2])
+        body = o.Body(f"body{k}", link.mass, self.vector(link.offset), inertia)
+        self.model.addBody(body)
+        self.bodies.append(body)
+        kind, frame, order = _joint(link)
+        turned = self.vector(_angles(frame))
+        ends = [self.frame(link.parent), self.place(link.parent, link.anchor), turned, body,
+                self.place(k, link.anchor), turned]  # fmt: skip
+        if kind == "CylindricalJoint":
+            joint = o.CustomJoint(f"joint{k}", *ends, self._cylindrical(k))
+        else:
+            joint = getattr(o, kind)(f"joint{k}", *ends)
+        self.model.addJoint(joint)
+        for n in range(link.freedoms):
+            coordinate = joint.upd_coordinates(order[n])
+            coordinate.setName(f"q{k}_{order[n]}")
+            coordinate.setRangeMin(-UNLIMITED)
+            coordinate.setRangeMax(UNLIMITED)
+            self.coordinates[self.tree.starts[k] + n] = coordinate
+
+    def _cylindrical(self, k: int) -> Any:
+        """Rotation about and translation along z; coordinates in this order."""
+        o = self.opensim
+        transform = o.SpatialTransform()
+        for n, axis in enumerate((transform.upd_rotation3(), transform.upd_translation3())):
+            names = o.ArrayStr()
+            names.append(f"q{k}_{n}")
+            axis.setCoordinateNames(names)
+            axis.set_function(o.LinearFunction(1.0, 0.0))
+        return transform
+
+    def _close(self, k: int, closure: Closure) -> Any:
+        first, second = closure.links
+        places = [self.place(link, closure.anchor) for link in closure.links]
+        if closure.kind == "point":
+            constraint = self.opensim.PointConstraint(
+                self.frame(first), places[0], self.frame(second), places[1]
+            )
+        else:
+            zero = self.vector((0, 0, 0))
+            constraint = self.opensim.WeldConstraint(
+                f"closure{k}", self.frame(first), places[0], zero, self.frame(second), places[1], zero
+            )
+        constraint.setName(f"closure{k}")
+        self.model.addConstraint(constraint)
+        return constraint
+
+    def _drive(self, driver: Driver) -> None:
+        coordinate = self.coordinates[self.tree.coordinate(self.scene, driver.joint)]
+        coordinate.setPrescribedFunction(self._motion(driver))
+        coordinate.setDefaultIsPrescribed(True)
+
+    def _motion(self, driver: Driver) -> Any:
+        """The driver's value as a function of time."""
+        o, s = self.opensim, driver.sine
+        if s is None:
+            descending = o.Vector(len(driver.polynomial), 0.0)
+            for n, c in enumerate(reversed(driver.polynomial)):
+                descending.set(n, c)
+            return o.PolynomialFunction(descending)
+        return o.Sine(s.amplitude, s.frequency, s.phase, driver.polynomial[0])
+
+    def _force(self, name: str, load: Any) -> Any:
+        return FORCES[type(load)](self, name, load)
+
+    def link_of(self, body: str) -> int:
+        """The link of a scene's body, by name."""
+        return self.tree.link_of(self.scene.body_index(body))
+
+
+def _constants(mechanism: Mechanism, values: Any) -> list[Any]:
+    return [mechanism.opensim.Constant(float(value)) for value in values]
+
+
+def _moment(mechanism: Mechanism, name: str, load: Moment) -> Any:
+    force = mechanism.opensim.PrescribedForce(name, mechanism.frame(mechanism.link_of(load.body)))
+    force.setTorqueFunctions(*_constants(mechanism, load.moment))
+    return force
+
+
+def _point_force(mechanism: Mechanism, name: str, load: Force) -> Any:
+    link = mechanism.link_of(load.body)
+    force = mechanism.opensim.PrescribedForce(name, mechanism.frame(link))
+    place = mechanism.place(link, load.point)
+    force.setForceFunctions(*_constants(mechanism, load.force))
+    force.setPointFunctions(*_constants(mechanism, [place[n] for n in range(3)]))
+    return force
+
+
+def _spring(mechanism: Mechanism, name: str, load: Spring) -> Any:
+    """Of the distance d and its rate; positive pulls together."""
+    force = mechanism.opensim.ExpressionBasedPointToPointForce()
+    links = [mechanism.link_of(body) for body in load.bodies]
+    first, second = (mechanism.frame(link) for link in links)
+    force.setName(name)
+    force.setBody1Name(first.getAbsolutePathString())
+    force.setBody2Name(second.getAbsolutePathString())
+    force.setPoint1(mechanism.place(links[0], load.points[0]))
+    force.setPoint2(mechanism.place(links[1], load.points[1]))
+    force.setExpression(f"({load.stiffness!r})*(d-({load.natural_length!r}))+({load.damping!r})*ddot")
+    return force
+
+
+def _torsion_spring(mechanism: Mechanism, name: str, load: TorsionSpring) -> Any:
+    coordinate = mechanism.coordinates[mechanism.tree.coordinate(mechanism.scene, load.joint)]
+    force = mechanism.opensim.SpringGeneralizedForce(coordinate.getName())
+    force.setName(name)
+    force.setStiffness(load.stiffness)
+    force.setRestLength(load.natural_angle)
+    force.setViscosity(load.damping)
+    return force
+
+
+FORCES = {Moment: _moment, Force: _point_force, Spring: _spring, TorsionSpring: _torsion_spring}
+
+
+def _joint(link: Link) -> tuple[str, np.ndarray, tuple[int, ...]]:
+    """OpenSim's joint of a link, its frame (3, 3), and which of its coordinates the tree's are."""
+    axes = link.axes
+    if link.kind == "universal":
+        y = axes[1] - (axes[1] @ axes[0]) * axes[0]
+        y /= np.linalg.norm(y)
+        return "UniversalJoint", np.column_stack([axes[0], y, np.cross(axes[0], y)]), (0, 1)
+    if link.kind == "translational":
+        return "SliderJoint", np.roll(joint_frame(axes[0]), 1, axis=1), (0,)
+    if link.kind in ("revolute", "cylindrical"):
+        kind, order = {"revolute": ("PinJoint", (0,)), "cylindrical": ("CylindricalJoint", (1, 0))}[link.kind]
+        return kind, joint_frame(axes[0]), order
+    kind, order = {"fixed": ("WeldJoint", ()), "spherical": ("BallJoint", (0, 1, 2)),
+                   "free": ("FreeJoint", (3, 4, 5, 0, 1, 2))}[link.kind]  # fmt: skip
+    return kind, np.eye(3), order
+
+
+def _angles(r: np.ndarray) -> tuple[float, float, float]:
+    """Angles of rotations about body-fixed x, y, z in turn that make up a rotation matrix (3, 3)."""
+    cosine = np.hypot(r[0, 0], r[0, 1])
+    if cosine < LOCKED:
+        return np.arctan2(r[2, 1], r[1, 1]), np.arctan2(r[0, 2], cosine), 0.0
+    return np.arctan2(-r[1, 2], r[2, 2]), np.arctan2(r[0, 2], cosine), np.arctan2(-r[0, 1], r[0, 0])

@@ -1,0 +1,5 @@
+"""SUNDIALS IDA as an engine."""
+
+from crosscheck.engines.sundials.adapter import ENGINE
+
+__all__ = ["ENGINE"]

@@ -1,0 +1,69 @@
+"""SUNDIALS IDA on the scene's own equations in Cartesian coordinates, stabilised and of index 1.
+
+With Euler parameters p, body-fixed ω', and the twist V = (v, ω'), the residual is
+
+    q' = T(q) (V + Φ_qᵀ μ),   M V' = f + Φ_qᵀ λ,   Φ(q, t) = 0,   Φ_q V = ν,
+
+the index-2 form of Gear, Gupta and Leimkuhler; λ and μ are derivatives of two further states, which makes
+it of index 1 (Gear).  Rows that are redundant at the start are left out, chosen by pivoted QR; when the
+chosen ones become ill-conditioned beside another choice, the run restarts with that.  A row left out that
+is violated later ends the run.
+
+The residual is numpy; its cost, not IDA's, is most of the time.  The one option is ``rtol``.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from importlib import metadata
+
+import numpy as np
+
+from crosscheck.engine import Cannot, Engine, Setting
+from crosscheck.engines.initial_velocities import lacks_mass
+from crosscheck.engines.sampling import run_through
+from crosscheck.engines.sundials.ida import Run
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+
+RTOLS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+FAMILY = "ggl"
+
+
+class Sundials(Engine):
+    """SUNDIALS IDA (PyPI ``scikit-sundae``)."""
+
+    name = "sundials"
+    package = "scikit-sundae"
+
+    def version(self) -> str:
+        """Version of scikit-sundae; raises ImportError when it is not installed."""
+        return metadata.version(self.package)
+
+    def prepare(self, families: Sequence[str]) -> None:
+        import sksundae.ida  # noqa: F401
+
+    def cannot(self, scene: Scene) -> Cannot | None:
+        """Every joint, driver and load is written out; without masses all motion must be prescribed."""
+        return lacks_mass(scene)
+
+    def settings(self, scene: Scene) -> Sequence[Setting]:
+        """One family, by relative tolerance."""
+        return [Setting(FAMILY, {"rtol": rtol}) for rtol in RTOLS]
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        """Simulate; raises ValueError for a family it does not have."""
+        if setting.family != FAMILY:
+            raise ValueError(f"sundials has no family {setting.family!r}")
+        from sksundae.ida import IDA
+
+        start = time.process_time()
+        run = Run(IDA, scene, setting.options["rtol"])
+        labels = {"engine": self.name, "version": self.version(), "method": setting.family,
+                  "settings": dict(setting.options)}  # fmt: skip
+        built = time.process_time() - start
+        return run_through(scene, times, run.advance, run.sample, run.counts, built, labels)
+
+
+ENGINE = Sundials()

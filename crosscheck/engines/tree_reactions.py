@@ -1,0 +1,156 @@
+"""Joint reactions of a tree by Newton-Euler recursion, from an engine's accelerations and closure forces.
+
+Wrenches are (force, moment about the world's origin), world axes.  Between redundant joints the reaction
+is the engine's choice; a ghost's joint carries the reaction of the joint that was cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.engines.spanning_tree import GROUND_LINK, Tree
+from mbref.scene import Distance, Force, Moment, Scene, Spring, TorsionSpring
+
+ZERO = np.zeros(3)
+
+
+@dataclass(frozen=True)
+class LinkMotion:
+    """Motion of the links' frames in the world: rotation since t = 0 (n, 3, 3); the rest (n, 3).
+
+    ``coordinates`` and ``rates`` (nv,) are the joint coordinates, meaningful where a joint has one angle.
+    """
+
+    rotation: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+    acceleration: np.ndarray
+    angular_acceleration: np.ndarray
+    coordinates: np.ndarray
+    rates: np.ndarray
+
+
+def wrench(force: np.ndarray, point: np.ndarray, moment: np.ndarray = ZERO) -> np.ndarray:
+    """(6,): a force at a point and a moment."""
+    return np.concatenate([force, moment + np.cross(point, force)])
+
+
+def joint_reactions(
+    scene: Scene, tree: Tree, motion: LinkMotion, closing: Sequence[np.ndarray]
+) -> dict[str, np.ndarray]:
+    """Force and moment (6,) on each joint's second body at the anchor on that body, world axes.
+
+    ``closing`` has, per closure of the tree, the wrench on its second link.
+    """
+    carried = _carried(scene, tree, motion, closing)
+    by_joint = {c.joint: w for c, w in zip(tree.closures, closing, strict=True) if c.kind == "point"}
+    for k, link in enumerate(tree.links):
+        if link.joint >= 0:
+            second = scene.body_index(scene.joint[link.joint].bodies[1])
+            child_is_second = link.body == second and not link.ends
+            by_joint[link.joint] = carried[k] if child_is_second else -carried[k]
+    return {
+        joint.name: _at_second_anchor(scene, tree, motion, j, by_joint[j])
+        for j, joint in enumerate(scene.joint)
+    }
+
+
+def _carried(scene: Scene, tree: Tree, motion: LinkMotion, closing: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """The wrench on every link through the joint that carries it."""
+    needed = [_inertial(scene, tree, motion, k) for k in range(len(tree.links))]
+    needed.append(np.zeros(6))  # the ground's, index -1
+    for load in scene.load:
+        for link, applied in _applied(scene, tree, motion, load):
+            needed[link] = needed[link] - applied
+    for closure, applied in zip(tree.closures, closing, strict=True):
+        first, second = closure.links
+        needed[first] = needed[first] + applied
+        needed[second] = needed[second] - applied
+    for k in reversed(range(len(tree.links))):
+        parent = tree.links[k].parent
+        needed[parent] = needed[parent] + needed[k]
+    return needed[:-1]
+
+
+def _inertial(scene: Scene, tree: Tree, motion: LinkMotion, k: int) -> np.ndarray:
+    """The wrench that accelerates a link, its weight taken off."""
+    link, rotation, spin = tree.links[k], motion.rotation[k], motion.angular_velocity[k]
+    arm = rotation @ link.offset
+    angular = motion.angular_acceleration[k]
+    acceleration = motion.acceleration[k] + np.cross(angular, arm) + np.cross(spin, np.cross(spin, arm))
+    inertia = rotation @ link.inertia @ rotation.T
+    moment = inertia @ angular + np.cross(spin, inertia @ spin)
+    return wrench(link.mass * (acceleration - np.array(scene.gravity)), motion.position[k] + arm, moment)
+
+
+def _arm(tree: Tree, motion: LinkMotion, link: int, point: Sequence[float]) -> np.ndarray:
+    return motion.rotation[link] @ (np.array(point) - tree.links[link].position)
+
+
+def _point(
+    tree: Tree, motion: LinkMotion, link: int, point: Sequence[float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Present position and velocity of a point of a link (of the ground), given in the world at t = 0."""
+    if link == GROUND_LINK:
+        return np.array(point), ZERO
+    arm = _arm(tree, motion, link, point)
+    return motion.position[link] + arm, motion.velocity[link] + np.cross(motion.angular_velocity[link], arm)
+
+
+def _applied(scene: Scene, tree: Tree, motion: LinkMotion, load) -> list[tuple[int, np.ndarray]]:
+    """Links a load acts on, and with what."""
+    if isinstance(load, Moment):
+        return [(tree.link_of(scene.body_index(load.body)), np.array([*ZERO, *load.moment]))]
+    if isinstance(load, Force):
+        link = tree.link_of(scene.body_index(load.body))
+        return [(link, wrench(np.array(load.force), _point(tree, motion, link, load.point)[0]))]
+    if isinstance(load, Spring):
+        links = [tree.link_of(scene.body_index(name)) for name in load.bodies]
+        (p, u), (q, v) = (_point(tree, motion, k, x) for k, x in zip(links, load.points, strict=True))
+        length = np.linalg.norm(q - p)
+        along = (q - p) / length
+        tension = load.stiffness * (length - load.natural_length) + load.damping * (v - u) @ along
+        return [(links[0], wrench(tension * along, p)), (links[1], wrench(-tension * along, q))]
+    return _twisted(scene, tree, motion, load)
+
+
+def _twisted(
+    scene: Scene, tree: Tree, motion: LinkMotion, load: TorsionSpring
+) -> list[tuple[int, np.ndarray]]:
+    i = tree.coordinate(scene, load.joint)
+    child = next(
+        k for k, n in enumerate(tree.links) if n.joint >= 0 and scene.joint[n.joint].name == load.joint
+    )
+    angle, rate = motion.coordinates[i], motion.rates[i]
+    back = -(load.stiffness * (angle - load.natural_angle) + load.damping * rate)
+    axis = motion.rotation[child] @ tree.links[child].axes[0]
+    moment = np.concatenate([ZERO, back * axis])
+    return [(child, moment), (tree.links[child].parent, -moment)]
+
+
+def _at_second_anchor(
+    scene: Scene, tree: Tree, motion: LinkMotion, j: int, on_second: np.ndarray
+) -> np.ndarray:
+    """A joint's wrench moved to the anchor on the second body; a rod's end mass given back to the body."""
+    joint = scene.joint[j]
+    link = tree.link_of(scene.body_index(joint.bodies[1]))
+    distance = isinstance(joint, Distance)
+    anchor, _ = _point(tree, motion, link, joint.anchors[1] if distance else joint.anchor)
+    force, moment = on_second[:3], on_second[3:] - np.cross(anchor, on_second[:3])
+    if distance:
+        rod = next(n for n in tree.links if n.ends and np.array_equal(n.ends[1][1], joint.anchors[1])
+                   and np.array_equal(n.ends[0][1], joint.anchors[0]))  # fmt: skip
+        force = force + rod.mass / 2 * (_acceleration(tree, motion, link, joint.anchors[1]) - scene.gravity)
+    return np.concatenate([force, moment])
+
+
+def _acceleration(tree: Tree, motion: LinkMotion, link: int, point: Sequence[float]) -> np.ndarray:
+    if link == GROUND_LINK:
+        return ZERO
+    arm, spin = _arm(tree, motion, link, point), motion.angular_velocity[link]
+    centripetal = np.cross(spin, np.cross(spin, arm))
+    return motion.acceleration[link] + np.cross(motion.angular_acceleration[link], arm) + centripetal

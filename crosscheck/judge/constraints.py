@@ -1,0 +1,198 @@
+"""Joint equations of a scene from poses: residuals at three levels, Jacobian, initial velocities.
+
+Plain numpy and formulas of its own (see joint_residuals.py), so that a trajectory can be judged without the
+model that produced it.  Arrays may have any leading shape (…): one pose, or the samples of a trajectory.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crosscheck.judge import joint_residuals
+from crosscheck.judge.tolerances import CONTRADICTION, RANK
+from mbref import rotations
+from mbref.scene import Scene, SceneError
+from mbref.scene_validation import DRIVEN
+
+Residuals = dict[str, np.ndarray]
+
+
+def closure(scene: Scene, t: np.ndarray | float, position: np.ndarray, orientation: np.ndarray) -> Residuals:
+    """Position residuals (…, rows) by joint name, m and rad, of positions (…, nb, 3) and unit
+    quaternions (…, nb, 4) at times t (…); a driver's residual stands last under its joint."""
+    pose = _pose(position, orientation)
+    return {
+        m.name: joint_residuals.position_rows(m, np.asarray(t, float), *pose)
+        for m in joint_residuals.mates(scene)
+    }
+
+
+def closure_rates(
+    scene: Scene, t: np.ndarray | float, position: np.ndarray, orientation: np.ndarray,
+    velocity: np.ndarray, angular_velocity: np.ndarray,
+) -> Residuals:  # fmt: skip
+    """Velocity residuals (…, rows), m/s and rad/s, of world velocities (…, nb, 3): the forbidden
+    components of the frames' relative twist; on closed poses the time derivative of `closure`."""
+    motion = (*_pose(position, orientation), _grounded(velocity), _grounded(angular_velocity))
+    return {
+        m.name: joint_residuals.velocity_rows(m, np.asarray(t, float), *motion)
+        for m in joint_residuals.mates(scene)
+    }
+
+
+def closure_accelerations(
+    scene: Scene, t: np.ndarray | float, position: np.ndarray, orientation: np.ndarray,
+    velocity: np.ndarray, angular_velocity: np.ndarray,
+    acceleration: np.ndarray, angular_acceleration: np.ndarray,
+) -> Residuals:  # fmt: skip
+    """Acceleration residuals (…, rows), m/s² and rad/s²: the time derivative of `closure_rates`."""
+    rates = (velocity, angular_velocity, acceleration, angular_acceleration)
+    motion = (*_pose(position, orientation), *map(_grounded, rates))
+    return {
+        m.name: joint_residuals.acceleration_rows(m, np.asarray(t, float), *motion)
+        for m in joint_residuals.mates(scene)
+    }
+
+
+def length_rows(scene: Scene) -> dict[str, np.ndarray]:
+    """Which residuals (rows,) of each joint are lengths (True, m) and which angles (False, rad)."""
+    return {m.name: joint_residuals.are_lengths(m) for m in joint_residuals.mates(scene)}
+
+
+def joint_coordinates(
+    scene: Scene, times: np.ndarray, position: np.ndarray, orientation: np.ndarray,
+    angular_velocity: np.ndarray,
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """(k, 2) angle (rad) and displacement (m) since t = 0 of every joint with an axis, by name.
+
+    Trajectory arrays (k, nb, ·).  The angle counts turns; it is NaN from where the samples are too far
+    apart to tell them.
+    """
+    motion = (np.asarray(times, float), *_pose(position, orientation), _grounded(angular_velocity))
+    if not len(motion[0]):
+        return {m.name: np.zeros((0, 2)) for m in joint_residuals.mates(scene) if m.type in DRIVEN}
+    return {
+        m.name: joint_residuals.coordinates(m, *motion)
+        for m in joint_residuals.mates(scene)
+        if m.type in DRIVEN
+    }
+
+
+def jacobian(
+    scene: Scene, t: float, position: np.ndarray, orientation: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(J, b) with J x = b at velocity level: J (rows, 6 nb), b (rows,), rows in the order of the joints.
+
+    x holds (velocity of the centre of mass, angular velocity), world, body after body; `position` (nb, 3)
+    and `orientation` (nb, 4) are one pose.
+    """
+    n = 6 * len(scene.body)
+    twists = np.vstack([np.zeros(n), np.eye(n)]).reshape(n + 1, -1, 6)
+    places, frames = (np.broadcast_to(a, (n + 1, *np.shape(a))) for a in (position, orientation))
+    rates = closure_rates(scene, np.full(n + 1, float(t)), places, frames, twists[..., :3], twists[..., 3:])
+    rows = np.concatenate([np.zeros((n + 1, 0)), *rates.values()], axis=1)
+    return (rows[1:] - rows[0]).T, -rows[0]
+
+
+def initial_poses(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (nb, 3) and orientations (nb, 4) the scene gives at t = 0."""
+    return np.array([b.position for b in scene.body]), np.array([b.orientation for b in scene.body])
+
+
+def initial_twists(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Velocities and angular velocities (nb, 3), world, at t = 0 that obey joints and drivers.
+
+    Among those, the nearest to the velocities the scene gives (least squares, angular ones times the
+    scene's length), and of what is left open the least mass-weighted norm (unit masses where the scene
+    has none).  Raises SceneError naming the joint when drivers or given velocities contradict the joints
+    by more than 5 % of the velocities' scale.
+    """
+    pose = initial_poses(scene)
+    scale = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))
+    given, wanted = _given(scene, scale)
+    j, b = jacobian(scene, 0.0, *pose)
+    j = j * scale
+    x, free = _solve(j, b)
+    _refuse(scene, "its driver contradicts the joints", j @ x - b, x)
+    step, still_free = _solve(free[given], wanted - x[given])
+    x, free = x + free @ step, free @ still_free
+    if np.abs(x[given] - wanted).max(initial=0.0) > CONTRADICTION * np.abs(wanted).max(initial=0.0):
+        as_given = x.copy()
+        as_given[given] = wanted
+        _refuse(scene, "the given velocities contradict it", j @ as_given - b, as_given)
+    if free.size:
+        weight = _root_of_mass(scene) * scale
+        x = x - free @ np.linalg.lstsq(weight @ free, weight @ x, rcond=None)[0]
+    twists = (x * scale).reshape(-1, 6)
+    return twists[:, :3], twists[:, 3:]
+
+
+def scene_length(scene: Scene) -> float:
+    """Characteristic length (m): the largest distance between two of the joint anchors and centres of
+    mass at t = 0; 1 for a scene whose points all coincide."""
+    points = [body.position for body in scene.body]
+    for joint in scene.joint:
+        points += list(joint.anchors) if joint.type == "distance" else [joint.anchor]
+    array = np.array(points)
+    return float(np.linalg.norm(array[:, None] - array[None], axis=-1).max()) or 1.0
+
+
+def inertia_matrices(scene: Scene) -> np.ndarray:
+    """Inertia (nb, 3, 3) about the centres of mass along the body axes, kg m²; the scene has masses."""
+    given = [np.array(body.inertia) for body in scene.body]
+    return np.array([np.diag(i) if i.ndim == 1 else i for i in given])
+
+
+def _given(scene: Scene, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mask (6 nb,) of the given velocity components, and their values divided by `scale`."""
+    rows = [(*(b.velocity or (np.nan,) * 3), *(b.angular_velocity or (np.nan,) * 3)) for b in scene.body]
+    values = np.array(rows, dtype=float).ravel()
+    given = ~np.isnan(values)
+    return given, values[given] / scale[given]
+
+
+def _solve(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least-squares solution of least norm, and a basis (n, k) of the null space."""
+    u, s, vt = np.linalg.svd(matrix, full_matrices=True)
+    rank = int(np.sum(s > RANK * max(s.max(initial=0.0), 1e-300)))
+    return vt[:rank].T @ ((u[:, :rank].T @ rhs) / s[:rank]), vt[rank:].T
+
+
+def _refuse(scene: Scene, why: str, residual: np.ndarray, x: np.ndarray) -> None:
+    """SceneError naming the joint with the largest residual, if that is gross beside the velocities."""
+    names = [name for name, rows in length_rows(scene).items() for _ in rows]
+    scale = np.abs(x).max(initial=0.0)
+    if names and np.abs(residual).max() > CONTRADICTION * scale:
+        name = names[int(np.abs(residual).argmax())]
+        index = [joint.name for joint in scene.joint].index(name)
+        size = np.abs(residual).max()
+        raise SceneError([f"joint[{index}] {name!r}: {why}: off by {size:.3g} of {scale:.3g} m/s or rad/s"])
+
+
+def _root_of_mass(scene: Scene) -> np.ndarray:
+    """W (6 nb, 6 nb) with WᵀW the mass matrix of the twists at t = 0; the identity without masses."""
+    n = 6 * len(scene.body)
+    root = np.eye(n)
+    if scene.has_mass():
+        axes = rotations.to_matrix(initial_poses(scene)[1])
+        for k, (body, inertia) in enumerate(zip(scene.body, inertia_matrices(scene), strict=True)):
+            moments, principal = np.linalg.eigh(inertia)
+            half = np.sqrt(np.maximum(moments, 0.0))[:, None] * (axes[k] @ principal).T
+            root[6 * k : 6 * k + 3, 6 * k : 6 * k + 3] *= np.sqrt(body.mass or 1.0)
+            root[6 * k + 3 : 6 * k + 6, 6 * k + 3 : 6 * k + 6] = half
+    return root
+
+
+def _pose(position: np.ndarray, orientation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and normalised quaternions with the ground appended."""
+    p = np.asarray(orientation, dtype=float)
+    ground = np.broadcast_to([1.0, 0.0, 0.0, 0.0], p[..., :1, :].shape)
+    return _grounded(position), np.concatenate(
+        [p / np.linalg.norm(p, axis=-1, keepdims=True), ground], axis=-2
+    )
+
+
+def _grounded(array: np.ndarray) -> np.ndarray:
+    """(…, nb + 1, 3): a row of zeros for the ground appended, so that index -1 is the ground."""
+    array = np.asarray(array, dtype=float)
+    return np.concatenate([array, np.zeros_like(array[..., :1, :])], axis=-2)

@@ -1,0 +1,129 @@
+"""Energy balance of a trajectory: kinetic energy and the potentials of gravity and loads over its samples.
+
+Every conservative load has a potential, so that energy minus work is one sum that stays constant.  A
+constant moment has one on a body whose joints keep it turning about a fixed direction parallel to the
+moment; elsewhere its work is the integral of the power through the samples (cubic spline).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from crosscheck.judge import constraints
+from crosscheck.judge.joint_residuals import counted
+from crosscheck.judge.loads import attachment, world_inertia
+from crosscheck.judge.tolerances import PARALLEL
+from mbref import rotations
+from mbref.scene import GROUND, Force, Moment, Scene, Spring, TorsionSpring
+from mbref.trajectory import Trajectory
+
+
+def energy_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
+    """Drift (k,) of energy minus work since t = 0, J divided by the largest energy seen.
+
+    None when a driver or a damper does work, when the scene has no masses, when the samples are too far
+    apart to count a body's turns, or when nothing ever has energy; infinite when a state is not finite.
+    """
+    damped = any(getattr(load, "damping", 0.0) for load in scene.load)
+    if scene.driver or damped or not scene.has_mass() or not len(trajectory.times):
+        return None
+    if not all(np.isfinite(array).all() for array in _motion(trajectory)):
+        return np.full(len(trajectory.times), np.inf)
+    kinetic = kinetic_energy(scene, *_motion(trajectory)[1:])
+    start = kinetic_energy(scene, *(a[None] for a in _initial(scene)[1:]))[0]
+    gains = np.array([kinetic - start, *_potential_gains(scene, trajectory)])
+    scale = max(start, kinetic.max(), np.abs(gains).max())
+    return None if np.isnan(gains).any() or scale == 0 else np.abs(gains.sum(axis=0)) / scale
+
+
+def kinetic_energy(
+    scene: Scene, orientation: np.ndarray, velocity: np.ndarray, angular_velocity: np.ndarray
+) -> np.ndarray:
+    """Kinetic energy (k,) in J of trajectory arrays (k, nb, ·)."""
+    mass = np.array([body.mass for body in scene.body])
+    inertia = world_inertia(scene, rotations.to_matrix(orientation))
+    turning = np.einsum("kbi,kbij,kbj->k", angular_velocity, inertia, angular_velocity)
+    return (np.sum(mass[:, None] * velocity**2, axis=(1, 2)) + turning) / 2
+
+
+def potential_energy(scene: Scene, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+    """Potential energy (k,) in J of gravity (zero at the origin) and springs, of poses (k, nb, ·)."""
+    mass = np.array([body.mass for body in scene.body])
+    energy = -(position @ np.array(scene.gravity)) @ mass
+    for load in scene.load:
+        if isinstance(load, Spring):
+            ends = zip(load.bodies, load.points, strict=True)
+            first, second = (_point(scene, *end, position, orientation) for end in ends)
+            stretch = np.linalg.norm(second - first, axis=-1) - load.natural_length
+            energy = energy + load.stiffness * stretch**2 / 2
+    return energy
+
+
+def _motion(trajectory: Trajectory) -> tuple[np.ndarray, ...]:
+    return trajectory.position, trajectory.orientation, trajectory.velocity, trajectory.angular_velocity
+
+
+def _initial(scene: Scene) -> tuple[np.ndarray, ...]:
+    return (*constraints.initial_poses(scene), *constraints.initial_twists(scene))
+
+
+def _potential_gains(scene: Scene, trajectory: Trajectory) -> Iterator[np.ndarray]:
+    """Growth (k,) of each potential since t = 0."""
+    position, orientation, _, spin = _motion(trajectory)
+    start = (a[None] for a in constraints.initial_poses(scene))
+    yield potential_energy(scene, position, orientation) - potential_energy(scene, *start)
+    angles = constraints.joint_coordinates(scene, trajectory.times, position, orientation, spin)
+    for load in scene.load:
+        if isinstance(load, Force):
+            moved = _point(scene, load.body, load.point, position, orientation) - np.array(load.point)
+            yield -moved @ np.array(load.force)
+        elif isinstance(load, TorsionSpring):
+            twist = angles[load.joint][:, 0] - load.natural_angle
+            yield load.stiffness * (twist**2 - load.natural_angle**2) / 2
+        elif isinstance(load, Moment):
+            yield -_work_of_moment(scene, load, trajectory)
+
+
+def _point(scene: Scene, name: str, point, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+    body, local = attachment(scene, name, point)
+    fixed = np.broadcast_to(local, position[:, 0].shape)
+    return fixed if body < 0 else position[:, body] + rotations.rotate(orientation[:, body], local)
+
+
+def _work_of_moment(scene: Scene, load: Moment, trajectory: Trajectory) -> np.ndarray:
+    moment, body = np.array(load.moment), scene.body_index(load.body)
+    size = np.linalg.norm(moment)
+    if size == 0:
+        return np.zeros(len(trajectory.times))
+    spin = trajectory.angular_velocity[:, body]
+    if load.body in _turning_about(scene, moment / size):
+        turn = rotations.multiply(
+            trajectory.orientation[:, body], rotations.conjugate(np.array(scene.body[body].orientation))
+        )
+        twist = 2 * np.arctan2(turn[:, 1:] @ moment / size, turn[:, 0])
+        return size * counted(trajectory.times, twist, spin @ moment / size)
+    start = constraints.initial_twists(scene)[1][body]
+    later = trajectory.times > 0
+    times = np.concatenate([[0.0], trajectory.times[later]])
+    power = np.concatenate([start[None], spin[later]]) @ moment
+    return CubicSpline(times, power).antiderivative()(trajectory.times) if len(times) > 1 else 0 * power
+
+
+def _turning_about(scene: Scene, direction: np.ndarray) -> set[str]:
+    """Bodies that joints to the ground allow no rotation but about a direction."""
+    reached, grew = {GROUND}, True
+    while grew:
+        links = [set(joint.bodies) for joint in scene.joint if _keeps(joint, direction)]
+        new = {name for pair in links if pair & reached for name in pair} - reached
+        reached |= new
+        grew = bool(new)
+    return reached
+
+
+def _keeps(joint, direction: np.ndarray) -> bool:
+    if joint.type in ("revolute", "cylindrical"):
+        return bool(np.linalg.norm(np.cross(joint.axis, direction)) <= PARALLEL * np.linalg.norm(joint.axis))
+    return joint.type in ("fixed", "translational")

@@ -1,0 +1,87 @@
+"""Gauss's principle: initial accelerations by the judge's own equations; distance from singular positions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crosscheck.judge.constraints import (
+    closure_accelerations,
+    inertia_matrices,
+    initial_poses,
+    initial_twists,
+    jacobian,
+    scene_length,
+)
+from crosscheck.judge.loads import Motion, wrenches
+from crosscheck.judge.tolerances import RANK
+from mbref import rotations
+from mbref.scene import Scene, TorsionSpring
+from mbref.trajectory import Trajectory
+
+NO_AXIS = np.zeros(3)  # no shared axis of turning: torsion springs are added here
+
+
+def gauss(scene: Scene) -> np.ndarray:
+    """Accelerations at t = 0 as `stacked`: of all that joints and drivers allow, the nearest in the mass
+    metric to those without joints.  The scene has masses."""
+    position, orientation = initial_poses(scene)
+    velocity, spin = initial_twists(scene)
+    turn = rotations.to_matrix(orientation)
+    motion = Motion(position[None], turn[None], velocity[None], spin[None], np.zeros((1, len(position))))
+    force, moment = (w[0] for w in wrenches(scene, motion, NO_AXIS))
+    moment = moment + _torsion(scene, spin)
+    inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
+    moment = moment - np.cross(spin, np.einsum("bij,bj->bi", inertia, spin))
+    rows, _ = jacobian(scene, 0.0, position, orientation)
+    root = np.zeros((rows.shape[1], rows.shape[1]))  # W with WᵀW the mass matrix
+    for b, body in enumerate(scene.body):
+        root[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = np.sqrt(body.mass or 0.0) * np.eye(3)
+        root[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = np.linalg.cholesky(inertia[b]).T
+    inverse = np.linalg.inv(root)
+    unbound = inverse.T @ np.hstack([force, moment]).ravel()  # W times the accelerations without joints
+    wanted = -bias(scene) - rows @ inverse @ unbound
+    found = unbound + np.linalg.lstsq(rows @ inverse, wanted, rcond=RANK)[0]
+    linear, angular = np.hsplit((inverse @ found).reshape(-1, 6), 2)
+    return np.concatenate([linear, scene_length(scene) * angular])
+
+
+def _torsion(scene: Scene, spin: np.ndarray) -> np.ndarray:
+    """Moments (nb, 3), world, of the torsion springs at t = 0, where their angles are zero."""
+    moment = np.zeros((len(scene.body) + 1, 3))  # the ground's last
+    spins = np.vstack([spin, np.zeros(3)])
+    joints = {joint.name: joint for joint in scene.joint}
+    for load in scene.load:
+        if isinstance(load, TorsionSpring):
+            joint = joints[load.joint]
+            axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+            first, second = (scene.body_index(name) for name in joint.bodies)
+            rate = (spins[second] - spins[first]) @ axis
+            resistance = (load.damping * rate - load.stiffness * load.natural_angle) * axis
+            moment[second] -= resistance
+            moment[first] += resistance
+    return moment[:-1]
+
+
+def singular_values(scene: Scene) -> np.ndarray:
+    """Of the Jacobian at t = 0, rows of unit length, lengths over the scene's; largest first."""
+    rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
+    scaled = rows * np.tile(np.repeat([scene_length(scene), 1.0], 3), len(scene.body))
+    return np.linalg.svd(scaled / np.linalg.norm(scaled, axis=1, keepdims=True), compute_uv=False)
+
+
+def bias(scene: Scene) -> np.ndarray:
+    """Acceleration residuals (rows,) of the bodies coasting: J a must be minus these."""
+    pose, rates = initial_poses(scene), initial_twists(scene)
+    still = np.zeros_like(pose[0])
+    rows = closure_accelerations(scene, 0.0, *pose, *rates, still, still)
+    return np.concatenate([np.zeros(0), *rows.values()])
+
+
+def stacked(scene: Scene, run: Trajectory, sample: int) -> np.ndarray:
+    """Accelerations at a sample, and angular ones times the scene's length (2 nb, 3), m/s², world.
+
+    Raises ValueError when the run has none.
+    """
+    if run.acceleration is None or run.angular_acceleration is None:
+        raise ValueError(f"{run.engine} reports no accelerations")
+    return np.concatenate([run.acceleration[sample], scene_length(scene) * run.angular_acceleration[sample]])

@@ -1,0 +1,155 @@
+"""Reactions compared where they are unique; what redundant joints share out is each engine's choice.
+
+The multipliers of redundant rows are determined up to the left null space of the Jacobian.  Seen at a
+joint, that is a subspace of wrenches: components across it are unique and must agree between engines,
+components in it need not.  The resultant of all joints on a body is always unique.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.judge.constraints import jacobian, length_rows, scene_length
+from crosscheck.judge.loads import attachment
+from crosscheck.judge.tolerances import RANK
+from mbref import rotations
+from mbref.scene import GROUND, Joint, Scene
+from mbref.trajectory import Trajectory
+
+SAMPLES = 11  # of a trajectory, spread over it, that are compared
+
+
+@dataclass(frozen=True)
+class Reaction:
+    """One joint's reactions in two runs: ``shared`` dimensions of the wrench that redundancy leaves open,
+    and the largest differences across (``unique``) and in (``chosen``) them, relative to the largest
+    reaction of the sample; moments count divided by the scene's length."""
+
+    shared: int
+    unique: float
+    chosen: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Reactions by joint, and the largest difference of the joints' resultants on a body."""
+
+    joints: Mapping[str, Reaction]
+    resultant: float
+
+
+def shared_wrenches(
+    scene: Scene, t: float, position: np.ndarray, orientation: np.ndarray
+) -> dict[str, np.ndarray]:
+    """By joint, an orthonormal basis (6, k) of the wrenches (force, moment over the scene's length; world,
+    on the second body at its anchor) that redundancy leaves open; k = 0 where the reaction is unique.
+
+    ``position`` (nb, 3) and ``orientation`` (nb, 4) are one pose at time t (s).
+    """
+    rows, _ = jacobian(scene, t, position, orientation)
+    length, found, start = scene_length(scene), {}, 0
+    u, s, _ = np.linalg.svd(rows / np.linalg.norm(rows, axis=1, keepdims=True))
+    open_ = u[:, int(np.sum(s > RANK * s[0])) :] / np.linalg.norm(rows, axis=1, keepdims=True)
+    for joint in scene.joint:
+        count = len(length_rows(scene)[joint.name])
+        own = slice(start, start + count)
+        wrenches = _on_second(scene, joint, rows[own], position, orientation) @ open_[own]
+        found[joint.name] = _span(wrenches / np.repeat([1.0, length], 3)[:, None], np.abs(rows).max())
+        start += count
+    return found
+
+
+def compare(scene: Scene, first: Trajectory, second: Trajectory) -> Comparison:
+    """Reactions of two runs of a scene at some common samples; both have reactions and the same times.
+
+    Raises ValueError when one has no reactions or their times differ.
+    """
+    samples = min(len(first.times), len(second.times))
+    if first.reactions is None or second.reactions is None:
+        raise ValueError("a run without reactions has none to compare")
+    if not samples or not np.array_equal(first.times[:samples], second.times[:samples]):
+        raise ValueError("runs are compared at common times")
+    chosen = np.unique(np.linspace(0, samples - 1, min(samples, SAMPLES)).round().astype(int))
+    tables = [_at_sample(scene, first, second, int(k)) for k in chosen]
+    joints = {
+        name: Reaction(*(max(found) for found in zip(*(joints[name] for joints, _ in tables), strict=True)))
+        for name in first.reactions
+    }
+    return Comparison(joints, max(resultant for _, resultant in tables))
+
+
+def side_by_side(scene: Scene, runs: Mapping[str, Trajectory], sample: int) -> dict[str, dict[str, float]]:
+    """By joint with a choice, the size (N, moments over the scene's length) of every run's component in
+    the shared wrenches at a sample: the engines' choices."""
+    pose = next(iter(runs.values()))
+    shared = shared_wrenches(scene, pose.times[sample], pose.position[sample], pose.orientation[sample])
+    units = np.repeat([1.0, scene_length(scene)], 3)
+    return {
+        name: {
+            label: float(np.linalg.norm(basis.T @ (run.reactions[name][sample] / units)))
+            for label, run in runs.items()
+            if run.reactions is not None
+        }
+        for name, basis in shared.items()
+        if basis.shape[1]
+    }
+
+
+def resultants(scene: Scene, run: Trajectory, sample: int) -> np.ndarray:
+    """Force and moment about the centre of mass (nb, 6), world, of all joints on every body."""
+    position, orientation = run.position[sample], run.orientation[sample]
+    total = np.zeros((len(scene.body), 6))
+    for joint in scene.joint:
+        wrench = (run.reactions or {})[joint.name][sample]
+        anchor = _anchor(scene, joint, position, orientation)
+        for sign, name in zip((-1.0, 1.0), joint.bodies, strict=True):
+            if name != GROUND:
+                b = scene.body_index(name)
+                moment = wrench[3:] + np.cross(anchor - position[b], wrench[:3])
+                total[b] += sign * np.concatenate([wrench[:3], moment])
+    return total
+
+
+def _at_sample(
+    scene: Scene, first: Trajectory, second: Trajectory, k: int
+) -> tuple[dict[str, tuple[int, float, float]], float]:
+    """(shared, unique, chosen) by joint and the difference of resultants, at one sample."""
+    assert first.reactions is not None and second.reactions is not None
+    units = np.repeat([1.0, scene_length(scene)], 3)
+    shared = shared_wrenches(scene, first.times[k], first.position[k], first.orientation[k])
+    sizes = [np.linalg.norm(w[k] / units) for r in (first.reactions, second.reactions) for w in r.values()]
+    scale = max(*sizes, 1e-300)
+    joints = {}
+    for name, basis in shared.items():
+        apart = (second.reactions[name][k] - first.reactions[name][k]) / units / scale
+        inside = basis @ (basis.T @ apart)
+        joints[name] = (basis.shape[1], float(np.linalg.norm(apart - inside)), float(np.linalg.norm(inside)))
+    off = (resultants(scene, second, k) - resultants(scene, first, k)) / units / scale
+    return joints, float(np.abs(off).max(initial=0.0))
+
+
+def _on_second(
+    scene: Scene, joint: Joint, rows: np.ndarray, position: np.ndarray, orientation: np.ndarray
+) -> np.ndarray:
+    """(6, rows): wrench on the second body at its anchor of unit multipliers of the joint's rows."""
+    first, second = (scene.body_index(name) for name in joint.bodies)
+    b, sign = (second, 1.0) if second >= 0 else (first, -1.0)
+    wrench = sign * rows[:, 6 * b : 6 * b + 6].T
+    arm = _anchor(scene, joint, position, orientation) - position[b]
+    return np.vstack([wrench[:3], wrench[3:] - np.cross(arm, wrench[:3].T).T])
+
+
+def _anchor(scene: Scene, joint: Joint, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+    """The anchor (3,) on the second body, world."""
+    point = joint.anchors[1] if joint.type == "distance" else joint.anchor
+    body, local = attachment(scene, joint.bodies[1], point)
+    return local if body < 0 else position[body] + rotations.rotate(orientation[body], local)
+
+
+def _span(vectors: np.ndarray, scale: float) -> np.ndarray:
+    """Orthonormal basis (6, k) of the span of columns (6, n); those of rounding size do not count."""
+    u, s, _ = np.linalg.svd(vectors, full_matrices=False)
+    return u[:, s > 1e3 * RANK * scale]

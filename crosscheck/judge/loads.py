@@ -1,0 +1,125 @@
+"""The forces and moments of a scene's gravity and loads on its bodies, from poses and velocities.
+
+Arrays keep the precision they come in (double, or extended for the truths); samples lead: (k, nb, ·).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from crosscheck.judge.constraints import inertia_matrices, initial_poses
+from mbref import rotations
+from mbref.scene import GROUND, Force, Moment, Scene, Spring, TorsionSpring
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Poses and velocities in the world: position, velocity, spin (angular velocity) (k, nb, 3),
+    rotation matrices (k, nb, 3, 3), and turn (k, nb): the angle each body has turned since t = 0 about
+    the axis the motion's family shares, NaN where it has no such angle."""
+
+    position: np.ndarray
+    rotation: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    turn: np.ndarray
+
+
+def wrenches(scene: Scene, motion: Motion, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Force and moment about the centre of mass (k, nb, 3), world, on every body, gravity included.
+
+    ``axis`` (3,) is the unit vector the turns of the motion are about.
+    """
+    mass = np.array([body.mass for body in scene.body])
+    force = motion.position * 0 + mass[:, None] * np.array(scene.gravity)
+    moment = np.zeros_like(force)
+    for load in scene.load:
+        ACTIONS[type(load)](scene, load, motion, axis, force, moment)
+    return force, moment
+
+
+def attachment(scene: Scene, name: str, point: Sequence[float]) -> tuple[int, np.ndarray]:
+    """Index of a body (-1 ground) and the point, given in the world at t = 0, in its frame."""
+    if name == GROUND:
+        return -1, np.array(point)
+    body = scene.body[scene.body_index(name)]
+    arm = np.array(point) - np.array(body.position)
+    return scene.body_index(name), rotations.rotate(rotations.conjugate(np.array(body.orientation)), arm)
+
+
+def _moment(scene, load: Moment, motion: Motion, axis, force, moment) -> None:
+    moment[:, scene.body_index(load.body)] += np.array(load.moment)
+
+
+def _force(scene, load: Force, motion: Motion, axis, force, moment) -> None:
+    body, local = attachment(scene, load.body, load.point)
+    _push(motion, body, motion.rotation[:, body] @ local, np.array(load.force), force, moment)
+
+
+def _spring(scene, load: Spring, motion: Motion, axis, force, moment) -> None:
+    ends = [attachment(scene, *end) for end in zip(load.bodies, load.points, strict=True)]
+    (start, start_rate), (stop, stop_rate) = (_point(motion, *end) for end in ends)
+    offset = stop - start
+    length = np.sqrt(np.sum(offset**2, axis=-1, keepdims=True))
+    direction = offset / length
+    rate = np.sum((stop_rate - start_rate) * direction, axis=-1, keepdims=True)
+    pull = (load.stiffness * (length - load.natural_length) + load.damping * rate) * direction
+    for (body, local), sign in zip(ends, (1, -1), strict=True):
+        if body >= 0:
+            _push(motion, body, motion.rotation[:, body] @ local, sign * pull, force, moment)
+
+
+def _torsion_spring(scene, load: TorsionSpring, motion: Motion, axis, force, moment) -> None:
+    joint: Any = next(j for j in scene.joint if j.name == load.joint)
+    along = np.array(joint.axis) / np.linalg.norm(joint.axis)
+    bodies = [scene.body_index(name) for name in joint.bodies]
+    sign = np.round(along @ axis)
+    angle, rate = motion.position[:, 0, 0] * 0, motion.position[:, 0, 0] * 0
+    for body, side in zip(bodies, (-1, 1), strict=True):
+        if body >= 0:
+            angle = angle + side * sign * motion.turn[:, body]
+            rate = rate + side * sign * (motion.spin[:, body] @ axis)
+    resistance = load.stiffness * (angle - load.natural_angle) + load.damping * rate
+    for body, side in zip(bodies, (-1, 1), strict=True):
+        if body >= 0:
+            moment[:, body] -= side * sign * resistance[:, None] * axis
+
+
+ACTIONS: dict[type, Callable[..., None]] = {
+    Moment: _moment,
+    Force: _force,
+    Spring: _spring,
+    TorsionSpring: _torsion_spring,
+}
+
+
+def _point(motion: Motion, body: int, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """World position and velocity (k, 3) of a body-fixed point."""
+    if body < 0:
+        return np.broadcast_to(local, motion.position[:, 0].shape), np.zeros_like(motion.position[:, 0])
+    arm = motion.rotation[:, body] @ local
+    return motion.position[:, body] + arm, motion.velocity[:, body] + cross(motion.spin[:, body], arm)
+
+
+def _push(motion: Motion, body: int, arm: np.ndarray, push: np.ndarray, force, moment) -> None:
+    force[:, body] += push
+    moment[:, body] += cross(arm, np.broadcast_to(push, arm.shape))
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Vector products (…, 3)."""
+    return a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
+
+
+def world_inertia(scene: Scene, rotation: np.ndarray) -> np.ndarray:
+    """Inertia (…, nb, 3, 3) about the centres of mass along world axes, of rotations (…, nb, 3, 3)."""
+    return rotation @ inertia_matrices(scene) @ np.swapaxes(rotation, -1, -2)
+
+
+def initial_rotations(scene: Scene) -> np.ndarray:
+    """Rotation matrices (nb, 3, 3), body to world, at t = 0."""
+    return rotations.to_matrix(initial_poses(scene)[1])

@@ -1,0 +1,201 @@
+"""Metrics: one number of a run each, from its scene, its trajectory and the exact motion alone.
+
+Errors are taken at the samples the run reached, so that a failed run is judged up to where it got.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from crosscheck.judge import constraints
+from crosscheck.judge.energy import energy_series
+from crosscheck.judge.tolerances import LEAST_ORDER, ROUNDING, STRAIGHT_LINE
+from crosscheck.judge.truth import NoSolution, Truth
+from mbref import rotations
+from mbref.scene import Scene
+from mbref.trajectory import Outcome, Trajectory
+
+
+@dataclass(frozen=True)
+class Metric:
+    """``function(scene, trajectory, exact)`` gives a number, or None where the metric says nothing.
+
+    ``exact`` is the truth's trajectory at the same times, or None.  Numbers are never NaN; a trajectory
+    that is not finite has infinite errors.
+    """
+
+    function: Callable[[Scene, Trajectory, Trajectory | None], float | None]
+    unit: str
+    label: str
+
+
+def measure(scene: Scene, trajectory: Trajectory, truth: Truth | None = None) -> dict[str, float | None]:
+    """Every metric of a trajectory by name; ValueError when its bodies are not the scene's."""
+    trajectory = in_scene_order(scene, trajectory)
+    exact = exact_motion(trajectory, truth)
+    with np.errstate(all="ignore"):  # states that are not finite are told by the metrics, not by warnings
+        return {name: metric.function(scene, trajectory, exact) for name, metric in METRICS.items()}
+
+
+def exact_motion(trajectory: Trajectory, truth: Truth | None) -> Trajectory | None:
+    """The truth at a trajectory's times; None without truth, and where the true motion ends before."""
+    try:
+        return None if truth is None else truth.poses(trajectory.times)
+    except NoSolution:
+        return None
+
+
+def in_scene_order(scene: Scene, trajectory: Trajectory) -> Trajectory:
+    """The trajectory with its bodies in the order of the scene; ValueError when they are others."""
+    names = tuple(body.name for body in scene.body)
+    if trajectory.bodies == names:
+        return trajectory
+    if sorted(trajectory.bodies) != sorted(names):
+        raise ValueError(f"trajectory of {trajectory.bodies}, scene of {names}")
+    order = [trajectory.bodies.index(name) for name in names]
+    keys = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
+    arrays: dict[str, Any] = {k: None if (a := getattr(trajectory, k)) is None else a[:, order] for k in keys}
+    return replace(trajectory, bodies=names, **arrays)
+
+
+def position_error_series(scene: Scene, trajectory: Trajectory, exact: Trajectory) -> np.ndarray:
+    """Largest distance (k,) of a body's centre from its true place, divided by the scene's length."""
+    distance = np.linalg.norm(trajectory.position - exact.position, axis=-1)
+    return distance.max(axis=-1) / constraints.scene_length(scene)
+
+
+def rotation_error_series(scene: Scene, trajectory: Trajectory, exact: Trajectory) -> np.ndarray:
+    """Largest geodesic angle (k,) between a body's orientation and its true one, rad."""
+    return rotations.angle_between(trajectory.orientation, exact.orientation).max(axis=-1)
+
+
+def error_series(scene: Scene, trajectory: Trajectory, exact: Trajectory) -> np.ndarray:
+    """The larger (k,) of relative position error and rotation error."""
+    return np.maximum(
+        position_error_series(scene, trajectory, exact), rotation_error_series(scene, trajectory, exact)
+    )
+
+
+def violation_series(scene: Scene, trajectory: Trajectory, level: int = 0) -> np.ndarray | None:
+    """Largest joint residual (k,) at position (0), velocity (1) or acceleration (2) level; lengths are
+    divided by the scene's, so that the unit is rad, rad/s, rad/s². None when accelerations are missing."""
+    pose = (trajectory.times, trajectory.position, trajectory.orientation)
+    rates = (trajectory.velocity, trajectory.angular_velocity)
+    if level == 0:
+        residuals = constraints.closure(scene, *pose)
+    elif level == 1:
+        residuals = constraints.closure_rates(scene, *pose, *rates)
+    elif trajectory.acceleration is None or trajectory.angular_acceleration is None:
+        return None
+    else:
+        second = (trajectory.acceleration, trajectory.angular_acceleration)
+        residuals = constraints.closure_accelerations(scene, *pose, *rates, *second)
+    length = constraints.scene_length(scene)
+    are_lengths = constraints.length_rows(scene)
+    scaled = [np.abs(r) / np.where(are_lengths[name], length, 1.0) for name, r in residuals.items()]
+    return np.concatenate([np.zeros((len(trajectory.times), 1)), *scaled], axis=1).max(axis=1)
+
+
+def _against_exact(series: Callable[..., np.ndarray]) -> Callable[..., float | None]:
+    def largest(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
+        return None if exact is None else _largest(series(scene, trajectory, exact))
+
+    return largest
+
+
+def _violation(level: int) -> Callable[..., float | None]:
+    def largest(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
+        return _largest(violation_series(scene, trajectory, level))
+
+    return largest
+
+
+def _energy(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
+    return _largest(energy_series(scene, trajectory))
+
+
+def _correct_digits(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
+    """-log10 of the error; the error counts as no less than the rounding unit."""
+    error = _error(scene, trajectory, exact)
+    return None if error is None or math.isinf(error) else -math.log10(max(error, ROUNDING))
+
+
+def _velocity_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
+    """Largest error of a velocity, or of an angular velocity times the scene's length, relative to the
+    largest true one."""
+    if exact is None or not len(trajectory.times):
+        return None
+    length = constraints.scene_length(scene)
+    pairs = [
+        (trajectory.velocity, exact.velocity),
+        (length * trajectory.angular_velocity, length * exact.angular_velocity),
+    ]
+    scale = max(np.linalg.norm(true, axis=-1).max() for _, true in pairs)
+    worst = [_largest(np.linalg.norm(got - true, axis=-1)) or 0.0 for got, true in pairs]
+    return max(worst) / float(scale) if scale > 0 else None
+
+
+def _largest(series: np.ndarray | None) -> float | None:
+    if series is None or series.size == 0:
+        return None
+    return float(series.max()) if np.isfinite(series).all() else math.inf
+
+
+_error = _against_exact(error_series)
+
+METRICS: dict[str, Metric] = {
+    "error": Metric(_error, "", "error (position/length or rotation angle)"),
+    "position_error": Metric(_against_exact(position_error_series), "", "position error / scene length"),
+    "rotation_error": Metric(_against_exact(rotation_error_series), "rad", "rotation error"),
+    "scd": Metric(_correct_digits, "digits", "significant correct digits"),
+    "velocity_error": Metric(_velocity_error, "", "relative velocity error"),
+    "violation_position": Metric(_violation(0), "rad", "violation of position constraints"),
+    "violation_velocity": Metric(_violation(1), "rad/s", "violation of velocity constraints"),
+    "violation_acceleration": Metric(_violation(2), "rad/s²", "violation of acceleration constraints"),
+    "energy_error": Metric(_energy, "", "drift of the energy balance / largest energy"),
+}
+
+
+def false_success(trajectory: Trajectory, error: float | None, level: float) -> bool:
+    """Whether a run says it completed although its error exceeds the level: the wrong branch, or drift."""
+    return trajectory.outcome is Outcome.COMPLETED and error is not None and error > level
+
+
+def order_of_convergence(steps: Sequence[float], errors: Sequence[float]) -> float | None:
+    """Slope of log error over log step in the longest range of at least three neighbouring step sizes
+    that lies on a rising line; None where there is none, as on a floor of rounding.
+    """
+    table = np.array([(s, e) for s, e in zip(steps, errors, strict=True) if 0 < e < math.inf]).reshape(-1, 2)
+    x, y = np.log10(table[np.argsort(table[:, 0])]).T
+    best: tuple[int, float] | None = None
+    for i in range(len(x)):
+        for j in range(i + 3, len(x) + 1):
+            slope, level = np.polyfit(x[i:j], y[i:j], 1)
+            scatter = np.sqrt(np.mean((slope * x[i:j] + level - y[i:j]) ** 2))
+            if scatter <= STRAIGHT_LINE and slope > LEAST_ORDER:
+                best = max(best or (0, 0.0), (j - i, float(slope)))
+    return None if best is None else best[1]
+
+
+def cost_at_error(costs: Sequence[float], errors: Sequence[float], level: float) -> float | None:
+    """Cost of reaching an error: log-log interpolation between the runs no other run beats in both.
+
+    The cheapest run's cost when that is already as good; None when no run reaches the level.
+    """
+    best: list[tuple[float, float]] = []
+    for cost, error in sorted(zip(costs, errors, strict=True)):
+        if math.isfinite(error) and cost > 0 and (not best or error < best[-1][1]):
+            best.append((cost, max(error, ROUNDING**2)))
+    if not best or best[-1][1] > level:
+        return None
+    reached = next(i for i, (_, error) in enumerate(best) if error <= level)
+    if reached == 0:
+        return best[0][0]
+    (c0, e0), (c1, e1) = best[reached - 1], best[reached]
+    share = math.log(e0 / level) / math.log(e0 / e1)
+    return float(c0 * (c1 / c0) ** share)

@@ -1,0 +1,54 @@
+"""Truths: the exact motion of scenes of known families, recognised from a scene's data alone.
+
+A truth is a closed form, or a high-precision solution of an equation reduced to the true degrees of
+freedom; it shares no code with the model it judges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from crosscheck.judge.truth.crankshaft import crankshaft
+from crosscheck.judge.truth.free_body import free_body
+from crosscheck.judge.truth.one_dof import Path, one_dof
+from crosscheck.judge.truth.parallelogram import parallelogram
+from crosscheck.judge.truth.picard import NoSolution
+from crosscheck.judge.truth.planar_slider_crank import planar_slider_crank
+from crosscheck.judge.truth.slider import slider
+from crosscheck.judge.truth.spatial_slider_crank import spatial_slider_crank
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+
+PATHS: tuple[Callable[[Scene], Path | None], ...] = (
+    parallelogram,
+    planar_slider_crank,
+    crankshaft,
+    spatial_slider_crank,
+    slider,
+)
+
+
+__all__ = ["NoSolution", "Truth", "truth_for"]
+
+
+class Truth(Protocol):
+    """The exact motion of one scene."""
+
+    name: str
+    """The family."""
+    accuracy: float
+    """Bound on the error of the poses, relative to the scene's length and to the angle turned."""
+
+    def poses(self, times: np.ndarray) -> Trajectory:
+        """Poses, velocities and accelerations (world) at times (k,) ≥ 0, double precision."""
+
+
+def truth_for(scene: Scene) -> Truth | None:
+    """The truth of a scene of a known family, or None."""
+    for family in PATHS:
+        if truth := one_dof(scene, family(scene)):
+            return truth
+    return free_body(scene)

@@ -1,0 +1,223 @@
+"""Motion of a mechanism with one degree of freedom: poses along its path, and how far along it is when.
+
+A family gives the path — every body's pose as a function of one coordinate q, with first and second
+derivatives — and the rest is common: either a driver prescribes q(t), or q follows from the reduced
+equation of motion I(q) q'' + ½ I'(q) q'² = Q, whose terms are sums over the bodies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.judge import constraints
+from crosscheck.judge.joint_residuals import driver_value
+from crosscheck.judge.loads import Motion, world_inertia, wrenches
+from crosscheck.judge.tolerances import FREEDOM, ON_PATH, PARALLEL, TRUTH_DRIVEN, TRUTH_DYNAMIC
+from crosscheck.judge.truth.picard import REAL, Solution
+from mbref import rotations
+from mbref.scene import Cylindrical, Driver, Revolute, Scene, TorsionSpring
+from mbref.trajectory import Trajectory
+
+EYE = np.eye(3)
+TURNS = (Revolute, Cylindrical)  # joints that carry a torsion spring
+PROBES = (0.0, 0.31, -0.83)  # path coordinates (rad, or lengths of the scene) where a path is tried
+
+
+@dataclass(frozen=True)
+class Pose:
+    """All bodies at coordinates q (k,): position, rotation matrix, turn, and derivatives by q.
+
+    With primes for d/dq, the velocity at rate q' is ``dposition`` q', the angular velocity ``spin`` q';
+    (k, nb, 3), rotation (k, nb, 3, 3), turn (k, nb) as in Motion.
+    """
+
+    position: np.ndarray
+    rotation: np.ndarray
+    turn: np.ndarray
+    dposition: np.ndarray
+    ddposition: np.ndarray
+    spin: np.ndarray
+    dspin: np.ndarray
+
+
+@dataclass(frozen=True)
+class Path:
+    """A family's guess for a scene: poses at q (q = 0 at t = 0), the axis of the turns, and the sign
+    with which a driver of a joint moves q (None: not this family's driver)."""
+
+    family: str
+    poses: Callable[[np.ndarray], Pose]
+    axis: np.ndarray
+    driven_sign: Callable[[Driver], float | None]
+
+
+class OneDof:
+    """Truth of a scene that moves along a path; ``rate`` is q' at t = 0, None when q is driven."""
+
+    def __init__(self, scene: Scene, path: Path, rate: float | None):
+        self.name = path.family
+        self.accuracy = TRUTH_DRIVEN if scene.driver else TRUTH_DYNAMIC
+        self._scene, self._path = scene, path
+        self._reduced = None if rate is None else Reduced(scene, path, rate)
+
+    def poses(self, times: np.ndarray) -> Trajectory:
+        """Trajectory at times (k,) ≥ 0; raises NoSolution when the motion ends at a singular position
+        before."""
+        times = np.asarray(times, dtype=float)
+        q, dq, ddq = self._coordinate(times)
+        pose = self._path.poses(q)
+        dq, ddq = dq[:, None, None], ddq[:, None, None]
+        return trajectory(
+            self._scene, self.name, times, pose.position, pose.rotation,
+            (pose.dposition * dq, pose.spin * dq),
+            (pose.dposition * ddq + pose.ddposition * dq**2, pose.spin * ddq + pose.dspin * dq**2),
+        )  # fmt: skip
+
+    def coordinate(self, times: np.ndarray) -> np.ndarray:
+        """(k, 2) path coordinate and its rate at times (k,)."""
+        return np.stack(self._coordinate(np.asarray(times, dtype=float))[:2], axis=-1).astype(float)
+
+    def _coordinate(self, times: np.ndarray) -> tuple[np.ndarray, ...]:
+        """q, q', q'' (k,) at times (k,)."""
+        if self._reduced is None:
+            driver = self._scene.driver[0]
+            sign = self._path.driven_sign(driver)
+            return tuple(sign * driver_value(driver, times, order) for order in (0, 1, 2))
+        return self._reduced(times)
+
+
+class Reduced:
+    """q(t) of the reduced equation of motion, integrated along σ with dt = sqrt(I) dσ.
+
+    There dq/dσ = s and ds/dσ = Q, where s = sqrt(I) q': the inertia drops out, and the time is one more
+    quadrature.
+    """
+
+    def __init__(self, scene: Scene, path: Path, rate: float):
+        self._scene, self._path = scene, path
+        self._damped = any(getattr(load, "damping", 0.0) for load in scene.load)
+        self._mass = np.array([body.mass for body in scene.body])[:, None]
+        root, push, _ = self._terms(np.zeros(1, dtype=REAL), np.array([rate], dtype=REAL))
+        pace = abs(rate) + np.sqrt(abs(push[0])) / root[0] + 1 / scene.duration
+        start = np.array([0, root[0] * rate, 0], dtype=REAL)
+        self._solution = Solution(self._derivative, start, 0.3 / (pace * root[0]))
+
+    def __call__(self, times: np.ndarray) -> tuple[np.ndarray, ...]:
+        """q, q', q'' (k,) at times (k,) ≥ 0."""
+        q, s, _ = self._solution.where(2, times).T
+        root = self._terms(q, s)[0]
+        rate = s / root
+        _, push, half_slope = self._terms(q, rate)
+        return q, rate, (push - half_slope * rate**2) / root**2
+
+    def _derivative(self, y: np.ndarray) -> np.ndarray:
+        q, s, _ = y.T
+        root, push, _ = self._terms(q, s)
+        if self._damped:
+            push = self._terms(q, s / root)[1]
+        return np.stack([s, push, root], axis=-1)
+
+    def _terms(self, q: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """sqrt(I), Q and I'/2 (n,) at coordinates q and rates (n,)."""
+        pose = self._path.poses(q)
+        dq = rate[:, None, None]
+        motion = Motion(pose.position, pose.rotation, pose.dposition * dq, pose.spin * dq, pose.turn)
+        force, moment = wrenches(self._scene, motion, self._path.axis)
+        inertias = world_inertia(self._scene, pose.rotation)
+        momentum, momentum_rate = _times(inertias, pose.spin), _times(inertias, pose.dspin)
+        mass = self._mass
+        inertia = np.sum(mass * pose.dposition**2 + pose.spin * momentum, axis=(1, 2))
+        half_slope = np.sum(mass * pose.dposition * pose.ddposition + pose.spin * momentum_rate, axis=(1, 2))
+        push = np.sum(force * pose.dposition + moment * pose.spin, axis=(1, 2))
+        return np.sqrt(inertia), push, half_slope
+
+
+def one_dof(scene: Scene, path: Path | None) -> OneDof | None:
+    """The truth along a path, or None when the scene does not move along it, and along it only."""
+    if path is None or not _fits(scene, path):
+        return None
+    if scene.driver:
+        alone = len(scene.driver) == 1
+        known = alone and path.driven_sign(scene.driver[0]) is not None
+        return OneDof(scene, path, None) if known else None
+    if not scene.has_mass() or not _torsion_angles_known(scene, path):
+        return None
+    rate = initial_rate(scene, path)
+    return None if rate is None else OneDof(scene, path, rate)
+
+
+def initial_rate(scene: Scene, path: Path) -> float | None:
+    """q' at t = 0 from the scene's velocities; None when those are not along the path."""
+    velocity, spin = constraints.initial_twists(scene)
+    pose = path.poses(np.zeros(1))
+    length = constraints.scene_length(scene)
+    along = np.concatenate([pose.dposition[0], length * pose.spin[0]]).astype(float)
+    wanted = np.concatenate([velocity, length * spin])
+    rate = float(np.sum(along * wanted) / np.sum(along**2))
+    off = np.abs(wanted - rate * along).max()
+    return rate if off <= ON_PATH * np.abs(wanted).max() else None
+
+
+def trajectory(scene: Scene, family: str, times, position, rotation, rates, accelerations) -> Trajectory:
+    """A Trajectory of engine "truth" in double precision; rates and accelerations are pairs (k, nb, 3)."""
+    velocity, spin = (np.asarray(a, dtype=float) for a in rates)
+    acceleration, spin_rate = (np.asarray(a, dtype=float) for a in accelerations)
+    return Trajectory(
+        scene=scene.name, engine="truth", version="", method=family, settings={}, times=times,
+        bodies=tuple(body.name for body in scene.body), position=np.asarray(position, dtype=float),
+        orientation=rotations.from_matrix(rotation), velocity=velocity, angular_velocity=spin,
+        acceleration=acceleration, angular_acceleration=spin_rate,
+        t_end=float(times[-1]) if len(times) else 0.0,
+    )  # fmt: skip
+
+
+def _times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    return (matrices @ vectors[..., None])[..., 0]
+
+
+def _fits(scene: Scene, path: Path) -> bool:
+    """The path closes every joint, and no motion but along it does."""
+    undriven = scene.with_(driver=())
+    length = constraints.scene_length(scene)
+    with np.errstate(invalid="ignore"):
+        pose = path.poses(np.array(PROBES))
+    orientation = rotations.from_matrix(np.nan_to_num(pose.rotation))
+    if not np.isfinite(pose.position).all() or not np.isfinite(pose.rotation).all():
+        return False
+    residuals = constraints.closure(undriven, np.zeros(len(PROBES)), pose.position, orientation)
+    gap = max((np.abs(r).max() for r in residuals.values()), default=0.0)
+    j, _ = constraints.jacobian(undriven, 0.0, pose.position[1].astype(float), orientation[1])
+    values = np.linalg.svd(j, compute_uv=False)
+    rank = int(np.sum(values > FREEDOM * values.max(initial=1.0)))
+    return gap <= ON_PATH * max(length, 1.0) and rank == 6 * len(scene.body) - 1
+
+
+def _torsion_angles_known(scene: Scene, path: Path) -> bool:
+    known = np.isfinite(path.poses(np.zeros(1)).turn[0].astype(float))
+    for load in scene.load:
+        if isinstance(load, TorsionSpring):
+            joint = next(j for j in scene.joint if isinstance(j, TURNS) and j.name == load.joint)
+            indices = [scene.body_index(name) for name in joint.bodies]
+            aligned = abs(abs(np.dot(joint.axis, path.axis)) - np.linalg.norm(joint.axis)) < PARALLEL
+            if not aligned or not all(known[i] for i in indices if i >= 0):
+                return False
+    return True
+
+
+def turned(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Rotation matrices (k, 3, 3) by angles (k,) about a unit axis."""
+    skew = np.cross(axis, EYE).T
+    sine, versine = np.sin(angle)[:, None, None], (2 * np.sin(angle / 2) ** 2)[:, None, None]
+    return EYE + sine * skew + versine * (skew @ skew)
+
+
+def circle(axis: np.ndarray, angle: np.ndarray, arm: np.ndarray) -> tuple[np.ndarray, ...]:
+    """A vector turning about a unit axis: its values (k, 3), first and second derivative by the angle."""
+    along = axis * (axis @ arm)
+    radial, ahead = arm - along, np.cross(axis, arm)
+    cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    now = cosine * radial + sine * ahead
+    return now + along, cosine * ahead - sine * radial, -now

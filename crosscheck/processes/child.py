@@ -1,0 +1,144 @@
+"""A child process that makes one call after another; a crash, a hang and an interrupt end only the child.
+
+It works in a temporary directory for each call, everything printed is captured at file-descriptor level,
+and numerical libraries get one thread.  It ends when its parent does.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from multiprocessing import Pipe
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from mbref.trajectory import Outcome
+
+ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+ORPHAN_SECONDS = 10.0  # beyond the limit of its call, a child whose parent has died ends itself
+ENDING_SECONDS = 10.0  # for a child that has hung up to end by itself, with an exit status that tells why
+PRINTED = 200  # characters of the last printed line that a message quotes
+
+_alive: set[Child] = set()
+
+
+class ChildFailed(Exception):
+    """A call gave no result: ``outcome`` TIMED_OUT or CRASHED, and a sentence."""
+
+    def __init__(self, outcome: Outcome, message: str):
+        self.outcome = outcome
+        super().__init__(message)
+
+
+class Observation(NamedTuple):
+    """What came of a call: its value, what was printed, and files left in its working directory."""
+
+    value: Any
+    printed: str
+    files: tuple[str, ...]
+
+
+class Child:
+    """The process, to be closed by who starts it."""
+
+    def __init__(self) -> None:
+        self._printed = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - closed by `close`
+        self._channel, theirs = Pipe()
+        with theirs:
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-m", "crosscheck.processes.serve"],
+                stdin=theirs, stdout=self._printed, stderr=subprocess.STDOUT, env=_environment(),
+                start_new_session=True,
+            )  # fmt: skip
+        _alive.add(self)
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether the process has not ended."""
+        return self._process.poll() is None
+
+    def call(self, function: Callable[..., Any], arguments: tuple, time_limit: float) -> Observation:
+        """``function(*arguments)`` in the child, within ``time_limit`` (s).
+
+        Raises ChildFailed; the child has then ended, as after an interrupt.
+        """
+        try:
+            return self._called(function, arguments, time_limit)
+        except BaseException:
+            self.kill()
+            raise
+
+    def kill(self) -> None:
+        """End the process and what it started; a call under way fails."""
+        if self.is_alive:
+            with contextlib.suppress(ProcessLookupError):  # it has just ended by itself
+                os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+
+    def close(self) -> None:
+        """Kill the process and let go of all that belongs to it."""
+        self.kill()
+        _alive.discard(self)
+        self._channel.close()
+        self._printed.close()
+
+    def _called(self, function: Callable[..., Any], arguments: tuple, time_limit: float) -> Observation:
+        self._printed.seek(0)  # the child writes at this place too: it shares the open file
+        self._printed.truncate()
+        with tempfile.TemporaryDirectory(prefix="crosscheck-", ignore_cleanup_errors=True) as folder:
+            self._ask((folder, time_limit + ORPHAN_SECONDS, function, arguments), time_limit)
+            is_value, value = self._answer()
+            files = sorted(str(path.relative_to(folder)) for path in Path(folder).rglob("*"))
+        if not is_value:
+            raise self._failure(Outcome.CRASHED, value)
+        return Observation(value, self._said(), tuple(files))
+
+    def _ask(self, job: tuple, time_limit: float) -> None:
+        """Send the job and wait until there is something to receive."""
+        with contextlib.suppress(BrokenPipeError):  # it has hung up, which receiving tells
+            self._channel.send(job)
+        if not self._channel.poll(time_limit):
+            raise self._failure(Outcome.TIMED_OUT, f"no result after {time_limit:g} s")
+
+    def _answer(self) -> tuple[bool, Any]:
+        try:
+            return pickle.loads(self._channel.recv_bytes())
+        except (EOFError, ConnectionError):
+            raise self._failure(Outcome.CRASHED, f"the process {self._ending()}") from None
+
+    def _ending(self) -> str:
+        try:
+            status = self._process.wait(ENDING_SECONDS)
+        except subprocess.TimeoutExpired:
+            return "does not answer"
+        try:
+            return f"was ended by {signal.Signals(-status).name}"
+        except ValueError:
+            return f"ended with exit status {status}"
+
+    def _said(self) -> str:
+        self._printed.seek(0)
+        return self._printed.read().decode(errors="replace")
+
+    def _failure(self, outcome: Outcome, sentence: str) -> ChildFailed:
+        """The sentence, with the last line printed."""
+        last = next((line.strip() for line in reversed(self._said().split("\n")) if line.strip()), "")
+        return ChildFailed(outcome, sentence + (f"; last printed: {last[:PRINTED]}" if last else ""))
+
+
+def stop_all() -> None:
+    """Kill every child of this process; what they are called for fails."""
+    for child in tuple(_alive):
+        child.kill()
+
+
+def _environment() -> dict[str, str]:
+    """The child finds every package this process finds, and computes with one thread."""
+    path = os.pathsep.join(os.path.abspath(entry) for entry in sys.path)
+    return {**os.environ, "PYTHONPATH": path, **dict.fromkeys(ONE_THREAD, "1")}

@@ -1,0 +1,146 @@
+"""Runs in child processes with a time limit: whatever an engine does, a Trajectory comes back.
+
+Starting a child takes seconds, so it serves the runs of one engine, one after another.  A run that does not
+complete ends it, and the next has a fresh one.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
+from threading import Lock
+
+import numpy as np
+
+from crosscheck.engine import Cannot, Setting, engine_names
+from crosscheck.processes import serve
+from crosscheck.processes.child import Child, ChildFailed, Observation
+from mbref.scene import Scene
+from mbref.trajectory import Outcome, Trajectory
+
+READY_SECONDS = 600.0  # for imports and compiling, before the time of a run begins
+
+_idle: list[tuple[str, Child]] = []  # with their engines, the one used last at the end
+_lending, _preparing = Lock(), Lock()
+_prepared: set[tuple[str, str]] = set()  # engines and families that a child has made ready
+
+
+def run_isolated(
+    engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, time_limit: float
+) -> Trajectory:
+    """The engine's trajectory at ``times`` (k,), computed in a child process.
+
+    ``engine_name`` is a known engine or ``module:attribute``; ``time_limit`` is wall time (s) of the
+    run, without imports and compiling.  A crash, a hang, an exception and a missing package are outcomes
+    CRASHED or TIMED_OUT of a trajectory without states.  Raises LookupError for an unknown engine.
+    """
+    _check(engine_name)
+    with _lent(engine_name) as child:
+        run = _observed(child, engine_name, scene, times, setting, time_limit).value
+        if run.outcome is not Outcome.COMPLETED:
+            child.kill()
+    return run
+
+
+def observe(
+    engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, time_limit: float
+) -> Observation:
+    """`run_isolated` in a process of its own, with what it printed from its start on and the files that the
+    run left; both empty when the run gave no result, as its message then quotes what was printed."""
+    _check(engine_name)
+    with closing(Child()) as child:
+        return _observed(child, engine_name, scene, times, setting, time_limit)
+
+
+def offers(engine_name: str, scene: Scene, time_limit: float) -> tuple[str, Cannot | None, list[Setting]]:
+    """An engine's version, what it cannot do with a scene, and else its settings, found out in a child.
+
+    Raises ChildFailed when that fails, LookupError for an unknown engine.
+    """
+    _check(engine_name)
+    with _lent(engine_name) as child:
+        return child.call(serve.offers, (engine_name, scene), time_limit).value
+
+
+def time_interleaved(
+    scene: Scene, times: np.ndarray, jobs: Sequence[serve.Job], repeats: int, time_limit: float
+) -> list[list[float]]:
+    """CPU seconds of stepping of every job, one list of ``repeats`` each, for speed comparisons.
+
+    The jobs (engine name, setting) take turns in one child process after a warm-up round, so that
+    all see the same machine.  A run that does not complete has NaN.  ``time_limit`` (s) is for all.
+    Raises ChildFailed when there is no result, LookupError for an unknown engine.
+    """
+    for engine_name, _ in jobs:
+        _check(engine_name)
+    with closing(Child()) as child:
+        return child.call(serve.run_interleaved, (scene, times, list(jobs), repeats), time_limit).value
+
+
+def end_idle() -> None:
+    """End the children that wait for a run."""
+    with _lending:
+        idle = [child for _, child in _idle]
+        _idle.clear()
+    for child in idle:
+        child.close()
+
+
+atexit.register(end_idle)
+os.register_at_fork(after_in_child=_idle.clear)  # they answer the process that started them
+
+
+def _check(engine_name: str) -> None:
+    if ":" not in engine_name and engine_name not in engine_names():
+        raise LookupError(f"unknown engine {engine_name!r}; known: {', '.join(engine_names())}")
+
+
+def _observed(
+    child: Child, engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, time_limit: float
+) -> Observation:
+    version = ""
+    try:
+        version, said, _ = _made_ready(child, engine_name, setting.family)
+        seen = child.call(serve.run_once, (engine_name, scene, times, setting), time_limit)
+    except ChildFailed as failure:
+        outcome, message = failure.outcome, str(failure)
+        return Observation(serve.failed(engine_name, version, scene, setting, outcome, message), "", ())
+    return seen._replace(printed=said + seen.printed)
+
+
+def _made_ready(child: Child, engine_name: str, family: str) -> Observation:
+    """The engine's version; what is compiled once a machine is not compiled by two children at a time."""
+    arguments = serve.get_ready, (engine_name, [family]), READY_SECONDS
+    if (engine_name, family) in _prepared:
+        return child.call(*arguments)
+    with _preparing:
+        ready = child.call(*arguments)
+        _prepared.add((engine_name, family))
+    return ready
+
+
+@contextmanager
+def _lent(engine_name: str) -> Iterator[Child]:
+    """A child that waits for a run of the engine, or a new one."""
+    with _lending:
+        known = [entry for entry in _idle if entry[0] == engine_name and entry[1].is_alive]
+        if known:
+            _idle.remove(known[-1])
+    child = known[-1][1] if known else Child()
+    try:
+        yield child
+    finally:
+        _put_back(engine_name, child)
+
+
+def _put_back(engine_name: str, child: Child) -> None:
+    """Let the child wait for another run, if it lives, and at most one child a core do so."""
+    with _lending:
+        _idle.append((engine_name, child))
+        waiting = [entry for entry in _idle if entry[1].is_alive][-(os.cpu_count() or 1) :]
+        ended = [entry for entry in _idle if entry not in waiting]
+        _idle[:] = waiting
+    for _, spent in ended:
+        spent.close()

@@ -1,0 +1,118 @@
+"""What a child process does: call after call, each in a directory of its own, until its parent hangs up.
+
+``python -m crosscheck.processes.serve`` has the channel to its parent as standard input.  It is sent
+(directory, seconds after which it ends itself should the parent have died, function, arguments) and
+answers (True, value) or (False, sentence).
+"""
+
+from __future__ import annotations
+
+import ctypes
+import faulthandler
+import os
+import pickle
+import sys
+import traceback
+import warnings
+from collections.abc import Callable, Sequence
+from multiprocessing.connection import Connection
+
+import numpy as np
+
+from crosscheck.engine import Cannot, Setting, engine
+from mbref.scene import Scene
+from mbref.trajectory import Outcome, Trajectory
+
+Job = tuple[str, Setting]  # engine name and setting
+
+
+def get_ready(engine_name: str, families: Sequence[str]) -> str:
+    """Do what an engine needs once, such as imports and compiling; its version, empty without its package."""
+    simulator = engine(engine_name)
+    try:
+        version = simulator.version()
+    except ImportError:  # which a run will say
+        return ""
+    simulator.prepare(families)
+    return version
+
+
+def run_once(engine_name: str, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+    """One run; a missing package is a failed trajectory that says what to install."""
+    simulator = engine(engine_name)
+    try:
+        simulator.version()
+    except ImportError as error:
+        message = f"{simulator.package} is not installed: {error}"
+        return failed(engine_name, "", scene, setting, Outcome.CRASHED, message)
+    return simulator.run(scene, times, setting)
+
+
+def offers(engine_name: str, scene: Scene) -> tuple[str, Cannot | None, list[Setting]]:
+    """Version, what cannot be done with the scene, and, where nothing hinders, the settings."""
+    simulator = engine(engine_name)
+    version, cannot = simulator.version(), simulator.cannot(scene)
+    return version, cannot, [] if cannot else list(simulator.settings(scene))
+
+
+def run_interleaved(
+    scene: Scene, times: np.ndarray, jobs: Sequence[Job], repeats: int
+) -> list[list[float]]:  # fmt: skip
+    """``cost.seconds`` of every repeat of every job, round-robin after a warm-up round.
+
+    NaN where a run did not complete: the time of a part is not the time of the whole.
+    """
+    simulators = [(engine(name), setting) for name, setting in jobs]
+
+    def one_round() -> list[float]:
+        runs = [simulator.run(scene, times, setting) for simulator, setting in simulators]
+        return [r.cost.seconds if r.outcome is Outcome.COMPLETED else float("nan") for r in runs]
+
+    one_round()
+    rounds = [one_round() for _ in range(repeats)]
+    return [list(seconds) for seconds in zip(*rounds, strict=True)]
+
+
+def failed(
+    engine_name: str, version: str, scene: Scene, setting: Setting, outcome: Outcome, message: str
+) -> Trajectory:
+    """The trajectory of a run that gave no state."""
+    return Trajectory.failed(
+        scene=scene.name, engine=engine_name, version=version, method=setting.family,
+        settings=dict(setting.options), bodies=tuple(b.name for b in scene.body), outcome=outcome,
+        message=message,
+    )  # fmt: skip
+
+
+def main() -> None:
+    """Serve the parent at the other end of standard input, which engines see empty."""
+    channel = Connection(os.dup(0))
+    with open(os.devnull) as nothing:
+        os.dup2(nothing.fileno(), 0)
+    while True:
+        try:
+            folder, last_resort, function, arguments = channel.recv()
+        except EOFError:
+            return
+        os.chdir(folder)
+        faulthandler.dump_traceback_later(last_resort, exit=True)
+        answer = _answer(function, arguments)
+        faulthandler.cancel_dump_traceback_later()
+        channel.send_bytes(answer)
+
+
+def _answer(function: Callable, arguments: tuple) -> bytes:
+    """The pickled answer; what the call warned of and printed is not left to the next one."""
+    try:
+        with warnings.catch_warnings():  # each call warns afresh
+            return pickle.dumps((True, function(*arguments)))
+    except Exception as error:  # the parent turns the sentence into an Outcome
+        return pickle.dumps((False, traceback.format_exception_only(error)[-1].strip()))
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        ctypes.CDLL(None).fflush(None)  # what compiled code has printed
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,71 @@
+"""What a fair comparison of speed needs: the same mechanism in every engine, and interleaved timing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from statistics import median
+
+from crosscheck.engine import engine
+from crosscheck.judge.model_identity import gate, gate_times
+from crosscheck.judge.truth import truth_for
+from crosscheck.processes.pool import ChildFailed, time_interleaved
+from crosscheck.study.grid import Case, Record, settings
+from crosscheck.study.record_view import is_completed
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+
+
+def gate_cases(scene: Scene, engines: Sequence[str], time_limit: float) -> list[Case]:
+    """The short runs from which `difference` tells whether all engines simulate the scene: each at the
+    finest of its settings."""
+    able = [name for name in engines if not engine(name).cannot(scene)]
+    return [Case(scene, gate_times(scene), name, settings(name, scene)[-1], time_limit) for name in able]
+
+
+def difference(scene: Scene, records: Sequence[Record]) -> str | None:
+    """The first field in which the records of `gate_cases` differ from the truth where there is one, else
+    from the first of them, as a sentence; None when all agree."""
+    truth = truth_for(scene)
+    exact = [] if truth is None else [truth.poses(gate_times(scene))]
+    found = gate(scene, [*exact, *(Trajectory.from_record(scene.name, record) for record in records)])
+    return None if found is None else str(found)
+
+
+def timed(
+    cases: Sequence[Case], records: Sequence[Record], repeats: int, notice: Callable[[str], None]
+) -> list[Record]:
+    """The records with the ``cost.seconds`` of interleaved runs: their minimum, and ``timing``
+    with their median and number.
+
+    The completed runs of a scene take turns in one process, so that all see the same machine.  A scene
+    whose timing process fails keeps the seconds of its isolated runs, which a ``notice`` says.
+    """
+    done = list(records)
+    for scene in {case.scene.name: case.scene for case in cases}.values():
+        places = [
+            i for i, case in enumerate(cases) if case.scene.name == scene.name and is_completed(records[i])
+        ]
+        try:
+            for i, seconds in zip(places, _seconds(scene, [cases[i] for i in places], repeats), strict=True):
+                done[i] = _with_cost(records[i], seconds)
+        except ChildFailed as failure:
+            notice(f"{scene.name}: no interleaved timing, single runs are shown: {failure}")
+    return done
+
+
+def _seconds(scene: Scene, cases: Sequence[Case], repeats: int) -> list[list[float]]:
+    if not cases:
+        return []
+    limit = (repeats + 1) * sum(case.time_limit for case in cases)
+    jobs = [(case.engine, case.setting) for case in cases]
+    return time_interleaved(scene, cases[0].times, jobs, repeats, limit)
+
+
+def _with_cost(record: Record, seconds: Sequence[float]) -> Record:
+    """NaN repeats are runs that this time did not complete; a record of those alone keeps its cost."""
+    finite = [s for s in seconds if math.isfinite(s)]
+    if not finite:
+        return record
+    cost = {**record["cost"], "seconds": min(finite)}
+    return {**record, "cost": cost, "timing": {"median": median(finite), "repeats": len(finite)}}

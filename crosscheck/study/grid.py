@@ -1,0 +1,221 @@
+"""The grid (scene × engine × setting) → raw records, one JSON line each; an interrupted study resumes."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import json
+import os
+import platform
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor, as_completed, wait
+from importlib import metadata
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import mbref
+from crosscheck.engine import Cannot, Setting, engine
+from crosscheck.judge import metrics
+from crosscheck.judge.truth import truth_for
+from crosscheck.processes.child import stop_all
+from crosscheck.processes.pool import end_idle, run_isolated
+from mbref.records import append, stored
+from mbref.scene import Scene
+from mbref.trajectory import Outcome, Trajectory
+
+SCHEMA = 1
+SAMPLES = 101  # sample times of a default case, both ends included
+TIME_LIMIT = 60.0  # s, of a default case
+PACKAGES = ("numpy", "scipy", "numba")
+
+Record = dict[str, Any]
+Progress = Callable[[int, int, Record], None]  # cases done, cases in all, the record just done
+
+
+class Case(NamedTuple):
+    """One run of a study; ``time_limit`` is wall time (s), without imports and compiling."""
+
+    scene: Scene
+    times: np.ndarray
+    engine: str
+    setting: Setting
+    time_limit: float = TIME_LIMIT
+
+
+class Unable(NamedTuple):
+    """A pair of a default sweep that is not run, and why."""
+
+    scene: Scene
+    engine: str
+    cannot: Cannot
+
+
+def default_cases(
+    scene: Scene,
+    engines: Sequence[str],
+    families: Sequence[str] | None = None,
+    times: np.ndarray | None = None,
+    time_limit: float = TIME_LIMIT,
+) -> tuple[list[Case], list[Unable]]:
+    """The sweep of every engine's settings over a scene, and the engines that cannot run it.
+
+    ``families`` restricts the settings; ``times`` (k,) default to SAMPLES over the scene's duration.
+    """
+    times = np.linspace(0.0, scene.duration, SAMPLES) if times is None else times
+    cases, unable = [], []
+    for name in engines:
+        simulator = engine(name)
+        cannot = simulator.cannot(scene)
+        if cannot:
+            unable.append(Unable(scene, name, cannot))
+            continue
+        wanted = [s for s in settings(name, scene) if families is None or s.family in families]
+        cases += [Case(scene, times, name, setting, time_limit) for setting in wanted]
+    return cases, unable
+
+
+@functools.lru_cache(maxsize=256)
+def settings(engine_name: str, scene: Scene) -> tuple[Setting, ...]:
+    """An engine's settings for a scene; found out once, as engines try a scene out for them."""
+    return tuple(engine(engine_name).settings(scene))
+
+
+def study(
+    cases: Sequence[Case],
+    executor: Executor | None = None,
+    records_path: str | Path | None = None,
+    progress: Progress | None = None,
+    run: Callable[[Case], Record] | None = None,
+) -> list[Record]:
+    """The record of every case, in the order of the cases.
+
+    Each record is appended to ``records_path`` as its run ends; records that the file already has are
+    not run again, unless they ran out of a shorter time limit than the case's.  Runs are spread by
+    ``executor``, by default threads, one a core: the runs are in child processes.  Any executor of
+    concurrent.futures will do, such as a process pool, or a Dask client's ``get_executor()`` for runs on
+    other machines; its workers have to have this package and the engines, and say which machine they are.
+    ``run`` makes the record of one case, by default ``run_case``; many short runs of an engine that neither
+    hangs nor crashes are made sooner by ``run_here`` in a process pool.
+    """
+    keys = [key(case) for case in cases]
+    records = known(cases, records_path)
+    left = {k: case for k, case in zip(keys, cases, strict=True) if k not in records}
+    with contextlib.closing(_run_all(list(left.values()), executor, run or run_case)) as fresh:
+        for record in fresh:
+            records[record["key"]] = record
+            append(records_path, record)
+            if progress:
+                progress(len(records), len(set(keys)), record)
+    return [records[k] for k in keys]
+
+
+def known(cases: Sequence[Case], records_path: str | Path | None) -> dict[str, Record]:
+    """Records of a file that answer the cases, by their keys: those that ``study`` does not run again."""
+    records = stored(records_path)
+    limits = {key(case): case.time_limit for case in cases}
+    return {k: records[k] for k in limits if k in records and not _worth_repeating(records[k], limits[k])}
+
+
+def key(case: Case) -> str:
+    """Hash of all that determines a record: scene, times, engine, version and setting."""
+    identity = [
+        SCHEMA, case.scene.to_dict(), list(map(float, case.times)), case.engine, _version(case.engine),
+        case.setting.family, dict(case.setting.options),
+    ]  # fmt: skip
+    return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
+
+
+def run_case(case: Case) -> Record:
+    """The raw record of one run, its metrics included."""
+    return _record(case, run_isolated(case.engine, case.scene, case.times, case.setting, case.time_limit))
+
+
+def run_here(case: Case) -> Record:
+    """As ``run_case`` in the calling process, without its time limit and its protection."""
+    return _record(case, engine(case.engine).run(case.scene, case.times, case.setting))
+
+
+def _record(case: Case, trajectory: Trajectory) -> Record:
+    return {
+        "schema": SCHEMA,
+        "key": key(case),
+        "scene": case.scene.name,
+        **trajectory.to_record(),
+        "family": case.setting.family,
+        "time_limit": case.time_limit,
+        "metrics": metrics.measure(case.scene, trajectory, _truth(case.scene)),
+        "seed": 0,
+        "versions": versions(),
+        "machine": machine(),
+    }
+
+
+@functools.cache
+def versions() -> dict[str, str | None]:
+    """Versions of Python and of the packages that results depend on; None when not installed."""
+    installed = {name: _installed(name) for name in PACKAGES}
+    return {"python": platform.python_version(), "mbref": mbref.__version__, **installed}
+
+
+@functools.cache
+def machine() -> dict[str, str | int | None]:
+    """Processor, number of cores and operating system."""
+    return {"cpu": _processor(), "cores": os.cpu_count(), "system": platform.platform()}
+
+
+def _run_all(
+    cases: Sequence[Case], executor: Executor | None, run: Callable[[Case], Record]
+) -> Generator[Record, None, None]:
+    """Records as their runs end; when the caller stops early, so do the runs."""
+    if executor is None:
+        with contextlib.ExitStack() as stack:
+            stack.callback(end_idle)
+            yield from _run_all(cases, stack.enter_context(ThreadPoolExecutor(os.cpu_count())), run)
+        return
+    futures = [executor.submit(run, case) for case in cases]
+    try:
+        for future in as_completed(futures):
+            yield future.result()
+    except BaseException:
+        for future in futures:
+            future.cancel()
+        while isinstance(executor, ThreadPoolExecutor) and wait(futures, timeout=0.1).not_done:
+            stop_all()  # again and again: a run may have been about to start
+        raise
+
+
+def _worth_repeating(record: Record, time_limit: float) -> bool:
+    return record["outcome"] == Outcome.TIMED_OUT.label and record["time_limit"] < time_limit
+
+
+@functools.cache
+def _version(engine_name: str) -> str:
+    """The engine's version; empty when its package is missing, which each run then says."""
+    try:
+        return engine(engine_name).version()
+    except ImportError:
+        return ""
+
+
+@functools.lru_cache(maxsize=32)
+def _truth(scene: Scene) -> Any:
+    return truth_for(scene)
+
+
+def _installed(package: str) -> str | None:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    models = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return models[0] if models else platform.processor() or platform.machine()

@@ -1,0 +1,86 @@
+"""Floors: the least error of every engine on every scene, the setting that gives it, and what it costs."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from crosscheck.judge.tolerances import FLOOR
+from crosscheck.study.grid import Case, Record, default_cases
+from crosscheck.study.record_view import by_scene, error, is_completed, swept
+from mbref.scene import Scene
+
+HEADER = ("scene", "engine", "family", "settings", "least error", "time (s)", f"within {FLOOR:.0e}", "others")
+
+FINEST = 3  # settings of a family among which its least error is looked for
+TIME_LIMIT = 240.0  # s
+
+
+def candidates(scene: Scene, engines: Sequence[str]) -> list[Case]:
+    """The finest settings of every family of the engines that can run the scene."""
+    families = defaultdict(list)
+    for case in default_cases(scene, engines, time_limit=TIME_LIMIT)[0]:
+        families[case.engine, case.setting.family].append(case)
+    return [case for group in families.values() for case in group[-FINEST:]]
+
+
+@dataclass(frozen=True)
+class Floor:
+    """An engine on a scene: of every family the completed run of least error, else the one that got
+    furthest; ``records`` are all its runs."""
+
+    scene: str
+    engine: str
+    families: Mapping[str, Record]
+    records: Sequence[Record]
+
+    @property
+    def best(self) -> Record:
+        """The run of least error; if none completed, the one that got furthest."""
+        return min(self.families.values(), key=_rank)
+
+    @property
+    def is_reached(self) -> bool:
+        """Whether a run completed within FLOOR."""
+        return _reaches(self.best)
+
+    def share(self) -> str:
+        """How many families are within FLOOR, of how many."""
+        return f"{sum(map(_reaches, self.families.values()))} of {len(self.families)}"
+
+    def row(self) -> tuple[str, ...]:
+        """Cells under HEADER."""
+        best = self.best
+        within = [name for name, record in self.families.items() if _reaches(record)]
+        others = [f"{name} {_said(r)}" for name, r in self.families.items() if not _reaches(r)]
+        return (self.scene, self.engine, best["family"], swept(best, self.records), _said(best),
+                f"{best['cost']['seconds']:.2g}", ", ".join(within), ", ".join(others))  # fmt: skip
+
+
+def floors(records: Sequence[Record]) -> list[Floor]:
+    """One floor a scene and engine, in the order of the records."""
+    found = []
+    for scene, group in by_scene(records).items():
+        for engine in dict.fromkeys(record["engine"] for record in group):
+            own = [record for record in group if record["engine"] == engine]
+            families = dict.fromkeys(record["family"] for record in own)
+            best = {name: min((r for r in own if r["family"] == name), key=_rank) for name in families}
+            found.append(Floor(scene, engine, best, own))
+    return found
+
+
+def _rank(record: Record) -> tuple[bool, float, float]:
+    done = is_completed(record)
+    return not done, 0.0 if done else -record["t_end"], error(record)
+
+
+def _reaches(record: Record) -> bool:
+    return is_completed(record) and error(record) <= FLOOR
+
+
+def _said(record: Record) -> str:
+    """The error, or how and when the run ended."""
+    if is_completed(record):
+        return f"{error(record):.1e}"
+    return f"{record['outcome'].lower().replace('_', ' ')} at {record['t_end']:.3g} s"

@@ -1,0 +1,60 @@
+"""A record as tables and files show it: its public fields, its error, the settings that vary."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from crosscheck.study.grid import Record
+from mbref.trajectory import Outcome
+
+PUBLIC = ("engine", "version", "method", "settings", "outcome", "message", "t_end", "times", "bodies",
+          "reactions", "metrics", "cost")  # fmt: skip
+
+
+def public(record: Record) -> Record:
+    """The fields of a record that ``--json`` prints, ``timing`` too where the run was timed; numbers that
+    are not finite become null."""
+    return {name: _finite(record[name]) for name in (*PUBLIC, "timing") if name in record}
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {k: _finite(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def is_completed(record: Record) -> bool:
+    """Whether the run reached its end time."""
+    return record["outcome"] == Outcome.COMPLETED.label
+
+
+def by_scene(records: Sequence[Record]) -> dict[str, list[Record]]:
+    """Records grouped by the scene's name, in their order."""
+    groups: dict[str, list[Record]] = {}
+    for record in records:
+        groups.setdefault(record["scene"], []).append(record)
+    return groups
+
+
+def error(record: Record) -> float:
+    """The error of a record; infinite where there is none to compare with."""
+    value = record["metrics"].get("error")
+    return math.inf if value is None or math.isnan(value) else value
+
+
+def curve(record: Record) -> tuple[str, str]:
+    """Engine and family."""
+    return record["engine"], record["family"]
+
+
+def swept(record: Record, records: Sequence[Record]) -> str:
+    """The settings in which a record differs from others of its family, as printed (``rtol=1e-06``);
+    all of them when it is alone."""
+    own = record["settings"]
+    settings = [r["settings"] for r in records if curve(r) == curve(record)]
+    names = [k for k in own if len(settings) == 1 or any(s.get(k, own[k]) != own[k] for s in settings)]
+    return ", ".join(f"{k}={own[k]:g}" if isinstance(own[k], float) else f"{k}={own[k]}" for k in names)

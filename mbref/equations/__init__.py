@@ -1,0 +1,1 @@
+"""The equations of a scene: model, joints, loads, evaluation, consistent start, diagnosis."""

@@ -1,0 +1,102 @@
+"""What of a scene can ever move: the rest needs no equation.
+
+Rows and columns of Φ_q that hang together by non-zero entries form a block.  Where no force, no γ, Φ or ν and
+no initial velocity acts on a block, it stays at rest with multipliers of zero; the bending of a planar
+mechanism out of its plane is such a block.  Which entries are zero is asked at random states of what moves:
+an expression that is not identically zero does not vanish there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mbref.equations.initial_state import Start, given_velocities, scene_length
+from mbref.equations.model import Model, displaced
+from mbref.kernels.layout import GEOMETRY, PRIMITIVES
+
+FIRST_ROW = 4  # column of PRIMITIVES
+STATES = 2  # random states asked, so that an accidental zero at one does no harm
+STILL = 1e-12  # of the scene's length, of 1, or of the largest velocity: what corrections leave
+
+
+def moving_entries(model: Model, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which velocities (n,) can move, and which Jacobian entries (m, 12) of theirs can be other than zero.
+
+    q (7 nb,) and v (6 nb,) are the start.  Columns of entries are those of ``tables.JACOBIAN``.
+    """
+    rng = np.random.default_rng(1)
+    moving = np.zeros(model.n, dtype=bool)
+    entries = np.zeros((model.m, 12), dtype=bool)
+    while True:
+        driving_rows, driving_columns = np.zeros(model.m, dtype=bool), v != 0
+        for state in range(STATES + 1):
+            t = rng.uniform(0.1, 1.0) * model.scene.duration if state else 0.0
+            x, w = (moving * rng.normal(size=model.n) if state else np.zeros(model.n) for _ in range(2))
+            terms = model.blocks(t, displaced(q, x), w if state else v)
+            entries |= (terms.jacobian != 0) & (model.entry_columns() < model.n)
+            driving_rows |= (terms.gamma != 0) | (terms.phi != 0) | (terms.nu != 0)
+            driving_columns |= terms.force != 0
+        found, rows = _reached(model, entries, driving_rows, driving_columns)
+        if np.array_equal(found, moving):
+            return moving, entries & rows[:, None]
+        moving = found
+
+
+def _reached(
+    model: Model, entries: np.ndarray, rows: np.ndarray, columns: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Columns (n,) and rows (m,) of the blocks that have a driving row or column."""
+    column = model.entry_columns()
+    reached = np.append(columns, np.zeros(6, dtype=bool))
+    while True:
+        rows = rows | (entries & reached[column]).any(axis=1)
+        found = reached.copy()
+        found[column[entries & rows[:, None]]] = True
+        if np.array_equal(found, reached):
+            return reached[: model.n], rows
+        reached = found
+
+
+def without_rounding(model: Model, start: Start) -> Start:
+    """The start with zero for the roundings of zero in its coordinates, and in velocities not given."""
+    q, v, small = start.q.reshape(-1, 7), start.v, np.full((model.nb, 7), STILL)
+    small[:, :3] *= scene_length(model)
+    given, _ = given_velocities(model, start.q)
+    still = (np.abs(v) < STILL * np.max(np.abs(v), initial=0.0)) & (given == 0)
+    return replace(start, q=np.where(np.abs(q) < small, 0.0, q).ravel(), v=np.where(still, 0.0, v))
+
+
+def moving_coordinates(q: np.ndarray, velocities: np.ndarray) -> np.ndarray:
+    """Which coordinates can move from q (7 nb,) where these columns of v can: indices into q.
+
+    Turning about axis k of a body's own frame mixes the Euler parameters e0 and ek, and the other two.
+    """
+    moves = np.zeros((q.size // 7, 7), dtype=bool)
+    free = np.zeros((q.size // 7, 6), dtype=bool)
+    free.reshape(-1)[velocities] = True
+    moves[:, :3] = free[:, :3]
+    for body, turns, p in zip(moves, free[:, 3:], q.reshape(-1, 7)[:, 3:], strict=True):
+        reached = p != 0
+        while True:
+            found = reached.copy()
+            for k in np.flatnonzero(turns):
+                for pair in ([0, 1 + k], [1 + (k + 1) % 3, 1 + (k + 2) % 3]):
+                    found[pair] |= reached[pair].any()
+            if np.array_equal(found, reached):
+                break
+            reached = found
+        body[3:] = reached & turns.any()
+    return np.flatnonzero(moves)
+
+
+def moving_primitives(model: Model, entries: np.ndarray) -> tuple[tuple, tuple]:
+    """The model's ``ints`` and ``floats`` without the primitives none of whose rows has an entry."""
+    primitives = model.ints[PRIMITIVES]
+    live = np.flatnonzero(entries.any(axis=1))
+    of_row = np.searchsorted(primitives[:, FIRST_ROW], live, side="right") - 1
+    kept = np.unique(of_row)
+    ints = tuple(table[kept] if k == PRIMITIVES else table for k, table in enumerate(model.ints))
+    floats = tuple(table[kept] if k == GEOMETRY else table for k, table in enumerate(model.floats))
+    return ints, floats

@@ -1,0 +1,99 @@
+"""What a scene is: counts, rank, redundant rows, which reactions are unique, how far from singular."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbref.equations.initial_state import consistent_start
+from mbref.equations.model import Model
+from mbref.linear_algebra.minimum_norm import LARGE, sparse_jacobian
+from mbref.linear_algebra.redundancy import Redundancy
+from mbref.scene import Scene
+
+RANK_TOLERANCE = 1e-10  # relative to the largest singular value of the scaled Jacobian
+UNIQUE_TOLERANCE = 1e-8  # a row takes part in a redundancy when its weight in it exceeds this
+UNIQUE_SHARE = 1e-9  # the same for the squares of a large scene, where other singular values leave 1e-12
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Counts at t = 0, the ground's where it is a body."""
+
+    coordinates: int  # 6 per body
+    rows: int
+    rows_by_joint: dict[str, int]  # drivers under their joint, a modelled ground under "ground"
+    rank: int
+    redundant: int
+    degrees_of_freedom: int
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Beyond counts, at t = 0."""
+
+    counts: Counts
+    redundant_by_joint: dict[str, int]  # rows that take part in a redundancy; their reactions are not unique
+    unique_reactions: tuple[str, ...]  # joints all of whose rows have a unique multiplier
+    smallest_singular_value: float  # of Φ_q with unit rows, above rank: the distance to a singular position
+    largest_singular_value: float
+
+
+def counts(scene: Scene) -> Counts:
+    """Counts of a scene at its corrected initial positions."""
+    model = Model(scene)
+    if model.m > LARGE:
+        return _counts(model, _redundancy(model).rank)
+    return _counts(model, rank_of(_jacobian_at_start(model)))
+
+
+def diagnose(scene: Scene) -> Diagnosis:
+    """Counts, redundancy joint by joint, and the distance to a singular position, at the initial positions.
+
+    A multiplier is unique where its row takes no part in any vanishing combination of rows: a left null
+    vector of Φ_q (Wojtyra, J. Theor. Appl. Mech. 43, 2005).
+    """
+    model = Model(scene)
+    if model.m > LARGE:
+        found = _redundancy(model)
+        rank, shared = found.rank, found.shares > UNIQUE_SHARE
+        smallest, largest = found.singular_values()
+    else:
+        jacobian = _jacobian_at_start(model)
+        left, values, _ = np.linalg.svd(jacobian)
+        rank = rank_of(jacobian)
+        shared = np.linalg.norm(left[:, rank:], axis=1) > UNIQUE_TOLERANCE
+        smallest = float(values[rank - 1]) if rank else 0.0
+        largest = float(values[0]) if values.size else 0.0
+    total = _counts(model, rank)
+    involved = Counter(name for name, part in zip(model.row_joint, shared, strict=True) if part)
+    unique = tuple(name for name in total.rows_by_joint if name not in involved)
+    return Diagnosis(total, dict(involved), unique, smallest, largest)
+
+
+def _counts(model: Model, rank: int) -> Counts:
+    by_joint = dict(Counter(model.row_joint))
+    return Counts(model.n, model.m, by_joint, rank, model.m - rank, model.n - rank)
+
+
+def _redundancy(model: Model) -> Redundancy:
+    terms = model.blocks(0.0, consistent_start(model).q, np.zeros(model.n))
+    return Redundancy(sparse_jacobian(model, terms.jacobian))
+
+
+def _jacobian_at_start(model: Model) -> np.ndarray:
+    return scaled_jacobian(model, 0.0, consistent_start(model).q)
+
+
+def scaled_jacobian(model: Model, t: float, q: np.ndarray) -> np.ndarray:
+    """Φ_q (m, n) with rows of unit length, so that its rank does not depend on units."""
+    jacobian = model.terms(t, q, np.zeros(model.n)).jacobian
+    return jacobian / np.linalg.norm(jacobian, axis=1, keepdims=True)
+
+
+def rank_of(matrix: np.ndarray) -> int:
+    """Number of singular values above the rank tolerance times the largest."""
+    values = np.linalg.svd(matrix, compute_uv=False)
+    return int(np.sum(values > RANK_TOLERANCE * values[0])) if values.size else 0

@@ -1,0 +1,179 @@
+"""Consistent initial positions and velocities (section 1 and Figure 2 of the paper)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_array, vstack
+
+from mbref import rotations
+from mbref.equations.model import Model, displaced
+from mbref.linear_algebra.minimum_norm import LARGE, LeastChange, sparse_jacobian
+from mbref.scene import SceneError
+
+RANK_TOLERANCE = 1e-5  # singular values below it (relative) are left alone: rank may drop at the start
+GROSS = 0.05  # of the scene's length, or of its speed: a larger inconsistency is a fault
+MOST_ITERATIONS = 30
+LIGHT, NEARER = 1e-4, 5  # weight of open velocities beside given ones, and how often that error is reduced
+
+
+@dataclass(frozen=True)
+class Start:
+    """A consistent state and how far the scene's own data was from it."""
+
+    q: np.ndarray  # (7 nb,)
+    v: np.ndarray  # (6 nb,)
+    position_violation: float  # largest |Φ| before correction (m or rad)
+    velocity_violation: float  # largest |Φ_q v - ν| of fully given velocities before correction
+
+    def report(self) -> str:
+        """One sentence for the user; empty where nothing but rounding was corrected."""
+        parts = []
+        if self.position_violation > 1e-9:
+            parts.append(f"positions were off the constraints by {self.position_violation:.2e}")
+        if self.velocity_violation > 1e-9:
+            parts.append(f"velocities by {self.velocity_violation:.2e}")
+        return f"initial {' and '.join(parts)}; corrected" if parts else ""
+
+
+def consistent_start(model: Model) -> Start:
+    """The nearest consistent state; raises SceneError naming the joint that is grossly violated."""
+    q, position_violation = corrected_positions(model, model.start())
+    v, velocity_violation = _velocities(model, q)
+    return Start(q, v, position_violation, velocity_violation)
+
+
+def scene_length(model: Model) -> float:
+    """The largest distance between two of the centres of mass and joint anchors at t = 0 (m)."""
+    points = [body.position for body in model.scene.body]
+    for joint in model.scene.joint:
+        points += getattr(joint, "anchors", None) or [joint.anchor]
+    array = np.array(points)
+    return float(np.max(np.linalg.norm(array[:, None] - array[None], axis=-1))) or 1.0
+
+
+def _fault(model: Model, row: int, what: str) -> SceneError:
+    name = model.row_joint[row]
+    index = next((j for j, joint in enumerate(model.scene.joint) if joint.name == name), 0)
+    return SceneError([f"joint[{index}]: {what} at joint {name!r}"])
+
+
+def corrected_positions(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]:
+    """Consistent coordinates (7 nb,) near q, and the largest |Φ| before: Newton–Raphson on Φ(q, 0) = 0.
+
+    With the pseudo-inverse, so that redundant rows and a singular start do no harm; the change is least
+    in the metric of M.  Raises SceneError naming the joint where q is grossly inconsistent.
+    """
+    v = np.zeros(model.n)
+    before = 0.0
+    for iteration in range(MOST_ITERATIONS):
+        terms = model.blocks(0.0, q, v)
+        if not model.m:
+            return q, 0.0
+        worst = int(np.argmax(np.abs(terms.phi)))
+        violation = abs(terms.phi[worst])
+        if iteration == 0:
+            before = violation
+            if before > GROSS * max(1.0, scene_length(model)):
+                raise _fault(model, worst, f"the initial positions violate the constraint by {before:.3g}")
+        if violation <= 1e-14 * max(1.0, scene_length(model)):
+            return q, before
+        x = _least_change(model, terms.jacobian, -terms.phi)
+        if np.max(np.abs(x)) < 1e-15:
+            break
+        q = displaced(q, x)
+    if violation > 1e-10:
+        raise _fault(model, worst, f"the initial positions cannot be corrected; {violation:.3g} is left")
+    return q, before
+
+
+def _least_change(model: Model, blocks: np.ndarray, rhs: np.ndarray) -> np.ndarray:
+    """The change (6 nb,), least in the metric of M, by which Φ_q grows by rhs (m,)."""
+    mass = np.where(model.mass > 0, model.mass, 1.0)
+    if model.m > LARGE:
+        return LeastChange(sparse_jacobian(model, blocks), mass)(rhs)
+    inverse_root = 1 / np.sqrt(mass)
+    return _least_norm(model.dense(blocks) * inverse_root, rhs) * inverse_root
+
+
+def _least_norm(matrix: np.ndarray, rhs: np.ndarray) -> np.ndarray:
+    return np.linalg.lstsq(matrix, rhs, rcond=RANK_TOLERANCE)[0]
+
+
+def given_velocities(model: Model, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The velocities the scene gives (zero elsewhere) and which those are, both (6 nb,)."""
+    v, given = np.zeros((model.nb, 6)), np.zeros((model.nb, 6), dtype=bool)
+    for b, body in enumerate(model.bodies):
+        if body.velocity is not None:
+            v[b, :3], given[b, :3] = body.velocity, True
+        if body.angular_velocity is not None:
+            to_body = rotations.conjugate(q.reshape(-1, 7)[b, 3:])
+            v[b, 3:], given[b, 3:] = rotations.rotate(to_body, np.array(body.angular_velocity)), True
+    return v.ravel(), given.ravel()
+
+
+def _velocities(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]:
+    """Velocities that meet Φ_q v = ν, and how far the given ones were from that.
+
+    Among the solutions those nearest to the given velocities (angular ones times the scene's length);
+    what they leave open is least in the metric of M.
+    """
+    v, given = given_velocities(model, q)
+    if model.m > LARGE:
+        return _sparse_velocities(model, q, v, given)
+    scale = np.tile(np.repeat([1.0, 1 / scene_length(model)], 3), model.nb)
+    wanted = v[given] / scale[given]
+    terms = model.terms(0.0, q, v)
+    jacobian = terms.jacobian * scale
+    x, open_ = _solutions(jacobian, terms.nu)
+    if np.max(np.abs(jacobian @ x - terms.nu), initial=0.0) > GROSS * np.max(np.abs(x), initial=0.0):
+        worst = int(np.argmax(np.abs(jacobian @ x - terms.nu)))
+        raise _fault(model, worst, "the driver contradicts the joints")
+    step, still_open = _solutions(open_[given], wanted - x[given])
+    x, open_ = x + open_ @ step, open_ @ still_open
+    as_given = x.copy()
+    as_given[given] = wanted
+    residual = np.abs(jacobian @ as_given - terms.nu)
+    if np.max(np.abs(x[given] - wanted), initial=0.0) > GROSS * np.max(np.abs(wanted), initial=0.0):
+        what = f"the initial velocities violate the constraint by {residual.max():.3g}"
+        raise _fault(model, int(np.argmax(residual)), what)
+    if open_.size:
+        weight = np.sqrt(model.mass) * scale
+        x = x - open_ @ _least_norm(weight[:, None] * open_, weight * x)
+    return x * scale, float(np.max(residual, initial=0.0))
+
+
+def _sparse_velocities(
+    model: Model, q: np.ndarray, v: np.ndarray, given: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """The same by sparse solutions: nearest to the given velocities first, then least where open."""
+    scale = np.tile(np.repeat([1.0, 1 / scene_length(model)], 3), model.nb)
+    terms = model.blocks(0.0, q, v)
+    jacobian, nu = sparse_jacobian(model, terms.jacobian), terms.nu
+    x = LeastChange(jacobian, scale**-2)(nu)
+    if np.max(np.abs(jacobian @ x - nu)) > GROSS * np.max(np.abs(x / scale)):
+        worst = int(np.argmax(np.abs(jacobian @ x - nu)))
+        raise _fault(model, worst, "the driver contradicts the joints")
+    nearest, x, aim = LeastChange(jacobian, np.where(given, 1.0, LIGHT) / scale**2), v, v
+    for _ in range(NEARER):
+        x = aim + nearest(nu - jacobian @ aim)
+        aim = aim + np.where(given, v - x, 0.0)
+    chosen = np.flatnonzero(given)
+    selection = csr_array((np.ones(chosen.size), (np.arange(chosen.size), chosen)), (chosen.size, model.n))
+    x = LeastChange(csr_array(vstack([jacobian, selection])), model.mass)(np.append(nu, x[given]))
+    residual = np.abs(jacobian @ np.where(given, v, x) - nu)
+    miss, wanted = np.abs((x - v) / scale)[given], np.abs(v / scale)[given]
+    if np.max(miss, initial=0.0) > GROSS * np.max(wanted, initial=0.0):
+        what = f"the initial velocities violate the constraint by {residual.max():.3g}"
+        raise _fault(model, int(np.argmax(residual)), what)
+    return x, float(np.max(residual, initial=0.0))
+
+
+def _solutions(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The least-norm least-squares solution (n,), and an orthonormal basis (n, k) of what it leaves open."""
+    if not matrix.size:
+        return np.zeros(matrix.shape[1]), np.eye(matrix.shape[1])
+    u, values, vt = np.linalg.svd(matrix)
+    rank = int(np.sum(values > RANK_TOLERANCE * values[0]))
+    return vt[:rank].T @ ((u[:, :rank].T @ rhs) / values[:rank]), vt[rank:].T

@@ -1,0 +1,166 @@
+"""How kernels are compiled: once per machine and source version, cached on disk, replaceable.
+
+``kernel`` marks a helper that other kernels call, ``inlined`` and ``view`` one that becomes part of them,
+``allocating`` one that makes arrays: no other can.
+``exchangeable(signature)`` marks one that is passed to another kernel as an argument (a formulation, a
+chart, an integrator): it is compiled when it is first asked for, and the kernels that take it need no
+compilation of their own for it.  With NUMBA_DISABLE_JIT=1 all leave the plain Python function.
+
+The cache lives in a folder named after a hash of mbref's sources, because numba does not notice an edit
+in a kernel that another file's kernel calls.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import os
+import sys
+import types as types_of_python
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numba
+from numba import cfunc, f8, i8, njit, types, u4
+
+import mbref
+
+# No fastmath: the same bits with and without the JIT.  Without numba's runtime (``_nrt``, undocumented there)
+# no kernel can allocate, and none counts references to its arrays, which takes time.
+OPTIONS = {"cache": True, "error_model": "numpy", "_nrt": False}
+PLAIN = bool(numba.config.DISABLE_JIT)
+
+VECTOR = types.Array(f8, 1, "C")
+MATRIX = types.Array(f8, 2, "C")
+INDICES = types.Array(i8, 1, "C")
+PLAN = types.Array(u4, 1, "C")
+INDEX_TABLE = types.Array(i8, 2, "C")
+FLOAT = f8
+INT = i8
+
+
+def _source_hash() -> str:
+    digest = hashlib.sha256(numba.__version__.encode())
+    for path in sorted(Path(mbref.__file__).parent.rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _cache_root() -> Path:
+    default = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "mbref"
+    return Path(os.environ.get("NUMBA_CACHE_DIR") or default)
+
+
+CACHE = _cache_root() / f"kernels-{_source_hash()}"
+
+
+@contextlib.contextmanager
+def _own_cache() -> Iterator[None]:
+    """numba reads its cache folder when a function is decorated; other users of numba keep theirs."""
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(CACHE)
+    try:
+        yield
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+def kernel(function: Callable) -> Callable:
+    """A compiled helper, callable from kernels and from Python."""
+    return _compiled(function)
+
+
+def inlined(function: Callable) -> Callable:
+    """A kernel compiled into each of its callers: of an evaluation, half of whose time calls would take.
+
+    A closure is not kept on disk, where numba would not find it again.
+    """
+    return _compiled(function, forceinline=True, cache=function.__closure__ is None)
+
+
+def allocating(function: Callable) -> Callable:
+    """A kernel that allocates: numpy's decompositions do."""
+    return _compiled(function, _nrt=True)
+
+
+def view(function: Callable) -> Callable:
+    """A kernel that returns arrays, parts of its arguments: its source becomes part of its callers'."""
+    return njit(inline="always")(function)
+
+
+def _compiled(function: Callable, **options: bool) -> Callable:
+    with _own_cache():
+        return njit(**{**OPTIONS, **options})(function)
+
+
+class Exchangeable:
+    """A kernel of fixed signature that other kernels take as an argument; ``pointer`` compiles it."""
+
+    def __init__(self, function: Callable, signature: types.Type):
+        self.function, self.signature = function, signature
+        self._compiled: Callable | None = function if PLAIN else None
+
+    @property
+    def pointer(self) -> Callable:
+        """What is passed to a kernel: the compiled function, or the plain one without the JIT."""
+        if self._compiled is None:
+            self._say_compiling()
+            with _own_cache():
+                self._compiled = self._compile()
+        return self._compiled
+
+    def prepare(self) -> None:
+        """Compile now, or load from the cache."""
+        self.pointer  # noqa: B018
+
+    @functools.cached_property
+    def callable(self) -> Entry:
+        """The same kernel as a function for Python to call with arrays.
+
+        Compiled from a renamed copy: numba's cache tells functions apart by name and signature only.
+        """
+        f = self.function
+        copy = types_of_python.FunctionType(f.__code__, f.__globals__, f"{f.__name__}_entry")
+        copy.__module__, copy.__qualname__ = f.__module__, f"{f.__qualname__}_entry"
+        return Entry(copy, self.signature)
+
+    def _compile(self) -> Callable:
+        return cfunc(self.signature, **OPTIONS)(self.function)
+
+    def _say_compiling(self) -> None:
+        module = self.function.__module__.rpartition(".")[2]
+        if not any(CACHE.rglob(f"{module}.{self.function.__name__}-*.nbi")):
+            _announce_once()
+
+
+class Entry(Exchangeable):
+    """A kernel that Python calls: explicit signature, compiled on first use."""
+
+    def __call__(self, *arguments: object) -> object:
+        return self.pointer(*arguments)
+
+    def _compile(self) -> Callable:
+        return njit(self.signature, **OPTIONS)(self.function)
+
+
+def exchangeable(signature: types.Type) -> Callable[[Callable], Exchangeable]:
+    """Decorator: a kernel that is passed to other kernels."""
+    return lambda function: Exchangeable(function, signature)
+
+
+def entry(signature: types.Type) -> Callable[[Callable], Entry]:
+    """Decorator: a kernel that Python calls."""
+    return lambda function: Entry(function, signature)
+
+
+def pointer_to(signature: types.Type) -> types.Type:
+    """The argument type of an exchangeable kernel."""
+    return types.FunctionType(signature)
+
+
+@functools.cache
+def _announce_once() -> None:
+    """Tell the user on stderr why the first run takes long; standard output belongs to results."""
+    message = "mbref: compiling kernels for this machine, once for each method; up to a minute"
+    print(message, file=sys.stderr, flush=True)

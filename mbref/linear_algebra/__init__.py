@@ -1,0 +1,1 @@
+"""Dense and sparse factorisations for the kernels; nothing here knows a mechanism."""

@@ -1,0 +1,190 @@
+"""Dense factorisations by elimination: LU with partial and with full pivoting, Cholesky.
+
+Small matrices by hand, because a call of LAPACK costs more than the work.  All in place on C-contiguous
+arrays given by the caller.
+"""
+
+from __future__ import annotations
+
+from mbref.kernels.compilation import kernel
+
+
+@kernel
+def lu_factor(a, n, pivots, tolerance):
+    """LU with partial pivoting of a[:n, :n], in place; False where a pivot is ≤ tolerance.
+
+    ``pivots`` (n,) receives the row exchanged with each row.
+    """
+    for k in range(n):
+        best, size = k, abs(a[k, k])
+        for i in range(k + 1, n):
+            if abs(a[i, k]) > size:
+                best, size = i, abs(a[i, k])
+        pivots[k] = best
+        if not size > tolerance:
+            return False
+        if best != k:
+            for j in range(n):
+                a[k, j], a[best, j] = a[best, j], a[k, j]
+        inverse = 1.0 / a[k, k]
+        for i in range(k + 1, n):
+            factor = a[i, k] * inverse
+            a[i, k] = factor
+            if factor != 0.0:
+                for j in range(k + 1, n):
+                    a[i, j] -= factor * a[k, j]
+    return True
+
+
+@kernel
+def lu_solve(a, n, pivots, b):
+    """Solve with the factors of ``lu_factor``; b (n,) becomes the solution."""
+    for k in range(n):
+        p = pivots[k]
+        if p != k:
+            b[k], b[p] = b[p], b[k]
+        for j in range(k):
+            b[k] -= a[k, j] * b[j]
+    for k in range(n - 1, -1, -1):
+        for j in range(n - 1, k, -1):  # what was found last comes last
+            b[k] -= a[k, j] * b[j]
+        b[k] /= a[k, k]
+
+
+@kernel
+def full_pivot(a, m, n, rows, columns, tolerance):
+    """Gaussian elimination with full pivoting of a[:m, :n], in place; returns the rank (Eq. 10).
+
+    ``rows`` (m,) and ``columns`` (n,) receive the order of elimination: the first ``rank`` columns are
+    the dependent coordinates, the rest independent; the last rows are redundant.  A pivot counts when
+    it exceeds ``tolerance`` times the first.
+    """
+    for i in range(m):
+        rows[i] = i
+    for j in range(n):
+        columns[j] = j
+    first = 0.0
+    for k in range(min(m, n)):
+        best_row, best_column, size = k, k, 0.0
+        for i in range(k, m):
+            for j in range(k, n):
+                if abs(a[i, j]) > size:
+                    best_row, best_column, size = i, j, abs(a[i, j])
+        if k == 0:
+            first = size
+        if not size > tolerance * first:
+            return k
+        exchange_rows(a, n, k, best_row, rows)
+        exchange_columns(a, m, k, best_column, columns)
+        inverse = 1.0 / a[k, k]
+        for i in range(k + 1, m):
+            factor = a[i, k] * inverse
+            a[i, k] = factor
+            if factor != 0.0:
+                for j in range(k + 1, n):
+                    a[i, j] -= factor * a[k, j]
+    return min(m, n)
+
+
+@kernel
+def exchange_rows(a, n, k, other, rows):
+    """Exchange rows k and other of a[:, :n] and of the record of their order."""
+    if other != k:
+        rows[k], rows[other] = rows[other], rows[k]
+        for j in range(n):
+            a[k, j], a[other, j] = a[other, j], a[k, j]
+
+
+@kernel
+def exchange_columns(a, m, k, other, columns):
+    """Exchange columns k and other of a[:m] and of the record of their order."""
+    if other != k:
+        columns[k], columns[other] = columns[other], columns[k]
+        exchange_entries(a, m, k, other)
+
+
+@kernel
+def exchange_entries(a, m, k, other):
+    """Exchange the first m entries of columns k and other."""
+    for i in range(m):
+        a[i, k], a[i, other] = a[i, other], a[i, k]
+
+
+@kernel
+def back_substitute(r, n, x):
+    """Solve R x = x with the upper triangle of r[:n, :n], in place."""
+    for k in range(n - 1, -1, -1):
+        for j in range(k + 1, n):
+            x[k] -= r[k, j] * x[j]
+        x[k] /= r[k, k]
+
+
+@kernel
+def gram(dt, s):
+    """The upper half of D Dᵀ from Dᵀ (n, m); rows that a column does not touch cost nothing."""
+    n, m = dt.shape
+    for i in range(m):
+        for k in range(i, m):
+            s[i, k] = 0.0
+    for j in range(n):
+        for i in range(m):
+            value = dt[j, i]
+            if value != 0.0:
+                for k in range(i, m):
+                    s[i, k] += value * dt[j, k]
+
+
+@kernel
+def add_product(dt, x, sign, y):
+    """y += sign D x from Dᵀ (n, m)."""
+    n, m = dt.shape
+    for j in range(n):
+        value = sign * x[j]
+        for i in range(m):
+            y[i] += value * dt[j, i]
+
+
+@kernel
+def times_transpose(d, y, x):
+    """x = Dᵀ y from D (m, n)."""
+    m, n = d.shape
+    for j in range(n):
+        x[j] = 0.0
+    for i in range(m):
+        value = y[i]
+        for j in range(n):
+            x[j] += value * d[i, j]
+
+
+@kernel
+def cholesky_factor(a, n):
+    """Uᵀ D U of the upper half of a[:n, :n], in place; False where an entry of D is ≤ 0.
+
+    U has a unit diagonal, in whose place 1/D is kept: no roots, and no divisions when solving.
+    """
+    for k in range(n):
+        if not a[k, k] > 0.0:
+            return False
+        inverse = 1.0 / a[k, k]
+        a[k, k] = inverse
+        for i in range(k + 1, n):
+            if a[k, i] != 0.0:
+                for j in range(i, n):
+                    a[i, j] -= a[k, i] * a[k, j] * inverse  # products need not wait for the division
+        for j in range(k + 1, n):
+            a[k, j] *= inverse
+    return True
+
+
+@kernel
+def cholesky_solve(a, n, b):
+    """Solve with the factors of ``cholesky_factor``; b (n,) becomes the solution."""
+    for k in range(n):
+        value = b[k]
+        for j in range(k + 1, n):
+            b[j] -= value * a[k, j]
+    for k in range(n):
+        b[k] *= a[k, k]
+    for k in range(n - 1, -1, -1):
+        for j in range(n - 1, k, -1):  # what was found last comes last
+            b[k] -= a[k, j] * b[j]

@@ -1,0 +1,1 @@
+"""Simulation: method, run, compiled stepping loop, singular positions, ensembles."""

@@ -1,0 +1,122 @@
+"""Method: formulation + stabilisation / integrator, as a name with options and as objects.
+
+mpi-svd+projection            lm1+baumgarte[alpha=10,beta=10]            lm1+none/rk4[step=1e-4]
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mbref.formulations import FORMULATIONS
+from mbref.formulations.base import Formulation
+from mbref.integrators import INTEGRATORS
+from mbref.integrators.base import Integrator
+from mbref.kernels.layout import KEPT_PARTITION, POSITION_GAIN, VELOCITY_GAIN
+from mbref.stabilisation import PROJECTION, STABILISATIONS
+from mbref.stabilisation.base import Stabilisation
+
+DEFAULT = "alf-dual+projection/dop853"
+KINEMATIC = "alf-dual+projection/predictor"  # Newton–Raphson on Eqs. 1 to 3, see integrators/predictor.py
+
+
+class MethodError(Exception):
+    """A method name that means nothing, or an option that its part does not have."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A row of the paper's tables, and how it is integrated."""
+
+    formulation: Formulation
+    stabilisation: Stabilisation
+    integrator: Integrator
+    options: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # by name of the part
+
+    def __str__(self) -> str:
+        parts = [_text(p.name, self.options.get(p.name, {})) for p in self.parts]
+        return f"{parts[0]}+{parts[1]}/{parts[2]}"
+
+    @property
+    def parts(self) -> tuple[Formulation, Stabilisation, Integrator]:
+        """Formulation, stabilisation, integrator."""
+        return self.formulation, self.stabilisation, self.integrator
+
+    def options_of(self, part: Formulation | Stabilisation | Integrator) -> dict[str, float]:
+        """A part's options, its defaults overridden by what the name says."""
+        return {**part.options, **self.options.get(part.name, {})}
+
+    def settings(self, rank_tolerance: float) -> np.ndarray:
+        """The settings vector of the kernels, the feedback gains of both parts added."""
+        values = self.formulation.settings(self.options_of(self.formulation), rank_tolerance)
+        for part in (self.formulation, self.stabilisation):
+            if part.feedback is not None:
+                values[[VELOCITY_GAIN, POSITION_GAIN]] += part.feedback(self.options_of(part))
+        values[KEPT_PARTITION] = self.options_of(self.stabilisation).get("kept", 0.0)
+        return values
+
+    @staticmethod
+    def parse(name: str) -> Method:
+        """The method of a name, "kinematic" among them; raises MethodError with what is known."""
+        name = KINEMATIC if name == "kinematic" else name
+        head, _, integrator = name.partition("/")
+        formulation, plus, stabilisation = _split_outside_brackets(head)
+        if not plus:
+            stabilisation = "none"
+        options: dict[str, dict[str, float]] = {}
+        parts = (
+            _part(formulation, FORMULATIONS, "formulation", options),
+            _part(stabilisation, STABILISATIONS, "stabilisation", options),
+            _part(integrator or "dop853", INTEGRATORS, "integrator", options),
+        )
+        if not parts[2].integrates and parts[1] is not PROJECTION:
+            raise MethodError(f"integrator {parts[2].name} only extrapolates: it goes with projection")
+        return Method(*parts, options)
+
+
+def _split_outside_brackets(text: str) -> tuple[str, str, str]:
+    """Split at the + that joins two parts, not at one inside an option such as [1e+5]."""
+    depth = 0
+    for k, character in enumerate(text):
+        depth += (character == "[") - (character == "]")
+        if character == "+" and depth == 0:
+            return text[:k], "+", text[k + 1 :]
+    return text, "", ""
+
+
+def _text(name: str, options: Mapping[str, float]) -> str:
+    return name + (f"[{','.join(f'{k}={v:g}' for k, v in options.items())}]" if options else "")
+
+
+def _part(text: str, table: Mapping, kind: str, options: dict[str, dict[str, float]]):
+    """The table's entry, its bracketed options put into ``options``."""
+    match = re.fullmatch(r"([\w-]+)(?:\[(.*)\])?", text.strip())
+    name = match[1] if match else text
+    if name not in table:
+        raise MethodError(f"unknown {kind} {name!r}; known: {', '.join(table)}")
+    part = table[name]
+    given = [item for item in (match[2] or "").split(",") if item.strip()] if match else []
+    for position, item in enumerate(given):
+        key, equals, value = item.partition("=")
+        key, value = (key.strip(), value) if equals else (_positional(part, position), key)
+        if key not in part.options:
+            raise MethodError(f"{kind} {name} has no option {key!r}; it has: {_listed(part.options)}")
+        try:
+            options.setdefault(name, {})[key] = number = float(value)
+        except ValueError:
+            raise MethodError(f"{kind} {name}: option {key} must be a number, got {value!r}") from None
+        if not number >= 0 or (key == "step" and number == 0):
+            raise MethodError(f"{kind} {name}: option {key} must be positive, got {value}")
+    return part
+
+
+def _positional(part, position: int) -> str:
+    names = list(part.options)
+    return names[position] if position < len(names) else f"number {position + 1}"
+
+
+def _listed(options: Mapping[str, float]) -> str:
+    return ", ".join(options) or "none"
