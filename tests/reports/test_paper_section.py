@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-import crosscheck.isolate
-import mbref.simulate
 import numpy as np
 import pytest
 from synthetic import MADE_OF
 
-import crosscheck.study
+import crosscheck.processes.pool
+import crosscheck.study.grid
+import mbref.simulation.simulate
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from crosscheck.paper import runs

@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 import math
 
-import crosscheck.isolate
-import mbref.simulate
 import pytest
 from synthetic import groups, nothing, record, records, scene
 
-import crosscheck.study
+import crosscheck.processes.pool
+import crosscheck.study.grid
+import mbref.simulation.simulate
 from crosscheck.judge.model_identity import gate_times
 from crosscheck.judge.truth import truth_for
 from mbref.trajectory import Outcome
