@@ -6,7 +6,7 @@
 chart, an integrator): it is compiled when it is first asked for, and the kernels that take it need no
 compilation of their own for it.  With NUMBA_DISABLE_JIT=1 all leave the plain Python function.
 
-The cache lives in a folder named after a hash of mbref's sources, because numba does not notice an edit
+The cache lives in a folder named after a hash of the sources that have kernels, because numba does not notice an edit
 in a kernel that another file's kernel calls.
 """
 
@@ -39,11 +39,17 @@ INDEX_TABLE = types.Array(i8, 2, "C")
 FLOAT = f8
 INT = i8
 
+WITH_KERNELS = (
+    "kernels", "linear_algebra", "equations", "formulations", "stabilisation", "integrators", "simulation",
+    "specialised",
+)  # fmt: skip
+
 
 def _source_hash() -> str:
     digest = hashlib.sha256(numba.__version__.encode())
-    for path in sorted(Path(mbref.__file__).parent.rglob("*.py")):
-        digest.update(path.read_bytes())
+    for folder in WITH_KERNELS:
+        for path in sorted((Path(mbref.__file__).parent / folder).rglob("*.py")):
+            digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
 
