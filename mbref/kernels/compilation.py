@@ -6,8 +6,8 @@
 chart, an integrator): it is compiled when it is first asked for, and the kernels that take it need no
 compilation of their own for it.  With NUMBA_DISABLE_JIT=1 all leave the plain Python function.
 
-The cache lives in a folder named after a hash of the sources that have kernels, because numba does not notice an edit
-in a kernel that another file's kernel calls.
+The cache lives in a folder named after a hash of the sources that have kernels, because numba does not
+notice an edit in a kernel that another file's kernel calls.
 """
 
 from __future__ import annotations
