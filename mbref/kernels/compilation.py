@@ -34,7 +34,7 @@ PLAIN = bool(numba.config.DISABLE_JIT)
 VECTOR = types.Array(f8, 1, "C")
 MATRIX = types.Array(f8, 2, "C")
 INDICES = types.Array(i8, 1, "C")
-PLAN = types.Array(u4, 1, "C")
+UNSIGNED = PLAN = types.Array(u4, 1, "C")
 INDEX_TABLE = types.Array(i8, 2, "C")
 FLOAT = f8
 INT = i8
