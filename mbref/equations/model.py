@@ -12,8 +12,8 @@ import numpy as np
 
 from mbref import rotations
 from mbref.equations.evaluation import evaluate_all
-from mbref.equations.joints import JOINTS
-from mbref.equations.joints.base import ROWS_OF, Primitive, driven_angle, driven_displacement, frame
+from mbref.equations.joints import driver_primitive, primitives_of
+from mbref.equations.joints.base import ROWS_OF, Primitive, frame
 from mbref.equations.loads import CONSTANTS, FIRST, FOURTH, SECOND, THIRD
 from mbref.kernels.layout import (
     COLUMNS,
@@ -39,7 +39,7 @@ from mbref.kernels.layout import (
     U_J,
     W_I,
 )
-from mbref.scene import GROUND, Body, Driver, Fixed, Joint, Scene
+from mbref.scene import GROUND, Body, Driver, Fixed, Joint, Scene, SceneError
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class Model:
 
     def anchor(self, joint: Joint, q: np.ndarray) -> np.ndarray:
         """World positions (…, 3) of the joint's anchor on its second body at coordinates q (…, nb, 7)."""
-        point = joint.anchors[1] if joint.type == "distance" else joint.anchor
+        point = joint.anchor_pair[1]
         b = self._index[joint.bodies[1]]
         if b == self.nb:
             return np.broadcast_to(point, (*q.shape[:-2], 3))
@@ -191,7 +191,7 @@ class Model:
         primitives, geometry, bodies, names = [], [], [], []
         for joint in self.joints:
             pair = [self._index[name] for name in joint.bodies]
-            for primitive in (*JOINTS[joint.type](joint), *_driver_rows(joint, driven)):
+            for primitive in (*primitives_of(joint), *_driver_rows(joint, driven)):
                 driver = driven[joint.name] if primitive.driven else -1
                 primitives.append([primitive.kind, *pair, driver, len(names)])
                 geometry.append(self._local(primitive, joint.bodies))
@@ -239,7 +239,7 @@ class Model:
                 for column, name, point in zip((FIRST, SECOND), load.bodies, load.points, strict=True):
                     row[column : column + 3] = self._point(name, point)
                 row[CONSTANTS:] = load.stiffness, load.damping, load.natural_length
-            else:
+            elif load.type == "torsion_spring":
                 joint = joints[load.joint]
                 first, second = joint.bodies
                 index.append([TORSION_SPRING, self._index[first], self._index[second], slots])
@@ -250,6 +250,10 @@ class Model:
                 ):  # fmt: skip
                     row[column : column + 3] = self._direction(name, axis)
                 row[CONSTANTS:] = load.stiffness, load.damping, load.natural_angle
+            else:
+                raise SceneError(
+                    [f"load[{len(data)}]: mbref has no equations for loads of type {load.type!r}"]
+                )
             data.append(row)
         return np.array(index, dtype=np.int64).reshape(-1, 4), np.array(data).reshape(-1, 15)
 
@@ -288,9 +292,7 @@ def _principal_axes(body: Body) -> tuple[np.ndarray, np.ndarray]:
 def _driver_rows(joint: Joint, driven: dict[str, int]) -> list[Primitive]:
     if joint.name not in driven:
         return []
-    if joint.type == "translational":
-        return [driven_displacement(joint.anchor, joint.axis)]
-    return [driven_angle(joint.axis)]
+    return [driver_primitive(joint)]
 
 
 def _driver_row(driver: Driver, degree: int) -> np.ndarray:

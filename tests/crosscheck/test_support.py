@@ -12,7 +12,7 @@ from crosscheck.conformance.features import JOINTS, LOADS, feature_scenes
 from crosscheck.engine import BUILT_IN, Cannot, Why, engine
 from crosscheck.judge.constraints import initial_poses, jacobian
 from mbref.scene import Joint, Load, Scene
-from mbref.scene_validation import DRIVEN
+from mbref.scene_validation import DRIVABLE
 from mbref.trajectory import Outcome
 
 README = Path(__file__).parents[2] / "README.md"
@@ -32,7 +32,7 @@ def test_probes_and_the_kinds_a_scene_may_have():
     assert set(JOINTS) == kinds(Joint), set(JOINTS) ^ kinds(Joint)
     assert set(LOADS) == kinds(Load), set(LOADS) ^ kinds(Load)
     scenes = feature_scenes()
-    assert {f"{kind} driver" for kind in DRIVEN} <= set(scenes), list(scenes)
+    assert {f"{kind} driver" for kind in DRIVABLE} <= set(scenes), list(scenes)
     for name, count in {"loop": 0, "redundant loop": 1, "several loops": 5}.items():
         rows, _ = jacobian(scenes[name], 0.0, *initial_poses(scenes[name]))
         redundant = len(rows) - np.linalg.matrix_rank(rows, rtol=1e-9)
