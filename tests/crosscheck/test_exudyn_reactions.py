@@ -51,7 +51,7 @@ def needed_wrench(scene: Scene, trajectory: Trajectory) -> np.ndarray:
     force = body.mass * (trajectory.acceleration[:, 0] - np.array(scene.gravity))
     spin = np.einsum("kij,kj->ki", inertia, w)
     moment = np.einsum("kij,kj->ki", inertia, alpha) + np.cross(w, spin) - np.array(scene.load[0].moment)
-    anchors = joint.anchors if joint.type == "distance" else (joint.anchor,) * 2
+    anchors = joint.anchor_pair
     point = np.array(anchors[1])
     if joint.bodies[1] == "b":
         start = rotations.to_matrix(np.array(body.orientation))

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from crosscheck.engines.driver_motion import motion
 from crosscheck.engines.initial_velocities import initial_rates, lacks_mass, twist_maps
-from crosscheck.engines.spanning_tree import GROUND_LINK, ROWS, Link, Tree, effective_mass, spanning_tree
+from crosscheck.engines.spanning_tree import GROUND_LINK, Link, Tree, effective_mass, spanning_tree
 from crosscheck.judge.constraints import initial_twists
 from mbref import rotations
 from mbref.scene import (
@@ -72,7 +72,7 @@ def test_parents_of_links_lie_on_the_way_from_the_ground(scene: Scene) -> None:
 @given(graphs())
 def test_freedoms_less_closure_rows_are_coordinates_less_joint_rows(scene: Scene) -> None:
     tree = spanning_tree(scene)
-    counted = 6 * len(scene.body) - sum(ROWS.get(joint.type, 1) for joint in scene.joint)
+    counted = 6 * len(scene.body) - sum(joint.facts.rows for joint in scene.joint)
     spins = len(rods(tree))
     measured = tree.nv - spins - sum(CLOSURE_ROWS[c.kind] for c in tree.closures)
     assert measured == counted, f"tree gives mobility {measured}, the scene's joints {counted}"
@@ -120,8 +120,7 @@ def test_every_part_keeps_a_positive_mass_and_inertia(scene: Scene) -> None:
 
 @given(graphs(), st.data())
 def test_a_driven_joint_stays_in_the_tree_and_moves_one_coordinate(scene: Scene, data: st.DataObject) -> None:
-    kinds = ("revolute", "cylindrical", "translational")
-    names = [joint.name for joint in scene.joint if joint.type in kinds]
+    names = [joint.name for joint in scene.joint if joint.facts.driven]
     if not names:
         return
     name = data.draw(st.sampled_from(names))
@@ -163,7 +162,7 @@ def test_rods_take_a_share_of_what_their_anchors_can_spare() -> None:
     scene = every_joint()
     tree = spanning_tree(scene)
     (rod,) = rods(tree)
-    whole = spanning_tree(scene.with_(joint=tuple(j for j in scene.joint if j.type != "distance")))
+    whole = spanning_tree(scene.with_(joint=tuple(j for j in scene.joint if not isinstance(j, Distance))))
     spare = min(effective_mass(whole.links[whole.own[b]], point) for b, point in rod.ends)
     assert rod.mass / 2 < 0.5 * spare, f"an end of {rod.mass / 2:.3g} kg where {spare:.3g} kg are to be had"
 

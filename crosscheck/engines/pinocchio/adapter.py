@@ -24,7 +24,7 @@ from scipy.linalg import solve_triangular
 from crosscheck.engine import Cannot, Engine, Setting
 from crosscheck.engines.driver_motion import fastest_rate, motion, stated_rate
 from crosscheck.engines.initial_velocities import lacks_mass
-from crosscheck.engines.pinocchio.model import Loads, Mechanism
+from crosscheck.engines.pinocchio.model import SUPPORTS, Loads, Mechanism
 from crosscheck.engines.sampling import Adaptive, Counts, Failed, Sample, rk4, run_through
 from crosscheck.engines.tree_reactions import LinkMotion, joint_reactions
 from mbref import rotations
@@ -63,6 +63,7 @@ class Pinocchio(Engine):
 
     name = "pinocchio"
     package = "pin"
+    supports = SUPPORTS
 
     def version(self) -> str:
         """Version of Pinocchio; raises ImportError when it is not installed."""
@@ -70,8 +71,8 @@ class Pinocchio(Engine):
 
         return pinocchio.__version__
 
-    def cannot(self, scene: Scene) -> Cannot | None:
-        """Every joint, driver and load maps exactly; what has no mass needs its whole motion prescribed."""
+    def refuses(self, scene: Scene) -> Cannot | None:
+        """Scenes without masses whose motion is not prescribed in full."""
         return lacks_mass(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
