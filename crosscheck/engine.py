@@ -1,4 +1,4 @@
-"""The Engine interface, what an engine cannot do, and the table of engines.
+"""The Engine interface, the refusals of engines, and the table of engines.
 
 An engine of a third party needs to import nothing but this module.
 """
@@ -78,8 +78,8 @@ class Supports:
 class Setting:
     """One way of running an engine.
 
-    ``family`` groups the settings that differ only in accuracy ("defaults" is what a user gets
-    without tuning, "tuned" what the engine's documentation allows at best); ``options`` are the
+    ``family`` groups the settings that differ only in accuracy ("defaults" are the options a
+    user has without tuning, "tuned" the best that the engine's documentation allows); ``options`` are the
     engine's own numbers; (family, options) reproduce the run.
     """
 

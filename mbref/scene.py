@@ -50,8 +50,8 @@ class Body(Entry):
 
     ``inertia`` is about the centre of mass along the body axes: three principal moments or a
     symmetric 3x3 (kg m²).  ``mass`` and ``inertia`` are omitted together when only kinematics is
-    wanted.  ``velocity`` and ``angular_velocity`` (world) are optional: what is left out is chosen
-    consistent with the constraints and with what is given.
+    wanted.  ``velocity`` and ``angular_velocity`` (world) are optional: velocities left out
+    are chosen consistent with the constraints and with the given ones.
     """
 
     name: Name
@@ -180,7 +180,7 @@ class Scene(Entry):
 
 
 def _lists(value: Any) -> Any:
-    """Tuples as lists, which is what a TOML or JSON writer takes."""
+    """Tuples as lists, as writers of TOML and JSON need them."""
     if isinstance(value, Mapping):
         return {k: _lists(v) for k, v in value.items()}
     return [_lists(v) for v in value] if isinstance(value, tuple | list) else value

@@ -1,4 +1,4 @@
-"""What is wrong with a scene: one message per fault, under the path of the field."""
+"""Faults of a scene: one message for each, under the path of the field."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class SceneError(Exception):
 
 
 def checked_inertia(value: Any) -> tuple[Any, ...]:
-    """Three principal moments or a symmetric 3x3, as tuples; ValueError says what is unphysical."""
+    """Three principal moments or a symmetric 3x3, as tuples; ValueError says which value is unphysical."""
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError):

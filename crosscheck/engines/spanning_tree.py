@@ -1,7 +1,7 @@
 """A scene as a spanning tree with loop closures, for the engines that work in joint coordinates.
 
 Nodes are the bodies and the ground, edges the joints.  A maximum-weight spanning tree by constraint rows
-keeps the stiff joints, and every driven one; what is cut closes a loop:
+keeps the stiff joints, and every driven one; every joint that is cut closes a loop:
 
 - a cut spherical joint is a point that two links share;
 - any other cut joint carries a *ghost*: its second body's mass and inertia are divided in equal shares

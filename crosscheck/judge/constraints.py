@@ -99,7 +99,7 @@ def initial_twists(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     """Velocities and angular velocities (nb, 3), world, at t = 0 that obey joints and drivers.
 
     Among those, the nearest to the velocities the scene gives (least squares, angular ones times the
-    scene's length), and of what is left open the least mass-weighted norm (unit masses where the scene
+    scene's length); velocities left free have the least mass-weighted norm (unit masses where the scene
     has none).  Raises SceneError naming the joint when drivers or given velocities contradict the joints
     by more than 5 % of the velocities' scale.
     """

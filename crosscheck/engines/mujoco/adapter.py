@@ -266,7 +266,7 @@ class _Run:
         )
 
     def link_motion(self) -> LinkMotion:
-        """How the links move; the data's forces are those of this state."""
+        """The motion of the links; the data's forces are those of this state afterwards."""
         mujoco, model, data, links = self.mujoco, self.model, self.data, self.compiled.links
         mujoco.mj_forward(model, data)
         mujoco.mj_rnePostConstraint(model, data)

@@ -1,8 +1,8 @@
 """A scene's tree as a MuJoCo model: bodies and joints, closures and drivers as equalities, loads.
 
 Every body frame has its origin at the centre of mass of the scene's body and world-aligned axes at t = 0.
-Masses are written after compilation, because the compiler refuses thin discs and rods by rounding; what
-it sees before has nothing special (no coinciding frames, no equal moments) that it could simplify by.
+Masses are written after compilation, because the compiler refuses thin discs and rods by rounding; the
+stand-ins until then have no coinciding frames and no equal moments that it could simplify by.
 """
 
 from __future__ import annotations
@@ -153,7 +153,7 @@ class _Builder:
         return self.tree.link_of(self.scene.body_index(body))
 
     def _force(self, k: int, load: Force) -> None:
-        """A massless body fixed at the point of attack: what is applied acts at a centre of mass."""
+        """A massless body fixed at the point of attack, because MuJoCo applies forces at centres of mass."""
         link = self.link_of(load.body)
         body = self.body[link].add_body(name=f"force {k}", pos=np.array(load.point) - self.centre(link))
         _inertial(body, 0.0, np.zeros(3), np.zeros(3), UNIT)

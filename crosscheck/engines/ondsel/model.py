@@ -168,7 +168,7 @@ def _frames(joint: Joint) -> list[np.ndarray]:
 
 
 def _expression(driver: Driver, t0: float, turned: float, sign: float) -> str:
-    """The driver's value times ``sign``, less what is ``turned``, in OndselSolver's syntax."""
+    """The driver's value times ``sign``, less the angle ``turned`` (rad), in OndselSolver's syntax."""
     t = f"(time + {t0!r})"
     terms = ["*".join([f"({sign * c!r})"] + [t] * n) for n, c in enumerate(driver.polynomial)]
     if s := driver.sine:

@@ -1,7 +1,7 @@
 """Pinocchio: rigid-body dynamics in joint coordinates, closed by its proximal constraint solver.
 
-Pinocchio has no integrator of its own; the families differ in what is put around
-``constraintDynamics``:
+Pinocchio has no integrator of its own; the families differ in the integrator and the stabilisation put
+around ``constraintDynamics``:
 
 - ``defaults``: the solver as it comes (no regularisation, one iteration), fixed-step RK4;
 - ``proximal``: the same with the solver iterated to convergence, which redundant closures need;
@@ -261,7 +261,7 @@ class _Run:
         )
 
     def link_motion(self, t: float, q: np.ndarray, v: np.ndarray) -> LinkMotion:
-        """How the links move; leaves the closure forces of this state in the closures' data."""
+        """The motion of the links; leaves the closure forces of this state in the closures' data."""
         pin, model, data = self.pin, self.model, self.data
         a = self._finite(t, self.accelerations(t, q, v, self.sampler))
         pin.forwardKinematics(model, data, q, v, a)

@@ -108,7 +108,7 @@ class _Run:
         )
 
     def _motion(self) -> LinkMotion:
-        """How the links move."""
+        """The motion of the links."""
         state, bodies = self.state, self.mechanism.bodies
         self.mechanism.model.realizeAcceleration(state)
         of = {name: np.array([_three(getattr(body, f"get{name}InGround")(state)) for body in bodies])
@@ -136,7 +136,7 @@ class _Run:
             at = next(k for k in range(labels.getSize()) if labels.get(k).endswith(name))
             force, moment = np.array([values.get(at + k) for k in range(6)]).reshape(2, 3)
             origin = motion.position[second] if second != GROUND_LINK else np.zeros(3)
-            found.append(-wrench(force, origin, moment))  # OpenSim records what the bodies exert
+            found.append(-wrench(force, origin, moment))  # OpenSim records the wrench that the bodies exert
         return found
 
 
