@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal, get_args
+from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import Discriminator, field_validator
 
@@ -54,6 +54,11 @@ class JointEntry(Entry):
     facts: ClassVar[JointFacts]
     name: Name
     bodies: Pair
+
+    @classmethod
+    def at(cls, name: str, bodies: tuple[str, str], **places: Any) -> Self:
+        """A joint of this type with those of the ``places`` (anchor, anchors, axis, axes) that it has."""
+        return cls(name=name, bodies=bodies, **{k: v for k, v in places.items() if k in cls.model_fields})
 
     @property
     def anchor_pair(self) -> tuple[Vector, Vector]:

@@ -19,20 +19,14 @@ from crosscheck.judge import constraints
 from mbref import rotations
 from mbref.equations.model import Model
 from mbref.scene import (
-    Cylindrical,
-    Distance,
-    Fixed,
-    Revolute,
+    JOINT_TYPES,
     Scene,
-    Spherical,
-    Translational,
-    Universal,
 )  # fmt: skip
 from mbref.scenes import SCENES
 from tests.crosscheck.tree_scenes import driven, every_joint, ring
 from tests.strategies import DRIVABLE, one_joint_scenes
 
-KINDS = (Fixed, Revolute, Universal, Spherical, Translational, Cylindrical, Distance)
+KINDS = tuple(JOINT_TYPES.values())
 MECHANISMS = {scene.name: scene for scene in (every_joint(), driven(), ring("revolute"), ring("universal"))}
 # without the chain, whose redundant rows lead Newton's method from disturbed states to a singular position
 MECHANISMS |= {name: SCENES[name]() for name in SCENES if name != "four_bar_chain"}

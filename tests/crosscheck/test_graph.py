@@ -13,22 +13,19 @@ from crosscheck.engines.spanning_tree import GROUND_LINK, Link, Tree, effective_
 from crosscheck.judge.constraints import initial_twists
 from mbref import rotations
 from mbref.scene import (
+    JOINT_TYPES,
     Body,
-    Cylindrical,
     Distance,
     Driver,
     Fixed,
-    Revolute,
     Scene,
     Sine,
-    Spherical,
     Translational,
-    Universal,
 )
 from mbref.scenes import SCENES
 from tests.crosscheck.tree_scenes import INERTIA, driven, every_joint, ring
 
-KINDS = (Fixed, Revolute, Translational, Universal, Cylindrical, Spherical, Distance)
+KINDS = tuple(JOINT_TYPES.values())
 CLOSURE_ROWS = {"point": 3, "weld": 6}
 
 
@@ -47,11 +44,7 @@ def graphs(draw: st.DrawFn) -> Scene:
     for k, kind in enumerate(draw(st.lists(st.sampled_from(KINDS), max_size=9), label="joints")):
         pair = tuple(str(name) for name in rng.choice(names, 2, replace=False))
         u, v = rng.normal(size=(2, 3))
-        places = {
-            "axis": u, "axes": (u, np.cross(u, v)), "anchor": v, "anchors": (u, v),
-            "name": f"j{k}", "bodies": pair,
-        }  # fmt: skip
-        joints.append(kind(**{key: value for key, value in places.items() if key in kind.model_fields}))
+        joints.append(kind.at(f"j{k}", pair, axis=u, axes=(u, np.cross(u, v)), anchor=v, anchors=(u, v)))
     return Scene(name="graph", body=bodies, joint=tuple(joints))
 
 
