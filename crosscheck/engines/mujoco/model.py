@@ -28,7 +28,15 @@ from mbref import rotations
 from mbref.scene import Driver, Force, Moment, Scene, Spring, TorsionSpring
 
 SUPPORTS = Supports(
-    joints=("fixed", "revolute", "universal", "spherical", "translational", "cylindrical", "distance"),
+    joints=(
+        "fixed",
+        "revolute",
+        "universal",
+        "spherical",
+        "translational",
+        "cylindrical",
+        "distance",
+    ),
     drivers=("angle", "displacement"),
     loads=("moment", "force", "spring", "torsion_spring"),
 )

@@ -37,7 +37,15 @@ class Sundials(Engine):
     name = "sundials"
     package = "scikit-sundae"
     supports = Supports(
-        joints=("fixed", "revolute", "universal", "spherical", "translational", "cylindrical", "distance"),
+        joints=(
+            "fixed",
+            "revolute",
+            "universal",
+            "spherical",
+            "translational",
+            "cylindrical",
+            "distance",
+        ),
         drivers=("angle", "displacement"),
         loads=("moment", "force", "spring", "torsion_spring"),
     )
