@@ -84,9 +84,8 @@ def _rows(scene: Scene, k: int, joint: Joint, driver: Driver | None) -> list[_Ro
     rows = [replace(blank, kind="point", e1=e[n]) for n in facts.forbidden_translations]
     pairs = [(e[a], f[b]) for a, b in (ACROSS[n] for n in facts.forbidden_rotations)]
     if facts.condition == "perpendicular axes":
-        pairs = [
-            tuple(in_body(scene, *end) for end in zip(joint.bodies, map(unit, joint.directions), strict=True))
-        ]
+        first, second = (unit(axis) for axis in joint.directions)
+        pairs = [(in_body(scene, joint.bodies[0], first), in_body(scene, joint.bodies[1], second))]
     rows += [replace(blank, kind="direction", e1=u, w=w) for u, w in pairs]
     if driver and facts.driven == "displacement":
         rows.append(replace(blank, kind="point", e1=e[2], driver=driver))

@@ -23,9 +23,11 @@ class Forces:
     def __init__(self, scene: Scene):
         self.scene, self.nb = scene, len(scene.body)
         weighed = scene.has_mass()
-        mass = [body.mass if weighed else 1.0 for body in scene.body]
+        mass = [(body.mass or 1.0) if weighed else 1.0 for body in scene.body]
         self.inertia = inertia_matrices(scene) if weighed else np.array([np.eye(3)] * self.nb)
-        self.weight = np.outer(mass, scene.gravity)[..., None] if weighed else np.zeros((self.nb, 3, 1))
+        self.weight = (
+            np.outer(mass, np.array(scene.gravity))[..., None] if weighed else np.zeros((self.nb, 3, 1))
+        )
         self.mass = np.zeros((6 * self.nb, 6 * self.nb))
         for b in range(self.nb):
             self.mass[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = mass[b] * np.eye(3)

@@ -39,8 +39,8 @@ class System:
         rates -, and the outputs (k, ·) of the joints' sensors side by side."""
         rows = np.array([[self.mbs.GetSensorStoredData(s) for s in node] for node in self.sensors])
         times = rows[0, 0, :, 0]
-        forces = [self.mbs.GetSensorStoredData(s)[:, 1:] for s in self.joint_sensors]
-        forces = np.concatenate([np.zeros((len(times), 0)), *forces], axis=1)
+        outputs = [self.mbs.GetSensorStoredData(s)[:, 1:] for s in self.joint_sensors]
+        forces = np.concatenate([np.zeros((len(times), 0)), *outputs], axis=1)
         return times, rows[..., 1:].transpose(1, 2, 0, 3), forces
 
 
@@ -105,7 +105,8 @@ class _Parts:
         return self.mbs.AddMarker(self.items.MarkerBodyRigid(bodyNumber=self.number[body], localHT=local))
 
     def joint(self, joint: Joint) -> int:
-        item, frame, given = JOINTS[joint.type], marker_frame(joint), {}
+        item, frame = JOINTS[joint.type], marker_frame(joint)
+        given: dict[str, Any] = {}
         ends = zip(joint.bodies, joint.anchor_pair, strict=True)
         markers = [self.marker(body, point, frame) for body, point in ends]
         if item.constrained:

@@ -23,10 +23,13 @@ JOINTS = {  # joint type: OndselSolver's
     "translational": "translational",
     "cylindrical": "cylindrical",
 }
-MOTIONS = {"angle": "rotational", "displacement": "translational"}  # driven coordinate: OndselSolver's motion
+MOTIONS: dict[str | None, str] = {
+    "angle": "rotational",
+    "displacement": "translational",
+}  # driven coordinate: OndselSolver's motion
 SUPPORTS = Supports(
     joints=tuple(JOINTS),
-    drivers=tuple(MOTIONS),
+    drivers=("angle", "displacement"),
     loads=("moment", "force", "spring", "torsion_spring"),  # no load changes a motion that is prescribed
 )
 ACCURATE_ON_GROUND = ("cylindrical",)  # joints with right accelerations only where the first body is at rest

@@ -5,6 +5,7 @@ Every body frame has the link's origin and world-aligned axes at t = 0; coordina
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -189,7 +190,12 @@ def _torsion_spring(mechanism: Mechanism, name: str, load: TorsionSpring) -> Any
     return force
 
 
-FORCES = {Moment: _moment, Force: _point_force, Spring: _spring, TorsionSpring: _torsion_spring}
+FORCES: dict[type, Callable[..., Any]] = {
+    Moment: _moment,
+    Force: _point_force,
+    Spring: _spring,
+    TorsionSpring: _torsion_spring,
+}
 
 
 def _joint(link: Link) -> tuple[str, np.ndarray, tuple[int, ...]]:
