@@ -25,6 +25,7 @@ from mbref.scene_joints import (
     Fixed,
     Joint,
     JointFacts,
+    Planar,
     Revolute,
     Spherical,
     Translational,
@@ -38,8 +39,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "GROUND", "JOINT_TYPES", "LOAD_TYPES", "Body", "Cylindrical", "Distance", "Driver", "Fixed", "Force",
-    "Joint", "JointFacts", "Load", "Moment", "Revolute", "Scene", "SceneError", "Sine", "Spherical", "Spring",
-    "TorsionSpring", "Translational", "Universal",
+    "Joint", "JointFacts", "Load", "Moment", "Planar", "Revolute", "Scene", "SceneError", "Sine", "Spherical",
+    "Spring", "TorsionSpring", "Translational", "Universal",
 ]  # fmt: skip
 
 UNIT_TOLERANCE = 1e-6  # a quaternion further than this from unit length is a fault, nearer is rounding

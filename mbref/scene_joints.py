@@ -141,6 +141,13 @@ class Cylindrical(_AxisJoint):
     type: Literal["cylindrical"] = "cylindrical"
 
 
+class Planar(_AxisJoint):
+    """Displacement in the plane through ``anchor`` with normal ``axis``, and rotation about the normal."""
+
+    facts = JointFacts(forbidden_translations=(Z,), forbidden_rotations=(X, Y))
+    type: Literal["planar"] = "planar"
+
+
 class Distance(JointEntry):
     """Constant distance between two ``anchors`` (first on the first body, second on the second)."""
 
@@ -161,7 +168,7 @@ class Distance(JointEntry):
 
 
 Joint = Annotated[
-    Fixed | Revolute | Universal | Spherical | Translational | Cylindrical | Distance,
+    Fixed | Revolute | Universal | Spherical | Translational | Cylindrical | Planar | Distance,
     Discriminator("type"),
 ]
 JOINT_TYPES: dict[str, type[JointEntry]] = {

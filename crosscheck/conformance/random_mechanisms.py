@@ -29,9 +29,9 @@ from mbref.scene import (
 from mbref.trajectory import Outcome
 
 REFERENCE, PRINCIPLE = "mbref", "Gauss's principle"
-KINDS = ("revolute", "universal", "spherical", "translational", "cylindrical", "distance", "fixed")
-TREE = (0.34, 0.14, 0.14, 0.12, 0.12, 0.09, 0.05)  # probability of each kind to join a body to the tree
-CLOSING = (0.4, 0.15, 0.2, 0.05, 0.1, 0.1, 0.0)  # and to close a loop
+KINDS = ("revolute", "universal", "spherical", "translational", "cylindrical", "distance", "fixed", "planar")
+TREE = (0.34, 0.14, 0.14, 0.12, 0.12, 0.08, 0.03, 0.03)  # probability of each kind to join a body to the tree
+CLOSING = (0.4, 0.15, 0.2, 0.05, 0.1, 0.08, 0.0, 0.02)  # and to close a loop
 PLANAR = 0.65  # part of the mechanisms whose axes are parallel, so that their loops are redundant
 HINGED = 0.25  # part of the loops that are a second hinge on the axis of the first
 TRIES = 60

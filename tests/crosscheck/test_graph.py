@@ -126,7 +126,7 @@ def test_a_driven_joint_stays_in_the_tree_and_moves_one_coordinate(scene: Scene,
     )
 
 
-@pytest.mark.parametrize("kind", ["revolute", "cylindrical", "universal", "spherical"])
+@pytest.mark.parametrize("kind", ["revolute", "cylindrical", "universal", "spherical", "planar"])
 def test_the_loosest_joint_of_a_loop_is_cut(kind: str) -> None:
     (closure,) = spanning_tree(ring(kind)).closures
     expected = "point" if kind == "spherical" else "weld"

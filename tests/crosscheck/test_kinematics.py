@@ -29,6 +29,7 @@ ROWS = {
     "spherical": 3,
     "translational": 5,
     "cylindrical": 4,
+    "planar": 3,
     "distance": 1,
 }
 

@@ -41,6 +41,7 @@ JOINTS = {
     "spherical": Item("ObjectJointSpherical", outputs={"Force": 3}),
     "translational": Item("ObjectJointPrismaticX", along=X, torques=ALL),
     "cylindrical": Item("ObjectJointGeneric", (1, 1, 0, 1, 1, 0), torques=ACROSS),
+    "planar": Item("ObjectJointGeneric", (0, 0, 1, 1, 1, 0), torques=ACROSS),
     "distance": Item("ObjectConnectorDistance", outputs={"Force": 1}),
 }
 SUPPORTS = Supports(

@@ -35,6 +35,7 @@ SUPPORTS = Supports(
         "spherical",
         "translational",
         "cylindrical",
+        "planar",
         "distance",
     ),
     drivers=("angle", "displacement"),

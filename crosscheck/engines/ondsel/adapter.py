@@ -4,8 +4,8 @@ Positions, velocities, accelerations and reactions follow from the drivers pose 
 redundant constraints are removed by the solver.  The one option ``step`` (s) is the largest step from pose
 to pose; it decides which of several assemblies is found, not how accurate it is.  Equally spaced samples
 are one analysis; where the spacing changes, a new one starts from the pose reached.  With a cylindrical
-joint between moving bodies OndselSolver's accelerations do not satisfy the joint's own equations, by 1e-3
-of their size; they and the reactions are then left out.
+or planar joint between moving bodies OndselSolver's accelerations do not satisfy the joint's own equations,
+by 1e-3 and 0.3 of their size; they and the reactions are then left out.
 """
 
 from __future__ import annotations

@@ -22,6 +22,7 @@ JOINTS = {  # joint type: OndselSolver's
     "spherical": "spherical",
     "translational": "translational",
     "cylindrical": "cylindrical",
+    "planar": "planar",
 }
 MOTIONS: dict[str | None, str] = {
     "angle": "rotational",
@@ -32,7 +33,8 @@ SUPPORTS = Supports(
     drivers=("angle", "displacement"),
     loads=("moment", "force", "spring", "torsion_spring"),  # no load changes a motion that is prescribed
 )
-ACCURATE_ON_GROUND = ("cylindrical",)  # joints with right accelerations only where the first body is at rest
+# joints whose accelerations are right only where the first body is at rest:
+ACCURATE_ON_GROUND = ("cylindrical", "planar")
 NAME = "scene"
 TOLERANCE = 1e-9
 TILT = rotations.from_vector(np.array([0.5, -0.4, 0.3]))

@@ -23,6 +23,7 @@ JOINTS = {  # joint type: OpenSim's joint, and its coordinates in the order of t
     "spherical": ("BallJoint", (0, 1, 2)),
     "translational": ("SliderJoint", (0,)),
     "cylindrical": ("CylindricalJoint", (1, 0)),
+    "planar": ("PlanarJoint", (1, 2, 0)),
     FREE: ("FreeJoint", (3, 4, 5, 0, 1, 2)),
 }
 SUPPORTS = Supports(

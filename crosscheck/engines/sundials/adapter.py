@@ -44,6 +44,7 @@ class Sundials(Engine):
             "spherical",
             "translational",
             "cylindrical",
+            "planar",
             "distance",
         ),
         drivers=("angle", "displacement"),

@@ -3,7 +3,16 @@
 from collections.abc import Callable
 from typing import Any
 
-from mbref.equations.joints import cylindrical, distance, fixed, revolute, spherical, translational, universal
+from mbref.equations.joints import (
+    cylindrical,
+    distance,
+    fixed,
+    planar,
+    revolute,
+    spherical,
+    translational,
+    universal,
+)
 from mbref.equations.joints.base import Primitive, driven_angle, driven_displacement
 from mbref.scene import Joint, SceneError
 
@@ -14,6 +23,7 @@ JOINTS: dict[str, Callable[[Any], list[Primitive]]] = {
     "spherical": spherical.primitives,
     "translational": translational.primitives,
     "cylindrical": cylindrical.primitives,
+    "planar": planar.primitives,
     "distance": distance.primitives,
 }
 
