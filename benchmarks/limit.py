@@ -16,7 +16,7 @@ import numpy as np
 from by_hand import AS_MBREF, BY_HAND
 from numba import njit
 
-from crosscheck.engine import Cannot, Engine, Setting, Why
+from crosscheck.engine import Cannot, Engine, Owner, Setting
 from crosscheck.engines.mbref import TOLERANCES
 from crosscheck.judge.truth import PATHS
 from crosscheck.judge.truth.one_dof import Path, initial_rate
@@ -103,7 +103,7 @@ class Limit(Engine):
         return (
             None
             if scene.name in BY_HAND
-            else Cannot(Why.UNBUILT, "its equation has not been derived by hand")
+            else Cannot(Owner.ADAPTER, "its equation has not been derived by hand")
         )
 
     def settings(self, scene: Scene) -> Sequence[Setting]:

@@ -16,8 +16,8 @@ from scipy.sparse import csr_array
 from mbref import rotations
 from mbref.equations.coordinates import displace
 from mbref.equations.evaluation import evaluate_all
-from mbref.equations.joints import JOINTS
-from mbref.equations.joints.base import ROWS_OF, Primitive, driven_angle, driven_displacement
+from mbref.equations.joints import primitives_of
+from mbref.equations.joints.base import ROWS_OF, Primitive
 from mbref.equations.loads import has_angles
 from mbref.equations.packing import packed_drivers, packed_loads
 from mbref.kernels.layout import Counts, Equations, Frames, Settings, System
@@ -146,7 +146,7 @@ class Model:
 
     def anchor(self, joint: Joint, q: np.ndarray) -> np.ndarray:
         """World positions (…, 3) of the joint's anchor on its second body at coordinates q (…, nb, 7)."""
-        point = joint.anchors[1] if joint.type == "distance" else joint.anchor
+        point = joint.anchor_pair[1]
         b = self._index[joint.bodies[1]]
         if b == self.nb:
             return np.broadcast_to(point, (*q.shape[:-2], 3))
@@ -194,7 +194,7 @@ class Model:
         rows, bodies, names = [], [], []
         for joint in self.joints:
             pair = [self._index[name] for name in joint.bodies]
-            for primitive in (*JOINTS[joint.type](joint), *_driver_rows(joint, driven)):
+            for primitive in (*primitives_of(joint), *_driver_rows(joint, driven)):
                 driver = driven[joint.name] if primitive.driven else -1
                 rows.append(self._primitive(primitive, joint.bodies, driver, len(names)))
                 count = ROWS_OF[primitive.kind]
@@ -256,8 +256,4 @@ def _principal_axes(body: Body) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _driver_rows(joint: Joint, driven: dict[str, int]) -> list[Primitive]:
-    if joint.name not in driven:
-        return []
-    if joint.type == "translational":
-        return [driven_displacement(joint.anchor, joint.axis)]
-    return [driven_angle(joint.axis)]
+    return [driver_primitive(joint)] if joint.name in driven else []

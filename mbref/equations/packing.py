@@ -10,7 +10,7 @@ import numpy as np
 from mbref.equations.joints.base import frame
 from mbref.kernels.named_memory import stacked
 from mbref.kernels.scene_layout import FORCE, MOMENT, SPRING, TORSION_SPRING, Drivers, Loads
-from mbref.scene import Driver, Force, Load, Moment, Sine, Spring, TorsionSpring
+from mbref.scene import Driver, Force, Load, Moment, SceneError, Sine, Spring, TorsionSpring
 
 if TYPE_CHECKING:
     from mbref.equations.model import Model
@@ -33,8 +33,8 @@ def _driver(driver: Driver, terms: int) -> Drivers:
 def packed_loads(model: Model) -> Loads:
     """All loads of the model's scene; none where it has no masses."""
     loads, slots = [], 0
-    for load in () if model.kinematic else model.scene.load:
-        fields = _fields(load, model)
+    for place, load in enumerate(() if model.kinematic else model.scene.load):
+        fields = _fields(place, load, model)
         if isinstance(load, TorsionSpring):
             fields["angle"] = slots
             slots += 1
@@ -42,30 +42,36 @@ def packed_loads(model: Model) -> Loads:
     return stacked(Loads, loads)
 
 
-def _fields(load: Load, model: Model) -> dict[str, Any]:
-    """The fields of ``Loads`` that a load uses."""
+def _fields(place: int, load: Load, model: Model) -> dict[str, Any]:
+    """The fields of ``Loads`` that load[place] uses; SceneError for a type without equations."""
     if isinstance(load, Moment):
         return {"kind": MOMENT, "first": model.index(load.body), "force": load.moment}
     if isinstance(load, Force):
-        place = {"first": model.index(load.body), "point_first": model.point(load.body, load.point)}
-        return {"kind": FORCE, "force": load.force, **place}
-    constants = {"stiffness": load.stiffness, "damping": load.damping}
+        acts_at = {"first": model.index(load.body), "point_first": model.point(load.body, load.point)}
+        return {"kind": FORCE, "force": load.force, **acts_at}
     if isinstance(load, Spring):
         first, second = load.bodies
-        return constants | {
-            "kind": SPRING, "first": model.index(first), "second": model.index(second),
+        return {
+            **_constants(load, load.natural_length), "kind": SPRING,
+            "first": model.index(first), "second": model.index(second),
             "point_first": model.point(first, load.points[0]),
-            "point_second": model.point(second, load.points[1]), "natural": load.natural_length,
+            "point_second": model.point(second, load.points[1]),
         }  # fmt: skip
+    if not isinstance(load, TorsionSpring):
+        raise SceneError([f"load[{place}]: mbref has no equations for loads of type {load.type!r}"])
     joint = next(joint for joint in model.joints if joint.name == load.joint)
     first, second = joint.bodies
     x, y, z = frame(joint.axis)
-    return constants | {
-        "kind": TORSION_SPRING, "first": model.index(first), "second": model.index(second),
+    return {
+        **_constants(load, load.natural_angle), "kind": TORSION_SPRING,
+        "first": model.index(first), "second": model.index(second),
         "axis": model.direction(first, z), "x_first": model.direction(first, x),
         "y_first": model.direction(first, y), "x_second": model.direction(second, x),
-        "natural": load.natural_angle,
     }  # fmt: skip
+
+
+def _constants(load: Spring | TorsionSpring, natural: float) -> dict[str, float]:
+    return {"stiffness": load.stiffness, "damping": load.damping, "natural": natural}
 
 
 def _no_load() -> dict[str, Any]:
