@@ -14,9 +14,11 @@ import numpy as np
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
+FamilyParts = Mapping[str, Mapping[str, Mapping[str, float]]]  # kind of part → name → options and defaults
+
 
 class Why(enum.Enum):
-    """Whose turn a gap is."""
+    """Why an engine lacks something: who could add it, if anyone."""
 
     UNBUILT = "not built here yet"
     UPSTREAM = "waits for the engine"
@@ -25,7 +27,7 @@ class Why(enum.Enum):
 
 @dataclass(frozen=True)
 class Cannot:
-    """Something an engine cannot do with a scene, asked before running."""
+    """Something an engine cannot do with a scene, declared before any run."""
 
     why: Why
     reason: str
@@ -38,9 +40,9 @@ class Cannot:
 class Setting:
     """One way of running an engine.
 
-    ``family`` groups the settings that differ only in accuracy ("defaults" is what a user gets
-    without tuning, "tuned" what the engine's documentation allows at best); ``options`` are the
-    engine's own numbers; (family, options) reproduce the run.
+    ``family`` groups the settings that differ only in accuracy: "defaults" are the library's own,
+    "tuned" the most accurate that its documentation allows.  ``options`` are the engine's own numbers;
+    (family, options) reproduce the run.
     """
 
     family: str
@@ -72,6 +74,14 @@ class Engine(ABC):
     def settings(self, scene: Scene) -> Sequence[Setting]:
         """The sweep over this engine's families and accuracies for a scene, coarse to fine in each
         family."""
+
+    def has_family(self, family: str) -> bool:
+        """Whether `run` takes this family although the sweep of `settings` may leave it out."""
+        return False
+
+    def family_parts(self) -> FamilyParts:
+        """The parts from which an engine's families are composed; empty where it only has its sweep's."""
+        return {}
 
     def prepare(self, families: Sequence[str]) -> None:  # noqa: B027 - most engines need nothing
         """What a process does before its first run of these families, such as importing and compiling."""
@@ -112,14 +122,17 @@ def installed(name: str) -> bool:
 def engine(name: str) -> Engine:
     """The engine of that name, or at ``module:attribute``; raises LookupError with the known names."""
     if name in BUILT_IN + OPTIONAL:
-        return import_module(f"crosscheck.engines.{name}").ENGINE
+        return _as_engine(name, import_module(f"crosscheck.engines.{name}").ENGINE)
     for point in metadata.entry_points(group=ENTRY_POINTS):
         if point.name == name:
-            return point.load()
+            return _as_engine(name, point.load())
     if ":" in name:
         module, attribute = name.split(":", 1)
-        found = getattr(import_module(module), attribute)
-        if isinstance(found, Engine):
-            return found
-        raise LookupError(f"{name!r} is no engine: it does not implement crosscheck.engine.Engine")
+        return _as_engine(name, getattr(import_module(module), attribute))
     raise LookupError(f"unknown engine {name!r}; known: {', '.join(engine_names())}")
+
+
+def _as_engine(name: str, found: object) -> Engine:
+    if isinstance(found, Engine):
+        return found
+    raise LookupError(f"{name!r} is no engine: it does not implement crosscheck.engine.Engine")

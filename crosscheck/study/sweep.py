@@ -1,0 +1,68 @@
+"""Which runs a report is made of: the whole sweep, or the quick one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from crosscheck.study.grid import Case, Unable, default_cases
+from mbref.scene import Scene
+from mbref.scenes import SCENES
+
+QUICK_SCENES = {  # name → end time (s)
+    "planar_slider_crank": 0.2,
+    "spatial_slider_crank": 0.02,
+    "spatial_slider_crank_driven": 0.05,
+    "four_bar": 0.02,
+    "five_bar": 0.02,
+}
+QUICK_FAMILIES = ("defaults", "tuned")  # of an engine that has them, else its first ones
+MOST_FAMILIES, MOST_SETTINGS = 2, 3  # in the quick sweep, of an engine and of a family
+QUICK_SAMPLES, SAMPLES = 31, 101
+QUICK_LIMIT, LIMIT = 60.0, 120.0  # s of a run; mbref's kernels, compiled once a machine, take some
+
+Sweep = tuple[list[Scene], list[Case], list[Unable]]
+
+
+def whole(engines: Sequence[str]) -> Sweep:
+    """Every built-in scene in every engine at every setting."""
+    return _sweep([make() for make in SCENES.values()], engines, SAMPLES, LIMIT)
+
+
+def quick(engines: Sequence[str]) -> Sweep:
+    """A few short scenes, a few settings of a few families of every engine."""
+    scenes = [SCENES[name]().with_(duration=end) for name, end in QUICK_SCENES.items()]
+    scenes, cases, unable = _sweep(scenes, engines, QUICK_SAMPLES, QUICK_LIMIT)
+    return scenes, thinned(cases), unable
+
+
+def _sweep(scenes: list[Scene], engines: Sequence[str], samples: int, limit: float) -> Sweep:
+    cases, unable = [], []
+    for scene in scenes:
+        able, not_able = default_cases(scene, engines, None, np.linspace(0, scene.duration, samples), limit)
+        cases += able
+        unable += not_able
+    return scenes, cases, unable
+
+
+def thinned(cases: Sequence[Case]) -> list[Case]:
+    """Of every scene and engine MOST_FAMILIES families, of each MOST_SETTINGS settings, ends included."""
+    groups: dict[tuple[str, str], list[Case]] = {}
+    for case in cases:
+        groups.setdefault((case.scene.name, case.engine), []).append(case)
+    return [case for group in groups.values() for case in _thinned_engine(group)]
+
+
+def _thinned_engine(cases: Sequence[Case]) -> list[Case]:
+    families: dict[str, list[Case]] = {}
+    for case in cases:
+        families.setdefault(case.setting.family, []).append(case)
+    wanted = [f for f in families if f in QUICK_FAMILIES] or list(families)[:MOST_FAMILIES]
+    return [case for family in wanted for case in spread(families[family], MOST_SETTINGS)]
+
+
+def spread(items: Sequence[Case], most: int) -> list[Case]:
+    """At most ``most`` of the items, equally spaced, first and last included."""
+    places = np.linspace(0, len(items) - 1, min(most, len(items))).round().astype(int)
+    return [items[i] for i in places]

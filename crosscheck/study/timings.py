@@ -1,0 +1,49 @@
+"""Interleaved timings of the short runs that completed, stored beside their records and not repeated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from crosscheck.study.fair_timing import timed
+from crosscheck.study.grid import Case, Record
+from mbref.records import append, stored
+from mbref.trajectory import Outcome
+
+REPEATS = 5
+LONG = 0.5  # s; a run that takes longer is timed by its single run, whose noise is small beside it
+
+
+def with_timings(
+    cases: Sequence[Case], records: Sequence[Record], path: Path, notice: Callable[[str], None]
+) -> list[Record]:
+    """The records with the times of ``path`` (JSON lines); a scene of which one is missing is timed."""
+    done, known = list(records), stored(path)
+    for name in dict.fromkeys(case.scene.name for case in cases):
+        places = [i for i, record in enumerate(records) if record["scene"] == name and _is_short(record)]
+        if any(records[i]["key"] not in known for i in places):
+            notice(f"{name}: timing, {REPEATS} interleaved repeats")
+            for record in timed([cases[i] for i in places], [records[i] for i in places], REPEATS, notice):
+                if "timing" in record:
+                    append(path, _entry(record))
+            known = stored(path)
+        for i in places:
+            done[i] = _with_cost(records[i], known)
+    return done
+
+
+def _is_short(record: Record) -> bool:
+    return record["outcome"] == Outcome.COMPLETED.label and record["cost"]["seconds"] <= LONG
+
+
+def _with_cost(record: Record, known: dict[str, dict[str, Any]]) -> Record:
+    if record["key"] not in known:
+        return record
+    entry = known[record["key"]]
+    cost = {**record["cost"], "seconds": entry["seconds"]}
+    return {**record, "cost": cost, "timing": entry["timing"]}
+
+
+def _entry(record: Record) -> dict[str, Any]:
+    return {"key": record["key"], "seconds": record["cost"]["seconds"], "timing": record["timing"]}
