@@ -73,6 +73,10 @@ class Run:
         rtol = self.record["settings"].get("rtol", math.inf)
         return self.completed and self.error > EXCESS * rtol
 
+    def rate(self, count: str) -> float:
+        """A cost of the record, such as ``steps``, a second of simulation; NaN for a run without any."""
+        return float(self.record["cost"][count]) / self.t_end if self.t_end > 0 else math.nan
+
     def metric(self, name: str) -> float:
         """A metric of the record; NaN where it has none."""
         value = self.record["metrics"].get(name)
@@ -131,6 +135,11 @@ def by_scene(
     for record in gates:
         gate[record["scene"]].append(record)
     return [SceneRuns(scene, runs[name], gate[name]) for name, scene in scenes.items() if runs[name]]
+
+
+def ended_briefly(run: Run) -> str:
+    """``20 s`` for a run of the paper that completed, else end time and footnote or name of the outcome."""
+    return "20 s" if run.completed else f"{run.t_end:.4g} s {run.outcome.letter or run.outcome.label}"
 
 
 def plain(value: Any) -> str:

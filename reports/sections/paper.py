@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Sequence
 
 from crosscheck.paper import settings, singular
 from crosscheck.paper.cells import CELLS, CLOSE, COUNTS_III, COUNTS_IV, SPATIAL, Cell, Counts, Match, match
+from crosscheck.paper.illustration import Illustration
 from crosscheck.paper.runs import FREE, KEPT_RTOLS, SPATIAL_DYNAMIC, Label, Records, draws, found
 from crosscheck.paper.settings import LINKAGES, SIZE, STRICT, TIGHT
 from reports.blocks import Block, Heading, Table, Text
@@ -22,7 +22,7 @@ TITLES = {
 NEAR = 0.1  # rad from a multiple of π: a run that ends so near ended at that crossing
 
 
-def render(records: Records) -> list[Block]:
+def render(records: Records, illustration: Illustration) -> list[Block]:
     """The chapter."""
     return [
         Heading("The paper's tables and figures", 2),
@@ -43,7 +43,7 @@ def render(records: Records) -> list[Block]:
         *_counts(records),
         *_differences(records),
         *paper_sweep.render(records),
-        *paper_methods.explained(),
+        *paper_methods.explained(illustration),
         *paper_figures.render(records),
         *paper_cranks.render(records),
         *paper_methods.render(records),
@@ -141,7 +141,7 @@ def _counts(records: Records) -> list[Block]:
     about = "Per second of simulation; ratios to the first row, of times by interleaved runs in one process. "
     right = frozenset({1, 2, 3, 4, 5, 6, 8})
     strict = [Run(records[Label("strict", row, SPATIAL, STRICT.name)]) for row in FREE]
-    steps = ", ".join(f"{_rate(run, 'steps'):.0f}" for run in strict)
+    steps = ", ".join(f"{run.rate('steps'):.0f}" for run in strict)
     return [
         Heading("Table III: steps and cost"),
         Table(
@@ -168,18 +168,16 @@ def _count_rows(part: str, column: str, paper: Counts, records: Records) -> list
     for row, (steps, time) in paper.items():
         run, timed = (Run(records[Label(p, row, column)]) for p in (part, "timed"))
         rows.append((
-            row, f"{steps}", f"{_rate(run, 'steps'):.0f}", f"{steps / first_steps:.3f}",
-            f"{_rate(run, 'steps') / _rate(first, 'steps'):.3f}", ratio(time / first_time),
-            ratio(_rate(timed, "seconds") / _rate(first_timed, "seconds")), ended(run), power(run.error),
+            row, f"{steps}", f"{run.rate('steps'):.0f}", f"{steps / first_steps:.3f}",
+            f"{run.rate('steps') / first.rate('steps'):.3f}", ratio(time / first_time),
+            ratio(timed.rate("seconds") / first_timed.rate("seconds")), ended(run), power(run.error),
         ))  # fmt: skip
     return rows
 
 
 def _with_tight(rows: list[Sequence[str]], records: Records) -> list[Sequence[str]]:
     """Table IV's rows with the ratio of steps at rtol 1e-9 behind that at the settings."""
-    steps = [
-        _rate(Run(records[Label("tight", row[0], SPATIAL_DYNAMIC, TIGHT.name)]), "steps") for row in rows
-    ]
+    steps = [Run(records[Label("tight", row[0], SPATIAL_DYNAMIC, TIGHT.name)]).rate("steps") for row in rows]
     ratios = [f"{count / steps[0]:.3f}" for count in steps]
     return [(*row[:5], ratio_, *row[5:]) for row, ratio_ in zip(rows, ratios, strict=True)]
 
@@ -193,9 +191,9 @@ def _kept(records: Records) -> Table:
             for label, record in records.items()
             if label.part == "kept" and label.variant == f"rtol {rtol:g}"
         }
-        free = _rate(runs["none"], "steps")
+        free = runs["none"].rate("steps")
         for name, run in runs.items():
-            steps = _rate(run, "steps")
+            steps = run.rate("steps")
             rows.append(
                 (f"{rtol:g}", name, f"{steps:.0f}", f"{steps / free:.3f}", ended(run), power(run.error))
             )
@@ -207,10 +205,6 @@ def _kept(records: Records) -> Table:
     )
     header = ("rtol", "Stabilisation", "Steps/s", "Ratio", "Ended", "Error")
     return Table(caption, header, rows, right=frozenset({0, 2, 3, 5}))
-
-
-def _rate(run: Run, count: str) -> float:
-    return run.record["cost"][count] / run.t_end if run.t_end > 0 else math.nan
 
 
 def _differences(records: Records) -> list[Block]:
@@ -266,14 +260,8 @@ def _papers_place(cell: Cell) -> list[str]:
         ]
     if cell.end is None:
         return []
-    near = _distance(cell.column, cell.end)
+    near = singular.crossing_distance(LINKAGES[cell.column][1], cell.end)
     return [f"the paper's end is {near:.2g} rad from the nearest crossing"] if near > NEAR else []
-
-
-def _distance(column: str, time: float) -> float:
-    """How far (rad) θ₂ is from a multiple of π."""
-    times = [t for t, _ in singular.crossings(LINKAGES[column][1], 25.0)]
-    return min(abs(t - time) for t in times) * singular.CRANK_RATE
 
 
 def _where(column: str, run: Run) -> str:
@@ -282,7 +270,7 @@ def _where(column: str, run: Run) -> str:
         return f"passes every crossing, violation {power(run.metric('violation_position'))}"
     theta0 = LINKAGES[column][1]
     t, k = min(singular.crossings(theta0, 25.0), key=lambda crossing: abs(crossing[0] - run.t_end))
-    near, angle = abs(t - run.t_end) * singular.CRANK_RATE, singular.turns(k)
+    near, angle = singular.crossing_distance(theta0, run.t_end), singular.turns(k)
     if near > NEAR:
         return f"ends {near:.2g} rad from the crossing θ₂ = {angle}, off the branch since an earlier one"
     others = [time for time, _ in singular.crossings(theta0, t + 0.06)]

@@ -11,7 +11,7 @@ from crosscheck.judge.truth import truth_for
 from crosscheck.paper.runs import HEAVY, RAISED, TRUE_BRANCH, UNEQUAL, Label, Records, dynamic_scene
 from mbref.trajectory import Trajectory
 from reports.blocks import Block, Heading, Table, Text
-from reports.runs import Run, number, power
+from reports.runs import Run, ended_briefly, number, power
 
 OFF = 0.01  # m; a body this far from the true motion is on another branch
 
@@ -67,19 +67,15 @@ def _about(records: Records) -> str:
 def _cells(column: str, run: Run) -> tuple[str, ...]:
     motion = run.trajectory
     if not len(motion.times):
-        return (_ended(run), *("–" for _ in range(7)))
+        return (ended_briefly(run), *("–" for _ in range(7)))
     true = _true(column, tuple(motion.times.tolist()))
     off = np.abs(motion.position - true.position).max(axis=(1, 2)) > OFF
     since = motion.times[np.argmax(off)] if off.any() else math.nan
     return (
-        _ended(run), power(run.error), power(run.metric("violation_position")), number(since, 4),
+        ended_briefly(run), power(run.error), power(run.metric("violation_position")), number(since, 4),
         str(_passed(column, since if off.any() else run.t_end)), power(_out_of_plane(motion)),
         f"{motion.angular_velocity[-1, 0, 2]:.4g}", f"{true.angular_velocity[-1, 0, 2]:.4g}",
     )  # fmt: skip
-
-
-def _ended(run: Run) -> str:
-    return "20 s" if run.completed else f"{run.t_end:.4g} s {run.outcome.letter or run.outcome.label}"
 
 
 @lru_cache(maxsize=64)
