@@ -9,9 +9,9 @@ from functools import cached_property
 from typing import Any
 
 from crosscheck.judge.tolerances import ERROR_LEVELS, EXCESS, FALSE_SUCCESS
-from crosscheck.study.fair_timing import difference
+from crosscheck.study.fair_timing import model_difference
 from crosscheck.study.grid import Record
-from crosscheck.study.record_view import swept
+from crosscheck.study.record_view import varied_settings
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
@@ -97,7 +97,7 @@ class SceneRuns:
 
     def difference(self) -> str | None:
         """The first field in which an engine's mechanism is another one; None when all agree."""
-        return difference(self.scene, self.gate) if self.gate else None
+        return model_difference(self.scene, self.gate) if self.gate else None
 
     def curves(self) -> dict[Curve, list[Run]]:
         """Runs by engine and family, in the order of the records."""
@@ -106,9 +106,9 @@ class SceneRuns:
             curves.setdefault(run.curve, []).append(run)
         return curves
 
-    def swept(self, run: Run) -> str:
+    def varied_settings(self, run: Run) -> str:
         """The settings of a run that vary along its curve, as printed (``rtol=1e-06``); all if alone."""
-        return swept(run.record, [other.record for other in self.runs])
+        return varied_settings(run.record, [other.record for other in self.runs])
 
     def completed(self) -> list[Run]:
         return [run for run in self.runs if run.completed]

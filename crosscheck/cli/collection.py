@@ -10,7 +10,7 @@ from crosscheck.cli.request import find_engines
 from crosscheck.paper import runs
 from crosscheck.paper.illustration import Illustration, illustration
 from crosscheck.study import sweep
-from crosscheck.study.fair_timing import gate_cases
+from crosscheck.study.fair_timing import identity_cases
 from crosscheck.study.grid import Case, Record, known, study
 from crosscheck.study.progress import shown
 from crosscheck.study.timings import with_timings
@@ -24,7 +24,7 @@ class Collection(NamedTuple):
 
     scenes: Sequence[Scene]
     records: Sequence[Record]
-    gates: Sequence[Record]
+    identities: Sequence[Record]
 
 
 class Paper(NamedTuple):
@@ -45,8 +45,8 @@ def comparison(out: Path, is_quick: bool, notice: Notice) -> Collection:
     for pair in unable:
         notice(f"{pair.engine} cannot run {pair.scene.name}: {pair.cannot}")
     _save(scenes, out / "scenes")
-    gates = [case for scene in scenes for case in gate_cases(scene, engines, sweep.QUICK_LIMIT)]
-    records = _run([*cases, *gates], out / "records.jsonl", notice)
+    identities = [case for scene in scenes for case in identity_cases(scene, engines, sweep.QUICK_LIMIT)]
+    records = _run([*cases, *identities], out / "records.jsonl", notice)
     timed = with_timings(cases, records[: len(cases)], out / "timings.jsonl", notice)
     return Collection(scenes, timed, records[len(cases) :])
 

@@ -1,4 +1,4 @@
-"""What `crosscheck list` prints: the tables of scenes, engines, methods, metrics and support."""
+"""The tables of `crosscheck list`: scenes, engines, methods, metrics and support."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _methods() -> Table:
 def _metrics() -> Table:
     from crosscheck.judge.metrics import METRICS
 
-    table = Table("metric", "unit", "what it is", title="metrics")
+    table = Table("metric", "unit", "definition", title="metrics")
     for name, metric in METRICS.items():
         table.add_row(name, metric.unit, metric.label)
     return table

@@ -1,4 +1,4 @@
-"""What a command line asks for: scenes, engines, settings and sample times, checked before anything runs."""
+"""The request of a command line, checked before anything runs: scenes, engines, settings, sample times."""
 
 from __future__ import annotations
 
@@ -185,7 +185,7 @@ def _at_tolerance(cases: Sequence[Case], rtol: float) -> list[Case]:
     """One run of every family that has a tolerance, at this one; the others keep their sweep."""
     if not (math.isfinite(rtol) and rtol > 0):
         raise RequestError(f"--rtol: must be positive, got {rtol:g}")
-    chosen: dict[tuple, Case] = {}
+    chosen: dict[tuple[str, str, str], Case] = {}
     for case in cases:
         options = dict(case.setting.options)
         if "rtol" in options:

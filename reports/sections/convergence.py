@@ -51,7 +51,8 @@ def _limits(groups: Sequence[SceneRuns]) -> list[Block]:
 
 
 def _limit_rows(group: SceneRuns) -> list[tuple[str, ...]]:
-    truth, rows = truth_for(group.scene), []
+    truth = truth_for(group.scene)
+    rows: list[tuple[str, ...]] = []
     for curve, runs in group.curves().items():
         told = [run for run in runs if run.completed and math.isfinite(run.error)]
         if truth is None or swept_option(told) != STEP:

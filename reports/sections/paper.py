@@ -161,7 +161,7 @@ def _counts(records: Records) -> list[Block]:
 
 
 def _count_rows(part: str, column: str, paper: Counts, records: Records) -> list[Sequence[str]]:
-    rows = []
+    rows: list[Sequence[str]] = []
     name = next(iter(paper))
     first, first_timed = (Run(records[Label(p, name, column)]) for p in (part, "timed"))
     first_steps, first_time = paper[name]

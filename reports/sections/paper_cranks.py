@@ -1,4 +1,4 @@
-"""The planar slider-cranks of the paper's Figures 11 to 14, run by run: how far a motion is to be trusted."""
+"""The planar slider-cranks of the paper's Figures 11 to 14, run by run: the error of every motion."""
 
 from __future__ import annotations
 
@@ -80,7 +80,9 @@ def _cells(column: str, run: Run) -> tuple[str, ...]:
 
 @lru_cache(maxsize=64)
 def _true(column: str, times: tuple[float, ...]) -> Trajectory:
-    return truth_for(dynamic_scene(column)).poses(np.array(times))
+    truth = truth_for(dynamic_scene(column))
+    assert truth is not None
+    return truth.poses(np.array(times))
 
 
 def _passed(column: str, time: float) -> int | str:

@@ -45,8 +45,8 @@ def _about(closed: float, opened: float) -> str:
         f"a second branch, the fold, crosses the parallelogram. Driven {TURNED:g} rad further along the "
         f"fold, the joint equations and the driver are violated by {power(opened)} from θ₂ = π: coupler and "
         "crank turn together about A, the rocker rests, the driver's equation holds, and a run can leave the "
-        f"true branch. From θ₂ = 0 they are violated by {number(closed)} rad: on the fold the crank would have "
-        "to rest, which its driver excludes. From π/4, π/2 and nπ the first position at which a driven "
+        f"true branch. From θ₂ = 0 they are violated by {number(closed)} rad: on the fold the crank would "
+        "have to rest, which its driver excludes. From π/4, π/2 and nπ the first position at which a driven "
         "linkage can leave the branch therefore comes at 0.0315, 0.0378 and 0.0503 s: the paper's 0.031, "
         "0.037 and 0.050 s (Table I, MPI)."
     )

@@ -92,7 +92,7 @@ def plot(scene_runs: SceneRuns, failures: Failures) -> Drawing:
     return figure
 
 
-def _draw_curve(axes: Axes, curve: Curve, runs: Sequence[Run], look: Mapping) -> None:
+def _draw_curve(axes: Axes, curve: Curve, runs: Sequence[Run], look: figures.Look) -> None:
     points = np.array([(max(r.error, SMALLEST), max(r.seconds, UNTIMED)) for r in runs])
     if len(points):
         axes.plot(*points.T, label=" ".join(curve), markersize=5, alpha=0.9, **look)
@@ -112,7 +112,7 @@ def _beside(figure: Drawing, main: Axes) -> Axes:
     return strip
 
 
-def _draw_strip(strip: Axes, failures: Failures, looks: Mapping, foot: float) -> None:
+def _draw_strip(strip: Axes, failures: Failures, looks: Mapping[Curve, figures.Look], foot: float) -> None:
     for number, ((curve, _), runs) in enumerate(failures.items(), 1):
         x = (number - 0.5) / len(failures)
         seconds = [max(run.seconds, foot) for run in runs]

@@ -76,11 +76,11 @@ def _rank(best: Run, costs: Sequence[float]) -> tuple[bool, float, float]:
 def _row(group: SceneRuns, best: Run, costs: Sequence[float], fastest: Sequence[float]) -> tuple[str, ...]:
     runs = group.curves()[best.curve]
     ratios = [ratio(cost / least) for cost, least in zip(costs, fastest, strict=True)]
-    floor = (
-        (power(best.error), group.swept(best), duration(best.seconds)) if best.completed else ("–", "–", "–")
-    )
+    least: tuple[str, str, str] = ("–", "–", "–")
+    if best.completed:
+        least = power(best.error), group.varied_settings(best), duration(best.seconds)
     done = f"{sum(run.completed for run in runs)} of {len(runs)}"
-    return (*best.curve, done, *floor, *ratios, _otherwise(runs))
+    return (*best.curve, done, *least, *ratios, _otherwise(runs))
 
 
 def _otherwise(runs: Sequence[Run]) -> str:

@@ -2,6 +2,7 @@
 
 import ast
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -97,6 +98,15 @@ def test_readme_commands_are_what_the_gate_runs():
     assert "README.md" in gate
     commands = re.findall(r"^python3 -m venv .*$", (ROOT / "README.md").read_text(), flags=re.M)
     assert len(commands) == 2, commands
+    assert "'.[dev]'" in commands[1], f"{commands[1]} does not install the linters that the gate runs"
+    for check in ("ruff format --check", "ruff check", "mypy"):
+        assert f".venv/bin/{check}" in gate, f"the gate does not run {check}"
+
+
+def test_slow_tests_are_left_out_unless_asked_for():
+    options = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["pytest"]["ini_options"]
+    assert "not slow" in options["addopts"], options["addopts"]
+    assert '-m "slow or not slow"' in (ROOT / "Makefile").read_text(), "make deep leaves slow tests out"
 
 
 def test_versions_are_pinned_without_addresses():

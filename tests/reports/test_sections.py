@@ -21,7 +21,7 @@ from reports.sections import (
     blocks,
     convergence,
     energy,
-    floors,
+    least_errors,
     mechanism,
     outcomes,
     provenance,
@@ -56,7 +56,7 @@ def test_every_section_and_a_heading(monkeypatch):
     headings = [part.text for part in parts if isinstance(part, Heading)]
     for heading in ("Summary", "spatial_slider_crank", "The mechanism", "Speed against error",
                     "Constraint violation over time", "Energy balance over time", "Outcomes",
-                    "Order of convergence", "The limit h → 0", "Floors", "Provenance"):  # fmt: skip
+                    "Order of convergence", "The limit h → 0", "Least errors", "Provenance"):  # fmt: skip
         assert heading in headings, (heading, headings)
 
 
@@ -133,8 +133,8 @@ def test_limits_and_the_bias_put_in():
     assert "1 of them bias" in found.caption, found.caption
 
 
-def test_floors_and_least_errors():
-    found, others = (table(floors.render(groups()), name) for name in ("Families", "Within 1e-08"))
+def test_least_errors_of_the_records():
+    found, others = (table(least_errors.render(groups()), name) for name in ("Families", "Within 1e-08"))
     rows = {row[1]: dict(zip(found.header, row, strict=True)) for row in found.rows[:3]}
     assert [row[0] for row in found.rows[:3]] == ["spatial_slider_crank", "", ""], "a scene is named once"
     best = rows["mbref"]
