@@ -37,7 +37,7 @@ quick: $(VENV)/ready ## a comparison report in about three minutes, into report/
 	$(BIN)/crosscheck report --quick
 
 picture: $(VENV)/ready ## the README's moving picture, into reports/rendered/
-	$(BIN)/python -m reports.animation
+	$(BIN)/python -m reports --picture reports/rendered/passage.svg
 
 docs: $(VENV)/ready ## the support matrix, into docs/engines.md
 	$(BIN)/python -m crosscheck.cli.support docs/engines.md

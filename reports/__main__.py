@@ -9,9 +9,10 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from crosscheck.cli import collection
+from crosscheck.cli.passage import passage
 from crosscheck.cli.request import RequestError
 from reports.blocks import Block
-from reports.runs import by_scene
+from reports.runs import Run, by_scene
 
 NEEDS = ("matplotlib", "jinja2")
 PAPER = "paper"  # the section whose runs are its own
@@ -25,6 +26,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     from reports.sections import NAMES
 
     arguments = _parser((*NAMES, PAPER)).parse_args(argv)
+    if arguments.picture:
+        return _picture(Path(arguments.picture))
     names = arguments.section or (NAMES if arguments.quick else (*NAMES, PAPER))
     try:
         blocks = _blocks(Path(arguments.out), arguments.quick, names)
@@ -35,6 +38,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         _notice(f"interrupted; what has been run is in {arguments.out}, the same command goes on from there")
         return 130
     _write(blocks, Path(arguments.out))
+    return 0
+
+
+def _picture(path: Path) -> int:
+    """Write the README's moving picture."""
+    from reports import animation
+
+    found = passage()
+    panels = [animation.panel(Run(record)) for record in found.records]
+    path.write_text(animation.animated(found.scene, found.exact, panels, found.singular))
+    _notice(f"written: {path}")
     return 0
 
 
@@ -71,6 +85,7 @@ def _parser(sections: Sequence[str]) -> argparse.ArgumentParser:
     parser.add_argument("--quick", action="store_true", help="fewer scenes and settings, minutes")
     parser.add_argument("--section", action="append", choices=sections, help="only this one; may repeat")
     parser.add_argument("--out", default="report", metavar="DIR", help="folder to write (default: report)")
+    parser.add_argument("--picture", metavar="FILE", help="write only the moving picture of the README")
     return parser
 
 

@@ -26,8 +26,14 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
 }  # fmt: skip
 
 MAKING = {"study", "run", "run_case", "run_here", "run_isolated", "time_interleaved", "observe", "collection"}
-MAKERS = ("crosscheck.processes", "crosscheck.engines", "crosscheck.cli.collection", "crosscheck.study.sweep",
-          "crosscheck.study.timings")  # fmt: skip
+MAKERS = (
+    "crosscheck.processes",
+    "crosscheck.engines",
+    "crosscheck.cli.collection",
+    "crosscheck.cli.passage",
+    "crosscheck.study.sweep",
+    "crosscheck.study.timings",
+)
 
 
 def modules(package: str) -> list[str]:
@@ -62,10 +68,11 @@ def test_no_module_that_renders_can_make_a_record(module):
     assert not wrong, f"{module} imports {wrong}: records are made before, by crosscheck"
 
 
-def test_the_report_asks_one_module_for_its_records():
+def test_the_program_asks_crosscheck_s_command_line_for_its_records():
     names = {n for n in of("reports", "reports.__main__") if n.startswith("crosscheck.")}
     allowed = {"crosscheck.cli", "crosscheck.cli.collection", "crosscheck.cli.request",
-               "crosscheck.cli.request.RequestError"}  # fmt: skip
+               "crosscheck.cli.request.RequestError", "crosscheck.cli.passage",
+               "crosscheck.cli.passage.passage"}  # fmt: skip
     assert names <= allowed, sorted(names - allowed)
 
 
