@@ -51,7 +51,7 @@ class Run:
 
     @property
     def reason(self) -> str:
-        """Why the run ended, one sentence; the outcome's own sentence where the engine gave none."""
+        """The reason of the end, one sentence: the engine's, else the outcome's."""
         return self.record["message"] or self.outcome.sentence
 
     @property

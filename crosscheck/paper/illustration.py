@@ -1,4 +1,4 @@
-"""What the report shows to explain Table I, computed once and stored: rank, fold and ALF near a crossing."""
+"""The explanation of Table I, computed once and stored: rank, fold, and ALF's iterations near a crossing."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ EXACT, PENALTY, DUAL = "mpi-svd", "alf", "alf-dual"
 
 
 class Label(NamedTuple):
-    """Where a run belongs: table, figure or sweep; its row and column; what is special about it."""
+    """The place of a run: table, figure or sweep; its row and column; the varied setting."""
 
     part: str
     row: str
@@ -90,7 +90,7 @@ def tables() -> Cases:
 
 
 def draws(cell: Cell) -> int:
-    """How many draws of first step and errors in the data a cell has: 1 where they cannot matter."""
+    """Number of draws of first step and data errors of a cell: 1 where they cannot matter."""
     if cell.letter == "a" or (cell.table == "III" and cell.row not in FREE):
         return 1
     return FEW if cell.table == "III" or cell.row in LASTING else SEEDS

@@ -1,4 +1,4 @@
-"""Why runs fail at the rhombus's singular positions: rank along the motion, the fold, and ALF's convergence.
+"""The rhombus's singular positions: rank along the motion, the fold branch, and the convergence of ALF.
 
 Everything follows from the judge's joint equations and the exact motion, in plain numpy.
 """
@@ -82,7 +82,7 @@ def crossings(theta0: float, last: float) -> list[tuple[float, int]]:
 
 
 def crossing_distance(theta0: float, time: float) -> float:
-    """How far (rad) θ₂ = theta0 - 124.8 t is at ``time`` (s) from the nearest multiple of π."""
+    """Distance (rad) of θ₂ = theta0 - 124.8 t at ``time`` (s) from the nearest multiple of π."""
     turns = (theta0 - CRANK_RATE * time) / math.pi
     return abs(turns - round(turns)) * math.pi
 

@@ -46,7 +46,7 @@ class LeastError:
         return _reaches(self.best)
 
     def share(self) -> str:
-        """How many families are within FLOOR, of how many."""
+        """The number of families within FLOOR, of all."""
         return f"{sum(map(_reaches, self.families.values()))} of {len(self.families)}"
 
     def row(self) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""The paper's Tables I to IV beside ours, cell by cell, and why the cells that differ do."""
+"""The paper's Tables I to IV beside ours, cell by cell, with reasons for the cells that differ."""
 
 from __future__ import annotations
 
@@ -183,7 +183,7 @@ def _with_tight(rows: list[Sequence[str]], records: Records) -> list[Sequence[st
 
 
 def _kept(records: Records) -> Table:
-    """What Table IV's ratio of steps depends on."""
+    """The ratio of steps of Table IV over tolerance and repartitioning."""
     rows = []
     for rtol in KEPT_RTOLS:
         runs = {
@@ -238,7 +238,7 @@ def _reason(cell: Cell, records: Records) -> str:
 
 
 def _drift(cell: Cell, run: Run, records: Records) -> str:
-    """Why a row of Table III ends at another time: its violation grows step by step, or not at all."""
+    """The reason for another end time of a row of Table III: drift, or its absence."""
     record = records.get(Label("strict", cell.row, cell.column, STRICT.name))
     strict = None if record is None else Run(record)
     said = "" if strict is None else (
@@ -252,7 +252,7 @@ def _drift(cell: Cell, run: Run, records: Records) -> str:
 
 
 def _papers_place(cell: Cell) -> list[str]:
-    """Where the paper's run ended, when that is at the start or between two crossings."""
+    """The place where the paper's run ended, if at the start or between two crossings."""
     if cell.end == 0:
         return [
             "the start is a singular position too, where ours converges: the errors of its state put less "
@@ -265,7 +265,7 @@ def _papers_place(cell: Cell) -> list[str]:
 
 
 def _where(column: str, run: Run) -> str:
-    """Which singular position a linkage's run ended at."""
+    """The singular position at which a linkage's run ended."""
     if run.completed:
         return f"passes every crossing, violation {power(run.metric('violation_position'))}"
     theta0 = LINKAGES[column][1]

@@ -17,7 +17,7 @@ OFF = 0.01  # m; a body this far from the true motion is on another branch
 
 
 def render(records: Records) -> list[Block]:
-    """What the paper says of these runs, ours one by one, and why they differ."""
+    """The paper's statement on these runs, ours one by one, and the reasons for differences."""
     rows = [
         (column, label.row, label.variant, *_cells(column, Run(record)))
         for column in (HEAVY, UNEQUAL)
@@ -50,7 +50,7 @@ def _about(records: Records) -> str:
         f"{len(heavy)} last, {len(right)} of them on the smooth branch (the one that steps over the singular "
         f"positions, {TRUE_BRANCH}): near one an unstabilised run divides its errors by the distance at "
         "which a step happens to fall, and it ends, or takes the other branch, at this or a later one; "
-        "the paper's own differing branches are this chance. ALF does not converge at the first: near it "
+        "the branches of the paper's runs differ for the same reason. ALF does not converge at the first: near it "
         "the iteration gains a factor 1 + α σ² a time, σ the vanishing singular value. "
         f"With a ≠ b nothing is singular, and yet the run of MPI (SVD) without partitioning goes wrong, with "
         f"violations of {power(drifting.metric('violation_position'))}: nothing holds the out-of-plane "

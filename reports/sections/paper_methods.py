@@ -24,7 +24,7 @@ SMALLEST = 1e-17  # magnitudes below are drawn here
 
 
 def explained(found: Illustration) -> list[Block]:
-    """Why the failure times of Table I are as they are, from the joint equations alone."""
+    """The failure times of Table I explained by the joint equations alone."""
     return [
         Heading("Singular positions explained"),
         Text(_about(*found["fold"])),
@@ -63,7 +63,7 @@ def _crossings(found: Sequence[Sequence[Any]]) -> Table:
 
 
 def _alf_near_a_crossing(iterations: Sequence[Sequence[int]]) -> Table:
-    """Why ALF ends at the first crossing, whatever branches meet there, and at a singular start."""
+    """ALF's iterations near a crossing: it ends at the first one and at a singular start."""
     rows = [(f"{distance:g}", *map(_count, row)) for distance, row in zip(DISTANCES, iterations, strict=True)]
     caption = (
         "Iterations of ALF, as set for the tables, over the distance (rad) to θ₂ = 0 and over the error of γ "

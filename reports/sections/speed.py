@@ -56,11 +56,13 @@ def _caption(scene_runs: SceneRuns, drawable: Sequence[Run]) -> str:
             f"the least time {duration(quick.seconds)} ({quick.label}, error {power(quick.error)})."
         )
     if wrong := sum(run.is_false_success for run in drawable):
-        text += f" {wrong} completed with an error above {short(WRONG)}: their outcome alone would deceive."
+        text += (
+            f" {wrong} completed with an error above {short(WRONG)}: wrong, although reported as a success."
+        )
     if len(scene_runs.completed()) < len(scene_runs.runs):
         text += (
-            " The others stand in the strip on the right at the time they took, at its foot if that was less "
-            "than any completed run took; the key says why they ended."
+            " The failed runs stand in the strip on the right at the time they took, or at its foot if that is "
+            "less than the time of any completed run; the key gives their reasons."
         )
     return text
 
