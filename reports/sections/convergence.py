@@ -22,7 +22,8 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
     text = (
         "The slope of log(error) over log(setting) where at least three completed runs of a family lie on"
         " a line. Over a fixed step it is the order of the method; over a tolerance, 1 says that the "
-        "error is proportional to the tolerance. A slope near zero: the error no longer falls; an en dash: no three runs lie on"
+        "error is proportional to the tolerance. A slope near zero: the error no longer falls; an en "
+        "dash: no three runs lie on"
         " a line."
     )
     curves = sorted({curve for group in groups for curve in group.curves()})

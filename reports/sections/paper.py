@@ -33,9 +33,12 @@ def render(records: Records, illustration: Illustration) -> list[Block]:
             f"sample, or at {paper_sweep.SHARE_TEXT} of the end time of a run that fails before the first. "
             f"Marks: {Match.SAME.value} same outcome, end within {CLOSE:g} s; {Match.OTHER_TIME.value} same "
             f"outcome at another time; {Match.DIFFERENT.value} another outcome. A match of "
-            "outcomes says nothing about correctness: the error does. Draws: with how many draws of first "
-            f"step and data errors of {SIZE:g} m a cell has the mark {Match.SAME.value}; – where they cannot "
-            "matter. At which crossing a run ends is chance, the set of times is the mechanism's: these "
+            "outcomes does not imply correctness: see the error. Draws: the number of draws of first "
+            "step and "
+            f"data errors of {SIZE:g} m with which a cell has the mark {Match.SAME.value}; – where they "
+            f"cannot "
+            "matter. Chance determines the crossing at which a run ends, the mechanism the set of times: "
+            "these "
             "counts, not one run, say whether a cell is reproduced. All else shown is of seed 0."
         ),
         _settings(),

@@ -29,7 +29,8 @@ def render(records: Records) -> list[Block]:
             "An unstabilised run is off the true branch by no more than its tolerance until the Jacobian "
             "loses rank; near that position its accelerations are errors divided by a small singular value. "
             "The crossing at which a run leaves the branch depends on the size of those errors and on the "
-            "instants of its steps. The mechanism determines the set of times, chance the choice within it: here one "
+            "instants of its steps. The mechanism determines the set of times, chance the choice within "
+            "it: here one "
             "setting at a time is varied, and the draw of first step and data errors."
         ),
         _scores(records),

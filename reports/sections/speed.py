@@ -61,7 +61,8 @@ def _caption(scene_runs: SceneRuns, drawable: Sequence[Run]) -> str:
         )
     if len(scene_runs.completed()) < len(scene_runs.runs):
         text += (
-            " The failed runs stand in the strip on the right at the time they took, or at its foot if that is "
+            " The failed runs stand in the strip on the right at the time they took, or at its foot if "
+            "that is "
             "less than the time of any completed run; the key gives their reasons."
         )
     return text

@@ -52,9 +52,7 @@ def _gate(group: SceneRuns) -> list[Block]:
         return []
     if reason := group.difference():
         return [
-            Text(
-                f"The engines do not simulate the same mechanism, so their times cannot be compared: {reason}."
-            )
+            Text(f"The engines simulate different mechanisms, so their times cannot be compared: {reason}.")
         ]
     engines = ", ".join(dict.fromkeys(record["engine"] for record in group.gate))
     return [Text(f"The same mechanism in {engines}: start, energy and first accelerations agree.")]

@@ -147,7 +147,7 @@ def test_least_errors_of_the_records():
 
 
 @pytest.mark.parametrize(
-    ("shifts", "words"), [((0.0,), "The same mechanism in b"), ((0.0, 1e-4), "do not agree")]
+    ("shifts", "words"), [((0.0,), "The same mechanism in b"), ((0.0, 1e-4), "different mechanisms")]
 )
 def test_gate_and_what_the_summary_says(shifts, words):
     gate = [at_gate(shift) for shift in shifts]
