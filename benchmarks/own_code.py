@@ -18,9 +18,9 @@ from statistics import median
 
 import numpy as np
 
+from mbref.method import Method
 from mbref.scene import Scene
 from mbref.scenes import find_scene
-from mbref.simulation.method import Method
 from mbref.simulation.simulate import Limits, simulate, why_no_code
 
 METHOD = "alf-dual+projection"

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbref.method import DEFAULT, MethodError
 from mbref.scene import Scene, SceneError
 from mbref.scenes import SCENES, find_scene
-from mbref.simulation.method import DEFAULT, MethodError
 from mbref.trajectory import Trajectory
 
 if TYPE_CHECKING:

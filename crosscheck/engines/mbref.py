@@ -78,7 +78,7 @@ class Mbref(Engine):
         return scene.counts().redundant == 0 or method.formulation.handles_redundancy
 
     def has_family(self, family: str) -> bool:
-        from mbref.simulation.method import MethodError
+        from mbref.method import MethodError
 
         try:
             _method(family)
@@ -111,7 +111,7 @@ class Mbref(Engine):
 
 
 def _method(family: str):
-    from mbref.simulation.method import Method
+    from mbref.method import Method
 
     return Method.parse(family.removesuffix(OWN_CODE))
 

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from mbref import __version__, records
+from mbref.method import DEFAULT, Method
 from mbref.scene import Scene
-from mbref.simulation.method import DEFAULT, Method
 from mbref.simulation.simulate import Limits, checked_times, prepare, simulate
 from mbref.trajectory import Trajectory
 

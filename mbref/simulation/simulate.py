@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from mbref.method import Method, MethodError
 from mbref.scene import Scene
-from mbref.simulation.method import Method, MethodError
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.run import SPECIALISED, Limits, Run, prepare
 from mbref.specialised import Untraceable

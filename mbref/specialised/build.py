@@ -29,7 +29,7 @@ from mbref.kernels.layout import OK, Active, Addresses, SparseFactor, State, Sys
 from mbref.kernels.named_memory import Packed, allocate, packed, record
 from mbref.linear_algebra.minimum_norm import NEVER
 from mbref.linear_algebra.sparse_cholesky import find_squared_pivots
-from mbref.simulation.method import Method
+from mbref.method import Method
 from mbref.specialised.machine_code import Code, Piece, compiled, processor
 from mbref.specialised.tracing import Record, Untraceable, inputs, numbers, plain
 from mbref.stabilisation.projection import REPEATED, newton_step, project_velocities

@@ -12,9 +12,9 @@ from mbref.equations.evaluation import assemble_system
 from mbref.kernels.compilation import CACHE
 from mbref.kernels.layout import OK, Addresses
 from mbref.linear_algebra.vectors import larger, largest
+from mbref.method import Method, MethodError
 from mbref.scene import Body, Fixed, Force, Revolute, Scene, Spring, TorsionSpring
 from mbref.scenes import SCENES, find_scene
-from mbref.simulation.method import Method, MethodError
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.run import Run
 from mbref.simulation.simulate import Limits, simulate
