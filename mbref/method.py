@@ -47,7 +47,7 @@ class Method:
         return self.formulation, self.stabilisation, self.integrator
 
     def options_of(self, part: Formulation | Stabilisation | Integrator) -> dict[str, float]:
-        """A part's options, its defaults overridden by what the name says."""
+        """A part's options, its defaults overridden by the name's."""
         return {**part.options, **self.options.get(part.name, {})}
 
     def settings(self, rank_tolerance: float) -> Settings:
@@ -64,7 +64,7 @@ class Method:
 
     @staticmethod
     def parse(name: str) -> Method:
-        """The method of a name, "kinematic" among them; raises MethodError with what is known."""
+        """The method of a name, "kinematic" among them; raises MethodError with the known names."""
         name = KINEMATIC if name == "kinematic" else name
         head, _, integrator = name.partition("/")
         formulation, plus, stabilisation = _split_outside_brackets(head)

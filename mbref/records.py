@@ -1,4 +1,4 @@
-"""Record files: results as JSON lines, each with a key; what is in the file need not be computed again."""
+"""Record files: results as JSON lines, each with a key; records in the file need not be computed again."""
 
 from __future__ import annotations
 

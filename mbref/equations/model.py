@@ -242,7 +242,7 @@ def _with_ground(scene: Scene) -> tuple[tuple[Body, ...], tuple[Joint, ...]]:
     return (*scene.body, body), (*scene.joint, hold)
 
 
-FRAME = "the fixed frame"  # what a modelled ground is held to
+FRAME = "the fixed frame"  # holds a modelled ground
 
 
 def _principal_axes(body: Body) -> tuple[np.ndarray, np.ndarray]:

@@ -88,7 +88,7 @@ class System(NamedTuple):
 
 
 class Equations(NamedTuple):
-    """What one evaluation reads and writes."""
+    """Memory of one evaluation."""
 
     scene: SceneData
     frames: Frames
@@ -197,7 +197,7 @@ class Clock(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """What is recorded at the sample times."""
+    """States, accelerations and multipliers at the sample times."""
 
     coordinates: Annotated[Matrix, "k", "7*nb"]
     velocities: Annotated[Matrix, "k", "n"]

@@ -150,7 +150,7 @@ def record(values: Any) -> np.record:
 
 
 class Packed:
-    """A schema or a record ready for kernels: ``argument`` is what they take.  Keep it while they run."""
+    """A schema or a record ready for kernels, which take ``argument``.  Keep it while they run."""
 
     def __init__(self, values: Any):
         self.values = values

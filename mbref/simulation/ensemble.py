@@ -36,8 +36,8 @@ def ensemble(
     ``scenes`` may be a generator: a few are drawn ahead of those that have ended.  ``executor`` is any of
     concurrent.futures; by default one process a core, for which a script needs the usual
     ``if __name__ == "__main__"``.  With ``path`` each result is appended to that file (JSON lines) before it
-    is handed out, and what the file already has of the same scene, times, method and limits is not run
-    again.  Raises what ``simulate`` raises, for the first scene that cannot be simulated.
+    is handed out, and a run of the same scene, times, method and limits in the file is not
+    repeated.  Raises the errors of ``simulate`` for the first scene that cannot be simulated.
     """
     limits, times = limits or Limits(), checked_times(times)
     if executor is None:

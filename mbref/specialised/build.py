@@ -147,8 +147,8 @@ def project_piece(state: RecordingState) -> Piece:
 def specialise(model: Model, method: Method, rank_tolerance: float, start: Start, part: Part) -> Specialised:
     """The code of a scene from its start, recorded and compiled, or as kept from an earlier run.
 
-    Raises Untraceable where the formulation decides at run time what it does, the scene is too large, or
-    there is no JIT.
+    Raises Untraceable where the formulation chooses pivots at run time, the scene is too large, or there is
+    no JIT.
     """
     if PLAIN:
         raise Untraceable("without the JIT there is no machine code")

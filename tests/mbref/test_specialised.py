@@ -1,4 +1,4 @@
-"""Machine code of a scene's own against the kernels it is traced from."""
+"""Specialised code against the kernels it is recorded from."""
 
 import ctypes
 import json
@@ -28,7 +28,7 @@ CALL = ctypes.CFUNCTYPE(ctypes.c_longlong, ctypes.c_double, *[ctypes.c_void_p] *
 
 
 def runs(scene, method, end=0.02, **limits):
-    """The same run by the kernels and by the scene's own code."""
+    """The same run by the general kernels and by specialised code."""
     times = np.linspace(0.0, end, 5)
     return [
         simulate(scene, method, times, Limits(code=code, **limits)) for code in ("generic", "specialised")
