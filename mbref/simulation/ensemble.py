@@ -46,7 +46,7 @@ def ensemble(
         return
     prepare(Method.parse(method))  # once, not in every process at the same time
     known = records.stored(path)
-    pending: dict[Future, tuple[int, str]] = {}
+    pending: dict[Future[Trajectory], tuple[int, str]] = {}
     try:
         for place, scene in enumerate(scenes):
             key = _key(scene, times, method, limits)
@@ -65,12 +65,14 @@ def ensemble(
 
 def processes(workers: int | None = None) -> ProcessPoolExecutor:
     """A pool of so many processes, by default one a core; an interrupt is heard by their parent alone."""
-    quiet = {"initializer": signal.signal, "initargs": (signal.SIGINT, signal.SIG_IGN)}
-    return ProcessPoolExecutor(workers or os.cpu_count(), get_context("spawn"), **quiet)
+    quiet = (signal.SIGINT, signal.SIG_IGN)
+    return ProcessPoolExecutor(
+        workers or os.cpu_count(), get_context("spawn"), initializer=signal.signal, initargs=quiet
+    )
 
 
 def _ended(
-    pending: dict[Future, tuple[int, str]], path: str | Path | None
+    pending: dict[Future[Trajectory], tuple[int, str]], path: str | Path | None
 ) -> Iterator[tuple[int, Trajectory]]:
     """The results there are, at least one, stored and taken off the pending ones."""
     ended = []
