@@ -78,7 +78,7 @@ class Model:
     def sizes(self) -> dict[str, int]:
         """Sizes of the model's memory (see ``kernels.layout``)."""
         angles = max(1, int(np.sum(self.data.loads.angle >= 0)))
-        return {"nb": self.nb, "n": self.n, "m": self.m, "angles": angles, "dense_rows": 0}
+        return {"nb": self.nb, "n": self.n, "m": self.m, "angles": angles, "dense_rows": 0, "width": 12}
 
     def equations(self, sizes: Mapping[str, int] | None = None, **system: Any) -> Equations:
         """Fresh memory of an evaluation; ``system`` names fields of its System that are given."""
