@@ -1,8 +1,8 @@
 """Formulation A: a scene in natural coordinates, where every constraint is a product of two linear forms.
 
 The coordinates of a body are the columns of X_b = [r A]: centre of mass and body axes in the world, twelve
-numbers (J. García de Jalón and E. Bayo, Kinematic and Dynamic Simulation of Multibody Systems, 1994).  A point
-or direction fixed in a body is linear in them, X e, so that rigidity and all joints are rows
+numbers (J. García de Jalón and E. Bayo, Kinematic and Dynamic Simulation of Multibody Systems, 1994).  A
+point or direction fixed in a body is linear in them, X e, so that rigidity and all joints are rows
 (X u) · (X w) = c, drivers put a time into c or turn u, and the mass matrix is constant.
 """
 

@@ -1,18 +1,19 @@
 """Sparse products and saddle-point systems in any arithmetic: factorised in double, refined to the end.
 
-Iterative refinement with residuals in the arithmetic itself (N. J. Higham, Accuracy and Stability of Numerical
-Algorithms, 2002, ch. 12) gains about as many digits a round as double precision has beyond the condition
-number.
+Iterative refinement with residuals in the arithmetic itself (N. J. Higham, Accuracy and Stability of
+Numerical Algorithms, 2002, ch. 12) gains about as many digits a round as double precision has beyond the
+condition number.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
+from scipy.linalg.lapack import dgetrf, dgetrs
 
 from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
 
 ROUNDS = 40  # of refinement, at most
+TINY = 1e-300
 STALLED = 0.5  # a round that leaves more than this part of the last correction is the last one
 
 
@@ -47,21 +48,20 @@ class SaddlePoint:
         matrix[self._size :, : self._size], matrix[: self._size, self._size :] = flat, flat.T
         self._product, near = Sparse(matrix), doubles(matrix)
         self._scale = 1 / np.sqrt(np.maximum(np.abs(near).max(axis=1), 1e-300))
-        self._factors = lu_factor(near * self._scale[:, None] * self._scale, check_finite=False)
+        self._factors = dgetrf(near * self._scale[:, None] * self._scale)[:2]
 
     def solve(self, force: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """x (3, n) and y (m,) of f (3, n) and g (m,)."""
         wanted = np.concatenate([force.ravel(), rate])
-        found, last = 0 * wanted, np.inf
+        found, left, last = 0 * wanted, wanted, 1.0
         for _ in range(ROUNDS):
-            left = wanted - self._product(found)
             size = np.abs(left).max()
             if float(size) == 0.0:
                 break
-            step = lu_solve(self._factors, doubles(left / size) * self._scale, check_finite=False)
+            step = dgetrs(*self._factors, doubles(left / size) * self._scale)[0]
             found = self._arithmetic.settled(found + (self._scale * step) * size)
             change = float(np.abs(step).max() * size / np.abs(found / self._scale).max())
-            if change <= self._eps or not change <= STALLED * last:
+            if change * change / last <= self._eps or not change <= STALLED * last:
                 break
-            last = change
+            last, left = max(change, TINY), wanted - self._product(found)
         return found[: self._size].reshape(force.shape), found[self._size :]

@@ -1,8 +1,8 @@
 """The motion of a scene by formulation A: Taylor series of high order, step after step.
 
-Steps are as long as the series' smallest term allows (À. Jorba and M. Zou, Experimental Mathematics 14, 2005);
-after each the coordinates are projected onto the rows.  A singular position, near which the series is lost in
-rounding noise, is never stepped on but leapt over, along the branch that the series continues.
+Steps are as long as the series' smallest term allows (À. Jorba and M. Zou, Experimental Mathematics 14,
+2005); after each the coordinates are projected onto the rows.  A singular position, near which the series is
+lost in rounding noise, is never stepped on but leapt over, along the branch that the series continues.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
 from crosscheck.judge.reference.expansion import Expansion, Series, value
@@ -22,16 +23,17 @@ from crosscheck.judge.reference.natural_loads import Loads
 from crosscheck.judge.reference.saddle_point import SaddlePoint
 from mbref.scene import Scene
 
-ORDER = 24
+ORDER = 28
 NEW_ROW = 1e-4  # pivot from which a row that was dependent at the start has become independent
 BLUNT = 1e-2  # part of the best sharpness below which the choice of rows is looked at again
 BETTER = 1e3  # times sharper that other rows have to be
 NEAR = 0.4  # part of the usual sharpness below which a position counts as near a singular one
 USUAL = 50  # steps over which sharpness is usual
-LOSSES = (1e4, 1e7, 1e10)  # multiples of the tolerance that a leap may leave
-MOST_LOST = 1e-9  # relative error of a leap that is not taken
-TRIED = 24  # lengths of a leap
-BEYOND = 0.8  # part of the sharpness before a leap that has to be there after it
+DATA = float(np.finfo(float).eps)  # rounding of a scene's numbers
+ENOUGH = 100.0  # multiples of the tolerance that a leap may lose without trying from nearer
+TRIED = 24  # lengths at which a singular position is looked for
+FINE = 1e-6  # relative accuracy of its place
+DEPENDENT = 0.02  # part of the present sharpness that it falls below
 SHORTER = 0.8  # factor on a step that ends too near to a singular position
 SHORTEST = 1e-9  # step, relative to the time reached, at which the series is said to end
 WITHOUT_INERTIA = 1e-13  # part of the largest inertia of a freedom that counts as none
@@ -59,8 +61,8 @@ def natural_motion(
             samples.append(sample)
     except Ended as end:
         reason = str(end)
-    empty = arithmetic.zeros(0, 3, 4 * len(scene.body) + 4)
-    x, v, a = (np.array(s) if len(s) else empty for s in (zip(*samples) if samples else ((),) * 3))
+    shape = (len(samples), 3, 3, 4 * len(scene.body) + 4)
+    x, v, a = np.moveaxis(np.array(samples, dtype=arithmetic.dtype).reshape(shape), 1, 0)
     return Motion(
         np.asarray(times[: len(samples)], dtype=float), *stepper.of.bodies(x, v, a),
         reached=float(stepper.t) if reason else float(times[-1]), reason=reason, steps=stepper.steps,
@@ -83,6 +85,7 @@ class Stepper:
             0.2 * np.random.default_rng(seed).random(len(self.of.c)) if seed else np.zeros(len(self.of.c))
         )
         self._weights = 1 + spread
+        self._lost = np.inf
         self._held = self._choice()[0]
         self._sharpness = [self._sharp(self._x, self.t)]
 
@@ -94,8 +97,7 @@ class Stepper:
         while pending:
             if time.thread_time() > deadline:
                 raise Ended("the time for it was up")
-            expansion = self._expansion()
-            h = self._step(expansion.x)
+            expansion, h = self._step()
             series = expansion.x[: Series(expansion.x).terms(h)]
             while pending and pending[0] <= float(self.t) + h:
                 d = self.of.arithmetic.number(pending.pop(0)) - self.t
@@ -103,9 +105,9 @@ class Stepper:
             if pending:
                 self._advance(expansion, series, h)
 
-    def _expansion(self) -> Expansion:
+    def _expansion(self, order: int) -> Expansion:
         state = self._x, self._v
-        return Expansion(self.of, self._held, self._loads, self._order, self.t, state, self._angles)
+        return Expansion(self.of, self._held, self._loads, order, self.t, state, self._angles)
 
     def _advance(self, expansion: Expansion, series: np.ndarray, h: float) -> None:
         d, settled = self.of.arithmetic.number(h), self.of.arithmetic.settled
@@ -180,38 +182,56 @@ class Stepper:
                 state[:, :-4] = arithmetic.settled(state[:, :-4] + system.solve(still, -gap)[0])
 
     # --- steps --------------------------------------------------------------------------------------------
-    def _step(self, x: np.ndarray) -> float:
-        """The length (s) of the step, which does not end much nearer to a singular position."""
-        series = Series(x)
+    def _step(self) -> tuple[Expansion, float]:
+        """A series and the length (s) of its step, which does not end much nearer to a singular position."""
+        expansion = self._expansion(self._order)
+        series = Series(expansion.x)
         h = series.reach(self._tolerance)
         if h <= SHORTEST * max(1e-3, float(self.t)):
             raise Ended("its series ends, as at a singular position that no smooth branch goes through")
         now = self._sharpness[-1]
-        ahead = self._ahead(x, series, h)
-        if ahead < now < NEAR * max(self._sharpness[-USUAL:]) and (leap := self._leap(x, series, h)):
-            return leap
+        ahead = self._ahead(expansion.x, series, h)
+        if ahead < now < NEAR * max(self._sharpness[-USUAL:]):
+            middle = self._crossing(expansion.x, series, h)
+            longer = self._expansion(2 * self._order) if middle else expansion
+            if middle and self._may_leap(Series(longer.x).left_out(2 * middle)):
+                self.crossings.append(float(self.t) + middle)
+                return longer, 2 * middle
         while ahead < NEAR * now:
             h *= SHORTER
-            ahead = self._ahead(x, series, h)
-        return h
+            ahead = self._ahead(expansion.x, series, h)
+        return expansion, h
 
     def _ahead(self, x: np.ndarray, series: Series, h: float) -> float:
         """Sharpness at the end of a step."""
         d = self.of.arithmetic.number(h)
         return self._sharp(value(x[: series.terms(h)], d), self.t + d)
 
-    def _leap(self, x: np.ndarray, series: Series, h: float) -> float:
-        """A step (s) to beyond the singular position ahead that loses few digits; 0 when there is none."""
-        reach = max(
-            series.reach(self._tolerance * loss) for loss in LOSSES if loss * self._tolerance < MOST_LOST
-        )
-        lengths = np.geomspace(h, reach, TRIED)[1:]
-        passed = [(self._ahead(x, series, length), length) for length in lengths]
-        for sharpness, length in passed:
-            if sharpness >= BEYOND * self._sharpness[-1]:
-                self.crossings.append(float(self.t) + min(p for p in passed if p[1] <= length)[1])
-                return float(length)
-        return 0.0
+    def _may_leap(self, lost: float) -> bool:
+        """Whether a leap that loses so much does so no more than rounded data, or than one from nearer."""
+        before, self._lost = self._lost, lost
+        blunt = max(self._sharpness[-USUAL:]) / self._sharpness[-1]
+        data = 0.0 if self.of.arithmetic.digits else DATA * blunt**2
+        enough = max(ENOUGH * self._tolerance, data)
+        if lost > np.sqrt(self._tolerance) or enough < lost < before:
+            return False
+        self._lost = np.inf
+        return True
+
+    def _crossing(self, x: np.ndarray, series: Series, h: float) -> float:
+        """How far ahead (s) the held rows are dependent, as far as the series tells; 0 when nowhere."""
+
+        def sharp(length: float) -> float:
+            return self._ahead(x, series, length)
+
+        lengths = np.geomspace(h / 4, max(h, series.reach(np.sqrt(self._tolerance))), TRIED)
+        values = np.array([sharp(length) for length in lengths])
+        lowest = int((np.diff(values) > 0).argmax())
+        if not lowest:
+            return 0.0
+        around = lengths[lowest - 1], lengths[lowest + 1]
+        found = minimize_scalar(sharp, bounds=around, method="bounded", options={"xatol": FINE * around[0]})
+        return float(found.x) if found.fun < DEPENDENT * self._sharpness[-1] else 0.0
 
 
 def _largest(values: np.ndarray) -> float:
