@@ -20,12 +20,13 @@ SWEEPS = 60  # Picard iterations before a panel is shortened
 MANY = 35  # a panel that took more is not followed by a longer one
 SETTLED = 2000.0  # rounding units of the last change, and of the end of the series
 BRIDGED = 1e4  # times more, across a singular position
-TELLING = 1e-6  # change below which the end of the series is that of the solution
+TELLING = 1e-3  # change below which the series tells how long a panel may be
+ROUGHLY = 1.2  # doubt in what the series of an iterate tells
 SPARE = 0.9  # of the length that the series could resolve
-LONGEST, SHORTER = 1.6, 0.6  # factors on the length of the next panel
+LONGEST, SHORTER, SHORTEST = 1.6, 0.6, 0.5  # factors on the length of the next panel
 FLOOR = 1e-3  # of the largest column, below which a column counts as small
 DIVERGES = 1e3
-LAST = 3  # coefficients that must be small
+LAST = 3  # coefficients of a series that must be small
 
 
 class Equations(Protocol):
@@ -42,13 +43,17 @@ class Equations(Protocol):
 
 @dataclass(frozen=True)
 class Panel:
-    """A stretch of time: start, length, states (nodes, n) and rates of the columns after the light ones."""
+    """A stretch of time: start, length, states (nodes, n) and rates of the columns after the light ones,
+    the singular position in it, whether the iteration has settled, and a factor on the length for the next panel,
+    or for another try."""
 
     start: Any
     length: Any
     states: np.ndarray
     rates: np.ndarray
     crossing: float | None
+    settled: bool
+    factor: float
 
 
 class Panels:
@@ -76,12 +81,11 @@ class Panels:
         out = np.array((a * b).entries() + [None], dtype=object)[:-1]
         return self.arithmetic.settled(out.reshape(matrix.shape[0], values.shape[1]))
 
-    def panel(self, equations: Equations, start: Any, y0: np.ndarray, length: Any) -> tuple[Panel | None, float]:
-        """The solution on a panel from state y0 (n,), None when the iteration does not settle on it, and a
-        factor on the length for the next one, or for another try."""
+    def panel(self, equations: Equations, start: Any, length: Any, guess: np.ndarray) -> Panel:
+        """The solution from the first state of a guess (nodes, n) on."""
         half, light, tolerance = length / 2, equations.light, self.tolerance
         t = start + half * (self.nodes + 1)
-        y, last, crossing = np.repeat(y0[None], self.count, axis=0), np.inf, None
+        y, y0, last, crossing = guess, guess[0], np.inf, None
         for sweep in range(1, SWEEPS):
             with np.errstate(all="ignore"):
                 rates, distance = equations.other_rates(t, y)
@@ -96,25 +100,35 @@ class Panels:
                 better[:, :light] = y0[:light] + half * self.times(self.integral, moves)
                 size = self._size(better, np.concatenate([moves, rates], axis=1) * length, light)
                 change = (np.abs(doubles(better - y)) / size).max(initial=0.0)
-            y = self.arithmetic.settled(better)
             if not np.isfinite(change) or change > DIVERGES * last:
-                return None, SHORTER
-            last = min(last, change)
+                return Panel(start, length, guess, rates, None, False, SHORTEST)
+            y, last = self.arithmetic.settled(better), min(last, change)
             if change <= max(TELLING, tolerance):
-                fits = self._fit(rates * length, size[light:], max(change, tolerance))
-                if fits < 1:
-                    return None, max(SPARE * fits, SHORTER)
-                if change <= tolerance:
+                fits, settled = (
+                    self._fits(rates * length, size[light:], change, tolerance),
+                    change <= tolerance,
+                )
+                if fits < 1 / (1 if settled else ROUGHLY):
+                    return Panel(start, length, y, rates, None, False, max(SPARE * fits, SHORTEST))
+                if settled:
                     at = None if crossing is None else float(start + half * (crossing + 1))
-                    longer = LONGEST if sweep < MANY else 1.0
-                    return Panel(start, length, y, rates, at), min(SPARE * fits, longer)
-        return None, SHORTER
+                    factor = min(SPARE * fits, LONGEST if sweep < MANY else 1.0)
+                    return Panel(start, length, y, rates, at, True, factor)
+        return Panel(start, length, guess, rates, None, False, SHORTER)
 
-    def _fit(self, moved: np.ndarray, size: np.ndarray, tolerance: float) -> float:
-        """How many times longer a panel the series could resolve: of its coefficients, over those needed."""
-        coefficients = np.abs(doubles(self.times(self.series, moved))) / size
-        needed = np.flatnonzero((coefficients > tolerance).any(axis=1)).max(initial=0) + 1
-        return (self.count - LAST) / needed
+    def _fits(self, moved: np.ndarray, size: np.ndarray, change: float, tolerance: float) -> float:
+        """How many times longer a panel its points could resolve.
+
+        The series falls geometrically: if an iterate needs k coefficients down to the size of its change,
+        the solution needs k log(tolerance) / log(change); if they do not reach so far, the last tells.
+        """
+        series = (np.abs(doubles(self.times(self.series, moved))) / size).max(axis=1, initial=0.0)
+        level = max(change, tolerance)
+        above = np.flatnonzero(series > level)
+        needed = above.max(initial=0) + 1
+        if needed > self.count - LAST:
+            needed, level = self.count, min(max(series[-LAST:].max(), level), TELLING)
+        return (self.count - LAST) / (needed * np.log(tolerance) / np.log(level))
 
     @staticmethod
     def _size(y: np.ndarray, moved: np.ndarray, light: int) -> np.ndarray:
@@ -128,7 +142,7 @@ class Panels:
     def sampled(self, panel: Panel, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """States (k, n) and rates of the columns after the light ones at times (k,) of a panel."""
         both = np.concatenate([panel.states, panel.rates], axis=1)
-        c = self.times(self.series, both)
+        c = self.times(self.series, both)  # Chebyshev coefficients
         x = ((t - panel.start) / panel.length * 2 - 1)[:, None]
         b, ahead = 0 * x + c[-1], 0 * x  # Clenshaw's recurrence
         for row in c[-2:0:-1]:

@@ -50,15 +50,14 @@ class _Run:
         """Runs to the last time; the reason where the motion ends before."""
         if reason := self.equations.undetermined():
             return reason
-        end = self.times.max(initial=0.0)
-        length = FIRST * end or 1.0
+        end, panel = self.times.max(initial=0.0), None
+        length = self.arithmetic.number(FIRST * end or 1.0)
         while self.taken < len(self.times):
             if time.thread_time() > until:
                 return "the CPU time for it is over"
-            tried = self.arithmetic.number(length)
-            panel, factor = self.panels.panel(self.equations, self.t, self.state, tried)
-            length *= factor
-            if panel is None:
+            panel = self.panels.panel(self.equations, self.t, length, self._guess(panel, length))
+            length = length * panel.factor
+            if not panel.settled:
                 if length < LEAST * end:
                     return "no panel of time is short enough"
                 continue
@@ -67,6 +66,14 @@ class _Run:
             if self.equations.gap(self.t, self.state) > OPEN:
                 return "rows that were redundant at the start are not later: it is a singular position"
         return ""
+
+    def _guess(self, tried: Panel | None, length: Any) -> np.ndarray:
+        """States at the points of a panel: as now, or those of a longer panel that was tried before."""
+        if tried is None or tried.settled:
+            return np.repeat(self.state[None], self.panels.count, axis=0)
+        guess, _ = self.panels.sampled(tried, self.t + length / 2 * (self.panels.nodes + 1))
+        guess[0] = self.state
+        return guess
 
     def _sample(self, panel: Panel) -> None:
         stop = int(np.searchsorted(self.times, float(panel.start + panel.length), side="right"))

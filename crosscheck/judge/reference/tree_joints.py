@@ -131,7 +131,9 @@ class Tree:
         arm = position[:, :, None] - (position[:, self.body] - outer)[:, None, self.link]
         turning, moved = self.turning[:, None], self.moved[..., None]
         swing, straight = cross(axis[:, None], arm), axis[:, None]
-        columns = np.concatenate([np.where(turning, swing, straight), straight * turning + 0 * swing], axis=-1)
+        columns = np.concatenate(
+            [np.where(turning, swing, straight), straight * turning + 0 * swing], axis=-1
+        )
         columns = columns * moved
         twist = apply(np.swapaxes(columns, -1, -2), rate[:, None])
         velocity, spin = twist[..., :3], twist[..., 3:]
@@ -187,7 +189,9 @@ def _outwards(scene: Scene, kept: list[Any]) -> list[Link]:
             waiting.remove(joint)
             first, second = (scene.body_index(name) for name in joint.bodies)
             forwards = first in reached
-            links.append(Link(*((second, first) if forwards else (first, second)), joint, 1 if forwards else -1))
+            links.append(
+                Link(*((second, first) if forwards else (first, second)), joint, 1 if forwards else -1)
+            )
         reached.add(links[-1].body)
     return links
 

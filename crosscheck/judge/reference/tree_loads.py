@@ -102,7 +102,11 @@ class Loads:
     def _point(self, placed: Placed, body: int, point) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Arm, position and velocity (K, 3) of a point, given in the world at t = 0, of a body."""
         arm = apply(placed.rotation[:, body], self.tree.arithmetic.array(point) - self.tree.start[body])
-        return arm, placed.position[:, body] + arm, placed.velocity[:, body] + cross(placed.spin[:, body], arm)
+        return (
+            arm,
+            placed.position[:, body] + arm,
+            placed.velocity[:, body] + cross(placed.spin[:, body], arm),
+        )
 
     def _world_inertia(self, placed: Placed) -> np.ndarray:
         rotation = placed.rotation[:, :-1]

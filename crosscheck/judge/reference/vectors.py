@@ -86,7 +86,9 @@ def _scaled_inverse(mass: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.
     diagonal = np.diagonal(mass, axis1=1, axis2=2)
     light = LIGHT * diagonal.max(axis=1, initial=0.0, keepdims=True) + np.finfo(float).tiny
     across = 1 / np.sqrt(np.maximum(diagonal, light))
-    size = np.linalg.norm(rows * across[:, None], axis=2).max(axis=0)  # of rows that vanish at some samples, too
+    size = np.linalg.norm(rows * across[:, None], axis=2).max(
+        axis=0
+    )  # of rows that vanish at some samples, too
     along = np.broadcast_to(1 / np.where(size > 0, size, 1.0), (len(mass), m))
     scale = np.concatenate([across, along], axis=1)
     matrix = _saddle(mass, rows, np.zeros((len(mass), m, m))) * scale[:, None] * scale[..., None]
