@@ -51,8 +51,9 @@ def natural_motion(
 ) -> Motion:  # fmt: skip
     """The motion at ascending times (k,) ≥ 0 in natural coordinates (see Motion), by series of an order.
 
-    ``tolerance`` is of a step, relative (default: the arithmetic's rounding unit); another ``seed`` prefers
-    other rows where some are redundant.  ``seconds`` limits the CPU time of the calling thread.
+    ``tolerance`` is of a step, relative (default: the arithmetic's rounding unit).  Another ``seed`` prefers
+    other rows where some are redundant, and displaces joints by the rounding of double precision.
+    ``seconds`` limits the CPU time of the calling thread.
     """
     began, reason, samples = time.thread_time(), "", []
     stepper = Stepper(scene, arithmetic, order, tolerance or arithmetic.eps, seed)
@@ -65,8 +66,8 @@ def natural_motion(
     x, v, a = np.moveaxis(np.array(samples, dtype=arithmetic.dtype).reshape(shape), 1, 0)
     return Motion(
         np.asarray(times[: len(samples)], dtype=float), *stepper.of.bodies(x, v, a),
-        reached=float(stepper.t) if reason else float(times[-1]), reason=reason, steps=stepper.steps,
-        crossings=tuple(stepper.crossings), seconds=time.thread_time() - began,
+        reached=float(stepper.t if reason else max(times, default=0.0)), reason=reason,
+        steps=stepper.steps, crossings=tuple(stepper.crossings), seconds=time.thread_time() - began,
     )  # fmt: skip
 
 
@@ -86,8 +87,15 @@ class Stepper:
         )
         self._weights = 1 + spread
         self._lost = np.inf
-        self._held = self._choice()[0]
+        self._held = self._choice(self._x, self.t)[0]
         self._sharpness = [self._sharp(self._x, self.t)]
+
+    def _vary(self, rng: np.random.Generator) -> None:
+        """Prefer other rows, and displace the joints by what rounding leaves open of them."""
+        self._weights += 0.2 * rng.random(len(self._weights))
+        joints = slice(6 * self.of.nb, None)
+        displaced = DATA * rng.uniform(-1, 1, len(self.of.c[joints]))
+        self.of.c[joints] = self.of.c[joints] + self.of.arithmetic.array(displaced)
 
     def samples(self, times: Sequence[float], deadline: float) -> Iterator[Sample]:
         """X, X', X'' (3, n) at ascending times; raises Ended where the motion cannot be followed."""
@@ -99,6 +107,8 @@ class Stepper:
                 raise Ended("the time for it was up")
             expansion, h = self._step()
             series = expansion.x[: Series(expansion.x).terms(h)]
+            if not self.steps:
+                self._refuse_singular_start(series, self.of.arithmetic.number(h / 2))
             while pending and pending[0] <= float(self.t) + h:
                 d = self.of.arithmetic.number(pending.pop(0)) - self.t
                 yield tuple(self.of.arithmetic.settled(value(series, d, n)) for n in range(3))
@@ -120,32 +130,34 @@ class Stepper:
         self._project()
 
     # --- rows ---------------------------------------------------------------------------------------------
-    def _choice(self) -> tuple[HeldRows, np.ndarray]:
-        """Independent rows at the present coordinates, and the pivots of all."""
+    def _choice(self, x: np.ndarray, t: Any) -> tuple[HeldRows, int]:
+        """Rows that are independent at the coordinates x, and how many are well so."""
         every = HeldRows(self.of, range(len(self.of.c)))
-        rows, pivots = independent(every.unit_gradient(self._x, self.t), self._weights)
-        return HeldRows(self.of, rows), pivots
+        rows, pivots = independent(every.unit_gradient(x, t), self._weights)
+        return HeldRows(self.of, rows), int((pivots > NEW_ROW).sum())
 
     def _sharp(self, x: np.ndarray, t: Any) -> float:
         """How far the held rows are from dependent: their least singular value, being of length one."""
         return float(np.linalg.svd(self._held.unit_gradient(x, t), compute_uv=False)[-1])
 
     def _choose_again(self) -> None:
-        """Refuse a start in a singular position; hold other rows where these have become blunt."""
-        if self.steps > 1 and self._sharpness[-1] > BLUNT * max(self._sharpness):
+        """Hold other rows where these have become blunt."""
+        if self._sharpness[-1] > BLUNT * max(self._sharpness):
             return
-        other, pivots = self._choice()
-        if self.steps == 1 and (pivots > NEW_ROW).sum() > len(self._held.numbers):
+        before, self._held = self._held, self._choice(self._x, self.t)[0]
+        sharpness = self._sharp(self._x, self.t)
+        if len(self._held.numbers) == len(before.numbers) and sharpness > BETTER * self._sharpness[-1]:
+            self._sharpness = [sharpness]
+        else:
+            self._held = before
+
+    def _refuse_singular_start(self, series: np.ndarray, d: Any) -> None:
+        """Raise Ended where more rows are independent a little later than at the start."""
+        if self._choice(value(series, d), self.t + d)[1] > len(self._held.numbers):
             raise Ended(
                 "it starts in a singular position, from which more than one motion goes on: "
                 "give poses and velocities a little later on the branch meant"
             )
-        before, self._held = self._held, other
-        sharpness = self._sharp(self._x, self.t)
-        if len(other.numbers) == len(before.numbers) and sharpness > BETTER * self._sharpness[-1]:
-            self._sharpness = [sharpness]
-        else:
-            self._held = before
 
     def _refuse_undetermined(self) -> None:
         """Raise Ended where a freedom has neither driver nor inertia."""
