@@ -2,8 +2,8 @@
 
     python benchmarks/references.py [--random 200] [--duration 0.5] [--seconds 60]
 
-Of each built-in scene and closed form of the conformance suite: steps of formulation A, CPU seconds of
-A, of its twin and of B, the difference of A and B, the bound, and the true error where a closed form is known.
+Of each built-in scene and closed form of the conformance suite: steps of formulation A, CPU seconds of A, of
+its twin and of B, the difference of A and B, the bound, and the true error where a closed form is known.
 Of the random mechanisms of 3 to 8 bodies: the part with a bound of 1e-11 or less, and the median CPU seconds.
 Nothing is taken from the cache.
 """
@@ -17,7 +17,6 @@ import numpy as np
 from crosscheck.conformance.closed_forms import CLOSED_FORMS
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from crosscheck.judge.metrics import error_series
-from crosscheck.judge.reference.arithmetic import EXTENDED
 from crosscheck.judge.reference.bound import differences
 from crosscheck.judge.reference.reference import Reference, judged, runs
 from crosscheck.judge.truth import closed_form
@@ -36,9 +35,8 @@ def main() -> None:
     parser.add_argument("--duration", type=float, default=0.5, help="of their motion, s")
     parser.add_argument("--seconds", type=float, default=60.0, help="of CPU time for each reference")
     asked = parser.parse_args()
-    print(
-        f"{'scene':28} {'s':>5} {'steps':>5} {'A':>7} {'twin':>7} {'B':>7} {'A - B':>7} {'bound':>7} {'error':>7}"
-    )
+    heads = "".join(f" {head:>7}" for head in ("A", "twin", "B", "A - B", "bound", "error"))
+    print(f"{'scene':28} {'s':>5} {'steps':>5}{heads}")
     for scene in [*(make() for make in SCENES.values()), *(make()[0] for make in CLOSED_FORMS)]:
         line(scene, scene.duration, asked.seconds)
     found = [line(random_mechanism(k), asked.duration, asked.seconds) for k in range(asked.random)]

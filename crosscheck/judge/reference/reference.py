@@ -81,6 +81,8 @@ def reference(scene: Scene, times: Sequence[float], seconds: float = SECONDS) ->
 def runs(scene: Scene, times: np.ndarray, seconds: float) -> tuple[Motion, Motion, Motion]:
     """The motion at ascending times (k,) by A, by A in its other way, and by B."""
     a = natural_motion(scene, times, EXTENDED, seconds=SHARE * seconds)
+    if not len(a.times):
+        return a, a, a
     left = seconds - a.seconds
     way = {"order": TWIN_ORDER, "seed": TWIN_SEED}
     twin = natural_motion(scene, a.times, EXTENDED, seconds=SHARE * left, **way)
