@@ -44,8 +44,8 @@ class Equations(Protocol):
 @dataclass(frozen=True)
 class Panel:
     """A stretch of time: start, length, states (nodes, n) and rates of the columns after the light ones,
-    the singular position in it, whether the iteration has settled, and a factor on the length for the next panel,
-    or for another try."""
+    the singular position in it, whether the iteration has settled, and a factor on the length for the next
+    panel, or for another try."""
 
     start: Any
     length: Any
@@ -78,7 +78,7 @@ class Panels:
         from flint import arb_mat
 
         a, b = (arb_mat(*x.shape, x.ravel().tolist()) for x in (matrix, values))
-        out = np.array((a * b).entries() + [None], dtype=object)[:-1]
+        out = np.array([*(a * b).entries(), None], dtype=object)[:-1]
         return self.arithmetic.settled(out.reshape(matrix.shape[0], values.shape[1]))
 
     def panel(self, equations: Equations, start: Any, length: Any, guess: np.ndarray) -> Panel:

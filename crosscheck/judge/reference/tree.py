@@ -1,13 +1,14 @@
-"""Formulation B of the reference: joint coordinates of a spanning tree, loop closures, d'Alembert's principle.
+"""Formulation B of the reference: joint coordinates of a spanning tree, closures, d'Alembert's principle.
 
 At all points of a panel of time at once, twists and their drifts are carried outwards along the tree
-(tree_joints.py), and the joint accelerations q'' and the multipliers λ solve [M Gᵀ; G 0] (q'', λ) = (Q, γ), with
-the mass matrix M and the forces Q of tree_loads.py and the closures' Jacobian G of tree_closures.py.
+(tree_joints.py), and the joint accelerations q'' and multipliers λ solve [M Gᵀ; G 0] (q'', λ) = (Q, γ),
+with mass matrix M and forces Q of tree_loads.py and the closures' Jacobian G of tree_closures.py.
 """
 
 from __future__ import annotations
 
 import time
+from typing import Any
 import numpy as np
 
 from crosscheck.judge.reference.arithmetic import Arithmetic

@@ -17,7 +17,7 @@ from crosscheck.judge.reference.tree_joints import Placed, Tree, joint_frame
 from crosscheck.judge.reference.vectors import apply, cross, dot, unit
 
 SLIDING = {"translational": (0, 1), "cylindrical": (0, 1), "planar": (2,)}
-"""Directions of the first body (two normal to the axis, the axis) along which nothing may slide; else all."""
+"""Directions of the first body (two normal to its axis, then the axis) that nothing may slide along; else all."""
 LOCKED = {"fixed": ((1, 2), (0, 2), (0, 1)), "translational": ((1, 2), (0, 2), (0, 1)),
           "revolute": ((2, 0), (2, 1)), "cylindrical": ((2, 0), (2, 1)), "planar": ((2, 0), (2, 1))}  # fmt: skip
 """Pairs of directions, of the first body and of the second, that stay perpendicular."""

@@ -57,7 +57,7 @@ class TreeEquations:
         self.kept: np.ndarray | None = None
 
     def light_rates(self, y: np.ndarray) -> np.ndarray:
-        """Rates (K, light) of scalars and quaternions; those of quaternions are half spin times quaternion."""
+        """Rates (K, light) of scalars and quaternions, the latter half spin times quaternion."""
         scalar, ball, _, rate = self._split(y)
         spin = rate[:, self.tree.scalars :].reshape(len(y), -1, 3)
         moves = product(np.concatenate([0 * spin[..., :1], spin], axis=-1), ball) / 2
