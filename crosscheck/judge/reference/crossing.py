@@ -25,7 +25,7 @@ def near_singular(distance: np.ndarray) -> np.ndarray:
 def singular_time(nodes: np.ndarray, distance: np.ndarray) -> float | None:
     """Where in [-1, 1] the distances (K,) from singularity, given as absolute values, change their sign."""
     near = near_singular(distance)
-    if not near.any() or near.sum() > MOST * len(nodes) or not np.isfinite(distance).all():
+    if not np.isfinite(distance).all() or not _inside(near):
         return None
     least = int(np.argmin(distance))
     window = np.arange(max(0, least - WINDOW), min(len(nodes), least + WINDOW + 1))
@@ -40,6 +40,11 @@ def singular_time(nodes: np.ndarray, distance: np.ndarray) -> float | None:
     return float(inside[np.argmin(np.abs(inside - nodes[least]))]) if len(inside) else None
 
 
+def _inside(near: np.ndarray) -> bool:
+    """Whether there are points to be bridged, not too many and with others on both sides."""
+    return bool(near.any() and near.sum() <= MOST * len(near) and not near[0] and not near[-1])
+
+
 def _fit(x: np.ndarray, d: np.ndarray) -> tuple[float, np.ndarray]:
     """Largest misfit of a polynomial through distances, and its Chebyshev coefficients."""
     coefficients = chebyshev.chebfit(x, d, DEGREE)
@@ -49,7 +54,7 @@ def _fit(x: np.ndarray, d: np.ndarray) -> tuple[float, np.ndarray]:
 def bridged(nodes: np.ndarray, rates: np.ndarray, distance: np.ndarray) -> np.ndarray:
     """Rates (K, n) with those near the singular position from the polynomial through the others."""
     near = near_singular(distance)
-    if not near.any() or near.sum() > MOST * len(nodes):
+    if not _inside(near):
         return rates
     x = nodes.astype(float)
     degree = len(x) - 2 * int(near.sum()) - 4

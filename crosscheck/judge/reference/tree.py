@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from typing import Any
+
 import numpy as np
 
 from crosscheck.judge.reference.arithmetic import Arithmetic

@@ -25,7 +25,7 @@ PREFERRED = 10  # of joints with a driver or a torsion spring, whose coordinate 
 
 @dataclass(frozen=True)
 class Link:
-    """A body on its parent (-1 ground) by a joint (None: free); ``sign`` is -1 where the joint points inwards."""
+    """A body on its parent (-1 ground) by a joint (None: free); ``sign`` -1 where it points inwards."""
 
     body: int
     parent: int

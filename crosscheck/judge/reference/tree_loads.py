@@ -118,7 +118,8 @@ LOADS = (Moment, Force, Spring, TorsionSpring)
 
 def _over_bodies(columns: np.ndarray) -> np.ndarray:
     """(K, nv, bodies · 6) of columns (K, bodies, nv, 6)."""
-    return np.swapaxes(columns, 1, 2).reshape(len(columns), columns.shape[2], -1)
+    samples, bodies, rates, _ = columns.shape
+    return np.swapaxes(columns, 1, 2).reshape(samples, rates, 6 * bodies)
 
 
 def _push(wrench: np.ndarray, body: int, arm: np.ndarray, force: np.ndarray) -> None:
