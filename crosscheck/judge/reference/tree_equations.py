@@ -149,7 +149,7 @@ class TreeEquations:
         """Keeps a largest set of independent rows: the first one while it is well enough conditioned."""
         rows = doubles(at.rows.jacobian[0])
         size = np.linalg.norm(rows, axis=1, keepdims=True)
-        largest = max(size.max(initial=0.0), np.finfo(float).tiny)
+        largest = max(size.max(initial=0.0), min(1.0, self.length**2))  # one joint rate moves so much
         rows = rows / np.where(size > RANK * largest, size, largest)  # those of rounding size stay small
         r, order = qr(rows.T, mode="r", pivoting=True)
         pivots = np.abs(np.diag(r))
