@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.polynomial import chebyshev
 
-NEAR = 0.15  # of the median distance from singularity: points to be bridged
+NEAR = 0.35  # of the median distance from singularity: points to be bridged
 MOST = 0.25  # of the points may be bridged
 DEGREE = 8  # of the polynomial that tells whether the distance changes its sign
 WINDOW = 12  # points on either side that it goes through
@@ -25,7 +25,7 @@ def near_singular(distance: np.ndarray) -> np.ndarray:
 def singular_time(nodes: np.ndarray, distance: np.ndarray) -> float | None:
     """Where in [-1, 1] the distances (K,) from singularity, given as absolute values, change their sign."""
     near = near_singular(distance)
-    if not near.any() or near.sum() > MOST * len(nodes) or not np.isfinite(distance).all():
+    if not np.isfinite(distance).all() or not _inside(near):
         return None
     least = int(np.argmin(distance))
     window = np.arange(max(0, least - WINDOW), min(len(nodes), least + WINDOW + 1))
@@ -40,6 +40,19 @@ def singular_time(nodes: np.ndarray, distance: np.ndarray) -> float | None:
     return float(inside[np.argmin(np.abs(inside - nodes[least]))]) if len(inside) else None
 
 
+def _inside(near: np.ndarray) -> bool:
+    """Whether there are points to be bridged, not too many and with others on both sides."""
+    return bool(near.any() and near.sum() <= MOST * len(near) and not near[0] and not near[-1])
+
+
+def singular_ahead(nodes: np.ndarray, distance: np.ndarray) -> float | None:
+    """Where in (1, 3) the distances (K,) will come to zero if they go on as at the panel's end."""
+    x, d = nodes[-WINDOW // 2 :], distance[-WINDOW // 2 :]
+    slope, _ = np.polyfit(x, d, 1)
+    ahead = 1 - d[-1] / slope if slope < 0 else np.inf
+    return float(ahead) if ahead < 1 + 2 else None
+
+
 def _fit(x: np.ndarray, d: np.ndarray) -> tuple[float, np.ndarray]:
     """Largest misfit of a polynomial through distances, and its Chebyshev coefficients."""
     coefficients = chebyshev.chebfit(x, d, DEGREE)
@@ -49,7 +62,7 @@ def _fit(x: np.ndarray, d: np.ndarray) -> tuple[float, np.ndarray]:
 def bridged(nodes: np.ndarray, rates: np.ndarray, distance: np.ndarray) -> np.ndarray:
     """Rates (K, n) with those near the singular position from the polynomial through the others."""
     near = near_singular(distance)
-    if not near.any() or near.sum() > MOST * len(nodes):
+    if not _inside(near):
         return rates
     x = nodes.astype(float)
     degree = len(x) - 2 * int(near.sum()) - 4

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
-from crosscheck.judge.reference.crossing import bridged, singular_time
+from crosscheck.judge.reference.crossing import bridged, singular_ahead, singular_time
 
 SWEEPS = 60  # Picard iterations before a panel is shortened
 MANY = 35  # a panel that took more is not followed by a longer one
@@ -43,17 +43,22 @@ class Equations(Protocol):
 
 @dataclass(frozen=True)
 class Panel:
-    """A stretch of time: start, length, states (nodes, n) and rates of the columns after the light ones,
-    the singular position in it, whether the iteration has settled, and a factor on the length for the next panel,
-    or for another try."""
+    """A stretch of time: start, length, states (nodes, n) and rates of the columns after the light ones;
+    whether the iteration has settled, and a factor on the length for the next panel, or for another try;
+    where in [-1, 1] a singular position is crossed, and where one is foreseen (from -1 on)."""
 
     start: Any
     length: Any
     states: np.ndarray
     rates: np.ndarray
-    crossing: float | None
     settled: bool
     factor: float
+    crossing: float | None = None
+    foreseen: float | None = None
+
+    def time(self, place: float | None) -> float | None:
+        """The time (s) of a place."""
+        return None if place is None else float(self.start + self.length * (place + 1) / 2)
 
 
 class Panels:
@@ -78,22 +83,22 @@ class Panels:
         from flint import arb_mat
 
         a, b = (arb_mat(*x.shape, x.ravel().tolist()) for x in (matrix, values))
-        out = np.array((a * b).entries() + [None], dtype=object)[:-1]
+        out = np.array([*(a * b).entries(), None], dtype=object)[:-1]
         return self.arithmetic.settled(out.reshape(matrix.shape[0], values.shape[1]))
 
     def panel(self, equations: Equations, start: Any, length: Any, guess: np.ndarray) -> Panel:
         """The solution from the first state of a guess (nodes, n) on."""
         half, light, tolerance = length / 2, equations.light, self.tolerance
-        t = start + half * (self.nodes + 1)
+        t, places = start + half * (self.nodes + 1), doubles(self.nodes)
         y, y0, last, crossing = guess, guess[0], np.inf, None
         for sweep in range(1, SWEEPS):
             with np.errstate(all="ignore"):
                 rates, distance = equations.other_rates(t, y)
-                if last < 1 and crossing is None:
-                    crossing = singular_time(doubles(self.nodes), distance)
+                if last < 1:
+                    crossing = singular_time(places, distance) or crossing
                     tolerance = self.tolerance * (1 if crossing is None else BRIDGED)
                 if crossing is not None:
-                    rates = bridged(self.nodes, rates, distance)
+                    rates = bridged(places, rates, distance)
                 better = y.copy()
                 better[:, light:] = y0[light:] + half * self.times(self.integral, rates)
                 moves = equations.light_rates(better)
@@ -101,7 +106,7 @@ class Panels:
                 size = self._size(better, np.concatenate([moves, rates], axis=1) * length, light)
                 change = (np.abs(doubles(better - y)) / size).max(initial=0.0)
             if not np.isfinite(change) or change > DIVERGES * last:
-                return Panel(start, length, guess, rates, None, False, SHORTEST)
+                return Panel(start, length, guess, rates, False, SHORTEST, foreseen=crossing)
             y, last = self.arithmetic.settled(better), min(last, change)
             if change <= max(TELLING, tolerance):
                 fits, settled = (
@@ -109,12 +114,13 @@ class Panels:
                     change <= tolerance,
                 )
                 if fits < 1 / (1 if settled else ROUGHLY):
-                    return Panel(start, length, y, rates, None, False, max(SPARE * fits, SHORTEST))
+                    factor = max(SPARE * fits, SHORTEST)
+                    return Panel(start, length, y, rates, False, factor, foreseen=crossing)
                 if settled:
-                    at = None if crossing is None else float(start + half * (crossing + 1))
                     factor = min(SPARE * fits, LONGEST if sweep < MANY else 1.0)
-                    return Panel(start, length, y, rates, at, True, factor)
-        return Panel(start, length, guess, rates, None, False, SHORTER)
+                    ahead = singular_ahead(places, distance)
+                    return Panel(start, length, y, rates, True, factor, crossing, ahead)
+        return Panel(start, length, guess, rates, False, SHORTER, foreseen=crossing)
 
     def _fits(self, moved: np.ndarray, size: np.ndarray, change: float, tolerance: float) -> float:
         """How many times longer a panel its points could resolve.

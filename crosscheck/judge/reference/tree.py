@@ -1,13 +1,15 @@
-"""Formulation B of the reference: joint coordinates of a spanning tree, loop closures, d'Alembert's principle.
+"""Formulation B of the reference: joint coordinates of a spanning tree, closures, d'Alembert's principle.
 
 At all points of a panel of time at once, twists and their drifts are carried outwards along the tree
-(tree_joints.py), and the joint accelerations q'' and the multipliers λ solve [M Gᵀ; G 0] (q'', λ) = (Q, γ), with
-the mass matrix M and the forces Q of tree_loads.py and the closures' Jacobian G of tree_closures.py.
+(tree_joints.py), and the joint accelerations q'' and multipliers λ solve [M Gᵀ; G 0] (q'', λ) = (Q, γ),
+with mass matrix M and forces Q of tree_loads.py and the closures' Jacobian G of tree_closures.py.
 """
 
 from __future__ import annotations
 
 import time
+from typing import Any
+
 import numpy as np
 
 from crosscheck.judge.reference.arithmetic import Arithmetic
@@ -20,6 +22,7 @@ from mbref.scene import Scene
 NODES_PER_DIGIT = 2.1
 FIRST = 0.1  # of the time asked for: length of the first panel
 LEAST = 1e-10  # of the time asked for: shortest panel
+NEAR_END = 0.7  # part of a panel from which on a singular position is too near its end
 
 
 def tree_motion(scene: Scene, times: np.ndarray, arithmetic: Arithmetic, *, seconds: float) -> Motion:
@@ -44,6 +47,7 @@ class _Run:
         self.state = equations.start()
         self.samples: list[tuple[np.ndarray, np.ndarray]] = []
         self.crossings: list[float] = []
+        self.foreseen = 0.0  # time of the next singular position, or a past one
         self.taken = self.steps = 0
 
     def through(self, until: float) -> str:
@@ -55,17 +59,28 @@ class _Run:
         while self.taken < len(self.times):
             if time.thread_time() > until:
                 return "the CPU time for it is over"
-            panel = self.panels.panel(self.equations, self.t, length, self._guess(panel, length))
-            length = length * panel.factor
+            tried = self._before_singular(length)
+            panel = self.panels.panel(self.equations, self.t, tried, self._guess(panel, tried))
+            length = length if panel.settled and tried < length else tried * panel.factor
+            self.foreseen = panel.time(panel.foreseen) or self.foreseen
             if not panel.settled:
                 if length < LEAST * end:
                     return "no panel of time is short enough"
                 continue
-            self._sample(panel)
-            self._advance(panel)
-            if self.equations.gap(self.t, self.state) > OPEN:
+            after = panel.start + panel.length
+            state = self.equations.closed(after, panel.states[-1])
+            if self.equations.gap(after, state) > OPEN:
                 return "rows that were redundant at the start are not later: it is a singular position"
+            self._sample(panel)
+            self._advance(panel, after, state)
         return ""
+
+    def _before_singular(self, length: Any) -> Any:
+        """A length with which no panel ends near a singular position: one ends half a length before it, and the
+        next has it in the middle."""
+        gap = self.foreseen - float(self.t)
+        near = NEAR_END * float(length) < gap < (1 + NEAR_END) * float(length)
+        return self.arithmetic.number(gap) - length / 2 if near else length
 
     def _guess(self, tried: Panel | None, length: Any) -> np.ndarray:
         """States at the points of a panel: as now, or those of a longer panel that was tried before."""
@@ -82,12 +97,9 @@ class _Run:
             self.samples.append(self.panels.sampled(panel, at))
             self.taken = stop
 
-    def _advance(self, panel: Panel) -> None:
-        self.steps += 1
-        self.t = panel.start + panel.length
-        self.state = self.equations.closed(self.t, panel.states[-1])
-        if panel.crossing is not None:
-            self.crossings.append(panel.crossing)
+    def _advance(self, panel: Panel, after: Any, state: np.ndarray) -> None:
+        self.t, self.state, self.steps = after, state, self.steps + 1
+        self.crossings += [panel.time(panel.crossing)] if panel.crossing is not None else []
 
     def motion(self, reason: str, seconds: float) -> Motion:
         """The samples as the motion of the bodies."""

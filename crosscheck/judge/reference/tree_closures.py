@@ -17,9 +17,9 @@ from crosscheck.judge.reference.tree_joints import Placed, Tree, joint_frame
 from crosscheck.judge.reference.vectors import apply, cross, dot, unit
 
 SLIDING = {"translational": (0, 1), "cylindrical": (0, 1), "planar": (2,)}
-"""Directions of the first body (two normal to the axis, the axis) along which nothing may slide; else all."""
-LOCKED = {"fixed": ((1, 2), (0, 2), (0, 1)), "translational": ((1, 2), (0, 2), (0, 1)),
-          "revolute": ((2, 0), (2, 1)), "cylindrical": ((2, 0), (2, 1)), "planar": ((2, 0), (2, 1))}  # fmt: skip
+"""Numbers of the directions (two normal to the axis, the axis) that nothing may slide along; else all."""
+ALL, TILTS = ((1, 2), (0, 2), (0, 1)), ((2, 0), (2, 1))
+LOCKED = {"fixed": ALL, "translational": ALL, "revolute": TILTS, "cylindrical": TILTS, "planar": TILTS}
 """Pairs of directions, of the first body and of the second, that stay perpendicular."""
 
 

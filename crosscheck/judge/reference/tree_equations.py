@@ -57,11 +57,11 @@ class TreeEquations:
         self.kept: np.ndarray | None = None
 
     def light_rates(self, y: np.ndarray) -> np.ndarray:
-        """Rates (K, light) of scalars and quaternions; those of quaternions are half spin times quaternion."""
+        """Rates (K, light) of scalars and quaternions, the latter half spin times quaternion."""
         scalar, ball, _, rate = self._split(y)
-        spin = rate[:, self.tree.scalars :].reshape(len(y), -1, 3)
+        spin = rate[:, self.tree.scalars :].reshape(len(y), len(self.tree.balls), 3)
         moves = product(np.concatenate([0 * spin[..., :1], spin], axis=-1), ball) / 2
-        return np.concatenate([rate[:, : scalar.shape[1]], moves.reshape(len(y), -1)], axis=1)
+        return np.concatenate([rate[:, : scalar.shape[1]], moves.reshape(len(y), 4 * moves.shape[1])], axis=1)
 
     def other_rates(self, t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rates (K, ·) of angles and joint rates at times t (K,), and the distance (K,) from singularity."""
@@ -127,7 +127,7 @@ class TreeEquations:
     def _split(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Scalars (K, ·), balls (K, ·, 4), angles (K, ·) and joint rates (K, nv)."""
         scalar, ball, angle, rate = np.split(y, self.ends[:-1], axis=1)
-        return scalar, ball.reshape(len(y), -1, 4), angle, rate
+        return scalar, ball.reshape(len(y), len(self.tree.balls), 4), angle, rate
 
     def _moved(self, y: np.ndarray, step: np.ndarray, coordinates: np.ndarray) -> np.ndarray:
         """States after a small displacement (K, nv) of the joint coordinates."""
@@ -135,8 +135,8 @@ class TreeEquations:
         y[:, self.ends[2] :] = step
         moves = self.light_rates(y)
         y[:, : self.light] = y[:, : self.light] + moves
-        ball = unit(y[:, self.tree.scalars : self.light].reshape(len(y), -1, 4))
-        y[:, self.tree.scalars : self.light] = ball.reshape(len(y), -1)
+        ball = unit(self._split(y)[1])
+        y[:, self.tree.scalars : self.light] = ball.reshape(len(y), 4 * ball.shape[1])
         angles = slice(self.light, self.ends[2])
         y[:, angles] = y[:, angles] + apply(coordinates[:, self.tree.scalars :], step)
         return y
@@ -149,7 +149,8 @@ class TreeEquations:
         """Keeps a largest set of independent rows: the first one while it is well enough conditioned."""
         rows = doubles(at.rows.jacobian[0])
         size = np.linalg.norm(rows, axis=1, keepdims=True)
-        rows = rows / np.maximum(size, RANK * max(size.max(initial=0.0), np.finfo(float).tiny))
+        largest = max(size.max(initial=0.0), min(1.0, self.length**2))  # one joint rate moves so much
+        rows = rows / np.where(size > RANK * largest, size, largest)  # those of rounding size stay small
         r, order = qr(rows.T, mode="r", pivoting=True)
         pivots = np.abs(np.diag(r))
         if self.kept is None:

@@ -1,8 +1,9 @@
 """The spanning tree of a scene: joint coordinates, and the bodies' motion carried outwards from the ground.
 
-Every body hangs on one joint, or moves freely; the joints left over close the loops.  A body is described by
-its turn since t = 0, so that the world directions and points of the scene's data are its own, too.
-Velocities follow Featherstone, Rigid Body Dynamics Algorithms, 2008, ch. 4: twist = Σ columns · joint rates.
+Every body hangs on one joint, or moves freely; the joints left over close the loops.  A body's frame is the
+world's at t = 0, so that the directions and points of the scene's data are its own, too.
+A twist about the world's origin is the sum of the joints' (Featherstone, Rigid Body Dynamics Algorithms,
+2008, ch. 2).
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ PREFERRED = 10  # of joints with a driver or a torsion spring, whose coordinate 
 
 @dataclass(frozen=True)
 class Link:
-    """A body on its parent (-1 ground) by a joint, None if free; ``sign`` -1 when the joint counts inwards."""
+    """A body on its parent (-1 ground) by a joint (None: free); ``sign`` -1 where it points inwards."""
 
     body: int
     parent: int
@@ -128,21 +129,19 @@ class Tree:
         inner = apply(rotation[:, self.parent], self.inner)
         slid = self.slides @ (axis[:, : self.scalars] * scalar[..., None])
         position = self.carried @ (inner + slid + outer)
-        arm = position[:, :, None] - (position[:, self.body] - outer)[:, None, self.link]
-        turning, moved = self.turning[:, None], self.moved[..., None]
-        swing, straight = cross(axis[:, None], arm), axis[:, None]
-        columns = np.concatenate(
-            [np.where(turning, swing, straight), straight * turning + 0 * swing], axis=-1
-        )
-        columns = columns * moved
-        twist = apply(np.swapaxes(columns, -1, -2), rate[:, None])
-        velocity, spin = twist[..., :3], twist[..., 3:]
-        pivot = (velocity[:, self.body] - cross(spin[:, self.body], outer))[:, None, self.link]
-        axis_rate = cross(spin[:, self.carrier], axis)[:, None]
-        changing = cross(axis_rate, arm) + cross(axis[:, None], velocity[:, :, None] - pivot)
-        weight = moved * rate[:, None, :, None]
-        drift = (np.where(turning, changing, axis_rate) * weight).sum(axis=2)
-        spin_drift = (axis_rate * turning * weight).sum(axis=2)
+        turning, weight = self.turning[:, None], rate[..., None]
+        joint = (position[:, self.body] - outer)[:, self.link]
+        angular = axis * turning
+        linear = np.where(turning, cross(joint, axis), axis)
+        spin = self.moved @ (angular * weight)
+        velocity = self.moved @ (linear * weight) + cross(spin, position)
+        passing = (velocity[:, self.body] - cross(spin[:, self.body], outer))[:, self.link]
+        axis_rate = cross(spin[:, self.carrier], axis)
+        bending = np.where(turning, cross(passing, axis) + cross(joint, axis_rate), axis_rate)
+        spin_drift = self.moved @ (axis_rate * turning * weight)
+        drift = self.moved @ (bending * weight) + cross(spin_drift, position) + cross(spin, velocity)
+        arms = linear[:, None] + cross(angular[:, None], position[:, :, None])
+        columns = np.concatenate([arms, angular[:, None] + 0 * arms], axis=-1) * self.moved[..., None]
         return Placed(position, turn, rotation, velocity, spin, drift, spin_drift, columns)
 
     def _turns(self, scalar: np.ndarray, ball: np.ndarray) -> np.ndarray:
@@ -167,7 +166,7 @@ def spanning_tree(scene: Scene) -> list[Link]:
     def weight(joint: Any) -> int:
         return RIGIDITY[joint.type] + PREFERRED * (joint.name in favoured)
 
-    group = list(range(len(scene.body))) + [-1]
+    group = [*range(len(scene.body)), -1]
     kept = []
     for joint in sorted((j for j in scene.joint if j.type != "distance"), key=weight, reverse=True):
         a, b = (group[scene.body_index(name)] for name in joint.bodies)

@@ -11,7 +11,7 @@ import numpy as np
 from crosscheck.judge.reference.tree_closures import Rows
 from crosscheck.judge.reference.tree_joints import Placed, Tree
 from crosscheck.judge.reference.vectors import apply, cross, dot, matrices, unit
-from mbref.scene import Force, Moment, Scene, Spring, TorsionSpring
+from mbref.scene import Force, Moment, Spring, TorsionSpring
 
 
 class Loads:
@@ -38,7 +38,7 @@ class Loads:
         return self._mass_matrix(placed, self._world_inertia(placed))
 
     def terms(self, placed: Placed, angles: Rows, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The mass matrix, and the forces (K, nv) of loads less those of inertia at joint accelerations of 0."""
+        """Mass matrix, and the forces (K, nv) of loads less those of inertia without joint accelerations."""
         spin, inertia = placed.spin[:, :-1], self._world_inertia(placed)
         turning = cross(spin, apply(inertia, spin)) + apply(inertia, placed.spin_drift[:, :-1])
         force = self.mass * (self.gravity - placed.drift[:, :-1])
@@ -118,7 +118,8 @@ LOADS = (Moment, Force, Spring, TorsionSpring)
 
 def _over_bodies(columns: np.ndarray) -> np.ndarray:
     """(K, nv, bodies · 6) of columns (K, bodies, nv, 6)."""
-    return np.swapaxes(columns, 1, 2).reshape(len(columns), columns.shape[2], -1)
+    samples, bodies, rates, _ = columns.shape
+    return np.swapaxes(columns, 1, 2).reshape(samples, rates, 6 * bodies)
 
 
 def _push(wrench: np.ndarray, body: int, arm: np.ndarray, force: np.ndarray) -> None:
