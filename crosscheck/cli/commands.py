@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from rich.console import Console
 from crosscheck.cli import listing, request, tables
 from crosscheck.cli.request import RequestError
 from crosscheck.engine import engine_names
+from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.study import fair_timing
 from crosscheck.study.grid import TIME_LIMIT, Case, Record, key, study
 from crosscheck.study.progress import counted, shown
@@ -70,7 +72,7 @@ def _compare(arguments: argparse.Namespace) -> int:
     if arguments.times is None and arguments.samples is None:
         arguments.samples = COMPARED_SAMPLES
     cases = _cases(arguments)
-    refused = _refused(cases)
+    refused = _refused(cases, arguments.reference_time)
     records = _study(cases, [])
     same = [i for i, case in enumerate(cases) if case.scene.name not in refused]
     _notice(f"timing: {arguments.repeats} interleaved repeats of the runs that completed")
@@ -86,7 +88,7 @@ def _compare(arguments: argparse.Namespace) -> int:
     return OTHERWISE if refused else _status(records)
 
 
-def _refused(cases: Sequence[Case]) -> set[str]:
+def _refused(cases: Sequence[Case], reference_time: float) -> set[str]:
     """Names of the scenes that are not the same mechanism in all their engines; each is said why."""
     scenes = {case.scene.name: case.scene for case in cases}
     limit = max(case.time_limit for case in cases)
@@ -94,7 +96,8 @@ def _refused(cases: Sequence[Case]) -> set[str]:
     gates = {n: fair_timing.gate_cases(scene, list(engines[n]), limit) for n, scene in scenes.items()}
     records = _study([case for group in gates.values() for case in group], [])
     reasons = {
-        n: fair_timing.difference(s, [r for r in records if r["scene"] == n]) for n, s in scenes.items()
+        n: fair_timing.difference(s, [r for r in records if r["scene"] == n], reference_time)
+        for n, s in scenes.items()
     }
     for name, reason in reasons.items():
         if reason:
@@ -106,7 +109,7 @@ def _verify(arguments: argparse.Namespace) -> int:
     from crosscheck.conformance import suite
 
     (engine,) = request.find_engines([arguments.engine], _notice)
-    chosen = request.find_specimens(arguments.scene)
+    chosen = request.find_specimens(arguments.scene, arguments.reference_time)
     with counted("verifying", len(chosen) + 1) as advance:
         found = suite.verify(engine, chosen, arguments.time_limit, advance)
     if arguments.json:
@@ -137,9 +140,10 @@ def _cases(arguments: argparse.Namespace) -> list[Case]:
     engines = request.find_engines(arguments.engine, _notice)
     families = [*(arguments.method or ()), *(arguments.setting or ())]
     times = [request.sample_times(s, arguments.times, arguments.samples, arguments.duration) for s in scenes]
-    return request.plan(
+    cases = request.plan(
         scenes, engines, families or None, arguments.rtol, times, arguments.time_limit, _notice
     )  # fmt: skip
+    return [case._replace(reference_time=arguments.reference_time) for case in cases]
 
 
 def _study(cases: Sequence[Case], finished: list[Record]) -> list[Record]:
@@ -227,7 +231,13 @@ def _add_verify(commands) -> None:
     parser.add_argument("engine", metavar="ENGINE", help="a known engine, or module:attribute")
     parser.add_argument("--scene", action="append", metavar="S", help="one of the suite; may repeat")
     parser.add_argument("--time-limit", type=float, default=TIME_LIMIT, metavar="T", help="of a run (s)")
+    _add_reference_time(parser)
     parser.add_argument("--json", action="store_true", help="machine-readable output on standard output")
+
+
+def _add_reference_time(parser: argparse.ArgumentParser) -> None:
+    about = "CPU seconds for the reference of a scene without a closed form (default: 20); 0 for none"
+    parser.add_argument("--reference-time", type=_not_negative, default=SECONDS, metavar="T", help=about)
 
 
 def _add_report(commands) -> None:
@@ -255,7 +265,15 @@ def _add_selection(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rtol", type=float, help="one relative tolerance instead of a sweep over them")
     parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
     parser.add_argument("--time-limit", type=float, default=TIME_LIMIT, metavar="T", help="of a run (s)")
+    _add_reference_time(parser)
     parser.add_argument("--json", action="store_true", help="machine-readable output on standard output")
+
+
+def _not_negative(text: str) -> float:
+    number = float(text)
+    if not 0 <= number < math.inf:
+        raise argparse.ArgumentTypeError(f"must be finite and not negative, got {text}")
+    return number
 
 
 def _numbers(text: str) -> list[float]:

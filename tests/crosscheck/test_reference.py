@@ -78,7 +78,7 @@ def assert_family(name: str) -> None:
     assert name in SINGULAR or found.bound.max() <= SMOOTH
 
 
-QUICK = ("four_bar_gravity", "spatial_slider_crank_driven", "pendulum_all", "free_spring", "four_bar_chain")
+QUICK = ("four_bar_gravity", "pendulum_all", "free_spring", "four_bar_chain")
 
 
 @pytest.mark.parametrize("name", QUICK)
@@ -103,7 +103,8 @@ def test_formulations_agree_on_every_feature(feature):
     assert apart < AGREE, f"{feature}: formulations differ by {apart:.1e}"
     for name in module.FIELDS[2:]:
         one, other = (np.asarray(getattr(motion, name), dtype=float) for motion in (a, b))
-        assert np.abs(one - other).max() <= 1e-13 * max(1.0, np.abs(one).max()), name
+        rate = max(1.0, float(np.abs(a.angular_velocity).max()))
+        assert np.abs(one - other).max() <= 1e-13 * rate**2, name
 
 
 def assert_random(seed: int) -> None:

@@ -35,6 +35,7 @@ TRIED = 24  # lengths at which a singular position is looked for
 FINE = 1e-6  # relative accuracy of its place
 DEPENDENT = 0.02  # part of the present sharpness that it falls below
 SHORTER = 0.8  # factor on a step that ends too near to a singular position
+LEAST_STEP = 1e-6  # s, where no time is left
 SHORTEST = 1e-9  # step, relative to the time reached, at which the series is said to end
 WITHOUT_INERTIA = 1e-13  # part of the largest inertia of a freedom that counts as none
 
@@ -105,7 +106,7 @@ class Stepper:
         while pending:
             if time.thread_time() > deadline:
                 raise Ended("the time for it was up")
-            expansion, h = self._step()
+            expansion, h = self._step(2 * (float(times[-1]) - float(self.t)))
             series = expansion.x[: Series(expansion.x).terms(h)]
             if not self.steps:
                 self._refuse_singular_start(series, self.of.arithmetic.number(h / 2))
@@ -194,14 +195,15 @@ class Stepper:
                 state[:, :-4] = arithmetic.settled(state[:, :-4] + system.solve(still, -gap)[0])
 
     # --- steps --------------------------------------------------------------------------------------------
-    def _step(self) -> tuple[Expansion, float]:
-        """A series and the length (s) of its step, which does not end much nearer to a singular position."""
+    def _step(self, most: float) -> tuple[Expansion, float]:
+        """A series and the length (s) of its step, at most ``most``, which does not end much nearer to a
+        singular position."""
         expansion = self._expansion(self._order)
         series = Series(expansion.x)
         h = series.reach(self._tolerance)
         if h <= SHORTEST * max(1e-3, float(self.t)):
             raise Ended("its series ends, as at a singular position that no smooth branch goes through")
-        now = self._sharpness[-1]
+        h, now = min(h, max(most, LEAST_STEP)), self._sharpness[-1]
         ahead = self._ahead(expansion.x, series, h)
         if ahead < now < NEAR * max(self._sharpness[-USUAL:]):
             middle = self._crossing(expansion.x, series, h)
