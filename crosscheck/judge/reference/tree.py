@@ -62,7 +62,8 @@ class _Run:
             tried = self._before_singular(length)
             panel = self.panels.panel(self.equations, self.t, tried, self._guess(panel, tried))
             length = length if panel.settled and tried < length else tried * panel.factor
-            self.foreseen = panel.time(panel.foreseen) or self.foreseen
+            if not panel.settled or self.foreseen <= float(self.t):
+                self.foreseen = panel.time(panel.foreseen) or self.foreseen
             if not panel.settled:
                 if length < LEAST * end:
                     return "no panel of time is short enough"
