@@ -112,7 +112,8 @@ class Panels:
             if not np.isfinite(change) or change > DIVERGES * last:
                 return Panel(start, length, guess, rates, False, SHORTEST, foreseen=crossing)
             y, last = self.arithmetic.settled(better), min(last, change)
-            if change <= max(TELLING, tolerance):
+            telling = TELLING if crossing is None else tolerance  # bridged iterates tell nothing
+            if change <= telling:
                 fits, settled = (
                     self._fits(rates * length, size[light:], change, tolerance),
                     change <= tolerance,
