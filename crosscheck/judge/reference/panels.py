@@ -41,7 +41,7 @@ class Equations(Protocol):
         """(K, n - light) rates of the others, and the distance (K,) of their equations from singularity."""
 
     def nearer(self, t: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """States nearer to obeying the constraints, away from which rates near singular positions are lost."""
+        """States nearer to obeying the constraints, off which rates near singular positions lose digits."""
 
 
 @dataclass(frozen=True)

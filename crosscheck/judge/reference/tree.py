@@ -77,7 +77,7 @@ class _Run:
         return ""
 
     def _before_singular(self, length: Any) -> Any:
-        """A length with which no panel ends near a singular position: one ends half a length before it, and the
+        """A length with which no panel ends near a singular position: one ends half a length before, and the
         next has it in the middle."""
         gap = self.foreseen - float(self.t)
         near = NEAR_END * float(length) < gap < (1 + NEAR_END) * float(length)
