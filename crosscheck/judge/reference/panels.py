@@ -40,6 +40,9 @@ class Equations(Protocol):
     def other_rates(self, t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(K, n - light) rates of the others, and the distance (K,) of their equations from singularity."""
 
+    def nearer(self, t: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """States nearer to obeying the constraints, off which rates near singular positions lose digits."""
+
 
 @dataclass(frozen=True)
 class Panel:
@@ -93,7 +96,8 @@ class Panels:
         y, y0, last, crossing = guess, guess[0], np.inf, None
         for sweep in range(1, SWEEPS):
             with np.errstate(all="ignore"):
-                rates, distance = equations.other_rates(t, y)
+                here = y if crossing is None else equations.nearer(t, y)
+                rates, distance = equations.other_rates(t, here)
                 if last < 1:
                     crossing = singular_time(places, distance) or crossing
                     tolerance = self.tolerance * (1 if crossing is None else BRIDGED)
@@ -108,7 +112,8 @@ class Panels:
             if not np.isfinite(change) or change > DIVERGES * last:
                 return Panel(start, length, guess, rates, False, SHORTEST, foreseen=crossing)
             y, last = self.arithmetic.settled(better), min(last, change)
-            if change <= max(TELLING, tolerance):
+            telling = TELLING if crossing is None else tolerance  # bridged iterates tell nothing
+            if change <= telling:
                 fits, settled = (
                     self._fits(rates * length, size[light:], change, tolerance),
                     change <= tolerance,

@@ -62,7 +62,8 @@ class _Run:
             tried = self._before_singular(length)
             panel = self.panels.panel(self.equations, self.t, tried, self._guess(panel, tried))
             length = length if panel.settled and tried < length else tried * panel.factor
-            self.foreseen = panel.time(panel.foreseen) or self.foreseen
+            if not panel.settled or self.foreseen <= float(self.t):
+                self.foreseen = panel.time(panel.foreseen) or self.foreseen
             if not panel.settled:
                 if length < LEAST * end:
                     return "no panel of time is short enough"
@@ -76,7 +77,7 @@ class _Run:
         return ""
 
     def _before_singular(self, length: Any) -> Any:
-        """A length with which no panel ends near a singular position: one ends half a length before it, and the
+        """A length with which no panel ends near a singular position: one ends half a length before, and the
         next has it in the middle."""
         gap = self.foreseen - float(self.t)
         near = NEAR_END * float(length) < gap < (1 + NEAR_END) * float(length)

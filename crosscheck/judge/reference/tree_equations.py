@@ -98,18 +98,22 @@ class TreeEquations:
     def closed(self, t: Any, y: np.ndarray) -> np.ndarray:
         """The state (n,) nearest in the mass metric to one at time t whose loops are closed."""
         y, t, last = y[None], self.arithmetic.zeros(1) + t, np.inf
+        self._choose(self.at(t, y))
         for _ in range(CORRECTIONS):
-            at = self.at(t, y)
-            self._choose(at)
-            zero = 0 * at.rate
-            step, _ = self._solve(at, zero, -1 * at.rows.value)
-            better = self._moved(y, step, at.coordinates.jacobian)
-            better[:, self.ends[2] :] = at.rate + self._solve(at, zero, -1 * at.speed)[0]
+            better = self.nearer(t, y)
             size = np.abs(doubles(better - y)).max(initial=0.0)
             if not size < last:
                 break
             y, last = self.arithmetic.settled(better), size
         return y[0]
+
+    def nearer(self, t: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """States (K, n) after one Newton step towards closed loops, and towards rates that keep them so."""
+        at = self.at(t, y)
+        step, _ = self._solve(at, 0 * at.rate, -1 * at.rows.value)
+        better = self._moved(y, step, at.coordinates.jacobian)
+        better[:, self.ends[2] :] = at.rate + self._solve(at, 0 * at.rate, -1 * at.speed)[0]
+        return better
 
     def gap(self, t: Any, y: np.ndarray) -> float:
         """Largest residual of any row, kept or not, of a state (n,), relative to the scene's length."""
