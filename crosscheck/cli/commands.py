@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from rich.console import Console
 from crosscheck.cli import listing, request, tables
 from crosscheck.cli.request import RequestError
 from crosscheck.engine import engine_names
+from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.study import fair_timing
 from crosscheck.study.grid import TIME_LIMIT, Case, Record, key, study
 from crosscheck.study.progress import counted, shown
@@ -73,7 +75,7 @@ def _compare(arguments: argparse.Namespace) -> int:
     if arguments.times is None and arguments.samples is None:
         arguments.samples = COMPARED_SAMPLES
     cases = _cases(arguments)
-    refused = _refused(cases)
+    refused = _refused(cases, arguments.reference_time)
     records = _study(cases, [])
     same = [i for i, case in enumerate(cases) if case.scene.name not in refused]
     _notice(f"timing: {arguments.repeats} interleaved repeats of the runs that completed")
@@ -89,7 +91,7 @@ def _compare(arguments: argparse.Namespace) -> int:
     return OTHERWISE if refused else _status(records)
 
 
-def _refused(cases: Sequence[Case]) -> set[str]:
+def _refused(cases: Sequence[Case], reference_time: float) -> set[str]:
     """Names of the scenes whose mechanism differs between engines; the difference is printed."""
     scenes = {case.scene.name: case.scene for case in cases}
     limit = max(case.time_limit for case in cases)
@@ -99,7 +101,8 @@ def _refused(cases: Sequence[Case]) -> set[str]:
     }
     records = _study([case for group in identities.values() for case in group], [])
     reasons = {
-        n: fair_timing.model_difference(s, [r for r in records if r["scene"] == n]) for n, s in scenes.items()
+        n: fair_timing.model_difference(s, [r for r in records if r["scene"] == n], reference_time)
+        for n, s in scenes.items()
     }
     for name, reason in reasons.items():
         if reason:
@@ -111,7 +114,7 @@ def _verify(arguments: argparse.Namespace) -> int:
     from crosscheck.conformance import suite
 
     (engine,) = request.find_engines([arguments.engine], _notice)
-    chosen = request.find_specimens(arguments.scene)
+    chosen = request.find_specimens(arguments.scene, arguments.reference_time)
     with counted("verifying", len(chosen) + 1) as advance:
         found = suite.verify(engine, chosen, arguments.time_limit, advance)
     if arguments.json:
@@ -142,9 +145,10 @@ def _cases(arguments: argparse.Namespace) -> list[Case]:
     engines = request.find_engines(arguments.engine, _notice)
     families = [*(arguments.method or ()), *(arguments.setting or ())]
     times = [request.sample_times(s, arguments.times, arguments.samples, arguments.duration) for s in scenes]
-    return request.plan(
+    cases = request.plan(
         scenes, engines, families or None, arguments.rtol, times, arguments.time_limit, _notice
     )  # fmt: skip
+    return [case._replace(reference_time=arguments.reference_time) for case in cases]
 
 
 def _study(cases: Sequence[Case], finished: list[Record]) -> list[Record]:
@@ -253,7 +257,13 @@ def _add_verify(commands: Commands) -> None:
         metavar="T",
         help="wall time a run may take (s); default: %(default)g",
     )
+    _add_reference_time(parser)
     parser.add_argument("--json", action="store_true", help="print records as JSON on standard output")
+
+
+def _add_reference_time(parser: argparse.ArgumentParser) -> None:
+    about = "CPU seconds for the reference of a scene without a closed form (default: %(default)g); 0: none"
+    parser.add_argument("--reference-time", type=_not_negative, default=SECONDS, metavar="T", help=about)
 
 
 def _add_report(commands: Commands) -> None:
@@ -305,7 +315,15 @@ def _add_selection(parser: argparse.ArgumentParser) -> None:
         metavar="T",
         help="wall time a run may take (s); default: %(default)g",
     )
+    _add_reference_time(parser)
     parser.add_argument("--json", action="store_true", help="print records as JSON on standard output")
+
+
+def _not_negative(text: str) -> float:
+    number = float(text)
+    if not 0 <= number < math.inf:
+        raise argparse.ArgumentTypeError(f"must be finite and not negative, got {text}")
+    return number
 
 
 def _numbers(text: str) -> list[float]:
