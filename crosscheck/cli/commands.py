@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import os
 import subprocess
 import sys
@@ -14,9 +13,8 @@ from typing import Any
 from rich.console import Console
 
 from crosscheck.cli import listing, request, tables
+from crosscheck.cli.options import add_reference_time, add_selection
 from crosscheck.cli.request import RequestError
-from crosscheck.engine import engine_names
-from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.study import fair_timing
 from crosscheck.study.grid import TIME_LIMIT, Case, Record, key, study
 from crosscheck.study.progress import counted, shown
@@ -227,14 +225,14 @@ def _add_run(commands: Commands) -> None:
     parser = _add(
         commands, "run", "run scenes in engines, one record for every engine and setting", example, _run
     )
-    _add_selection(parser)
+    add_selection(parser)
 
 
 def _add_compare(commands: Commands) -> None:
     example = "crosscheck compare planar_slider_crank --engine mbref --engine pinocchio"
     about = "compare speed at equal error: run, then time the completed runs in turns; table and plot"
     parser = _add(commands, "compare", about, example, _compare)
-    _add_selection(parser)
+    add_selection(parser)
     parser.add_argument(
         "--repeats", type=int, default=REPEATS, help=f"timed runs of every setting, at least {REPEATS}"
     )
@@ -257,13 +255,8 @@ def _add_verify(commands: Commands) -> None:
         metavar="T",
         help="wall time a run may take (s); default: %(default)g",
     )
-    _add_reference_time(parser)
+    add_reference_time(parser)
     parser.add_argument("--json", action="store_true", help="print records as JSON on standard output")
-
-
-def _add_reference_time(parser: argparse.ArgumentParser) -> None:
-    about = "CPU seconds for the reference of a scene without a closed form (default: %(default)g); 0: none"
-    parser.add_argument("--reference-time", type=_not_negative, default=SECONDS, metavar="T", help=about)
 
 
 def _add_report(commands: Commands) -> None:
@@ -277,57 +270,3 @@ def _add_report(commands: Commands) -> None:
         "--section", action="append", metavar="S", help="render only this section, such as speed; may repeat"
     )
     parser.add_argument("--out", default="report", metavar="DIR", help="folder to write (default: report)")
-
-
-def _add_selection(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "scene",
-        nargs="+",
-        metavar="SCENE",
-        help="a built-in scene (`crosscheck list scenes`) or a .toml file",
-    )
-    known = ", ".join(engine_names())
-    parser.add_argument("--engine", action="append", metavar="E", help=f"{known}; may repeat; default: all")
-    parser.add_argument(
-        "--method",
-        action="append",
-        metavar="M",
-        help="a family of settings, or any method of mbref: formulation+stabilisation/integrator, such as "
-        "lm2+projection/dop853 (`crosscheck list methods`); may repeat; default: every family",
-    )
-    parser.add_argument(
-        "--setting",
-        action="append",
-        metavar="FAMILY",
-        help="an engine's family of settings, such as defaults or tuned; may repeat; default: all",
-    )
-    when = parser.add_mutually_exclusive_group()
-    when.add_argument("--times", type=_numbers, metavar="a,b,c", help="sample times (s), increasing")
-    when.add_argument("--samples", type=int, metavar="N", help="equally spaced samples, both ends included")
-    parser.add_argument(
-        "--rtol", type=float, help="one relative tolerance instead of the sweep over tolerances"
-    )
-    parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
-    parser.add_argument(
-        "--time-limit",
-        type=float,
-        default=TIME_LIMIT,
-        metavar="T",
-        help="wall time a run may take (s); default: %(default)g",
-    )
-    _add_reference_time(parser)
-    parser.add_argument("--json", action="store_true", help="print records as JSON on standard output")
-
-
-def _not_negative(text: str) -> float:
-    number = float(text)
-    if not 0 <= number < math.inf:
-        raise argparse.ArgumentTypeError(f"must be finite and not negative, got {text}")
-    return number
-
-
-def _numbers(text: str) -> list[float]:
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"must be numbers separated by commas, got {text!r}") from None
