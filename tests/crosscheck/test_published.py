@@ -25,7 +25,7 @@ MASSLESS_TURNS = {"point_pendulum": "lm1+projection/dop853", "bricard_thin": "al
 @pytest.mark.parametrize("name", FREEDOMS)
 def test_freedoms_and_redundant_rows_are_as_published(name):
     counts = SCENES[name]().counts()
-    assert (counts.freedoms, counts.redundant) == FREEDOMS[name]
+    assert (counts.degrees_of_freedom, counts.redundant) == FREEDOMS[name]
 
 
 @pytest.mark.parametrize("name", FREEDOMS)
