@@ -154,13 +154,13 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _limits(options: argparse.Namespace):
-    from mbref.simulation.simulate import Limits
+    """The limits; ValueError names their field, which is the option's but for --max-step."""
+    from mbref.simulation.limits import Limits
 
-    if not 0 < options.rtol < 1:
-        raise ValueError(f"--rtol: must be between 0 and 1, got {options.rtol:g}")
-    if options.max_step < 0:
-        raise ValueError(f"--max-step: must not be negative, got {options.max_step:g}")
-    return Limits(rtol=options.rtol, largest_step=options.max_step, code=options.code)
+    try:
+        return Limits(rtol=options.rtol, largest_step=options.max_step, code=options.code)
+    except ValueError as error:
+        raise ValueError(f"--{error}".replace("largest_step", "max-step")) from None
 
 
 @contextmanager

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tomli_w
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -27,7 +28,15 @@ from pydantic import (
     model_validator,
 )
 
-from mbref.scene_validation import GROUND, SceneError, checked_inertia, field_faults, reference_faults
+from mbref.scene_validation import (
+    GROUND,
+    SceneError,
+    checked_inertia,
+    checked_length,
+    checked_size,
+    field_faults,
+    reference_faults,
+)
 
 if TYPE_CHECKING:
     from mbref.equations.diagnosis import Counts
@@ -40,9 +49,10 @@ def _as_list(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-Real = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
-NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
+Sized = AfterValidator(checked_size)
+Real = Annotated[float, Field(strict=True, allow_inf_nan=False), Sized]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0), AfterValidator(checked_length)]
+NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0), Sized]
 Vector = Annotated[tuple[Real, Real, Real], Strict(False), BeforeValidator(_as_list)]
 Quaternion = Annotated[tuple[Real, Real, Real, Real], Strict(False), BeforeValidator(_as_list)]
 Name = Annotated[str, Field(min_length=1)]
@@ -52,8 +62,9 @@ Reals = Annotated[tuple[Real, ...], Field(min_length=1), Strict(False), BeforeVa
 
 
 def _direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
-    if math.hypot(*v) == 0:
+    if (length := math.hypot(*v)) == 0:
         raise ValueError("must have a length, got the zero vector")
+    checked_length(length)
     return v
 
 
@@ -291,17 +302,19 @@ class Scene(_Data):
 
     def save(self, path: str | Path) -> None:
         """Write the scene as TOML; ``Scene.from_file`` gives back an equal scene."""
-        Path(path).write_text(tomli_w.dumps(self.to_dict()))
+        Path(path).write_text(tomli_w.dumps(self.to_dict()), encoding="utf-8")
 
     @staticmethod
     def from_file(path: str | Path) -> Scene:
-        """Read a scene file; raises SceneError naming the file, or every faulty field."""
+        """Read a scene file (TOML, UTF-8); raises SceneError naming the file, or every faulty field."""
         try:
-            data = tomllib.loads(Path(path).read_text())
+            data = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
         except OSError as error:
             raise SceneError([f"{path}: cannot be read: {error.strerror}"]) from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        except ValueError as error:  # no UTF-8, no TOML, or a number of thousands of digits
             raise SceneError([f"{path}: is not TOML: {error}"]) from None
+        except RecursionError:
+            raise SceneError([f"{path}: is nested too deeply"]) from None
         return Scene(**data)
 
 

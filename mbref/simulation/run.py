@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -44,6 +43,7 @@ from mbref.kernels.layout import (
 from mbref.kernels.pointer_table import table_of
 from mbref.linear_algebra.symbolic_factorisation import COLUMN, plan_for
 from mbref.scene import Scene, SceneError
+from mbref.simulation.limits import AUTO, SPECIALISED, Limits
 from mbref.simulation.method import Method
 from mbref.simulation.singular_crossing import KEPT, NODES
 from mbref.simulation.stepping import PAUSED, TIME, march
@@ -55,25 +55,6 @@ from mbref.stabilisation.sparse_chart import CHARTS
 CALL = 5_000  # steps between returns to Python, where an interrupt is heard and progress is told
 WORTH_IT = 20_000  # steps ahead from which on machine code of the scene's own saves what making it takes
 UNWRAPPED = 1.0  # rad that a body may turn in a step where springs wind up: two turn less than π apart
-AUTO, GENERIC, SPECIALISED = "auto", "generic", "specialised"
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Numbers of a run that belong to no part of the method."""
-
-    rtol: float = 1e-9  # local error per step, relative …
-    atol: float | None = None  # … and absolute (SI units); None means as rtol
-    rank_tolerance: float = 1e-10  # relative; a singular value or pivot below it counts as zero
-    violation: float = 3e-3  # largest |Φ| tolerated (m or rad), times the scene's length where over 1 m
-    first_step: float = 0.0  # s, that is tried first; 0: the integrator's own guess
-    smallest_step: float = 0.0  # s; 0 means a million-millionth of the duration
-    forced_step: float = 0.0  # s; a step this short is taken whatever its error estimate; 0: none
-    largest_step: float = 0.0  # s; 0 means the duration
-    largest_turn: float = 0.0  # rad that the fastest body may turn in an adaptive step; 0: what is safe
-    most_steps: int = 5_000_000
-    sparse_above: int = -1  # constraint rows; with more, alf-dual's general kernels have a sparse factor
-    code: str = AUTO  # GENERIC kernels, SPECIALISED to the scene, or AUTO: where WORTH_IT steps are ahead
 
 
 class Run:
