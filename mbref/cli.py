@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
 
+from mbref.records import strict_json
 from mbref.scene import Scene, SceneError
 from mbref.scenes import SCENES, find_scene
 from mbref.simulation.method import DEFAULT, MethodError
@@ -33,6 +33,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has gone, as `head` does
         sys.stdout = None
         return INCOMPLETE
+    except OSError as error:  # of the file of --out
+        return _refuse([f"{error.filename or options.out}: {error.strerror}"])
 
 
 def _refuse(faults: Sequence[str]) -> int:
@@ -147,7 +149,7 @@ def _run(options: argparse.Namespace) -> int:
     with _progress_bar("simulating", float(times[-1])) as progress:
         trajectory = simulate(scene, options.method, times, limits, progress)
     if options.json:
-        print(json.dumps({"scene": scene.name, "records": [trajectory.to_record()]}))
+        print(strict_json({"scene": scene.name, "records": [trajectory.to_record()]}))
     else:
         _show(scene, trajectory)
     return 0 if trajectory.outcome.name == "COMPLETED" else INCOMPLETE
@@ -207,7 +209,7 @@ def _show_spread(scene: Scene, end: float, completed: Sequence, options: argpars
             for key, values in last.items() if completed
             for what, a in (("mean", values.mean(axis=0)), ("deviation", values.std(axis=0)))
         }  # fmt: skip
-        print(json.dumps({"scene": scene.name, "time": end, "completed": len(completed), **spread}))
+        print(strict_json({"scene": scene.name, "time": end, "completed": len(completed), **spread}))
         return
     console = Console() if sys.stdout.isatty() else Console(width=PIPED_WIDTH)
     seconds = sum(run.cost.seconds for run in completed)
@@ -270,7 +272,7 @@ def _diagnose(options: argparse.Namespace) -> int:
     found = diagnose(scene)
     counts = found.counts
     if options.json:
-        print(json.dumps({"scene": scene.name, "ground": scene.ground, **asdict(counts), **_beyond(found)}))
+        print(strict_json({"scene": scene.name, "ground": scene.ground, **asdict(counts), **_beyond(found)}))
         return 0
     print(
         f"{scene.name} (ground as a {scene.ground})\n"

@@ -160,7 +160,8 @@ LIMITS = (
     "largest_step", "largest_turn", "most_steps", "sparse_above", "code",
 )  # fmt: skip
 PATHS = ("body[0].mass", "gravity[1]", "joint[0].anchor[2]", "body[", "x", "")
-RATHER = (1e-3, 1e-6, 1e-9, 1e-12, 0.01, 0.1, 0.5, 1.0, 5, 100)  # numbers that a user may well give
+CODES = ("auto", "generic", "specialised")
+RATHER = (1e-3, 1e-6, 1e-9, 1e-12, 0.01, 0.1, 0.5, 1, 100)  # numbers that a user may well give
 
 
 def number(draw: random.Random) -> float | int:
@@ -185,9 +186,9 @@ def limits(draw: random.Random) -> dict[str, Any]:
     """Some fields of Limits; few steps unless drawn otherwise."""
     chosen: dict[str, Any] = {"most_steps": 500}
     for name in draw.sample(LIMITS, draw.choice((0, 0, 1, 1, 2, 3))):
-        chosen[name] = draw.choice(("auto", "generic", "specialised", 1)) if name == "code" else number(draw)
-        if draw.random() < 0.05:
-            chosen[name] = strange(draw)
+        chosen[name] = draw.choice(CODES) if name == "code" else draw.choice(RATHER)
+        if draw.random() < 0.1:
+            chosen[name] = draw.choice((number(draw), strange(draw)))
     return chosen
 
 
@@ -207,6 +208,7 @@ def option_words(draw: random.Random) -> list[str]:
         "--count": number, "--seed": number, "--workers": lambda d: d.choice(("1", "0", "-1", "x")),
         "--engine": lambda d: d.choice(("mbref", "nothing", "a:b", "os:path", ":", "mbref:x", "..")),
         "--setting": lambda d: d.choice(("kinematic", "x", "")), "--time-limit": number, "--scene": str,
+        "--out": lambda d: d.choice(("scene.toml", "runs.jsonl", "", "no/such", "/", "x" * 300)),
         "--repeats": number, "--section": lambda d: d.choice(("x", "", "../..")),
     }  # fmt: skip
     words = ["--samples", "3", "--duration", "0.01"] if draw.random() < 0.7 else []

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from mbref.cli import main as mbref_main
 from mbref.equations.diagnosis import diagnose
+from mbref.records import strict_json
 from mbref.scene import Scene, SceneError
 from mbref.scenes import SCENES
 from mbref.simulation.method import Method, MethodError
@@ -59,14 +60,21 @@ def simulation(seed: int) -> str:
     """A run; the record of what it reached is strict JSON."""
     draw = random.Random(seed)
     try:
-        scene = Scene(**(mutations.mutated_data(draw) if draw.random() < 0.5 else mutations.base(draw)))
+        scene = _accepted(draw)
         limits = Limits(**mutations.limits(draw))
         run = simulate(scene, mutations.method(draw), mutations.times(draw), limits)
     except (SceneError, MethodError, ValueError) as error:
         assert str(error), "an error without a message"
         return type(error).__name__
-    json.dumps(run.to_record())
+    json.loads(strict_json(run.to_record()), parse_constant=_refuse_constant)
     return run.outcome.name
+
+
+def _accepted(draw: random.Random) -> Scene:
+    """A mutated scene that is a scene."""
+    while True:
+        with contextlib.suppress(SceneError):
+            return Scene(**mutations.mutated_data(draw))
 
 
 def command_line(seed: int) -> str:
