@@ -75,8 +75,8 @@ def checked_inertia(value: Any) -> tuple[Any, ...]:
 def field_faults(error: ValidationError) -> Iterator[tuple[str, str]]:
     """(path, message) of every fault pydantic found, in the words of the file."""
     for fault in error.errors(include_url=False):
-        kind, got, limit = fault["type"], _shown(fault["input"]), fault.get("ctx", {})
-        tags = f"{limit.get('expected_tags')}, got {_shown(limit.get('tag'))}"
+        kind, got, limit = fault["type"], shown(fault["input"]), fault.get("ctx", {})
+        tags = f"{limit.get('expected_tags')}, got {shown(limit.get('tag'))}"
         messages = {
             "missing": "is required",
             "extra_forbidden": "is not a known field",
@@ -102,8 +102,8 @@ def field_faults(error: ValidationError) -> Iterator[tuple[str, str]]:
         yield path, messages.get(kind, default)
 
 
-def _shown(value: Any) -> str:
-    """The value as Python writes it, cut short."""
+def shown(value: Any) -> str:
+    """The value as Python writes it, cut short: for messages, whatever was given."""
     try:
         return SHOWN.repr(value)
     except ValueError:  # Python writes no integers of so many digits

@@ -20,6 +20,7 @@ from multiprocessing.connection import Connection
 import numpy as np
 
 from crosscheck.engine import Cannot, Setting, engine
+from crosscheck.processes.answer import well_formed
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
@@ -34,18 +35,21 @@ def get_ready(engine_name: str, families: Sequence[str]) -> str:
     except ImportError:  # which a run will say
         return ""
     simulator.prepare(families)
-    return version
+    return str(version)
 
 
 def run_once(engine_name: str, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-    """One run; a missing package is a failed trajectory that says what to install."""
+    """One run; a missing package is a failed trajectory that says what to install.
+
+    Raises MalformedAnswer where what the engine returns is no trajectory of this run.
+    """
     simulator = engine(engine_name)
     try:
         simulator.version()
     except ImportError as error:
         message = f"{simulator.package} is not installed: {error}"
         return failed(engine_name, "", scene, setting, Outcome.CRASHED, message)
-    return simulator.run(scene, times, setting)
+    return well_formed(simulator.run(scene, times, setting), scene, times)
 
 
 def offers(engine_name: str, scene: Scene) -> tuple[str, Cannot | None, list[Setting]]:

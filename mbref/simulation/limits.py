@@ -7,7 +7,7 @@ import operator
 from dataclasses import dataclass, fields
 from typing import Any
 
-from mbref.scene_validation import LARGEST, SMALLEST
+from mbref.scene_validation import LARGEST, SMALLEST, shown
 
 AUTO, GENERIC, SPECIALISED = "auto", "generic", "specialised"
 CODES = (AUTO, GENERIC, SPECIALISED)
@@ -57,7 +57,7 @@ class Limits:
 def _checked(name: str, value: Any) -> Any:
     if name == "code":
         if value not in CODES:
-            raise ValueError(f"code: must be one of {', '.join(CODES)}, got {value!r}")
+            raise ValueError(f"code: must be one of {', '.join(CODES)}, got {shown(value)}")
         return value
     if name in COUNTS:
         return _count(name, value, *COUNTS[name])
@@ -71,7 +71,7 @@ def _number(name: str, value: Any, least: float, largest: float, zero: bool) -> 
         number = math.nan
     if not (least <= number <= largest or (zero and number == 0)):
         also = "0 or " if zero else ""
-        raise ValueError(f"{name}: must be {also}a number from {least:g} to {largest:g}, got {value!r}")
+        raise ValueError(f"{name}: must be {also}a number from {least:g} to {largest:g}, got {shown(value)}")
     return number
 
 
@@ -81,5 +81,5 @@ def _count(name: str, value: Any, least: int, largest: int) -> int:
     except TypeError:
         count = least - 1
     if not least <= count <= largest:
-        raise ValueError(f"{name}: must be a whole number from {least} to 2**62, got {value!r}")
+        raise ValueError(f"{name}: must be a whole number from {least} to 2**62, got {shown(value)}")
     return count
