@@ -7,14 +7,9 @@ bear on none that does, are left out.
 
 from __future__ import annotations
 
-import functools
 import hashlib
-import json
-import os
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -50,7 +45,8 @@ from mbref.kernels.layout import (
 )
 from mbref.linear_algebra.sparse_cholesky import memories, squared_pivots
 from mbref.linear_algebra.symbolic_factorisation import COLUMN, ROW, Plan
-from mbref.specialised.machine_code import Code, Piece, compiled, processor
+from mbref.specialised.kept_code import code_of
+from mbref.specialised.machine_code import Code, Piece, processor
 from mbref.specialised.tracing import Record, Untraceable, inputs, numbers, plain
 from mbref.stabilisation.all_coordinates import normalise
 from mbref.stabilisation.projection import (
@@ -187,10 +183,11 @@ def specialise(
     if len(moving.rows) > MOST_ROWS:
         raise Untraceable(f"{len(moving.rows)} rows that move, more than {MOST_ROWS}")
     arrays = (*model.ints, *model.floats, settings, q, v, moving.coordinates, moving.plan.indices)
-    kept = CACHE / "scenes" / _key(formulation.name, arrays)
-    if not kept.with_suffix(".json").exists():
-        _keep(kept, _traced(model, formulation, settings, q, v, moving))
-    return _loaded(kept, model, moving)
+    kept = CACHE / "scenes" / f"{_key(formulation.name, arrays)}.code"
+    operations, code = code_of(kept, lambda: _traced(model, formulation, settings, q, v, moving))
+    live = model.entries(moving.coordinates, moving.velocities)
+    live[0, [RATES_CODE, PROJECT_CODE]] = [code.address(name) for name in PIECES]
+    return Specialised(live, operations, code)
 
 
 def _key(name: str, arrays: Sequence[np.ndarray]) -> str:
@@ -205,27 +202,3 @@ def _traced(
 ) -> list[Piece]:
     rates = rates_piece(State(model, q, v, moving), formulation, settings)
     return [rates, project_piece(State(model, q, v, moving))]
-
-
-def _keep(path: Path, pieces: list[Piece]) -> None:
-    """Write the code, then its facts, each whole or not at all."""
-    facts = {"operations": {piece.name: len(piece.live()) for piece in pieces}}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    for suffix, data in ((".o", compiled(pieces)), (".json", json.dumps(facts).encode())):
-        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
-            file.write(data)
-        os.replace(file.name, path.with_suffix(suffix))
-
-
-@functools.lru_cache(maxsize=64)
-def _read(path: Path) -> tuple[dict[str, int], Code]:
-    """Operations and code of a scene, loaded once in a process."""
-    facts = json.loads(path.with_suffix(".json").read_text())
-    return facts["operations"], Code(path.with_suffix(".o").read_bytes())
-
-
-def _loaded(path: Path, model: Model, moving: Part) -> Specialised:
-    operations, code = _read(path)
-    live = model.entries(moving.coordinates, moving.velocities)
-    live[0, [RATES_CODE, PROJECT_CODE]] = [code.address(name) for name in PIECES]
-    return Specialised(live, operations, code)
