@@ -1,22 +1,23 @@
-"""What is wrong with a scene: one message per fault, under the path of the field."""
+"""Faults of a scene: one message for each, under the path of the field."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from reprlib import Repr
 from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
+from mbref.scene_fields import LARGEST, SMALLEST, checked_length, checked_size, shown
+from mbref.scene_joints import JOINT_TYPES
+from mbref.scene_loads import LOAD_TYPES
+
 GROUND = "ground"
 RESERVED = (GROUND, "the fixed frame")  # names that no body can have
-LARGEST, SMALLEST = 1e40, 1e-40  # sizes of numbers whose products and squares are still numbers
-SHOWN = Repr()  # how a faulty value is quoted, however long or deep
-SHOWN.maxstring = SHOWN.maxother = SHOWN.maxlong = 80
-DRIVEN = ("revolute", "cylindrical", "translational")  # joints a driver can move
-TURNING = ("revolute", "cylindrical")  # joints a torsion spring can act on
+DRIVABLE = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.driven)
+TORSIONAL = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.takes_torsion_spring)
+ACTS_ON = {name: load.acts_on for name, load in LOAD_TYPES.items()}
 INERTIA_TOLERANCE = 1e-9  # relative; discs and thin rods meet the triangle inequality with equality
 
 
@@ -31,22 +32,8 @@ class SceneError(Exception):
         return type(self), (self.faults,)  # so that it comes whole out of another process
 
 
-def checked_size(value: float) -> float:
-    """The number; ValueError where it is so large that its powers would overflow."""
-    if abs(value) > LARGEST:
-        raise ValueError(f"must be at most {LARGEST:g} in size, got {value:g}")
-    return value
-
-
-def checked_length(value: float) -> float:
-    """The positive number; ValueError where its powers would overflow or vanish."""
-    if value < SMALLEST:
-        raise ValueError(f"must be at least {SMALLEST:g} in size, got {value:g}")
-    return checked_size(value)
-
-
 def checked_inertia(value: Any) -> tuple[Any, ...]:
-    """Three principal moments or a symmetric 3x3, as tuples; ValueError says what is unphysical."""
+    """Three principal moments or a symmetric 3x3, as tuples; ValueError says which value is unphysical."""
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError, OverflowError):
@@ -102,14 +89,6 @@ def field_faults(error: ValidationError) -> Iterator[tuple[str, str]]:
         yield path, messages.get(kind, default)
 
 
-def shown(value: Any) -> str:
-    """The value as Python writes it, cut short: for messages, whatever was given."""
-    try:
-        return SHOWN.repr(value)
-    except ValueError:  # Python writes no integers of so many digits
-        return "a number of thousands of digits"
-
-
 def _path(location: Sequence[str | int]) -> str:
     """body[2].mass; the tag that a union of joint or load types adds to a location is dropped."""
     parts = list(location)
@@ -157,18 +136,18 @@ def reference_faults(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     types = dict(zip(_names(joints), (_get(joint, "type") for joint in joints), strict=True))
     yield from _driver_faults(data, types)
     for i, load in enumerate(_entries(data, "load")):
-        kind = _get(load, "type")
-        if kind in ("moment", "force"):
+        acts_on = ACTS_ON.get(_get(load, "type"))
+        if acts_on == "body":
             name = _get(load, "body")
             if name == GROUND:
                 yield f"load[{i}].body", "the ground cannot be loaded"
             elif isinstance(name, str) and name not in known:
                 yield f"load[{i}].body", _unknown("body", name, known - {GROUND})
-        elif kind == "spring":
+        elif acts_on == "bodies":
             yield from _pair_faults(f"load[{i}].bodies", _get(load, "bodies"), known)
-        elif kind == "torsion_spring":
+        elif acts_on == "joint":
             name = _get(load, "joint")
-            yield from _joint_faults(f"load[{i}].joint", name, types, TURNING, "carry a torsion spring")
+            yield from _joint_faults(f"load[{i}].joint", name, types, TORSIONAL, "carry a torsion spring")
 
 
 def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -176,7 +155,7 @@ def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Iterato
     driven: set[str] = set()
     for i, driver in enumerate(_entries(data, "driver")):
         name = _get(driver, "joint")
-        yield from _joint_faults(f"driver[{i}].joint", name, types, DRIVEN, "be driven")
+        yield from _joint_faults(f"driver[{i}].joint", name, types, DRIVABLE, "be driven")
         if isinstance(name, str):
             if name in driven:
                 yield f"driver[{i}].joint", f"{name!r} already has a driver"

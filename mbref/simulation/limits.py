@@ -7,7 +7,7 @@ import operator
 from dataclasses import dataclass, fields
 from typing import Any
 
-from mbref.scene_validation import LARGEST, SMALLEST, shown
+from mbref.scene_fields import LARGEST, SMALLEST, shown
 
 AUTO, GENERIC, SPECIALISED = "auto", "generic", "specialised"
 CODES = (AUTO, GENERIC, SPECIALISED)
@@ -26,7 +26,7 @@ INTERVALS = {
     "largest_step": (SMALLEST, LARGEST, True),
     "largest_turn": (SMALLEST, LARGEST, True),
 }
-COUNTS = {"most_steps": (1, MOST), "sparse_above": (-1, MOST)}
+COUNTS = {"most_steps": (1, MOST)}
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,8 @@ class Limits:
     smallest_step: float = 0.0  # s; 0 means a million-millionth of the duration
     forced_step: float = 0.0  # s; a step this short is taken whatever its error estimate; 0: none
     largest_step: float = 0.0  # s; 0 means the duration
-    largest_turn: float = 0.0  # rad that the fastest body may turn in an adaptive step; 0: what is safe
+    largest_turn: float = 0.0  # rad that the fastest body may turn in an adaptive step; 0: a safe angle
     most_steps: int = 5_000_000
-    sparse_above: int = -1  # constraint rows; with more, alf-dual's general kernels have a sparse factor
     code: str = AUTO  # GENERIC kernels, SPECIALISED to the scene, or AUTO: where many steps are ahead
 
     def __post_init__(self) -> None:

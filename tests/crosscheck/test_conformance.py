@@ -15,7 +15,7 @@ from crosscheck.conformance import properties, suite, trial
 from crosscheck.conformance.features import undetermined
 from crosscheck.conformance.relations import shaken
 from crosscheck.conformance.trial import Specimen, specimens
-from crosscheck.engine import Cannot, Engine, Setting, Why
+from crosscheck.engine import Cannot, Engine, Owner, Setting
 from crosscheck.judge.truth import truth_for
 from crosscheck.processes.pool import Observation
 from mbref.scene import Scene
@@ -37,7 +37,7 @@ class Exact(Engine):
         return "1"
 
     def cannot(self, scene: Scene) -> Cannot | None:
-        return None if scene.has_mass() else Cannot(Why.NEVER, "bodies have no mass")
+        return None if scene.has_mass() else Cannot(Owner.MODEL, "bodies have no mass")
 
     def settings(self, scene: Scene) -> list[Setting]:
         return [Setting("only", {"step": 0.1})]

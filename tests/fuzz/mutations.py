@@ -157,7 +157,7 @@ METHODS = (
 OPTIONS = ("alpha", "beta", "step", "max_order", "omega", "mu", "kept", "iterations", "", "nothing")
 LIMITS = (
     "rtol", "atol", "rank_tolerance", "violation", "first_step", "smallest_step", "forced_step",
-    "largest_step", "largest_turn", "most_steps", "sparse_above", "code",
+    "largest_step", "largest_turn", "most_steps", "code",
 )  # fmt: skip
 PATHS = ("body[0].mass", "gravity[1]", "joint[0].anchor[2]", "body[", "x", "")
 CODES = ("auto", "generic", "specialised")

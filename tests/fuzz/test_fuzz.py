@@ -15,6 +15,6 @@ def test_mutated_scenes_are_scenes_or_documented_errors(target, count, tmp_path,
 
 def test_an_undocumented_error_is_a_defect(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("mbref.scene_validation.LARGEST", "not a number")
+    monkeypatch.setattr("mbref.scene_fields.LARGEST", "not a number")
     found = [defect for seed in range(20) if (defect := targets.case("scene_data", seed)[1])]
-    assert found and all("TypeError" in defect and "scene_validation.py" in defect for defect in found), found
+    assert found and all("TypeError" in defect and "scene_fields.py" in defect for defect in found), found
