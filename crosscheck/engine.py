@@ -25,6 +25,8 @@ __all__ = [
     "initial_poses", "initial_twists", "installed", "rotations",
 ]  # fmt: skip
 
+FamilyParts = Mapping[str, Mapping[str, Mapping[str, float]]]  # kind of part → name → options and defaults
+
 
 class Owner(enum.Enum):
     """The part that would have to change before the engine could do what it refuses."""
@@ -78,9 +80,9 @@ class Supports:
 class Setting:
     """One way of running an engine.
 
-    ``family`` groups the settings that differ only in accuracy ("defaults" are the options a
-    user has without tuning, "tuned" the best that the engine's documentation allows); ``options`` are the
-    engine's own numbers; (family, options) reproduce the run.
+    ``family`` groups the settings that differ only in accuracy: "defaults" are the library's own,
+    "tuned" the most accurate that its documentation allows.  ``options`` are the engine's own numbers;
+    (family, options) reproduce the run.
     """
 
     family: str
@@ -118,6 +120,14 @@ class Engine(ABC):
     def settings(self, scene: Scene) -> Sequence[Setting]:
         """The sweep over this engine's families and accuracies for a scene, coarse to fine in each
         family."""
+
+    def has_family(self, family: str) -> bool:
+        """Whether `run` takes this family although the sweep of `settings` may leave it out."""
+        return False
+
+    def family_parts(self) -> FamilyParts:
+        """The parts from which an engine's families are composed; empty where it only has its sweep's."""
+        return {}
 
     def prepare(self, families: Sequence[str]) -> None:  # noqa: B027 - most engines need nothing
         """Import and compile ahead of the first run of these families in a process."""
@@ -158,14 +168,17 @@ def installed(name: str) -> bool:
 def engine(name: str) -> Engine:
     """The engine of that name, or at ``module:attribute``; raises LookupError with the known names."""
     if name in BUILT_IN + OPTIONAL:
-        return import_module(f"crosscheck.engines.{name}").ENGINE
+        return _as_engine(name, import_module(f"crosscheck.engines.{name}").ENGINE)
     for point in metadata.entry_points(group=ENTRY_POINTS):
         if point.name == name:
-            return point.load()
+            return _as_engine(name, point.load())
     if ":" in name:
         module, attribute = name.split(":", 1)
-        found = getattr(import_module(module), attribute)
-        if isinstance(found, Engine):
-            return found
-        raise LookupError(f"{name!r} is no engine: it does not implement crosscheck.engine.Engine")
+        return _as_engine(name, getattr(import_module(module), attribute))
     raise LookupError(f"unknown engine {name!r}; known: {', '.join(engine_names())}")
+
+
+def _as_engine(name: str, found: object) -> Engine:
+    if isinstance(found, Engine):
+        return found
+    raise LookupError(f"{name!r} is no engine: it does not implement crosscheck.engine.Engine")

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +14,11 @@ from mbref.records import strict_json
 from mbref.scene import Scene, SceneError
 from mbref.scenes import SCENES, find_scene
 from mbref.simulation.method import DEFAULT, MethodError
+from mbref.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from mbref.equations.diagnosis import Diagnosis
+    from mbref.simulation.simulate import Limits
 
 BAD_INPUT, INCOMPLETE, INTERRUPTED = 2, 1, 130
 PIPED_WIDTH = 160  # characters of a line where no terminal says otherwise
@@ -155,7 +161,7 @@ def _run(options: argparse.Namespace) -> int:
     return 0 if trajectory.outcome.name == "COMPLETED" else INCOMPLETE
 
 
-def _limits(options: argparse.Namespace):
+def _limits(options: argparse.Namespace) -> Limits:
     """The limits; ValueError names their field, which is the option's but for --max-step."""
     from mbref.simulation.limits import Limits
 
@@ -166,7 +172,7 @@ def _limits(options: argparse.Namespace):
 
 
 @contextmanager
-def _progress_bar(what: str, end: float) -> Iterator:
+def _progress_bar(what: str, end: float) -> Iterator[Callable[[float], None]]:
     """Tells how far it is on stderr, where that is a terminal; appears only on long runs."""
     from rich.console import Console
     from rich.progress import Progress
@@ -196,7 +202,9 @@ def _ensemble(options: argparse.Namespace) -> int:
     return 0 if len(completed) == options.count else INCOMPLETE
 
 
-def _show_spread(scene: Scene, end: float, completed: Sequence, options: argparse.Namespace) -> None:
+def _show_spread(
+    scene: Scene, end: float, completed: Sequence[Trajectory], options: argparse.Namespace
+) -> None:
     """Mean and standard deviation of every body over the completed runs, at the last time."""
     from rich.console import Console
     from rich.table import Table
@@ -231,7 +239,7 @@ def _show_spread(scene: Scene, end: float, completed: Sequence, options: argpars
     console.print(table)
 
 
-def _show(scene: Scene, trajectory) -> None:
+def _show(scene: Scene, trajectory: Trajectory) -> None:
     from rich.console import Console
     from rich.table import Table
 
@@ -289,7 +297,7 @@ def _diagnose(options: argparse.Namespace) -> int:
     return 0
 
 
-def _beyond(found) -> dict:
+def _beyond(found: Diagnosis) -> dict[str, Any]:
     """The fields of a diagnosis besides its counts, for JSON."""
     from dataclasses import asdict
 

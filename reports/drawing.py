@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,7 +45,7 @@ def _anchors(joint: Joint) -> list[tuple[str, tuple[float, float, float]]]:
     return list(zip(joint.bodies, joint.anchor_pair, strict=True))
 
 
-def _inverse(orientation, vectors: np.ndarray) -> np.ndarray:
+def _inverse(orientation: Sequence[float], vectors: np.ndarray) -> np.ndarray:
     return rotations.rotate(rotations.conjugate(np.array(orientation)), vectors)
 
 

@@ -14,7 +14,7 @@ from crosscheck.engine import Cannot, Setting
 from crosscheck.judge.metrics import error_series, in_scene_order
 from crosscheck.judge.tolerances import OWN_ACCURACY, SAME_MOTION
 from crosscheck.judge.truth import truth_for
-from crosscheck.processes.pool import Observation, observe, offers, run_isolated
+from crosscheck.processes.pool import Observation, capabilities, observe, run_isolated
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
@@ -121,7 +121,7 @@ class Bench:
 
 def set_up(engine: str, specimen: Specimen, time_limit: float) -> Bench:
     """A bench with what the engine says of the specimen; raises ChildFailed when it cannot even say."""
-    version, cannot, settings = offers(engine, specimen.scene, time_limit)
+    version, cannot, settings = capabilities(engine, specimen.scene, time_limit)
     return Bench(engine, specimen, version, cannot, best_family(settings), time_limit)
 
 

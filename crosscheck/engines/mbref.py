@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Engine, Owner, Setting, Supports
+from crosscheck.engine import Cannot, Engine, FamilyParts, Owner, Setting, Supports
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
@@ -76,6 +76,26 @@ class Mbref(Engine):
         if family.endswith(OWN_CODE):
             return not why_no_code(scene, method)
         return scene.counts().redundant == 0 or method.formulation.handles_redundancy
+
+    def has_family(self, family: str) -> bool:
+        from mbref.simulation.method import MethodError
+
+        try:
+            _method(family)
+        except MethodError:
+            return False
+        return True
+
+    def family_parts(self) -> FamilyParts:
+        from mbref.formulations import FORMULATIONS
+        from mbref.integrators import INTEGRATORS
+        from mbref.stabilisation import STABILISATIONS
+
+        return {
+            "formulation": {name: part.options for name, part in FORMULATIONS.items()},
+            "stabilisation": {name: part.options for name, part in STABILISATIONS.items()},
+            "integrator": {name: part.options for name, part in INTEGRATORS.items()},
+        }
 
     def prepare(self, families: Sequence[str]) -> None:
         from mbref.simulation.simulate import prepare

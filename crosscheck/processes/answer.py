@@ -40,12 +40,12 @@ def well_formed(answer: Any, scene: Scene, times: np.ndarray) -> Trajectory:
     if not isinstance(answer.bodies, tuple | list) or sorted(map(str, answer.bodies)) != sorted(names):
         raise MalformedAnswer(f"bodies: are {answer.bodies!r}, not those of the scene, {names!r}")
     reached = _times(answer, times)
-    plain = {name: _array(name, getattr(answer, name), (reached.size, len(names), width))
+    plain: dict[str, Any] = {name: _array(name, getattr(answer, name), (reached.size, len(names), width))
              for name, width in (WIDTHS | OPTIONAL).items()
              if name in WIDTHS or getattr(answer, name) is not None}  # fmt: skip
     if np.any(np.abs(np.linalg.norm(plain["orientation"], axis=-1) - 1) > UNIT_TOLERANCE):
         raise MalformedAnswer("orientation: has a quaternion that is not of unit length")
-    texts = {name: str(getattr(answer, name)) for name in ("version", "method", "message")}
+    texts: dict[str, Any] = {name: str(getattr(answer, name)) for name in ("version", "method", "message")}
     return replace(
         answer, **plain, **texts, times=reached, bodies=tuple(answer.bodies),
         settings=_settings(answer.settings), cost=_cost(answer.cost), t_end=_number("t_end", answer.t_end),
@@ -101,4 +101,5 @@ def _cost(value: Any) -> Cost:
     }
     if not all(math.isfinite(number) for number in numbers.values()):
         raise MalformedAnswer("cost: is not finite")
-    return Cost(**{name: x if name.endswith("seconds") else int(x) for name, x in numbers.items()})
+    plain: dict[str, Any] = {n: x if n.endswith("seconds") else int(x) for n, x in numbers.items()}
+    return Cost(**plain)

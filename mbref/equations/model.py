@@ -16,7 +16,7 @@ from scipy.sparse import csr_array
 from mbref import rotations
 from mbref.equations.coordinates import displace
 from mbref.equations.evaluation import evaluate_all
-from mbref.equations.joints import primitives_of
+from mbref.equations.joints import driver_primitive, primitives_of
 from mbref.equations.joints.base import ROWS_OF, Primitive
 from mbref.equations.loads import has_angles
 from mbref.equations.packing import packed_drivers, packed_loads

@@ -1,4 +1,4 @@
-"""Support matrix: what engines say / the README's block, the suite's probes, and what they then do."""
+"""Support matrix: answers of the engines / the document's block, the suite's probes, and short runs."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from mbref.scene import Joint, Load, Scene
 from mbref.scene_validation import DRIVABLE
 from mbref.trajectory import Outcome
 
-README = Path(__file__).parents[2] / "README.md"
+DOCUMENT = Path(__file__).parents[2] / "docs" / "engines.md"
 
 
-def test_readme_and_generated_block():
-    block = support.block_of(README.read_text())
+def test_document_and_generated_block():
+    block = support.block_of(DOCUMENT.read_text())
     assert block == support.markdown(support.KNOWN), (
-        "README's support matrix is stale: python -m crosscheck.cli.support README.md renews it"
+        "the support matrix is stale: python -m crosscheck.cli.support docs/engines.md renews it"
     )
 
 
