@@ -44,6 +44,13 @@ def stored(path: str | Path | None) -> dict[str, dict[str, Any]]:
     return {record["key"]: record for record in lines if record is not None}
 
 
+def opened(path: str | Path | None) -> dict[str, dict[str, Any]]:
+    """As ``stored``, of a file that can be appended to and is made where there is none; raises OSError."""
+    if path is not None:
+        open(path, "ab").close()
+    return stored(path)
+
+
 def append(path: str | Path | None, record: dict[str, Any]) -> None:
     """Add a record to the file, whole or not at all; nowhere without a path.
 

@@ -56,8 +56,8 @@ def ensemble(
         with processes() as pool:
             yield from ensemble(scenes, times, method, limits, pool, path)
         return
+    known = records.opened(path)  # before anything is compiled or run for it
     prepare(Method.parse(method))  # once, not in every process at the same time
-    known = records.stored(path)
     pending: dict[Future, Job] = {}
     try:
         for place, scene in enumerate(scenes):

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from mbref import records
 from mbref.cli import main
 from mbref.records import RecordsError, append, stored, strict_json
 
@@ -59,6 +60,7 @@ def test_a_line_cut_short_is_taken_off_and_no_other(tmp_path: Path):
     path.write_text('{"key": "a"}\n{"key": "cut sho')
     assert set(stored(path)) == {"a"}
     append(path, {"key": "b"})
+    assert set(records.opened(path)) == {"a", "b"}
     assert path.read_text() == '{"key": "a"}\n{"key": "b"}\n'
 
 
