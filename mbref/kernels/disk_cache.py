@@ -8,8 +8,8 @@ place while one of our functions is decorated, and other users of numba keep the
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
-import os
 import pickle
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -48,15 +48,20 @@ class _Place:
     def get_cache_path(self) -> str:
         return str(self.folder / Path(self._source).parent.name)
 
-    def get_source_stamp(self) -> tuple[float, int]:
-        status = os.stat(self._source)
-        return status.st_mtime, status.st_size
+    def get_source_stamp(self) -> str:
+        return _digest(self._source)
 
     def get_disambiguator(self) -> str:
-        return hashlib.sha256(self._source.encode()).hexdigest()[:10]
+        return "kernel"
 
     def ensure_cache_path(self) -> None:
         """Nothing before there is something to write."""
+
+
+@functools.cache
+def _digest(source: str) -> str:
+    """Of the file's text: the cache serves every copy of the same sources."""
+    return hashlib.sha256(Path(source).read_bytes()).hexdigest()
 
 
 class _Files:
