@@ -1,9 +1,9 @@
 """One-line defects to plant, each with the tests that have to see it.
 
 Chosen for what a report would silently get wrong: signs, factors, phases and frames in the equations,
-exchanged options, units, labels and cells, least against median and wall against processor time, keys, samples
-and order of records, checks at the doors.  Where two places compute the same (kernel, adapter, judge), each has
-its own.
+exchanged options, units, labels and cells, least against median and wall against processor time, keys,
+samples and order of records, checks at the doors.  Where two places compute the same (kernel, adapter,
+judge), each has its own.
 """
 
 from __future__ import annotations
