@@ -27,7 +27,7 @@ from mbref.trajectory import Trajectory
 
 COPIES = {name: [RELATIONS[name]] for name in ("rotated", "translated", "mirrored")}
 SHAKEN = {"shaken": [shaken(seed) for seed in range(3)]}
-ROUNDING = 10  # times the difference of three shaken scenes: what a copy that differs by rounding may do
+ROUNDING = 10  # times the difference of three shaken scenes: allowed to a copy that differs by rounding
 
 
 def main() -> int:

@@ -19,9 +19,9 @@ from forward_dynamics import timed_calls
 from mbref.formulations import FORMULATIONS
 from mbref.kernels.compilation import INT, VECTOR, entry
 from mbref.kernels.layout import MEMORY, OK
+from mbref.method import Method
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.simulation.method import Method
 from mbref.simulation.run import SPECIALISED, Limits, Run
 from mbref.simulation.simulate import why_no_code
 

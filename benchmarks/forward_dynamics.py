@@ -22,7 +22,7 @@ Timed = Callable[[], float]  # process CPU seconds of one call
 
 
 def timed_calls(scene: Scene) -> Iterator[tuple[str, Timed]]:
-    """(what is called, a function that times it) of every engine that is installed."""
+    """(name of the call, a function that times it) of every engine that is installed."""
     for name, calls in (("mujoco", _mujoco), ("pinocchio", _pinocchio), ("exudyn", _exudyn)):
         try:
             engine(name).version()

@@ -19,8 +19,8 @@ from crosscheck.engine import Cannot, Engine, Setting
 from crosscheck.engines.initial_velocities import lacks_mass
 from mbref.kernels.compilation import FLOAT, INT, VECTOR, entry
 from mbref.kernels.layout import MEMORY
+from mbref.method import Method
 from mbref.scene import Scene
-from mbref.simulation.method import Method
 from mbref.simulation.run import Limits, Run
 from mbref.trajectory import Cost, Outcome, Trajectory
 

@@ -1,4 +1,4 @@
-"""The limit: what a mechanism costs when its one equation of motion is derived by hand.
+"""The limit: the cost of a mechanism whose one equation of motion is derived by hand.
 
 Free scenes: the equation of ``by_hand``, compiled, by mbref's own DOP853 and step control at the tolerances
 of mbref.  Driven scenes: their poses in closed form at the sample times, which is all that a perfect method
@@ -128,7 +128,7 @@ class Limit(Engine):
 def _integrated(
     scene: Scene, theta0: float, times: np.ndarray, rtol: float, path: Path
 ) -> tuple[np.ndarray, Cost]:
-    """(k, 2) angle and rate at the times, and what the stepping took."""
+    """(k, 2) angle and rate at the times, and the cost of the stepping."""
     by_hand, integrator = BY_HAND[scene.name], INTEGRATORS["dop853"]
     control = Control(
         order=integrator.order, fixed_step=0.0, smallest_step=0.0, largest_step=times[-1], largest_turn=0.0,
@@ -159,7 +159,7 @@ def _integrated(
 
 
 def _closed_form(scene: Scene, thetas: np.ndarray, path: Path) -> Cost:
-    """What the poses take; they are compared with the truth's path first."""
+    """The cost of the poses; they are compared with the truth's path first."""
     by_hand = BY_HAND[scene.name]
     numbers, poses = np.array(by_hand.numbers(scene)), np.zeros((len(thetas), 12 * len(scene.body)))
     by_hand.poses(thetas, numbers, poses)

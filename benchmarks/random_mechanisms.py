@@ -38,7 +38,7 @@ def main(count: int) -> None:
 
 
 def describe(found: Sequence[Comparison]) -> str:
-    """What the mechanisms are: bodies, loops, redundancy, joints."""
+    """The mechanisms: bodies, loops, redundancy, joints."""
     kinds = Counter(joint.type for c in found for joint in c.scene.joint)
     bodies = [len(c.scene.body) for c in found]
     loops = Counter(len(c.scene.joint) - len(c.scene.body) for c in found)

@@ -4,7 +4,7 @@
 
 Process CPU time of the stepping, medians of REPEATS rounds in which all take turns; the error, against the
 scene's truth and relative to a link, stands beside every time.  The first tables have milliseconds per step
-at STEPS steps or a few more, the last what an error costs.
+at STEPS steps or a few more, the last the cost of an error.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ def scaling(console: Console, chain: str, sizes: Sequence[int]) -> None:
 
 
 def at_errors(console: Console, loops: int) -> None:
-    """What an error costs on the chain of four-bars: mbref's two integrators and MuJoCo's best model."""
+    """The cost of an error on the chain of four-bars: mbref's two integrators and MuJoCo's best model."""
     scene = find_scene(f"four_bar_chain[{loops}]")
     truth = end_of(scene)
     curves = {

@@ -1,4 +1,4 @@
-"""What a simulated second costs at errors of 1e-3, 1e-6 and 1e-9: mbref, engines, general integrators, limit.
+"""Cost of a simulated second at errors of 1e-3, 1e-6 and 1e-9: mbref, engines, general integrators, limit.
 
     python benchmarks/speed.py [SCENE …] [--out FILE.json] [--plot FILE.png]
 
@@ -26,7 +26,7 @@ from rich.console import Console
 from rich.table import Table
 
 from crosscheck.engine import Setting, engine, installed
-from crosscheck.engines.mbref import OWN_CODE
+from crosscheck.engines.mbref import SPECIALISED
 from crosscheck.judge.metrics import cost_at_error, measure
 from crosscheck.judge.tolerances import ERROR_LEVELS
 from crosscheck.judge.truth import truth_for
@@ -128,7 +128,7 @@ def _times(run: Run) -> int:
 
 
 def _is_worth_timing(run: Run, curves: dict[Curve, list[Run]]) -> bool:
-    """What the cost at a level is read from: of mbref in every family, of an engine in its best ones."""
+    """Runs that give the cost at a level: of mbref in every family, of an engine in its best ones."""
     own = curves[run.engine, run.family]
     if run.cost["seconds"] > LONG or not any(run in _around(own, level) for level in ERROR_LEVELS):
         return False
@@ -208,7 +208,7 @@ def show(console: Console, scene: Scene, table: Sequence[dict[str, Any]]) -> Non
 
 
 def summary(console: Console, tables: dict[str, Sequence[dict[str, Any]]]) -> None:
-    """mbref's best by own code and by general kernels, against the best of the others."""
+    """mbref's best by specialised code and by general kernels, against the best of the others."""
     shown = Table(title="The best of others as a multiple of mbref's best, at errors of …")
     shown.add_column("scene", no_wrap=True)
     shown.add_column("mbref by", no_wrap=True)
@@ -218,8 +218,8 @@ def summary(console: Console, tables: dict[str, Sequence[dict[str, Any]]]) -> No
             shown.add_column(f"{name} {level:.0e}", justify="right")
     for scene, table in tables.items():
         others = [cost for names in groups.values() for cost in _best(_of(table, names))]
-        for whose, own in (("own code", True), ("general kernels", False)):
-            mine = [row for row in _of(table, (OURS,)) if row["family"].endswith(OWN_CODE) is own]
+        for whose, own in (("specialised code", True), ("general kernels", False)):
+            mine = [row for row in _of(table, (OURS,)) if row["family"].endswith(SPECIALISED) is own]
             pairs = zip(others, _best(mine) * len(groups), strict=True)
             shown.add_row(scene, whose, *(_advantage(theirs, ours) for theirs, ours in pairs))
     console.print(shown)

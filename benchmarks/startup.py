@@ -1,4 +1,4 @@
-"""What the first run costs before it steps: imports, compilation, loading compiled kernels from the cache.
+"""The cost of the first run before it steps: imports, compilation, loading compiled kernels from the cache.
 
     python benchmarks/startup.py [METHOD …]
 

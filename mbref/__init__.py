@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mbref.equations.diagnosis import Diagnosis, counts, diagnose
+    from mbref.method import Method, MethodError
     from mbref.scene import Scene, SceneError
     from mbref.scenes import SCENES, find_scene
     from mbref.simulation.ensemble import ensemble
-    from mbref.simulation.method import Method, MethodError
     from mbref.simulation.simulate import Limits, simulate
     from mbref.trajectory import Cost, Outcome, Trajectory
     from mbref.variation import Variation, variants
@@ -24,8 +24,8 @@ _MODULE_OF = {
     "Cost": "mbref.trajectory",
     "Diagnosis": "mbref.equations.diagnosis",
     "Limits": "mbref.simulation.simulate",
-    "Method": "mbref.simulation.method",
-    "MethodError": "mbref.simulation.method",
+    "Method": "mbref.method",
+    "MethodError": "mbref.method",
     "Outcome": "mbref.trajectory",
     "SCENES": "mbref.scenes",
     "Scene": "mbref.scene",

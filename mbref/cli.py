@@ -1,4 +1,4 @@
-"""The command line of mbref: run a scene, run variants of it, or say what it is."""
+"""The command line of mbref: run a scene, run variants of a scene, or diagnose it."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbref.formulations import FORMULATIONS
+from mbref.integrators import INTEGRATORS
+from mbref.method import DEFAULT, MethodError
 from mbref.records import strict_json
 from mbref.scene import Scene, SceneError
 from mbref.scenes import SCENES, find_scene
-from mbref.simulation.method import DEFAULT, MethodError
+from mbref.stabilisation import STABILISATIONS
 from mbref.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -75,7 +78,8 @@ def _parser() -> argparse.ArgumentParser:
     many = commands.add_parser(
         "ensemble", help="simulate variants of a scene on every core", formatter_class=text,
         description="Simulate copies of a scene with numbers drawn at random; mean and standard deviation\n"
-        "of every body at the last time. Interrupted, --out keeps what has ended; the same command goes on.",
+        "of every body at the last time. Interrupted, --out keeps the runs that ended;\n"
+        "the same command goes on.",
         epilog="example:\n"
         "  mbref ensemble planar_slider_crank --vary 'joint[B].anchor[0]=0.304+-1e-4' \\\n"
         "      --vary 'body[slider].mass=0.9:1.1' --count 500 --duration 0.1 --out runs.jsonl",
@@ -93,7 +97,7 @@ def _parser() -> argparse.ArgumentParser:
     many.set_defaults(action=_ensemble)
 
     diagnose = commands.add_parser(
-        "diagnose", help="say what a scene is: counts, rank, redundant rows", formatter_class=text,
+        "diagnose", help="counts, rank and redundant rows of a scene", formatter_class=text,
         description="Counts, rank, redundant rows by joint, unique reactions and the distance to a singular\n"
         "position, at t = 0.",
         epilog="examples:\n  mbref diagnose five_bar\n  mbref diagnose mechanism.toml --json",
@@ -105,13 +109,18 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_method_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--method", default=DEFAULT, help=f"or kinematic; default {DEFAULT}")
+    parser.add_argument(
+        "--method", default=DEFAULT,
+        help="formulation+stabilisation/integrator, or kinematic for a fully driven mechanism;\n"
+        f"formulations: {', '.join(FORMULATIONS)};\nstabilisations: {', '.join(STABILISATIONS)};\n"
+        f"integrators: {', '.join(INTEGRATORS)} (default: {DEFAULT})",
+    )  # fmt: skip
     add_time_options(parser)
     parser.add_argument("--rtol", type=float, default=1e-9, help="relative tolerance per step (default 1e-9)")
     parser.add_argument(
         "--code", choices=("auto", "generic", "specialised"), default="auto",
-        help="kernels that serve every scene, machine code of this scene's own, or (default) the latter\n"
-        "where 20 000 steps are ahead; evaluations agree to rounding",
+        help="generic: the kernels that serve every scene; specialised: machine code made for this scene;\n"
+        "auto (default): specialised code once 20 000 steps are ahead.  Both agree to rounding",
     )  # fmt: skip
     parser.add_argument("--max-step", type=float, default=0.0, help="largest step, s (default: the duration)")
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")

@@ -1,4 +1,4 @@
-"""Record files: results as JSON lines, each with a key; what is in the file need not be computed again.
+"""Record files: results as JSON lines, each with a key; records in the file need not be computed again.
 
 A line is strict JSON (no NaN: null; an infinite number is 1e999) and is handed to the operating system in
 one write.  So only the last line can be cut short, by a kill or a power cut; reading the file takes it off.

@@ -30,7 +30,7 @@ class Outcome(enum.Enum):
 
 @dataclass(frozen=True)
 class Cost:
-    """What a run cost: process CPU seconds of the stepping alone, build apart, and counts."""
+    """Cost of a run: process CPU seconds of the stepping alone, build apart, and counts."""
 
     seconds: float = 0.0
     build_seconds: float = 0.0

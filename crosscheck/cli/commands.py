@@ -13,8 +13,8 @@ from typing import Any
 from rich.console import Console
 
 from crosscheck.cli import listing, request, tables
+from crosscheck.cli.options import add_reference_time, add_selection
 from crosscheck.cli.request import RequestError
-from crosscheck.engine import engine_names
 from crosscheck.study import fair_timing
 from crosscheck.study.grid import TIME_LIMIT, Case, Record, key, study
 from crosscheck.study.progress import counted, shown
@@ -73,7 +73,7 @@ def _compare(arguments: argparse.Namespace) -> int:
     if arguments.times is None and arguments.samples is None:
         arguments.samples = COMPARED_SAMPLES
     cases = _cases(arguments)
-    refused = _refused(cases)
+    refused = _refused(cases, arguments.reference_time)
     records = _study(cases, [])
     same = [i for i, case in enumerate(cases) if case.scene.name not in refused]
     _notice(f"timing: {arguments.repeats} interleaved repeats of the runs that completed")
@@ -89,7 +89,7 @@ def _compare(arguments: argparse.Namespace) -> int:
     return OTHERWISE if refused else _status(records)
 
 
-def _refused(cases: Sequence[Case]) -> set[str]:
+def _refused(cases: Sequence[Case], reference_time: float) -> set[str]:
     """Names of the scenes whose mechanism differs between engines; the difference is printed."""
     scenes = {case.scene.name: case.scene for case in cases}
     limit = max(case.time_limit for case in cases)
@@ -99,7 +99,8 @@ def _refused(cases: Sequence[Case]) -> set[str]:
     }
     records = _study([case for group in identities.values() for case in group], [])
     reasons = {
-        n: fair_timing.model_difference(s, [r for r in records if r["scene"] == n]) for n, s in scenes.items()
+        n: fair_timing.model_difference(s, [r for r in records if r["scene"] == n], reference_time)
+        for n, s in scenes.items()
     }
     for name, reason in reasons.items():
         if reason:
@@ -111,7 +112,7 @@ def _verify(arguments: argparse.Namespace) -> int:
     from crosscheck.conformance import suite
 
     (engine,) = request.find_engines([arguments.engine], _notice)
-    chosen = request.find_specimens(arguments.scene)
+    chosen = request.find_specimens(arguments.scene, arguments.reference_time)
     with counted("verifying", len(chosen) + 1) as advance:
         found = suite.verify(engine, chosen, arguments.time_limit, advance)
     if arguments.json:
@@ -142,9 +143,10 @@ def _cases(arguments: argparse.Namespace) -> list[Case]:
     engines = request.find_engines(arguments.engine, _notice)
     families = [*(arguments.method or ()), *(arguments.setting or ())]
     times = [request.sample_times(s, arguments.times, arguments.samples, arguments.duration) for s in scenes]
-    return request.plan(
+    cases = request.plan(
         scenes, engines, families or None, arguments.rtol, times, arguments.time_limit, _notice
     )  # fmt: skip
+    return [case._replace(reference_time=arguments.reference_time) for case in cases]
 
 
 def _study(cases: Sequence[Case], finished: list[Record]) -> list[Record]:
@@ -223,14 +225,14 @@ def _add_run(commands: Commands) -> None:
     parser = _add(
         commands, "run", "run scenes in engines, one record for every engine and setting", example, _run
     )
-    _add_selection(parser)
+    add_selection(parser)
 
 
 def _add_compare(commands: Commands) -> None:
     example = "crosscheck compare planar_slider_crank --engine mbref --engine pinocchio"
     about = "compare speed at equal error: run, then time the completed runs in turns; table and plot"
     parser = _add(commands, "compare", about, example, _compare)
-    _add_selection(parser)
+    add_selection(parser)
     parser.add_argument(
         "--repeats", type=int, default=REPEATS, help=f"timed runs of every setting, at least {REPEATS}"
     )
@@ -253,6 +255,7 @@ def _add_verify(commands: Commands) -> None:
         metavar="T",
         help="wall time a run may take (s); default: %(default)g",
     )
+    add_reference_time(parser)
     parser.add_argument("--json", action="store_true", help="print records as JSON on standard output")
 
 
@@ -267,49 +270,3 @@ def _add_report(commands: Commands) -> None:
         "--section", action="append", metavar="S", help="render only this section, such as speed; may repeat"
     )
     parser.add_argument("--out", default="report", metavar="DIR", help="folder to write (default: report)")
-
-
-def _add_selection(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "scene",
-        nargs="+",
-        metavar="SCENE",
-        help="a built-in scene (`crosscheck list scenes`) or a .toml file",
-    )
-    known = ", ".join(engine_names())
-    parser.add_argument("--engine", action="append", metavar="E", help=f"{known}; may repeat; default: all")
-    parser.add_argument(
-        "--method",
-        action="append",
-        metavar="M",
-        help="a family of settings, or any method of mbref: formulation+stabilisation/integrator, such as "
-        "lm2+projection/dop853 (`crosscheck list methods`); may repeat; default: every family",
-    )
-    parser.add_argument(
-        "--setting",
-        action="append",
-        metavar="FAMILY",
-        help="an engine's family of settings, such as defaults or tuned; may repeat; default: all",
-    )
-    when = parser.add_mutually_exclusive_group()
-    when.add_argument("--times", type=_numbers, metavar="a,b,c", help="sample times (s), increasing")
-    when.add_argument("--samples", type=int, metavar="N", help="equally spaced samples, both ends included")
-    parser.add_argument(
-        "--rtol", type=float, help="one relative tolerance instead of the sweep over tolerances"
-    )
-    parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
-    parser.add_argument(
-        "--time-limit",
-        type=float,
-        default=TIME_LIMIT,
-        metavar="T",
-        help="wall time a run may take (s); default: %(default)g",
-    )
-    parser.add_argument("--json", action="store_true", help="print records as JSON on standard output")
-
-
-def _numbers(text: str) -> list[float]:
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"must be numbers separated by commas, got {text!r}") from None

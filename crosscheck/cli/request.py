@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Iterable, Sequence
 
@@ -61,9 +62,10 @@ def find_engines(names: Sequence[str] | None, notice: Notice) -> list[str]:
     return [name for name in wanted if name not in missing]
 
 
-def find_specimens(names: Sequence[str] | None) -> list[Specimen]:
-    """The conformance suite's specimens of those scenes, or all; RequestError for a name it has not."""
-    known = {specimen.scene.name: specimen for specimen in specimens()}
+def find_specimens(names: Sequence[str] | None, reference_time: float) -> list[Specimen]:
+    """The conformance suite's specimens of those scenes, or all, with so much time (s) for a reference;
+    RequestError for a name it has not."""
+    known = {s.scene.name: dataclasses.replace(s, reference_time=reference_time) for s in specimens()}
     if unknown := [name for name in names or () if name not in known]:
         listed = ", ".join(known)
         raise RequestError(*(f"unknown scene of the suite {name!r}; known: {listed}" for name in unknown))

@@ -12,9 +12,16 @@ from rich.text import Text
 
 from crosscheck.cli.terminal_plot import scatter
 from crosscheck.study.grid import Record
-from crosscheck.study.record_view import by_scene, engine_and_family, error, is_completed, varied_settings
+from crosscheck.study.record_view import (
+    by_scene,
+    engine_and_family,
+    error,
+    error_text,
+    is_completed,
+    varied_settings,
+)
 
-MEASURED = ("error", "violation_position", "energy_error")  # of the metrics, what the table of runs shows
+MEASURED = ("violation_position", "energy_error")  # of the metrics, what the table of runs shows too
 
 
 def print_runs(console: Console, records: Sequence[Record]) -> None:
@@ -33,7 +40,7 @@ def print_runs(console: Console, records: Sequence[Record]) -> None:
     for name, group in by_scene(records).items():
         table = _table(name, header, right_from=4)
         for r in group:
-            numbers = [_number(r["metrics"].get(m)) for m in MEASURED]
+            numbers = [error_text(r), *(_number(r["metrics"].get(m)) for m in MEASURED)]
             table.add_row(
                 *_identity(r, group),
                 _outcome(r),
@@ -64,7 +71,7 @@ def print_comparison(console: Console, records: Sequence[Record]) -> None:
         fastest = min((r["cost"]["seconds"] for r in group if is_completed(r)), default=math.nan)
         table = _table(name, header, right_from=5)
         for r in sorted(group, key=lambda r: (not is_completed(r), error(r))):
-            measured = (f"{r['t_end']:.4g}", _number(error(r)), *_times(r, fastest))
+            measured = (f"{r['t_end']:.4g}", error_text(r), *_times(r, fastest))
             table.add_row(letters[engine_and_family(r)], *_identity(r, group), _outcome(r), *measured)
         console.print(table)
         console.print(scatter(group, letters))

@@ -12,8 +12,9 @@ from crosscheck.conformance.closed_forms import CLOSED_FORMS, Exact
 from crosscheck.conformance.features import feature_scenes
 from crosscheck.engine import Cannot, Setting
 from crosscheck.judge.metrics import error_series, in_scene_order
+from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.tolerances import OWN_ACCURACY, SAME_MOTION
-from crosscheck.judge.truth import truth_for
+from crosscheck.judge.truth import NoSolution, truth_for
 from crosscheck.processes.pool import Observation, capabilities, observe, run_isolated
 from mbref.scene import Scene
 from mbref.scenes import SCENES
@@ -38,11 +39,12 @@ class Broken(Exception):
 @dataclass(frozen=True)
 class Specimen:
     """A scene of the suite; ``exact`` gives its poses where a formula does, ``related`` asks for the
-    metamorphic relations too."""
+    metamorphic relations too, ``reference_time`` is CPU time (s) for a scene without a closed form."""
 
     scene: Scene
     exact: Exact | None = None
     related: bool = False
+    reference_time: float = SECONDS
 
 
 def specimens() -> list[Specimen]:
@@ -147,10 +149,14 @@ def difference(scene: Scene, first: Trajectory, second: Trajectory) -> float:
 
 
 def exact_motion(specimen: Specimen, times: np.ndarray) -> Trajectory | None:
-    """Exact poses at times (k,); None where the suite knows none. Velocities of a formula are NaN."""
+    """Exact poses at times (k,); None where there is neither formula nor reference. Velocities of a formula
+    are NaN."""
     if specimen.exact is None:
-        truth = truth_for(specimen.scene)
-        return None if truth is None else truth.poses(times)
+        truth = truth_for(specimen.scene, specimen.reference_time)
+        try:
+            return None if truth is None else truth.poses(times)
+        except NoSolution:
+            return None
     position, orientation = specimen.exact(times)
     unknown = np.full_like(position, np.nan)
     names = tuple(body.name for body in specimen.scene.body)

@@ -13,10 +13,10 @@ from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
 METHODS = (
-    "alf-dual+projection, own code",
+    "alf-dual+projection, specialised",
     "alf-dual+projection",
-    "lm2+projection, own code",
-    "kinematic, own code",
+    "lm2+projection, specialised",
+    "kinematic, specialised",
     "kinematic",
     "mpi-svd+partitioning",
     "mpi-svd+projection",
@@ -25,7 +25,7 @@ METHODS = (
     "lm2+projection",
 )
 KINEMATIC = "kinematic"  # of driven scenes; integrates nothing, so has no tolerance
-OWN_CODE = ", own code"  # machine code of the scene, made before the clock runs
+SPECIALISED = ", specialised"  # machine code of the scene, made before the clock runs
 LOADS = ("moment", "force", "spring", "torsion_spring")
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-10, 1e-11)
 
@@ -73,12 +73,12 @@ class Mbref(Engine):
         if family.startswith(KINEMATIC) and undriven_freedoms(scene) > 0:
             return False
         method = _method(family)
-        if family.endswith(OWN_CODE):
+        if family.endswith(SPECIALISED):
             return not why_no_code(scene, method)
         return scene.counts().redundant == 0 or method.formulation.handles_redundancy
 
     def has_family(self, family: str) -> bool:
-        from mbref.simulation.method import MethodError
+        from mbref.method import MethodError
 
         try:
             _method(family)
@@ -106,14 +106,14 @@ class Mbref(Engine):
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         from mbref.simulation.simulate import Limits, simulate
 
-        code = "specialised" if setting.family.endswith(OWN_CODE) else "generic"
+        code = "specialised" if setting.family.endswith(SPECIALISED) else "generic"
         return simulate(scene, _method(setting.family), times, Limits(code=code, **setting.options))
 
 
 def _method(family: str):
-    from mbref.simulation.method import Method
+    from mbref.method import Method
 
-    return Method.parse(family.removesuffix(OWN_CODE))
+    return Method.parse(family.removesuffix(SPECIALISED))
 
 
 ENGINE = Mbref()

@@ -35,11 +35,14 @@ class Metric:
 
 
 def measure(scene: Scene, trajectory: Trajectory, truth: Truth | None = None) -> dict[str, float | None]:
-    """Every metric of a trajectory by name; ValueError when its bodies are not the scene's."""
+    """Every metric of a trajectory by name, and ``error_bound``: how far the truth may be off, None without
+    one.  Raises ValueError when the bodies are not the scene's."""
     trajectory = in_scene_order(scene, trajectory)
     exact = exact_motion(trajectory, truth)
     with np.errstate(all="ignore"):  # states that are not finite are told by the metrics, not by warnings
-        return {name: metric.function(scene, trajectory, exact) for name, metric in METRICS.items()}
+        found = {name: metric.function(scene, trajectory, exact) for name, metric in METRICS.items()}
+    known = exact is not None and truth is not None
+    return found | {"error_bound": exact.settings.get("bound", truth.accuracy) if known else None}
 
 
 def exact_motion(trajectory: Trajectory, truth: Truth | None) -> Trajectory | None:

@@ -8,7 +8,8 @@ from statistics import median
 
 from crosscheck.engine import engine
 from crosscheck.judge.model_identity import gate, gate_times
-from crosscheck.judge.truth import truth_for
+from crosscheck.judge.reference.reference import SECONDS
+from crosscheck.judge.truth import NoSolution, truth_for
 from crosscheck.processes.pool import ChildFailed, time_interleaved
 from crosscheck.study.grid import Case, Record, settings
 from crosscheck.study.record_view import is_completed
@@ -23,11 +24,14 @@ def identity_cases(scene: Scene, engines: Sequence[str], time_limit: float) -> l
     return [Case(scene, gate_times(scene), name, settings(name, scene)[-1], time_limit) for name in able]
 
 
-def model_difference(scene: Scene, records: Sequence[Record]) -> str | None:
+def model_difference(scene: Scene, records: Sequence[Record], reference_time: float = SECONDS) -> str | None:
     """The first field in which the records of `identity_cases` differ from the truth where there is one, else
     from the first of them, as a sentence; None when all agree."""
-    truth = truth_for(scene)
-    exact = [] if truth is None else [truth.poses(gate_times(scene))]
+    truth = truth_for(scene, reference_time)
+    try:
+        exact = [] if truth is None else [truth.poses(gate_times(scene))]
+    except NoSolution:
+        exact = []
     found = gate(scene, [*exact, *(Trajectory.from_record(scene.name, record) for record in records)])
     return None if found is None else str(found)
 

@@ -19,7 +19,8 @@ import numpy as np
 import mbref
 from crosscheck.engine import Cannot, Setting, engine
 from crosscheck.judge import metrics
-from crosscheck.judge.truth import truth_for
+from crosscheck.judge.reference.reference import SECONDS
+from crosscheck.judge.truth import Truth, truth_for
 from crosscheck.processes.child import stop_all
 from crosscheck.processes.pool import end_idle, run_isolated
 from crosscheck.processes.serve import run_once
@@ -37,13 +38,15 @@ Progress = Callable[[int, int, Record], None]  # cases done, cases in all, the r
 
 
 class Case(NamedTuple):
-    """One run of a study; ``time_limit`` is wall time (s), without imports and compiling."""
+    """One run of a study; ``time_limit`` is wall time (s), without imports and compiling, ``reference_time``
+    what the reference may take of CPU time (s) where the scene has no closed form."""
 
     scene: Scene
     times: np.ndarray
     engine: str
     setting: Setting
     time_limit: float = TIME_LIMIT
+    reference_time: float = SECONDS
 
 
 class Unable(NamedTuple):
@@ -147,7 +150,7 @@ def _record(case: Case, trajectory: Trajectory) -> Record:
         **trajectory.to_record(),
         "family": case.setting.family,
         "time_limit": case.time_limit,
-        "metrics": metrics.measure(case.scene, trajectory, _truth(case.scene)),
+        "metrics": metrics.measure(case.scene, trajectory, _truth(case.scene, case.reference_time)),
         "seed": 0,
         "versions": versions(),
         "machine": machine(),
@@ -202,8 +205,8 @@ def _version(engine_name: str) -> str:
 
 
 @functools.lru_cache(maxsize=32)
-def _truth(scene: Scene) -> Any:
-    return truth_for(scene)
+def _truth(scene: Scene, reference_time: float) -> Truth | None:
+    return truth_for(scene, reference_time)
 
 
 def _installed(package: str) -> str | None:

@@ -46,6 +46,14 @@ def error(record: Record) -> float:
     return math.inf if value is None or math.isnan(value) else value
 
 
+def error_text(record: Record) -> str:
+    """The error of a record as shown: ``< 3e-12`` below what the truth may be off itself, – without one."""
+    value, bound = error(record), record["metrics"].get("error_bound") or 0.0
+    if not math.isfinite(value):
+        return "–"
+    return f"< {bound:.0e}" if value < bound else f"{value:.2e}"
+
+
 def engine_and_family(record: Record) -> tuple[str, str]:
     """Engine and family."""
     return record["engine"], record["family"]

@@ -1,4 +1,4 @@
-"""What a scene is: counts, rank, redundant rows, which reactions are unique, how far from singular."""
+"""Diagnosis of a scene: counts, rank, redundant rows, unique reactions, distance from singular."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Counts:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Beyond counts, at t = 0."""
+    """Counts, redundancy by joint and the distance from a singular position, at t = 0."""
 
     counts: Counts
     redundant_by_joint: dict[str, int]  # rows that take part in a redundancy; their reactions are not unique

@@ -21,7 +21,7 @@ OPEN_WEIGHT, REPEATS = 1e-4, 5  # weight of open velocities beside given ones, a
 
 @dataclass(frozen=True)
 class Start:
-    """A consistent state and how far the scene's own data was from it."""
+    """A consistent state and the violation of the scene's data before correction."""
 
     q: np.ndarray  # (7 nb,)
     v: np.ndarray  # (6 nb,)
@@ -127,7 +127,7 @@ def _velocities(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]:
     """Velocities that meet Φ_q v = ν, and how far the given ones were from that.
 
     Among the solutions those nearest to the given velocities (angular ones times the scene's length);
-    what they leave open is least in the metric of M.
+    velocities left open are least in the metric of M.
     """
     v, given = given_velocities(model, q)
     if model.m > LARGE:
@@ -181,7 +181,7 @@ def _sparse_velocities(
 
 
 def _solutions(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The least-norm least-squares solution (n,), and an orthonormal basis (n, k) of what it leaves open."""
+    """The least-norm least-squares solution (n,), and an orthonormal basis (n, k) of the null space."""
     if not matrix.size:
         return np.zeros(matrix.shape[1]), np.eye(matrix.shape[1])
     u, values, vt = np.linalg.svd(matrix)

@@ -78,7 +78,7 @@ class Model:
     def sizes(self) -> dict[str, int]:
         """Sizes of the model's memory (see ``kernels.layout``)."""
         angles = max(1, int(np.sum(self.data.loads.angle >= 0)))
-        return {"nb": self.nb, "n": self.n, "m": self.m, "angles": angles, "dense_rows": 0}
+        return {"nb": self.nb, "n": self.n, "m": self.m, "angles": angles, "dense_rows": 0, "width": 12}
 
     def equations(self, sizes: Mapping[str, int] | None = None, **system: Any) -> Equations:
         """Fresh memory of an evaluation; ``system`` names fields of its System that are given."""
@@ -242,7 +242,7 @@ def _with_ground(scene: Scene) -> tuple[tuple[Body, ...], tuple[Joint, ...]]:
     return (*scene.body, body), (*scene.joint, hold)
 
 
-FRAME = "the fixed frame"  # what a modelled ground is held to
+FRAME = "the fixed frame"  # holds a modelled ground
 
 
 def _principal_axes(body: Body) -> tuple[np.ndarray, np.ndarray]:

@@ -21,7 +21,7 @@ AT_REST = Sine(amplitude=0.0, frequency=0.0, phase=0.0)
 def packed_drivers(drivers: Sequence[Driver]) -> Drivers:
     """All drivers, their polynomials filled up with zeros to the highest degree."""
     terms = max((len(driver.polynomial) for driver in drivers), default=1)
-    return stacked(Drivers, [_driver(driver, terms) for driver in drivers], {"degree": terms - 1})
+    return stacked(Drivers, [_driver(driver, terms) for driver in drivers], {"terms": terms})
 
 
 def _driver(driver: Driver, terms: int) -> Drivers:

@@ -89,9 +89,9 @@ def _static_rows(entries: np.ndarray, columns: np.ndarray, held: Sequence[Held])
 def held_by_rows(
     model: Model, start: Start, moving: np.ndarray, entries: np.ndarray
 ) -> tuple[list[Held], np.ndarray]:
-    """What rows hold of the velocities that move (n,) from the start, in the order found.
+    """Groups of statically determined rows and the active velocities (n,) that they hold, in the order found.
 
-    And which of the Jacobian's ``entries`` (m, 12) can be other than zero while it rests.
+    And the Jacobian's ``entries`` (m, 12) that can be other than zero while those velocities are zero.
     """
     can_rest = moving & (model.mass > 0)
     held, left = _found(model, start.q, moving, entries, can_rest)

@@ -1,4 +1,4 @@
-"""What the Moore–Penrose formulations share: Eq. 26 around the product D⁺ b.
+"""The common part of the Moore–Penrose formulations: Eq. 26 around the product D⁺ b.
 
     q̈ = q̈_unc + M^(-1/2) D⁺ (γ - Φ_q q̈_unc),   D = Φ_q M^(-1/2),   q̈_unc = M⁻¹ g
 

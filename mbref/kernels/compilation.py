@@ -93,7 +93,7 @@ class Exchangeable:
 
     @property
     def pointer(self) -> Callable:
-        """What is passed to a kernel: the compiled function, or the plain one without the JIT."""
+        """The function that kernels take: the compiled one, or the plain one without the JIT."""
         if self._compiled is None:
             self._say_compiling()
             with kept_in(CACHE):

@@ -77,7 +77,7 @@ class System(NamedTuple):
     inverse_root: Annotated[Vector, "n"]  # M^(-1/2); 1 where the mass is zero
     force: Annotated[Vector, "n"]  # g
     acceleration: Annotated[Vector, "n"]  # q̈
-    blocks: Annotated[Matrix, "m", 12]
+    blocks: Annotated[Matrix, "m", "width"]  # width = 12, or n where a dense matrix takes their place
     jacobian: Annotated[Matrix, "dense_rows", "n"]
     rhs: Annotated[Vector, "m"]
     multipliers: Annotated[Vector, "m"]  # λ
@@ -88,7 +88,7 @@ class System(NamedTuple):
 
 
 class Equations(NamedTuple):
-    """What one evaluation reads and writes."""
+    """Memory of one evaluation."""
 
     scene: SceneData
     frames: Frames
@@ -109,8 +109,8 @@ class State(NamedTuple):
 class Active(NamedTuple):
     """Which entries of q and of v are integrated: y = (q[coordinates], v[velocities])."""
 
-    coordinates: Annotated[Indices, 0]
-    velocities: Annotated[Indices, 0]
+    coordinates: Annotated[Indices, "active_coordinates"]
+    velocities: Annotated[Indices, "active_velocities"]
 
 
 class Symbolic(NamedTuple):
@@ -197,7 +197,7 @@ class Clock(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """What is recorded at the sample times."""
+    """States, accelerations and multipliers at the sample times."""
 
     coordinates: Annotated[Matrix, "k", "7*nb"]
     velocities: Annotated[Matrix, "k", "n"]

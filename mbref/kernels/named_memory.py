@@ -15,6 +15,7 @@ the NamedTuple itself.  The table and its arrays stay in place while kernels run
 from __future__ import annotations
 
 import functools
+import re
 import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Annotated, Any
@@ -141,7 +142,12 @@ def stacked(schema: type, rows: Sequence[Any], sizes: Mapping[str, int] | None =
 
 def _size(expression: str, sizes: Mapping[str, int]) -> int:
     """The length of a dimension, an expression in the sizes' names that the schema's author wrote."""
-    return int(eval(expression, {"max": max}, dict(sizes)))
+    return sizes[expression] if expression in sizes else int(eval(expression, {"max": max}, dict(sizes)))
+
+
+def _names(expression: str) -> set[str]:
+    """The sizes that an expression names."""
+    return set(re.findall(r"[a-z_]\w*", expression)) - {"max"}
 
 
 def record(values: Any) -> np.record:
@@ -150,14 +156,16 @@ def record(values: Any) -> np.record:
 
 
 class Packed:
-    """A schema or a record ready for kernels: ``argument`` is what they take.  Keep it while they run."""
+    """A schema or a record ready for kernels, which take ``argument``.  Keep it while they run."""
 
     def __init__(self, values: Any):
         self.values = values
         if isinstance(values, np.record):
             self.address = _record_address(values)
         else:
-            self.table = np.array(list(_words(values)), dtype=np.int64).reshape(-1, WORDS)
+            leaves = list(_leaves(values))
+            _check_sizes(leaves)
+            self.table = np.array([_words(leaf) for leaf in leaves], dtype=np.int64).reshape(-1, WORDS)
             self.address = self.table.ctypes.data
         self.argument = values if PLAIN else self
 
@@ -168,37 +176,72 @@ def _typeof_packed(value, context):
 
 
 def packed(values: Any) -> Packed:
-    """A schema or record for kernels; TypeError names the field whose array does not fit."""
+    """A schema or record for kernels; TypeError names the field that does not fit its declaration."""
     return Packed(values)
 
 
-def _words(values: Any) -> Iterator[tuple[int, int, int]]:
-    for field, value in zip(fields_of(type(values)).values(), values, strict=True):
-        kind = field.kind
-        if isinstance(kind, Named):
-            yield from _words(value)
-        elif isinstance(kind, types.Array):
-            _check(type(values), field, value)
-            yield value.ctypes.data, value.shape[0], value.shape[-1]
-        elif isinstance(kind, types.Record):
-            yield _record_address(value), 0, 0
-        elif isinstance(kind, types.FunctionType):
-            yield (0 if PLAIN else value.address), 0, 0
+class Leaf(typing.NamedTuple):
+    """A field that takes one row of the table, and its value."""
+
+    name: str
+    field: Field
+    value: Any
+
+
+def _leaves(values: Any) -> Iterator[Leaf]:
+    """All fields of a schema and of the schemas in it, each checked for its type."""
+    schema = type(values)
+    for field, value in zip(fields_of(schema).values(), values, strict=True):
+        name = f"{schema.__name__}.{field.name}"
+        if isinstance(field.kind, Named):
+            if type(value) is not field.kind.schema:
+                raise TypeError(f"{name}: needs {field.kind.schema.__name__}, got {type(value).__name__}")
+            yield from _leaves(value)
         else:
-            yield (0 if value is None else value.address), 0, 0
+            _check_type(name, field.kind, value)
+            yield Leaf(name, field, value)
+
+
+def _check_type(name: str, kind: types.Type, value: Any) -> None:
+    """TypeError unless an array or record has the bytes that its field declares."""
+    if isinstance(kind, types.Array):
+        fits = isinstance(value, np.ndarray) and str(value.dtype) == str(kind.dtype)
+        if not (fits and value.ndim == kind.ndim and value.flags.c_contiguous):
+            found = f"{value.dtype} {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
+            raise TypeError(f"{name}: needs a contiguous {kind}, got {found}")
+    elif isinstance(kind, types.Record) and from_dtype(getattr(value, "dtype", np.dtype("f8"))) != kind:
+        raise TypeError(f"{name}: needs the record that its schema declares, got {type(value).__name__}")
+
+
+def _check_sizes(leaves: Sequence[Leaf]) -> None:
+    """TypeError unless dimensions of one name have one length in all arrays."""
+    arrays = [leaf for leaf in leaves if isinstance(leaf.field.kind, types.Array)]
+    sizes: dict[str, int] = {}
+    for leaf in arrays:
+        for dimension, length in zip(leaf.field.shape, leaf.value.shape, strict=True):
+            if dimension.isidentifier() or not _names(dimension) <= sizes.keys():
+                sizes.setdefault(dimension, length)
+    for leaf in arrays:
+        declared = tuple(_size(dimension, sizes) for dimension in leaf.field.shape)
+        if declared != leaf.value.shape:
+            shape = ", ".join(leaf.field.shape)
+            raise TypeError(f"{leaf.name}: ({shape}) is {declared} here, got {leaf.value.shape}")
+
+
+def _words(leaf: Leaf) -> tuple[int, int, int]:
+    """A row of the table: address, rows and columns."""
+    kind, value = leaf.field.kind, leaf.value
+    if isinstance(kind, types.Array):
+        return value.ctypes.data, value.shape[0], value.shape[-1]
+    if isinstance(kind, types.Record):
+        return _record_address(value), 0, 0
+    if isinstance(kind, types.FunctionType):
+        return (0 if PLAIN else value.address), 0, 0
+    return (0 if value is None else value.address), 0, 0
 
 
 def _record_address(values: np.record) -> int:
-    return values.__array_interface__["data"][0]
-
-
-def _check(schema: type, field: Field, value: np.ndarray) -> None:
-    """TypeError unless an array has the type of its field: wrong bytes are memory corruption."""
-    kind = field.kind
-    fits = isinstance(value, np.ndarray) and str(value.dtype) == str(kind.dtype) and value.ndim == kind.ndim
-    if not fits or not value.flags.c_contiguous:
-        found = f"{value.dtype} {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
-        raise TypeError(f"{schema.__name__}.{field.name}: needs a contiguous {kind}, got {found}")
+    return int(values.__array_interface__["data"][0])
 
 
 @infer_getattr

@@ -42,7 +42,7 @@ class Drivers(NamedTuple):
     amplitude: Annotated[Vector, "d"]
     frequency: Annotated[Vector, "d"]
     phase: Annotated[Vector, "d"]
-    polynomial: Annotated[Matrix, "d", "degree + 1"]
+    polynomial: Annotated[Matrix, "d", "terms"]
 
 
 class Loads(NamedTuple):

@@ -46,7 +46,7 @@ def lu_solve(a, n, pivots, b):
         for j in range(k):
             b[k] -= a[k, j] * b[j]
     for k in range(n - 1, -1, -1):
-        for j in range(n - 1, k, -1):  # what was found last comes last
+        for j in range(n - 1, k, -1):  # the entry found last is used last
             b[k] -= a[k, j] * b[j]
         b[k] /= a[k, k]
 
@@ -164,5 +164,5 @@ def cholesky_solve(a, n, b):
     for k in range(n):
         b[k] *= a[k, k]
     for k in range(n - 1, -1, -1):
-        for j in range(n - 1, k, -1):  # what was found last comes last
+        for j in range(n - 1, k, -1):  # the entry found last is used last
             b[k] -= a[k, j] * b[j]

@@ -38,7 +38,7 @@ class Redundancy:
 
         def inverted(x: np.ndarray) -> np.ndarray:
             for _ in range(2):
-                x = x - inverse(x) / ALPHA  # what is left of x is in the row space
+                x = x - inverse(x) / ALPHA  # the remainder of x is in the row space
             return inverse(x)
 
         start = np.random.default_rng(1).normal(size=m)

@@ -9,15 +9,24 @@ from functools import partial
 from pathlib import Path
 
 from mbref.scene import Scene, SceneError
+from mbref.scenes.andrews_squeezer import andrews_squeezer
+from mbref.scenes.bennett import bennett
+from mbref.scenes.bricard import bricard
 from mbref.scenes.five_bar import five_bar, five_bar_gravity
+from mbref.scenes.flyball_governor import flyball_governor
 from mbref.scenes.four_bar import four_bar, four_bar_gravity
 from mbref.scenes.four_bar_chain import four_bar_chain
+from mbref.scenes.h_frame import h_frame
+from mbref.scenes.heavy_top import heavy_top
 from mbref.scenes.planar_slider_crank import (
     planar_slider_crank,
     planar_slider_crank_equal,
     planar_slider_crank_gravity,
     planar_slider_crank_heavy,
 )
+from mbref.scenes.point_pendulum import point_pendulum
+from mbref.scenes.rigid_slider_crank import rigid_slider_crank
+from mbref.scenes.sarrus import sarrus
 from mbref.scenes.slider_crank_chain import slider_crank_chain
 from mbref.scenes.spatial_slider_crank import (
     spatial_slider_crank,
@@ -41,6 +50,17 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "planar_slider_crank_gravity": planar_slider_crank_gravity,
     "four_bar_chain": four_bar_chain,
     "slider_crank_chain": slider_crank_chain,
+    "point_pendulum": point_pendulum,
+    "andrews_squeezer": andrews_squeezer,
+    "bricard": bricard,
+    "bricard_thin": partial(bricard, True, "bricard_thin"),
+    "flyball_governor": flyball_governor,
+    "rigid_slider_crank": rigid_slider_crank,
+    "rigid_slider_crank_middle": partial(rigid_slider_crank, True, "rigid_slider_crank_middle"),
+    "heavy_top": heavy_top,
+    "bennett": bennett,
+    "sarrus": sarrus,
+    "h_frame": h_frame,
 }
 
 # of any number of loops, two unless said: four_bar_chain[40]

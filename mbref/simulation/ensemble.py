@@ -25,8 +25,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbref import __version__, records
+from mbref.method import DEFAULT, Method
 from mbref.scene import Scene
-from mbref.simulation.method import DEFAULT, Method
 from mbref.simulation.simulate import Limits, checked_times, prepare, simulate
 from mbref.trajectory import Outcome, Trajectory
 
@@ -46,10 +46,10 @@ def ensemble(
     ``scenes`` may be a generator: a few are drawn ahead of those that have ended.  ``executor`` is any of
     concurrent.futures; by default one process a core, for which a script needs the usual
     ``if __name__ == "__main__"``.  With ``path`` each result is appended to that file (JSON lines) before it
-    is handed out, and what the file already has of the same scene, times, method and limits is not run
-    again.  A run whose process is killed has the outcome CRASHED; it is not stored, so that it is run again.
-    Raises what ``simulate`` raises, for the first scene that cannot be simulated, and RecordsError or OSError
-    for a file that is none of records or cannot be written.
+    is handed out, and a run of the same scene, times, method and limits in the file is not repeated.  A run
+    whose process is killed has the outcome CRASHED; it is not stored, so that it is run again.  Raises the
+    errors of ``simulate`` for the first scene that cannot be simulated, and RecordsError or OSError for a
+    file that holds something else than records or cannot be written.
     """
     limits, times = limits or Limits(), checked_times(times)
     if executor is None:
@@ -58,7 +58,7 @@ def ensemble(
         return
     known = records.opened(path)  # before anything is compiled or run for it
     prepare(Method.parse(method))  # once, not in every process at the same time
-    pending: dict[Future, Job] = {}
+    pending: dict[Future[Trajectory], Job] = {}
     try:
         for place, scene in enumerate(scenes):
             key = _key(scene, times, method, limits)
@@ -88,7 +88,7 @@ class Processes(Executor):
         for _ in range(workers):
             self._idle.put(_process())
 
-    def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future:
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
         """The future of a call; BrokenExecutor is its exception where its process is killed."""
         return self._threads.submit(self._call, function, arguments, named)
 
@@ -116,8 +116,8 @@ def processes(workers: int | None = None) -> Processes:
 
 
 def _process() -> ProcessPoolExecutor:
-    quiet = {"initializer": signal.signal, "initargs": (signal.SIGINT, signal.SIG_IGN)}
-    return ProcessPoolExecutor(1, get_context("spawn"), **quiet)
+    quiet = (signal.SIGINT, signal.SIG_IGN)
+    return ProcessPoolExecutor(1, get_context("spawn"), initializer=signal.signal, initargs=quiet)
 
 
 class Job(NamedTuple):
@@ -130,7 +130,9 @@ class Job(NamedTuple):
     limits: Limits
 
 
-def _ended(pending: dict[Future, Job], path: str | Path | None) -> Iterator[tuple[int, Trajectory]]:
+def _ended(
+    pending: dict[Future[Trajectory], Job], path: str | Path | None
+) -> Iterator[tuple[int, Trajectory]]:
     """The results there are, at least one, stored and taken off the pending ones."""
     ended = []
     for future in wait(pending, return_when=FIRST_COMPLETED).done:

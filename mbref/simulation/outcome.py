@@ -54,7 +54,7 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Trajec
 
 
 def _message(run: Run, status: int) -> str:
-    """One sentence: what ended the run, where; or what was corrected at its start."""
+    """One sentence: the cause and time of the end; or the correction of the start."""
     if status == DONE:
         crossings = int(run.memory.equations.system.counts.crossings)
         passed = f"singular positions passed: {crossings}" if crossings else ""

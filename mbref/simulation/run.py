@@ -33,9 +33,9 @@ from mbref.kernels.layout import (
 from mbref.kernels.named_memory import allocate, packed, record
 from mbref.kernels.scene_layout import SceneData
 from mbref.linear_algebra.symbolic_factorisation import empty_factor
+from mbref.method import Method
 from mbref.scene import Scene, SceneError
 from mbref.simulation.limits import AUTO, SPECIALISED, Limits
-from mbref.simulation.method import Method
 from mbref.simulation.stepping import PAUSED, advance_to_end
 from mbref.specialised import Part, Specialised, Untraceable, specialise, with_specialised_code
 from mbref.stabilisation.base import Stabilisation

@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from mbref.method import Method, MethodError
 from mbref.scene import Scene
 from mbref.simulation.limits import SPECIALISED, Limits
-from mbref.simulation.method import Method, MethodError
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.run import Run, prepare
 from mbref.specialised import Untraceable

@@ -24,7 +24,7 @@ from mbref.kernels.layout import OK, Active, Addresses, SparseFactor, State, Sys
 from mbref.kernels.named_memory import Packed, allocate, packed, record
 from mbref.linear_algebra.minimum_norm import NEVER
 from mbref.linear_algebra.sparse_cholesky import find_squared_pivots
-from mbref.simulation.method import Method
+from mbref.method import Method
 from mbref.specialised.kept_code import code_of
 from mbref.specialised.machine_code import Code, Piece, processor
 from mbref.specialised.tracing import Record, Untraceable, inputs, numbers, plain
@@ -143,8 +143,8 @@ def project_piece(state: RecordingState) -> Piece:
 def specialise(model: Model, method: Method, rank_tolerance: float, start: Start, part: Part) -> Specialised:
     """The code of a scene from its start, recorded and compiled, or as kept from an earlier run.
 
-    Raises Untraceable where the formulation decides at run time what it does, the scene is too large, or
-    there is no JIT.
+    Raises Untraceable where the formulation chooses pivots at run time, the scene is too large, or there is
+    no JIT.
     """
     if PLAIN:
         raise Untraceable("without the JIT there is no machine code")

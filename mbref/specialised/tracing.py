@@ -20,7 +20,7 @@ COMPARISONS = {">": "ogt", ">=": "oge", "<": "olt", "<=": "ole"}  # as LLVM name
 
 
 class Untraceable(Exception):
-    """A kernel does what cannot be recorded."""
+    """A kernel that cannot be recorded, with the reason."""
 
 
 class Record:

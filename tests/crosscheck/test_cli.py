@@ -69,6 +69,29 @@ def test_json_and_the_design_s_schema(capsys, still):
         assert record["metrics"], "no metric"
 
 
+def two_blocks(folder: Path) -> str:
+    """A scene of no known family that stays where it is, as the fake engine says."""
+    path = folder / "two.toml"
+    bodies = [
+        Body(name=n, mass=2.0, inertia=(1.0, 1.0, 1.0), position=(1.0, y, 3.0))
+        for n, y in zip("ab", (0.0, 2.0), strict=True)
+    ]
+    Scene(name="two", body=tuple(bodies), duration=0.5).save(path)
+    return str(path)
+
+
+def test_a_scene_of_no_family_is_judged_by_its_reference(capsys, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    asked = ("run", two_blocks(tmp_path), "--engine", FAKE, "--setting", "plain", "--samples", "3")
+    _, out, _ = run_main(capsys, *asked, "--json")
+    measured = [record["metrics"] for record in json.loads(out)["records"]]
+    assert [m["error"] for m in measured] == [0.0, 0.0] and measured[0]["error_bound"] == 1e-14, measured
+    assert run_main(capsys, *asked)[1].count("< 1e-14") == 2, "an error below the bound is shown as the bound"
+    _, out, _ = run_main(capsys, *asked, "--reference-time", "0", "--json")
+    assert json.loads(out)["records"][0]["metrics"]["error"] is None
+    assert run_main(capsys, *asked, "--reference-time", "-1")[0] == 2
+
+
 def test_json_of_several_scenes_and_a_list_in_the_order_asked(capsys, tmp_path):
     paths = [saved(tmp_path, "b"), saved(tmp_path, "a")]
     status, out, _ = run_main(capsys, "run", *paths, "--engine", FAKE, "--samples", "3", "--json")

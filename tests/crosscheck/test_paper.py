@@ -14,10 +14,10 @@ from crosscheck.judge.truth import truth_for
 from crosscheck.paper import runs, settings, singular
 from crosscheck.paper.cells import CELLS, CLOSE, COUNTS_III, COUNTS_IV, Cell, Match, match
 from crosscheck.paper.runs import Label
+from mbref.method import Method
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.scenes.four_bar import four_bar
-from mbref.simulation.method import Method
 from mbref.simulation.simulate import Limits, simulate
 from mbref.trajectory import Outcome, Trajectory
 

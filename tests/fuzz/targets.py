@@ -18,10 +18,10 @@ from pathlib import Path
 
 from mbref.cli import main as mbref_main
 from mbref.equations.diagnosis import diagnose
+from mbref.method import Method, MethodError
 from mbref.records import strict_json
 from mbref.scene import Scene, SceneError
 from mbref.scenes import SCENES
-from mbref.simulation.method import Method, MethodError
 from mbref.simulation.simulate import Limits, prepare, simulate
 from tests.fuzz import mutations
 

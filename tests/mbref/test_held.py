@@ -6,9 +6,9 @@ import pytest
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from mbref.equations.active_coordinates import active_entries
 from mbref.equations.static_constraints import SMALL, _perpendicular, held_by_rows
+from mbref.method import Method
 from mbref.scene import Body, Driver, Fixed, Revolute, Scene, Spring, Translational
 from mbref.scenes import SCENES, find_scene
-from mbref.simulation.method import Method
 from mbref.simulation.run import Run
 from mbref.simulation.simulate import Limits, simulate
 

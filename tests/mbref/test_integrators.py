@@ -14,9 +14,9 @@ from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.integrators.dop853 import ERROR3, ERROR5, STAGES, A, B, sum_with
+from mbref.method import Method
 from mbref.scene import Body, Revolute, Scene, Spring, Translational
 from mbref.scenes import SCENES
-from mbref.simulation.method import Method
 from mbref.simulation.run import Run
 from mbref.simulation.simulate import Limits, simulate
 

@@ -8,9 +8,9 @@ from crosscheck.judge.truth import truth_for
 from mbref.equations.degrees_of_freedom import undriven_freedoms
 from mbref.equations.initial_state import corrected_positions, displaced
 from mbref.equations.model import Model
+from mbref.method import MethodError
 from mbref.scene import SceneError
 from mbref.scenes import SCENES
-from mbref.simulation.method import MethodError
 from mbref.simulation.simulate import Limits, simulate
 
 DRIVEN = ["four_bar", "four_bar_quarter", "four_bar_straight", "five_bar", "spatial_slider_crank_driven"]

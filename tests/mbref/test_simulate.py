@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 
+from mbref.method import Method, MethodError
 from mbref.scene import (
     Body,
     Cylindrical,
@@ -25,7 +26,6 @@ from mbref.scene import (
     Universal,
 )
 from mbref.scenes import SCENES
-from mbref.simulation.method import Method, MethodError
 from mbref.simulation.simulate import Limits, simulate
 
 FINE = Limits(rtol=1e-11)

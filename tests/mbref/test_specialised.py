@@ -1,4 +1,4 @@
-"""Machine code of a scene's own against the kernels it is traced from."""
+"""Specialised code against the kernels it is recorded from."""
 
 import ctypes
 import json
@@ -12,9 +12,9 @@ from mbref.equations.evaluation import assemble_system
 from mbref.kernels.compilation import CACHE
 from mbref.kernels.layout import OK, Addresses
 from mbref.linear_algebra.vectors import larger, largest
+from mbref.method import Method, MethodError
 from mbref.scene import Body, Fixed, Force, Revolute, Scene, Spring, TorsionSpring
 from mbref.scenes import SCENES, find_scene
-from mbref.simulation.method import Method, MethodError
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.run import Run
 from mbref.simulation.simulate import Limits, simulate
@@ -28,7 +28,7 @@ CALL = ctypes.CFUNCTYPE(ctypes.c_longlong, ctypes.c_double, *[ctypes.c_void_p] *
 
 
 def runs(scene, method, end=0.02, **limits):
-    """The same run by the kernels and by the scene's own code."""
+    """The same run by the general kernels and by specialised code."""
     times = np.linspace(0.0, end, 5)
     return [
         simulate(scene, method, times, Limits(code=code, **limits)) for code in ("generic", "specialised")

@@ -15,8 +15,14 @@ ALLOWED = {  # package → the names of mbref that it may import
 ADAPTER = "crosscheck.engines.mbref"  # the one module that may import all of mbref
 
 FLOORS = {  # lowest first; an arrow within a floor or downwards
+    "mbref": (
+        ["rotations", "records", "trajectory"],
+        ["scene", "scene_fields", "scene_joints", "scene_loads", "scene_validation"], ["scenes", "variation"],
+        ["kernels"], ["linear_algebra"], ["equations"], ["formulations"], ["stabilisation"], ["integrators"],
+        ["method"], ["specialised"], ["simulation"], ["cli"], ["__main__"],
+    ),
     "crosscheck": (
-        ["engine"], ["judge"], ["engines"], ["processes"], ["study"], ["conformance"], ["paper"], ["cli"],
+        ["judge"], ["engine"], ["engines"], ["processes"], ["study"], ["conformance"], ["paper"], ["cli"],
         ["__main__"],
     ),
     "reports": (

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from imports import sources
 
-PACKAGES = ("crosscheck", "reports")
+PACKAGES = ("mbref", "crosscheck", "reports")
 MEDIAN, MOST, SHARE = 7, 20, 0.9  # lines of a function's body, and how many have at most MOST
 
 

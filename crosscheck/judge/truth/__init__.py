@@ -1,7 +1,7 @@
-"""Truths: the exact motion of scenes of known families, recognised from a scene's data alone.
+"""Truths: the exact motion of scenes of known families, recognised from their data, and references of others.
 
-A truth is a closed form, or a high-precision solution of an equation reduced to the true degrees of
-freedom; it shares no code with the model it judges.
+A truth is a closed form, a high-precision solution of an equation reduced to the true degrees of freedom, or
+the reference that two formulations agree on; it shares no code with the model it judges.
 """
 
 from __future__ import annotations
@@ -11,12 +11,14 @@ from typing import Protocol
 
 import numpy as np
 
+from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth.crankshaft import crankshaft
 from crosscheck.judge.truth.free_body import free_body
 from crosscheck.judge.truth.one_dof import Path, one_dof
 from crosscheck.judge.truth.parallelogram import parallelogram
 from crosscheck.judge.truth.picard import NoSolution
 from crosscheck.judge.truth.planar_slider_crank import planar_slider_crank
+from crosscheck.judge.truth.reference_truth import ReferenceTruth
 from crosscheck.judge.truth.slider import slider
 from crosscheck.judge.truth.spatial_slider_crank import spatial_slider_crank
 from mbref.scene import Scene
@@ -31,7 +33,7 @@ PATHS: tuple[Callable[[Scene], Path | None], ...] = (
 )
 
 
-__all__ = ["NoSolution", "Truth", "truth_for"]
+__all__ = ["NoSolution", "Truth", "closed_form", "truth_for"]
 
 
 class Truth(Protocol):
@@ -46,7 +48,13 @@ class Truth(Protocol):
         """Poses, velocities and accelerations (world) at times (k,) ≥ 0, double precision."""
 
 
-def truth_for(scene: Scene) -> Truth | None:
+def truth_for(scene: Scene, reference_time: float = SECONDS) -> Truth | None:
+    """The truth of a scene: of its family if that is known, else a reference, for which ``poses`` takes up to
+    so many CPU seconds when first asked; None where that is 0."""
+    return closed_form(scene) or (ReferenceTruth(scene, reference_time) if reference_time else None)
+
+
+def closed_form(scene: Scene) -> Truth | None:
     """The truth of a scene of a known family, or None."""
     for family in PATHS:
         if truth := one_dof(scene, family(scene)):

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from mbref.stabilisation.base import Stabilisation
 
 DEFAULT = "alf-dual+projection/dop853"
 KINEMATIC = "alf-dual+projection/predictor"  # Newton–Raphson on Eqs. 1 to 3, see integrators/predictor.py
+
+
+Part = TypeVar("Part", Formulation, Stabilisation, Integrator)
 
 
 class MethodError(Exception):
@@ -47,7 +51,7 @@ class Method:
         return self.formulation, self.stabilisation, self.integrator
 
     def options_of(self, part: Formulation | Stabilisation | Integrator) -> dict[str, float]:
-        """A part's options, its defaults overridden by what the name says."""
+        """A part's options, its defaults overridden by the name's."""
         return {**part.options, **self.options.get(part.name, {})}
 
     def settings(self, rank_tolerance: float) -> Settings:
@@ -56,7 +60,8 @@ class Method:
         for part in (self.formulation, self.stabilisation):
             if part.feedback is not None:
                 gains += part.feedback(self.options_of(part))
-        return Settings(*map(float, gains), rank_tolerance=rank_tolerance)
+        velocity_gain, position_gain = map(float, gains)
+        return Settings(velocity_gain, position_gain, rank_tolerance)
 
     def packed_options(self, part: Formulation | Stabilisation) -> Packed | None:
         """A part's own numbers for its kernels."""
@@ -64,7 +69,7 @@ class Method:
 
     @staticmethod
     def parse(name: str) -> Method:
-        """The method of a name, "kinematic" among them; raises MethodError with what is known."""
+        """The method of a name, "kinematic" among them; raises MethodError with the known names."""
         name = KINEMATIC if name == "kinematic" else name
         head, _, integrator = name.partition("/")
         formulation, plus, stabilisation = _split_outside_brackets(head)
@@ -95,7 +100,7 @@ def _text(name: str, options: Mapping[str, float]) -> str:
     return name + (f"[{','.join(f'{k}={v:g}' for k, v in options.items())}]" if options else "")
 
 
-def _part(text: str, table: Mapping, kind: str, options: dict[str, dict[str, float]]):
+def _part(text: str, table: Mapping[str, Part], kind: str, options: dict[str, dict[str, float]]) -> Part:
     """The table's entry, its bracketed options put into ``options``."""
     match = re.fullmatch(r"([\w-]+)(?:\[(.*)\])?", text.strip())
     name = match[1] if match else text
@@ -117,7 +122,7 @@ def _part(text: str, table: Mapping, kind: str, options: dict[str, dict[str, flo
     return part
 
 
-def _positional(part, position: int) -> str:
+def _positional(part: Formulation | Stabilisation | Integrator, position: int) -> str:
     names = list(part.options)
     return names[position] if position < len(names) else f"number {position + 1}"
 

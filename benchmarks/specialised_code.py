@@ -1,10 +1,10 @@
-"""What machine code of a scene's own costs to make and to load, and after how many simulated seconds it pays.
+"""The cost of making and loading specialised code, and the simulated seconds after which it pays.
 
-    python benchmarks/own_code.py [SCENE …]
+    python benchmarks/specialised_code.py [SCENE …]
 
 Process CPU time.  Made, then loaded: in a fresh process each, of a scene whose first mass is changed in the
-last digits, so that no stored code fits.  Generic and own: milliseconds per simulated second at a tolerance
-of 1e-7, medians of REPEATS interleaved runs.
+last digits, so that no stored code fits.  General and specialised: milliseconds per simulated second at a
+tolerance of 1e-7, medians of REPEATS interleaved runs.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from statistics import median
 
 import numpy as np
 
+from mbref.method import Method
 from mbref.scene import Scene
 from mbref.scenes import find_scene
-from mbref.simulation.method import Method
 from mbref.simulation.simulate import Limits, simulate, why_no_code
 
 METHOD = "alf-dual+projection"

@@ -1,0 +1,1 @@
+"""References: the motion of any scene by two formulations that share nothing but the scene, and its bound."""

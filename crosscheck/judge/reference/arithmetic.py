@@ -1,0 +1,66 @@
+"""The numbers of a reference: double, extended (long double), or of any number of digits (python-flint).
+
+Formulas are written once, with NumPy's operators and np.sqrt, np.sin, np.cos, for arrays of any kind; arrays
+of many digits hold objects.  There only the midpoints of Arb's balls are kept from step to step, so that
+the evidence for the digits is the agreement of two formulations, not an enclosure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Arithmetic:
+    """One element type of arrays; ``eps`` is its rounding unit, ``digits`` set where elements are objects."""
+
+    name: str
+    eps: float
+    dtype: Any
+    digits: int = 0
+
+    def array(self, values: Any) -> np.ndarray:
+        """An array (any shape) of the arithmetic from doubles or from its own numbers; the doubles count
+        as exact."""
+        if not self.digits:
+            return np.array(values, dtype=self.dtype)
+        from flint import arb, ctx
+
+        ctx.dps = self.digits
+        given = np.array(values, dtype=object)
+        return _objects([x if isinstance(x, arb) else arb(float(x)) for x in given.ravel()], given.shape)
+
+    def number(self, value: Any) -> Any:
+        """One number of the arithmetic."""
+        return self.array(value)[()]
+
+    def zeros(self, *shape: int) -> np.ndarray:
+        """An array of zeros."""
+        return np.full(shape, self.number(0.0), dtype=self.dtype)
+
+    def settled(self, values: np.ndarray) -> np.ndarray:
+        """The same numbers without the radii of their balls, which grow from operation to operation."""
+        return _objects([x.mid() for x in np.ravel(values)], np.shape(values)) if self.digits else values
+
+
+DOUBLE = Arithmetic("double", float(np.finfo(float).eps), np.float64)
+EXTENDED = Arithmetic("long double", float(np.finfo(np.longdouble).eps), np.longdouble)  # double on some CPUs
+
+
+def many_digits(digits: int) -> Arithmetic:
+    """The arithmetic of so many decimal digits; ImportError where python-flint is not installed."""
+    return Arithmetic(f"{digits} digits", 10.0**-digits, object, digits)
+
+
+def doubles(values: np.ndarray) -> np.ndarray:
+    """The nearest doubles of an array of any arithmetic."""
+    return np.asarray(values).astype(float)
+
+
+def _objects(values: list[Any], shape: tuple[int, ...]) -> np.ndarray:
+    out = np.empty(len(values), dtype=object)
+    out[:] = values
+    return out.reshape(shape)

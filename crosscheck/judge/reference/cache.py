@@ -1,0 +1,66 @@
+"""References kept on disk: one file a scene, found by what determines the motion, and checked when read."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import io
+import json
+import os
+import tempfile
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from mbref.scene import Scene
+
+JUDGE = Path(__file__).parents[1]
+SOURCES = (
+    *sorted((JUDGE / "reference").glob("*.py")),
+    JUDGE / "constraints.py",
+    JUDGE / "joint_residuals.py",
+)
+DIGEST = hashlib.sha256().digest_size
+
+
+def load(scene: Scene) -> dict[str, np.ndarray]:
+    """The arrays kept for a scene; none where there is no whole file."""
+    try:
+        content = _path(scene).read_bytes()
+    except OSError:
+        return {}
+    body = content[DIGEST:]
+    if hashlib.sha256(body).digest() != content[:DIGEST]:
+        return {}
+    with contextlib.suppress(ValueError, zipfile.BadZipFile), np.load(io.BytesIO(body)) as arrays:
+        return dict(arrays)
+    return {}
+
+
+def save(scene: Scene, arrays: dict[str, np.ndarray]) -> None:
+    """Keep the arrays of a scene; a reader sees the old file or the new one, never a part."""
+    body, path = io.BytesIO(), _path(scene)
+    np.savez(body, **arrays)
+    with contextlib.suppress(OSError):  # a cache that cannot be written is no cache
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
+            file.write(hashlib.sha256(body.getvalue()).digest() + body.getvalue())
+        os.replace(file.name, path)
+
+
+def canonical(scene: Scene) -> str:
+    """What determines the motion of a scene, as JSON: all but its own name and duration."""
+    return json.dumps({**scene.to_dict(), "name": "", "duration": 0.0}, sort_keys=True)
+
+
+def _path(scene: Scene) -> Path:
+    root = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "mbref" / "references"
+    return root / hashlib.sha256((_version() + canonical(scene)).encode()).hexdigest()
+
+
+@functools.cache
+def _version() -> str:
+    """Hash of the code that makes references."""
+    return hashlib.sha256(b"".join(path.read_bytes() for path in SOURCES)).hexdigest()

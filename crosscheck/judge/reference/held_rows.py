@@ -1,0 +1,123 @@
+"""Which rows of a scene in natural coordinates are held, and their drivers as Taylor series.
+
+Redundant rows are left out: columns of Gᵀ are taken in the order of a QR factorisation with column pivoting.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy.linalg import qr
+
+from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
+from crosscheck.judge.reference.natural import NaturalCoordinates
+from crosscheck.judge.reference.natural_loads import convolved
+from crosscheck.judge.reference.saddle_point import Sparse
+from crosscheck.judge.tolerances import RANK
+from mbref.scene import Driver
+
+
+class HeldRows:
+    """Some m of a scene's rows (``numbers``), and the p products they are made of."""
+
+    def __init__(self, of: NaturalCoordinates, rows: Sequence[int]):
+        self.numbers = tuple(map(int, rows))
+        self._arithmetic, self._length = of.arithmetic, of.length
+        driven = [(self.numbers.index(k), k, row) for k, row in of.driven if k in self.numbers]
+        second = [of.second[k] for _, k, _ in driven if k in of.second]
+        self._c = of.c[list(self.numbers)]
+        self._moved = [(at, row.driver) for at, k, row in driven if k not in of.second]
+        turned = [(at, row.driver) for at, k, row in driven if k in of.second]
+        self._turned = [(at, len(self.numbers) + i, driver) for i, (at, driver) in enumerate(turned)]
+        self.products = [*self.numbers, *second]
+        u, w = of.u[self.products], of.w[self.products]
+        self.u, self.w, self.to_u, self.to_w = Sparse(u), Sparse(w), Sparse(u.T), Sparse(w.T)
+        self._dense = u, w
+
+    def drives(self, t: Any, terms: int) -> Drives:
+        """The rows' dependence on time about t, as series of so many terms."""
+        value = self._arithmetic.zeros(terms, len(self.numbers))
+        value[0] = self._c
+        for at, driver in self._moved:
+            value[:, at] = value[:, at] + driver_series(driver, t, terms, self._arithmetic) / self._length
+        angles = [(at, to, driver_series(d, t, terms, self._arithmetic)) for at, to, d in self._turned]
+        return Drives(value, [(at, to, *cos_sin_series(angle)) for at, to, angle in angles])
+
+    def gradient(self, x: np.ndarray, drives: Drives) -> np.ndarray:
+        """G (m, 3, n): derivatives of the rows by the coordinates x (3, n)."""
+        u, w = self._dense
+        products = self.w(x).T[:, :, None] * u[:, None, :] + self.u(x).T[:, :, None] * w[:, None, :]
+        return drives.combined(products[None], 0)
+
+    def unit_gradient(self, x: np.ndarray, t: Any) -> np.ndarray:
+        """G (m, 3 (n - 4)) in double precision, every row of length one, without the ground's columns."""
+        rows = doubles(self.gradient(x, self.drives(t, 1)))[:, :, :-4].reshape(len(self.numbers), -1)
+        return rows / np.linalg.norm(rows, axis=1, keepdims=True)
+
+
+class Drives:
+    """The rows of products y about one time: right-hand sides c (terms, m), and of driven angles
+    cos ψ y_row + sin ψ y_second."""
+
+    def __init__(self, c: np.ndarray, turns: list[tuple[int, int, np.ndarray, np.ndarray]]):
+        self.c, self._turns = c, turns
+
+    def combined(self, products: np.ndarray, k: int) -> np.ndarray:
+        """Order k of the rows (m, …) from series of the products (terms, p, …)."""
+        rows = products[k][: self.c.shape[1]].copy()
+        each = (-1,) + (1,) * (products.ndim - 2)
+        for at, second, cosine, sine in self._turns:
+            first = convolved(cosine.reshape(each), products[:, at], k)
+            rows[at] = first + convolved(sine.reshape(each), products[:, second], k)
+        return rows
+
+    def spread(self, multipliers: np.ndarray, k: int) -> np.ndarray:
+        """Order k of the products' factors (p,) from series of the rows' multipliers (terms, m)."""
+        factors = np.concatenate([multipliers[k], 0 * multipliers[k][: len(self._turns)]])
+        for at, second, cosine, sine in self._turns:
+            factors[at] = convolved(cosine, multipliers[:, at], k)
+            factors[second] = convolved(sine, multipliers[:, at], k)
+        return factors
+
+
+def independent(rows: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of independent rows among unit rows (m, n), in ascending order, and the pivots (min(m, n),)
+    relative to the first; weights (m,) near one decide between rows that do equally well."""
+    if not len(rows):
+        return np.zeros(0, dtype=int), np.zeros(0)
+    r, order = qr((rows * weights[:, None]).T, mode="r", pivoting=True, check_finite=False)
+    pivots = np.abs(np.diag(r)) / np.abs(r[0, 0])
+    return np.sort(order[: int((pivots > RANK).sum())]), pivots
+
+
+def driver_series(driver: Driver, t: Any, terms: int, arithmetic: Arithmetic) -> np.ndarray:
+    """Taylor coefficients (terms,) of a driver's value about t."""
+    c = list(arithmetic.array(driver.polynomial))
+    for i in range(len(c)):  # Horner's scheme, again and again: the polynomial of t + s
+        for j in range(len(c) - 2, i - 1, -1):
+            c[j] = c[j] + t * c[j + 1]
+    series = arithmetic.zeros(terms)
+    series[: len(c)] = c[:terms]
+    if driver.sine:
+        amplitude, frequency, phase = arithmetic.array(
+            [driver.sine.amplitude, driver.sine.frequency, driver.sine.phase]
+        )
+        angle = frequency * t + phase
+        sine, cosine = amplitude * np.sin(angle), amplitude * np.cos(angle)
+        for k in range(terms):
+            series[k] = series[k] + (sine, cosine, -sine, -cosine)[k % 4] * frequency**k / math.factorial(k)
+    return arithmetic.settled(series)
+
+
+def cos_sin_series(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Taylor coefficients of the cosine and the sine of a series (terms,)."""
+    cosine, sine = 0 * angle, 0 * angle
+    cosine[0], sine[0] = np.cos(angle[0]), np.sin(angle[0])
+    rate = angle[1:] * np.arange(1, len(angle))
+    for k in range(1, len(angle)):
+        cosine[k] = -(rate[:k] * sine[k - 1 :: -1]).sum() / k
+        sine[k] = (rate[:k] * cosine[k - 1 :: -1]).sum() / k
+    return cosine, sine

@@ -1,0 +1,185 @@
+"""Chebyshev–Picard panels: integrals of whole stretches of time at once, in any arithmetic.
+
+The rates at the Chebyshev points of a panel are interpolated and integrated exactly, and the iteration is
+repeated until it stands still (Clenshaw and Norton, Computer Journal 6, 1963; Bai and Junkins, Journal of
+the Astronautical Sciences 58, 2011).  Positions follow from the velocities of the same sweep, which about
+halves the number of sweeps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
+from crosscheck.judge.reference.crossing import bridged, singular_ahead, singular_time
+
+SWEEPS = 60  # Picard iterations before a panel is shortened
+MANY = 35  # a panel that took more is not followed by a longer one
+SETTLED = 2000.0  # rounding units of the last change, and of the end of the series
+BRIDGED = 1e4  # times more, across a singular position
+TELLING = 1e-3  # change below which the series tells how long a panel may be
+ROUGHLY = 1.2  # doubt in what the series of an iterate tells
+SPARE = 0.9  # of the length that the series could resolve
+LONGEST, SHORTER, SHORTEST = 1.6, 0.6, 0.5  # factors on the length of the next panel
+FLOOR = 1e-3  # of the largest column, below which a column counts as small
+DIVERGES = 1e3
+LAST = 3  # coefficients of a series that must be small
+
+
+class Equations(Protocol):
+    """y' of states (K, n): the rates of the first ``light`` columns are cheap and follow from all columns."""
+
+    light: int
+
+    def light_rates(self, y: np.ndarray) -> np.ndarray:
+        """(K, light) rates of the first columns."""
+
+    def other_rates(self, t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(K, n - light) rates of the others, and the distance (K,) of their equations from singularity."""
+
+    def nearer(self, t: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """States nearer to obeying the constraints, off which rates near singular positions lose digits."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A stretch of time: start, length, states (nodes, n) and rates of the columns after the light ones;
+    whether the iteration has settled, and a factor on the length for the next panel, or for another try;
+    where in [-1, 1] a singular position is crossed, and where one is foreseen (from -1 on)."""
+
+    start: Any
+    length: Any
+    states: np.ndarray
+    rates: np.ndarray
+    settled: bool
+    factor: float
+    crossing: float | None = None
+    foreseen: float | None = None
+
+    def time(self, place: float | None) -> float | None:
+        """The time (s) of a place."""
+        return None if place is None else float(self.start + self.length * (place + 1) / 2)
+
+
+class Panels:
+    """The matrices of so many Chebyshev points, and the iteration on them."""
+
+    def __init__(self, arithmetic: Arithmetic, nodes: int):
+        self.arithmetic, self.count = arithmetic, nodes
+        self.tolerance = SETTLED * arithmetic.eps
+        last, i = nodes - 1, np.arange(nodes)
+        cosine = _cosines(arithmetic, last)
+        self.nodes = -1 * cosine[i]
+        self.series = cosine[(i[:, None] * (last - i)) % (2 * last)] * 2 / last
+        self.series[:, [0, last]] = self.series[:, [0, last]] / 2
+        self.series[[0, last]] = self.series[[0, last]] / 2
+        values = cosine[(np.arange(nodes + 1) * (last - i)[:, None]) % (2 * last)]  # of T_0 … T_nodes
+        self.integral = self.times(_antiderivatives(values), self.series)
+
+    def times(self, matrix: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Matrix products (m, n) (n, k); Arb's own where elements are objects."""
+        if not self.arithmetic.digits:
+            return matrix @ values
+        from flint import arb_mat
+
+        a, b = (arb_mat(*x.shape, x.ravel().tolist()) for x in (matrix, values))
+        out = np.array([*(a * b).entries(), None], dtype=object)[:-1]
+        return self.arithmetic.settled(out.reshape(matrix.shape[0], values.shape[1]))
+
+    def panel(self, equations: Equations, start: Any, length: Any, guess: np.ndarray) -> Panel:
+        """The solution from the first state of a guess (nodes, n) on."""
+        half, light, tolerance = length / 2, equations.light, self.tolerance
+        t, places = start + half * (self.nodes + 1), doubles(self.nodes)
+        y, y0, last, crossing = guess, guess[0], np.inf, None
+        for sweep in range(1, SWEEPS):
+            with np.errstate(all="ignore"):
+                here = y if crossing is None else equations.nearer(t, y)
+                rates, distance = equations.other_rates(t, here)
+                if last < 1:
+                    crossing = singular_time(places, distance) or crossing
+                    tolerance = self.tolerance * (1 if crossing is None else BRIDGED)
+                if crossing is not None:
+                    rates = bridged(places, rates, distance)
+                better = y.copy()
+                better[:, light:] = y0[light:] + half * self.times(self.integral, rates)
+                moves = equations.light_rates(better)
+                better[:, :light] = y0[:light] + half * self.times(self.integral, moves)
+                size = self._size(better, np.concatenate([moves, rates], axis=1) * length, light)
+                change = (np.abs(doubles(better - y)) / size).max(initial=0.0)
+            if not np.isfinite(change) or change > DIVERGES * last:
+                return Panel(start, length, guess, rates, False, SHORTEST, foreseen=crossing)
+            y, last = self.arithmetic.settled(better), min(last, change)
+            telling = TELLING if crossing is None else tolerance  # bridged iterates tell nothing
+            if change <= telling:
+                fits, settled = (
+                    self._fits(rates * length, size[light:], change, tolerance),
+                    change <= tolerance,
+                )
+                if fits < 1 / (1 if settled else ROUGHLY):
+                    factor = max(SPARE * fits, SHORTEST)
+                    return Panel(start, length, y, rates, False, factor, foreseen=crossing)
+                if settled:
+                    factor = min(SPARE * fits, LONGEST if sweep < MANY else 1.0)
+                    ahead = singular_ahead(places, distance)
+                    return Panel(start, length, y, rates, True, factor, crossing, ahead)
+        return Panel(start, length, guess, rates, False, SHORTER, foreseen=crossing)
+
+    def _fits(self, moved: np.ndarray, size: np.ndarray, change: float, tolerance: float) -> float:
+        """How many times longer a panel its points could resolve.
+
+        The series falls geometrically: if an iterate needs k coefficients down to the size of its change,
+        the solution needs k log(tolerance) / log(change); if they do not reach so far, the last tells.
+        """
+        series = (np.abs(doubles(self.times(self.series, moved))) / size).max(axis=1, initial=0.0)
+        level = max(change, tolerance)
+        above = np.flatnonzero(series > level)
+        needed = above.max(initial=0) + 1
+        if needed > self.count - LAST:
+            needed, level = self.count, min(max(series[-LAST:].max(), level), TELLING)
+        return (self.count - LAST) / (needed * np.log(tolerance) / np.log(level))
+
+    @staticmethod
+    def _size(y: np.ndarray, moved: np.ndarray, light: int) -> np.ndarray:
+        """(n,) scales of the columns' changes."""
+        size = np.maximum(np.abs(doubles(y)).max(axis=0), np.abs(doubles(moved)).max(axis=0))
+        for group in (slice(None, light), slice(light, None)):
+            largest = size[group].max(initial=0.0)
+            size[group] = np.maximum(size[group], FLOOR * largest + np.finfo(float).tiny)
+        return size
+
+    def sampled(self, panel: Panel, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """States (k, n) and rates of the columns after the light ones at times (k,) of a panel."""
+        both = np.concatenate([panel.states, panel.rates], axis=1)
+        c = self.times(self.series, both)  # Chebyshev coefficients
+        x = ((t - panel.start) / panel.length * 2 - 1)[:, None]
+        b, ahead = 0 * x + c[-1], 0 * x  # Clenshaw's recurrence
+        for row in c[-2:0:-1]:
+            b, ahead = 2 * x * b - ahead + row, b
+        values = c[0] + x * b - ahead
+        return values[:, : panel.states.shape[1]], values[:, panel.states.shape[1] :]
+
+
+def _antiderivatives(values: np.ndarray) -> np.ndarray:
+    """(nodes, nodes) integrals of T_j from -1 to each node, from the values (nodes, nodes + 1) of T_j."""
+    nodes = len(values)
+    out = values[:, :nodes] * 0
+    out[:, 0], out[:, 1] = values[:, 1] + 1, (values[:, 2] - 1) / 4
+    for j in range(2, nodes):
+        at = values[:, j + 1] / (2 * (j + 1)) - values[:, j - 1] / (2 * (j - 1))
+        out[:, j] = at - at[0]
+    return out
+
+
+def _cosines(arithmetic: Arithmetic, n: int) -> np.ndarray:
+    """cos(π k / n) (2 n,); π by Gauss's arithmetic-geometric mean (Brent, Journal of the ACM 23, 1976)."""
+    a, gap, power = arithmetic.array([1.0]), arithmetic.array([0.25]), 1
+    b = np.sqrt(a / 2)
+    while float(a[0] - b[0]) > arithmetic.eps**0.5:
+        mean = (a + b) / 2
+        a, b, gap, power = mean, np.sqrt(a * b), gap - power * (a - mean) * (a - mean), 2 * power
+    mean = (a + b) / 2
+    gap = gap - power * (a - mean) * (a - mean)
+    return arithmetic.settled(np.cos(mean * mean / gap * arithmetic.array(np.arange(2 * n)) / n))

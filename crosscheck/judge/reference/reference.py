@@ -1,0 +1,139 @@
+"""The reference motion of any scene: two formulations, their agreement, and the bound that follows from it.
+
+Formulation A moves the scene twice, by series of different orders, with other rows where some are redundant
+and with joints displaced by the rounding of the scene's numbers; formulation B moves it once.  Where B ends
+before A, as in a singular position, the two runs of A bound each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.judge.reference import cache
+from crosscheck.judge.reference.arithmetic import EXTENDED, doubles
+from crosscheck.judge.reference.bound import USEFUL, bounds, differences
+from crosscheck.judge.reference.motion import Motion
+from crosscheck.judge.reference.taylor import natural_motion
+from crosscheck.judge.reference.tree import tree_motion
+from mbref.scene import Scene
+
+SECONDS = 20.0
+TWIN_ORDER, TWIN_SEED = 24, 1  # of A's second run
+SHARE = 0.4  # of the time that is left for each run of A
+FIELDS = (
+    "position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration"
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Samples of the reference motion in double precision, as in Motion, and the ``bound`` (k,) on their
+    error: distance over the scene's length, or angle (rad).  ``both`` (k,) tells where A and B agree and
+    not two runs of A alone; ``seconds`` of CPU time were spent."""
+
+    times: np.ndarray
+    position: np.ndarray
+    orientation: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+    acceleration: np.ndarray
+    angular_acceleration: np.ndarray
+    bound: np.ndarray
+    both: np.ndarray
+    seconds: float
+
+    def at(self, times: np.ndarray) -> Reference:
+        """The same at some of its times (k,)."""
+        chosen = np.searchsorted(self.times, times)
+        arrays = {name: getattr(self, name)[chosen] for name in ("times", *FIELDS, "bound", "both")}
+        return Reference(**arrays, seconds=self.seconds)
+
+
+@dataclass(frozen=True)
+class NoReference:
+    """Why a scene has no reference at all times asked for, and the samples it has, up to ``until`` (s)."""
+
+    reason: str
+    until: float
+    part: Reference
+
+
+def reference(scene: Scene, times: Sequence[float], seconds: float = SECONDS) -> Reference | NoReference:
+    """The reference motion at times (k,) ≥ 0, from the cache where it has them.
+
+    Takes about so many CPU seconds of the calling thread at most.  Raises SceneError where the scene's
+    velocities contradict its joints.
+    """
+    wanted = np.unique(np.asarray(times, dtype=float))
+    kept = _load(scene)
+    if kept is None or not kept.answers(wanted, seconds):
+        known = wanted if kept is None else np.union1d(wanted, kept.samples.times)
+        kept = _Kept(*judged(scene, known, *runs(scene, known, seconds)), seconds)
+        cache.save(scene, kept.arrays())
+    there = np.isin(wanted, kept.samples.times)
+    part = kept.samples.at(wanted[there])
+    return part if there.all() else NoReference(kept.reason, kept.until(), part)
+
+
+def runs(scene: Scene, times: np.ndarray, seconds: float) -> tuple[Motion, Motion, Motion]:
+    """The motion at ascending times (k,) by A, by A in its other way, and by B."""
+    a = natural_motion(scene, times, EXTENDED, seconds=SHARE * seconds)
+    if not len(a.times):
+        return a, a, a
+    left = seconds - a.seconds
+    way = {"order": TWIN_ORDER, "seed": TWIN_SEED}
+    twin = natural_motion(scene, a.times, EXTENDED, seconds=SHARE * left, **way)
+    return a, twin, tree_motion(scene, a.times, EXTENDED, seconds=left - twin.seconds)
+
+
+def judged(scene: Scene, times: np.ndarray, a: Motion, twin: Motion, b: Motion) -> tuple[Reference, str]:
+    """Samples of A with the bound that its twin and B leave, as far as that is small enough to be of use."""
+    apart = np.zeros(max(len(twin.times), len(b.times)))
+    for other in (twin, b):
+        apart[: len(other.times)] = np.maximum(apart[: len(other.times)], differences(scene, a, other))
+    bound = bounds(apart)
+    good = int((bound <= USEFUL).sum())
+    samples = Reference(
+        a.times[:good], *(doubles(getattr(a, name)[:good]) for name in FIELDS), bound[:good],
+        np.arange(good) < len(b.times), a.seconds + twin.seconds + b.seconds,
+    )  # fmt: skip
+    if good < len(apart):
+        return samples, f"independent motions of it differ by {apart[good]:.0e} at t = {a.times[good]:.6g} s"
+    ended = a if len(a.times) < len(times) else twin
+    return samples, f"{ended.reason}, at t = {ended.reached:.6g} s" if good < len(times) else ""
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """What is known of a scene's motion: samples, why there are no later ones, and the time it was given."""
+
+    samples: Reference
+    reason: str
+    seconds: float
+
+    def answers(self, times: np.ndarray, seconds: float) -> bool:
+        """Whether nothing more would be known at the times (k,) from another run of so many seconds."""
+        missing = times[~np.isin(times, self.samples.times)]
+        return not len(missing) or (
+            missing.min() > self.until() and self.seconds >= seconds and bool(self.reason)
+        )
+
+    def until(self) -> float:
+        """The last time (s) at which the motion is known."""
+        return float(self.samples.times.max(initial=0.0))
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """As arrays, for the cache."""
+        known = {name: np.asarray(getattr(self.samples, name)) for name in Reference.__dataclass_fields__}
+        return known | {"reason": np.array(self.reason), "given": np.array(self.seconds)}
+
+
+def _load(scene: Scene) -> _Kept | None:
+    arrays = cache.load(scene)
+    if not arrays:
+        return None
+    reason, given = str(arrays.pop("reason")), float(arrays.pop("given"))
+    return _Kept(Reference(**arrays | {"seconds": float(arrays["seconds"])}), reason, given)

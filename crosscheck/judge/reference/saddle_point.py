@@ -1,0 +1,67 @@
+"""Sparse products and saddle-point systems in any arithmetic: factorised in double, refined to the end.
+
+Iterative refinement with residuals in the arithmetic itself (N. J. Higham, Accuracy and Stability of
+Numerical Algorithms, 2002, ch. 12) gains about as many digits a round as double precision has beyond the
+condition number.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg.lapack import dgetrf, dgetrs
+
+from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
+
+ROUNDS = 40  # of refinement, at most
+TINY = 1e-300
+STALLED = 0.5  # a round that leaves more than this part of the last correction is the last one
+
+
+class Sparse:
+    """A matrix (m, n) that has few entries other than zero, in any arithmetic."""
+
+    def __init__(self, matrix: np.ndarray):
+        rows, self._columns = np.nonzero(doubles(matrix))
+        self._values, self._size = matrix[rows, self._columns], len(matrix)
+        self._filled, self._starts = np.unique(rows, return_index=True)
+
+    def __call__(self, vectors: np.ndarray) -> np.ndarray:
+        """The matrix times vectors (…, n): (…, m)."""
+        out = np.zeros((*vectors.shape[:-1], self._size), dtype=vectors.dtype)
+        if len(self._filled):
+            terms = self._values * vectors[..., self._columns]
+            out[..., self._filled] = np.add.reduceat(terms, self._starts, axis=-1)
+        return out
+
+
+class SaddlePoint:
+    """M x + Gᵀ y = f, G x = g with x, f (3, n): ``mass`` M (n, n) acts on each row, ``rows`` G (m, 3, n)."""
+
+    def __init__(self, mass: np.ndarray, rows: np.ndarray, arithmetic: Arithmetic):
+        self._eps, self._arithmetic = arithmetic.eps, arithmetic
+        self._size = 3 * len(mass)
+        matrix = arithmetic.zeros(self._size + len(rows), self._size + len(rows))
+        for i in range(3):
+            at = slice(i * len(mass), (i + 1) * len(mass))
+            matrix[at, at] = mass
+        flat = rows.reshape(len(rows), self._size)
+        matrix[self._size :, : self._size], matrix[: self._size, self._size :] = flat, flat.T
+        self._product, near = Sparse(matrix), doubles(matrix)
+        self._scale = 1 / np.sqrt(np.maximum(np.abs(near).max(axis=1), 1e-300))
+        self._factors = dgetrf(near * self._scale[:, None] * self._scale)[:2]
+
+    def solve(self, force: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """x (3, n) and y (m,) of f (3, n) and g (m,)."""
+        wanted = np.concatenate([force.ravel(), rate])
+        found, left, last = 0 * wanted, wanted, 1.0
+        for _ in range(ROUNDS):
+            size = np.abs(left).max()
+            if float(size) == 0.0:
+                break
+            step = dgetrs(*self._factors, doubles(left / size) * self._scale)[0]
+            found = self._arithmetic.settled(found + (self._scale * step) * size)
+            change = float(np.abs(step).max() * size / np.abs(found / self._scale).max())
+            if change * change / last <= self._eps or not change <= STALLED * last:
+                break
+            last, left = max(change, TINY), wanted - self._product(found)
+        return found[: self._size].reshape(force.shape), found[self._size :]

@@ -1,0 +1,253 @@
+"""The motion of a scene by formulation A: Taylor series of high order, step after step.
+
+Steps are as long as the series' smallest term allows (À. Jorba and M. Zou, Experimental Mathematics 14,
+2005); after each the coordinates are projected onto the rows.  A singular position, near which the series is
+lost in rounding noise, is never stepped on but leapt over, along the branch that the series continues.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
+from crosscheck.judge.reference.expansion import Expansion, Series, value
+from crosscheck.judge.reference.held_rows import HeldRows, independent
+from crosscheck.judge.reference.motion import Motion
+from crosscheck.judge.reference.natural import NaturalCoordinates
+from crosscheck.judge.reference.natural_loads import Loads
+from crosscheck.judge.reference.saddle_point import SaddlePoint
+from mbref.scene import Scene
+
+ORDER = 28
+NEW_ROW = 1e-4  # pivot from which a row that was dependent at the start has become independent
+BLUNT = 1e-2  # part of the best sharpness below which the choice of rows is looked at again
+BETTER = 1e3  # times sharper that other rows have to be
+NEAR = 0.4  # part of the usual sharpness below which a position counts as near a singular one
+USUAL = 50  # steps over which sharpness is usual
+DATA = float(np.finfo(float).eps)  # rounding of a scene's numbers
+ENOUGH = 100.0  # multiples of the tolerance that a leap may lose without trying from nearer
+TRIED = 24  # lengths at which a singular position is looked for
+FINE = 1e-6  # relative accuracy of its place
+DEPENDENT = 0.02  # part of the present sharpness that it falls below
+SHORTER = 0.8  # factor on a step that ends too near to a singular position
+LEAST_STEP = 1e-6  # s, where no time is left
+SHORTEST = 1e-9  # step, relative to the time reached, at which the series is said to end
+WITHOUT_INERTIA = 1e-13  # part of the largest inertia of a freedom that counts as none
+
+Sample = tuple[np.ndarray, ...]
+
+
+class Ended(ArithmeticError):
+    """The motion cannot be followed further; the message is the reason, a clause."""
+
+
+def natural_motion(
+    scene: Scene, times: Sequence[float], arithmetic: Arithmetic, *, seconds: float = np.inf,
+    order: int = ORDER, tolerance: float | None = None, seed: int = 0,
+) -> Motion:  # fmt: skip
+    """The motion at ascending times (k,) ≥ 0 in natural coordinates (see Motion), by series of an order.
+
+    ``tolerance`` is of a step, relative (default: the arithmetic's rounding unit).  Another ``seed`` prefers
+    other rows where some are redundant, and displaces joints by the rounding of double precision.
+    ``seconds`` limits the CPU time of the calling thread.
+    """
+    began, reason, samples = time.thread_time(), "", []
+    stepper = Stepper(scene, arithmetic, order, tolerance or arithmetic.eps, seed)
+    try:
+        for sample in stepper.samples(times, began + seconds):
+            samples.append(sample)
+    except Ended as end:
+        reason = str(end)
+    shape = (len(samples), 3, 3, 4 * len(scene.body) + 4)
+    x, v, a = np.moveaxis(np.array(samples, dtype=arithmetic.dtype).reshape(shape), 1, 0)
+    return Motion(
+        np.asarray(times[: len(samples)], dtype=float), *stepper.of.bodies(x, v, a),
+        reached=float(stepper.t if reason else max(times, default=0.0)), reason=reason,
+        steps=stepper.steps, crossings=tuple(stepper.crossings), seconds=time.thread_time() - began,
+    )  # fmt: skip
+
+
+class Stepper:
+    """The coordinates of a scene at a time ``t``, and the steps that take them on."""
+
+    def __init__(self, scene: Scene, arithmetic: Arithmetic, order: int, tolerance: float, seed: int):
+        self.of = NaturalCoordinates(scene, arithmetic)
+        self.t: Any = arithmetic.number(0.0)
+        self.steps, self.crossings = 0, []
+        self._loads = Loads(self.of)
+        self._order, self._tolerance = order, tolerance
+        self._x, self._v = self.of.start()
+        self._angles = [arithmetic.number(0.0) for _ in self._loads.torsions]
+        spread = (
+            0.2 * np.random.default_rng(seed).random(len(self.of.c)) if seed else np.zeros(len(self.of.c))
+        )
+        self._weights = 1 + spread
+        self._lost = np.inf
+        self._held = self._choice(self._x, self.t)[0]
+        self._sharpness = [self._sharp(self._x, self.t)]
+
+    def _vary(self, rng: np.random.Generator) -> None:
+        """Prefer other rows, and displace the joints by what rounding leaves open of them."""
+        self._weights += 0.2 * rng.random(len(self._weights))
+        joints = slice(6 * self.of.nb, None)
+        displaced = DATA * rng.uniform(-1, 1, len(self.of.c[joints]))
+        self.of.c[joints] = self.of.c[joints] + self.of.arithmetic.array(displaced)
+
+    def samples(self, times: Sequence[float], deadline: float) -> Iterator[Sample]:
+        """X, X', X'' (3, n) at ascending times; raises Ended where the motion cannot be followed."""
+        self._refuse_undetermined()
+        self._project()
+        pending = list(times)
+        while pending:
+            if time.thread_time() > deadline:
+                raise Ended("the time for it was up")
+            expansion, h = self._step(2 * (float(times[-1]) - float(self.t)))
+            series = expansion.x[: Series(expansion.x).terms(h)]
+            if not self.steps:
+                self._refuse_singular_start(series, self.of.arithmetic.number(h / 2))
+            while pending and pending[0] <= float(self.t) + h:
+                d = self.of.arithmetic.number(pending.pop(0)) - self.t
+                yield tuple(self.of.arithmetic.settled(value(series, d, n)) for n in range(3))
+            if pending:
+                self._advance(expansion, series, h)
+
+    def _expansion(self, order: int) -> Expansion:
+        state = self._x, self._v
+        return Expansion(self.of, self._held, self._loads, order, self.t, state, self._angles)
+
+    def _advance(self, expansion: Expansion, series: np.ndarray, h: float) -> None:
+        d, settled = self.of.arithmetic.number(h), self.of.arithmetic.settled
+        self._x, self._v = value(series, d), value(series, d, 1)
+        self._angles = [settled(value(angle[: len(series)], d))[()] for angle in expansion.angles]
+        self.t = settled(self.t + d)[()]
+        self.steps += 1
+        self._sharpness.append(self._sharp(self._x, self.t))
+        self._choose_again()
+        self._project()
+
+    # --- rows ---------------------------------------------------------------------------------------------
+    def _choice(self, x: np.ndarray, t: Any) -> tuple[HeldRows, int]:
+        """Rows that are independent at the coordinates x, and how many are well so."""
+        every = HeldRows(self.of, range(len(self.of.c)))
+        rows, pivots = independent(every.unit_gradient(x, t), self._weights)
+        return HeldRows(self.of, rows), int((pivots > NEW_ROW).sum())
+
+    def _sharp(self, x: np.ndarray, t: Any) -> float:
+        """How far the held rows are from dependent: their least singular value, being of length one."""
+        return float(np.linalg.svd(self._held.unit_gradient(x, t), compute_uv=False)[-1])
+
+    def _choose_again(self) -> None:
+        """Hold other rows where these have become blunt."""
+        if self._sharpness[-1] > BLUNT * max(self._sharpness):
+            return
+        before, self._held = self._held, self._choice(self._x, self.t)[0]
+        sharpness = self._sharp(self._x, self.t)
+        if len(self._held.numbers) == len(before.numbers) and sharpness > BETTER * self._sharpness[-1]:
+            self._sharpness = [sharpness]
+        else:
+            self._held = before
+
+    def _refuse_singular_start(self, series: np.ndarray, d: Any) -> None:
+        """Raise Ended where more rows are independent a little later than at the start."""
+        if self._choice(value(series, d), self.t + d)[1] > len(self._held.numbers):
+            raise Ended(
+                "it starts in a singular position, from which more than one motion goes on: "
+                "give poses and velocities a little later on the branch meant"
+            )
+
+    def _refuse_undetermined(self) -> None:
+        """Raise Ended where a freedom has neither driver nor inertia."""
+        rows = self._held.unit_gradient(self._x, self.t)
+        free = np.linalg.svd(rows, full_matrices=True)[2][len(rows) :].reshape(-1, 3, 4 * self.of.nb)
+        if not self.of.scene.has_mass() and len(free):
+            raise Ended("bodies without mass have to be driven in every freedom")
+        inertia = np.einsum("ick,kl,jcl->ij", free, doubles(self.of.mass), free)
+        sizes, ways = np.linalg.eigh(inertia)
+        if len(sizes) and sizes[0] <= WITHOUT_INERTIA * doubles(self.of.mass).max():
+            way = np.abs(np.einsum("i,icn->cn", ways[:, 0], free)).max(axis=0)
+            raise Ended(f"body {self.of.scene.body[way.argmax() // 4].name!r} can turn without inertia")
+
+    # --- consistency --------------------------------------------------------------------------------------
+    def _gaps(self) -> tuple[np.ndarray, np.ndarray]:
+        """Residuals (m,) of the rows and of their time derivatives."""
+        held, drives = self._held, self._held.drives(self.t, 2)
+        u, w = (np.stack([form(self._x), form(self._v)]) for form in (held.u, held.w))
+        products = np.stack([(u[0] * w[0]).sum(axis=0), (u[0] * w[1] + u[1] * w[0]).sum(axis=0)])
+        return drives.combined(products, 0) - drives.c[0], drives.combined(products, 1) - drives.c[1]
+
+    def _project(self) -> None:
+        """Put coordinates and velocities onto the rows, with the least change in the sense of the masses."""
+        arithmetic, held = self.of.arithmetic, self._held
+        if not held.numbers:
+            return
+        rows = held.gradient(self._x, held.drives(self.t, 1))[:, :, :-4]
+        system, still = SaddlePoint(self.of.mass, rows, arithmetic), 0 * self._x[:, :-4]
+        for level, rounds in ((0, 4), (1, 2)):
+            for _ in range(rounds):
+                gap, state = self._gaps()[level], (self._x, self._v)[level]
+                if _largest(gap) <= 4 * arithmetic.eps * max(_largest(state), 1.0):
+                    break
+                state[:, :-4] = arithmetic.settled(state[:, :-4] + system.solve(still, -gap)[0])
+
+    # --- steps --------------------------------------------------------------------------------------------
+    def _step(self, most: float) -> tuple[Expansion, float]:
+        """A series and the length (s) of its step, at most ``most``, which does not end much nearer to a
+        singular position."""
+        expansion = self._expansion(self._order)
+        series = Series(expansion.x)
+        h = series.reach(self._tolerance)
+        if h <= SHORTEST * max(1e-3, float(self.t)):
+            raise Ended("its series ends, as at a singular position that no smooth branch goes through")
+        h, now = min(h, max(most, LEAST_STEP)), self._sharpness[-1]
+        ahead = self._ahead(expansion.x, series, h)
+        if ahead < now < NEAR * max(self._sharpness[-USUAL:]):
+            middle = self._crossing(expansion.x, series, h)
+            longer = self._expansion(2 * self._order) if middle else expansion
+            if middle and self._may_leap(Series(longer.x).left_out(2 * middle)):
+                self.crossings.append(float(self.t) + middle)
+                return longer, 2 * middle
+        while ahead < NEAR * now:
+            h *= SHORTER
+            ahead = self._ahead(expansion.x, series, h)
+        return expansion, h
+
+    def _ahead(self, x: np.ndarray, series: Series, h: float) -> float:
+        """Sharpness at the end of a step."""
+        d = self.of.arithmetic.number(h)
+        return self._sharp(value(x[: series.terms(h)], d), self.t + d)
+
+    def _may_leap(self, lost: float) -> bool:
+        """Whether a leap that loses so much does so no more than rounded data, or than one from nearer."""
+        before, self._lost = self._lost, lost
+        blunt = max(self._sharpness[-USUAL:]) / self._sharpness[-1]
+        data = 0.0 if self.of.arithmetic.digits else DATA * blunt**2
+        enough = max(ENOUGH * self._tolerance, data)
+        if lost > np.sqrt(self._tolerance) or enough < lost < before:
+            return False
+        self._lost = np.inf
+        return True
+
+    def _crossing(self, x: np.ndarray, series: Series, h: float) -> float:
+        """How far ahead (s) the held rows are dependent, as far as the series tells; 0 when nowhere."""
+
+        def sharp(length: float) -> float:
+            return self._ahead(x, series, length)
+
+        lengths = np.geomspace(h / 4, max(h, series.reach(np.sqrt(self._tolerance))), TRIED)
+        values = np.array([sharp(length) for length in lengths])
+        lowest = int((np.diff(values) > 0).argmax())
+        if not lowest:
+            return 0.0
+        around = lengths[lowest - 1], lengths[lowest + 1]
+        found = minimize_scalar(sharp, bounds=around, method="bounded", options={"xatol": FINE * around[0]})
+        return float(found.x) if found.fun < DEPENDENT * self._sharpness[-1] else 0.0
+
+
+def _largest(values: np.ndarray) -> float:
+    """The largest of an array, as a double; 0 of an empty one."""
+    return float(np.abs(doubles(values)).max(initial=0.0))

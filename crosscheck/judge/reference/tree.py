@@ -1,0 +1,129 @@
+"""Formulation B of the reference: joint coordinates of a spanning tree, closures, d'Alembert's principle.
+
+At all points of a panel of time at once, twists and their drifts are carried outwards along the tree
+(tree_joints.py), and the joint accelerations q'' and multipliers λ solve [M Gᵀ; G 0] (q'', λ) = (Q, γ),
+with mass matrix M and forces Q of tree_loads.py and the closures' Jacobian G of tree_closures.py.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from crosscheck.judge.reference.arithmetic import Arithmetic
+from crosscheck.judge.reference.motion import Motion
+from crosscheck.judge.reference.panels import Panel, Panels
+from crosscheck.judge.reference.tree_equations import OPEN, TreeEquations
+from crosscheck.judge.reference.vectors import apply, product, unit
+from mbref.scene import Scene
+
+NODES_PER_DIGIT = 2.1
+FIRST = 0.1  # of the time asked for: length of the first panel
+LEAST = 1e-10  # of the time asked for: shortest panel
+NEAR_END = 0.7  # part of a panel from which on a singular position is too near its end
+
+
+def tree_motion(scene: Scene, times: np.ndarray, arithmetic: Arithmetic, *, seconds: float) -> Motion:
+    """The motion of a scene at ascending times (k,) ≥ 0 in an arithmetic; see Motion.
+
+    It ends early, with the reason, after so many CPU seconds, where the loops do not stay closed, and where
+    no panel of time is short enough.  Raises SceneError when the given velocities contradict the joints.
+    """
+    clock = time.thread_time()
+    run = _Run(TreeEquations(scene, arithmetic), np.asarray(times, dtype=float))
+    reason = run.through(clock + seconds)
+    return run.motion(reason, time.thread_time() - clock)
+
+
+class _Run:
+    """Panels from t = 0 on, and the samples that fell into them."""
+
+    def __init__(self, equations: TreeEquations, times: np.ndarray):
+        self.equations, self.arithmetic, self.times = equations, equations.arithmetic, times
+        self.panels = Panels(self.arithmetic, round(-NODES_PER_DIGIT * np.log10(self.arithmetic.eps)))
+        self.t = self.arithmetic.number(0.0)
+        self.state = equations.start()
+        self.samples: list[tuple[np.ndarray, np.ndarray]] = []
+        self.crossings: list[float] = []
+        self.foreseen = 0.0  # time of the next singular position, or a past one
+        self.taken = self.steps = 0
+
+    def through(self, until: float) -> str:
+        """Runs to the last time; the reason where the motion ends before."""
+        if reason := self.equations.undetermined():
+            return reason
+        end, panel = self.times.max(initial=0.0), None
+        length = self.arithmetic.number(FIRST * end or 1.0)
+        while self.taken < len(self.times):
+            if time.thread_time() > until:
+                return "the CPU time for it is over"
+            tried = self._before_singular(length)
+            panel = self.panels.panel(self.equations, self.t, tried, self._guess(panel, tried))
+            length = length if panel.settled and tried < length else tried * panel.factor
+            if not panel.settled or self.foreseen <= float(self.t):
+                self.foreseen = panel.time(panel.foreseen) or self.foreseen
+            if not panel.settled:
+                if length < LEAST * end:
+                    return "no panel of time is short enough"
+                continue
+            after = panel.start + panel.length
+            state = self.equations.closed(after, panel.states[-1])
+            if self.equations.gap(after, state) > OPEN:
+                return "rows that were redundant at the start are not later: it is a singular position"
+            self._sample(panel)
+            self._advance(panel, after, state)
+        return ""
+
+    def _before_singular(self, length: Any) -> Any:
+        """A length with which no panel ends near a singular position: one ends half a length before, and the
+        next has it in the middle."""
+        gap = self.foreseen - float(self.t)
+        near = NEAR_END * float(length) < gap < (1 + NEAR_END) * float(length)
+        return self.arithmetic.number(gap) - length / 2 if near else length
+
+    def _guess(self, tried: Panel | None, length: Any) -> np.ndarray:
+        """States at the points of a panel: as now, or those of a longer panel that was tried before."""
+        if tried is None or tried.settled:
+            return np.repeat(self.state[None], self.panels.count, axis=0)
+        guess, _ = self.panels.sampled(tried, self.t + length / 2 * (self.panels.nodes + 1))
+        guess[0] = self.state
+        return guess
+
+    def _sample(self, panel: Panel) -> None:
+        stop = int(np.searchsorted(self.times, float(panel.start + panel.length), side="right"))
+        if stop > self.taken:
+            at = self.arithmetic.array(self.times[self.taken : stop])
+            self.samples.append(self.panels.sampled(panel, at))
+            self.taken = stop
+
+    def _advance(self, panel: Panel, after: Any, state: np.ndarray) -> None:
+        self.t, self.state, self.steps = after, state, self.steps + 1
+        self.crossings += [panel.time(panel.crossing)] if panel.crossing is not None else []
+
+    def motion(self, reason: str, seconds: float) -> Motion:
+        """The samples as the motion of the bodies."""
+        equations, numbers = self.equations, self.arithmetic
+        if not self.samples:
+            self.samples.append((numbers.zeros(0, int(equations.ends[-1])), numbers.zeros(0, equations.nv)))
+        y, rates = (np.concatenate(parts) for parts in zip(*self.samples, strict=True))
+        times = self.times[: self.taken]
+        at = equations.at(numbers.array(times), y)
+        placed, acceleration = at.placed, rates[:, rates.shape[1] - equations.nv :]
+        gained = apply(np.swapaxes(placed.columns, -1, -2), acceleration[:, None])
+        given = unit(numbers.array([body.orientation for body in equations.scene.body]))
+        return Motion(
+            times=times,
+            position=placed.position[:, :-1],
+            orientation=product(placed.turn[:, :-1], given),
+            velocity=placed.velocity[:, :-1],
+            angular_velocity=placed.spin[:, :-1],
+            acceleration=(placed.drift + gained[..., :3])[:, :-1],
+            angular_acceleration=(placed.spin_drift + gained[..., 3:])[:, :-1],
+            reached=float(self.times[-1] if self.taken == len(self.times) and self.taken else self.t),
+            reason=reason,
+            steps=self.steps,
+            crossings=tuple(self.crossings),
+            seconds=seconds,
+        )

@@ -1,0 +1,190 @@
+"""The equations of motion of a scene on its spanning tree: rates of states, and states that obey the joints.
+
+A state holds, in this order, the scalar joint coordinates, the quaternions of the balls, the angles of joints
+outside the tree that a driver or a torsion spring asks for, and the joint rates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import qr
+
+from crosscheck.judge import constraints
+from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
+from crosscheck.judge.reference.tree_closures import Closures, Rows, Twists
+from crosscheck.judge.reference.tree_joints import Placed, Tree
+from crosscheck.judge.reference.tree_loads import Loads
+from crosscheck.judge.reference.vectors import apply, product, saddle_solve, unit
+from crosscheck.judge.tolerances import RANK
+from mbref.scene import Driver, Scene
+
+WORSE = 0.03  # part of the best conditioning below which other rows are chosen
+CORRECTIONS = 8  # Newton iterations at most that close the loops
+OPEN = 1e-9  # residual, relative to the scene's length, of rows that were taken as redundant and are not
+
+
+@dataclass(frozen=True)
+class Instant:
+    """What the equations of K states are made of: bodies, joint coordinates (see ``coordinates``), the rows
+    of closures and drivers with their rates ``speed`` (K, m), and the joint rates (K, nv)."""
+
+    placed: Placed
+    coordinates: Rows
+    rows: Rows
+    speed: np.ndarray
+    rate: np.ndarray
+
+
+class TreeEquations:
+    """Rates of states; ``kept`` are the independent ones of the rows of closures and drivers."""
+
+    def __init__(self, scene: Scene, arithmetic: Arithmetic):
+        self.scene, self.arithmetic, self.tree = scene, arithmetic, Tree(scene, arithmetic)
+        self.closures = Closures(self.tree)
+        asked = {d.joint for d in scene.driver} | {l.joint for l in scene.load if l.type == "torsion_spring"}
+        away = [joint for joint in self.tree.cut if joint.name in asked]
+        self.twists = Twists(self.tree, away)
+        measured = {name: places[-1] for name, places in self.tree.coordinate.items() if places}
+        measured |= {joint.name: self.tree.scalars + k for k, joint in enumerate(away)}
+        self.driven = np.array([measured[driver.joint] for driver in scene.driver], dtype=int)
+        self.loads = Loads(self.tree, measured)
+        self.nv = len(self.tree.axis)
+        self.ends = np.cumsum([self.tree.scalars, 4 * len(self.tree.balls), len(away), self.nv])
+        self.light, self.length = int(self.ends[1]), constraints.scene_length(scene)
+        self.kept: np.ndarray | None = None
+
+    def light_rates(self, y: np.ndarray) -> np.ndarray:
+        """Rates (K, light) of scalars and quaternions, the latter half spin times quaternion."""
+        scalar, ball, _, rate = self._split(y)
+        spin = rate[:, self.tree.scalars :].reshape(len(y), len(self.tree.balls), 3)
+        moves = product(np.concatenate([0 * spin[..., :1], spin], axis=-1), ball) / 2
+        return np.concatenate([rate[:, : scalar.shape[1]], moves.reshape(len(y), 4 * moves.shape[1])], axis=1)
+
+    def other_rates(self, t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rates (K, ·) of angles and joint rates at times t (K,), and the distance (K,) from singularity."""
+        at = self.at(t, y)
+        mass, force = self.loads.terms(at.placed, at.coordinates, at.rate)
+        jacobian, drift = at.rows.jacobian[:, self.kept], at.rows.drift[:, self.kept]
+        acceleration, distance = saddle_solve(mass, jacobian, force, -1 * drift)
+        turning = apply(at.coordinates.jacobian[:, self.tree.scalars :], at.rate)
+        return np.concatenate([turning, acceleration], axis=1), distance
+
+    def at(self, t: np.ndarray, y: np.ndarray) -> Instant:
+        """Everything of states (K, n) at times (K,)."""
+        scalar, ball, angle, rate = self._split(y)
+        placed = self.tree.placed(scalar, unit(ball), rate)
+        own = scalar[..., None] * 0 + np.eye(self.tree.scalars, self.nv, dtype=int)
+        coordinates = Rows(scalar, 0 * scalar, own).joined(self.twists.rows(placed, angle))
+        closing = self.closures.rows(placed)
+        wanted = self._wanted(t)
+        driven = coordinates.among(self.driven)
+        driven = Rows(driven.value - wanted[0], driven.drift - wanted[2], driven.jacobian)
+        speed = [apply(closing.jacobian, rate), apply(driven.jacobian, rate) - wanted[1]]
+        return Instant(placed, coordinates, closing.joined(driven), np.concatenate(speed, axis=1), rate)
+
+    def start(self) -> np.ndarray:
+        """The state (n,) at t = 0 with the velocities of `initial_twists`, made exact."""
+        y = self.arithmetic.zeros(1, int(self.ends[-1]))
+        y[0, self.tree.scalars : self.light : 4] = self.arithmetic.number(1.0)
+        at = self.at(self.arithmetic.zeros(1), y)
+        self._choose(at)
+        twists = self.arithmetic.array(np.concatenate(constraints.initial_twists(self.scene), axis=-1))
+        y[:, self.ends[2] :] = self._solve(at, self.loads.momentum(at.placed, twists[None]), -1 * at.speed)[0]
+        return self.closed(self.arithmetic.number(0.0), y[0])
+
+    def closed(self, t: Any, y: np.ndarray) -> np.ndarray:
+        """The state (n,) nearest in the mass metric to one at time t whose loops are closed."""
+        y, t, last = y[None], self.arithmetic.zeros(1) + t, np.inf
+        self._choose(self.at(t, y))
+        for _ in range(CORRECTIONS):
+            better = self.nearer(t, y)
+            size = np.abs(doubles(better - y)).max(initial=0.0)
+            if not size < last:
+                break
+            y, last = self.arithmetic.settled(better), size
+        return y[0]
+
+    def nearer(self, t: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """States (K, n) after one Newton step towards closed loops, and towards rates that keep them so."""
+        at = self.at(t, y)
+        step, _ = self._solve(at, 0 * at.rate, -1 * at.rows.value)
+        better = self._moved(y, step, at.coordinates.jacobian)
+        better[:, self.ends[2] :] = at.rate + self._solve(at, 0 * at.rate, -1 * at.speed)[0]
+        return better
+
+    def gap(self, t: Any, y: np.ndarray) -> float:
+        """Largest residual of any row, kept or not, of a state (n,), relative to the scene's length."""
+        at = self.at(self.arithmetic.zeros(1) + t, y[None])
+        return float(np.abs(doubles(at.rows.value)).max(initial=0.0)) / self.length
+
+    def undetermined(self) -> str:
+        """Why a scene without masses has no motion; empty where drivers determine it or masses are there."""
+        missing = [body.name for body in self.scene.body if body.mass is None]
+        assert self.kept is not None
+        if not missing or len(self.kept) == self.nv:
+            return ""
+        return f"bodies without mass move freely: {', '.join(missing)}"
+
+    def _split(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Scalars (K, ·), balls (K, ·, 4), angles (K, ·) and joint rates (K, nv)."""
+        scalar, ball, angle, rate = np.split(y, self.ends[:-1], axis=1)
+        return scalar, ball.reshape(len(y), len(self.tree.balls), 4), angle, rate
+
+    def _moved(self, y: np.ndarray, step: np.ndarray, coordinates: np.ndarray) -> np.ndarray:
+        """States after a small displacement (K, nv) of the joint coordinates."""
+        y = y.copy()
+        y[:, self.ends[2] :] = step
+        moves = self.light_rates(y)
+        y[:, : self.light] = y[:, : self.light] + moves
+        ball = unit(self._split(y)[1])
+        y[:, self.tree.scalars : self.light] = ball.reshape(len(y), 4 * ball.shape[1])
+        angles = slice(self.light, self.ends[2])
+        y[:, angles] = y[:, angles] + apply(coordinates[:, self.tree.scalars :], step)
+        return y
+
+    def _solve(self, at: Instant, force: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        mass = self.loads.mass_matrix(at.placed)
+        return saddle_solve(mass, at.rows.jacobian[:, self.kept], force, right[:, self.kept])
+
+    def _choose(self, at: Instant) -> None:
+        """Keeps a largest set of independent rows: the first one while it is well enough conditioned."""
+        rows = doubles(at.rows.jacobian[0])
+        size = np.linalg.norm(rows, axis=1, keepdims=True)
+        largest = max(size.max(initial=0.0), min(1.0, self.length**2))  # one joint rate moves so much
+        rows = rows / np.where(size > RANK * largest, size, largest)  # those of rounding size stay small
+        r, order = qr(rows.T, mode="r", pivoting=True)
+        pivots = np.abs(np.diag(r))
+        if self.kept is None:
+            self.kept = np.sort(order[: int((pivots > RANK).sum())])
+        elif _least(rows[self.kept]) < WORSE * _least(rows[np.sort(order[: len(self.kept)])]):
+            self.kept = np.sort(order[: len(self.kept)])
+
+    def _wanted(self, t: np.ndarray) -> np.ndarray:
+        """(3, K, drivers) values of the drivers at times (K,), their rates and second rates."""
+        values = [_driver(self.arithmetic, driver, t) for driver in self.scene.driver]
+        return np.stack(values, axis=-1) if values else self.arithmetic.zeros(3, len(t), 0)
+
+
+def _least(rows: np.ndarray) -> float:
+    """Least singular value; infinite without rows."""
+    return float(np.linalg.svd(rows, compute_uv=False).min(initial=np.inf))
+
+
+def _driver(arithmetic: Arithmetic, driver: Driver, t: np.ndarray) -> np.ndarray:
+    """(3, K) value, rate and second rate of a driver at times (K,)."""
+    coefficients, out = arithmetic.array(driver.polynomial), []
+    for _ in range(3):
+        value = 0 * t
+        for c in coefficients[::-1]:
+            value = value * t + c
+        out.append(value)
+        coefficients = coefficients[1:] * np.arange(1, len(coefficients))
+    if driver.sine is not None:
+        sine = driver.sine
+        amplitude, frequency, phase = arithmetic.array((sine.amplitude, sine.frequency, sine.phase))
+        wave, slope = amplitude * np.sin(frequency * t + phase), amplitude * np.cos(frequency * t + phase)
+        out = [out[0] + wave, out[1] + frequency * slope, out[2] - frequency * frequency * wave]
+    return np.stack(out)

@@ -1,0 +1,135 @@
+"""Inertia and loads of a scene in the joint coordinates of its tree, by d'Alembert's principle.
+
+A body's part of the mass matrix is columnᵀ · inertia · column and its part of the generalised force is
+columnᵀ · (load - inertia · drift); a torsion spring works on its joint's angle alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crosscheck.judge.reference.tree_closures import Rows
+from crosscheck.judge.reference.tree_joints import Placed, Tree
+from crosscheck.judge.reference.vectors import apply, cross, dot, matrices, unit
+from mbref.scene import Force, Moment, Spring, TorsionSpring
+
+
+class Loads:
+    """Masses, inertias, gravity and loads, packed; ``measured`` tells the row of a torsion spring's joint.
+
+    A scene without all its masses has no loads, and mass 1 and inertia 1 stand for the missing ones: its
+    drivers determine the motion, whatever they are.
+    """
+
+    def __init__(self, tree: Tree, measured: dict[str, int]):
+        scene, numbers = tree.scene, tree.arithmetic
+        massive = scene.has_mass()
+        self.tree, self.gravity = tree, numbers.array(scene.gravity)
+        self.mass = numbers.array([b.mass if massive else 1.0 for b in scene.body])[:, None]
+        self.inertia = _inertias(tree) if massive else numbers.array([np.eye(3)] * len(scene.body))
+        of = {kind: [l for l in scene.load if massive and isinstance(l, kind)] for kind in LOADS}
+        self.moments, self.forces, self.springs = of[Moment], of[Force], of[Spring]
+        self.torsion = np.array([measured[load.joint] for load in of[TorsionSpring]], dtype=int)
+        values = [(l.stiffness, l.damping, l.natural_angle) for l in of[TorsionSpring]]
+        self.stiffness, self.damping, self.natural = numbers.array(values).reshape(-1, 3).T
+
+    def mass_matrix(self, placed: Placed) -> np.ndarray:
+        """(K, nv, nv)."""
+        return self._mass_matrix(placed, self._world_inertia(placed))
+
+    def terms(self, placed: Placed, angles: Rows, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mass matrix, and the forces (K, nv) of loads less those of inertia without joint accelerations."""
+        spin, inertia = placed.spin[:, :-1], self._world_inertia(placed)
+        turning = cross(spin, apply(inertia, spin)) + apply(inertia, placed.spin_drift[:, :-1])
+        force = self.mass * (self.gravity - placed.drift[:, :-1])
+        wrench = self._with_ground(np.concatenate([force, -1 * turning], axis=-1))
+        self._act(placed, wrench)
+        total = self._project(placed, wrench)
+        if len(self.torsion):
+            jacobian = angles.jacobian[:, self.torsion]
+            resisting = self.stiffness * (angles.value[:, self.torsion] - self.natural)
+            resisting = resisting + self.damping * apply(jacobian, rate)
+            total = total - apply(np.swapaxes(jacobian, 1, 2), resisting)
+        return self._mass_matrix(placed, inertia), total
+
+    def momentum(self, placed: Placed, twist: np.ndarray) -> np.ndarray:
+        """(K, nv) columnᵀ · inertia · twist, of twists (K, nb, 6)."""
+        turning = apply(self._world_inertia(placed), twist[..., 3:])
+        momentum = np.concatenate([self.mass * twist[..., :3], turning], axis=-1)
+        return self._project(placed, self._with_ground(momentum))
+
+    @staticmethod
+    def _with_ground(wrench: np.ndarray) -> np.ndarray:
+        """A row for the ground, on which wrenches do nothing."""
+        return np.concatenate([wrench, 0 * wrench[:, :1]], axis=1)
+
+    @staticmethod
+    def _project(placed: Placed, wrench: np.ndarray) -> np.ndarray:
+        """(K, nv) generalised force of wrenches (K, nb + 1, 6)."""
+        return apply(_over_bodies(placed.columns), wrench.reshape(len(wrench), -1))
+
+    def _mass_matrix(self, placed: Placed, inertia: np.ndarray) -> np.ndarray:
+        columns = placed.columns[:, :-1]
+        turning = columns[..., 3:] @ inertia
+        momenta = np.concatenate([self.mass[..., None] * columns[..., :3], turning], axis=-1)
+        return _over_bodies(momenta) @ np.swapaxes(_over_bodies(columns), 1, 2)
+
+    def _act(self, placed: Placed, wrench: np.ndarray) -> None:
+        """Adds the loads, each of them a force at a point of a body or a moment."""
+        scene = self.tree.scene
+        for load in self.moments:
+            body = scene.body_index(load.body)
+            wrench[:, body, 3:] = wrench[:, body, 3:] + self.tree.arithmetic.array(load.moment)
+        for load in self.forces:
+            body = scene.body_index(load.body)
+            arm, _, _ = self._point(placed, body, load.point)
+            _push(wrench, body, arm, 0 * arm + self.tree.arithmetic.array(load.force))
+        for load in self.springs:
+            self._pull(placed, load, wrench)
+
+    def _pull(self, placed: Placed, load: Spring, wrench: np.ndarray) -> None:
+        pair = [self.tree.scene.body_index(name) for name in load.bodies]
+        ends = [self._point(placed, body, point) for body, point in zip(pair, load.points, strict=True)]
+        offset, rate = ends[1][1] - ends[0][1], ends[1][2] - ends[0][2]
+        direction = unit(offset)
+        stiffness, damping, natural = self.tree.arithmetic.array(
+            (load.stiffness, load.damping, load.natural_length)
+        )
+        size = stiffness * (dot(direction, offset) - natural) + damping * dot(direction, rate)
+        for body, end, sign in zip(pair, ends, (1, -1), strict=True):
+            _push(wrench, body, end[0], sign * size[:, None] * direction)
+
+    def _point(self, placed: Placed, body: int, point) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Arm, position and velocity (K, 3) of a point, given in the world at t = 0, of a body."""
+        arm = apply(placed.rotation[:, body], self.tree.arithmetic.array(point) - self.tree.start[body])
+        return (
+            arm,
+            placed.position[:, body] + arm,
+            placed.velocity[:, body] + cross(placed.spin[:, body], arm),
+        )
+
+    def _world_inertia(self, placed: Placed) -> np.ndarray:
+        rotation = placed.rotation[:, :-1]
+        return rotation @ self.inertia @ np.swapaxes(rotation, -1, -2)
+
+
+LOADS = (Moment, Force, Spring, TorsionSpring)
+
+
+def _over_bodies(columns: np.ndarray) -> np.ndarray:
+    """(K, nv, bodies · 6) of columns (K, bodies, nv, 6)."""
+    samples, bodies, rates, _ = columns.shape
+    return np.swapaxes(columns, 1, 2).reshape(samples, rates, 6 * bodies)
+
+
+def _push(wrench: np.ndarray, body: int, arm: np.ndarray, force: np.ndarray) -> None:
+    wrench[:, body, :3] = wrench[:, body, :3] + force
+    wrench[:, body, 3:] = wrench[:, body, 3:] + cross(arm, force)
+
+
+def _inertias(tree: Tree) -> np.ndarray:
+    """(nb, 3, 3) along the world's axes at t = 0."""
+    scene, numbers = tree.scene, tree.arithmetic
+    given = [np.diag(b.inertia) if np.ndim(b.inertia) == 1 else np.array(b.inertia) for b in scene.body]
+    frames = matrices(unit(numbers.array([b.orientation for b in scene.body])))
+    return frames @ numbers.array(given) @ np.swapaxes(frames, -1, -2)

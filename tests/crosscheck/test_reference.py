@@ -1,0 +1,377 @@
+"""The reference: against closed forms, physics and itself; its bound, its limits and its cache."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mbref.equations.model
+from crosscheck.conformance.closed_forms import CLOSED_FORMS, free_fall, pendulum
+from crosscheck.conformance.features import BODY, JOINTS, feature_scenes, massless, undetermined
+from crosscheck.conformance.random_mechanisms import random_mechanism
+from crosscheck.conformance.trial import best_family
+from crosscheck.engine import engine
+from crosscheck.judge import constraints, metrics
+from crosscheck.judge.energy import energy_series
+from crosscheck.judge.gauss_principle import gauss, stacked
+from crosscheck.judge.reference import cache, tree_loads
+from crosscheck.judge.reference import reference as module
+from crosscheck.judge.reference.arithmetic import DOUBLE, EXTENDED
+from crosscheck.judge.reference.bound import differences
+from crosscheck.judge.reference.natural import NaturalCoordinates
+from crosscheck.judge.reference.reference import NoReference, Reference, judged, reference, runs
+from crosscheck.judge.reference.taylor import natural_motion
+from crosscheck.judge.reference.tree import tree_motion
+from crosscheck.judge.truth import NoSolution, closed_form, truth_for
+from crosscheck.judge.truth.reference_truth import ReferenceTruth, trajectory
+from mbref import rotations
+from mbref.scene import Body, Scene, Spring
+from mbref.scenes import SCENES
+from mbref.trajectory import Trajectory
+from tests.crosscheck.truth_scenes import ALL
+
+SMOOTH = 1e-12  # bound where nothing is singular
+AGREE = 1e-15  # of two formulations over a short smooth motion
+SECONDS = 200.0
+SINGULAR = ("four_bar", "four_bar_quarter", "four_bar_gravity", "five_bar", "five_bar_gravity",
+            "planar_slider_crank_equal", "planar_slider_crank_gravity", "planar_slider_crank_heavy",
+            "crank_torsion", "slider_spring")  # fmt: skip
+BRIEF = {"planar_slider_crank_heavy": 4.0, "planar_slider_crank": 0.1, "spatial_slider_crank": 0.03,
+         "slider_spring": 0.3, "crank_torsion": 0.3, "planar_slider_crank_gravity": 0.5,
+         "planar_slider_crank_equal": 0.1}  # fmt: skip
+
+
+def samples(scene: Scene, duration: float, count: int = 9, seconds: float = SECONDS) -> tuple[Reference, str]:
+    """A reference that is not taken from the cache, and why it ends."""
+    times = np.linspace(0.0, duration, count)
+    return judged(scene, times, *runs(scene, times, seconds))
+
+
+def errors(scene: Scene, found: Reference, exact: Trajectory) -> np.ndarray:
+    return metrics.error_series(scene, trajectory(scene, found), exact)
+
+
+# --- closed forms -----------------------------------------------------------------------------------------
+@pytest.mark.parametrize("make", CLOSED_FORMS, ids=lambda make: make.__name__)
+def test_closed_form_is_within_the_bound(make):
+    scene, exact = make()
+    found, reason = samples(scene, scene.duration)
+    assert not reason
+    position, orientation = exact(found.times)
+    distance = np.linalg.norm(found.position - position, axis=-1).max() / constraints.scene_length(scene)
+    angle = rotations.angle_between(found.orientation, orientation).max()
+    assert found.bound.max() <= SMOOTH
+    assert distance <= found.bound.max(), (
+        f"{distance:.1e} from the closed form, bound {found.bound.max():.1e}"
+    )
+    assert angle <= 1e-7, "arccos resolves no less"
+
+
+def assert_family(name: str) -> None:
+    scene = ALL[name]
+    found, reason = samples(scene, BRIEF.get(name, scene.duration))
+    truth = closed_form(scene)
+    assert not reason, reason
+    off = errors(scene, found, truth.poses(found.times))
+    worst = int((off / found.bound).argmax())
+    assert (off <= found.bound).all(), f"error {off[worst]:.1e} above the bound {found.bound[worst]:.1e}"
+    assert name in SINGULAR or found.bound.max() <= SMOOTH
+
+
+QUICK = ("four_bar_gravity", "pendulum_all", "free_spring", "four_bar_chain")
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_known_motion_is_within_the_bound(name):
+    assert_family(name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(set(ALL) - {*QUICK, "four_bar_straight"}))
+def test_every_known_motion_is_within_the_bound(name):
+    assert_family(name)
+
+
+# --- two formulations -------------------------------------------------------------------------------------
+@pytest.mark.parametrize("feature", sorted(feature_scenes()))
+def test_formulations_agree_on_every_feature(feature):
+    scene = feature_scenes()[feature]
+    times = np.linspace(0.0, scene.duration / 2, 4)
+    a, b = (move(scene, times, EXTENDED, seconds=SECONDS) for move in (natural_motion, tree_motion))
+    assert not a.reason and not b.reason
+    apart = differences(scene, a, b).max()
+    assert apart < AGREE, f"{feature}: formulations differ by {apart:.1e}"
+    for name in module.FIELDS[2:]:
+        one, other = (np.asarray(getattr(motion, name), dtype=float) for motion in (a, b))
+        rate = max(1.0, float(np.abs(a.angular_velocity).max()))
+        assert np.abs(one - other).max() <= 1e-13 * rate**2, name
+
+
+def assert_random(seed: int) -> None:
+    scene = random_mechanism(seed)
+    found, reason = samples(scene, 0.3, 4)
+    assert not reason, f"random_{seed}: {reason}"
+    assert found.bound.max() <= 1e-11, f"random_{seed}: bound {found.bound.max():.1e}"
+
+
+@pytest.mark.parametrize("seed", [3, 5])
+def test_random_mechanism_has_a_tight_reference(seed):
+    assert_random(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10, 26))
+def test_random_mechanisms_have_tight_references(seed):
+    assert_random(seed)
+
+
+# --- physics ----------------------------------------------------------------------------------------------
+def moving(seed: int, **changes) -> tuple[Scene, Trajectory]:
+    """A random mechanism, some of its data changed, and its motion by formulation A."""
+    scene = random_mechanism(seed).with_(**changes)
+    motion = natural_motion(scene, np.linspace(0.0, 0.3, 13), EXTENDED, seconds=SECONDS)
+    assert not motion.reason
+    arrays = {name: np.asarray(getattr(motion, name), dtype=float) for name in module.FIELDS}
+    found = Reference(motion.times, **arrays, bound=np.zeros(13), both=np.zeros(13, bool), seconds=0.0)
+    return scene, trajectory(scene, found)
+
+
+def test_energy_is_kept_and_joints_stay_closed():
+    undamped = tuple(
+        load.model_copy(update={"damping": 0.0}) if load.type == "spring" else load
+        for load in random_mechanism(2).load
+        if load.type != "moment"
+    )
+    scene, motion = moving(2, load=undamped)
+    assert energy_series(scene, motion).max() < 1e-13
+    for level in (0, 1, 2):
+        assert metrics.violation_series(scene, motion, level).max() < 1e-11, f"joints open at level {level}"
+
+
+def test_accelerations_at_the_start_obey_gauss_principle():
+    scene, motion = moving(4)
+    wanted = gauss(scene)
+    assert np.abs(stacked(scene, motion, 0) - wanted).max() < 1e-11 * np.abs(wanted).max()
+
+
+def test_momentum_of_free_bodies_is_kept():
+    second = BODY.model_copy(
+        update={"name": "second", "position": (1.0, 0.4, -0.3), "velocity": (0.0, 1.0, 0.5)}
+    )
+    first = BODY.model_copy(update={"velocity": (0.5, 0.0, 0.0), "angular_velocity": (1.0, -2.0, 0.5)})
+    spring = Spring(bodies=("body", "second"), points=((0.4, 0, 0), (0.9, 0.5, 0)), stiffness=40.0,
+                    damping=0.7, natural_length=0.3)  # fmt: skip
+    scene = Scene(name="pair", body=(first, second), load=(spring,))
+    motion = natural_motion(scene, np.linspace(0.0, 1.0, 9), EXTENDED, seconds=SECONDS)
+    mass = np.array([body.mass for body in scene.body])
+    linear = np.einsum("b,kbi->ki", mass, np.asarray(motion.velocity, dtype=float))
+    turn = rotations.to_matrix(np.asarray(motion.orientation, dtype=float))
+    inertia = turn @ constraints.inertia_matrices(scene) @ np.swapaxes(turn, -1, -2)
+    place, spin = (np.asarray(a, dtype=float) for a in (motion.position, motion.angular_velocity))
+    own = np.einsum("kbij,kbj->ki", inertia, spin)
+    angular = own + np.einsum("b,kbi->ki", mass, np.cross(place, np.asarray(motion.velocity, dtype=float)))
+    assert np.abs(linear - linear[0]).max() < 1e-14
+    assert np.abs(angular - angular[0]).max() < 1e-14
+
+
+def test_lengths_in_millimetres_give_the_same_motion():
+    scene = random_mechanism(5)
+    small = _scaled(scene, 1e-3)
+    times = np.linspace(0.0, 0.2, 3)
+    one, other = (natural_motion(s, times, EXTENDED, seconds=SECONDS) for s in (scene, small))
+    assert np.abs(np.asarray(one.position - 1e3 * other.position, dtype=float)).max() < 1e-13
+
+
+def _scaled(scene: Scene, by: float) -> Scene:
+    """The same mechanism with all its lengths times ``by``, moving alike in time."""
+
+    def times(value, power=1):
+        return np.asarray(value, dtype=float) * by**power
+
+    bodies = [
+        body.model_copy(update={
+            "position": tuple(times(body.position)), "velocity": tuple(times(body.velocity)),
+            "inertia": tuple(map(tuple, times(body.inertia, 2))),
+        })
+        for body in scene.body
+    ]  # fmt: skip
+    joints = [
+        joint.model_copy(update={
+            key: tuple(times(getattr(joint, key)) if key == "anchor" else map(tuple, times(joint.anchors)))
+            for key in ("anchor", "anchors") if hasattr(joint, key)
+        })
+        for joint in scene.joint
+    ]  # fmt: skip
+    moment, force, spring = scene.load
+    loads = (
+        moment.model_copy(update={"moment": tuple(times(moment.moment, 2))}),
+        force.model_copy(update={"force": tuple(times(force.force)), "point": tuple(times(force.point))}),
+        spring.model_copy(update={"points": tuple(map(tuple, times(spring.points))),
+                                  "natural_length": float(times(spring.natural_length))}),
+    )  # fmt: skip
+    gravity = tuple(times(scene.gravity))
+    return scene.with_(body=tuple(bodies), joint=tuple(joints), load=loads, gravity=gravity)
+
+
+def test_double_precision_gives_thirteen_digits():
+    scene, _ = pendulum()
+    times = np.linspace(0.0, 0.8, 5)
+    one, other = (natural_motion(scene, times, a, seconds=SECONDS) for a in (DOUBLE, EXTENDED))
+    assert one.position.dtype == float
+    assert np.abs(np.asarray(one.position - other.position, dtype=float)).max() < 1e-13
+
+
+# --- planted defects --------------------------------------------------------------------------------------
+def heavier(values):
+    return values * (1 + 1e-4)
+
+
+def plant_in_a(monkeypatch):
+    right = NaturalCoordinates._mass
+    monkeypatch.setattr(NaturalCoordinates, "_mass", lambda self: right(self) + 1e-6)
+
+
+def plant_in_b(monkeypatch):
+    right = tree_loads._inertias
+    monkeypatch.setattr(tree_loads, "_inertias", lambda tree: heavier(right(tree)))
+
+
+def plant_in_mbref(monkeypatch):
+    right = mbref.equations.model._principal_axes
+    monkeypatch.setattr(
+        mbref.equations.model, "_principal_axes", lambda body: (heavier(right(body)[0]), right(body)[1])
+    )
+
+
+@pytest.mark.parametrize("plant", [plant_in_a, plant_in_b, plant_in_mbref])
+def test_a_planted_defect_is_seen_by_the_other_two(plant, monkeypatch):
+    """The two without the defect agree with each other, and neither agrees with the third."""
+    scene, times = random_mechanism(3).with_(duration=0.2), np.linspace(0.0, 0.2, 3)
+    plant(monkeypatch)
+    setting = best_family(engine("mbref").settings(scene))[-1]
+    found = {
+        plant_in_a: natural_motion(scene, times, EXTENDED, seconds=SECONDS),
+        plant_in_b: tree_motion(scene, times, EXTENDED, seconds=SECONDS),
+        plant_in_mbref: engine("mbref").run(scene, times, setting),
+    }
+    wrong = found.pop(plant)
+    one, other = found.values()
+    assert differences(scene, one, other).max() < 1e-8
+    assert differences(scene, one, wrong).max() > 1e-7
+    assert differences(scene, other, wrong).max() > 1e-7
+
+
+# --- what has none ----------------------------------------------------------------------------------------
+def test_a_start_in_a_singular_position_is_refused_with_the_remedy():
+    times = np.linspace(0.0, 1e-4, 3)  # within the first step
+    motion = natural_motion(SCENES["four_bar_straight"](), times, EXTENDED, seconds=SECONDS)
+    assert "starts in a singular position" in motion.reason and "a little later" in motion.reason
+    assert motion.position.shape == (0, 3, 3)
+
+
+def test_a_body_that_can_turn_without_inertia_is_named():
+    pole = Body(name="pole", mass=1.0, inertia=(0.0, 0.1, 0.1), position=(0.0, 0.0, 0.0))
+    motion = natural_motion(Scene(name="rod", body=(pole,)), [0.1], EXTENDED, seconds=SECONDS)
+    assert motion.reason == "body 'pole' can turn without inertia"
+
+
+def test_point_mass_on_a_joint_needs_no_inertia():
+    scene, _ = pendulum()
+    bob = scene.body[0].model_copy(update={"inertia": (0.0, 0.0, 0.0)})
+    motion = natural_motion(scene.with_(body=(bob,)), [0.3], EXTENDED, seconds=SECONDS)
+    other = tree_motion(scene.with_(body=(bob,)), [0.3], EXTENDED, seconds=SECONDS)
+    assert differences(scene, motion, other).max() < AGREE
+
+
+def test_bodies_without_mass_have_to_be_driven():
+    motion = natural_motion(undetermined(), [0.1], EXTENDED, seconds=SECONDS)
+    assert motion.reason == "bodies without mass have to be driven in every freedom"
+    driven = massless(SCENES["four_bar"]()).with_(duration=0.01)
+    assert not natural_motion(driven, [0.01], EXTENDED, seconds=SECONDS).reason
+
+
+def test_time_is_limited():
+    scene = SCENES["planar_slider_crank"]()
+    motion = natural_motion(scene, np.linspace(0.0, 100.0, 3), EXTENDED, seconds=0.2)
+    assert motion.reason == "the time for it was up"
+    assert len(motion.times) == 1 and 0 < motion.reached < 50
+
+
+# --- the cache --------------------------------------------------------------------------------------------
+@pytest.fixture
+def own_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return tmp_path / "mbref" / "references"
+
+
+def never(*_):
+    raise AssertionError("computed again")
+
+
+def test_known_times_are_not_computed_again(own_cache, monkeypatch):
+    scene, _ = free_fall()
+    first = reference(scene, np.linspace(0.0, 0.5, 5))
+    monkeypatch.setattr(module, "runs", never)
+    again = reference(scene.with_(name="other"), [0.5, 0.25])
+    assert (again.times == [0.25, 0.5]).all()
+    assert (again.position == first.position[[2, 4]]).all()
+    with pytest.raises(AssertionError, match="computed again"):
+        reference(scene.with_(gravity=(0.0, -9.8, 0.0)), [0.5])
+
+
+def test_new_times_keep_the_old_ones(own_cache, monkeypatch):
+    scene, _ = free_fall()
+    reference(scene, [0.1])
+    reference(scene, [0.2])
+    monkeypatch.setattr(module, "runs", never)
+    assert len(reference(scene, [0.1, 0.2]).times) == 2
+
+
+@pytest.mark.parametrize("damage", [lambda b: b[:-7], lambda b: b[:50] + b"x" + b[51:], lambda b: b""])
+def test_a_damaged_file_is_made_again(own_cache, damage):
+    scene, _ = free_fall()
+    first = reference(scene, [0.5])
+    (file,) = own_cache.iterdir()
+    whole = file.read_bytes()
+    file.write_bytes(damage(whole))
+    assert cache.load(scene) == {}
+    assert (reference(scene, [0.5]).position == first.position).all()
+    assert cache.load(scene)["bound"].shape == (1,)
+
+
+def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
+    (tmp_path / "mbref").write_text("a file where a folder should be")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert isinstance(reference(free_fall()[0], [0.5]), Reference)
+
+
+# --- the truth of a scene ---------------------------------------------------------------------------------
+def test_truth_of_any_scene_is_its_reference(own_cache):
+    scene = random_mechanism(3)
+    assert truth_for(scene, 0.0) is None
+    truth = truth_for(scene)
+    motion = truth.poses(np.array([0.0, 0.1]))
+    assert truth.name == "reference" and truth.accuracy <= 1e-11
+    assert metrics.measure(scene, motion, truth)["error"] < 1e-15
+    assert truth_for(SCENES["four_bar"]()).name == "parallelogram"
+
+
+def test_truth_ends_with_the_reference(own_cache, monkeypatch):
+    found = reference(SCENES["four_bar_straight"](), [0.0, 0.1])
+    assert isinstance(found, NoReference) and found.until == 0.0
+    truth = ReferenceTruth(SCENES["four_bar_straight"](), 5.0)
+    with pytest.raises(NoSolution, match="singular position"):
+        truth.poses(np.array([0.05]))
+    monkeypatch.setattr(module, "runs", never)  # nor is it tried again
+    with pytest.raises(NoSolution, match="no reference after t = 0 s"):
+        truth.poses(np.array([0.05]))
+
+
+def test_defective_formulations_give_no_reference(monkeypatch):
+    plant_in_b(monkeypatch)
+    found, reason = samples(JOINTED, 0.2)
+    assert "differ by" in reason
+    assert (found.bound <= 1e-6).all()
+
+
+JOINTED = Scene(name="swing", gravity=(0.0, -9.81, 0.0), body=(BODY,), joint=(JOINTS["spherical"],))
