@@ -228,10 +228,10 @@ def _show_spread(
         }  # fmt: skip
         print(strict_json({"scene": scene.name, "time": end, "completed": len(completed), **spread}))
         return
-    console = Console() if sys.stdout.isatty() else Console(width=PIPED_WIDTH)
+    console = Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, markup=False)
     seconds = sum(run.cost.seconds for run in completed)
     console.print(
-        f"[bold]{scene.name}[/]: {len(completed)} of {options.count} variants completed, "
+        f"{scene.name}: {len(completed)} of {options.count} variants completed, "
         f"{seconds:.3g} s of stepping in all"
     )
     if not completed:
@@ -252,10 +252,10 @@ def _show(scene: Scene, trajectory: Trajectory) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    console = Console() if sys.stdout.isatty() else Console(width=PIPED_WIDTH)
+    console = Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, markup=False)
     cost = trajectory.cost
     ended = trajectory.outcome
-    console.print(f"[bold]{scene.name}[/] by {trajectory.method}: {ended.name} at t = {trajectory.t_end:g} s")
+    console.print(f"{scene.name} by {trajectory.method}: {ended.name} at t = {trajectory.t_end:g} s")
     if trajectory.message:
         console.print(trajectory.message)
     console.print(

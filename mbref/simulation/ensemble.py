@@ -98,7 +98,7 @@ class Processes(Executor):
         while not self._idle.empty():
             self._idle.get().shutdown(wait)
 
-    def _call(self, function: Callable[..., Any], arguments: tuple, named: dict[str, Any]) -> Any:
+    def _call(self, function: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
         process = self._idle.get()
         try:
             return process.submit(function, *arguments, **named).result()

@@ -58,7 +58,7 @@ DEFECTS = (
         P,
         "second = subtract(scale(-acceleration, along), scale(rate * rate, direction))",
         "second = add(scale(-acceleration, along), scale(rate * rate, direction))",
-        MBREF,
+        PRIMITIVES,
     ),
     Defect(
         P,
