@@ -1,4 +1,4 @@
-"""What an engine may answer with: a Trajectory of the bodies asked for, at the times asked for.
+"""An engine's answer to a run: a Trajectory of the bodies asked for, at the times asked for.
 
 Checked in the child, so that a malformed answer is the outcome of its run; a child answers with Python's and
 numpy's own types alone.
@@ -23,7 +23,7 @@ UNIT_TOLERANCE = 1e-3  # of a quaternion's length; beyond it, it is none
 
 
 class MalformedAnswer(Exception):
-    """What an engine returned is no trajectory of the run; the sentence says why."""
+    """An engine returned no trajectory of the run; the sentence says why."""
 
 
 def well_formed(answer: Any, scene: Scene, times: np.ndarray) -> Trajectory:

@@ -17,9 +17,9 @@ DIGEST = hashlib.sha256().digest_size  # bytes, before the data
 
 
 def read(path: Path) -> bytes | None:
-    """The data written to this path; None where there are none, or what is there is not what was written.
+    """The data written to this path; None where there are none, or the file is damaged.
 
-    The latter is told in one line on stderr and removed, where it can be.
+    A damaged file is told in one line on stderr and removed, where it can be.
     """
     try:
         found = path.read_bytes()

@@ -139,7 +139,7 @@ class Stuck(Fake):
 
 
 class Malformed(Fake):
-    """Answers with what the function of the name in its options makes of a good answer."""
+    """Damages a good answer by the function that its options name."""
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         return DAMAGES[setting.options["damage"]](super().run(scene, times, Setting(setting.family)))
@@ -154,6 +154,7 @@ DAMAGES = {
     "no bodies": lambda good: replace(good, bodies=None),
     "other times": lambda good: replace(good, times=good.times + 1e-3),
     "few samples": lambda good: replace(good, times=good.times[:1], position=good.position[:1]),
+    "few positions": lambda good: replace(good, position=good.position[:1]),
     "wrong shape": lambda good: replace(good, position=good.position[:, 0]),
     "text": lambda good: replace(good, velocity="fast"),
     "ragged": lambda good: replace(good, velocity=[[1.0], [1.0, 2.0]]),

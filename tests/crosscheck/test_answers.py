@@ -26,6 +26,7 @@ SAYS = {
     "no bodies": "bodies: are None",
     "other times": "times: are not the first of those asked for",
     "few samples": "times: completed with 1 of 3 samples",
+    "few positions": "position: has shape (1, 1, 3), not (3, 1, 3)",
     "wrong shape": "position: has shape (3, 3), not (3, 1, 3)",
     "text": "velocity: is str, not an array of numbers",
     "ragged": "velocity: is list, not an array of numbers",

@@ -1,4 +1,4 @@
-"""What is fuzzed: a case by its seed, and how it ended; anything that is not documented is raised.
+"""The cases of the fuzzers, each by its seed; anything that is not documented is raised.
 
 ``scene_file``: reading, writing, diagnosing.  ``simulation``: a scene by a method within limits.
 ``command_line``: both programs.  A case that takes long is interrupted, which it has to hear.
