@@ -110,8 +110,13 @@ def _entries(data: Mapping[str, Any], key: str) -> list[Any]:
     return list(value) if isinstance(value, list | tuple) else []
 
 
+def _text(entry: Any, key: str) -> str:
+    """A text of an entry, empty where there is none."""
+    return found if isinstance(found := _get(entry, key), str) else ""
+
+
 def _names(entries: Sequence[Any]) -> list[str]:
-    return [name if isinstance(name := _get(entry, "name"), str) else "" for entry in entries]
+    return [_text(entry, "name") for entry in entries]
 
 
 def reference_faults(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -133,10 +138,10 @@ def reference_faults(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     known = {*_names(bodies), GROUND}
     for i, joint in enumerate(joints):
         yield from _pair_faults(f"joint[{i}].bodies", _get(joint, "bodies"), known)
-    types = dict(zip(_names(joints), (_get(joint, "type") for joint in joints), strict=True))
+    types = {_text(joint, "name"): _text(joint, "type") for joint in joints}
     yield from _driver_faults(data, types)
     for i, load in enumerate(_entries(data, "load")):
-        acts_on = ACTS_ON.get(_get(load, "type"))
+        acts_on = ACTS_ON.get(_text(load, "type"))
         if acts_on == "body":
             name = _get(load, "body")
             if name == GROUND:

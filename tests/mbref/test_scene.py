@@ -62,6 +62,8 @@ FAULTS = [
     (("body", 0, "inertia"), [10**400, 1.0, 1.0], "body[0].inertia"),
     (("body", 1, "name"), "the fixed frame", "body[1].name"),
     (("driver", 0, "joint"), ["H"], "driver[0].joint"),
+    (("load", 0, "type"), ["force"], "load[0].type"),
+    (("joint", 1, "type"), ["spherical"], "joint[1].type"),
     (("driver", 0, "polynomial"), [10**400, 1.0], "driver[0].polynomial[0]"),
 ]
 
