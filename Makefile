@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help check test lint deep coverage report quick picture docs bench clean
+.PHONY: help check test lint deep fuzz mutants coverage report quick picture docs bench clean
 
 help: ## show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -24,6 +24,15 @@ lint: $(VENV)/ready ## format, lint and types, in this checkout
 
 deep: $(VENV)/ready ## the slow tests too, with many more random cases
 	HYPOTHESIS_PROFILE=deep $(BIN)/pytest -n 2 -m "slow or not slow"
+
+fuzz: $(VENV)/ready ## mutated scenes, runs and command lines against both packages
+	$(BIN)/python -m tests.fuzz scene_file --count 20000
+	$(BIN)/python -m tests.fuzz scene_data --count 20000
+	$(BIN)/python -m tests.fuzz simulation --count 2000
+	$(BIN)/python -m tests.fuzz command_line --count 1000
+
+mutants: $(VENV)/ready ## one-line defects planted one at a time: which do the tests see?
+	$(BIN)/python -m tests.mutants
 
 coverage: $(VENV)/ready ## coverage of mbref, its kernels run as plain Python
 	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run --source=mbref -m pytest -q tests/properties \

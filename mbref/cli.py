@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -14,6 +13,7 @@ import numpy as np
 from mbref.formulations import FORMULATIONS
 from mbref.integrators import INTEGRATORS
 from mbref.method import DEFAULT, MethodError
+from mbref.records import strict_json
 from mbref.scene import Scene, SceneError
 from mbref.scenes import SCENES, find_scene
 from mbref.stabilisation import STABILISATIONS
@@ -42,6 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has gone, as `head` does
         sys.stdout = None
         return INCOMPLETE
+    except OSError as error:  # of the file of --out
+        return _refuse([f"{error.filename or options.out}: {error.strerror}"])
 
 
 def _refuse(faults: Sequence[str]) -> int:
@@ -162,20 +164,20 @@ def _run(options: argparse.Namespace) -> int:
     with _progress_bar("simulating", float(times[-1])) as progress:
         trajectory = simulate(scene, options.method, times, limits, progress)
     if options.json:
-        print(json.dumps({"scene": scene.name, "records": [trajectory.to_record()]}))
+        print(strict_json({"scene": scene.name, "records": [trajectory.to_record()]}))
     else:
         _show(scene, trajectory)
     return 0 if trajectory.outcome.name == "COMPLETED" else INCOMPLETE
 
 
 def _limits(options: argparse.Namespace) -> Limits:
-    from mbref.simulation.simulate import Limits
+    """The limits; ValueError names their field, which is the option's but for --max-step."""
+    from mbref.simulation.limits import Limits
 
-    if not 0 < options.rtol < 1:
-        raise ValueError(f"--rtol: must be between 0 and 1, got {options.rtol:g}")
-    if options.max_step < 0:
-        raise ValueError(f"--max-step: must not be negative, got {options.max_step:g}")
-    return Limits(rtol=options.rtol, largest_step=options.max_step, code=options.code)
+    try:
+        return Limits(rtol=options.rtol, largest_step=options.max_step, code=options.code)
+    except ValueError as error:
+        raise ValueError(f"--{error}".replace("largest_step", "max-step")) from None
 
 
 @contextmanager
@@ -224,12 +226,12 @@ def _show_spread(
             for key, values in last.items() if completed
             for what, a in (("mean", values.mean(axis=0)), ("deviation", values.std(axis=0)))
         }  # fmt: skip
-        print(json.dumps({"scene": scene.name, "time": end, "completed": len(completed), **spread}))
+        print(strict_json({"scene": scene.name, "time": end, "completed": len(completed), **spread}))
         return
-    console = Console() if sys.stdout.isatty() else Console(width=PIPED_WIDTH)
+    console = Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, markup=False)
     seconds = sum(run.cost.seconds for run in completed)
     console.print(
-        f"[bold]{scene.name}[/]: {len(completed)} of {options.count} variants completed, "
+        f"{scene.name}: {len(completed)} of {options.count} variants completed, "
         f"{seconds:.3g} s of stepping in all"
     )
     if not completed:
@@ -250,10 +252,10 @@ def _show(scene: Scene, trajectory: Trajectory) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    console = Console() if sys.stdout.isatty() else Console(width=PIPED_WIDTH)
+    console = Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, markup=False)
     cost = trajectory.cost
     ended = trajectory.outcome
-    console.print(f"[bold]{scene.name}[/] by {trajectory.method}: {ended.name} at t = {trajectory.t_end:g} s")
+    console.print(f"{scene.name} by {trajectory.method}: {ended.name} at t = {trajectory.t_end:g} s")
     if trajectory.message:
         console.print(trajectory.message)
     console.print(
@@ -287,7 +289,7 @@ def _diagnose(options: argparse.Namespace) -> int:
     found = diagnose(scene)
     counts = found.counts
     if options.json:
-        print(json.dumps({"scene": scene.name, "ground": scene.ground, **asdict(counts), **_beyond(found)}))
+        print(strict_json({"scene": scene.name, "ground": scene.ground, **asdict(counts), **_beyond(found)}))
         return 0
     print(
         f"{scene.name} (ground as a {scene.ground})\n"

@@ -1,28 +1,99 @@
-"""Record files: results as JSON lines, each with a key; records in the file need not be computed again."""
+"""Record files: results as JSON lines, each with a key; records in the file need not be computed again.
+
+A line is strict JSON (no NaN: null; an infinite number is 1e999) and is handed to the operating system in
+one write.  So only the last line can be cut short, by a kill or a power cut; reading the file takes it off.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import json
+import math
+import os
+import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+INFINITE = {math.inf: "\ue000+", -math.inf: "\ue000-"}  # stand for these until the text is made
+
+
+class RecordsError(ValueError):
+    """A file that holds something else than records, and is left as it is."""
 
 
 def stored(path: str | Path | None) -> dict[str, dict[str, Any]]:
     """Records of the file by ``key``, the last of each; none where there is no file.
 
-    A last line that an interruption cut short is removed from the file.
+    Lines that hold no record are told by number on stderr and left alone.  Raises RecordsError where no line
+    holds one, OSError where the file cannot be read.
     """
     if path is None or not Path(path).exists():
         return {}
     text = Path(path).read_bytes()
-    whole = text[: text.rfind(b"\n") + 1]
-    if len(whole) < len(text):
-        Path(path).write_bytes(whole)
-    return {record["key"]: record for record in map(json.loads, whole.splitlines())}
+    end = text.rfind(b"\n") + 1
+    lines = [_record(line) for line in text[:end].splitlines()]
+    foreign = [number for number, record in enumerate(lines, 1) if record is None]
+    if text and len(foreign) == len(lines):
+        raise RecordsError(f"{path}: holds no records; name another file, or remove it")
+    if end < len(text):
+        os.truncate(path, end)
+    if foreign:
+        numbers = ", ".join(map(str, foreign))
+        print(f"{path}: no record in line {numbers}; left as it is", file=sys.stderr)
+    return {record["key"]: record for record in lines if record is not None}
+
+
+def opened(path: str | Path | None) -> dict[str, dict[str, Any]]:
+    """As ``stored``, of a file that can be appended to and is made where there is none; raises OSError."""
+    if path is not None:
+        open(path, "ab").close()
+    return stored(path)
 
 
 def append(path: str | Path | None, record: dict[str, Any]) -> None:
-    """Add a record to the file; nowhere without a path."""
-    if path is not None:
-        with open(path, "a") as file:
-            file.write(json.dumps(record) + "\n")
+    """Add a record to the file, whole or not at all; nowhere without a path.
+
+    Raises OSError where the file cannot take it.
+    """
+    if path is None:
+        return
+    line = (strict_json(record) + "\n").encode()
+    with open(path, "ab", buffering=0) as file:
+        before = os.fstat(file.fileno()).st_size
+        try:
+            while line:  # one write, but on a disk that is nearly full: the next one raises
+                line = line[file.write(line) :]
+        except BaseException:
+            with contextlib.suppress(OSError):  # what failed first is what is told
+                file.truncate(before)
+            raise
+
+
+def strict_json(value: Any) -> str:
+    """The value as JSON that any reader takes: NaN is null, an infinite number one beyond every double."""
+    text = json.dumps(_finite(value), allow_nan=False)
+    for number, mark in INFINITE.items():
+        text = text.replace(json.dumps(mark), f"{math.copysign(1, number):.0f}e999")
+    return text
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _finite(v) for key, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(v) for v in value]
+    return INFINITE.get(value) if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _record(line: bytes) -> dict[str, Any] | None:
+    """The record of a line, None where it holds none."""
+    try:
+        found = json.loads(line, parse_constant=_refused)
+    except (ValueError, RecursionError):
+        return None
+    return found if isinstance(found, dict) and isinstance(found.get("key"), str) else None
+
+
+def _refused(name: str) -> float:
+    raise ValueError(f"{name} is no JSON")

@@ -166,17 +166,19 @@ class Scene(Entry):
 
     def save(self, path: str | Path) -> None:
         """Write the scene as TOML; ``Scene.from_file`` gives back an equal scene."""
-        Path(path).write_text(tomli_w.dumps(self.to_dict()))
+        Path(path).write_text(tomli_w.dumps(self.to_dict()), encoding="utf-8")
 
     @staticmethod
     def from_file(path: str | Path) -> Scene:
-        """Read a scene file; raises SceneError naming the file, or every faulty field."""
+        """Read a scene file (TOML, UTF-8); raises SceneError naming the file, or every faulty field."""
         try:
-            data = tomllib.loads(Path(path).read_text())
+            data = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
         except OSError as error:
             raise SceneError([f"{path}: cannot be read: {error.strerror}"]) from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        except ValueError as error:  # no UTF-8, no TOML, or a number of thousands of digits
             raise SceneError([f"{path}: is not TOML: {error}"]) from None
+        except RecursionError:
+            raise SceneError([f"{path}: is nested too deeply"]) from None
         return Scene(**data)
 
 

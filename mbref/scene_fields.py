@@ -1,11 +1,38 @@
-"""Types of a scene's fields, and the frozen table every entry of a scene is."""
+"""Types of a scene's fields, the sizes of numbers, and the frozen table every entry of a scene is."""
 
 from __future__ import annotations
 
 import math
+from reprlib import Repr
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, Strict
+
+LARGEST, SMALLEST = 1e40, 1e-40  # sizes of numbers whose products and squares are still numbers
+SHOWN = Repr()  # how a faulty value is quoted, however long or deep
+SHOWN.maxstring = SHOWN.maxother = SHOWN.maxlong = 80
+
+
+def shown(value: Any) -> str:
+    """The value as Python writes it, cut short: for messages, whatever was given."""
+    try:
+        return SHOWN.repr(value)
+    except ValueError:  # Python writes no integers of so many digits
+        return "a number of thousands of digits"
+
+
+def checked_size(value: float) -> float:
+    """The number; ValueError where it is so large that its powers would overflow."""
+    if abs(value) > LARGEST:
+        raise ValueError(f"must be at most {LARGEST:g} in size, got {value:g}")
+    return value
+
+
+def checked_length(value: float) -> float:
+    """The positive number; ValueError where its powers would overflow or vanish."""
+    if value < SMALLEST:
+        raise ValueError(f"must be at least {SMALLEST:g} in size, got {value:g}")
+    return checked_size(value)
 
 
 def as_list(value: Any) -> Any:
@@ -13,9 +40,10 @@ def as_list(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-Real = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
-NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
+Sized = AfterValidator(checked_size)
+Real = Annotated[float, Field(strict=True, allow_inf_nan=False), Sized]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0), AfterValidator(checked_length)]
+NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0), Sized]
 Vector = Annotated[tuple[Real, Real, Real], Strict(False), BeforeValidator(as_list)]
 Quaternion = Annotated[tuple[Real, Real, Real, Real], Strict(False), BeforeValidator(as_list)]
 Name = Annotated[str, Field(min_length=1)]
@@ -25,9 +53,10 @@ Reals = Annotated[tuple[Real, ...], Field(min_length=1), Strict(False), BeforeVa
 
 
 def direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
-    """The vector itself; ValueError where it is zero."""
-    if math.hypot(*v) == 0:
+    """The vector itself; ValueError where it is zero or too short to be squared."""
+    if (length := math.hypot(*v)) == 0:
         raise ValueError("must have a length, got the zero vector")
+    checked_length(length)
     return v
 
 

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from mbref.scene_fields import LARGEST, SMALLEST, checked_length, checked_size, shown
 from mbref.scene_joints import JOINT_TYPES
 from mbref.scene_loads import LOAD_TYPES
 
 GROUND = "ground"
+RESERVED = (GROUND, "the fixed frame")  # names that no body can have
 DRIVABLE = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.driven)
 TORSIONAL = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.takes_torsion_spring)
 ACTS_ON = {name: load.acts_on for name, load in LOAD_TYPES.items()}
@@ -34,17 +36,20 @@ def checked_inertia(value: Any) -> tuple[Any, ...]:
     """Three principal moments or a symmetric 3x3, as tuples; ValueError says which value is unphysical."""
     try:
         array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ValueError("must be three numbers or a 3x3 matrix") from None
     if array.shape not in ((3,), (3, 3)):
         raise ValueError(f"must be three numbers or a 3x3 matrix, got shape {array.shape}")
     if not np.isfinite(array).all():
         raise ValueError("must be finite")
+    checked_size(float(abs(array).max()))
     matrix = np.diag(array) if array.ndim == 1 else array
     tolerance = INERTIA_TOLERANCE * max(abs(matrix).max(), 1e-300)
     if abs(matrix - matrix.T).max() > tolerance:
         raise ValueError("must be symmetric")
     moments = np.linalg.eigvalsh(matrix)
+    for moment in moments[(moments > 0) & (moments < SMALLEST)]:
+        checked_length(float(moment))
     if moments[0] < -tolerance:
         raise ValueError(f"must have no negative principal moment, got {moments[0]:.6g}")
     if moments[2] > moments[0] + moments[1] + tolerance:
@@ -57,28 +62,28 @@ def checked_inertia(value: Any) -> tuple[Any, ...]:
 def field_faults(error: ValidationError) -> Iterator[tuple[str, str]]:
     """(path, message) of every fault pydantic found, in the words of the file."""
     for fault in error.errors(include_url=False):
-        kind, got = fault["type"], fault["input"]
-        limit = fault.get("ctx", {})
+        kind, got, limit = fault["type"], shown(fault["input"]), fault.get("ctx", {})
+        tags = f"{limit.get('expected_tags')}, got {shown(limit.get('tag'))}"
         messages = {
             "missing": "is required",
             "extra_forbidden": "is not a known field",
-            "greater_than": f"must be positive, got {got!r}",
-            "greater_than_equal": f"must not be negative, got {got!r}",
-            "finite_number": f"must be finite, got {got!r}",
-            "float_type": f"must be a number, got {got!r}",
-            "string_type": f"must be a string, got {got!r}",
+            "greater_than": f"must be positive, got {got}",
+            "greater_than_equal": f"must not be negative, got {got}",
+            "finite_number": f"must be finite, got {got}",
+            "float_type": f"must be a number, got {got}",
+            "string_type": f"must be a string, got {got}",
             "string_too_short": "must not be empty",
             "too_short": "must not be empty",
-            "tuple_type": f"must be a list, got {got!r}",
+            "tuple_type": f"must be a list, got {got}",
             "union_tag_not_found": "is required",
-            "union_tag_invalid": f"must be one of {limit.get('expected_tags')}, got {limit.get('tag')!r}",
-            "literal_error": f"must be {limit.get('expected')}, got {got!r}",
+            "union_tag_invalid": f"must be one of {tags}",
+            "literal_error": f"must be {limit.get('expected')}, got {got}",
             "model_type": "must be a table",
             "model_attributes_type": "must be a table",
             "value_error": str(limit.get("error", "")),
         }
-        default = f"{fault['msg'][0].lower()}{fault['msg'][1:]}, got {got!r}"
-        if kind == "too_short" and got:
+        default = f"{fault['msg'][0].lower()}{fault['msg'][1:]}, got {got}"
+        if kind == "too_short" and fault["input"]:
             continue  # entries are there, but faulty ones were left out
         path = _path(fault["loc"]) + (".type" if kind.startswith("union_tag") else "")
         yield path, messages.get(kind, default)
@@ -105,8 +110,13 @@ def _entries(data: Mapping[str, Any], key: str) -> list[Any]:
     return list(value) if isinstance(value, list | tuple) else []
 
 
+def _text(entry: Any, key: str) -> str:
+    """A text of an entry, empty where there is none."""
+    return found if isinstance(found := _get(entry, key), str) else ""
+
+
 def _names(entries: Sequence[Any]) -> list[str]:
-    return [name if isinstance(name := _get(entry, "name"), str) else "" for entry in entries]
+    return [_text(entry, "name") for entry in entries]
 
 
 def reference_faults(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -115,8 +125,8 @@ def reference_faults(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     Works on raw tables, so that these are found beside the faults of single fields.
     """
     bodies, joints = _entries(data, "body"), _entries(data, "joint")
-    yield from _duplicates("body", _names(bodies), reserved=(GROUND,))
-    yield from _duplicates("joint", _names(joints))
+    yield from _duplicates("body", _names(bodies), reserved=RESERVED)
+    yield from _duplicates("joint", _names(joints), (GROUND,) if data.get("ground") == "body" else ())
     for i, body in enumerate(bodies):
         mass, inertia = _get(body, "mass"), _get(body, "inertia")
         if (mass is None) != (inertia is None):
@@ -128,19 +138,10 @@ def reference_faults(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     known = {*_names(bodies), GROUND}
     for i, joint in enumerate(joints):
         yield from _pair_faults(f"joint[{i}].bodies", _get(joint, "bodies"), known)
-    types = dict(zip(_names(joints), (_get(joint, "type") for joint in joints), strict=True))
-    driven: set[str] = set()
-    for i, driver in enumerate(_entries(data, "driver")):
-        name = _get(driver, "joint")
-        yield from _joint_faults(f"driver[{i}].joint", name, types, DRIVABLE, "be driven")
-        if name in driven:
-            yield f"driver[{i}].joint", f"{name!r} already has a driver"
-        driven.add(name if isinstance(name, str) else "")
-        if start := _initial_value(driver):
-            message = f"c0 + amplitude·sin(phase) must be 0, motion is measured from t = 0; got {start:g}"
-            yield f"driver[{i}].polynomial", message
+    types = {_text(joint, "name"): _text(joint, "type") for joint in joints}
+    yield from _driver_faults(data, types)
     for i, load in enumerate(_entries(data, "load")):
-        acts_on = ACTS_ON.get(_get(load, "type"))
+        acts_on = ACTS_ON.get(_text(load, "type"))
         if acts_on == "body":
             name = _get(load, "body")
             if name == GROUND:
@@ -154,18 +155,33 @@ def reference_faults(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             yield from _joint_faults(f"load[{i}].joint", name, types, TORSIONAL, "carry a torsion spring")
 
 
+def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Drivers of unknown or wrong joints, second ones of a joint, and values that do not begin at 0."""
+    driven: set[str] = set()
+    for i, driver in enumerate(_entries(data, "driver")):
+        name = _get(driver, "joint")
+        yield from _joint_faults(f"driver[{i}].joint", name, types, DRIVABLE, "be driven")
+        if isinstance(name, str):
+            if name in driven:
+                yield f"driver[{i}].joint", f"{name!r} already has a driver"
+            driven.add(name)
+        if start := _initial_value(driver):
+            message = f"c0 + amplitude·sin(phase) must be 0, motion is measured from t = 0; got {start:g}"
+            yield f"driver[{i}].polynomial", message
+
+
 def _initial_value(driver: Any) -> float:
     """value(0) of a driver; 0 where rounding or where its fields are themselves faulty."""
-    polynomial, sine = _get(driver, "polynomial") or (0.0,), _get(driver, "sine")
-    terms = [polynomial[0] if isinstance(polynomial, list | tuple) else 0.0]
-    if sine is not None:
-        amplitude, phase = _get(sine, "amplitude") or 0.0, _get(sine, "phase") or 0.0
-        if isinstance(amplitude, int | float) and isinstance(phase, int | float):
-            terms.append(amplitude * math.sin(phase))
-    if not all(isinstance(term, int | float) for term in terms):
-        return 0.0
-    start = float(sum(terms))
+    polynomial, sine = _get(driver, "polynomial"), _get(driver, "sine")
+    first = polynomial[0] if isinstance(polynomial, list | tuple) and polynomial else 0.0
+    amplitude, phase = _number(_get(sine, "amplitude")), _number(_get(sine, "phase"))
+    start = _number(first) + amplitude * math.sin(phase)
     return start if abs(start) > 1e-12 else 0.0
+
+
+def _number(value: Any) -> float:
+    """A number of a size that a scene can have, or 0, where a field's own fault is reported."""
+    return float(value) if isinstance(value, int | float) and abs(value) <= LARGEST else 0.0
 
 
 def _duplicates(key: str, names: Sequence[str], reserved: Sequence[str] = ()) -> Iterator[tuple[str, str]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import zlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -24,10 +25,11 @@ def write(blocks: Sequence[Block], out: Path) -> None:
         if isinstance(block, Figure):
             drawing = block.draw()
             drawn[block.name] = figures.svg(drawing, block.name)
-            (pictures / f"{block.name}.svg").write_text(drawn[block.name])
-            (pictures / f"{block.name}.png").write_bytes(figures.png(drawing))
-    (out / "index.html").write_text(html(blocks, drawn))
-    (out / "report.md").write_text(markdown(blocks))
+            name = file_name(block.name)
+            (pictures / f"{name}.svg").write_text(drawn[block.name], encoding="utf-8")
+            (pictures / f"{name}.png").write_bytes(figures.png(drawing))
+    (out / "index.html").write_text(html(blocks, drawn), encoding="utf-8")
+    (out / "report.md").write_text(markdown(blocks), encoding="utf-8")
 
 
 def html(blocks: Sequence[Block], drawn: dict[str, str]) -> str:
@@ -53,13 +55,13 @@ def markdown(blocks: Iterable[Block]) -> str:
 def _markdown(block: Block) -> str:
     match block:
         case Heading():
-            return f"{'#' * block.level} {block.text}"
+            return f"{'#' * block.level} {_words(block.text)}"
         case Text():
             return block.text
         case Table():
             return f"{block.caption}\n\n{_rows(block)}"
         case Figure():
-            return f"{block.caption}\n\n![{block.name}](figures/{block.name}.png)"
+            return f"{block.caption}\n\n![{_words(block.name)}](figures/{file_name(block.name)}.png)"
         case Listing():
             return f"```\n{block.text}\n```"
 
@@ -71,7 +73,18 @@ def _rows(table: Table) -> str:
 
 def _line(cells: Sequence[str]) -> str:
     """One line of a Markdown table; what would end a cell or a line is taken out of it."""
-    return "| " + " | ".join(" ".join(cell.replace("|", "\\|").split()) for cell in cells) + " |"
+    return "| " + " | ".join(_words(cell).replace("|", "\\|") for cell in cells) + " |"
+
+
+def _words(text: str) -> str:
+    """The text on one line, without tags of HTML."""
+    return " ".join(text.replace("&", "&amp;").replace("<", "&lt;").split())
+
+
+def file_name(name: str) -> str:
+    """The name of a figure as a file name: a name that is none, such as ../up, gets a number of its own."""
+    plain = re.sub(r"[^\w-]+", "-", name).strip("-")[:80]
+    return plain if plain and plain == name else f"{plain}-{zlib.crc32(name.encode()):08x}"
 
 
 def slug(text: str) -> str:

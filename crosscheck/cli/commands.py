@@ -180,7 +180,7 @@ def _status(records: Sequence[Record]) -> int:
 
 def _console() -> Console:
     """Standard output; wide when it is no terminal, so that no cell of a table is folded."""
-    return Console(width=None if sys.stdout.isatty() else PIPED_WIDTH)
+    return Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, markup=False)
 
 
 def _notice(sentence: str) -> None:

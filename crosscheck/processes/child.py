@@ -2,6 +2,9 @@
 
 It works in a temporary directory for each call, everything printed is captured at file-descriptor level,
 and numerical libraries get one thread.  It ends when its parent does.
+
+Calls and answers are pickled: a child is trusted, with the engine in it, as any package that is installed is.
+What protects is meant against accidents, not against an engine that means harm.
 """
 
 from __future__ import annotations
@@ -114,6 +117,8 @@ class Child:
             return pickle.loads(self._channel.recv_bytes())
         except (EOFError, ConnectionError):
             raise self._failure(Outcome.CRASHED, f"the process {self._ending()}") from None
+        except Exception as error:  # whatever unpickling what an engine made may raise
+            raise self._failure(Outcome.CRASHED, f"its answer cannot be read: {error}") from None
 
     def _ending(self) -> str:
         try:

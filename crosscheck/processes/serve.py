@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Cannot, Setting, engine
+from crosscheck.processes.answer import well_formed
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
@@ -36,18 +37,21 @@ def get_ready(engine_name: str, families: Sequence[str]) -> str:
     except ImportError:  # a run will say so
         return ""
     simulator.prepare(families)
-    return version
+    return str(version)
 
 
 def run_once(engine_name: str, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-    """One run; a missing package is a failed trajectory that says what to install."""
+    """One run; a missing package is a failed trajectory that says what to install.
+
+    Raises MalformedAnswer where what the engine returns is no trajectory of this run.
+    """
     simulator = engine(engine_name)
     try:
         simulator.version()
     except ImportError as error:
         message = f"{simulator.package} is not installed: {error}"
         return failed(engine_name, "", scene, setting, Outcome.CRASHED, message)
-    return simulator.run(scene, times, setting)
+    return well_formed(simulator.run(scene, times, setting), scene, times)
 
 
 def capabilities(engine_name: str, scene: Scene) -> Capabilities:

@@ -23,6 +23,7 @@ from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth import Truth, truth_for
 from crosscheck.processes.child import stop_all
 from crosscheck.processes.pool import end_idle, run_isolated
+from crosscheck.processes.serve import run_once
 from mbref.records import append, stored
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
@@ -138,7 +139,7 @@ def run_case(case: Case) -> Record:
 
 def run_here(case: Case) -> Record:
     """As ``run_case`` in the calling process, without its time limit and its protection."""
-    return _record(case, engine(case.engine).run(case.scene, case.times, case.setting))
+    return _record(case, run_once(case.engine, case.scene, case.times, case.setting))
 
 
 def _record(case: Case, trajectory: Trajectory) -> Record:
@@ -196,10 +197,10 @@ def _worth_repeating(record: Record, time_limit: float) -> bool:
 
 @functools.cache
 def _version(engine_name: str) -> str:
-    """The engine's version; empty when its package is missing, which each run then says."""
+    """The engine's version; empty where it tells none, which each run then says as its outcome."""
     try:
-        return engine(engine_name).version()
-    except ImportError:
+        return str(engine(engine_name).version())
+    except Exception:
         return ""
 
 

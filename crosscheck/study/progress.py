@@ -35,5 +35,5 @@ def shown(what: str, total: int) -> Iterator[Advance]:
 
 def _bar() -> Progress:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-               TextColumn("{task.fields[last]}"))  # fmt: skip
+               TextColumn("{task.fields[last]}", markup=False))  # fmt: skip
     return Progress(*columns, console=Console(stderr=True), transient=True)

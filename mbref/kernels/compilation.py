@@ -12,19 +12,19 @@ notice an edit in a kernel that another file's kernel calls.
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import hashlib
 import os
 import sys
 import types as types_of_python
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numba
 from numba import cfunc, f8, i8, njit, types, u4
 
 import mbref
+from mbref.kernels.disk_cache import kept_in
 
 # No fastmath: the same bits with and without the JIT.  Without numba's runtime (``_nrt``, undocumented there)
 # no kernel can allocate, and none counts references to its arrays, which takes time.
@@ -61,17 +61,6 @@ def _cache_root() -> Path:
 CACHE = _cache_root() / f"kernels-{_source_hash()}"
 
 
-@contextlib.contextmanager
-def _own_cache() -> Iterator[None]:
-    """numba reads its cache folder when a function is decorated; other users of numba keep theirs."""
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(CACHE)
-    try:
-        yield
-    finally:
-        numba.config.CACHE_DIR = before
-
-
 def kernel(function: Callable) -> Callable:
     """A compiled helper, callable from kernels and from Python."""
     return _compiled(function)
@@ -91,7 +80,7 @@ def allocating(function: Callable) -> Callable:
 
 
 def _compiled(function: Callable, **options: bool) -> Callable:
-    with _own_cache():
+    with kept_in(CACHE):
         return njit(**{**OPTIONS, **options})(function)
 
 
@@ -107,7 +96,7 @@ class Exchangeable:
         """The function that kernels take: the compiled one, or the plain one without the JIT."""
         if self._compiled is None:
             self._say_compiling()
-            with _own_cache():
+            with kept_in(CACHE):
                 self._compiled = self._compile()
         return self._compiled
 
@@ -131,7 +120,7 @@ class Exchangeable:
 
     def _say_compiling(self) -> None:
         module = self.function.__module__.rpartition(".")[2]
-        if not any(CACHE.rglob(f"{module}.{self.function.__name__}-*.nbi")):
+        if not any(CACHE.rglob(f"{module}.{self.function.__name__}-*.nbc")):
             _announce_once()
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -36,6 +35,7 @@ from mbref.kernels.scene_layout import SceneData
 from mbref.linear_algebra.symbolic_factorisation import empty_factor
 from mbref.method import Method
 from mbref.scene import Scene, SceneError
+from mbref.simulation.limits import AUTO, SPECIALISED, Limits
 from mbref.simulation.stepping import PAUSED, advance_to_end
 from mbref.specialised import Part, Specialised, Untraceable, specialise, with_specialised_code
 from mbref.stabilisation.base import Stabilisation
@@ -43,24 +43,6 @@ from mbref.stabilisation.base import Stabilisation
 STEPS_PER_CALL = 5_000  # between returns to Python, where an interrupt is heard and progress is told
 STEPS_WORTH_CODE = 20_000  # steps ahead from which on specialised code saves more than it takes to make
 UNWRAPPED = 1.0  # rad that a body may turn in a step where torsion springs unwrap: two turn less than π apart
-AUTO, GENERIC, SPECIALISED = "auto", "generic", "specialised"
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Tolerances and limits of a run, and whose code it runs."""
-
-    rtol: float = 1e-9  # local error per step, relative …
-    atol: float | None = None  # … and absolute (SI units); None means as rtol
-    rank_tolerance: float = 1e-10  # relative; a singular value or pivot below it counts as zero
-    violation: float = 3e-3  # largest |Φ| tolerated (m or rad), times the scene's length where over 1 m
-    first_step: float = 0.0  # s, that is tried first; 0: the integrator's own guess
-    smallest_step: float = 0.0  # s; 0 means a million-millionth of the duration
-    forced_step: float = 0.0  # s; a step this short is taken whatever its error estimate; 0: none
-    largest_step: float = 0.0  # s; 0 means the duration
-    largest_turn: float = 0.0  # rad that the fastest body may turn in an adaptive step; 0: a safe angle
-    most_steps: int = 5_000_000
-    code: str = AUTO  # GENERIC kernels, SPECIALISED to the scene, or AUTO: where many steps are ahead
 
 
 class Run:

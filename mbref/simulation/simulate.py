@@ -9,8 +9,9 @@ import numpy as np
 
 from mbref.method import Method, MethodError
 from mbref.scene import Scene
+from mbref.simulation.limits import SPECIALISED, Limits
 from mbref.simulation.outcome import trajectory_of
-from mbref.simulation.run import SPECIALISED, Limits, Run, prepare
+from mbref.simulation.run import Run, prepare
 from mbref.specialised import Untraceable
 from mbref.trajectory import Trajectory
 
@@ -56,7 +57,10 @@ def why_no_code(scene: Scene, method: Method) -> str:
 
 def checked_times(times: Sequence[float] | np.ndarray) -> np.ndarray:
     """Sample times as an array (k,); ValueError unless finite, not negative and increasing."""
-    array = np.ascontiguousarray(times, dtype=float)
+    try:
+        array = np.ascontiguousarray(times, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError("times: must be numbers") from None
     if array.ndim != 1 or not array.size:
         raise ValueError("times: needs at least one sample time")
     if not np.isfinite(array).all() or array[0] < 0 or np.any(np.diff(array) <= 0):

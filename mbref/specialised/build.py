@@ -6,14 +6,9 @@ the active rows and columns, and one Newton step of the projection.
 
 from __future__ import annotations
 
-import functools
 import hashlib
-import json
-import os
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -30,7 +25,8 @@ from mbref.kernels.named_memory import Packed, allocate, packed, record
 from mbref.linear_algebra.minimum_norm import NEVER
 from mbref.linear_algebra.sparse_cholesky import find_squared_pivots
 from mbref.method import Method
-from mbref.specialised.machine_code import Code, Piece, compiled, processor
+from mbref.specialised.kept_code import code_of
+from mbref.specialised.machine_code import Code, Piece, processor
 from mbref.specialised.tracing import Record, Untraceable, inputs, numbers, plain
 from mbref.stabilisation.projection import REPEATED, newton_step, project_velocities
 
@@ -157,10 +153,12 @@ def specialise(model: Model, method: Method, rank_tolerance: float, start: Start
     if part.factor.symbolic.row.size > MOST_ROWS:
         raise Untraceable(f"{part.factor.symbolic.row.size} rows are active, more than {MOST_ROWS}")
     arguments = (model, method, rank_tolerance, start, part)
-    kept = CACHE / "scenes" / _key(*arguments)
-    if not kept.with_suffix(".json").exists():
-        _keep(kept, [rates_piece(RecordingState(*arguments)), project_piece(RecordingState(*arguments))])
-    return _loaded(kept)
+    operations, code = code_of(CACHE / "scenes" / f"{_key(*arguments)}.code", lambda: _pieces(*arguments))
+    return Specialised(Addresses(*map(code.address, Addresses._fields)), operations, code)
+
+
+def _pieces(*arguments: Any) -> list[Piece]:
+    return [rates_piece(RecordingState(*arguments)), project_piece(RecordingState(*arguments))]
 
 
 def _key(model: Model, method: Method, rank_tolerance: float, start: Start, part: Part) -> str:
@@ -178,25 +176,3 @@ def _arrays(values: Any) -> Iterator[np.ndarray]:
             yield value
         else:
             yield from _arrays(value)
-
-
-def _keep(path: Path, pieces: list[Piece]) -> None:
-    """Write the code, then its facts, each whole or not at all."""
-    facts = {"operations": {piece.name: len(piece.live()) for piece in pieces}}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    for suffix, data in ((".o", compiled(pieces)), (".json", json.dumps(facts).encode())):
-        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
-            file.write(data)
-        os.replace(file.name, path.with_suffix(suffix))
-
-
-@functools.lru_cache(maxsize=64)
-def _read(path: Path) -> tuple[dict[str, int], Code]:
-    """Operations and code of a scene, loaded once in a process."""
-    facts = json.loads(path.with_suffix(".json").read_text())
-    return facts["operations"], Code(path.with_suffix(".o").read_bytes())
-
-
-def _loaded(path: Path) -> Specialised:
-    operations, code = _read(path)
-    return Specialised(Addresses(*map(code.address, Addresses._fields)), operations, code)

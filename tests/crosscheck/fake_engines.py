@@ -138,9 +138,54 @@ class Stuck(Fake):
         time.sleep(600)
 
 
+class Malformed(Fake):
+    """Damages a good answer by the function that its options name."""
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        return DAMAGES[setting.options["damage"]](super().run(scene, times, Setting(setting.family)))
+
+
+DAMAGES = {
+    "nothing": lambda good: None,
+    "a table": lambda good: good.to_record(),
+    "an engine": lambda good: Fake,
+    "no outcome": lambda good: replace(good, outcome="COMPLETED"),
+    "other bodies": lambda good: replace(good, bodies=("someone",)),
+    "no bodies": lambda good: replace(good, bodies=None),
+    "other times": lambda good: replace(good, times=good.times + 1e-3),
+    "few samples": lambda good: replace(good, times=good.times[:1], position=good.position[:1]),
+    "few positions": lambda good: replace(good, position=good.position[:1]),
+    "wrong shape": lambda good: replace(good, position=good.position[:, 0]),
+    "text": lambda good: replace(good, velocity="fast"),
+    "ragged": lambda good: replace(good, velocity=[[1.0], [1.0, 2.0]]),
+    "no rotation": lambda good: replace(good, orientation=0 * good.orientation),
+    "unknown joint": lambda good: replace(good, reactions={"X": np.zeros((3, 6))}),
+    "no cost": lambda good: replace(good, cost=1.0),
+    "cost of NaN": lambda good: replace(good, cost=Cost(seconds=float("nan"))),
+    "settings of objects": lambda good: replace(good, settings={"a": Fake}),
+    "a local class": lambda good: type("Local", (), {})(),
+}
+
+
+class Scalars(Fake):
+    """Answers with numbers of numpy's and lists where Python's numbers and arrays are expected."""
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        good = super().run(scene, times, setting)
+        cost = Cost(np.float32(0.5), np.float64(0.1), np.int64(7))
+        return replace(good, t_end=np.float64(good.t_end), cost=cost, settings={"seconds": np.float64(0.5)},
+                       velocity=good.velocity.tolist(), bodies=list(good.bodies))  # fmt: skip
+
+
+class Versionless(Fake):
+    def version(self) -> str:
+        raise RuntimeError("no licence")
+
+
 FAKE, SEGFAULT, HANG, CHATTER, RAISE, QUIT = Fake(), Segfault(), Hang(), Chatter(), Raise(), Quit()
 THREADS, MISSING, RECORDER, AGING = Threads(), Missing(), Recorder(), Aging()
 SLOW, STUCK = Slow(), Stuck()
+MALFORMED, SCALARS, VERSIONLESS = Malformed(), Scalars(), Versionless()
 
 
 def converse(text: str) -> tuple[str, int]:

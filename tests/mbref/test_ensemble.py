@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from concurrent.futures import ThreadPoolExecutor
+import signal
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -151,3 +152,38 @@ def test_command_and_single_runs_agree(tmp_path: Path, capsys: pytest.CaptureFix
     assert np.allclose(printed["mean_position"]["slider"], places.mean(axis=0), rtol=0, atol=1e-13)
     assert np.allclose(printed["deviation_position"]["slider"], places.std(axis=0), rtol=0, atol=1e-13)
     assert len(path.read_text().splitlines()) == 4
+
+
+def test_a_killed_process_costs_its_own_run_alone(tmp_path: Path):
+    """The third call kills its process; the others, before and after it, give what they give."""
+    with processes(2) as pool:
+        calls = [pool.submit(signal.raise_signal if k == 2 else pow, *_arguments(k)) for k in range(8)]
+        errors = [type(call.exception()).__name__ for call in calls]
+    assert errors == ["NoneType"] * 2 + ["BrokenProcessPool"] + ["NoneType"] * 5
+    assert [call.result() for call in calls if call.exception() is None] == [2**k for k in range(8) if k != 2]
+
+
+def _arguments(k: int) -> tuple:
+    return (signal.SIGKILL,) if k == 2 else (2, k)
+
+
+def test_a_killed_run_is_told_and_not_stored(tmp_path: Path):
+    class Killed(Executor):
+        """Breaks at the second call."""
+
+        calls = 0
+
+        def submit(self, function, /, *arguments):
+            self.calls += 1
+            future: Future = Future()
+            if self.calls == 2:
+                future.set_exception(BrokenExecutor())
+            else:
+                future.set_result(function(*arguments))
+            return future
+
+    scenes, path = list(variants(DRIVEN, VARY, 3)), tmp_path / "runs.jsonl"
+    runs = dict(ensemble(scenes, TIMES, METHOD, LIMITS, Killed(), path))
+    assert [runs[k].outcome.name for k in range(3)] == ["COMPLETED", "CRASHED", "COMPLETED"]
+    assert runs[1].message == "its process was killed" and runs[1].bodies == runs[0].bodies
+    assert len(path.read_text().splitlines()) == 2

@@ -10,23 +10,31 @@ from mbref.kernels.layout import NOT_CONVERGED, OK, SINGULAR
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import simulate
 
-RNG = np.random.default_rng(20031)
 
+def system(m, n, redundant, seed=20031):
+    """Random M, Φ_q of rank m - redundant, g, consistent γ; and the exact solution by the KKT system.
 
-def system(m, n, redundant):
-    """Random M, Φ_q of rank m - redundant, g, consistent γ; and the exact solution by the KKT system."""
-    mass = RNG.uniform(0.1, 10, n)
-    jacobian = RNG.normal(size=(m, n))
+    The same for the same arguments, whichever tests ran before.
+    """
+    rng = np.random.default_rng([m, n, redundant, seed])
+    mass = rng.uniform(0.1, 10, n)
+    jacobian = rng.normal(size=(m, n))
     if redundant:
-        mix = RNG.normal(size=(redundant, m - redundant))
+        mix = rng.normal(size=(redundant, m - redundant))
         jacobian[m - redundant :] = mix @ jacobian[: m - redundant]
-    force, wanted = RNG.normal(size=n), RNG.normal(size=n)
+    force, wanted = rng.normal(size=n), rng.normal(size=n)
     gamma = jacobian @ wanted
     independent = jacobian[: m - redundant]
     k = len(independent)
     kkt = np.block([[np.diag(mass), independent.T], [independent, np.zeros((k, k))]])
     exact = np.linalg.solve(kkt, np.concatenate([force, gamma[:k]]))[:n]
     return mass, jacobian, force, gamma, exact
+
+
+def tolerance(formulation):
+    """Ten times what 40 random systems of each kind measured: alf stops at a change of 1e-9 (2e-9), the
+    others are off by rounding (6e-14)."""
+    return 2e-8 if formulation.name == "alf" else 6e-13
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS.values(), ids=FORMULATIONS)
@@ -39,9 +47,9 @@ def test_claim_of_redundancy_and_exact_solution(formulation, redundant):
         return
     assert status == OK
     error = np.max(np.abs(acceleration - exact))
-    assert error < 1e-9, f"{formulation.name}: acceleration differs by {error:.2e}"
+    assert error < tolerance(formulation), f"{formulation.name}: acceleration differs by {error:.2e}"
     balance = np.max(np.abs(mass * acceleration + jacobian.T @ multipliers - force))
-    assert balance < 1e-9, f"{formulation.name}: M q̈ + Φ_qᵀ λ - g = {balance:.2e}"
+    assert balance < tolerance(formulation), f"{formulation.name}: M q̈ + Φ_qᵀ λ - g = {balance:.2e}"
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS.values(), ids=FORMULATIONS)
@@ -58,9 +66,9 @@ def test_rescaled_and_repeated_rows_change_nothing(formulation, factor):
         assert status == SINGULAR
         return
     assert status == OK
-    assert np.max(np.abs(acceleration - exact)) < 1e-9, formulation.name
+    assert np.max(np.abs(acceleration - exact)) < tolerance(formulation), formulation.name
     reaction = force - mass * exact
-    assert np.max(np.abs(jacobian.T @ multipliers - reaction)) < 1e-9, formulation.name
+    assert np.max(np.abs(jacobian.T @ multipliers - reaction)) < tolerance(formulation), formulation.name
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS.values(), ids=FORMULATIONS)

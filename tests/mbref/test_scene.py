@@ -53,6 +53,18 @@ FAULTS = [
     (("load", 0, "type"), "wind", "load[0].type"),
     (("gravity",), [0, 0, float("inf")], "gravity[2]"),
     (("duration",), 0.0, "duration"),
+    (("joint", 0, "axis"), [0, 0, 1e200], "joint[0].axis[2]"),
+    (("joint", 0, "axis"), [0, 1e-200, 1e-200], "joint[0].axis"),
+    (("body", 0, "mass"), 1e-200, "body[0].mass"),
+    (("body", 0, "mass"), 10**400, "body[0].mass"),
+    (("body", 0, "inertia"), [1e-200, 1.0, 1.0], "body[0].inertia"),
+    (("body", 0, "inertia"), [1e200, 1e200, 1e200], "body[0].inertia"),
+    (("body", 0, "inertia"), [10**400, 1.0, 1.0], "body[0].inertia"),
+    (("body", 1, "name"), "the fixed frame", "body[1].name"),
+    (("driver", 0, "joint"), ["H"], "driver[0].joint"),
+    (("load", 0, "type"), ["force"], "load[0].type"),
+    (("joint", 1, "type"), ["spherical"], "joint[1].type"),
+    (("driver", 0, "polynomial"), [10**400, 1.0], "driver[0].polynomial[0]"),
 ]
 
 
@@ -131,3 +143,45 @@ def test_unreadable_files_are_faults(tmp_path):
     (tmp_path / "broken.toml").write_text("name = \n")
     with pytest.raises(SceneError, match="is not TOML"):
         Scene.from_file(tmp_path / "broken.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (b"a = " + b"[" * 4000 + b"]" * 4000, "is nested too deeply"),
+        (b"a = " + b"1" * 5000, "is not TOML"),
+        (b"a = 0x" + b"f" * 5000, "a: is not a known field"),
+        (b'name = "\xff"', "is not TOML"),
+        (b"\x00", "is not TOML"),
+    ],
+)
+def test_strange_files_are_faults(text, says, tmp_path):
+    (tmp_path / "strange.toml").write_bytes(text)
+    with pytest.raises(SceneError, match=says):
+        Scene.from_file(tmp_path / "strange.toml")
+
+
+def test_faulty_values_are_quoted_in_short():
+    deep = [0.0]
+    for _ in range(900):
+        deep = [deep]
+    faults = faults_of(changed((("body", 0, "position"), deep), (("name",), ["x" * 9000])))
+    assert len(faults) == 4 and max(map(len, faults)) < 200, faults  # two coordinates are missing too
+
+
+def test_files_are_utf8_whatever_the_locale_and_may_begin_with_a_mark(tmp_path, monkeypatch):
+    monkeypatch.setattr("locale.getpreferredencoding", lambda *_: "ascii")
+    scene = Scene(**changed((("name",), "Türe α")))
+    path = tmp_path / "scene.toml"
+    scene.save(path)
+    assert "Türe α".encode() in path.read_bytes()
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert Scene.from_file(path) == scene
+
+
+def test_a_joint_of_a_modelled_ground_s_name_is_a_fault():
+    data = changed((("joint", 1, "name"), "ground"))
+    assert Scene(**data).ground == "frame"
+    assert faults_of({**data, "ground": "body"}) == [
+        "joint[1].name: 'ground' is reserved for the fixed frame"
+    ]

@@ -1,0 +1,105 @@
+"""An engine's answer to a run: a Trajectory of the bodies asked for, at the times asked for.
+
+Checked in the child, so that a malformed answer is the outcome of its run; a child answers with Python's and
+numpy's own types alone.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+
+from mbref.scene import Scene
+from mbref.trajectory import Cost, Outcome, Trajectory
+
+WIDTHS = {"position": 3, "orientation": 4, "velocity": 3, "angular_velocity": 3}
+OPTIONAL = {"acceleration": 3, "angular_acceleration": 3}
+UNIT_TOLERANCE = 1e-3  # of a quaternion's length; beyond it, it is none
+
+
+class MalformedAnswer(Exception):
+    """An engine returned no trajectory of the run; the sentence says why."""
+
+
+def well_formed(answer: Any, scene: Scene, times: np.ndarray) -> Trajectory:
+    """The engine's answer to ``run(scene, times, …)`` as a Trajectory of plain numbers.
+
+    Raises MalformedAnswer where it is no Trajectory, has other bodies, other or too few samples, arrays of
+    another shape or fields of another type.
+    """
+    if not isinstance(answer, Trajectory):
+        raise MalformedAnswer(f"the engine returned {type(answer).__name__}, not a Trajectory")
+    if not isinstance(answer.outcome, Outcome):
+        raise MalformedAnswer(f"outcome: is {answer.outcome!r}, not an Outcome")
+    names = tuple(body.name for body in scene.body)
+    if not isinstance(answer.bodies, tuple | list) or sorted(map(str, answer.bodies)) != sorted(names):
+        raise MalformedAnswer(f"bodies: are {answer.bodies!r}, not those of the scene, {names!r}")
+    reached = _times(answer, times)
+    plain: dict[str, Any] = {name: _array(name, getattr(answer, name), (reached.size, len(names), width))
+             for name, width in (WIDTHS | OPTIONAL).items()
+             if name in WIDTHS or getattr(answer, name) is not None}  # fmt: skip
+    if np.any(np.abs(np.linalg.norm(plain["orientation"], axis=-1) - 1) > UNIT_TOLERANCE):
+        raise MalformedAnswer("orientation: has a quaternion that is not of unit length")
+    texts: dict[str, Any] = {name: str(getattr(answer, name)) for name in ("version", "method", "message")}
+    return replace(
+        answer, **plain, **texts, times=reached, bodies=tuple(answer.bodies),
+        settings=_settings(answer.settings), cost=_cost(answer.cost), t_end=_number("t_end", answer.t_end),
+        reactions=_reactions(answer.reactions, scene, reached.size),
+    )  # fmt: skip
+
+
+def _times(answer: Trajectory, times: np.ndarray) -> np.ndarray:
+    """The times reached (k,): the first of those asked for, all of them where the run completed."""
+    reached = _array("times", answer.times, None)
+    if reached.ndim != 1 or reached.size > times.size or not np.array_equal(reached, times[: reached.size]):
+        raise MalformedAnswer("times: are not the first of those asked for")
+    if answer.outcome is Outcome.COMPLETED and reached.size < times.size:
+        raise MalformedAnswer(f"times: completed with {reached.size} of {times.size} samples")
+    return reached
+
+
+def _array(name: str, value: Any, shape: tuple[int, ...] | None) -> np.ndarray:
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise MalformedAnswer(f"{name}: is {type(value).__name__}, not an array of numbers") from None
+    if shape is not None and array.shape != shape:
+        raise MalformedAnswer(f"{name}: has shape {array.shape}, not {shape}")
+    return array
+
+
+def _number(name: str, value: Any) -> float:
+    return float(_array(name, value, ()))
+
+
+def _reactions(value: Any, scene: Scene, reached: int) -> dict[str, np.ndarray] | None:
+    if value is None:
+        return None
+    if not isinstance(value, Mapping) or not set(value) <= {joint.name for joint in scene.joint}:
+        raise MalformedAnswer("reactions: are not those of joints of the scene")
+    return {name: _array(f"reactions[{name}]", load, (reached, 6)) for name, load in value.items()}
+
+
+def _settings(value: Any) -> dict[str, Any]:
+    """As JSON gives them back, numbers of numpy made plain."""
+    try:
+        return json.loads(json.dumps(dict(value), default=lambda number: number.item()))
+    except (TypeError, ValueError, AttributeError):
+        raise MalformedAnswer("settings: are no table of plain values") from None
+
+
+def _cost(value: Any) -> Cost:
+    if not isinstance(value, Cost):
+        raise MalformedAnswer(f"cost: is {type(value).__name__}, not a Cost")
+    numbers = {
+        field.name: _number(f"cost.{field.name}", getattr(value, field.name)) for field in fields(Cost)
+    }
+    if not all(math.isfinite(number) for number in numbers.values()):
+        raise MalformedAnswer("cost: is not finite")
+    plain: dict[str, Any] = {n: x if n.endswith("seconds") else int(x) for n, x in numbers.items()}
+    return Cost(**plain)

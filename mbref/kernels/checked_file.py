@@ -1,0 +1,62 @@
+"""Files of a cache: whole or not there, with a checksum; where they cannot be kept, work goes on without.
+
+Nothing here raises for a damaged, foreign, missing or unwritable file: a cache may be thrown away any time.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+DIGEST = hashlib.sha256().digest_size  # bytes, before the data
+
+
+def read(path: Path) -> bytes | None:
+    """The data written to this path; None where there are none, or the file is damaged.
+
+    A damaged file is told in one line on stderr and removed, where it can be.
+    """
+    try:
+        found = path.read_bytes()
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        _tell(f"{path} cannot be read ({error.strerror}) and is done without")
+        return None
+    digest, data = found[:DIGEST], found[DIGEST:]
+    if hashlib.sha256(data).digest() == digest:
+        return data
+    _tell(f"{path} is damaged and is made anew")
+    with contextlib.suppress(OSError):
+        path.unlink()
+    return None
+
+
+def write(path: Path, data: bytes) -> None:
+    """Keep the data, whole or not at all; where that fails one line on stderr says so, once a folder."""
+    temporary = ""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
+            temporary = file.name
+            file.write(hashlib.sha256(data).digest() + data)
+        os.replace(temporary, path)
+    except OSError as error:
+        _tell_once(f"nothing can be kept in {path.parent} ({error.strerror}); it is made anew each time")
+        if temporary:
+            with contextlib.suppress(OSError):
+                os.unlink(temporary)
+
+
+@functools.cache
+def _tell_once(sentence: str) -> None:
+    _tell(sentence)
+
+
+def _tell(sentence: str) -> None:
+    print(f"mbref: {sentence}", file=sys.stderr, flush=True)

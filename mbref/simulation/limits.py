@@ -1,0 +1,84 @@
+"""Limits: the numbers of a run that belong to no part of the method, checked where they enter."""
+
+from __future__ import annotations
+
+import math
+import operator
+from dataclasses import dataclass, fields
+from typing import Any
+
+from mbref.scene_fields import LARGEST, SMALLEST, shown
+
+AUTO, GENERIC, SPECIALISED = "auto", "generic", "specialised"
+CODES = (AUTO, GENERIC, SPECIALISED)
+FINEST = 1e-16  # relative tolerance; a number has no more digits
+MOST = 2**62  # of what is counted
+
+# field → least and largest value, and whether 0 is taken too
+INTERVALS = {
+    "rtol": (FINEST, 0.99, False),
+    "atol": (SMALLEST, LARGEST, False),
+    "rank_tolerance": (SMALLEST, 0.99, True),
+    "violation": (SMALLEST, LARGEST, False),
+    "first_step": (SMALLEST, LARGEST, True),
+    "smallest_step": (SMALLEST, LARGEST, True),
+    "forced_step": (SMALLEST, LARGEST, True),
+    "largest_step": (SMALLEST, LARGEST, True),
+    "largest_turn": (SMALLEST, LARGEST, True),
+}
+COUNTS = {"most_steps": (1, MOST)}
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Tolerances, steps and code of a run; raises ValueError naming a field that is out of its interval.
+
+    Whatever number is given, the field is a Python float or int: compiled code reads its bytes.
+    """
+
+    rtol: float = 1e-9  # local error per step, relative …
+    atol: float | None = None  # … and absolute (SI units); None means as rtol
+    rank_tolerance: float = 1e-10  # relative; a singular value or pivot below it counts as zero
+    violation: float = 3e-3  # largest |Φ| tolerated (m or rad), times the scene's length where over 1 m
+    first_step: float = 0.0  # s, that is tried first; 0: the integrator's own guess
+    smallest_step: float = 0.0  # s; 0 means a million-millionth of the duration
+    forced_step: float = 0.0  # s; a step this short is taken whatever its error estimate; 0: none
+    largest_step: float = 0.0  # s; 0 means the duration
+    largest_turn: float = 0.0  # rad that the fastest body may turn in an adaptive step; 0: a safe angle
+    most_steps: int = 5_000_000
+    code: str = AUTO  # GENERIC kernels, SPECIALISED to the scene, or AUTO: where many steps are ahead
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            object.__setattr__(self, field.name, _checked(field.name, getattr(self, field.name)))
+
+
+def _checked(name: str, value: Any) -> Any:
+    if name == "code":
+        if value not in CODES:
+            raise ValueError(f"code: must be one of {', '.join(CODES)}, got {shown(value)}")
+        return value
+    if name in COUNTS:
+        return _count(name, value, *COUNTS[name])
+    return None if name == "atol" and value is None else _number(name, value, *INTERVALS[name])
+
+
+def _number(name: str, value: Any, least: float, largest: float, zero: bool) -> float:
+    try:
+        number = math.nan if isinstance(value, str | bool) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not (least <= number <= largest or (zero and number == 0)):
+        also = "0 or " if zero else ""
+        raise ValueError(f"{name}: must be {also}a number from {least:g} to {largest:g}, got {shown(value)}")
+    return number
+
+
+def _count(name: str, value: Any, least: int, largest: int) -> int:
+    try:
+        count = least - 1 if isinstance(value, bool) else operator.index(value)
+    except TypeError:
+        count = least - 1
+    if not least <= count <= largest:
+        raise ValueError(f"{name}: must be a whole number from {least} to 2**62, got {shown(value)}")
+    return count

@@ -1,0 +1,77 @@
+"""Malformed answers of an engine: outcomes of their runs; the study goes on."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Setting
+from crosscheck.processes.answer import MalformedAnswer, well_formed
+from crosscheck.study.grid import Case, study
+from mbref.scene import Body, Scene
+from tests.crosscheck.fake_engines import DAMAGES, FAKE, MALFORMED, SCALARS
+
+TIMES = np.array([0.0, 0.1, 0.3])
+BLOCK = Body(name="block", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(1.0, 2.0, 3.0))
+SCENE = Scene(name="still", body=(BLOCK,))
+SAYS = {
+    "nothing": "returned NoneType, not a Trajectory",
+    "a table": "returned dict, not a Trajectory",
+    "an engine": "not a Trajectory",
+    "no outcome": "outcome: is 'COMPLETED'",
+    "other bodies": "bodies: are ('someone',)",
+    "no bodies": "bodies: are None",
+    "other times": "times: are not the first of those asked for",
+    "few samples": "times: completed with 1 of 3 samples",
+    "few positions": "position: has shape (1, 1, 3), not (3, 1, 3)",
+    "wrong shape": "position: has shape (3, 3), not (3, 1, 3)",
+    "text": "velocity: is str, not an array of numbers",
+    "ragged": "velocity: is list, not an array of numbers",
+    "no rotation": "orientation: has a quaternion",
+    "unknown joint": "reactions: are not those of joints",
+    "no cost": "cost: is float, not a Cost",
+    "cost of NaN": "cost: is not finite",
+    "settings of objects": "settings: are no table",
+    "a local class": "returned Local, not a Trajectory",
+}
+
+
+@pytest.fixture(autouse=True)
+def _fakes_importable(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_malformed_answers_are_told_apart(damage: str):
+    with pytest.raises(MalformedAnswer) as caught:
+        well_formed(MALFORMED.run(SCENE, TIMES, Setting("a", {"damage": damage})), SCENE, TIMES)
+    assert SAYS[damage] in str(caught.value)
+
+
+def test_a_run_that_ended_early_has_its_samples():
+    good = FAKE.run(SCENE, TIMES[:2], Setting("a", {"outcome": "STEP_FAILED"}))
+    assert well_formed(good, SCENE, TIMES).times.tolist() == [0.0, 0.1]
+
+
+def test_numbers_of_numpy_become_plain():
+    run = well_formed(SCALARS.run(SCENE, TIMES, Setting("a")), SCENE, TIMES)
+    assert json.loads(json.dumps(run.to_record()))["cost"]["steps"] == 7
+    kinds = [type(x) for x in (run.t_end, run.cost.seconds, run.cost.steps, run.settings["seconds"])]
+    assert kinds == [float, float, int, float]
+    assert run.velocity.shape == (3, 1, 3) and run.bodies == ("block",)
+
+
+def test_a_study_goes_on_after_every_malformed_answer(tmp_path: Path):
+    wanted = [
+        ("MALFORMED", {"damage": "nothing"}), ("MALFORMED", {"damage": "few samples"}), ("SCALARS", {}),
+        ("VERSIONLESS", {}), ("MALFORMED", {"damage": "a local class"}), ("FAKE", {}),
+    ]  # fmt: skip
+    cases = [Case(SCENE, TIMES, f"fake_engines:{name}", Setting("a", options)) for name, options in wanted]
+    records = study(cases, None, tmp_path / "records.jsonl")
+    outcomes = [record["outcome"] for record in records]
+    assert outcomes == ["CRASHED", "CRASHED", "COMPLETED", "CRASHED", "CRASHED", "COMPLETED"]
+    assert "no licence" in records[3]["message"], records[3]["message"]
+    assert len((tmp_path / "records.jsonl").read_text().splitlines()) == 6

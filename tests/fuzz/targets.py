@@ -1,0 +1,161 @@
+"""The cases of the fuzzers, each by its seed; anything that is not documented is raised.
+
+``scene_file``: reading, writing, diagnosing.  ``simulation``: a scene by a method within limits.
+``command_line``: both programs.  A case that takes long is interrupted, which it has to hear.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import random
+import signal
+import traceback
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from mbref.cli import main as mbref_main
+from mbref.equations.diagnosis import diagnose
+from mbref.method import Method, MethodError
+from mbref.records import strict_json
+from mbref.scene import Scene, SceneError
+from mbref.scenes import SCENES
+from mbref.simulation.simulate import Limits, prepare, simulate
+from tests.fuzz import mutations
+
+LONG = 10.0  # s after which a case is interrupted
+DOCUMENTED = (0, 1, 2, 130)  # exit statuses
+
+
+def scene_file(seed: int) -> str:
+    """Read a mutated file; write what was read and read that; diagnose it."""
+    draw = random.Random(seed)
+    Path("scene.toml").write_bytes(mutations.mutated_text(draw))
+    try:
+        scene = Scene.from_file("scene.toml")
+    except SceneError as error:
+        assert error.faults and all(error.faults), "an error without a fault"
+        return "refused"
+    scene.save("again.toml")
+    assert Scene.from_file("again.toml") == scene, "another scene comes out of the file that it was saved to"
+    try:
+        diagnose(scene)
+    except SceneError:
+        return "read, not diagnosed"
+    return "diagnosed"
+
+
+def scene_data(seed: int) -> str:
+    """A scene from Python's objects."""
+    try:
+        Scene(**mutations.mutated_data(random.Random(seed)))
+    except SceneError:
+        return "refused"
+    return "accepted"
+
+
+def simulation(seed: int) -> str:
+    """A run; the record of what it reached is strict JSON."""
+    draw = random.Random(seed)
+    try:
+        scene = _accepted(draw)
+        limits = Limits(**mutations.limits(draw))
+        run = simulate(scene, mutations.method(draw), mutations.times(draw), limits)
+    except (SceneError, MethodError, ValueError) as error:
+        assert str(error), "an error without a message"
+        return type(error).__name__
+    json.loads(strict_json(run.to_record()), parse_constant=_refuse_constant)
+    return run.outcome.name
+
+
+def _accepted(draw: random.Random) -> Scene:
+    """A mutated scene that is a scene."""
+    while True:
+        with contextlib.suppress(SceneError):
+            return Scene(**mutations.mutated_data(draw))
+
+
+def command_line(seed: int) -> str:
+    """A command line of mbref or crosscheck: its exit status and what it printed."""
+    draw = random.Random(seed)
+    Path("scene.toml").write_bytes(mutations.mutated_text(draw))
+    scene = draw.choice(
+        ("scene.toml", draw.choice(sorted(SCENES)), draw.choice(mutations.WORDS), "four_bar[9]")
+    )
+    words = [scene.replace("\x00", ""), *mutations.option_words(draw)]
+    program, command = draw.choice(_programs())
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            status = program([command, *words])
+        except SystemExit as end:
+            status = end.code
+    assert status in DOCUMENTED, f"exit status {status}"
+    assert "Traceback" not in err.getvalue(), err.getvalue()[-300:]
+    assert status != 2 or err.getvalue().strip(), f"bad input, and no message: {command} {words}"
+    if "--json" in words and status in (0, 1):
+        json.loads(out.getvalue(), parse_constant=_refuse_constant)
+    return f"exit status {status}"
+
+
+def _programs() -> list[tuple[Callable, str]]:
+    from crosscheck.cli import main as crosscheck_main
+
+    mbref = [
+        (mbref_main, command) for command in ("run", "run", "run", "diagnose", "diagnose", "ensemble", "x")
+    ]
+    return mbref + [
+        (crosscheck_main, command) for command in ("run", "compare", "verify", "list", "report", "")
+    ]
+
+
+def _refuse_constant(name: str) -> float:
+    raise AssertionError(f"{name} is no JSON")
+
+
+TARGETS = {f.__name__: f for f in (scene_file, scene_data, simulation, command_line)}
+
+
+def compile_all() -> None:
+    """Compile what the cases need, so that none is interrupted in that."""
+    for name in dict.fromkeys(mutations.METHODS):
+        prepare(Method.parse(name))
+    diagnose(SCENES["four_bar"]())
+
+
+def case(name: str, seed: int) -> tuple[str, str]:
+    """How the case of that seed ended, and what was wrong with that, or ""."""
+    try:
+        with warnings.catch_warnings(), _interrupted_after(LONG):
+            warnings.simplefilter("error")
+            return TARGETS[name](seed), ""
+    except KeyboardInterrupt:
+        return "interrupted", ""
+    except BaseException as error:
+        sentence = traceback.format_exception_only(error)[-1].strip()[:300]
+        return "DEFECT", f"{sentence} | {_where(error)}"
+
+
+def _where(error: BaseException) -> str:
+    """The last lines of the packages that the error came through."""
+    frames = traceback.extract_tb(error.__traceback__)
+    ours = [f for f in frames if any(package in f.filename for package in ("mbref", "crosscheck"))]
+    return " ".join(f"{Path(f.filename).name}:{f.lineno}" for f in ours[-3:])
+
+
+@contextlib.contextmanager
+def _interrupted_after(seconds: float) -> Iterator[None]:
+    """SIGINT, as from Ctrl-C, unless the block ends before."""
+    before = signal.signal(signal.SIGALRM, _interrupt)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def _interrupt(*_: object) -> None:
+    raise KeyboardInterrupt

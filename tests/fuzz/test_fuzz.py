@@ -1,0 +1,20 @@
+"""A few hundred of the fuzzers' cases; ``make fuzz`` runs the many."""
+
+import pytest
+
+from tests.fuzz import targets
+
+
+@pytest.mark.parametrize(("target", "count"), [("scene_file", 150), ("scene_data", 300)])
+def test_mutated_scenes_are_scenes_or_documented_errors(target, count, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    endings = [(seed, *targets.case(target, seed)) for seed in range(count)]
+    assert not [case for case in endings if case[2]]
+    assert len({ending for _, ending, _ in endings}) > 1, "every case ended alike"
+
+
+def test_an_undocumented_error_is_a_defect(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("mbref.scene_fields.LARGEST", "not a number")
+    found = [defect for seed in range(20) if (defect := targets.case("scene_data", seed)[1])]
+    assert found and all("TypeError" in defect and "scene_fields.py" in defect for defect in found), found

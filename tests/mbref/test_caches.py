@@ -1,0 +1,152 @@
+"""Caches: damaged, truncated, foreign, unwritable and concurrent ones cost time, never a result."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from mbref.kernels import checked_file
+
+ROOT = Path(__file__).parents[2]
+SMALL_KERNEL = """
+import sys
+sys.path.insert(0, {root!r})
+from numba import f8
+from mbref.kernels.compilation import CACHE, entry, kernel
+
+@kernel
+def twice(x):
+    return 2.0 * x
+
+@entry(f8(f8))
+def shifted(x):
+    return twice(x) + 1.0
+
+print(shifted(3.0))
+"""
+SCENE = """
+import sys
+sys.path.insert(0, {root!r})
+from pathlib import Path
+from mbref.specialised import kept_code
+from mbref.specialised.machine_code import Piece
+from mbref.specialised.tracing import Record, inputs
+
+def pieces():
+    record = Record()
+    (x,) = inputs(record, "y", [2.0])
+    return [Piece("rates", record, [x * 3.0])]
+
+operations, code = kept_code.code_of(Path(sys.argv[1]) / "scene.code", pieces)
+print(operations["rates"], code.address("rates") != 0)
+"""
+
+
+def test_what_is_written_is_read(tmp_path: Path):
+    checked_file.write(tmp_path / "new" / "a", b"data")
+    assert checked_file.read(tmp_path / "new" / "a") == b"data"
+    assert checked_file.read(tmp_path / "b") is None
+    assert os.listdir(tmp_path / "new") == ["a"]
+
+
+@pytest.mark.parametrize("damage", [
+    lambda data: data[:-1], lambda data: data[:10], lambda data: b"", lambda data: data + b"x",
+    lambda data: data[:40] + bytes([data[40] ^ 1]) + data[41:], lambda data: b"something else",
+])  # fmt: skip
+def test_damaged_files_are_told_and_removed(damage, tmp_path: Path, capsys):
+    path = tmp_path / "a"
+    checked_file.write(path, b"data " * 10)
+    path.write_bytes(damage(path.read_bytes()))
+    assert checked_file.read(path) is None
+    assert capsys.readouterr().err == f"mbref: {path} is damaged and is made anew\n"
+    assert not path.exists()
+
+
+def test_a_folder_that_cannot_be_written_is_told_once(tmp_path: Path, capsys):
+    (tmp_path / "file").write_text("no folder")
+    for name in "ab":
+        checked_file.write(tmp_path / "file" / name, b"data")
+        assert checked_file.read(tmp_path / "file" / name) is None
+    error = capsys.readouterr().err
+    assert error.count("nothing can be kept in") == 1, error
+
+
+def test_a_folder_in_place_of_a_file_is_told(tmp_path: Path, capsys):
+    (tmp_path / "a").mkdir()
+    assert checked_file.read(tmp_path / "a") is None
+    assert "cannot be read (Is a directory)" in capsys.readouterr().err
+
+
+def test_writers_at_the_same_time_leave_one_whole_file(tmp_path: Path):
+    path, sizes = tmp_path / "a", range(1000, 200_000, 4000)
+    writers = [threading.Thread(target=checked_file.write, args=(path, b"x" * size)) for size in sizes]
+    for writer in writers:
+        writer.start()
+    for writer in writers:
+        writer.join()
+    assert len(checked_file.read(path)) in sizes
+    assert os.listdir(tmp_path) == ["a"]
+
+
+def ran(script: str, folder: Path, cache: Path) -> tuple[str, str]:
+    """What a program prints that has its cache there; it is to end well."""
+    file = folder / "program.py"
+    if not file.exists():
+        file.write_text(script.format(root=str(ROOT)))
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+    environment.pop("NUMBA_DISABLE_JIT", None)
+    command = [sys.executable, str(file), str(cache)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done
+    return done.stdout, done.stderr
+
+
+def kept(cache: Path, pattern: str) -> list[Path]:
+    return sorted(cache.rglob(pattern))
+
+
+@pytest.mark.parametrize(
+    ("script", "pattern", "says"), [(SMALL_KERNEL, "*.nbc", "7.0\n"), (SCENE, "*.code", "2 True\n")]
+)
+@pytest.mark.parametrize("damage", [lambda data: data[: len(data) // 2], lambda data: b"\0" * len(data)])
+def test_damaged_code_is_made_anew(script, pattern, says, damage, tmp_path: Path):
+    cache = tmp_path / "cache"
+    assert ran(script, tmp_path, cache)[0] == says
+    files = kept(cache, pattern)
+    assert files
+    good = {file: file.read_bytes() for file in files}
+    for file in files:
+        file.write_bytes(damage(good[file]))
+    out, error = ran(script, tmp_path, cache)
+    assert out == says and "is damaged and is made anew" in error and "Traceback" not in error, error
+    assert kept(cache, pattern) == files
+    out, error = ran(script, tmp_path, cache)
+    assert (out, "damaged" in error) == (says, False), error
+
+
+@pytest.mark.parametrize(("script", "says"), [(SMALL_KERNEL, "7.0\n"), (SCENE, "2 True\n")])
+def test_without_a_place_for_the_cache_code_is_made_each_time(script, says, tmp_path: Path):
+    (tmp_path / "file").write_text("no folder")
+    out, error = ran(script, tmp_path, tmp_path / "file")
+    assert out == says and "nothing can be kept in" in error and "Traceback" not in error, error
+
+
+def test_compiled_code_is_found_again(tmp_path: Path):
+    cache = tmp_path / "cache"
+    ran(SMALL_KERNEL, tmp_path, cache)
+    before = {file: file.stat().st_mtime_ns for file in kept(cache, "*.nbc")}
+    ran(SMALL_KERNEL, tmp_path, cache)
+    assert {file: file.stat().st_mtime_ns for file in kept(cache, "*.nbc")} == before != {}
+
+
+@pytest.mark.parametrize("program", ["mbref", "crosscheck"])
+def test_help_touches_no_cache(program, tmp_path: Path):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    command = [sys.executable, "-m", program, "--help"]
+    subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, check=True)
+    assert not (tmp_path / "cache").exists()

@@ -1,0 +1,69 @@
+"""Limits: every number that compiled code could not bear is refused by its name."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mbref.cli import main
+from mbref.scenes import SCENES
+from mbref.simulation.limits import Limits
+from mbref.simulation.simulate import simulate
+
+NUMBERS = (
+    "rtol", "atol", "rank_tolerance", "violation", "first_step", "smallest_step", "forced_step",
+    "largest_step", "largest_turn",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("value", [-1.0, math.nan, math.inf, 5e-324, 10**400, "1", True, [1.0]], ids=repr)
+@pytest.mark.parametrize("name", NUMBERS)
+def test_numbers_out_of_their_interval_are_refused(name, value):
+    with pytest.raises(ValueError, match=f"^{name}: must be "):
+        Limits(**{name: value})
+
+
+@pytest.mark.parametrize(("name", "value"), [("rtol", 0.0), ("rtol", 1.0), ("atol", 0.0), ("violation", 0.0)])
+def test_limits_that_no_run_could_keep_are_refused(name, value):
+    with pytest.raises(ValueError, match=f"^{name}: must be "):
+        Limits(**{name: value})
+
+
+@pytest.mark.parametrize(
+    "name", ["first_step", "smallest_step", "forced_step", "largest_step", "largest_turn"]
+)
+def test_zero_means_not_given(name):
+    assert getattr(Limits(**{name: 0}), name) == 0.0
+
+
+@pytest.mark.parametrize("value", [0, -1, 1.5, 100.0, 2**63, True, "9", None], ids=repr)
+def test_steps_are_counted_in_whole_numbers(value):
+    with pytest.raises(ValueError, match=r"^most_steps: must be a whole number from 1"):
+        Limits(most_steps=value)
+
+
+def test_code_is_one_of_three():
+    with pytest.raises(ValueError, match=r"^code: must be one of auto, generic, specialised, got 'fast'"):
+        Limits(code="fast")
+
+
+def test_numpy_s_numbers_become_python_s():
+    limits = Limits(rtol=np.float32(0.5), atol=np.int64(1), most_steps=np.int32(7))
+    assert [type(x) for x in (limits.rtol, limits.atol, limits.most_steps)] == [float, float, int]
+    assert limits == Limits(rtol=0.5, atol=1.0, most_steps=7)
+
+
+@pytest.mark.parametrize(
+    "times", [[10**400], ["x"], [[0.0], [1.0, 2.0]], None, [math.nan], [1.0, 1.0]], ids=repr
+)
+def test_times_are_refused_by_name(times):
+    with pytest.raises(ValueError, match=r"^times: "):
+        simulate(SCENES["four_bar"](), "alf-dual+projection", times)
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("--rtol", "5e-324"), ("--rtol", "1"), ("--rtol", "nan"), ("--max-step", "-1")]
+)
+def test_options_are_refused_by_their_own_name(option, value, capsys):
+    assert main(["run", "four_bar", option, value]) == 2
+    assert capsys.readouterr().err.startswith(f"{option}: must be ")
