@@ -63,12 +63,16 @@ def find_engines(names: Sequence[str] | None, notice: Notice) -> list[str]:
 
 
 def find_specimens(names: Sequence[str] | None) -> list[Specimen]:
-    """The conformance suite's specimens of those scenes, or all; RequestError for a name it has not."""
+    """The conformance suite's specimens of those scenes, or all; a ``.toml`` file is one of its own, held
+    against every card.  RequestError for a name the suite has not, SceneError for a faulty file."""
     known = {specimen.scene.name: specimen for specimen in specimens()}
-    if unknown := [name for name in names or () if name not in known]:
+    given = {
+        name: Specimen(Scene.from_file(name), None, True) for name in names or () if name.endswith(".toml")
+    }
+    if unknown := [name for name in names or () if name not in known and name not in given]:
         listed = ", ".join(known)
         raise RequestError(*(f"unknown scene of the suite {name!r}; known: {listed}" for name in unknown))
-    return [known[name] for name in dict.fromkeys(names or known)]
+    return [{**known, **given}[name] for name in dict.fromkeys(names or known)]
 
 
 def _unknown_engine(name: str) -> str | None:

@@ -51,7 +51,7 @@ def accelerations(scene: Scene, t: float, state: State) -> np.ndarray:
     """Accelerations and angular accelerations (nb, 6), world, at a state (position (nb, 3), unit orientation
     (nb, 4), velocity, spin (nb, 3), angles of the torsion springs): of all that joints and drivers allow,
     the nearest in the mass metric to those without joints."""
-    position, orientation, velocity, spin, angles = state
+    position, orientation, velocity, spin, _ = state
     turn = rotations.to_matrix(orientation)
     force = applied(scene, state)
     inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)

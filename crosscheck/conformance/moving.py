@@ -106,19 +106,17 @@ def door() -> Scene:
 
 
 def wound_spring() -> Scene:
-    """A torsion spring turned by more than two turns, on a hinge between moving bodies."""
+    """A body turning by some turns about a slanted hinge on the ground, against a torsion spring."""
+    hinge = JOINTS["revolute"]
+    axis = np.array(hinge.axis) / np.linalg.norm(hinge.axis)
+    swing = np.cross(40.0 * axis, np.array(BODY.position) - np.array(hinge.anchor))
+    body = _with(BODY, {"angular_velocity": 40.0 * axis, "velocity": swing})
     spring = TorsionSpring(joint="J", stiffness=0.4, damping=0.01, natural_angle=0.4)
-    scene = _pair(JOINTS["revolute"], load=(spring,))
-    axis = np.array(scene.joint[1].axis) / np.linalg.norm(scene.joint[1].axis)
-    about = np.array(BODY.position) - np.array(scene.joint[1].anchor)
-    hub = {"velocity": (0.0, 0.0, 0.0), "angular_velocity": (0.0, 0.0, 0.0)}
-    turning = {"angular_velocity": 30.0 * axis, "velocity": np.cross(30.0 * axis, about)}
-    bodies = (_with(HUB, hub), _with(BODY, turning))
-    return scene.with_(body=bodies, duration=0.4, gravity=(0.0, 0.0, 0.0))
+    return Scene(name="wound spring", duration=0.25, body=(body,), joint=(hinge,), load=(spring,))
 
 
 def consistent(scene: Scene, twists: np.ndarray) -> Scene:
-    """The scene with the velocities nearest to twists (nb, 6), world, that its joints allow; drivers apart."""
+    """The scene with the velocities nearest to twists (nb, 6), world, that its joints allow."""
     still = scene.with_(driver=())
     rows, _ = jacobian(still, 0.0, *initial_poses(scene))
     _, s, vt = np.linalg.svd(rows) if len(rows) else (0, np.zeros(0), np.eye(6 * len(scene.body)))

@@ -123,7 +123,7 @@ def true_velocities(bench: Bench) -> Finding | Outside:
 
 
 def true_accelerations(bench: Bench) -> Finding | Outside:
-    """Accelerations and angular accelerations (world), where the engine gives them, against the exact ones."""
+    """Accelerations and angular accelerations (world), where the engine gives them, against exact ones."""
     if bench.motion.acceleration is None:
         return Outside("the engine gives no accelerations")
     if bench.exact.acceleration is None:

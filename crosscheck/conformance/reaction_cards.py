@@ -39,7 +39,7 @@ def demanded(scene: Scene, exact: Trajectory) -> np.ndarray:
 
 
 def idle(scene: Scene, run: Trajectory, exact: Trajectory) -> float:
-    """Largest part of the largest force by which a joint's reaction is not of the joint's and driver's rows."""
+    """Largest part of the largest force by which a reaction is not of its joint's and driver's rows."""
     length = scene_length(scene)
     wanted = demanded(scene, exact) / np.repeat([1.0, length], 3)
     worst = max(_idle_at(scene, run, k, length) for k in range(len(run.times)))

@@ -148,7 +148,7 @@ def in_other_units(scene: Scene, length: float, time: float) -> Scene:
         gravity=by(push)(scene.gravity).tolist(), duration=scene.duration * time,
         body=tuple(mapped(body, bodies) for body in scene.body),
         joint=tuple(mapped(joint, places) for joint in scene.joint),
-        driver=tuple(_slower(driver, length if driver.joint in slides else 1.0, time) for driver in scene.driver),
+        driver=tuple(_slower(d, length if d.joint in slides else 1.0, time) for d in scene.driver),
         load=tuple(mapped(x, {**loads, **(linear if x.type == "spring" else turning)}) for x in scene.load),
     )  # fmt: skip
 
@@ -187,7 +187,8 @@ def _isometry(about: str, matrix: np.ndarray, shift: Sequence[float] = (0.0, 0.0
     return Relation(about, lambda scene, _: isometry.change(scene), lambda _, motion: isometry.expect(motion))
 
 
-def _unchanged(about: str, change: Callable[[Scene], Scene | Outside]) -> Relation:
+def unchanged(about: str, change: Callable[[Scene], Scene | Outside]) -> Relation:
+    """The relation of a change that leaves the motion what it is."""
     return Relation(about, lambda scene, motion: change(scene), same)
 
 
@@ -196,15 +197,15 @@ RELATIONS = {
     "turned": _isometry("about z, its motion rotates with it", IN_PLANE),
     "translated": _isometry("its motion moves with it", np.eye(3), (0.3, -0.5, 0.0)),
     "mirrored": _isometry("its motion is the mirror image", np.eye(3) - 2 * np.outer(NORMAL, NORMAL)),
-    "scaled": _unchanged("masses and loads times 2.5, the motion stays", lambda s: scaled(s, 2.5)),
-    "reordered": _unchanged("bodies and joints listed in reverse, the motion stays", reordered),
+    "scaled": unchanged("masses and loads times 2.5, the motion stays", lambda s: scaled(s, 2.5)),
+    "reordered": unchanged("bodies and joints listed in reverse, the motion stays", reordered),
     "relabelled": Relation("under other names, the motion stays", lambda s, _: relabelled(s), renamed),
-    "swapped": _unchanged("with the bodies of every joint exchanged, the motion stays", swapped),
-    "stretched": _unchanged("with axes 1000 times as long, the motion stays", stretched),
-    "duplicated": _unchanged("with a joint given twice, the motion stays", duplicated),
-    "satisfied": _unchanged("with a joint that the motion satisfies anyway, the motion stays", satisfied),
+    "swapped": unchanged("with the bodies of every joint exchanged, the motion stays", swapped),
+    "stretched": unchanged("with axes 1000 times as long, the motion stays", stretched),
+    "duplicated": unchanged("with a joint given twice, the motion stays", duplicated),
+    "satisfied": unchanged("with a joint that the motion satisfies anyway, the motion stays", satisfied),
     "split": Relation("with a body as two welded halves, the motion stays", lambda s, _: split(s), of_halves),
-    "negated": _unchanged("with the other sign of every quaternion, the motion stays", negated),
+    "negated": unchanged("with the other sign of every quaternion, the motion stays", negated),
     "enlarged": _other_units("four times as large, twice as slow under its gravity (Froude)", 4.0, 2.0),
     "in millimetres": _other_units("with its lengths in millimetres, the motion stays", 1000.0, 1.0),
     "restarted": Relation("from its state half way, the motion goes on", *RESTARTED),

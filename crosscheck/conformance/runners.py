@@ -41,7 +41,7 @@ class Runner(Protocol):
 
 @dataclass(frozen=True)
 class Isolated:
-    """Every run in a child process with a time limit (s): ``name`` is a known engine or ``module:attribute``."""
+    """Every run in a child process with a time limit (s); ``name`` is known, or ``module:attribute``."""
 
     name: str
     time_limit: float

@@ -41,7 +41,6 @@ class Verdict:
     allowed: float | None = None
     reason: str = ""
 
-    @property
     def card(self) -> str:
         """The property with its version: verdicts of different cards are not compared."""
         return f"{self.property}/{PROPERTIES[self.property].version if self.property in PROPERTIES else 1}"
@@ -64,7 +63,7 @@ class Conformance:
     def to_record(self) -> dict[str, Any]:
         """What ``verify --json`` prints; numbers that are not finite are null."""
         verdicts = [
-            {"card": verdict.card, **{k: _finite(v) for k, v in asdict(verdict).items()}}
+            {"card": verdict.card(), **{k: _finite(v) for k, v in asdict(verdict).items()}}
             for verdict in self.verdicts
         ]
         return {**asdict(self), "conforms": self.conforms, "verdicts": verdicts}
@@ -107,16 +106,27 @@ def held_against(
 
 def examine(bench: Bench) -> Iterator[Verdict]:
     """The verdicts on one bench."""
+    yield (first := refusal(bench))
+    if first.status == PASS and not bench.cannot:
+        yield from _run(bench)
+
+
+def refusal(bench: Bench) -> Verdict:
+    """Whether the engine refuses what it cannot run, and has settings for what it can."""
     name = bench.scene.name
     impossible = bench.scene == undetermined()
     if bench.cannot:
-        yield Verdict(REFUSAL, name, PASS if impossible else CANNOT, reason=str(bench.cannot))
-    elif impossible or not bench.settings:
+        return Verdict(REFUSAL, name, PASS if impossible else CANNOT, reason=str(bench.cannot))
+    if impossible or not bench.settings:
         reason = "cannot() is silent on a motion without masses" if impossible else "it offers no setting"
-        yield Verdict(REFUSAL, name, FAIL, reason=reason)
-    else:
-        yield Verdict(REFUSAL, name, PASS)
-        yield from _run(bench)
+        return Verdict(REFUSAL, name, FAIL, reason=reason)
+    return Verdict(REFUSAL, name, PASS)
+
+
+def verdict_on(card: str, bench: Bench) -> Verdict:
+    """The verdict of one card, named as in `abouts`, on a bench."""
+    known = {REFUSAL: refusal, RUN: first_run}
+    return known[card](bench) if card in known else judged(card, bench)
 
 
 def _run(bench: Bench) -> Iterator[Verdict]:
@@ -156,7 +166,7 @@ def tables(conformance: Conformance) -> Iterator[Table | Text]:
     """A table of scenes × properties, then what the failures and gaps are."""
     by_place = {(v.scene, v.property): v for v in conformance.verdicts}
     properties = [n for n in (*FIRST, *PROPERTIES) if any(v.property == n for v in conformance.verdicts)]
-    title = f"{conformance.engine} {conformance.version}: ✓ pass, ✗ fail, – cannot, ○ outside; the number measured"
+    title = f"{conformance.engine} {conformance.version}: ✓ pass, ✗ fail, – cannot, ○ outside; measured"
     table = Table(Column("scene", no_wrap=True), *properties, title=title, box=SIMPLE, padding=(0, 1, 0, 0))
     for scene in dict.fromkeys(v.scene for v in conformance.verdicts):
         table.add_row(scene, *(_cell(by_place.get((scene, name))) for name in properties))
@@ -178,7 +188,7 @@ def _domains(conformance: Conformance) -> Iterator[Text]:
 
 
 def _card(name: str) -> str:
-    return Verdict(name, "", PASS).card
+    return Verdict(name, "", PASS).card()
 
 
 def abouts() -> dict[str, str]:

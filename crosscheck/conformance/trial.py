@@ -32,7 +32,7 @@ SHORT = {  # built-in scenes with a truth, and end times (s) before their first 
     "spatial_slider_crank_driven": 0.02,
 }
 RELATED = (  # the scenes that are changed as relations say at quick depth
-    "pendulum", "torsion", "oscillator", "driven", "turntable", "four_bar_gravity", "spatial_slider_crank",
+    "pendulum", "torsion", "oscillator", "driven", "turntable", "four_bar_gravity", "spinning loop",
     "cylindrical driver", "force load", "tumbling body",
 )  # fmt: skip
 

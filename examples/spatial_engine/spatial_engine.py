@@ -50,7 +50,7 @@ class Spatial(Engine):
         return Cannot(Why.UNBUILT, f"no {unknown[0]} joints") if unknown else None
 
     def settings(self, scene):
-        return [Setting("dop853", {"rtol": r}) for r in (1e-6, 1e-8, 1e-10)]
+        return [Setting("dop853", {"rtol": r}) for r in (1e-5, 1e-7, 1e-9)]
 
     def run(self, scene, times, setting):
         model, began = Mechanism(scene), time.process_time()
