@@ -57,7 +57,7 @@ def test_faulty_engine_and_its_finding(tmp_path, capsys, monkeypatch):
     assert run.returncode == 1 and "kept as" in run.stdout, run.stdout[-1500:] + run.stderr[-500:]
     (path,) = (tmp_path / "found").glob("*.toml")
     scene = Scene.from_file(path)
-    assert len(scene.body) == 1 and not scene.load, f"not made small: {scene}"
+    assert len(scene.joint) == 1 and not any(scene.gravity), f"not made small: {scene}"
     command = path.read_text().splitlines()[1].removeprefix("# crosscheck ").split()
     assert command == ["verify", "spatial_engine:ENGINE", "--scene", str(path)], command
     monkeypatch.syspath_prepend(str(tmp_path))
