@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help check test lint deep coverage report quick bench clean
+.PHONY: help check test lint deep coverage report quick picture docs bench clean
 
 help: ## show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -13,14 +13,14 @@ $(VENV)/ready: pyproject.toml constraints.txt
 	$(BIN)/pip install -q -c constraints.txt -e '.[dev]'
 	touch $@
 
-check: ## what CI runs: the README's test command, in a fresh clone and environment
+check: ## the gate: the README's test command, lint and types, in a fresh clone and environment
 	bash .ci/run
 
 test: $(VENV)/ready ## the tests, in this checkout
 	$(BIN)/pytest -n 2
 
-lint: $(VENV)/ready ## format and lint
-	$(BIN)/ruff format . && $(BIN)/ruff check .
+lint: $(VENV)/ready ## format, lint and types, in this checkout
+	$(BIN)/ruff format . && $(BIN)/ruff check . && $(BIN)/mypy
 
 deep: $(VENV)/ready ## the slow tests too, with many more random cases
 	HYPOTHESIS_PROFILE=deep $(BIN)/pytest -n 2 -m "slow or not slow"
@@ -36,8 +36,14 @@ report: $(VENV)/ready ## the whole comparison report, into report/
 quick: $(VENV)/ready ## a comparison report in about three minutes, into report/
 	$(BIN)/crosscheck report --quick
 
+picture: $(VENV)/ready ## the README's moving picture, into reports/rendered/
+	$(BIN)/python -m reports --picture reports/rendered/passage.svg
+
+docs: $(VENV)/ready ## the support matrix, into docs/engines.md
+	$(BIN)/python -m crosscheck.cli.support docs/engines.md
+
 bench: $(VENV)/ready ## the benchmarks, printed
 	for script in $$(grep -l __main__ benchmarks/*.py); do $(BIN)/python $$script; done
 
 clean: ## remove what the targets above made
-	rm -rf $(VENV) report build *.egg-info .pytest_cache .hypothesis .ruff_cache
+	rm -rf $(VENV) report build *.egg-info .pytest_cache .hypothesis .ruff_cache .mypy_cache

@@ -1,7 +1,7 @@
 """The paper's mechanisms as equations of one degree of freedom, I θ'' + ½ I' θ'² = Q, derived by hand.
 
 Each is a function of the signature that mbref's integrators take, with y = (θ, θ'), θ the crank's angle and
-I' = dI/dθ; ``p`` holds its numbers.  Driven mechanisms need no equation but their poses in
+I' = dI/dθ; ``memory.numbers`` holds its numbers.  Driven mechanisms need no equation but their poses in
 closed form, which the kernels ``…_poses`` write: position and rotation matrix (12 numbers) of every body.
 """
 
@@ -30,8 +30,9 @@ class ByHand(NamedTuple):
 
 
 @njit(**AS_MBREF)
-def swing(accelerate, t, y, y_rate, p):
+def swing(t, y, y_rate, memory):
     """Parallelogram under gravity: I and the first moment of mass do not change."""
+    p = memory.numbers
     inertia, moment = p[0], p[1]
     y_rate[0] = y[1]
     y_rate[1] = -moment * cos(y[0]) / inertia
@@ -48,8 +49,9 @@ def swing_numbers(scene: Scene) -> list[float]:
 
 
 @njit(**AS_MBREF)
-def planar(accelerate, t, y, y_rate, p):
+def planar(t, y, y_rate, memory):
     """Slider-crank in a plane; phi the rod's angle, s = dphi/dθ and c its derivative."""
+    p = memory.numbers
     a, b, crank, rod, spin = p[0], p[1], p[2], p[3], p[4]
     slider, torque, first, weight = p[5], p[6], p[7], p[8]
     sine, cosine = sin(y[0]), cos(y[0])
@@ -69,8 +71,9 @@ def planar(accelerate, t, y, y_rate, p):
 
 
 @njit(**AS_MBREF)
-def planar_equal(accelerate, t, y, y_rate, p):
+def planar_equal(t, y, y_rate, memory):
     """Slider-crank, crank and rod of equal length: the rod's angle is -θ, the slider's place 2 a cos θ."""
+    p = memory.numbers
     a, crank, rod, spin = p[0], p[2], p[3], p[4]
     slider, torque, first, weight = p[5], p[6], p[7], p[8]
     sine, cosine = sin(y[0]), cos(y[0])
@@ -92,9 +95,10 @@ def planar_numbers(scene: Scene) -> list[float]:
 
 
 @njit(**AS_MBREF)
-def spatial(accelerate, t, y, y_rate, p):
+def spatial(t, y, y_rate, memory):
     """Slider-crank in space: h the slider's height, h1 and h2 its derivatives by θ; k the rod's spin
     about itself per crank angle, that keeps its universal joint's axes perpendicular."""
+    p = memory.numbers
     r, l, d, crank, across = p[0], p[1], p[2], p[3], p[4]
     along, slider, torque, weight = p[5], p[6], p[7], p[8]
     sine, cosine = sin(y[0]), cos(y[0])

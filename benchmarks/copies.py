@@ -1,17 +1,17 @@
 """Rotated, translated and mirrored copies of every built-in scene beside the original, engine by engine.
 
 ``python benchmarks/copies.py [--records FILE] [--engine NAME …] [SCENE …]``: each engine runs the copies at
-its setting of least error (as `floors.py` finds it), resuming from FILE.  The table has the largest
-difference from the original's motion moved likewise, and beside it the engine's own floor: how far rounding
+its setting of least error (as `least_errors.py` finds it), resuming from FILE.  The table has the largest
+difference from the original's motion moved likewise, and beside it the engine's own least: how far rounding
 carries the motion when the scene's numbers are shaken in their last digit.  Its status is 1 where a copy
-differs by more than twice the floor asked of every engine, and by more than ten times its own.
+differs by more than twice the least asked of every engine, and by more than ten times its own.
 """
 
 import sys
 from functools import partial
 
 import numpy as np
-from floors import asked_for
+from least_errors import asked_for
 from rich.console import Console
 from rich.table import Table
 
@@ -20,7 +20,7 @@ from crosscheck.engine import Setting
 from crosscheck.judge.metrics import error_series, in_scene_order
 from crosscheck.judge.tolerances import FLOOR
 from crosscheck.study.grid import Case, Record, study
-from crosscheck.study.least_errors import TIME_LIMIT, Floor
+from crosscheck.study.least_errors import TIME_LIMIT, LeastError
 from crosscheck.study.progress import shown
 from crosscheck.study.record_view import is_completed
 from mbref.scene import Scene
@@ -35,45 +35,45 @@ def main() -> int:
     """Run and print; returns 1 where a copy moves otherwise."""
     scenes, found, path = asked_for(__doc__)
     columns = {**COPIES, **SHAKEN}
-    places = [(floor, name, relation) for floor in found for name in columns for relation in columns[name]]
-    cases = [case(scenes[floor.scene], floor, relation) for floor, _, relation in places]
+    places = [(least, name, relation) for least in found for name in columns for relation in columns[name]]
+    cases = [case(scenes[least.scene], least, relation) for least, _, relation in places]
     with shown("running the copies", len(cases)) as progress:
         records = study(cases, records_path=path, progress=progress)
     apart: dict[tuple[str, str], dict[str, float]] = {}
-    for (floor, name, relation), record in zip(places, records, strict=True):
-        row = apart.setdefault((floor.scene, floor.engine), dict.fromkeys(columns, 0.0))
-        row[name] = max(row[name], difference(scenes[floor.scene], floor, relation, record))
+    for (least, name, relation), record in zip(places, records, strict=True):
+        row = apart.setdefault((least.scene, least.engine), dict.fromkeys(columns, 0.0))
+        row[name] = max(row[name], difference(scenes[least.scene], least, relation, record))
     table = Table("scene", "engine", "family", "error", *columns, title="difference of copies")
-    for floor in found:
-        row = apart[floor.scene, floor.engine]
-        error = f"{floor.best['metrics']['error']:.1e}"
+    for least in found:
+        row = apart[least.scene, least.engine]
+        error = f"{least.best['metrics']['error']:.1e}"
         table.add_row(
-            floor.scene, floor.engine, floor.best["family"], error, *(f"{x:.1e}" for x in row.values())
+            least.scene, least.engine, least.best["family"], error, *(f"{x:.1e}" for x in row.values())
         )
     Console(width=None if sys.stdout.isatty() else 160).print(table)
     return 0 if all(is_alike(row) for row in apart.values()) else 1
 
 
-def case(scene: Scene, floor: Floor, relation: Relation) -> Case:
+def case(scene: Scene, least: LeastError, relation: Relation) -> Case:
     """The run of the changed scene at the engine's setting of least error."""
-    setting = Setting(floor.best["family"], floor.best["settings"])
-    times = np.array(Trajectory.from_record(scene.name, floor.best).times)
-    return Case(copied(scene, floor, relation), times, floor.engine, setting, TIME_LIMIT)
+    setting = Setting(least.best["family"], least.best["settings"])
+    times = np.array(Trajectory.from_record(scene.name, least.best).times)
+    return Case(copied(scene, least, relation), times, least.engine, setting, TIME_LIMIT)
 
 
-def copied(scene: Scene, floor: Floor, relation: Relation) -> Scene:
+def copied(scene: Scene, least: LeastError, relation: Relation) -> Scene:
     """The scene changed as the relation says, which every scene here can be."""
-    copy = relation.change(scene, Trajectory.from_record(scene.name, floor.best))
+    copy = relation.change(scene, Trajectory.from_record(scene.name, least.best))
     assert isinstance(copy, Scene), copy
     return copy
 
 
-def difference(scene: Scene, floor: Floor, relation: Relation, record: Record) -> float:
+def difference(scene: Scene, least: LeastError, relation: Relation, record: Record) -> float:
     """Largest difference of the copy's motion from the original's moved likewise; inf if one fails."""
-    if not (is_completed(floor.best) and is_completed(record)):
+    if not (is_completed(least.best) and is_completed(record)):
         return np.inf
-    copy = copied(scene, floor, relation)
-    expected = in_scene_order(copy, relation.expect(scene, Trajectory.from_record(scene.name, floor.best)))
+    copy = copied(scene, least, relation)
+    expected = in_scene_order(copy, relation.expect(scene, Trajectory.from_record(scene.name, least.best)))
     return float(error_series(copy, Trajectory.from_record(scene.name, record), expected).max())
 
 

@@ -17,24 +17,23 @@ import numpy as np
 from forward_dynamics import timed_calls
 
 from mbref.formulations import FORMULATIONS
-from mbref.kernels.compilation import INT, VECTOR, entry, pointer_to
-from mbref.kernels.layout import ACCELERATE, OK, PROBLEM, RATES, SIZES
+from mbref.kernels.compilation import INT, VECTOR, entry
+from mbref.kernels.layout import MEMORY, OK
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.simulation.method import Method
 from mbref.simulation.run import SPECIALISED, Limits, Run
 from mbref.simulation.simulate import why_no_code
-from mbref.specialised import with_own_code
 
 SCENE_NAMES = ("spatial_slider_crank", "planar_slider_crank", "four_bar", "five_bar")
 CALLS, REPEATS = 2000, 15
 
 
-@entry(INT(pointer_to(RATES), pointer_to(ACCELERATE), INT, VECTOR, VECTOR, PROBLEM))
-def repeat(rates, accelerate, calls, y, y_rate, problem):
+@entry(INT(INT, VECTOR, VECTOR, MEMORY))
+def repeat(calls, y, y_rate, memory):
     status = 0
     for _ in range(calls):
-        status = rates(accelerate, 0.0, y, y_rate, problem)
+        status = memory.kernels.rates(0.0, y, y_rate, memory)
     return status
 
 
@@ -44,7 +43,7 @@ def main(names: Sequence[str]) -> None:
         (what, name): call
         for name in names
         for scene in [SCENES[name]()]
-        for what, call in (*_formulations(scene), *_own_code(scene), *timed_calls(scene))
+        for what, call in (*_formulations(scene), *_specialised(scene), *timed_calls(scene))
     }
     seconds = {key: np.median(rounds) for key, rounds in _in_turns(calls).items()}
     print(f"{'µs per right-hand side':32}" + "".join(f"{name:>24}" for name in names))
@@ -69,25 +68,24 @@ def _formulations(scene: Scene) -> Iterator[tuple[str, Callable[[], float]]]:
     """Every formulation's accelerations without stabilisation; NaN seconds where it fails."""
     for formulation in FORMULATIONS:
         run = Run(scene, Method.parse(f"{formulation}+none"), np.array([1.0]), Limits())
-        kernels = run.chart.rates.pointer, run.method.formulation.accelerate.pointer
-        yield formulation, functools.partial(_timed, run, *kernels)
+        yield formulation, functools.partial(_timed, run)
 
 
-def _own_code(scene: Scene) -> Iterator[tuple[str, Callable[[], float]]]:
-    """The same by machine code of the scene's own, where a formulation has it."""
+def _specialised(scene: Scene) -> Iterator[tuple[str, Callable[[], float]]]:
+    """The same by specialised code, where a formulation has it."""
     for formulation in FORMULATIONS:
         method = Method.parse(f"{formulation}+projection")
         if not why_no_code(scene, method):
             run = Run(scene, method, np.array([1.0]), Limits(code=SPECIALISED))
-            kernels = with_own_code(run.chart).rates.pointer, method.formulation.accelerate.pointer
-            yield f"{formulation}, own code", functools.partial(_timed, run, *kernels)
+            yield f"{formulation}, specialised", functools.partial(_timed, run)
 
 
-def _timed(run: Run, rates, accelerate) -> float:
+def _timed(run: Run) -> float:
     """Seconds of one evaluation; NaN where it fails."""
-    y, y_rate = run.y[: run.pivots[SIZES, 1]], run.y_rate[: run.pivots[SIZES, 1]]
+    loop = run.memory.loop
+    y, y_rate = loop.y[: loop.clock.y_size], loop.y_rate[: loop.clock.y_size]
     began = time.process_time()
-    status = repeat(rates, accelerate, CALLS, y, y_rate, run.problem)
+    status = repeat(CALLS, y, y_rate, run.packed.argument)
     return (time.process_time() - began) / CALLS if status == OK else np.nan
 
 

@@ -6,23 +6,22 @@ from mbref is the integrator, called from Python.  IDA is given the residual y' 
 
 from __future__ import annotations
 
-import functools
 import math
 import os
 import time
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from importlib import metadata
 
 import numpy as np
-from numba import njit
 
 from crosscheck.engine import Cannot, Engine, Setting
 from crosscheck.engines.initial_velocities import lacks_mass
-from mbref.kernels.layout import ACCELERATION, COLUMNS, EVALUATIONS, SIZES
+from mbref.kernels.compilation import FLOAT, INT, VECTOR, entry
+from mbref.kernels.layout import MEMORY
 from mbref.scene import Scene
 from mbref.simulation.method import Method
-from mbref.simulation.run import Limits, Run, chart_of
+from mbref.simulation.run import Limits, Run
 from mbref.trajectory import Cost, Outcome, Trajectory
 
 for kind in ("WARNING", "ERROR"):  # of SUNDIALS: a run that fails says so itself
@@ -37,17 +36,10 @@ Solution = tuple[
 ]  # states (k, n) reached, why it ended (empty: at the end), factorisations
 
 
-@functools.cache
-def compiled() -> Callable:
-    """``rates`` of METHOD, its formulation bound: to pass a kernel from Python costs more than its call."""
-    method = Method.parse(METHOD)
-    rates, accelerate = chart_of(method)[0].rates.pointer, method.formulation.accelerate.pointer
-
-    @njit(error_model="numpy")
-    def call(t, y, y_rate, problem):
-        return rates(accelerate, t, y, y_rate, problem)
-
-    return call
+@entry(INT(FLOAT, VECTOR, VECTOR, MEMORY))
+def rates(t, y, y_rate, memory):
+    """y' of the run's method."""
+    return memory.kernels.rates(t, y, y_rate, memory)
 
 
 class TooLong(Exception):
@@ -62,9 +54,8 @@ class RightHandSide:
 
     def __init__(self, scene: Scene, times: np.ndarray):
         self.run = run = Run(scene, Method.parse(METHOD), times, Limits())
-        self.call = compiled()
-        self.size = int(run.pivots[SIZES, 1])
-        self.start = run.y[: self.size].copy()
+        self.size, self.counts = int(run.memory.loop.clock.y_size), run.memory.equations.system.counts
+        self.start = run.memory.loop.y[: self.size].copy()
         self.deadline = math.inf
         self(0.0, self.start)  # compiled before anything is timed
 
@@ -72,7 +63,7 @@ class RightHandSide:
         rate = np.empty(self.size)
         if time.process_time() > self.deadline:
             raise TooLong
-        self.call(t, np.array(y), rate, self.run.problem)
+        rates(t, np.array(y), rate, self.run.packed.argument)
         return rate
 
     def motion(self, times: np.ndarray, states: np.ndarray) -> dict[str, np.ndarray]:
@@ -81,7 +72,7 @@ class RightHandSide:
         accelerations = np.zeros((len(states), n))
         for k, (t, y) in enumerate(zip(times, states, strict=True)):
             self(t, y)
-            accelerations[k] = self.run.work[COLUMNS][ACCELERATION]
+            accelerations[k] = self.run.memory.equations.system.acceleration
         q = states[:, : 7 * nb].reshape(-1, nb, 7).copy()
         q[..., 3:] /= np.linalg.norm(q[..., 3:], axis=-1, keepdims=True)
         rates = (a.reshape(-1, nb, 6) for a in (states[:, 7 * nb :], accelerations))
@@ -106,7 +97,7 @@ class GeneralIntegrator(Engine):
         began = time.process_time()
         f = RightHandSide(scene, times)
         built = time.process_time() - began
-        f.run.counts[:] = 0
+        f.counts.evaluations = 0
         began = time.process_time()
         f.deadline = began + LONGEST
         try:
@@ -114,7 +105,7 @@ class GeneralIntegrator(Engine):
         except TooLong:
             states, message, factorisations = np.zeros((0, f.size)), f"given up after {LONGEST:g} s", 0
         seconds, f.deadline = time.process_time() - began, math.inf
-        cost = Cost(seconds, built, rhs=int(f.run.counts[EVALUATIONS]), factorisations=factorisations)
+        cost = Cost(seconds, built, rhs=int(f.counts.evaluations), factorisations=factorisations)
         done = len(states) == len(times) and not message
         motion = f.motion(times[: len(states)], states)
         return Trajectory(

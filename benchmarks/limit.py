@@ -10,26 +10,38 @@ from __future__ import annotations
 import functools
 import time
 from collections.abc import Callable, Sequence
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from by_hand import AS_MBREF, BY_HAND
 from numba import njit
 
-from crosscheck.engine import Cannot, Engine, Setting, Why
+from crosscheck.engine import Cannot, Engine, Owner, Setting
 from crosscheck.engines.mbref import TOLERANCES
 from crosscheck.judge.truth import PATHS
 from crosscheck.judge.truth.one_dof import Path, initial_rate
 from mbref import __version__, rotations
 from mbref.integrators import INTEGRATORS
-from mbref.integrators.coefficients import STAGES
-from mbref.kernels.layout import LARGEST_STEP, OK, ORDER
+from mbref.integrators.dop853 import STAGES, Stages
+from mbref.kernels.layout import OK, Control
+from mbref.kernels.named_memory import Address, Vector, allocate, packed, record
 from mbref.linear_algebra.vectors import copy
 from mbref.scene import Scene
 from mbref.trajectory import Cost, Outcome, Trajectory
 
-CONTROL = 16  # entries of ``control``, more than there are
 REPEATS = 100  # within one reading of the clock: one run is a matter of microseconds
 STEPS, REJECTED, EVALUATIONS = range(3)
+
+
+class OneDegreeOfFreedom(NamedTuple):
+    """Memory of the equation and of the integrator."""
+
+    control: Control
+    integrator: Address
+    numbers: Annotated[Vector, "numbers"]
+    y: Annotated[Vector, 2]
+    rate: Annotated[Vector, 2]
+    new: Annotated[Vector, 2]
 
 
 @functools.cache
@@ -39,27 +51,27 @@ def compiled(rates: Callable) -> Callable:
     step, propose = (njit(**AS_MBREF)(kernel.function) for kernel in (integrator.step, integrator.propose))
 
     @njit(**AS_MBREF)
-    def integrate(times, samples, start, control, tolerances, memory, p, counts):
+    def integrate(times, samples, start, memory, counts):
         """From sample to sample: y(t) into the rows of ``samples``."""
-        y, rate, new = memory[-3, :2], memory[-2, :2], memory[-1, :2]
+        y, rate, new = memory.y, memory.rate, memory.new
         copy(start, y)
         t, h, suggested, ratio = 0.0, 0.0, 0.0, 0.0
         for k in range(times.shape[0]):
             while t < times[k]:
-                rates(0, t, y, rate, p)
+                rates(t, y, rate, memory)
                 counts[EVALUATIONS] += 1
-                suggested = propose(h, suggested, ratio, y, rate, memory, control, tolerances)
+                suggested = propose(h, suggested, ratio, y, rate, memory)
                 while True:
                     left = times[k] - t
                     h = left if suggested * (1.0 + 1e-9) >= left else min(suggested, 0.5 * left)
-                    ratio = step(rates, 0, t, h, y, rate, new, memory, tolerances, p)
+                    ratio = step(rates, t, h, y, rate, new, memory)
                     counts[EVALUATIONS] += STAGES - 1
                     if not ratio >= 0.0 or h < 1e-14 * times[-1]:
                         return -1
                     if ratio <= 1.0:
                         break
                     counts[REJECTED] += 1
-                    suggested = propose(h, suggested, ratio, y, rate, memory, control, tolerances)
+                    suggested = propose(h, suggested, ratio, y, rate, memory)
                 counts[STEPS] += 1
                 copy(new, y)
                 t = times[k] if h == left else t + h
@@ -67,12 +79,12 @@ def compiled(rates: Callable) -> Callable:
         return OK
 
     @njit(**AS_MBREF)
-    def repeat(times, samples, start, control, tolerances, memory, p, counts):
+    def repeat(times, samples, start, memory, counts):
         """Several times: one run is too short for one reading of the clock."""
         status = OK
         for _ in range(REPEATS):
             counts[:] = 0.0
-            status = integrate(times, samples, start, control, tolerances, memory, p, counts)
+            status = integrate(times, samples, start, memory, counts)
         return status
 
     return repeat
@@ -91,7 +103,7 @@ class Limit(Engine):
         return (
             None
             if scene.name in BY_HAND
-            else Cannot(Why.UNBUILT, "its equation has not been derived by hand")
+            else Cannot(Owner.ADAPTER, "its equation has not been derived by hand")
         )
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
@@ -118,16 +130,24 @@ def _integrated(
 ) -> tuple[np.ndarray, Cost]:
     """(k, 2) angle and rate at the times, and what the stepping took."""
     by_hand, integrator = BY_HAND[scene.name], INTEGRATORS["dop853"]
-    control = np.zeros(CONTROL)
-    control[ORDER], control[LARGEST_STEP] = integrator.order, times[-1]
+    control = Control(
+        order=integrator.order, fixed_step=0.0, smallest_step=0.0, largest_step=times[-1], largest_turn=0.0,
+        violation=0.0, most_steps=0.0, steps_per_call=0.0, forced_step=0.0, first_step=0.0, rtol=rtol,
+        atol=rtol,
+    )  # fmt: skip
+    numbers = np.array(by_hand.numbers(scene))
+    memory = packed(
+        allocate(
+            OneDegreeOfFreedom, {}, control=record(control), numbers=numbers,
+            integrator=packed(allocate(Stages, {"nb": 1})),
+        )
+    )  # fmt: skip
     start, samples, counts = (
         np.array([theta0, initial_rate(scene, path)]),
         np.zeros((len(times), 2)),
         np.zeros(3),
     )
-    memory = np.zeros((integrator.rows + 3, 14))
-    numbers = np.array(by_hand.numbers(scene))
-    arguments = times, samples, start, control, np.full(2, rtol), memory, numbers, counts
+    arguments = times, samples, start, memory.argument, counts
     repeat = compiled(by_hand.equation)
     repeat(*arguments)
     began = time.process_time()

@@ -1,1 +1,53 @@
-"""crosscheck: the same mechanism in several engines, against truth."""
+"""crosscheck: the same mechanism in several engines, against truth.
+
+The names below are loaded when they are first used, so that ``import crosscheck`` costs nothing.
+``find_engine`` and ``run_study`` are the functions ``crosscheck.engine.engine`` and
+``crosscheck.study.study``, which the modules of these names would hide here.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from crosscheck.engine import Cannot, Engine, Owner, Setting, Supports, default_engines, engine_names
+    from crosscheck.engine import engine as find_engine
+    from crosscheck.judge.metrics import METRICS, measure
+    from crosscheck.judge.truth import Truth, truth_for
+    from crosscheck.study import Case, default_cases
+    from crosscheck.study import study as run_study
+
+_PLACE_OF = {
+    "Cannot": ("crosscheck.engine", "Cannot"),
+    "Case": ("crosscheck.study", "Case"),
+    "Engine": ("crosscheck.engine", "Engine"),
+    "METRICS": ("crosscheck.judge.metrics", "METRICS"),
+    "Owner": ("crosscheck.engine", "Owner"),
+    "Setting": ("crosscheck.engine", "Setting"),
+    "Supports": ("crosscheck.engine", "Supports"),
+    "Truth": ("crosscheck.judge.truth", "Truth"),
+    "default_cases": ("crosscheck.study", "default_cases"),
+    "default_engines": ("crosscheck.engine", "default_engines"),
+    "engine_names": ("crosscheck.engine", "engine_names"),
+    "find_engine": ("crosscheck.engine", "engine"),
+    "measure": ("crosscheck.judge.metrics", "measure"),
+    "run_study": ("crosscheck.study", "study"),
+    "truth_for": ("crosscheck.judge.truth", "truth_for"),
+}
+
+__all__ = [
+    "METRICS", "Cannot", "Case", "Engine", "Owner", "Setting", "Supports", "Truth", "default_cases",
+    "default_engines", "engine_names", "find_engine", "measure", "run_study", "truth_for",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name in _PLACE_OF:
+        module, attribute = _PLACE_OF[name]
+        return getattr(import_module(module), attribute)
+    raise AttributeError(f"module 'crosscheck' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_PLACE_OF])

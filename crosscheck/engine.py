@@ -1,46 +1,88 @@
-"""The Engine interface, what an engine cannot do, and the table of engines."""
+"""The Engine interface, the refusals of engines, and the table of engines.
+
+An engine of a third party needs to import nothing but this module.
+"""
 
 from __future__ import annotations
 
 import enum
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module, metadata
 from typing import Any
 
 import numpy as np
 
-from mbref.scene import Scene
-from mbref.trajectory import Trajectory
+from crosscheck.judge.constraints import inertia_matrices, initial_poses, initial_twists
+from mbref import rotations
+from mbref.scene import GROUND, Scene
+from mbref.trajectory import Cost, Outcome, Trajectory
+
+__all__ = [
+    "BUILT_IN", "ENTRY_POINTS", "GROUND", "OPTIONAL", "Cannot", "Cost", "Engine", "Outcome", "Owner", "Scene",
+    "Setting", "Supports", "Trajectory", "default_engines", "engine", "engine_names", "inertia_matrices",
+    "initial_poses", "initial_twists", "installed", "rotations",
+]  # fmt: skip
+
+FamilyParts = Mapping[str, Mapping[str, Mapping[str, float]]]  # kind of part → name → options and defaults
 
 
-class Why(enum.Enum):
-    """Whose turn a gap is."""
+class Owner(enum.Enum):
+    """The part that would have to change before the engine could do what it refuses."""
 
-    UNBUILT = "not built here yet"
-    UPSTREAM = "waits for the engine"
-    NEVER = "the engine's model excludes it"
+    ADAPTER = "missing in the adapter"
+    ENGINE = "missing in the engine"
+    MODEL = "excluded by the engine's model"
 
 
 @dataclass(frozen=True)
 class Cannot:
-    """Something an engine cannot do with a scene, asked before running."""
+    """A refusal, given before running: a sentence about the scene, and the part that is the cause."""
 
-    why: Why
+    owner: Owner
     reason: str
 
     def __str__(self) -> str:
-        return f"{self.reason} ({self.why.value})"
+        return f"{self.reason} ({self.owner.value})"
+
+
+@dataclass(frozen=True)
+class Supports:
+    """The joint types, driven coordinates ("angle", "displacement") and load types that an adapter maps to
+    its engine."""
+
+    joints: Collection[str] = ()
+    drivers: Collection[str] = ()
+    loads: Collection[str] = ()
+
+    def missing(self, scene: Scene) -> Cannot | None:
+        """The refusal of the first joint, driver or load of a scene that is not declared, or None."""
+        reasons = [
+            f"joint {joint.name!r} is of type {joint.type!r}, which the adapter does not map"
+            for joint in scene.joint
+            if joint.type not in self.joints
+        ]
+        for driver in scene.driver:
+            coordinate = scene.joint_named(driver.joint).facts.driven
+            if coordinate not in self.drivers:
+                reasons.append(f"the driver of joint {driver.joint!r} prescribes its {coordinate}, "
+                               "which the adapter does not map")  # fmt: skip
+        reasons += [
+            f"load[{k}] is of type {load.type!r}, which the adapter does not map"
+            for k, load in enumerate(scene.load)
+            if load.type not in self.loads
+        ]
+        return Cannot(Owner.ADAPTER, reasons[0]) if reasons else None
 
 
 @dataclass(frozen=True)
 class Setting:
     """One way of running an engine.
 
-    ``family`` groups the settings that differ only in accuracy ("defaults" is what a user gets
-    without tuning, "tuned" what the engine's documentation allows at best); ``options`` are the
-    engine's own numbers; (family, options) reproduce the run.
+    ``family`` groups the settings that differ only in accuracy: "defaults" are the library's own,
+    "tuned" the most accurate that its documentation allows.  ``options`` are the engine's own numbers;
+    (family, options) reproduce the run.
     """
 
     family: str
@@ -58,23 +100,37 @@ class Engine(ABC):
     """
 
     name: str
-    package: str  # what to install when it is missing
+    package: str  # to install when it is missing
+    supports: Supports = Supports()  # everything else is refused
 
     @abstractmethod
     def version(self) -> str:
         """Version of the engine; raises ImportError when its package is not installed."""
 
-    @abstractmethod
     def cannot(self, scene: Scene) -> Cannot | None:
-        """Why this scene cannot be run, or None."""
+        """The refusal of a scene that cannot be run, or None: anything that ``supports`` does not declare,
+        then what ``refuses`` says."""
+        return self.supports.missing(scene) or self.refuses(scene)
+
+    def refuses(self, scene: Scene) -> Cannot | None:
+        """The refusal of a scene of declared joints, drivers and loads that still cannot be run, or None."""
+        return None
 
     @abstractmethod
     def settings(self, scene: Scene) -> Sequence[Setting]:
         """The sweep over this engine's families and accuracies for a scene, coarse to fine in each
         family."""
 
+    def has_family(self, family: str) -> bool:
+        """Whether `run` takes this family although the sweep of `settings` may leave it out."""
+        return False
+
+    def family_parts(self) -> FamilyParts:
+        """The parts from which an engine's families are composed; empty where it only has its sweep's."""
+        return {}
+
     def prepare(self, families: Sequence[str]) -> None:  # noqa: B027 - most engines need nothing
-        """What a process does before its first run of these families, such as importing and compiling."""
+        """Import and compile ahead of the first run of these families in a process."""
 
     @abstractmethod
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
@@ -112,14 +168,17 @@ def installed(name: str) -> bool:
 def engine(name: str) -> Engine:
     """The engine of that name, or at ``module:attribute``; raises LookupError with the known names."""
     if name in BUILT_IN + OPTIONAL:
-        return import_module(f"crosscheck.engines.{name}").ENGINE
+        return _as_engine(name, import_module(f"crosscheck.engines.{name}").ENGINE)
     for point in metadata.entry_points(group=ENTRY_POINTS):
         if point.name == name:
-            return point.load()
+            return _as_engine(name, point.load())
     if ":" in name:
         module, attribute = name.split(":", 1)
-        found = getattr(import_module(module), attribute)
-        if isinstance(found, Engine):
-            return found
-        raise LookupError(f"{name!r} is no engine: it does not implement crosscheck.engine.Engine")
+        return _as_engine(name, getattr(import_module(module), attribute))
     raise LookupError(f"unknown engine {name!r}; known: {', '.join(engine_names())}")
+
+
+def _as_engine(name: str, found: object) -> Engine:
+    if isinstance(found, Engine):
+        return found
+    raise LookupError(f"{name!r} is no engine: it does not implement crosscheck.engine.Engine")

@@ -1,4 +1,4 @@
-"""A mechanism of one's own, written as a file: a door with its closer, simulated and drawn as text."""
+"""A mechanism of your own as a file: a door with its closer, simulated and drawn as text."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What tolerances do to a slider-crank: 200 variants on every core, beside first-order theory."""
+"""Effect of tolerances on a slider-crank: 200 variants on every core, beside first-order theory."""
 
 import numpy as np
 

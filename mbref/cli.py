@@ -5,14 +5,20 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbref.scene import Scene, SceneError
 from mbref.scenes import SCENES, find_scene
 from mbref.simulation.method import DEFAULT, MethodError
+from mbref.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from mbref.equations.diagnosis import Diagnosis
+    from mbref.simulation.simulate import Limits
 
 BAD_INPUT, INCOMPLETE, INTERRUPTED = 2, 1, 130
 PIPED_WIDTH = 160  # characters of a line where no terminal says otherwise
@@ -153,7 +159,7 @@ def _run(options: argparse.Namespace) -> int:
     return 0 if trajectory.outcome.name == "COMPLETED" else INCOMPLETE
 
 
-def _limits(options: argparse.Namespace):
+def _limits(options: argparse.Namespace) -> Limits:
     from mbref.simulation.simulate import Limits
 
     if not 0 < options.rtol < 1:
@@ -164,7 +170,7 @@ def _limits(options: argparse.Namespace):
 
 
 @contextmanager
-def _progress_bar(what: str, end: float) -> Iterator:
+def _progress_bar(what: str, end: float) -> Iterator[Callable[[float], None]]:
     """Tells how far it is on stderr, where that is a terminal; appears only on long runs."""
     from rich.console import Console
     from rich.progress import Progress
@@ -194,7 +200,9 @@ def _ensemble(options: argparse.Namespace) -> int:
     return 0 if len(completed) == options.count else INCOMPLETE
 
 
-def _show_spread(scene: Scene, end: float, completed: Sequence, options: argparse.Namespace) -> None:
+def _show_spread(
+    scene: Scene, end: float, completed: Sequence[Trajectory], options: argparse.Namespace
+) -> None:
     """Mean and standard deviation of every body over the completed runs, at the last time."""
     from rich.console import Console
     from rich.table import Table
@@ -229,7 +237,7 @@ def _show_spread(scene: Scene, end: float, completed: Sequence, options: argpars
     console.print(table)
 
 
-def _show(scene: Scene, trajectory) -> None:
+def _show(scene: Scene, trajectory: Trajectory) -> None:
     from rich.console import Console
     from rich.table import Table
 
@@ -287,7 +295,7 @@ def _diagnose(options: argparse.Namespace) -> int:
     return 0
 
 
-def _beyond(found) -> dict:
+def _beyond(found: Diagnosis) -> dict[str, Any]:
     """The fields of a diagnosis besides its counts, for JSON."""
     from dataclasses import asdict
 

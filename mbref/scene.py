@@ -15,59 +15,44 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tomli_w
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Discriminator,
-    Field,
-    Strict,
-    ValidationError,
-    field_validator,
-    model_validator,
-)
+from pydantic import Field, Strict, ValidationError, field_validator, model_validator
 
+from mbref.scene_fields import Entry, Name, Positive, Quaternion, Real, Reals, Vector, as_list
+from mbref.scene_joints import (
+    JOINT_TYPES,
+    Cylindrical,
+    Distance,
+    Fixed,
+    Joint,
+    JointFacts,
+    Planar,
+    Revolute,
+    Spherical,
+    Translational,
+    Universal,
+)
+from mbref.scene_loads import LOAD_TYPES, Force, Load, Moment, Spring, TorsionSpring
 from mbref.scene_validation import GROUND, SceneError, checked_inertia, field_faults, reference_faults
 
 if TYPE_CHECKING:
     from mbref.equations.diagnosis import Counts
 
+__all__ = [
+    "GROUND", "JOINT_TYPES", "LOAD_TYPES", "Body", "Cylindrical", "Distance", "Driver", "Fixed", "Force",
+    "Joint", "JointFacts", "Load", "Moment", "Planar", "Revolute", "Scene", "SceneError", "Sine", "Spherical",
+    "Spring", "TorsionSpring", "Translational", "Universal",
+]  # fmt: skip
+
 UNIT_TOLERANCE = 1e-6  # a quaternion further than this from unit length is a fault, nearer is rounding
 
 
-def _as_list(value: Any) -> Any:
-    """Arrays are accepted wherever the file has a list."""
-    return value.tolist() if hasattr(value, "tolist") else value
-
-
-Real = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
-NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
-Vector = Annotated[tuple[Real, Real, Real], Strict(False), BeforeValidator(_as_list)]
-Quaternion = Annotated[tuple[Real, Real, Real, Real], Strict(False), BeforeValidator(_as_list)]
-Name = Annotated[str, Field(min_length=1)]
-Pair = Annotated[tuple[Name, Name], Strict(False)]
-VectorPair = Annotated[tuple[Vector, Vector], Strict(False), BeforeValidator(_as_list)]
-Reals = Annotated[tuple[Real, ...], Field(min_length=1), Strict(False), BeforeValidator(_as_list)]
-
-
-def _direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
-    if math.hypot(*v) == 0:
-        raise ValueError("must have a length, got the zero vector")
-    return v
-
-
-class _Data(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Body(_Data):
+class Body(Entry):
     """A rigid body; its frame sits at the centre of mass.
 
     ``inertia`` is about the centre of mass along the body axes: three principal moments or a
     symmetric 3x3 (kg m²).  ``mass`` and ``inertia`` are omitted together when only kinematics is
-    wanted.  ``velocity`` and ``angular_velocity`` (world) are optional: what is left out is chosen
-    consistent with the constraints and with what is given.
+    wanted.  ``velocity`` and ``angular_velocity`` (world) are optional: velocities left out
+    are chosen consistent with the constraints and with the given ones.
     """
 
     name: Name
@@ -81,7 +66,7 @@ class Body(_Data):
     @field_validator("inertia", mode="plain")
     @classmethod
     def _inertia_is_physical(cls, value: Any) -> Any:
-        return None if value is None else checked_inertia(_as_list(value))
+        return None if value is None else checked_inertia(as_list(value))
 
     @field_validator("orientation")
     @classmethod
@@ -92,84 +77,7 @@ class Body(_Data):
         return q if abs(norm - 1) <= 1e-15 else tuple(x / norm for x in q)
 
 
-class _Joint(_Data):
-    name: Name
-    bodies: Pair
-
-
-class _AxisJoint(_Joint):
-    anchor: Vector
-    axis: Vector
-
-    _axis = field_validator("axis")(_direction)
-
-
-class Fixed(_Joint):
-    """No relative motion."""
-
-    type: Literal["fixed"] = "fixed"
-    anchor: Vector
-
-
-class Revolute(_AxisJoint):
-    """Rotation about ``axis`` through ``anchor``."""
-
-    type: Literal["revolute"] = "revolute"
-
-
-class Universal(_Joint):
-    """Coincident ``anchor``; ``axes`` (first on the first body, second on the second) stay perpendicular."""
-
-    type: Literal["universal"] = "universal"
-    anchor: Vector
-    axes: VectorPair
-
-    @field_validator("axes")
-    @classmethod
-    def _axes_have_length(cls, axes: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
-        return tuple(_direction(axis) for axis in axes)
-
-
-class Spherical(_Joint):
-    """Coincident ``anchor``, free rotation."""
-
-    type: Literal["spherical"] = "spherical"
-    anchor: Vector
-
-
-class Translational(_AxisJoint):
-    """Displacement along ``axis``, no rotation."""
-
-    type: Literal["translational"] = "translational"
-
-
-class Cylindrical(_AxisJoint):
-    """Displacement along and rotation about ``axis``."""
-
-    type: Literal["cylindrical"] = "cylindrical"
-
-
-class Distance(_Joint):
-    """Constant distance between two ``anchors`` (first on the first body, second on the second)."""
-
-    type: Literal["distance"] = "distance"
-    anchors: VectorPair
-
-    @field_validator("anchors")
-    @classmethod
-    def _anchors_are_apart(cls, anchors: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
-        if math.dist(*anchors) == 0:
-            raise ValueError("must be two different points (coincident points are a spherical joint)")
-        return anchors
-
-
-Joint = Annotated[
-    Fixed | Revolute | Universal | Spherical | Translational | Cylindrical | Distance,
-    Discriminator("type"),
-]
-
-
-class Sine(_Data):
+class Sine(Entry):
     """amplitude · sin(frequency · t + phase); frequency in rad/s."""
 
     amplitude: Real = 0.0
@@ -177,7 +85,7 @@ class Sine(_Data):
     phase: Real = 0.0
 
 
-class Driver(_Data):
+class Driver(Entry):
     """Prescribed motion of the second body of ``joint`` relative to the first, from t = 0.
 
     value(t) = c0 + c1 t + c2 t² + … (+ sine): the angle of a revolute or cylindrical joint about its
@@ -189,48 +97,7 @@ class Driver(_Data):
     sine: Sine | None = None
 
 
-class Moment(_Data):
-    """Constant moment on a body (N m, world axes)."""
-
-    type: Literal["moment"] = "moment"
-    body: Name
-    moment: Vector
-
-
-class Force(_Data):
-    """Constant force (N, world axes) at a body-fixed point (given in the world at t = 0)."""
-
-    type: Literal["force"] = "force"
-    body: Name
-    point: Vector
-    force: Vector
-
-
-class Spring(_Data):
-    """Spring and damper between two body-fixed points (world at t = 0); N/m, N s/m, m."""
-
-    type: Literal["spring"] = "spring"
-    bodies: Pair
-    points: VectorPair
-    stiffness: NotNegative
-    damping: NotNegative = 0.0
-    natural_length: NotNegative
-
-
-class TorsionSpring(_Data):
-    """Spring and damper about a joint's axis; N m/rad, N m s/rad; angle measured from t = 0."""
-
-    type: Literal["torsion_spring"] = "torsion_spring"
-    joint: Name
-    stiffness: NotNegative
-    damping: NotNegative = 0.0
-    natural_angle: Real = 0.0
-
-
-Load = Annotated[Moment | Force | Spring | TorsionSpring, Discriminator("type")]
-
-
-class Scene(_Data):
+class Scene(Entry):
     """A mechanism: ``body``, ``joint``, ``driver`` and ``load`` tuples, gravity and default end time.
 
     ``ground = "body"`` adds the ground as a body held by six rows, as the paper counts it; the
@@ -267,6 +134,13 @@ class Scene(_Data):
         """Index of a body in ``body``; -1 for the ground."""
         return -1 if name == GROUND else [b.name for b in self.body].index(name)
 
+    def joint_named(self, name: str) -> Joint:
+        """The joint of that name; raises KeyError where the scene has none."""
+        for joint in self.joint:
+            if joint.name == name:
+                return joint
+        raise KeyError(name)
+
     def has_mass(self) -> bool:
         """Whether every body has mass and inertia, as a dynamic analysis needs."""
         return all(body.mass is not None for body in self.body)
@@ -287,7 +161,8 @@ class Scene(_Data):
         for key in ("joint", "load"):
             for item, source in zip(data.get(key, ()), getattr(self, key), strict=True):
                 item["type"] = source.type
-        return _lists(data)
+        lists: dict[str, Any] = _lists(data)
+        return lists
 
     def save(self, path: str | Path) -> None:
         """Write the scene as TOML; ``Scene.from_file`` gives back an equal scene."""
@@ -306,7 +181,7 @@ class Scene(_Data):
 
 
 def _lists(value: Any) -> Any:
-    """Tuples as lists, which is what a TOML or JSON writer takes."""
+    """Tuples as lists, as writers of TOML and JSON need them."""
     if isinstance(value, Mapping):
         return {k: _lists(v) for k, v in value.items()}
     return [_lists(v) for v in value] if isinstance(value, tuple | list) else value

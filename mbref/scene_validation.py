@@ -1,4 +1,4 @@
-"""What is wrong with a scene: one message per fault, under the path of the field."""
+"""Faults of a scene: one message for each, under the path of the field."""
 
 from __future__ import annotations
 
@@ -9,9 +9,13 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from mbref.scene_joints import JOINT_TYPES
+from mbref.scene_loads import LOAD_TYPES
+
 GROUND = "ground"
-DRIVEN = ("revolute", "cylindrical", "translational")  # joints a driver can move
-TURNING = ("revolute", "cylindrical")  # joints a torsion spring can act on
+DRIVABLE = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.driven)
+TORSIONAL = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.takes_torsion_spring)
+ACTS_ON = {name: load.acts_on for name, load in LOAD_TYPES.items()}
 INERTIA_TOLERANCE = 1e-9  # relative; discs and thin rods meet the triangle inequality with equality
 
 
@@ -27,7 +31,7 @@ class SceneError(Exception):
 
 
 def checked_inertia(value: Any) -> tuple[Any, ...]:
-    """Three principal moments or a symmetric 3x3, as tuples; ValueError says what is unphysical."""
+    """Three principal moments or a symmetric 3x3, as tuples; ValueError says which value is unphysical."""
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError):
@@ -128,7 +132,7 @@ def reference_faults(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     driven: set[str] = set()
     for i, driver in enumerate(_entries(data, "driver")):
         name = _get(driver, "joint")
-        yield from _joint_faults(f"driver[{i}].joint", name, types, DRIVEN, "be driven")
+        yield from _joint_faults(f"driver[{i}].joint", name, types, DRIVABLE, "be driven")
         if name in driven:
             yield f"driver[{i}].joint", f"{name!r} already has a driver"
         driven.add(name if isinstance(name, str) else "")
@@ -136,18 +140,18 @@ def reference_faults(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             message = f"c0 + amplitude·sin(phase) must be 0, motion is measured from t = 0; got {start:g}"
             yield f"driver[{i}].polynomial", message
     for i, load in enumerate(_entries(data, "load")):
-        kind = _get(load, "type")
-        if kind in ("moment", "force"):
+        acts_on = ACTS_ON.get(_get(load, "type"))
+        if acts_on == "body":
             name = _get(load, "body")
             if name == GROUND:
                 yield f"load[{i}].body", "the ground cannot be loaded"
             elif isinstance(name, str) and name not in known:
                 yield f"load[{i}].body", _unknown("body", name, known - {GROUND})
-        elif kind == "spring":
+        elif acts_on == "bodies":
             yield from _pair_faults(f"load[{i}].bodies", _get(load, "bodies"), known)
-        elif kind == "torsion_spring":
+        elif acts_on == "joint":
             name = _get(load, "joint")
-            yield from _joint_faults(f"load[{i}].joint", name, types, TURNING, "carry a torsion spring")
+            yield from _joint_faults(f"load[{i}].joint", name, types, TORSIONAL, "carry a torsion spring")
 
 
 def _initial_value(driver: Any) -> float:

@@ -113,11 +113,13 @@ class Trajectory:
         names = tuple(record["bodies"])
         k = len(record["times"])
 
-        def stacked(key: str, width: int) -> np.ndarray | None:
-            rows = [record["bodies"][name].get(key) for name in names]
-            if any(row is None for row in rows):
-                return None
+        def stacked(key: str, width: int) -> np.ndarray:
+            rows = [record["bodies"][name][key] for name in names]
             return np.array(rows, dtype=float).reshape(len(names), k, width).transpose(1, 0, 2)
+
+        def optional(key: str) -> np.ndarray | None:
+            given = all(record["bodies"][name].get(key) is not None for name in names)
+            return stacked(key, 3) if given else None
 
         reactions = {n: np.array(v, dtype=float).reshape(k, 6) for n, v in record["reactions"].items()}
         return Trajectory(
@@ -129,8 +131,8 @@ class Trajectory:
             orientation=stacked("orientation", 4),
             velocity=stacked("velocity", 3),
             angular_velocity=stacked("angular_velocity", 3),
-            acceleration=stacked("acceleration", 3),
-            angular_acceleration=stacked("angular_acceleration", 3),
+            acceleration=optional("acceleration"),
+            angular_acceleration=optional("angular_acceleration"),
             reactions=reactions or None,
             outcome=Outcome[record["outcome"]],
             cost=Cost(**record["cost"]),

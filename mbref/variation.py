@@ -95,7 +95,7 @@ def _replaced(value: Any, steps: Sequence[str], number: float, path: str) -> Any
     return {**fields, step: _replaced(fields[step], rest, number, path)}
 
 
-def _place(entries: tuple, step: str, path: str) -> int:
+def _place(entries: tuple[Any, ...], step: str, path: str) -> int:
     """The index that a step names: a number, or the name of the entry (a driver has its joint's)."""
     names = [getattr(entry, "name", getattr(entry, "joint", None)) for entry in entries]
     if step in names:

@@ -1,1 +1,1 @@
-"""reports: pages rendered from stored records; nothing here simulates except the study it starts."""
+"""reports: pages rendered from stored records; nothing here simulates."""

@@ -1,4 +1,4 @@
-"""`python -m reports`: run the study, or what is missing of it, and render the report."""
+"""`python -m reports`: have crosscheck make the missing records, then render the report from them."""
 
 from __future__ import annotations
 
@@ -8,15 +8,11 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
-from crosscheck.cli.request import RequestError, find_engines
-from crosscheck.paper import runs
-from crosscheck.study.fair_timing import gate_cases
-from crosscheck.study.grid import Case, Record, known, study
-from crosscheck.study.progress import shown
-from reports import sweep
+from crosscheck.cli import collection
+from crosscheck.cli.passage import passage
+from crosscheck.cli.request import RequestError
 from reports.blocks import Block
-from reports.runs import SceneRuns, by_scene
-from reports.timings import with_timings
+from reports.runs import Run, by_scene
 
 NEEDS = ("matplotlib", "jinja2")
 PAPER = "paper"  # the section whose runs are its own
@@ -30,6 +26,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     from reports.sections import NAMES
 
     arguments = _parser((*NAMES, PAPER)).parse_args(argv)
+    if arguments.picture:
+        return _picture(Path(arguments.picture))
     names = arguments.section or (NAMES if arguments.quick else (*NAMES, PAPER))
     try:
         blocks = _blocks(Path(arguments.out), arguments.quick, names)
@@ -43,56 +41,32 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
+def _picture(path: Path) -> int:
+    """Write the README's moving picture."""
+    from reports import animation
+
+    found = passage()
+    panels = [animation.panel(Run(record)) for record in found.records]
+    path.write_text(animation.animated(found.scene, found.exact, panels, found.singular))
+    _notice(f"written: {path}")
+    return 0
+
+
 def _blocks(out: Path, is_quick: bool, names: Sequence[str]) -> list[Block]:
-    """What the named sections say; only the runs they need are made."""
+    """The blocks of the named sections; only the records they need are made."""
     from reports import sections
     from reports.sections import paper
 
-    out.mkdir(parents=True, exist_ok=True)
     blocks: list[Block] = []
     if set(names) - {PAPER}:
-        blocks += sections.blocks(_collect(out, is_quick), names)
+        scenes, records, gates = collection.comparison(out, is_quick, _notice)
+        groups = by_scene(records, {scene.name: scene for scene in scenes}, gates)
+        blocks += sections.blocks(groups, names)
     if PAPER in names:
-        records = _collect_paper(out)
-        print(paper.score(records))
-        blocks += paper.render(records)
+        records_of_paper, illustration = collection.paper(out, _notice)
+        print(paper.score(records_of_paper))
+        blocks += paper.render(records_of_paper, illustration)
     return blocks
-
-
-def _collect_paper(out: Path) -> runs.Records:
-    """The runs of the paper's tables and figures; raw records stay in ``out``/paper.jsonl."""
-    path, cases = out / "paper.jsonl", runs.cases()
-    with shown("the paper's runs", len(cases)) as progress:
-        records = runs.run(path, cases, progress)
-    more = runs.follow_ups(records)
-    with shown("their errors", len(more)) as progress:
-        records |= runs.run(path, more, progress)
-    cases = runs.timed()
-    single = runs.run(path, cases)
-    timed = with_timings(list(cases.values()), list(single.values()), out / "paper-timings.jsonl", _notice)
-    return records | dict(zip(cases, timed, strict=True))
-
-
-def _collect(out: Path, is_quick: bool) -> list[SceneRuns]:
-    """The runs of the study by scene; raw records stay in ``out``/records.jsonl."""
-    engines = find_engines(None, _notice)
-    _notice("planning the sweep")
-    scenes, cases, unable = (sweep.quick if is_quick else sweep.whole)(engines)
-    for pair in unable:
-        _notice(f"{pair.engine} cannot run {pair.scene.name}: {pair.cannot}")
-    (out / "scenes").mkdir(parents=True, exist_ok=True)
-    for scene in scenes:
-        scene.save(out / "scenes" / f"{scene.name}.toml")
-    gates = [case for scene in scenes for case in gate_cases(scene, engines, sweep.QUICK_LIMIT)]
-    records = _records([*cases, *gates], out / "records.jsonl")
-    timed = with_timings(cases, records[: len(cases)], out / "timings.jsonl", _notice)
-    return by_scene(timed, {scene.name: scene for scene in scenes}, records[len(cases) :])
-
-
-def _records(cases: Sequence[Case], path: Path) -> list[Record]:
-    _notice(f"{len(cases)} runs, of which {path} has {len(known(cases, path))}")
-    with shown("running", len(cases)) as progress:
-        return study(cases, records_path=path, progress=progress)
 
 
 def _write(blocks: Sequence[Block], out: Path) -> None:
@@ -111,6 +85,7 @@ def _parser(sections: Sequence[str]) -> argparse.ArgumentParser:
     parser.add_argument("--quick", action="store_true", help="fewer scenes and settings, minutes")
     parser.add_argument("--section", action="append", choices=sections, help="only this one; may repeat")
     parser.add_argument("--out", default="report", metavar="DIR", help="folder to write (default: report)")
+    parser.add_argument("--picture", metavar="FILE", help="write only the moving picture of the README")
     return parser
 
 

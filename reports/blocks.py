@@ -1,4 +1,4 @@
-"""What a section consists of: headings, sentences, tables and figures, as data.
+"""The parts of a section as data: headings, sentences, tables and figures.
 
 A section makes blocks once; ``render`` writes them as HTML and as Markdown.
 """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,11 +42,10 @@ def shapes(scene: Scene) -> list[Shape]:
 
 
 def _anchors(joint: Joint) -> list[tuple[str, tuple[float, float, float]]]:
-    points = joint.anchors if joint.type == "distance" else (joint.anchor, joint.anchor)
-    return list(zip(joint.bodies, points, strict=True))
+    return list(zip(joint.bodies, joint.anchor_pair, strict=True))
 
 
-def _inverse(orientation, vectors: np.ndarray) -> np.ndarray:
+def _inverse(orientation: Sequence[float], vectors: np.ndarray) -> np.ndarray:
     return rotations.rotate(rotations.conjugate(np.array(orientation)), vectors)
 
 
@@ -119,9 +119,9 @@ def _draw_body(axes: Axes, poses: np.ndarray, colour: str, name: str) -> None:
 def _guide(scene: Scene, trajectory: Trajectory, joint: Joint, size: float) -> np.ndarray:
     """Ends (2, 3) of the line a joint to the ground slides along, a little longer than its travel."""
     point = np.array(_anchors(joint)[joint.bodies.index(GROUND)][1])
-    if joint.type not in ("translational", "cylindrical"):
+    if joint.facts.free_translations != 1 or not joint.directions:
         return np.stack([point, point])
-    axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+    axis = np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
     moving = scene.body_index(next(name for name in joint.bodies if name != GROUND))
     travel = (trajectory.position[:, moving] - point) @ axis
     return point + axis * np.array([[travel.min() - size / 8], [travel.max() + size / 8]])

@@ -56,9 +56,12 @@ def colour(engine: str) -> str:
     return COLOURS[names.index(engine) % len(COLOURS)] if engine in names else COLOURS[-1]
 
 
-def looks(curves: Iterable[Curve]) -> Mapping[Curve, dict]:
+Look = dict[str, Any]  # keyword arguments of a line
+
+
+def looks(curves: Iterable[Curve]) -> Mapping[Curve, Look]:
     """Line and marker of every (engine, family): colour by engine, marker and dash by family."""
-    styles: dict[Curve, dict] = {}
+    styles: dict[Curve, Look] = {}
     for engine, group in itertools.groupby(sorted(set(curves)), key=lambda curve: curve[0]):
         for i, curve in enumerate(group):
             dash, marker = DASHES[i % len(DASHES)], MARKERS[i % len(MARKERS)]

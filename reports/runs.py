@@ -9,9 +9,9 @@ from functools import cached_property
 from typing import Any
 
 from crosscheck.judge.tolerances import ERROR_LEVELS, EXCESS, FALSE_SUCCESS
-from crosscheck.study.fair_timing import difference
+from crosscheck.study.fair_timing import model_difference
 from crosscheck.study.grid import Record
-from crosscheck.study.record_view import swept
+from crosscheck.study.record_view import varied_settings
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
@@ -51,7 +51,7 @@ class Run:
 
     @property
     def reason(self) -> str:
-        """Why the run ended, one sentence; the outcome's own sentence where the engine gave none."""
+        """The reason of the end, one sentence: the engine's, else the outcome's."""
         return self.record["message"] or self.outcome.sentence
 
     @property
@@ -73,6 +73,10 @@ class Run:
         rtol = self.record["settings"].get("rtol", math.inf)
         return self.completed and self.error > EXCESS * rtol
 
+    def rate(self, count: str) -> float:
+        """A cost of the record, such as ``steps``, a second of simulation; NaN for a run without any."""
+        return float(self.record["cost"][count]) / self.t_end if self.t_end > 0 else math.nan
+
     def metric(self, name: str) -> float:
         """A metric of the record; NaN where it has none."""
         value = self.record["metrics"].get(name)
@@ -93,7 +97,7 @@ class SceneRuns:
 
     def difference(self) -> str | None:
         """The first field in which an engine's mechanism is another one; None when all agree."""
-        return difference(self.scene, self.gate) if self.gate else None
+        return model_difference(self.scene, self.gate) if self.gate else None
 
     def curves(self) -> dict[Curve, list[Run]]:
         """Runs by engine and family, in the order of the records."""
@@ -102,9 +106,9 @@ class SceneRuns:
             curves.setdefault(run.curve, []).append(run)
         return curves
 
-    def swept(self, run: Run) -> str:
+    def varied_settings(self, run: Run) -> str:
         """The settings of a run that vary along its curve, as printed (``rtol=1e-06``); all if alone."""
-        return swept(run.record, [other.record for other in self.runs])
+        return varied_settings(run.record, [other.record for other in self.runs])
 
     def completed(self) -> list[Run]:
         return [run for run in self.runs if run.completed]
@@ -131,6 +135,11 @@ def by_scene(
     for record in gates:
         gate[record["scene"]].append(record)
     return [SceneRuns(scene, runs[name], gate[name]) for name, scene in scenes.items() if runs[name]]
+
+
+def ended_briefly(run: Run) -> str:
+    """``20 s`` for a run of the paper that completed, else end time and footnote or name of the outcome."""
+    return "20 s" if run.completed else f"{run.t_end:.4g} s {run.outcome.letter or run.outcome.label}"
 
 
 def plain(value: Any) -> str:

@@ -1,4 +1,4 @@
-"""What property tests draw: directions, poses, joints between two bodies, and states."""
+"""Strategies of the property tests: directions, poses, joints between two bodies, and states."""
 
 from __future__ import annotations
 
@@ -6,16 +6,12 @@ import numpy as np
 from hypothesis import strategies as st
 
 from mbref.scene import (
+    JOINT_TYPES,
     Body,
-    Cylindrical,
     Distance,
     Driver,
-    Fixed,
-    Revolute,
     Scene,
     Sine,
-    Spherical,
-    Translational,
     Universal,
 )
 
@@ -25,7 +21,7 @@ directions = vectors.filter(lambda v: np.linalg.norm(v) > 0.1)
 quaternions = st.tuples(coordinate, coordinate, coordinate, coordinate).filter(
     lambda q: np.linalg.norm(q) > 0.1
 ).map(lambda q: tuple((np.array(q) / np.linalg.norm(q)).tolist()))  # fmt: skip
-DRIVABLE = (Revolute, Cylindrical, Translational)
+DRIVABLE = tuple(kind for kind in JOINT_TYPES.values() if kind.facts.driven)
 
 
 @st.composite
@@ -52,7 +48,7 @@ def joints(draw, kind: type, pair: tuple[str, str]):
         if np.linalg.norm(across) < 0.05:
             across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
         return Universal(**common, anchor=draw(vectors), axes=(tuple(axis.tolist()), tuple(across.tolist())))
-    if kind in (Fixed, Spherical):
+    if "axis" not in kind.model_fields:
         return kind(**common, anchor=draw(vectors))
     return kind(**common, anchor=draw(vectors), axis=draw(directions))
 

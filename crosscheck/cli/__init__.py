@@ -1,4 +1,4 @@
-"""The command `crosscheck`: what it accepts, what it lists and the tables it prints."""
+"""The command `crosscheck`: its options, its lists and the tables it prints."""
 
 from crosscheck.cli.commands import main
 

@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from rich.console import Console
 
@@ -21,6 +22,8 @@ from crosscheck.study.record_view import public
 from mbref.scene import SceneError
 from mbref.trajectory import Outcome
 
+Document = dict[str, Any]
+Commands = Any  # the object that argparse adds subcommands to; its type is private
 COMPLETED, OTHERWISE, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 REPEATS = 5
 COMPARED_SAMPLES = 11  # few, because adaptive integrators end a step at every sample time
@@ -40,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         _notice("interrupted")
         return INTERRUPTED
-    except BrokenPipeError:  # the reader of our output has gone, as in `crosscheck list | head`
+    except BrokenPipeError:  # the reader of the output has closed it, as in `crosscheck list | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return OTHERWISE
 
@@ -55,7 +58,7 @@ def _run(arguments: argparse.Namespace) -> int:
     finished: list[Record] = []
     try:
         _study(cases, finished)
-    finally:  # also when interrupted: what has been computed is shown
+    finally:  # also when interrupted: the finished runs are shown
         records = _in_order(cases, finished)
         if arguments.json:
             print(json.dumps(_by_scene(cases, records), allow_nan=False))
@@ -87,14 +90,16 @@ def _compare(arguments: argparse.Namespace) -> int:
 
 
 def _refused(cases: Sequence[Case]) -> set[str]:
-    """Names of the scenes that are not the same mechanism in all their engines; each is said why."""
+    """Names of the scenes whose mechanism differs between engines; the difference is printed."""
     scenes = {case.scene.name: case.scene for case in cases}
     limit = max(case.time_limit for case in cases)
     engines = {name: dict.fromkeys(c.engine for c in cases if c.scene.name == name) for name in scenes}
-    gates = {n: fair_timing.gate_cases(scene, list(engines[n]), limit) for n, scene in scenes.items()}
-    records = _study([case for group in gates.values() for case in group], [])
+    identities = {
+        n: fair_timing.identity_cases(scene, list(engines[n]), limit) for n, scene in scenes.items()
+    }
+    records = _study([case for group in identities.values() for case in group], [])
     reasons = {
-        n: fair_timing.difference(s, [r for r in records if r["scene"] == n]) for n, s in scenes.items()
+        n: fair_timing.model_difference(s, [r for r in records if r["scene"] == n]) for n, s in scenes.items()
     }
     for name, reason in reasons.items():
         if reason:
@@ -122,7 +127,7 @@ def _report(arguments: argparse.Namespace) -> int:
     with subprocess.Popen([sys.executable, "-m", "reports", *_report_options(arguments)]) as program:
         try:
             return program.wait()
-        except KeyboardInterrupt:  # the program hears it too, stores what it has and ends by itself
+        except KeyboardInterrupt:  # the program is interrupted too, stores its records and ends by itself
             return program.wait()
 
 
@@ -132,7 +137,7 @@ def _report_options(arguments: argparse.Namespace) -> list[str]:
 
 
 def _cases(arguments: argparse.Namespace) -> list[Case]:
-    """The runs asked for; what engines cannot do is said on standard error."""
+    """The runs asked for; a scene that an engine cannot run is reported on standard error."""
     scenes = request.find_scenes(arguments.scene)
     engines = request.find_engines(arguments.engine, _notice)
     families = [*(arguments.method or ()), *(arguments.setting or ())]
@@ -158,7 +163,7 @@ def _in_order(cases: Sequence[Case], finished: Sequence[Record]) -> list[Record]
     return [by_key[k] for k in dict.fromkeys(map(key, cases)) if k in by_key]
 
 
-def _by_scene(cases: Sequence[Case], records: Sequence[Record]) -> dict | list[dict]:
+def _by_scene(cases: Sequence[Case], records: Sequence[Record]) -> Document | list[Document]:
     """{"scene", "records"} of one scene; a list of them for several."""
     names = dict.fromkeys(case.scene.name for case in cases)
     documents = [
@@ -193,69 +198,114 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _add(commands, name: str, about: str, example: str, command: Callable) -> argparse.ArgumentParser:
-    parser = commands.add_parser(
+def _add(
+    commands: Commands, name: str, about: str, example: str, command: Callable[[argparse.Namespace], int]
+) -> argparse.ArgumentParser:
+    parser: argparse.ArgumentParser = commands.add_parser(
         name, help=about, description=about, epilog=f"example: {example}", allow_abbrev=False
     )
     parser.set_defaults(command=command)
     return parser
 
 
-def _add_list(commands) -> None:
-    parser = _add(commands, "list", "what there is", "crosscheck list engines", _list)
-    parser.add_argument("what", nargs="?", choices=tuple(listing.TABLES), help="default: everything")
+def _add_list(commands: Commands) -> None:
+    parser = _add(
+        commands, "list", "print the known scenes, engines, methods, metrics and the support matrix",
+        "crosscheck list engines", _list,
+    )  # fmt: skip
+    parser.add_argument(
+        "what", nargs="?", choices=tuple(listing.TABLES), help="the table to print; default: all"
+    )
 
 
-def _add_run(commands) -> None:
+def _add_run(commands: Commands) -> None:
     example = "crosscheck run four_bar --engine mujoco --engine exudyn --samples 21 --json"
-    parser = _add(commands, "run", "run scenes in engines, one record for every setting", example, _run)
+    parser = _add(
+        commands, "run", "run scenes in engines, one record for every engine and setting", example, _run
+    )
     _add_selection(parser)
 
 
-def _add_compare(commands) -> None:
+def _add_compare(commands: Commands) -> None:
     example = "crosscheck compare planar_slider_crank --engine mbref --engine pinocchio"
-    about = "speed against error: outcomes and errors first, then interleaved timing; table and plot"
+    about = "compare speed at equal error: run, then time the completed runs in turns; table and plot"
     parser = _add(commands, "compare", about, example, _compare)
     _add_selection(parser)
-    parser.add_argument("--repeats", type=int, default=REPEATS, help=f"timed runs of each, ≥ {REPEATS}")
-
-
-def _add_verify(commands) -> None:
-    example = "crosscheck verify mujoco"
-    about = "hold an engine against the conformance suite: every property on every scene of the suite"
-    parser = _add(commands, "verify", about, example, _verify)
-    parser.add_argument("engine", metavar="ENGINE", help="a known engine, or module:attribute")
-    parser.add_argument("--scene", action="append", metavar="S", help="one of the suite; may repeat")
-    parser.add_argument("--time-limit", type=float, default=TIME_LIMIT, metavar="T", help="of a run (s)")
-    parser.add_argument("--json", action="store_true", help="machine-readable output on standard output")
-
-
-def _add_report(commands) -> None:
-    example = "crosscheck report --quick --out report"
-    about = "run the study and render its report; resumes where it was interrupted"
-    parser = _add(commands, "report", about, example, _report)
-    parser.add_argument("--quick", action="store_true", help="fewer scenes and settings, minutes")
     parser.add_argument(
-        "--section", action="append", metavar="S", help="render only this section; may repeat"
+        "--repeats", type=int, default=REPEATS, help=f"timed runs of every setting, at least {REPEATS}"
+    )
+
+
+def _add_verify(commands: Commands) -> None:
+    example = "crosscheck verify mujoco"
+    about = "test an engine by the conformance suite: every property on every scene of the suite"
+    parser = _add(commands, "verify", about, example, _verify)
+    parser.add_argument(
+        "engine", metavar="ENGINE", help="a known engine (`crosscheck list engines`), or module:attribute"
+    )
+    parser.add_argument(
+        "--scene", action="append", metavar="S", help="a scene of the suite; may repeat; default: all"
+    )
+    parser.add_argument(
+        "--time-limit",
+        type=float,
+        default=TIME_LIMIT,
+        metavar="T",
+        help="wall time a run may take (s); default: %(default)g",
+    )
+    parser.add_argument("--json", action="store_true", help="print records as JSON on standard output")
+
+
+def _add_report(commands: Commands) -> None:
+    example = "crosscheck report --quick --out report"
+    about = "make the missing records and render the report; resumes where it was interrupted"
+    parser = _add(commands, "report", about, example, _report)
+    parser.add_argument(
+        "--quick", action="store_true", help="five short scenes, a few settings: about three minutes"
+    )
+    parser.add_argument(
+        "--section", action="append", metavar="S", help="render only this section, such as speed; may repeat"
     )
     parser.add_argument("--out", default="report", metavar="DIR", help="folder to write (default: report)")
 
 
 def _add_selection(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("scene", nargs="+", metavar="SCENE", help="a built-in name or a .toml file")
+    parser.add_argument(
+        "scene",
+        nargs="+",
+        metavar="SCENE",
+        help="a built-in scene (`crosscheck list scenes`) or a .toml file",
+    )
     known = ", ".join(engine_names())
     parser.add_argument("--engine", action="append", metavar="E", help=f"{known}; may repeat; default: all")
-    parser.add_argument("--method", action="append", metavar="M", help="a method of mbref; may repeat")
     parser.add_argument(
-        "--setting", action="append", metavar="FAMILY", help="a family of settings; may repeat"
+        "--method",
+        action="append",
+        metavar="M",
+        help="a family of settings, or any method of mbref: formulation+stabilisation/integrator, such as "
+        "lm2+projection/dop853 (`crosscheck list methods`); may repeat; default: every family",
+    )
+    parser.add_argument(
+        "--setting",
+        action="append",
+        metavar="FAMILY",
+        help="an engine's family of settings, such as defaults or tuned; may repeat; default: all",
     )
     when = parser.add_mutually_exclusive_group()
-    when.add_argument("--times", type=_numbers, metavar="a,b,c", help="sample times (s)")
+    when.add_argument("--times", type=_numbers, metavar="a,b,c", help="sample times (s), increasing")
     when.add_argument("--samples", type=int, metavar="N", help="equally spaced samples, both ends included")
-    parser.add_argument("--rtol", type=float, help="one relative tolerance instead of a sweep over them")
+    parser.add_argument(
+        "--rtol", type=float, help="one relative tolerance instead of the sweep over tolerances"
+    )
     parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
-    parser.add_argument("--time-limit", type=float, default=TIME_LIMIT, metavar="T", help="of a run (s)")
-    parser.add_argument("--json", action="store_true", help="machine-readable output on standard output")
+    parser.add_argument(
+        "--time-limit",
+        type=float,
+        default=TIME_LIMIT,
+        metavar="T",
+        help="wall time a run may take (s); default: %(default)g",
+    )
+    parser.add_argument("--json", action="store_true", help="print records as JSON on standard output")
 
 
 def _numbers(text: str) -> list[float]:

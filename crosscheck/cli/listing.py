@@ -1,4 +1,4 @@
-"""What `crosscheck list` prints: the tables of scenes, engines, methods, metrics and support."""
+"""The tables of `crosscheck list`: scenes, engines, methods, metrics and support."""
 
 from __future__ import annotations
 
@@ -46,23 +46,20 @@ def _engines() -> Table:
 
 
 def _methods() -> Table:
-    from mbref.formulations import FORMULATIONS
-    from mbref.integrators import INTEGRATORS
-    from mbref.stabilisation import STABILISATIONS
-
-    table = Table("part", "name", "options", title="methods: formulation+stabilisation/integrator")
-    parts = {"formulation": FORMULATIONS, "stabilisation": STABILISATIONS, "integrator": INTEGRATORS}
-    for part, entries in parts.items():
-        for name, entry in entries.items():
-            table.add_row(part, name, ", ".join(f"{k}={v:g}" for k, v in entry.options.items()))
-        table.add_section()
+    title = "methods: formulation+stabilisation/integrator, such as lm2+baumgarte[alpha=10,beta=10]/rk4"
+    table = Table("engine", "part", "name", "options", title=title)
+    for name in engine_names():
+        for part, entries in engine(name).family_parts().items():
+            for entry, options in entries.items():
+                table.add_row(name, part, entry, ", ".join(f"{k}={v:g}" for k, v in options.items()))
+            table.add_section()
     return table
 
 
 def _metrics() -> Table:
     from crosscheck.judge.metrics import METRICS
 
-    table = Table("metric", "unit", "what it is", title="metrics")
+    table = Table("metric", "unit", "definition", title="metrics")
     for name, metric in METRICS.items():
         table.add_row(name, metric.unit, metric.label)
     return table

@@ -1,4 +1,4 @@
-"""What a command line asks for: scenes, engines, settings and sample times, checked before anything runs."""
+"""The request of a command line, checked before anything runs: scenes, engines, settings, sample times."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from mbref.scene import Scene, SceneError
 from mbref.scenes import find_scene
 
 SAMPLES = 101
-METHODS_OF = "mbref"  # the engine whose families are method names, more of them than its sweep has
 
 
 class RequestError(Exception):
@@ -157,27 +156,29 @@ def plan(
 
 
 def _of_families(cases: Sequence[Case], families: Sequence[str]) -> list[Case]:
-    """The cases of these families; those of a method of mbref that its sweep leaves out are added."""
+    """The cases of these families; one that an engine has beyond its sweep is run at the options of the
+    sweep's first family.  Raises RequestError for a family that no engine has."""
     offered = dict.fromkeys(case.setting.family for case in cases)
-    unknown = [family for family in families if family not in offered]
-    sweep = [case for case in cases if case.engine == METHODS_OF]
-    if faults := [
-        _unknown_family(family, offered) for family in unknown if not (sweep and _is_method(family))
-    ]:
+    beyond = {family: _having(family, cases) for family in dict.fromkeys(families) if family not in offered}
+    if faults := [_unknown_family(family, offered) for family, having in beyond.items() if not having]:
         raise RequestError(*faults)
-    first = [case for case in sweep if case.setting.family == sweep[0].setting.family]
-    added = [c._replace(setting=Setting(f, c.setting.options)) for f in dict.fromkeys(unknown) for c in first]
+    added = [
+        case._replace(setting=Setting(family, case.setting.options))
+        for family, having in beyond.items()
+        for case in _of_first_family(cases, having)
+    ]
     return [case for case in cases if case.setting.family in families] + added
 
 
-def _is_method(name: str) -> bool:
-    from mbref.simulation.method import Method, MethodError
+def _having(family: str, cases: Sequence[Case]) -> list[str]:
+    """The engines of the cases that have the family."""
+    return [name for name in dict.fromkeys(case.engine for case in cases) if engine(name).has_family(family)]
 
-    try:
-        Method.parse(name)
-    except MethodError:
-        return False
-    return True
+
+def _of_first_family(cases: Sequence[Case], engines: Sequence[str]) -> list[Case]:
+    """Of every one of these engines the cases of the first family of its sweep."""
+    first = {name: next(c.setting.family for c in cases if c.engine == name) for name in engines}
+    return [case for case in cases if first.get(case.engine) == case.setting.family]
 
 
 def _unknown_family(name: str, offered: Iterable[str]) -> str:
@@ -188,7 +189,7 @@ def _at_tolerance(cases: Sequence[Case], rtol: float) -> list[Case]:
     """One run of every family that has a tolerance, at this one; the others keep their sweep."""
     if not (math.isfinite(rtol) and rtol > 0):
         raise RequestError(f"--rtol: must be positive, got {rtol:g}")
-    chosen: dict[tuple, Case] = {}
+    chosen: dict[tuple[str, str, str], Case] = {}
     for case in cases:
         options = dict(case.setting.options)
         if "rtol" in options:

@@ -1,6 +1,7 @@
-"""Support matrix: what every engine says it can do, feature by feature and scene by scene, from `cannot`.
+"""Support matrix, feature by feature and scene by scene, from every engine's `cannot`.
 
-``python -m crosscheck.cli.support README.md`` renews the block of a document, without a path it prints it.
+``python -m crosscheck.cli.support docs/engines.md`` renews the block of a document, without a path it
+prints the block.
 """
 
 from __future__ import annotations
@@ -17,13 +18,13 @@ from mbref.scenes import SCENES
 
 CAN = "✓"
 BEGIN, END = "<!-- support -->", "<!-- /support -->"
-KNOWN = (*BUILT_IN, *OPTIONAL)  # the engines of the README's block, installed or not
+KNOWN = (*BUILT_IN, *OPTIONAL)  # the engines of the document's block, installed or not
 Ask = Callable[[str, Scene], Cannot | None]  # (engine name, scene)
 
 
 @dataclass(frozen=True)
 class Support:
-    """``answers[row][engine]``: None where the engine can, else what it cannot and whose turn it is."""
+    """``answers[row][engine]``: None where the engine can, else the reason and who could change it."""
 
     engines: Sequence[str]
     answers: Mapping[str, Mapping[str, Cannot | None]]
@@ -57,7 +58,7 @@ def of_scenes(engines: Sequence[str], ask: Ask | None = None) -> Support:
 
 
 def markdown(engines: Sequence[str]) -> str:
-    """The README's block, markers included: features × engines."""
+    """The document's block, markers included: features × engines."""
     return "\n".join([BEGIN, *_table("feature", of_features(engines)), END]) + "\n"
 
 

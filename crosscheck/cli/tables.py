@@ -12,7 +12,7 @@ from rich.text import Text
 
 from crosscheck.cli.terminal_plot import scatter
 from crosscheck.study.grid import Record
-from crosscheck.study.record_view import by_scene, curve, error, is_completed, swept
+from crosscheck.study.record_view import by_scene, engine_and_family, error, is_completed, varied_settings
 
 MEASURED = ("error", "violation_position", "energy_error")  # of the metrics, what the table of runs shows
 
@@ -65,7 +65,7 @@ def print_comparison(console: Console, records: Sequence[Record]) -> None:
         table = _table(name, header, right_from=5)
         for r in sorted(group, key=lambda r: (not is_completed(r), error(r))):
             measured = (f"{r['t_end']:.4g}", _number(error(r)), *_times(r, fastest))
-            table.add_row(letters[curve(r)], *_identity(r, group), _outcome(r), *measured)
+            table.add_row(letters[engine_and_family(r)], *_identity(r, group), _outcome(r), *measured)
         console.print(table)
         console.print(scatter(group, letters))
         _print_messages(console, group)
@@ -89,12 +89,12 @@ def _print_messages(console: Console, records: Sequence[Record]) -> None:
 
 def _letters(records: Sequence[Record]) -> dict[tuple[str, str], str]:
     marks = string.ascii_uppercase + string.ascii_lowercase + string.digits
-    curves = dict.fromkeys(curve(record) for record in records)
+    curves = dict.fromkeys(engine_and_family(record) for record in records)
     return {name: marks[i % len(marks)] for i, name in enumerate(curves)}
 
 
 def _identity(record: Record, records: Sequence[Record]) -> tuple[str, str, str]:
-    return (*curve(record), swept(record, records))
+    return (*engine_and_family(record), varied_settings(record, records))
 
 
 def _outcome(record: Record) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from rich.text import Text
 
 from crosscheck.study.grid import Record
-from crosscheck.study.record_view import curve, error, is_completed
+from crosscheck.study.record_view import engine_and_family, error, is_completed
 
 COLOURS = ("blue", "red", "green", "magenta", "yellow", "cyan")
 WIDTH, HEIGHT = 64, 16  # characters of the plot
@@ -17,7 +17,7 @@ WIDTH, HEIGHT = 64, 16  # characters of the plot
 def scatter(records: Sequence[Record], letters: Mapping[tuple[str, str], str]) -> Text:
     """Error (right: larger) against time (up: slower), both logarithmic, one letter a family."""
     plotted = [r for r in records if is_completed(r) and math.isfinite(error(r))]
-    points = [(*_place(r), letters[curve(r)]) for r in plotted]
+    points = [(*_place(r), letters[engine_and_family(r)]) for r in plotted]
     if not points:
         return Text("nothing to plot: no completed run has an error")
     (left, right), (low, high) = _range([p[0] for p in points]), _range([p[1] for p in points])
@@ -39,7 +39,10 @@ def _range(values: Sequence[float]) -> tuple[float, float]:
     return low, high if high > low else low + 1
 
 
-def _framed(grid, across: tuple[float, float], up: tuple[float, float], names: Mapping) -> Text:
+def _framed(
+    grid: Sequence[Sequence[str]], across: tuple[float, float], up: tuple[float, float],
+    names: Mapping[str, tuple[str, str]],
+) -> Text:  # fmt: skip
     engines = list(dict.fromkeys(engine for engine, _ in names.values()))
     colours = {mark: COLOURS[engines.index(engine) % len(COLOURS)] for mark, (engine, _) in names.items()}
     text = Text("time (s)\n")

@@ -6,22 +6,17 @@ from collections.abc import Mapping
 
 from mbref import rotations
 from mbref.scene import (
+    JOINT_TYPES,
     Body,
-    Cylindrical,
-    Distance,
     Driver,
-    Fixed,
     Force,
     Joint,
+    Load,
     Moment,
-    Revolute,
     Scene,
     Sine,
-    Spherical,
     Spring,
     TorsionSpring,
-    Translational,
-    Universal,
 )
 from mbref.scenes import SCENES
 
@@ -32,17 +27,14 @@ BODY = Body(
     name="body", mass=1.5, inertia=INERTIA, position=PLACE,
     orientation=tuple(rotations.from_vector([0.3, -0.2, 0.5]).tolist()),
 )  # fmt: skip
+ACROSS = (1.0, -1.0, 0.5)  # axis of joints without rotation, along which the body can fall
+PLACES = {"anchor": PIVOT, "anchors": (PIVOT, (0.4, -0.1, 0.1)), "axes": ((0.0, 0.0, 1.0), (1.0, 0.3, 0.0))}
 JOINTS: Mapping[str, Joint] = {
-    "fixed": Fixed(name="J", bodies=LINK, anchor=PIVOT),
-    "revolute": Revolute(name="J", bodies=LINK, anchor=PIVOT, axis=AXIS),
-    "universal": Universal(name="J", bodies=LINK, anchor=PIVOT, axes=((0.0, 0.0, 1.0), (1.0, 0.3, 0.0))),
-    "spherical": Spherical(name="J", bodies=LINK, anchor=PIVOT),
-    "translational": Translational(name="J", bodies=LINK, anchor=PIVOT, axis=(1.0, -1.0, 0.5)),
-    "cylindrical": Cylindrical(name="J", bodies=LINK, anchor=PIVOT, axis=AXIS),
-    "distance": Distance(name="J", bodies=LINK, anchors=(PIVOT, (0.4, -0.1, 0.1))),
+    name: kind.at("J", LINK, **PLACES, axis=AXIS if kind.facts.free_rotations else ACROSS)
+    for name, kind in JOINT_TYPES.items()
 }
 PIVOTED, TURNS = JOINTS["revolute"], JOINTS["cylindrical"]
-LOADS = {
+LOADS: Mapping[str, Load] = {
     "moment": Moment(body="body", moment=(0.3, 0.2, -0.4)),
     "force": Force(body="body", point=(0.5, -0.1, 0.2), force=(1.0, -2.0, 3.0)),
     "spring": Spring(bodies=LINK, points=((0.0, 0.8, 0.0), (0.4, -0.1, 0.1)), stiffness=30.0, damping=0.5,
@@ -51,9 +43,9 @@ LOADS = {
 }  # fmt: skip
 POLYNOMIAL, WAVE = (0.0, 0.8, -0.5), Sine(amplitude=0.2, frequency=6.0)
 DRIVERS = {
-    "revolute": Driver(joint="J", polynomial=POLYNOMIAL, sine=WAVE),
-    "translational": Driver(joint="J", polynomial=POLYNOMIAL, sine=WAVE),
-    "cylindrical": Driver(joint="J", polynomial=POLYNOMIAL, sine=WAVE),
+    name: Driver(joint="J", polynomial=POLYNOMIAL, sine=WAVE)
+    for name, kind in JOINT_TYPES.items()
+    if kind.facts.driven
 }
 
 
@@ -64,7 +56,7 @@ def feature_scenes() -> dict[str, Scene]:
     probes |= {
         f"{kind} driver": _probe(f"{kind}_driver", JOINTS[kind], driver=(d,)) for kind, d in DRIVERS.items()
     }
-    probes |= {f"{kind} load": _probe(kind, _carrier(kind), load=(load,)) for kind, load in LOADS.items()}
+    probes |= {f"{kind} load": _probe(kind, _carrier(load), load=(load,)) for kind, load in LOADS.items()}
     return probes | {
         "free body": _probe("free_body"),
         "loop": _short("spatial_slider_crank_gravity", 0.1),
@@ -86,9 +78,9 @@ def massless(scene: Scene) -> Scene:
     return scene.with_(name=f"massless_{scene.name}", body=tuple(bare), load=())
 
 
-def _carrier(load: str) -> Joint:
+def _carrier(load: Load) -> Joint:
     """The joint of the probe of a load: one that leaves its action free to show."""
-    return TURNS if load == "torsion_spring" else JOINTS["spherical"]
+    return TURNS if load.acts_on == "joint" else JOINTS["spherical"]
 
 
 def _probe(name: str, *joint: Joint, **causes) -> Scene:

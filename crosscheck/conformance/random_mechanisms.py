@@ -15,10 +15,9 @@ from crosscheck.judge.tolerances import RANK
 from mbref import rotations
 from mbref.scene import (
     GROUND,
+    JOINT_TYPES,
     Body,
     Cylindrical,
-    Distance,
-    Fixed,
     Force,
     Joint,
     Moment,
@@ -26,15 +25,13 @@ from mbref.scene import (
     Scene,
     Spherical,
     Spring,
-    Translational,
-    Universal,
 )
 from mbref.trajectory import Outcome
 
 REFERENCE, PRINCIPLE = "mbref", "Gauss's principle"
-KINDS = ("revolute", "universal", "spherical", "translational", "cylindrical", "distance", "fixed")
-TREE = (0.34, 0.14, 0.14, 0.12, 0.12, 0.09, 0.05)  # how often each kind joins a body to the tree
-CLOSING = (0.4, 0.15, 0.2, 0.05, 0.1, 0.1, 0.0)  # and closes a loop
+KINDS = ("revolute", "universal", "spherical", "translational", "cylindrical", "distance", "fixed", "planar")
+TREE = (0.34, 0.14, 0.14, 0.12, 0.12, 0.08, 0.03, 0.03)  # probability of each kind to join a body to the tree
+CLOSING = (0.4, 0.15, 0.2, 0.05, 0.1, 0.08, 0.0, 0.02)  # and to close a loop
 PLANAR = 0.65  # part of the mechanisms whose axes are parallel, so that their loops are redundant
 HINGED = 0.25  # part of the loops that are a second hinge on the axis of the first
 TRIES = 60
@@ -176,19 +173,12 @@ class _Draw:
         middle = self.point((places[first] + places[second]) / 2)
         along, across = self.axis if self.planar else self.direction(), self.direction()
         across = np.cross(along, across) / np.linalg.norm(np.cross(along, across))
-        common = {"name": f"J{len(self.joints)}", "bodies": (first, second)}
-        if kind == "distance":
-            far = np.array(middle) + self.rng.uniform(0.3, 0.8) * across
-            return Distance(**common, anchors=(middle, _triple(far)))
-        made = {
-            "fixed": lambda: Fixed(**common, anchor=middle),
-            "spherical": lambda: Spherical(**common, anchor=middle),
-            "universal": lambda: Universal(**common, anchor=middle, axes=(_triple(along), _triple(across))),
-            "revolute": lambda: Revolute(**common, anchor=middle, axis=_triple(along)),
-            "cylindrical": lambda: Cylindrical(**common, anchor=middle, axis=_triple(along)),
-            "translational": lambda: Translational(**common, anchor=middle, axis=_triple(across)),
-        }
-        return made[kind]()
+        far = np.array(middle) + self.rng.uniform(0.3, 0.8) * across if kind == "distance" else across
+        has_rotation = JOINT_TYPES[kind].facts.free_rotations > 0
+        return JOINT_TYPES[kind].at(
+            f"J{len(self.joints)}", (first, second), anchor=middle, anchors=(middle, _triple(far)),
+            axis=_triple(along if has_rotation else across), axes=(_triple(along), _triple(across)),
+        )  # fmt: skip
 
     def second_hinge(self, hinge: Revolute) -> Joint:
         """Another joint on the axis of a revolute one, between the same bodies: redundant."""

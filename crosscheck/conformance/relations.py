@@ -79,8 +79,9 @@ class Isometry:
             "angular_velocity": self.axial, "moment": self.axial, "inertia": self.inertia,
             "orientation": self.turn,
         }  # fmt: skip
+        along = {"displacement": self.polar}  # the axis of a driven displacement; others are of rotations
         joints = [
-            mapped(joint, {**fields, "axis": self.polar if joint.type == "translational" else self.axial})
+            mapped(joint, {**fields, "axis": along.get(joint.facts.driven, self.axial)})
             for joint in scene.joint
         ]
         return scene.with_(

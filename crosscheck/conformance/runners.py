@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Setting, engine
-from crosscheck.processes.pool import Observation, observe, offers, run_isolated
+from crosscheck.processes.pool import Observation, capabilities, observe, run_isolated
 from crosscheck.processes.serve import failed
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
@@ -47,7 +47,7 @@ class Isolated:
     time_limit: float
 
     def offers(self, scene: Scene) -> tuple[str, Cannot | None, list[Setting]]:
-        return offers(self.name, scene, self.time_limit)
+        return capabilities(self.name, scene, self.time_limit)
 
     def cannot(self, scene: Scene) -> Cannot | None:
         return engine(self.name).cannot(scene)

@@ -1,1 +1,1 @@
-"""One adapter a file; what adapters share stands in graph.py."""
+"""Adapters, one folder or file for each engine; the modules beside them are shared by several."""

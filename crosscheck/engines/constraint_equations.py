@@ -17,14 +17,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from crosscheck.engines.driver_motion import motion
-from crosscheck.engines.spanning_tree import cross_matrix
+from crosscheck.engines.geometry import cross_matrix, in_body, joint_frame, point_in_body, unit
 from mbref import rotations
-from mbref.scene import GROUND, Driver, Joint, Scene
+from mbref.scene import Driver, Joint, Scene
 
 O = np.zeros(3)
 TILDE = np.array([cross_matrix(e) for e in np.eye(3)])
-AXES_FORBIDDEN = {"fixed": 3, "translational": 3, "revolute": 2, "cylindrical": 2}
-PLANES = {"translational": 2, "cylindrical": 2}  # directions in which the anchors stay together; else 3
+ACROSS = ((1, 2), (0, 2), (0, 1))  # axes of the first and second frame that a forbidden rotation keeps normal
 Levels = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
@@ -39,11 +38,11 @@ class Frames:
     a2: np.ndarray
 
 
-def frames(r: np.ndarray, p: np.ndarray, v: np.ndarray, spin: np.ndarray) -> Frames:
+def frames(r: np.ndarray, p: np.ndarray, v: np.ndarray, omega: np.ndarray) -> Frames:
     """Frames of positions and velocities (…, nb, 3), Euler parameters p (…, nb, 4) of any length, and
-    body-fixed angular velocities ``spin`` (…, nb, 3)."""
+    angular velocities ``omega`` (…, nb, 3) in body axes."""
     a = rotations.to_matrix(p / np.sqrt(np.sum(p * p, axis=-1, keepdims=True)))
-    tilde = np.tensordot(spin, TILDE, 1)
+    tilde = np.tensordot(omega, TILDE, 1)
     a, tilde = _grounded(a, np.eye(3)), _grounded(tilde, np.zeros((3, 3)))
     a1 = a @ tilde
     ground = O[:, None]
@@ -54,27 +53,6 @@ def _grounded(array: np.ndarray, ground: np.ndarray) -> np.ndarray:
     """The bodies' array (…, nb, 3, k) with the ground's entry appended."""
     last = np.broadcast_to(ground, (*array.shape[:-3], 1, *ground.shape))
     return np.concatenate([array, last], axis=-3)
-
-
-def joint_frame(axis: np.ndarray) -> np.ndarray:
-    """Rotation matrix (3, 3) whose last column is along ``axis`` (3,)."""
-    z = np.array(axis, dtype=float) / np.linalg.norm(axis)
-    x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
-
-
-def in_body(scene: Scene, name: str, vectors: np.ndarray) -> np.ndarray:
-    """World vectors at t = 0 (…, 3) in the axes of a body."""
-    if name == GROUND:
-        return np.array(vectors, dtype=float)
-    return vectors @ rotations.to_matrix(np.array(scene.body[scene.body_index(name)].orientation))
-
-
-def point_in_body(scene: Scene, name: str, point: np.ndarray) -> np.ndarray:
-    """A world point at t = 0 (3,) in the frame of a body."""
-    start = O if name == GROUND else np.array(scene.body[scene.body_index(name)].position)
-    return in_body(scene, name, np.array(point) - start)
 
 
 @dataclass(frozen=True)
@@ -94,31 +72,26 @@ class _Row:
 
 def _rows(scene: Scene, k: int, joint: Joint, driver: Driver | None) -> list[_Row]:
     """The rows of joint k; those of its driver last."""
-    first, second = joint.bodies
-    anchors = joint.anchors if joint.type == "distance" else (joint.anchor,) * 2
+    facts, anchors = joint.facts, joint.anchor_pair
     points = np.array([point_in_body(scene, *end) for end in zip(joint.bodies, anchors, strict=True)])
-    indices = (scene.body_index(first), scene.body_index(second))
+    indices = (scene.body_index(joint.bodies[0]), scene.body_index(joint.bodies[1]))
     length = float(np.linalg.norm(np.subtract(*anchors)))
     blank = _Row("length", k, indices, points, O, O, O, length, None)
-    if joint.type == "distance":
+    if facts.condition == "constant distance":
         return [blank]
-    if joint.type == "universal":
-        frame, axes = np.eye(3), [np.array(axis) / np.linalg.norm(axis) for axis in joint.axes]
-        crossing = (in_body(scene, first, axes[0]), in_body(scene, second, axes[1]))
-        turned = [replace(blank, kind="direction", e1=crossing[0], w=crossing[1])]
-    else:
-        frame = np.eye(3) if joint.type in ("fixed", "spherical") else joint_frame(joint.axis)
-        e, f = in_body(scene, first, frame.T), in_body(scene, second, frame.T)
-        pairs = ((1, 2), (0, 2), (0, 1))[: AXES_FORBIDDEN.get(joint.type, 0)]
-        turned = [replace(blank, kind="direction", e1=e[a], w=f[b]) for a, b in pairs]
-    e = in_body(scene, first, frame.T)
-    held = [replace(blank, kind="point", e1=e[n]) for n in range(PLANES.get(joint.type, 3))]
-    if driver and joint.type == "translational":
-        return [*held, *turned, replace(blank, kind="point", e1=e[2], driver=driver)]
-    if driver:
-        turns = replace(blank, kind="direction", e1=e[1], e2=-e[0], w=f[0], driver=driver)
-        return [*held, *turned, turns]
-    return [*held, *turned]
+    frame = joint_frame(joint.directions[0]) if len(joint.directions) == 1 else np.eye(3)
+    e, f = (in_body(scene, name, frame.T) for name in joint.bodies)
+    rows = [replace(blank, kind="point", e1=e[n]) for n in facts.forbidden_translations]
+    pairs = [(e[a], f[b]) for a, b in (ACROSS[n] for n in facts.forbidden_rotations)]
+    if facts.condition == "perpendicular axes":
+        first, second = (unit(axis) for axis in joint.directions)
+        pairs = [(in_body(scene, joint.bodies[0], first), in_body(scene, joint.bodies[1], second))]
+    rows += [replace(blank, kind="direction", e1=u, w=w) for u, w in pairs]
+    if driver and facts.driven == "displacement":
+        rows.append(replace(blank, kind="point", e1=e[2], driver=driver))
+    elif driver:
+        rows.append(replace(blank, kind="direction", e1=e[1], e2=-e[0], w=f[0], driver=driver))
+    return rows
 
 
 class Constraints:

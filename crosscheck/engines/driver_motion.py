@@ -1,4 +1,4 @@
-"""Driver motions as plain numbers, and how fast a scene moves."""
+"""Driver motions as plain numbers, and the fastest rate of a scene."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def motion(driver: Driver, t: float) -> tuple[float, float, float]:
 
 
 def stated_rate(scene: Scene) -> float:
-    """The fastest rate (rad/s) to read off a scene: of its duration, drivers, springs and velocities."""
+    """The fastest rate (rad/s) that a scene states: of its duration, drivers, springs and velocities."""
     rates = [1 / scene.duration]
     for driver in scene.driver:
         rates += [abs(motion(driver, t)[1]) for t in np.linspace(0, scene.duration, 101)]
@@ -48,20 +48,22 @@ def stated_rate(scene: Scene) -> float:
 
 
 def _middle_moment(inertia: Sequence) -> float:
-    """The middle principal moment: about their own axis thin rods have next to none."""
+    """The middle principal moment; the least one is next to zero for thin rods."""
     matrix = np.array(inertia)
     return float(np.linalg.eigvalsh(np.diag(matrix) if matrix.ndim == 1 else matrix)[1])
 
 
 def fastest_rate(scene: Scene, coarse: Callable[[float], Trajectory], counts: Sequence[int] = SCOUT) -> float:
-    """The fastest angular velocity (rad/s) of a coarse run, of steps of the length given, or what the
-    scene states if faster; ``counts`` are how many steps the run has, and how many it is repeated with
-    when it fails or is too coarse to tell."""
+    """The fastest angular velocity (rad/s) of a coarse run, or `stated_rate` where that is faster.
+
+    ``coarse(step)`` runs the scene with steps of that length (s).  ``counts`` are the numbers of steps to
+    try in turn: a run that fails, or turns by more than SCOUT_TURN in a step, is repeated with the next.
+    """
     for steps in counts:
         run = coarse(scene.duration / steps)
-        spins = np.linalg.norm(run.angular_velocity, axis=2)
+        speeds = np.linalg.norm(run.angular_velocity, axis=2)
         resolved = SCOUT_TURN * steps / scene.duration
-        rate = max(stated_rate(scene), float(spins.max(initial=0.0)))
+        rate = max(stated_rate(scene), float(speeds.max(initial=0.0)))
         if run.outcome is Outcome.COMPLETED and rate < resolved:
             break
     return min(rate, resolved)

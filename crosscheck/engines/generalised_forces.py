@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.engines.constraint_equations import Frames, in_body, joint_frame, point_in_body
+from crosscheck.engines.constraint_equations import Frames
+from crosscheck.engines.geometry import in_body, joint_frame, point_in_body
 from crosscheck.judge.constraints import inertia_matrices
 from mbref.scene import Force, Moment, Scene, Spring, TorsionSpring
 
@@ -22,9 +23,11 @@ class Forces:
     def __init__(self, scene: Scene):
         self.scene, self.nb = scene, len(scene.body)
         weighed = scene.has_mass()
-        mass = [body.mass if weighed else 1.0 for body in scene.body]
+        mass = [(body.mass or 1.0) if weighed else 1.0 for body in scene.body]
         self.inertia = inertia_matrices(scene) if weighed else np.array([np.eye(3)] * self.nb)
-        self.weight = np.outer(mass, scene.gravity)[..., None] if weighed else np.zeros((self.nb, 3, 1))
+        self.weight = (
+            np.outer(mass, np.array(scene.gravity))[..., None] if weighed else np.zeros((self.nb, 3, 1))
+        )
         self.mass = np.zeros((6 * self.nb, 6 * self.nb))
         for b in range(self.nb):
             self.mass[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = mass[b] * np.eye(3)
@@ -48,18 +51,18 @@ class Forces:
 
     def _hinge(self, name: str) -> tuple[tuple[int, ...], list[np.ndarray]]:
         """Bodies of a joint, and the axes (3, 3, columns) of its frame on either."""
-        joint = next(joint for joint in self.scene.joint if joint.name == name)
-        frame = joint_frame(joint.axis).T
+        joint = self.scene.joint_named(name)
+        frame = joint_frame(joint.directions[0]).T
         axes = [in_body(self.scene, body, frame).T for body in joint.bodies]
         return tuple(self.scene.body_index(body) for body in joint.bodies), axes
 
-    def __call__(self, f: Frames, spin: np.ndarray, angles: np.ndarray) -> np.ndarray:
-        """Generalised forces (…, 6 nb) with body-fixed ``spin`` (…, nb, 3) and the torsion springs'
-        estimated ``angles`` (…, springs)."""
+    def __call__(self, f: Frames, omega: np.ndarray, angles: np.ndarray) -> np.ndarray:
+        """Generalised forces (…, 6 nb) with angular velocities ``omega`` (…, nb, 3) in body axes and the
+        torsion springs' estimated ``angles`` (…, springs)."""
         total = np.zeros((*f.r.shape[:-3], self.nb + 1, 6, 1))
         total[..., : self.nb, :3, :] += self.weight
-        momentum = np.einsum("bij,...bj->...bi", self.inertia, spin)
-        total[..., : self.nb, 3:, 0] -= np.cross(spin, momentum)
+        momentum = np.einsum("bij,...bj->...bi", self.inertia, omega)
+        total[..., : self.nb, 3:, 0] -= np.cross(omega, momentum)
         for body, moment in self.moments:
             total[..., body, 3:, :] += _to_body(f, body, moment)
         for end, force in self.pulls:

@@ -1,12 +1,13 @@
-"""Where a tree starts: joint velocities that give the bodies the scene's consistent velocities."""
+"""Initial joint velocities of a tree: they give the bodies the scene's consistent velocities."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Why
+from crosscheck.engine import Cannot, Owner
 from crosscheck.engines.driver_motion import motion
-from crosscheck.engines.spanning_tree import GROUND_LINK, Link, Tree, cross_matrix
+from crosscheck.engines.geometry import cross_matrix
+from crosscheck.engines.spanning_tree import BALL_JOINT, FREE, GROUND_LINK, SLIDE, TURN, Link, Tree
 from crosscheck.judge.constraints import initial_poses, initial_twists, jacobian
 from mbref.scene import Scene
 
@@ -14,20 +15,20 @@ RANK_TOLERANCE = 1e-9  # relative to the largest singular value
 
 
 def lacks_mass(scene: Scene) -> Cannot | None:
-    """A scene without masses whose drivers leave some of the motion open has no dynamics."""
+    """The refusal of a scene without masses whose drivers leave some of the motion open; None of others."""
     if scene.has_mass():
         return None
     rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
     if np.linalg.matrix_rank(rows, RANK_TOLERANCE) == 6 * len(scene.body):
         return None
     without = ", ".join(body.name for body in scene.body if body.mass is None)
-    return Cannot(Why.NEVER, f"the drivers leave the motion open, and there is no mass on {without}")
+    return Cannot(Owner.MODEL, f"the drivers do not prescribe the whole motion, and {without} has no mass")
 
 
 def initial_rates(scene: Scene, tree: Tree) -> np.ndarray:
     """Joint velocities (nv,) at t = 0, in the order of the tree's links.
 
-    The bodies move with `kinematics.initial_twists`, ghosts with their bodies, rods without spin about
+    The bodies move with `constraints.initial_twists`, ghosts with their bodies, rods without spin about
     their own axes.  Raises SceneError where those velocities contradict the joints.
     """
     if tree.nv == 0:
@@ -71,16 +72,13 @@ def _joint_map(link: Link) -> np.ndarray:
     """(6, freedoms): the twist of the link's frame of its own joint's velocities."""
     turning = np.vstack([-cross_matrix(link.position - link.anchor), np.eye(3)])
     sliding = np.vstack([np.eye(3), np.zeros((3, 3))])
-    along = link.axes.T
-    return {
-        "fixed": lambda: np.zeros((6, 0)),
-        "revolute": lambda: turning @ along,
-        "universal": lambda: turning @ along,
-        "translational": lambda: sliding @ along,
-        "cylindrical": lambda: np.hstack([sliding @ along, turning @ along]),
-        "spherical": lambda: turning,
-        "free": lambda: np.eye(6),
-    }[link.kind]()
+    of_kind = {
+        SLIDE: lambda axis: sliding @ axis[:, None],
+        TURN: lambda axis: turning @ axis[:, None],
+        BALL_JOINT: lambda axis: turning,
+        FREE: lambda axis: np.eye(6),
+    }
+    return np.hstack([np.zeros((6, 0)), *(of_kind[m.kind](m.axis) for m in link.mobilities)])
 
 
 def _velocity(scene: Scene, twists: np.ndarray, body: int, point: np.ndarray) -> np.ndarray:

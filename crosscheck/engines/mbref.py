@@ -1,12 +1,14 @@
-"""mbref as an engine: a family is a method and whose code it runs, its accuracy the tolerance."""
+"""mbref as an engine: a family is a method, by the general kernels or by specialised code; it is swept over
+the relative tolerance."""
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Engine, Setting, Why
+from crosscheck.engine import Cannot, Engine, FamilyParts, Owner, Setting, Supports
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
@@ -24,6 +26,7 @@ METHODS = (
 )
 KINEMATIC = "kinematic"  # of driven scenes; integrates nothing, so has no tolerance
 OWN_CODE = ", own code"  # machine code of the scene, made before the clock runs
+LOADS = ("moment", "force", "spring", "torsion_spring")
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-10, 1e-11)
 
 
@@ -33,16 +36,26 @@ class Mbref(Engine):
     name = "mbref"
     package = "mbref"
 
+    @functools.cached_property
+    def supports(self) -> Supports:  # type: ignore[override]
+        """mbref has equations for every joint in its table, and for every load of a scene file."""
+        from mbref.equations.joints import JOINTS
+
+        return Supports(joints=tuple(JOINTS), drivers=("angle", "displacement"), loads=LOADS)
+
     def version(self) -> str:
         from mbref import __version__
 
         return __version__
 
-    def cannot(self, scene: Scene) -> Cannot | None:
+    def refuses(self, scene: Scene) -> Cannot | None:
         from mbref.equations.degrees_of_freedom import undriven_freedoms
 
         if not scene.has_mass() and undriven_freedoms(scene) > 0:
-            return Cannot(Why.NEVER, "bodies without mass move only where every freedom is driven")
+            return Cannot(
+                Owner.MODEL,
+                "bodies without mass can be moved only where the drivers prescribe the whole motion",
+            )
         return None
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
@@ -63,6 +76,26 @@ class Mbref(Engine):
         if family.endswith(OWN_CODE):
             return not why_no_code(scene, method)
         return scene.counts().redundant == 0 or method.formulation.handles_redundancy
+
+    def has_family(self, family: str) -> bool:
+        from mbref.simulation.method import MethodError
+
+        try:
+            _method(family)
+        except MethodError:
+            return False
+        return True
+
+    def family_parts(self) -> FamilyParts:
+        from mbref.formulations import FORMULATIONS
+        from mbref.integrators import INTEGRATORS
+        from mbref.stabilisation import STABILISATIONS
+
+        return {
+            "formulation": {name: part.options for name, part in FORMULATIONS.items()},
+            "stabilisation": {name: part.options for name, part in STABILISATIONS.items()},
+            "integrator": {name: part.options for name, part in INTEGRATORS.items()},
+        }
 
     def prepare(self, families: Sequence[str]) -> None:
         from mbref.simulation.simulate import prepare

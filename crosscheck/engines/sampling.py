@@ -1,4 +1,4 @@
-"""Stepping an engine from sample to sample: what a run collects, and the integrators run outside engines."""
+"""Stepping an engine from sample to sample: the samples of a run, and the integrators run outside engines."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ STRETCH = 1.01  # by which a step may be longer to end at a sample
 JUMPS = np.linspace(1.0, 4.0, 16)  # shortest steps, tried where the shortest one fails
 
 Rhs = Callable[[float, np.ndarray], np.ndarray]
-Settle = Callable[[float, np.ndarray], np.ndarray]  # what an accepted state is corrected to
+Settle = Callable[[float, np.ndarray], np.ndarray]  # (t, accepted state) -> corrected state
 
 
 class Failed(Exception):
@@ -36,7 +36,7 @@ class Failed(Exception):
 
 @dataclass
 class Counts:
-    """What stepping has cost so far."""
+    """Numbers of steps, rejected steps and evaluations so far."""
 
     steps: int = 0
     rejected: int = 0

@@ -1,7 +1,7 @@
 """A scene as a spanning tree with loop closures, for the engines that work in joint coordinates.
 
 Nodes are the bodies and the ground, edges the joints.  A maximum-weight spanning tree by constraint rows
-keeps the stiff joints, and every driven one; what is cut closes a loop:
+keeps the stiff joints, and every driven one; every joint that is cut closes a loop:
 
 - a cut spherical joint is a point that two links share;
 - any other cut joint carries a *ghost*: its second body's mass and inertia are divided in equal shares
@@ -15,20 +15,40 @@ about its own axis is arbitrary, because a rod that starts without spin never sp
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from crosscheck.engines.geometry import cross_matrix, joint_frame, unit
 from mbref import rotations
-from mbref.scene import Body, Distance, Fixed, Joint, Scene, Spherical, Universal
+from mbref.scene import Body, Distance, Joint, JointFacts, Scene, Spherical
 
 GROUND_LINK = -1
-ROWS = {"fixed": 6, "revolute": 5, "translational": 5, "universal": 4, "cylindrical": 4, "spherical": 3}
-FREEDOMS = {"fixed": 0, "revolute": 1, "translational": 1, "universal": 2, "cylindrical": 2, "spherical": 3,
-            "free": 6}  # fmt: skip
 NO_AXES = np.zeros((0, 3))
 DRIVEN_WEIGHT = 10  # more than any joint has rows: a driven joint is cut last
 ROD_SHARE = 0.1  # of the smallest effective mass a body shows at the anchor of a distance joint
+BALL: JointFacts = Spherical.facts
+ROD_END: str = Spherical.model_fields["type"].default
+FREE, SLIDE, TURN, BALL_JOINT = "free", "slide", "turn", "ball"
+COORDINATES = {FREE: 6, SLIDE: 1, TURN: 1, BALL_JOINT: 3}
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """One elementary motion of a link relative to its parent: a slide along or a turn about ``axis`` (3,),
+    the free rotation of a ball, or the displacement and rotation of a free link."""
+
+    kind: str
+    axis: np.ndarray
+
+
+def mobilities(facts: JointFacts, axes: np.ndarray) -> tuple[Mobility, ...]:
+    """The chain of elementary motions that a joint leaves free, slides first; ``axes`` (n, 3) are its own."""
+    free = [n for n in range(3) if n not in facts.forbidden_translations]
+    slides = [Mobility(SLIDE, joint_frame(axes[0])[:, n] if n < 2 else axes[0]) for n in free]
+    if facts.free_rotations == 3:
+        return (*slides, Mobility(BALL_JOINT, np.zeros(3)))
+    return (*slides, *(Mobility(TURN, axis) for axis in axes[: facts.free_rotations]))
 
 
 @dataclass(frozen=True)
@@ -37,9 +57,9 @@ class Link:
 
     Its frame sits at ``position`` (world) with world-aligned axes at t = 0; ``offset`` leads from there
     to its centre of mass, about which ``inertia`` (3, 3) is taken.  ``kind`` is the scene's joint type or
-    ``"free"``; ``axes`` (n, 3) are unit vectors, from the parent's side to the child's, such that positive
-    coordinates move the joint's second body relative to its first.  A cylindrical joint's coordinates are
-    displacement and angle, a free one's displacement and rotation.
+    ``"free"``, ``mobilities`` are the elementary motions that it leaves free; ``axes`` (n, 3) are unit
+    vectors, from the parent's side to the child's, such that positive coordinates move the joint's second
+    body relative to its first.
     """
 
     body: int  # index in scene.body; -1 for the rod of a distance joint
@@ -47,23 +67,24 @@ class Link:
     mass: float
     offset: np.ndarray
     inertia: np.ndarray
-    kind: str = "free"
+    kind: str = FREE
+    mobilities: tuple[Mobility, ...] = (Mobility(FREE, np.zeros(3)),)
     joint: int = -1  # index in scene.joint; -1 for a free link and the first end of a rod
     parent: int = GROUND_LINK
-    anchor: np.ndarray | None = None
-    axes: np.ndarray | None = None
+    anchor: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    axes: np.ndarray = field(default_factory=lambda: NO_AXES)
     ghost: bool = False
     ends: tuple[tuple[int, np.ndarray], ...] = ()  # of a rod: the bodies it ties, and where (world)
 
     @property
     def freedoms(self) -> int:
         """Number of joint coordinates (velocities)."""
-        return FREEDOMS[self.kind]
+        return sum(COORDINATES[mobility.kind] for mobility in self.mobilities)
 
 
 @dataclass(frozen=True)
 class Closure:
-    """What the tree does not hold: a ``point`` two links share, or a ``weld`` of a link and its ghost."""
+    """A loop closure: a ``point`` that two links share, or a ``weld`` of a link and its ghost."""
 
     kind: str
     joint: int
@@ -99,6 +120,7 @@ class Tree:
 @dataclass(frozen=True)
 class _Edge:
     kind: str
+    facts: JointFacts
     joint: int
     nodes: tuple[int, int]
     anchor: np.ndarray
@@ -114,12 +136,12 @@ def spanning_tree(scene: Scene) -> Tree:
         first, second = joint.bodies
         pair = (scene.body_index(first), scene.body_index(second))
         if isinstance(joint, Distance):
-            edges += _rod(nodes, j, pair, np.array(joint.anchors, dtype=float))
+            edges += _rod(nodes, j, pair, np.array(joint.anchors))
         else:
             driven = any(driver.joint == joint.name for driver in scene.driver)
-            weight = ROWS[joint.type] + DRIVEN_WEIGHT * driven
-            anchor = np.array(joint.anchor, dtype=float)
-            edges.append(_Edge(joint.type, j, pair, anchor, _axes(joint), weight))
+            weight = joint.facts.rows + DRIVEN_WEIGHT * driven
+            anchor = np.array(joint.anchor_pair[0])
+            edges.append(_Edge(joint.type, joint.facts, j, pair, anchor, _axes(joint), weight))
     kept, cut = _kruskal(len(nodes), edges)
     closures = _cut_open(nodes, kept, cut)
     return _depth_first(nodes, kept, closures, len(scene.body))
@@ -137,15 +159,7 @@ def _body_link(index: int, body: Body) -> Link:
 
 def _axes(joint: Joint) -> np.ndarray:
     """Unit axes (n, 3) of a joint, first body's first."""
-    if isinstance(joint, Fixed | Spherical | Distance):
-        return NO_AXES
-    axes = np.array(joint.axes if isinstance(joint, Universal) else [joint.axis], dtype=float)
-    return axes / np.linalg.norm(axes, axis=1, keepdims=True)
-
-
-def cross_matrix(v: np.ndarray) -> np.ndarray:
-    """The matrix (3, 3) of the product v × ·."""
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+    return np.array([unit(axis) for axis in joint.directions]).reshape(-1, 3)
 
 
 def effective_mass(link: Link, point: np.ndarray) -> float:
@@ -177,8 +191,8 @@ def _rod(nodes: list[Link], joint: int, pair: tuple[int, int], anchors: np.ndarr
     ties = tuple(zip(pair, anchors, strict=True))
     nodes.append(Link(-1, anchors.mean(axis=0), 2 * mass, np.zeros(3), inertia, ends=ties))
     return [
-        _Edge("spherical", -1, (pair[0], rod), anchors[0], NO_AXES, ROWS["spherical"]),
-        _Edge("spherical", joint, (rod, pair[1]), anchors[1], NO_AXES, ROWS["spherical"]),
+        _Edge(ROD_END, BALL, -1, (pair[0], rod), anchors[0], NO_AXES, BALL.rows),
+        _Edge(ROD_END, BALL, joint, (rod, pair[1]), anchors[1], NO_AXES, BALL.rows),
     ]
 
 
@@ -199,7 +213,7 @@ def _cut_open(nodes: list[Link], kept: list[_Edge], cut: list[_Edge]) -> list[Cl
     closures: list[Closure] = []
     ghosts: dict[int, list[int]] = {}
     for edge in cut:
-        if edge.kind == "spherical":
+        if edge.facts == BALL:
             closures.append(Closure("point", edge.joint, edge.nodes, edge.anchor))
             continue
         end = 1 if edge.nodes[1] != GROUND_LINK else 0
@@ -232,13 +246,14 @@ def _depth_first(nodes: list[Link], edges: list[_Edge], closures: list[Closure],
                 continue
             forward = edge.nodes[0] == node
             child = edge.nodes[1] if forward else edge.nodes[0]
-            axes = edge.axes if forward or edge.kind == "fixed" else -edge.axes[::-1]
-            add(child, kind=edge.kind, joint=edge.joint, parent=number[node], anchor=edge.anchor, axes=axes)
+            axes = edge.axes if forward else -edge.axes[::-1]
+            add(child, kind=edge.kind, mobilities=mobilities(edge.facts, axes), joint=edge.joint,
+                parent=number[node], anchor=edge.anchor, axes=axes)  # fmt: skip
 
     grow(GROUND_LINK)
     for node in range(len(nodes)):
         if node not in number:
-            add(node, anchor=nodes[node].position, axes=NO_AXES)
+            add(node, anchor=nodes[node].position)
     starts = np.cumsum([0, *(link.freedoms for link in links)])[:-1]
     return Tree(
         links=tuple(links),

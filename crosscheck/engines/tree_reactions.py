@@ -78,12 +78,12 @@ def _carried(scene: Scene, tree: Tree, motion: LinkMotion, closing: Sequence[np.
 
 def _inertial(scene: Scene, tree: Tree, motion: LinkMotion, k: int) -> np.ndarray:
     """The wrench that accelerates a link, its weight taken off."""
-    link, rotation, spin = tree.links[k], motion.rotation[k], motion.angular_velocity[k]
+    link, rotation, omega = tree.links[k], motion.rotation[k], motion.angular_velocity[k]
     arm = rotation @ link.offset
     angular = motion.angular_acceleration[k]
-    acceleration = motion.acceleration[k] + np.cross(angular, arm) + np.cross(spin, np.cross(spin, arm))
+    acceleration = motion.acceleration[k] + np.cross(angular, arm) + np.cross(omega, np.cross(omega, arm))
     inertia = rotation @ link.inertia @ rotation.T
-    moment = inertia @ angular + np.cross(spin, inertia @ spin)
+    moment = inertia @ angular + np.cross(omega, inertia @ omega)
     return wrench(link.mass * (acceleration - np.array(scene.gravity)), motion.position[k] + arm, moment)
 
 
@@ -102,7 +102,7 @@ def _point(
 
 
 def _applied(scene: Scene, tree: Tree, motion: LinkMotion, load) -> list[tuple[int, np.ndarray]]:
-    """Links a load acts on, and with what."""
+    """The links that a load acts on, each with the wrench on it."""
     if isinstance(load, Moment):
         return [(tree.link_of(scene.body_index(load.body)), np.array([*ZERO, *load.moment]))]
     if isinstance(load, Force):
@@ -138,10 +138,9 @@ def _at_second_anchor(
     """A joint's wrench moved to the anchor on the second body; a rod's end mass given back to the body."""
     joint = scene.joint[j]
     link = tree.link_of(scene.body_index(joint.bodies[1]))
-    distance = isinstance(joint, Distance)
-    anchor, _ = _point(tree, motion, link, joint.anchors[1] if distance else joint.anchor)
+    anchor, _ = _point(tree, motion, link, joint.anchor_pair[1])
     force, moment = on_second[:3], on_second[3:] - np.cross(anchor, on_second[:3])
-    if distance:
+    if isinstance(joint, Distance):
         rod = next(n for n in tree.links if n.ends and np.array_equal(n.ends[1][1], joint.anchors[1])
                    and np.array_equal(n.ends[0][1], joint.anchors[0]))  # fmt: skip
         force = force + rod.mass / 2 * (_acceleration(tree, motion, link, joint.anchors[1]) - scene.gravity)
@@ -151,6 +150,6 @@ def _at_second_anchor(
 def _acceleration(tree: Tree, motion: LinkMotion, link: int, point: Sequence[float]) -> np.ndarray:
     if link == GROUND_LINK:
         return ZERO
-    arm, spin = _arm(tree, motion, link, point), motion.angular_velocity[link]
-    centripetal = np.cross(spin, np.cross(spin, arm))
+    arm, omega = _arm(tree, motion, link, point), motion.angular_velocity[link]
+    centripetal = np.cross(omega, np.cross(omega, arm))
     return motion.acceleration[link] + np.cross(motion.angular_acceleration[link], arm) + centripetal

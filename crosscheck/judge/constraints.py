@@ -12,7 +12,6 @@ from crosscheck.judge import joint_residuals
 from crosscheck.judge.tolerances import CONTRADICTION, RANK
 from mbref import rotations
 from mbref.scene import Scene, SceneError
-from mbref.scene_validation import DRIVEN
 
 Residuals = dict[str, np.ndarray]
 
@@ -22,8 +21,8 @@ def closure(scene: Scene, t: np.ndarray | float, position: np.ndarray, orientati
     quaternions (…, nb, 4) at times t (…); a driver's residual stands last under its joint."""
     pose = _pose(position, orientation)
     return {
-        m.name: joint_residuals.position_rows(m, np.asarray(t, float), *pose)
-        for m in joint_residuals.mates(scene)
+        joint.name: joint_residuals.position_rows(joint, np.asarray(t, float), *pose)
+        for joint in joint_residuals.joint_frames(scene)
     }
 
 
@@ -35,8 +34,8 @@ def closure_rates(
     components of the frames' relative twist; on closed poses the time derivative of `closure`."""
     motion = (*_pose(position, orientation), _grounded(velocity), _grounded(angular_velocity))
     return {
-        m.name: joint_residuals.velocity_rows(m, np.asarray(t, float), *motion)
-        for m in joint_residuals.mates(scene)
+        joint.name: joint_residuals.velocity_rows(joint, np.asarray(t, float), *motion)
+        for joint in joint_residuals.joint_frames(scene)
     }
 
 
@@ -49,33 +48,30 @@ def closure_accelerations(
     rates = (velocity, angular_velocity, acceleration, angular_acceleration)
     motion = (*_pose(position, orientation), *map(_grounded, rates))
     return {
-        m.name: joint_residuals.acceleration_rows(m, np.asarray(t, float), *motion)
-        for m in joint_residuals.mates(scene)
+        joint.name: joint_residuals.acceleration_rows(joint, np.asarray(t, float), *motion)
+        for joint in joint_residuals.joint_frames(scene)
     }
 
 
 def length_rows(scene: Scene) -> dict[str, np.ndarray]:
-    """Which residuals (rows,) of each joint are lengths (True, m) and which angles (False, rad)."""
-    return {m.name: joint_residuals.are_lengths(m) for m in joint_residuals.mates(scene)}
+    """Masks (rows,) of the residuals by joint name: True for lengths (m), False for angles (rad)."""
+    return {joint.name: joint_residuals.are_lengths(joint) for joint in joint_residuals.joint_frames(scene)}
 
 
 def joint_coordinates(
     scene: Scene, times: np.ndarray, position: np.ndarray, orientation: np.ndarray,
     angular_velocity: np.ndarray,
 ) -> dict[str, np.ndarray]:  # fmt: skip
-    """(k, 2) angle (rad) and displacement (m) since t = 0 of every joint with an axis, by name.
+    """(k, 2) angle (rad) and displacement (m) since t = 0 of every joint that can be driven, by name.
 
     Trajectory arrays (k, nb, ·).  The angle counts turns; it is NaN from where the samples are too far
     apart to tell them.
     """
     motion = (np.asarray(times, float), *_pose(position, orientation), _grounded(angular_velocity))
+    with_axis = [joint for joint in joint_residuals.joint_frames(scene) if joint.facts.driven]
     if not len(motion[0]):
-        return {m.name: np.zeros((0, 2)) for m in joint_residuals.mates(scene) if m.type in DRIVEN}
-    return {
-        m.name: joint_residuals.coordinates(m, *motion)
-        for m in joint_residuals.mates(scene)
-        if m.type in DRIVEN
-    }
+        return {joint.name: np.zeros((0, 2)) for joint in with_axis}
+    return {joint.name: joint_residuals.coordinates(joint, *motion) for joint in with_axis}
 
 
 def jacobian(
@@ -103,7 +99,7 @@ def initial_twists(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     """Velocities and angular velocities (nb, 3), world, at t = 0 that obey joints and drivers.
 
     Among those, the nearest to the velocities the scene gives (least squares, angular ones times the
-    scene's length), and of what is left open the least mass-weighted norm (unit masses where the scene
+    scene's length); velocities left free have the least mass-weighted norm (unit masses where the scene
     has none).  Raises SceneError naming the joint when drivers or given velocities contradict the joints
     by more than 5 % of the velocities' scale.
     """
@@ -132,7 +128,7 @@ def scene_length(scene: Scene) -> float:
     mass at t = 0; 1 for a scene whose points all coincide."""
     points = [body.position for body in scene.body]
     for joint in scene.joint:
-        points += list(joint.anchors) if joint.type == "distance" else [joint.anchor]
+        points += joint.anchor_pair
     array = np.array(points)
     return float(np.linalg.norm(array[:, None] - array[None], axis=-1).max()) or 1.0
 

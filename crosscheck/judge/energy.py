@@ -17,7 +17,7 @@ from crosscheck.judge.joint_residuals import counted
 from crosscheck.judge.loads import attachment, world_inertia
 from crosscheck.judge.tolerances import PARALLEL
 from mbref import rotations
-from mbref.scene import GROUND, Force, Moment, Scene, Spring, TorsionSpring
+from mbref.scene import GROUND, Force, Joint, Moment, Scene, Spring, TorsionSpring
 from mbref.trajectory import Trajectory
 
 
@@ -27,7 +27,7 @@ def energy_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
     None when a driver or a damper does work, when the scene has no masses, when the samples are too far
     apart to count a body's turns, or when nothing ever has energy; infinite when a state is not finite.
     """
-    damped = any(getattr(load, "damping", 0.0) for load in scene.load)
+    damped = any(load.is_damped for load in scene.load)
     if scene.driver or damped or not scene.has_mass() or not len(trajectory.times):
         return None
     if not all(np.isfinite(array).all() for array in _motion(trajectory)):
@@ -72,10 +72,10 @@ def _initial(scene: Scene) -> tuple[np.ndarray, ...]:
 
 def _potential_gains(scene: Scene, trajectory: Trajectory) -> Iterator[np.ndarray]:
     """Growth (k,) of each potential since t = 0."""
-    position, orientation, _, spin = _motion(trajectory)
+    position, orientation, _, angular_velocity = _motion(trajectory)
     start = (a[None] for a in constraints.initial_poses(scene))
     yield potential_energy(scene, position, orientation) - potential_energy(scene, *start)
-    angles = constraints.joint_coordinates(scene, trajectory.times, position, orientation, spin)
+    angles = constraints.joint_coordinates(scene, trajectory.times, position, orientation, angular_velocity)
     for load in scene.load:
         if isinstance(load, Force):
             moved = _point(scene, load.body, load.point, position, orientation) - np.array(load.point)
@@ -98,17 +98,17 @@ def _work_of_moment(scene: Scene, load: Moment, trajectory: Trajectory) -> np.nd
     size = np.linalg.norm(moment)
     if size == 0:
         return np.zeros(len(trajectory.times))
-    spin = trajectory.angular_velocity[:, body]
+    angular_velocity = trajectory.angular_velocity[:, body]
     if load.body in _turning_about(scene, moment / size):
         turn = rotations.multiply(
             trajectory.orientation[:, body], rotations.conjugate(np.array(scene.body[body].orientation))
         )
         twist = 2 * np.arctan2(turn[:, 1:] @ moment / size, turn[:, 0])
-        return size * counted(trajectory.times, twist, spin @ moment / size)
+        return size * counted(trajectory.times, twist, angular_velocity @ moment / size)
     start = constraints.initial_twists(scene)[1][body]
     later = trajectory.times > 0
     times = np.concatenate([[0.0], trajectory.times[later]])
-    power = np.concatenate([start[None], spin[later]]) @ moment
+    power = np.concatenate([start[None], angular_velocity[later]]) @ moment
     return CubicSpline(times, power).antiderivative()(trajectory.times) if len(times) > 1 else 0 * power
 
 
@@ -123,7 +123,11 @@ def _turning_about(scene: Scene, direction: np.ndarray) -> set[str]:
     return reached
 
 
-def _keeps(joint, direction: np.ndarray) -> bool:
-    if joint.type in ("revolute", "cylindrical"):
-        return bool(np.linalg.norm(np.cross(joint.axis, direction)) <= PARALLEL * np.linalg.norm(joint.axis))
-    return joint.type in ("fixed", "translational")
+def _keeps(joint: Joint, direction: np.ndarray) -> bool:
+    """Whether a joint allows no relative rotation but about a direction (3,), a unit vector."""
+    if not joint.facts.free_rotations:
+        return True
+    if joint.facts.free_rotations > 1:
+        return False
+    axis = np.array(joint.directions[0])
+    return bool(np.linalg.norm(np.cross(axis, direction)) <= PARALLEL * np.linalg.norm(axis))

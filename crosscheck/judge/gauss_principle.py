@@ -25,13 +25,15 @@ def gauss(scene: Scene) -> np.ndarray:
     """Accelerations at t = 0 as `stacked`: of all that joints and drivers allow, the nearest in the mass
     metric to those without joints.  The scene has masses."""
     position, orientation = initial_poses(scene)
-    velocity, spin = initial_twists(scene)
+    velocity, angular_velocity = initial_twists(scene)
     turn = rotations.to_matrix(orientation)
-    motion = Motion(position[None], turn[None], velocity[None], spin[None], np.zeros((1, len(position))))
+    no_turn = np.zeros((1, len(position)))
+    motion = Motion(position[None], turn[None], velocity[None], angular_velocity[None], no_turn)
     force, moment = (w[0] for w in wrenches(scene, motion, NO_AXIS))
-    moment = moment + _torsion(scene, spin)
+    moment = moment + _torsion(scene, angular_velocity)
     inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
-    moment = moment - np.cross(spin, np.einsum("bij,bj->bi", inertia, spin))
+    momentum = np.einsum("bij,bj->bi", inertia, angular_velocity)
+    moment = moment - np.cross(angular_velocity, momentum)
     rows, _ = jacobian(scene, 0.0, position, orientation)
     root = np.zeros((rows.shape[1], rows.shape[1]))  # W with WᵀW the mass matrix
     for b, body in enumerate(scene.body):
@@ -45,17 +47,16 @@ def gauss(scene: Scene) -> np.ndarray:
     return np.concatenate([linear, scene_length(scene) * angular])
 
 
-def _torsion(scene: Scene, spin: np.ndarray) -> np.ndarray:
+def _torsion(scene: Scene, angular_velocity: np.ndarray) -> np.ndarray:
     """Moments (nb, 3), world, of the torsion springs at t = 0, where their angles are zero."""
     moment = np.zeros((len(scene.body) + 1, 3))  # the ground's last
-    spins = np.vstack([spin, np.zeros(3)])
-    joints = {joint.name: joint for joint in scene.joint}
+    turning = np.vstack([angular_velocity, np.zeros(3)])
     for load in scene.load:
         if isinstance(load, TorsionSpring):
-            joint = joints[load.joint]
-            axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+            joint = scene.joint_named(load.joint)
+            axis = np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
             first, second = (scene.body_index(name) for name in joint.bodies)
-            rate = (spins[second] - spins[first]) @ axis
+            rate = (turning[second] - turning[first]) @ axis
             resistance = (load.damping * rate - load.stiffness * load.natural_angle) * axis
             moment[second] -= resistance
             moment[first] += resistance

@@ -144,8 +144,7 @@ def _on_second(
 
 def _anchor(scene: Scene, joint: Joint, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
     """The anchor (3,) on the second body, world."""
-    point = joint.anchors[1] if joint.type == "distance" else joint.anchor
-    body, local = attachment(scene, joint.bodies[1], point)
+    body, local = attachment(scene, joint.bodies[1], joint.anchor_pair[1])
     return local if body < 0 else position[body] + rotations.rotate(orientation[body], local)
 
 

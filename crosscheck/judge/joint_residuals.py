@@ -1,9 +1,10 @@
-"""One joint as a mate of two frames: its packing, and its residuals at three levels.
+"""Residuals of one joint at three levels, from the poses, velocities and accelerations of two joint frames.
 
-The frames have their third axis along the joint's axis and coincide at t = 0; those of a universal joint
-share the origin only, and each follows its own axis.  The residuals are the components of the relative
-displacement (m, resolved in the first frame) and of the relative rotation (rad) that the joint forbids;
-the driver's residual stands last.  Arrays have any leading shape (…), and the ground as their last body.
+A joint frame is fixed in each of the two bodies; its third axis is along the joint's axis, and the frames
+coincide at t = 0.  The frames of a universal joint share the origin only, and each follows its own axis.
+The residuals are the components of the relative displacement (m, resolved in the first frame) and of the
+relative rotation (rad) that the joint forbids; the driver's residual stands last.  Arrays have any leading
+shape (…), and the ground as their last body.
 """
 
 from __future__ import annotations
@@ -15,37 +16,49 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbref import rotations
-from mbref.scene import GROUND, Driver, Joint, Scene
+from mbref.scene import GROUND, Driver, Joint, JointFacts, Scene
 
-DISPLACEMENT = {"fixed": 3, "revolute": 3, "universal": 3, "spherical": 3,
-                "translational": 2, "cylindrical": 2}  # fmt: skip
-ROTATION = {"fixed": 3, "revolute": 2, "translational": 3, "cylindrical": 2}  # leading components forbidden
 Z = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
-class Mate:
-    """A joint packed for arrays: body indices (-1 ground), frames on the bodies, and its driver."""
+class JointFrames:
+    """A joint packed for arrays: facts, body indices (-1 ground), frames on the bodies, and driver."""
 
     name: str
-    type: str
+    facts: JointFacts
     bodies: tuple[int, ...]
     points: np.ndarray  # (2, 3) frame origins, in the body frames
     frames: np.ndarray  # (2, 4) frame orientations, frame to body
     length: float  # of a distance joint, else 0
     driver: Driver | None
 
+    @property
+    def keeps_distance(self) -> bool:
+        """Whether the origins of the two frames keep their distance."""
+        return self.facts.condition == "constant distance"
+
+    @property
+    def keeps_axes_perpendicular(self) -> bool:
+        """Whether the third axes of the two frames stay perpendicular."""
+        return self.facts.condition == "perpendicular axes"
+
+    @property
+    def slides(self) -> bool:
+        """Whether a driver prescribes the displacement, not the angle."""
+        return self.facts.driven == "displacement"
+
 
 @functools.lru_cache(maxsize=64)
-def mates(scene: Scene) -> tuple[Mate, ...]:
-    """The joints of a scene, packed."""
+def joint_frames(scene: Scene) -> tuple[JointFrames, ...]:
+    """The frames of the joints of a scene, in its order."""
     drivers = {driver.joint: driver for driver in scene.driver}
-    return tuple(_mate(scene, joint, drivers.get(joint.name)) for joint in scene.joint)
+    return tuple(_packed(scene, joint, drivers.get(joint.name)) for joint in scene.joint)
 
 
-def _mate(scene: Scene, joint: Joint, driver: Driver | None) -> Mate:
-    anchors = np.array(joint.anchors if joint.type == "distance" else (joint.anchor,) * 2)
-    frames = np.array([_frame(axis) for axis in _axes(joint)])
+def _packed(scene: Scene, joint: Joint, driver: Driver | None) -> JointFrames:
+    anchors = np.array(joint.anchor_pair)
+    frames = np.array([_frame(axis) for axis in _third_axes(joint)])
     points = anchors.copy()
     for k, name in enumerate(joint.bodies):
         if name != GROUND:
@@ -55,15 +68,13 @@ def _mate(scene: Scene, joint: Joint, driver: Driver | None) -> Mate:
             frames[k] = rotations.multiply(back, frames[k])
     indices = tuple(scene.body_index(name) for name in joint.bodies)
     length = float(np.linalg.norm(anchors[1] - anchors[0]))
-    return Mate(joint.name, joint.type, indices, points, frames, length, driver)
+    return JointFrames(joint.name, joint.facts, indices, points, frames, length, driver)
 
 
-def _axes(joint: Joint) -> Sequence[Sequence[float]]:
-    if joint.type == "universal":
-        return joint.axes
-    if joint.type in ("revolute", "translational", "cylindrical"):
-        return (joint.axis,) * 2
-    return ((0.0, 0.0, 1.0),) * 2
+def _third_axes(joint: Joint) -> Sequence[Sequence[float]]:
+    """The third axis (world) of the frame on the first and on the second body."""
+    axes = joint.directions or ((0.0, 0.0, 1.0),)
+    return (axes[0], axes[-1])
 
 
 def _frame(axis: Sequence[float]) -> np.ndarray:
@@ -86,80 +97,85 @@ def driver_value(driver: Driver, t: np.ndarray | float, derivative: int = 0) -> 
     return total + driver.sine.amplitude * w**derivative * np.sin(angle)
 
 
-def are_lengths(mate: Mate) -> np.ndarray:
-    """Which of a mate's residuals are lengths (True, m), which angles (False, rad)."""
-    if mate.type == "distance":
+def are_lengths(joint: JointFrames) -> np.ndarray:
+    """Mask (rows,) of a joint's residuals: True for lengths (m), False for angles (rad)."""
+    facts = joint.facts
+    if joint.keeps_distance:
         return np.array([True])
-    angles = ROTATION.get(mate.type, int(mate.type == "universal"))
-    driver = [mate.type == "translational"] if mate.driver else []
-    return np.array([True] * DISPLACEMENT[mate.type] + [False] * angles + driver)
+    angles = len(facts.forbidden_rotations) + joint.keeps_axes_perpendicular
+    driver = [joint.slides] if joint.driver else []
+    return np.array([True] * len(facts.forbidden_translations) + [False] * angles + driver)
 
 
-def position_rows(mate: Mate, t: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+def position_rows(
+    joint: JointFrames, t: np.ndarray, position: np.ndarray, orientation: np.ndarray
+) -> np.ndarray:
     """Residuals (…, rows), m and rad, of positions (…, nb + 1, 3) and quaternions (…, nb + 1, 4)."""
-    _, offset, frames = _in_world(mate, position, orientation)
-    if mate.type == "distance":
-        return np.linalg.norm(offset, axis=-1, keepdims=True) - mate.length
+    _, offset, frames = _in_world(joint, position, orientation)
+    if joint.keeps_distance:
+        return np.linalg.norm(offset, axis=-1, keepdims=True) - joint.length
     relative = rotations.multiply(rotations.conjugate(frames[0]), frames[1])
     local = _resolve(frames[0], offset)
-    rows = [local[..., : DISPLACEMENT[mate.type]]]
-    if mate.type == "universal":
+    rows = [local[..., list(joint.facts.forbidden_translations)]]
+    if joint.keeps_axes_perpendicular:
         rows.append(np.arcsin(np.clip(rotations.to_matrix(relative)[..., 2, 2:], -1, 1)))
-    elif mate.type in ROTATION:
-        rows.append(_turn(relative) if ROTATION[mate.type] == 3 else _tilt(relative))
-    if mate.driver:
-        value = driver_value(mate.driver, t)
-        slides = mate.type == "translational"
-        rows.append((local[..., 2] - value if slides else wrapped(_twist(relative) - value))[..., None])
+    elif joint.facts.forbidden_rotations:
+        rows.append(_tilt(relative) if joint.facts.free_rotations else _rotation_vector(relative))
+    if joint.driver:
+        value = driver_value(joint.driver, t)
+        rows.append((local[..., 2] - value if joint.slides else wrapped(_twist(relative) - value))[..., None])
     return np.concatenate(rows, axis=-1)
 
 
 def velocity_rows(
-    mate: Mate, t: np.ndarray, position: np.ndarray, orientation: np.ndarray,
-    velocity: np.ndarray, spin: np.ndarray,
+    joint: JointFrames, t: np.ndarray, position: np.ndarray, orientation: np.ndarray,
+    velocity: np.ndarray, angular_velocity: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
     """Forbidden components (…, rows) of the frames' relative twist, of world velocities (…, nb + 1, 3)."""
-    arms, offset, frames = _in_world(mate, position, orientation)
-    w = [spin[..., b, :] for b in mate.bodies]
-    dv = _difference(velocity[..., b, :] + np.cross(w[k], arms[k]) for k, b in enumerate(mate.bodies))
-    if mate.type == "distance":
+    arms, offset, frames = _in_world(joint, position, orientation)
+    w = [angular_velocity[..., b, :] for b in joint.bodies]
+    dv = _difference(velocity[..., b, :] + np.cross(w[k], arms[k]) for k, b in enumerate(joint.bodies))
+    if joint.keeps_distance:
         return _dot(offset, dv) / np.linalg.norm(offset, axis=-1, keepdims=True)
     linear = _resolve(frames[0], dv - np.cross(w[0], offset))
     angular = _resolve(frames[0], w[1] - w[0])
-    crossing = [_dot(w[1] - w[0], _crossing(frames)[0])] if mate.type == "universal" else []
-    return _rows(mate, linear, angular, crossing, t, 1)
+    crossing = [_dot(w[1] - w[0], _crossing(frames)[0])] if joint.keeps_axes_perpendicular else []
+    return _rows(joint, linear, angular, crossing, t, 1)
 
 
 def acceleration_rows(
-    mate: Mate, t: np.ndarray, position: np.ndarray, orientation: np.ndarray,
-    velocity: np.ndarray, spin: np.ndarray, acceleration: np.ndarray, spin_rate: np.ndarray,
+    joint: JointFrames, t: np.ndarray, position: np.ndarray, orientation: np.ndarray,
+    velocity: np.ndarray, angular_velocity: np.ndarray,
+    acceleration: np.ndarray, angular_acceleration: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
     """Time derivative (…, rows) of `velocity_rows`, of world accelerations (…, nb + 1, 3)."""
-    arms, offset, frames = _in_world(mate, position, orientation)
-    w = [spin[..., b, :] for b in mate.bodies]
-    dw = [spin_rate[..., b, :] for b in mate.bodies]
-    dv = _difference(velocity[..., b, :] + np.cross(w[k], arms[k]) for k, b in enumerate(mate.bodies))
+    arms, offset, frames = _in_world(joint, position, orientation)
+    w = [angular_velocity[..., b, :] for b in joint.bodies]
+    dw = [angular_acceleration[..., b, :] for b in joint.bodies]
+    dv = _difference(velocity[..., b, :] + np.cross(w[k], arms[k]) for k, b in enumerate(joint.bodies))
     da = _difference(
         acceleration[..., b, :] + np.cross(dw[k], arms[k]) + np.cross(w[k], np.cross(w[k], arms[k]))
-        for k, b in enumerate(mate.bodies)
+        for k, b in enumerate(joint.bodies)
     )
-    if mate.type == "distance":
+    if joint.keeps_distance:
         length = np.linalg.norm(offset, axis=-1, keepdims=True)
         along = _dot(offset, dv) / length
         return (_dot(offset, da) + _dot(dv, dv) - along**2) / length
     seen = da - np.cross(dw[0], offset) - 2 * np.cross(w[0], dv) + np.cross(w[0], np.cross(w[0], offset))
     angular = _resolve(frames[0], dw[1] - dw[0] - np.cross(w[0], w[1]))
-    crossing = [_crossing_acceleration(frames, w, dw)] if mate.type == "universal" else []
-    return _rows(mate, _resolve(frames[0], seen), angular, crossing, t, 2)
+    crossing = [_crossing_acceleration(frames, w, dw)] if joint.keeps_axes_perpendicular else []
+    return _rows(joint, _resolve(frames[0], seen), angular, crossing, t, 2)
 
 
 def coordinates(
-    mate: Mate, times: np.ndarray, position: np.ndarray, orientation: np.ndarray, spin: np.ndarray
-) -> np.ndarray:
+    joint: JointFrames, times: np.ndarray, position: np.ndarray, orientation: np.ndarray,
+    angular_velocity: np.ndarray,
+) -> np.ndarray:  # fmt: skip
     """(k, 2) unwrapped angle about the axis and displacement along it since t = 0, over k samples."""
-    _, offset, frames = _in_world(mate, position, orientation)
+    _, offset, frames = _in_world(joint, position, orientation)
     twist = _twist(rotations.multiply(rotations.conjugate(frames[0]), frames[1]))
-    rate = _resolve(frames[0], spin[..., mate.bodies[1], :] - spin[..., mate.bodies[0], :])[..., 2]
+    w = [angular_velocity[..., b, :] for b in joint.bodies]
+    rate = _resolve(frames[0], w[1] - w[0])[..., 2]
     return np.stack([counted(times, twist, rate), _resolve(frames[0], offset)[..., 2]], axis=-1)
 
 
@@ -184,23 +200,30 @@ def wrapped(angle: np.ndarray) -> np.ndarray:
 
 
 def _in_world(
-    mate: Mate, position: np.ndarray, orientation: np.ndarray
+    joint: JointFrames, position: np.ndarray, orientation: np.ndarray
 ) -> tuple[list[np.ndarray], np.ndarray, list[np.ndarray]]:
     """Arms from the centres to the origins (…, 3), offset between the origins, frame quaternions."""
-    p = [orientation[..., b, :] for b in mate.bodies]
-    arms = [rotations.rotate(p[k], mate.points[k]) for k in (0, 1)]
-    offset = _difference(position[..., b, :] + arms[k] for k, b in enumerate(mate.bodies))
-    return arms, offset, [rotations.multiply(p[k], mate.frames[k]) for k in (0, 1)]
+    p = [orientation[..., b, :] for b in joint.bodies]
+    arms = [rotations.rotate(p[k], joint.points[k]) for k in (0, 1)]
+    offset = _difference(position[..., b, :] + arms[k] for k, b in enumerate(joint.bodies))
+    return arms, offset, [rotations.multiply(p[k], joint.frames[k]) for k in (0, 1)]
 
 
 def _rows(
-    mate: Mate, linear: np.ndarray, angular: np.ndarray, crossing: list, t: np.ndarray, derivative: int
+    joint: JointFrames,
+    linear: np.ndarray,
+    angular: np.ndarray,
+    crossing: list,
+    t: np.ndarray,
+    derivative: int,
 ) -> np.ndarray:
-    """Rows of a rate: forbidden displacement, forbidden rotation (or the universal's), then the driver."""
-    rows = [linear[..., : DISPLACEMENT[mate.type]], angular[..., : ROTATION.get(mate.type, 0)], *crossing]
-    if mate.driver:
-        done = (linear if mate.type == "translational" else angular)[..., 2:]
-        rows.append(done - driver_value(mate.driver, t, derivative)[..., None])
+    """Rows of a rate: forbidden translations, forbidden rotations (or the universal's), then the driver."""
+    facts = joint.facts
+    rows = [linear[..., list(facts.forbidden_translations)], angular[..., list(facts.forbidden_rotations)]]
+    rows += crossing
+    if joint.driver:
+        moved = (linear if joint.slides else angular)[..., 2:]
+        rows.append(moved - driver_value(joint.driver, t, derivative)[..., None])
     return np.concatenate(rows, axis=-1)
 
 
@@ -232,7 +255,7 @@ def _difference(pair: Iterable[np.ndarray]) -> np.ndarray:
     return second - first
 
 
-def _turn(q: np.ndarray) -> np.ndarray:
+def _rotation_vector(q: np.ndarray) -> np.ndarray:
     """Rotation vectors (…, 3), length ≤ π, of unit quaternions."""
     q = np.where(q[..., :1] < 0, -q, q)
     size = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -18,14 +17,14 @@ from mbref.scene import GROUND, Force, Moment, Scene, Spring, TorsionSpring
 
 @dataclass(frozen=True)
 class Motion:
-    """Poses and velocities in the world: position, velocity, spin (angular velocity) (k, nb, 3),
+    """Poses and velocities in the world: position, velocity, angular_velocity (k, nb, 3),
     rotation matrices (k, nb, 3, 3), and turn (k, nb): the angle each body has turned since t = 0 about
     the axis the motion's family shares, NaN where it has no such angle."""
 
     position: np.ndarray
     rotation: np.ndarray
     velocity: np.ndarray
-    spin: np.ndarray
+    angular_velocity: np.ndarray
     turn: np.ndarray
 
 
@@ -74,15 +73,15 @@ def _spring(scene, load: Spring, motion: Motion, axis, force, moment) -> None:
 
 
 def _torsion_spring(scene, load: TorsionSpring, motion: Motion, axis, force, moment) -> None:
-    joint: Any = next(j for j in scene.joint if j.name == load.joint)
-    along = np.array(joint.axis) / np.linalg.norm(joint.axis)
+    joint = scene.joint_named(load.joint)
+    along = np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
     bodies = [scene.body_index(name) for name in joint.bodies]
     sign = np.round(along @ axis)
     angle, rate = motion.position[:, 0, 0] * 0, motion.position[:, 0, 0] * 0
     for body, side in zip(bodies, (-1, 1), strict=True):
         if body >= 0:
             angle = angle + side * sign * motion.turn[:, body]
-            rate = rate + side * sign * (motion.spin[:, body] @ axis)
+            rate = rate + side * sign * (motion.angular_velocity[:, body] @ axis)
     resistance = load.stiffness * (angle - load.natural_angle) + load.damping * rate
     for body, side in zip(bodies, (-1, 1), strict=True):
         if body >= 0:
@@ -102,7 +101,9 @@ def _point(motion: Motion, body: int, local: np.ndarray) -> tuple[np.ndarray, np
     if body < 0:
         return np.broadcast_to(local, motion.position[:, 0].shape), np.zeros_like(motion.position[:, 0])
     arm = motion.rotation[:, body] @ local
-    return motion.position[:, body] + arm, motion.velocity[:, body] + cross(motion.spin[:, body], arm)
+    return motion.position[:, body] + arm, motion.velocity[:, body] + cross(
+        motion.angular_velocity[:, body], arm
+    )
 
 
 def _push(motion: Motion, body: int, arm: np.ndarray, push: np.ndarray, force, moment) -> None:

@@ -18,7 +18,7 @@ from crosscheck.judge.tolerances import LEAST_ORDER, ROUNDING, STRAIGHT_LINE
 from crosscheck.judge.truth import NoSolution, Truth
 from mbref import rotations
 from mbref.scene import Scene
-from mbref.trajectory import Outcome, Trajectory
+from mbref.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
@@ -159,11 +159,6 @@ METRICS: dict[str, Metric] = {
     "violation_acceleration": Metric(_violation(2), "rad/s²", "violation of acceleration constraints"),
     "energy_error": Metric(_energy, "", "drift of the energy balance / largest energy"),
 }
-
-
-def false_success(trajectory: Trajectory, error: float | None, level: float) -> bool:
-    """Whether a run says it completed although its error exceeds the level: the wrong branch, or drift."""
-    return trajectory.outcome is Outcome.COMPLETED and error is not None and error > level
 
 
 def order_of_convergence(steps: Sequence[float], errors: Sequence[float]) -> float | None:

@@ -1,7 +1,7 @@
 """Model-identity gate: do two engines simulate the same mechanism? Asked before their speeds are compared.
 
-Engines are asked for a short run; what it shows of the model — where the bodies start, and how fast
-their velocities change — must agree, so that masses, inertias, axes and loads are the same.
+Every engine makes a short run.  The initial poses and the changes of the velocities must agree, so that
+masses, inertias, axes and loads are the same.
 """
 
 from __future__ import annotations
@@ -67,8 +67,8 @@ def _differences(
         yield "centre of mass", off, SAME_START
     speed = max(_size(first.velocity[0]), length * _size(first.angular_velocity[0]), length / scene.duration)
     yield "initial velocity", _apart(first.velocity[0], second.velocity[0], speed), SAME_START
-    spins = (first.angular_velocity[0], second.angular_velocity[0])
-    yield "initial angular velocity", _apart(*spins, speed / length), SAME_START
+    angular = (first.angular_velocity[0], second.angular_velocity[0])
+    yield "initial angular velocity", _apart(*angular, speed / length), SAME_START
     if scene.has_mass():
         energies = [_energy(scene, t) for t in (first, second)]
         scale = max(*map(abs, energies), _energy_unit(scene))
@@ -92,13 +92,17 @@ def _given_accelerations(
     first: Trajectory, second: Trajectory, length: float
 ) -> Iterator[tuple[str, float, float]]:  # fmt: skip
     linear = (first.acceleration, second.acceleration)
-    spins = (first.angular_acceleration, second.angular_acceleration)
-    if linear[0] is None or linear[1] is None or spins[0] is None or spins[1] is None:
+    angular = (first.angular_acceleration, second.angular_acceleration)
+    if linear[0] is None or linear[1] is None or angular[0] is None or angular[1] is None:
         return
-    scale = max(_size(linear[0][0]), length * _size(spins[0][0]))
+    scale = max(_size(linear[0][0]), length * _size(angular[0][0]))
     if scale > 0:
         yield "initial acceleration", _apart(linear[0][0], linear[1][0], scale), SAME_CHANGE
-        yield "initial angular acceleration", _apart(spins[0][0], spins[1][0], scale / length), SAME_CHANGE
+        yield (
+            "initial angular acceleration",
+            _apart(angular[0][0], angular[1][0], scale / length),
+            SAME_CHANGE,
+        )
 
 
 def _size(vectors: np.ndarray) -> float:

@@ -1,7 +1,7 @@
 """The limit h → 0 of fixed-step runs by Richardson's extrapolation: bias apart from discretisation.
 
 Three runs x(h) = x₀ + c hᵖ give order, limit and the finest run's distance from it without any truth; the
-limit's own error against a truth is what no smaller step would cure, such as a soft constraint's give.
+limit's own error against a truth remains at any step, such as the error of a soft constraint.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ care, and far above rounding, which singular positions magnify to 1e-10."""
 
 FALSE_SUCCESS = 1e-2
 """Error of a completed run that makes it a false success: one percent of the mechanism's size or 0.6
-degrees is beyond any accuracy asked for, and is what a wrong branch or a lost constraint leaves."""
+degrees is beyond any accuracy asked for, and a wrong branch or a lost constraint leaves as much."""
 
 EXCESS = 100.0
 """Multiples of the relative tolerance asked for beyond which the error of a completed run makes it a false
@@ -72,7 +72,7 @@ GATE_TIME = 1e-3
 short enough that they are accelerations times time."""
 
 UNIT_NORM = 1e-12
-"""How far the length of an orientation's quaternion may be from 1: rounding after a normalisation."""
+"""Allowed distance from 1 of the length of an orientation's quaternion: rounding after a normalisation."""
 
 STAYS_CLOSED = 1e-6
 """Joint residual (rad, or relative to the scene's length) that a conforming engine may leave at the finest

@@ -30,7 +30,7 @@ class Cell:
 
 
 class Match(enum.Enum):
-    """How a run compares with a cell; the value is the mark in the report."""
+    """Agreement of a run with a cell; the value is the mark in the report."""
 
     SAME = "="
     OTHER_TIME = "≈"

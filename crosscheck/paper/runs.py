@@ -11,18 +11,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crosscheck.engine import Setting
+from crosscheck.engine import Setting, engine
 from crosscheck.paper import settings
 from crosscheck.paper.cells import CELLS, COUNTS_III, COUNTS_IV, FIVE_BAR, FOUR_BAR_COLUMNS, SPATIAL, Cell
 from crosscheck.paper.settings import BASE, DRAWN, END, FEW, SEEDS, SIZED, STRICT, SWEEP, TIGHT, Variant
 from crosscheck.study.grid import Case, Record, run_here, study
 from crosscheck.study.grid import Progress as Advance
-from mbref.formulations import FORMULATIONS
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.stabilisation import STABILISATIONS
 from mbref.trajectory import Outcome
 
+ENGINE = "mbref"  # the engine that has the paper's methods
 SHARE = 0.95  # of the end time of a failed run, where its error is taken
 SAMPLES = np.linspace(0.0, END, 101)
 SHORT = np.linspace(0.0, 0.12, 61)  # every 2 ms over two revolutions
@@ -55,7 +54,7 @@ EXACT, PENALTY, DUAL = "mpi-svd", "alf", "alf-dual"
 
 
 class Label(NamedTuple):
-    """Where a run belongs: table, figure or sweep; its row and column; what is special about it."""
+    """The place of a run: table, figure or sweep; its row and column; the varied setting."""
 
     part: str
     row: str
@@ -91,7 +90,7 @@ def tables() -> Cases:
 
 
 def draws(cell: Cell) -> int:
-    """How many draws of first step and errors in the data a cell has: 1 where they cannot matter."""
+    """Number of draws of first step and data errors of a cell: 1 where they cannot matter."""
     if cell.letter == "a" or (cell.table == "III" and cell.row not in FREE):
         return 1
     return FEW if cell.table == "III" or cell.row in LASTING else SEEDS
@@ -194,17 +193,22 @@ def tight() -> Cases:
 
 def pairs() -> Cases:
     """Every formulation with every stabilisation on the driven spatial slider-crank, 20 s."""
-    scene = settings.column_scene(SPATIAL)
+    scene, parts = settings.column_scene(SPATIAL), engine(ENGINE).family_parts()
     return {
         Label("pairs", f, s): _named(scene, f"{BASE.formulation(f)}+{s}/{settings.INTEGRATOR}", SAMPLES)
-        for f in FORMULATIONS
-        for s in STABILISATIONS
+        for f in parts["formulation"]
+        for s in parts["stabilisation"]
     }
+
+
+def digits_scene() -> Scene:
+    """The moving mechanism whose accelerations at t = 0 ALF and its dual are asked for."""
+    return SCENES["spatial_slider_crank_gravity"]()
 
 
 def digits() -> Cases:
     """The accelerations at t = 0 of a moving mechanism by ALF and its dual over the penalty."""
-    scene, once = SCENES["spatial_slider_crank_gravity"](), np.zeros(1)
+    scene, once = digits_scene(), np.zeros(1)
     out = {Label("digits", EXACT, ""): _named(scene, f"{EXACT}+none", once)}
     for alpha in ALPHAS:
         for name in (PENALTY, DUAL):
@@ -261,4 +265,4 @@ def _case(scene: Scene, row: str, times: np.ndarray, variant: Variant = BASE) ->
 
 
 def _named(scene: Scene, method: str, times: np.ndarray, variant: Variant = BASE) -> Case:
-    return Case(scene, times, "mbref", Setting(method, variant.options()))
+    return Case(scene, times, ENGINE, Setting(method, variant.options()))

@@ -1,4 +1,4 @@
-"""One set of settings for all the paper's runs, what is varied to see what they matter, and its scenes."""
+"""One set of settings for all the paper's runs, their variations one at a time, and the paper's scenes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mbref.scene import Scene
+from mbref.scene import Distance, Joint, Scene
 from mbref.scenes import SCENES
 from mbref.scenes.planar_slider_crank import FLYWHEEL
 
@@ -64,7 +64,7 @@ STABILISATIONS = {"": "none", "B": "baumgarte", "CP": "partitioning"}
 
 @dataclass(frozen=True)
 class Variant:
-    """The settings, or what differs from them in one point of the sweep."""
+    """The settings, or a variation of them in one point of the sweep."""
 
     name: str = "the settings"
     limits: Mapping[str, float] = field(default_factory=dict)
@@ -126,17 +126,23 @@ def imprecise(scene: Scene, size: float, seed: int) -> Scene:
     drawn = np.random.default_rng(seed).uniform(-size, size, (len(scene.joint), 3))
     return scene.with_(
         joint=tuple(
-            joint.model_copy(update={"anchor": tuple((np.array(joint.anchor) + shift).tolist())})
+            joint.model_copy(update={"anchor": tuple((np.array(_anchor(joint)) + shift).tolist())})
             for joint, shift in zip(scene.joint, drawn, strict=True)
         )
     )
+
+
+def _anchor(joint: Joint) -> tuple[float, float, float]:
+    if isinstance(joint, Distance):
+        raise ValueError(f"joint {joint.name!r}: a distance joint has two anchors")
+    return joint.anchor
 
 
 def heavy_crank(scene: Scene, axis: int, inertia: float = FLYWHEEL) -> Scene:
     """The scene with a disc of ``inertia`` (kg m²) about a body axis on its crank, for 20 s."""
     crank = scene.body[0]
     disc = [inertia if k == axis else inertia / 2 for k in range(3)]
-    total = tuple(i + j for i, j in zip(crank.inertia, disc, strict=True))
+    total = tuple((np.array(crank.inertia) + disc).tolist())
     body = (crank.model_copy(update={"inertia": total}), *scene.body[1:])
     return scene.with_(body=body, name=f"{scene.name}_flywheel", duration=END)
 

@@ -1,4 +1,7 @@
-"""Singular positions of the rhombus: its Jacobian along the motion, and the branches that meet there."""
+"""The rhombus's singular positions: rank along the motion, the fold branch, and the convergence of ALF.
+
+Everything follows from the judge's joint equations and the exact motion, in plain numpy.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +10,10 @@ import math
 import numpy as np
 
 from crosscheck.judge import constraints
+from crosscheck.judge.gauss_principle import bias
 from crosscheck.judge.tolerances import RANK
 from crosscheck.judge.truth import truth_for
 from crosscheck.paper import settings
-from mbref.equations.initial_state import consistent_start
-from mbref.equations.model import Model
-from mbref.formulations.alf import ALF
-from mbref.kernels.layout import OK
 from mbref.scene import Scene
 from mbref.scenes.four_bar import LENGTH, four_bar
 from mbref.scenes.links import CRANK_RATE, about_z
@@ -22,19 +22,26 @@ MOST = 10_000  # iterations counted
 
 
 def scaled_singular_values(scene: Scene, times: np.ndarray) -> np.ndarray:
-    """Singular values (k, n) of the scaled Jacobian along the true motion at times (k,).
+    """Singular values (k, n) of the scaled constraint Jacobian along the exact motion at times (k,), s.
 
-    Angular columns are divided by the scene's length and rows brought to unit length.
+    Angular columns are divided by the scene's length and rows brought to unit length.  Raises ValueError
+    for a scene without a known exact motion.
     """
     truth = truth_for(scene)
-    assert truth is not None, f"{scene.name}: no truth"
+    if truth is None:
+        raise ValueError(f"{scene.name}: no exact motion is known")
     motion = truth.poses(times)
     scale = np.tile(np.repeat([1.0, 1 / constraints.scene_length(scene)], 3), len(scene.body))
     values = []
     for t, r, p in zip(motion.times, motion.position, motion.orientation, strict=True):
-        j = constraints.jacobian(scene, t, r, p)[0] * scale
-        values.append(np.linalg.svd(j / np.linalg.norm(j, axis=1, keepdims=True), compute_uv=False))
+        rows = _of_unit_length(constraints.jacobian(scene, t, r, p)[0] * scale)
+        values.append(np.linalg.svd(rows, compute_uv=False))
     return np.array(values)
+
+
+def _of_unit_length(rows: np.ndarray) -> np.ndarray:
+    scaled: np.ndarray = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+    return scaled
 
 
 def rank(values: np.ndarray) -> int:
@@ -74,23 +81,37 @@ def crossings(theta0: float, last: float) -> list[tuple[float, int]]:
     return [(t, k) for t, k in out if t <= last]
 
 
+def crossing_distance(theta0: float, time: float) -> float:
+    """Distance (rad) of θ₂ = theta0 - 124.8 t at ``time`` (s) from the nearest multiple of π."""
+    turns = (theta0 - CRANK_RATE * time) / math.pi
+    return abs(turns - round(turns)) * math.pi
+
+
 def alf_iterations(distance: float, error: float) -> int:
     """Iterations that ALF, as set for the tables, takes at θ₂ = distance (rad); MOST if more are needed.
 
-    γ is off by ``error`` of its size in the direction that vanishes at θ₂ = 0.
+    Without masses M = I, and (I + α DᵀD) q̈ ← q̈ + α Dᵀ γ from q̈ = 0 (Eqs. 17 to 20), where D is the
+    constraint Jacobian with rows of unit length and Φ = Φ' = 0.  γ is off by ``error`` of its size in the
+    direction that vanishes at θ₂ = 0.
     """
-    model = Model(settings.kinematic(four_bar(distance)))
-    terms = model.terms(0.0, model.start(), consistent_start(model).v)
-    left, values, _ = np.linalg.svd(terms.jacobian)
-    vanishing = left[:, rank(values) - 1]
-    gamma = terms.gamma + error * np.linalg.norm(terms.gamma) * vanishing
-    few, enough = 0, MOST
-    while enough - few > 1:
-        middle = (few + enough) // 2
-        options = {**settings.ALF, "iterations": float(middle)}
-        status = ALF.solve(terms.mass, terms.jacobian, terms.force, gamma, **options)[0]
-        few, enough = (few, middle) if status == OK else (middle, enough)
-    return enough
+    scene = four_bar(distance)
+    jacobian, _ = constraints.jacobian(scene, 0.0, *constraints.initial_poses(scene))
+    d, gamma = _of_unit_length(jacobian), -bias(scene) / np.linalg.norm(jacobian, axis=1)
+    left, values, _ = np.linalg.svd(d)
+    gamma = gamma + error * np.linalg.norm(gamma) * left[:, rank(values) - 1]
+    return _iterations(d, gamma, settings.ALF["alpha"], settings.ALF["epsilon"])
+
+
+def _iterations(d: np.ndarray, gamma: np.ndarray, alpha: float, epsilon: float) -> int:
+    """Iterations until the change is ≤ ``epsilon`` of the larger of 1 and the acceleration (Eq. 20)."""
+    inverse = np.linalg.inv(np.eye(d.shape[1]) + alpha * d.T @ d)
+    step, acceleration = alpha * d.T @ gamma, np.zeros(d.shape[1])
+    for k in range(1, MOST):
+        before, acceleration = acceleration, inverse @ (acceleration + step)
+        change = np.linalg.norm(acceleration - before)
+        if change <= epsilon * max(1.0, float(np.linalg.norm(acceleration))):
+            return k
+    return MOST
 
 
 def turns(k: int) -> str:

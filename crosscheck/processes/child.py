@@ -25,6 +25,9 @@ ORPHAN_SECONDS = 10.0  # beyond the limit of its call, a child whose parent has 
 ENDING_SECONDS = 10.0  # for a child that has hung up to end by itself, with an exit status that tells why
 PRINTED = 200  # characters of the last printed line that a message quotes
 
+Function = Callable[..., Any]
+Arguments = tuple[Any, ...]
+
 _alive: set[Child] = set()
 
 
@@ -37,7 +40,7 @@ class ChildFailed(Exception):
 
 
 class Observation(NamedTuple):
-    """What came of a call: its value, what was printed, and files left in its working directory."""
+    """Outcome of a call: its value, the printed text, and the files left in its working directory."""
 
     value: Any
     printed: str
@@ -45,7 +48,7 @@ class Observation(NamedTuple):
 
 
 class Child:
-    """The process, to be closed by who starts it."""
+    """The child process; its owner closes it."""
 
     def __init__(self) -> None:
         self._printed = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - closed by `close`
@@ -53,7 +56,7 @@ class Child:
         with theirs:
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "crosscheck.processes.serve"],
-                stdin=theirs, stdout=self._printed, stderr=subprocess.STDOUT, env=_environment(),
+                stdin=theirs.fileno(), stdout=self._printed, stderr=subprocess.STDOUT, env=_environment(),
                 start_new_session=True,
             )  # fmt: skip
         _alive.add(self)
@@ -63,7 +66,7 @@ class Child:
         """Whether the process has not ended."""
         return self._process.poll() is None
 
-    def call(self, function: Callable[..., Any], arguments: tuple, time_limit: float) -> Observation:
+    def call(self, function: Function, arguments: Arguments, time_limit: float) -> Observation:
         """``function(*arguments)`` in the child, within ``time_limit`` (s).
 
         Raises ChildFailed; the child has then ended, as after an interrupt.
@@ -82,13 +85,13 @@ class Child:
         self._process.wait()
 
     def close(self) -> None:
-        """Kill the process and let go of all that belongs to it."""
+        """Kill the process and release its channel and its captured output."""
         self.kill()
         _alive.discard(self)
         self._channel.close()
         self._printed.close()
 
-    def _called(self, function: Callable[..., Any], arguments: tuple, time_limit: float) -> Observation:
+    def _called(self, function: Function, arguments: Arguments, time_limit: float) -> Observation:
         self._printed.seek(0)  # the child writes at this place too: it shares the open file
         self._printed.truncate()
         with tempfile.TemporaryDirectory(prefix="crosscheck-", ignore_cleanup_errors=True) as folder:
@@ -99,9 +102,9 @@ class Child:
             raise self._failure(Outcome.CRASHED, value)
         return Observation(value, self._said(), tuple(files))
 
-    def _ask(self, job: tuple, time_limit: float) -> None:
+    def _ask(self, job: tuple[Any, ...], time_limit: float) -> None:
         """Send the job and wait until there is something to receive."""
-        with contextlib.suppress(BrokenPipeError):  # it has hung up, which receiving tells
+        with contextlib.suppress(BrokenPipeError):  # the child has hung up: receiving says so
             self._channel.send(job)
         if not self._channel.poll(time_limit):
             raise self._failure(Outcome.TIMED_OUT, f"no result after {time_limit:g} s")
@@ -133,7 +136,7 @@ class Child:
 
 
 def stop_all() -> None:
-    """Kill every child of this process; what they are called for fails."""
+    """Kill every child of this process; the calls under way fail."""
     for child in tuple(_alive):
         child.kill()
 

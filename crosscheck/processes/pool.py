@@ -54,14 +54,16 @@ def observe(
         return _observed(child, engine_name, scene, times, setting, time_limit)
 
 
-def offers(engine_name: str, scene: Scene, time_limit: float) -> tuple[str, Cannot | None, list[Setting]]:
+def capabilities(
+    engine_name: str, scene: Scene, time_limit: float
+) -> tuple[str, Cannot | None, list[Setting]]:
     """An engine's version, what it cannot do with a scene, and else its settings, found out in a child.
 
     Raises ChildFailed when that fails, LookupError for an unknown engine.
     """
     _check(engine_name)
     with _lent(engine_name) as child:
-        return child.call(serve.offers, (engine_name, scene), time_limit).value
+        return child.call(serve.capabilities, (engine_name, scene), time_limit).value
 
 
 def time_interleaved(

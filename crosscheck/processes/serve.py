@@ -1,7 +1,7 @@
-"""What a child process does: call after call, each in a directory of its own, until its parent hangs up.
+"""The child process: it serves call after call, each in a directory of its own, until its parent hangs up.
 
 ``python -m crosscheck.processes.serve`` has the channel to its parent as standard input.  It is sent
-(directory, seconds after which it ends itself should the parent have died, function, arguments) and
+(directory, seconds after which it ends itself in case the parent has died, function, arguments) and
 answers (True, value) or (False, sentence).
 """
 
@@ -16,6 +16,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection
+from typing import Any
 
 import numpy as np
 
@@ -24,14 +25,15 @@ from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
 Job = tuple[str, Setting]  # engine name and setting
+Capabilities = tuple[str, Cannot | None, list[Setting]]
 
 
 def get_ready(engine_name: str, families: Sequence[str]) -> str:
-    """Do what an engine needs once, such as imports and compiling; its version, empty without its package."""
+    """Import and compile what an engine needs once; returns its version, empty without its package."""
     simulator = engine(engine_name)
     try:
         version = simulator.version()
-    except ImportError:  # which a run will say
+    except ImportError:  # a run will say so
         return ""
     simulator.prepare(families)
     return version
@@ -48,8 +50,8 @@ def run_once(engine_name: str, scene: Scene, times: np.ndarray, setting: Setting
     return simulator.run(scene, times, setting)
 
 
-def offers(engine_name: str, scene: Scene) -> tuple[str, Cannot | None, list[Setting]]:
-    """Version, what cannot be done with the scene, and, where nothing hinders, the settings."""
+def capabilities(engine_name: str, scene: Scene) -> Capabilities:
+    """The engine's version, why it cannot run the scene or None, and its settings where it can."""
     simulator = engine(engine_name)
     version, cannot = simulator.version(), simulator.cannot(scene)
     return version, cannot, [] if cannot else list(simulator.settings(scene))
@@ -86,7 +88,7 @@ def failed(
 
 def main() -> None:
     """Serve the parent at the other end of standard input, which engines see empty."""
-    channel = Connection(os.dup(0))
+    channel: Connection[Any, Any] = Connection(os.dup(0))
     with open(os.devnull) as nothing:
         os.dup2(nothing.fileno(), 0)
     while True:
@@ -101,8 +103,8 @@ def main() -> None:
         channel.send_bytes(answer)
 
 
-def _answer(function: Callable, arguments: tuple) -> bytes:
-    """The pickled answer; what the call warned of and printed is not left to the next one."""
+def _answer(function: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
+    """The pickled answer; warnings and printed text of the call are not left to the next one."""
     try:
         with warnings.catch_warnings():  # each call warns afresh
             return pickle.dumps((True, function(*arguments)))
@@ -111,7 +113,7 @@ def _answer(function: Callable, arguments: tuple) -> bytes:
     finally:
         sys.stdout.flush()
         sys.stderr.flush()
-        ctypes.CDLL(None).fflush(None)  # what compiled code has printed
+        ctypes.CDLL(None).fflush(None)  # the output of compiled code
 
 
 if __name__ == "__main__":

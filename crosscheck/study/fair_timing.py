@@ -1,4 +1,4 @@
-"""What a fair comparison of speed needs: the same mechanism in every engine, and interleaved timing."""
+"""Fair comparison of speed: the same mechanism in every engine, and timing in turns."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
 
-def gate_cases(scene: Scene, engines: Sequence[str], time_limit: float) -> list[Case]:
-    """The short runs from which `difference` tells whether all engines simulate the scene: each at the
+def identity_cases(scene: Scene, engines: Sequence[str], time_limit: float) -> list[Case]:
+    """The short runs from which `model_difference` tells whether all engines simulate the scene: each at the
     finest of its settings."""
     able = [name for name in engines if not engine(name).cannot(scene)]
     return [Case(scene, gate_times(scene), name, settings(name, scene)[-1], time_limit) for name in able]
 
 
-def difference(scene: Scene, records: Sequence[Record]) -> str | None:
-    """The first field in which the records of `gate_cases` differ from the truth where there is one, else
+def model_difference(scene: Scene, records: Sequence[Record]) -> str | None:
+    """The first field in which the records of `identity_cases` differ from the truth where there is one, else
     from the first of them, as a sentence; None when all agree."""
     truth = truth_for(scene)
     exact = [] if truth is None else [truth.poses(gate_times(scene))]

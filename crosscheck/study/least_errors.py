@@ -1,4 +1,4 @@
-"""Floors: the least error of every engine on every scene, the setting that gives it, and what it costs."""
+"""The least error of every engine on every scene, with its setting and its cost."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 from crosscheck.judge.tolerances import FLOOR
 from crosscheck.study.grid import Case, Record, default_cases
-from crosscheck.study.record_view import by_scene, error, is_completed, swept
+from crosscheck.study.record_view import by_scene, error, is_completed, varied_settings
 from mbref.scene import Scene
 
 HEADER = ("scene", "engine", "family", "settings", "least error", "time (s)", f"within {FLOOR:.0e}", "others")
 
-FINEST = 3  # settings of a family among which its least error is looked for
+FINEST = 3  # settings of a family that are run to find its least error
 TIME_LIMIT = 240.0  # s
 
 
@@ -26,7 +26,7 @@ def candidates(scene: Scene, engines: Sequence[str]) -> list[Case]:
 
 
 @dataclass(frozen=True)
-class Floor:
+class LeastError:
     """An engine on a scene: of every family the completed run of least error, else the one that got
     furthest; ``records`` are all its runs."""
 
@@ -46,7 +46,7 @@ class Floor:
         return _reaches(self.best)
 
     def share(self) -> str:
-        """How many families are within FLOOR, of how many."""
+        """The number of families within FLOOR, of all."""
         return f"{sum(map(_reaches, self.families.values()))} of {len(self.families)}"
 
     def row(self) -> tuple[str, ...]:
@@ -54,19 +54,19 @@ class Floor:
         best = self.best
         within = [name for name, record in self.families.items() if _reaches(record)]
         others = [f"{name} {_said(r)}" for name, r in self.families.items() if not _reaches(r)]
-        return (self.scene, self.engine, best["family"], swept(best, self.records), _said(best),
+        return (self.scene, self.engine, best["family"], varied_settings(best, self.records), _said(best),
                 f"{best['cost']['seconds']:.2g}", ", ".join(within), ", ".join(others))  # fmt: skip
 
 
-def floors(records: Sequence[Record]) -> list[Floor]:
-    """One floor a scene and engine, in the order of the records."""
+def least_errors(records: Sequence[Record]) -> list[LeastError]:
+    """One least a scene and engine, in the order of the records."""
     found = []
     for scene, group in by_scene(records).items():
         for engine in dict.fromkeys(record["engine"] for record in group):
             own = [record for record in group if record["engine"] == engine]
             families = dict.fromkeys(record["family"] for record in own)
             best = {name: min((r for r in own if r["family"] == name), key=_rank) for name in families}
-            found.append(Floor(scene, engine, best, own))
+            found.append(LeastError(scene, engine, best, own))
     return found
 
 

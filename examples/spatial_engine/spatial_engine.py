@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from crosscheck.engine import Cannot, Engine, Setting, Why
+from crosscheck.engine import Cannot, Engine, Owner, Setting
 from crosscheck.judge.constraints import inertia_matrices, initial_twists
 from mbref import rotations
 from mbref.trajectory import Cost, Outcome, Trajectory
@@ -45,9 +45,9 @@ class Spatial(Engine):
 
     def cannot(self, scene):
         if not scene.has_mass() or any(np.linalg.eigvalsh(i)[0] <= 0 for i in inertia_matrices(scene)):
-            return Cannot(Why.NEVER, "every body needs a mass and three moments of inertia")
+            return Cannot(Owner.MODEL, "every body needs a mass and three moments of inertia")
         unknown = [joint.type for joint in scene.joint if joint.type not in HELD]
-        return Cannot(Why.UNBUILT, f"no {unknown[0]} joints") if unknown else None
+        return Cannot(Owner.ADAPTER, f"no {unknown[0]} joints") if unknown else None
 
     def settings(self, scene):
         return [Setting("dop853", {"rtol": r}) for r in (1e-5, 1e-7, 1e-9)]

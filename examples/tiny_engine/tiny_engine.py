@@ -4,10 +4,20 @@ import time
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Engine, Setting, Why
-from crosscheck.judge.constraints import inertia_matrices, initial_twists
-from mbref import rotations
-from mbref.trajectory import Cost, Outcome, Trajectory
+from crosscheck.engine import (
+    GROUND,
+    Cannot,
+    Cost,
+    Engine,
+    Outcome,
+    Owner,
+    Setting,
+    Supports,
+    Trajectory,
+    inertia_matrices,
+    initial_twists,
+    rotations,
+)
 
 PINS = ("revolute", "universal", "spherical")
 
@@ -17,22 +27,17 @@ class Tiny(Engine):
 
     name = "tiny"
     package = "tiny-engine"
+    supports = Supports(joints=(*PINS, "translational"), loads=("moment",))
 
     def version(self):
         return "0.1"
 
-    def cannot(self, scene):
-        if not scene.has_mass() or scene.driver:
-            return Cannot(Why.UNBUILT, "it has no drivers, and needs masses")
-        if any(joint.type not in (*PINS, "translational") for joint in scene.joint):
-            return Cannot(Why.UNBUILT, "its joints are pins and slides")
-        if any(load.type != "moment" for load in scene.load):
-            return Cannot(Why.UNBUILT, "its loads are gravity and constant moments")
-        return (
-            None
-            if planar(scene)
-            else Cannot(Why.NEVER, "bodies must move in the xy-plane, slides stand on the ground")
-        )
+    def refuses(self, scene):
+        if not scene.has_mass():
+            return Cannot(Owner.MODEL, "bodies need masses")
+        if not planar(scene):
+            return Cannot(Owner.MODEL, "bodies must move in the xy-plane, slides stand on the ground")
+        return None
 
     def settings(self, scene):
         return [Setting("rk4", {"step": scene.duration / n}) for n in (100, 1000, 4000)]
@@ -68,9 +73,10 @@ class Plane:
     def __init__(self, scene):
         self.scene, gravity = scene, np.array(scene.gravity)
         angles = [2 * np.arctan2(body.orientation[3], body.orientation[0]) for body in scene.body]
-        velocity, spin = initial_twists(scene)
+        velocity, omega = initial_twists(scene)
         self.q0 = np.column_stack([np.array([body.position[:2] for body in scene.body]), angles])
-        self.start = np.concatenate([self.q0.ravel(), np.column_stack([velocity[:, :2], spin[:, 2]]).ravel()])
+        rates = np.column_stack([velocity[:, :2], omega[:, 2]])
+        self.start = np.concatenate([self.q0.ravel(), rates.ravel()])
         moments = inertia_matrices(scene)[:, 2, 2]
         self.mass = np.column_stack([[[b.mass] * 2 for b in scene.body], moments]).ravel()
         self.force = np.array([[*(b.mass * gravity[:2]), 0.0] for b in scene.body])
@@ -121,7 +127,7 @@ def planar(scene):
     off += [(b.velocity or (0, 0, 0))[2] for b in scene.body]
     off += [x for b in scene.body for x in (b.angular_velocity or (0, 0, 0))[:2]]
     off += [x for pair in across for x in pair]
-    return np.abs(off).max() < 1e-12 and all("ground" in j.bodies for j in slides)
+    return np.abs(off).max() < 1e-12 and all(GROUND in j.bodies for j in slides)
 
 
 ENGINE = Tiny()

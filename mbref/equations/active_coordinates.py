@@ -1,9 +1,9 @@
-"""What of a scene can ever move: the rest needs no equation.
+"""Active coordinates: those of a scene that can ever move; the others need no equation.
 
-Rows and columns of Φ_q that hang together by non-zero entries form a block.  Where no force, no γ, Φ or ν and
-no initial velocity acts on a block, it stays at rest with multipliers of zero; the bending of a planar
-mechanism out of its plane is such a block.  Which entries are zero is asked at random states of what moves:
-an expression that is not identically zero does not vanish there.
+Rows and columns of Φ_q that hang together by non-zero entries form a block.  A block on which no force, no γ,
+Φ or ν and no initial velocity acts stays at rest with multipliers of zero; the bending of a planar mechanism
+out of its plane is such a block.  Entries are found to be zero at random states of the active coordinates: an
+expression that is not identically zero does not vanish there.
 """
 
 from __future__ import annotations
@@ -14,17 +14,16 @@ import numpy as np
 
 from mbref.equations.initial_state import Start, given_velocities, scene_length
 from mbref.equations.model import Model, displaced
-from mbref.kernels.layout import GEOMETRY, PRIMITIVES
+from mbref.kernels.scene_layout import Primitives, SceneData
 
-FIRST_ROW = 4  # column of PRIMITIVES
-STATES = 2  # random states asked, so that an accidental zero at one does no harm
-STILL = 1e-12  # of the scene's length, of 1, or of the largest velocity: what corrections leave
+STATES = 2  # random states, so that an accidental zero at one does no harm
+STILL = 1e-12  # of the scene's length, of 1, or of the largest velocity: the rounding of corrections
 
 
-def moving_entries(model: Model, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def active_entries(model: Model, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Which velocities (n,) can move, and which Jacobian entries (m, 12) of theirs can be other than zero.
 
-    q (7 nb,) and v (6 nb,) are the start.  Columns of entries are those of ``tables.JACOBIAN``.
+    q (7 nb,) and v (6 nb,) are the start.  Columns of entries are those of ``layout.System.blocks``.
     """
     rng = np.random.default_rng(1)
     moving = np.zeros(model.n, dtype=bool)
@@ -68,7 +67,7 @@ def without_rounding(model: Model, start: Start) -> Start:
     return replace(start, q=np.where(np.abs(q) < small, 0.0, q).ravel(), v=np.where(still, 0.0, v))
 
 
-def moving_coordinates(q: np.ndarray, velocities: np.ndarray) -> np.ndarray:
+def active_coordinates(q: np.ndarray, velocities: np.ndarray) -> np.ndarray:
     """Which coordinates can move from q (7 nb,) where these columns of v can: indices into q.
 
     Turning about axis k of a body's own frame mixes the Euler parameters e0 and ek, and the other two.
@@ -91,12 +90,10 @@ def moving_coordinates(q: np.ndarray, velocities: np.ndarray) -> np.ndarray:
     return np.flatnonzero(moves)
 
 
-def moving_primitives(model: Model, entries: np.ndarray) -> tuple[tuple, tuple]:
-    """The model's ``ints`` and ``floats`` without the primitives none of whose rows has an entry."""
-    primitives = model.ints[PRIMITIVES]
-    live = np.flatnonzero(entries.any(axis=1))
-    of_row = np.searchsorted(primitives[:, FIRST_ROW], live, side="right") - 1
-    kept = np.unique(of_row)
-    ints = tuple(table[kept] if k == PRIMITIVES else table for k, table in enumerate(model.ints))
-    floats = tuple(table[kept] if k == GEOMETRY else table for k, table in enumerate(model.floats))
-    return ints, floats
+def active_scene(model: Model, entries: np.ndarray) -> SceneData:
+    """The model's data without the primitives none of whose rows has an entry (m, 12)."""
+    primitives = model.data.primitives
+    rows = np.flatnonzero(entries.any(axis=1))
+    kept = np.unique(np.searchsorted(primitives.row, rows, side="right") - 1)
+    chosen = Primitives(*(np.ascontiguousarray(column[kept]) for column in primitives))
+    return model.data._replace(primitives=chosen)

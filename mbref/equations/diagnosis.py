@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mbref.equations.initial_state import consistent_start
+from mbref.equations.initial_state import LARGE, consistent_start
 from mbref.equations.model import Model
-from mbref.linear_algebra.minimum_norm import LARGE, sparse_jacobian
 from mbref.linear_algebra.redundancy import Redundancy
 from mbref.scene import Scene
 
@@ -80,7 +79,7 @@ def _counts(model: Model, rank: int) -> Counts:
 
 def _redundancy(model: Model) -> Redundancy:
     terms = model.blocks(0.0, consistent_start(model).q, np.zeros(model.n))
-    return Redundancy(sparse_jacobian(model, terms.jacobian))
+    return Redundancy(model.sparse(terms.jacobian))
 
 
 def _jacobian_at_start(model: Model) -> np.ndarray:

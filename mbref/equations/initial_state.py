@@ -9,13 +9,14 @@ from scipy.sparse import csr_array, vstack
 
 from mbref import rotations
 from mbref.equations.model import Model, displaced
-from mbref.linear_algebra.minimum_norm import LARGE, LeastChange, sparse_jacobian
+from mbref.linear_algebra.minimum_norm import MinimumNorm
 from mbref.scene import SceneError
 
 RANK_TOLERANCE = 1e-5  # singular values below it (relative) are left alone: rank may drop at the start
+LARGE = 40  # rows; above, dense singular values take longer than sparse factors
 GROSS = 0.05  # of the scene's length, or of its speed: a larger inconsistency is a fault
 MOST_ITERATIONS = 30
-LIGHT, NEARER = 1e-4, 5  # weight of open velocities beside given ones, and how often that error is reduced
+OPEN_WEIGHT, REPEATS = 1e-4, 5  # weight of open velocities beside given ones, and how often it is compensated
 
 
 @dataclass(frozen=True)
@@ -60,39 +61,48 @@ def _fault(model: Model, row: int, what: str) -> SceneError:
 
 
 def corrected_positions(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]:
-    """Consistent coordinates (7 nb,) near q, and the largest |Φ| before: Newton–Raphson on Φ(q, 0) = 0.
+    """Consistent coordinates (7 nb,) near q at t = 0, and the largest |Φ| before.
+
+    Raises SceneError naming the joint where q is grossly inconsistent or cannot be corrected.
+    """
+    if not model.m:
+        return q, 0.0
+    phi = np.abs(model.blocks(0.0, q, np.zeros(model.n)).phi)
+    before, worst = float(phi.max()), int(np.argmax(phi))
+    if before > GROSS * max(1.0, scene_length(model)):
+        raise _fault(model, worst, f"the initial positions violate the constraint by {before:.3g}")
+    q, phi = solve_positions(model, 0.0, q)
+    left, worst = float(np.abs(phi).max()), int(np.argmax(np.abs(phi)))
+    if left > 1e-10:
+        raise _fault(model, worst, f"the initial positions cannot be corrected; {left:.3g} is left")
+    return q, before
+
+
+def solve_positions(model: Model, t: float, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Newton–Raphson on Φ(q, t) = 0 from q (7 nb,); the coordinates reached and Φ (m,) there.
 
     With the pseudo-inverse, so that redundant rows and a singular start do no harm; the change is least
-    in the metric of M.  Raises SceneError naming the joint where q is grossly inconsistent.
+    in the metric of M.
     """
-    v = np.zeros(model.n)
-    before = 0.0
-    for iteration in range(MOST_ITERATIONS):
-        terms = model.blocks(0.0, q, v)
-        if not model.m:
-            return q, 0.0
-        worst = int(np.argmax(np.abs(terms.phi)))
-        violation = abs(terms.phi[worst])
-        if iteration == 0:
-            before = violation
-            if before > GROSS * max(1.0, scene_length(model)):
-                raise _fault(model, worst, f"the initial positions violate the constraint by {before:.3g}")
-        if violation <= 1e-14 * max(1.0, scene_length(model)):
-            return q, before
-        x = _least_change(model, terms.jacobian, -terms.phi)
+    v, enough = np.zeros(model.n), 1e-14 * max(1.0, scene_length(model))
+    phi = model.blocks(t, q, v).phi
+    for _ in range(MOST_ITERATIONS):
+        terms = model.blocks(t, q, v)
+        phi = terms.phi
+        if np.max(np.abs(phi), initial=0.0) <= enough:
+            break
+        x = _least_change(model, terms.jacobian, -phi)
         if np.max(np.abs(x)) < 1e-15:
             break
         q = displaced(q, x)
-    if violation > 1e-10:
-        raise _fault(model, worst, f"the initial positions cannot be corrected; {violation:.3g} is left")
-    return q, before
+    return q, phi
 
 
 def _least_change(model: Model, blocks: np.ndarray, rhs: np.ndarray) -> np.ndarray:
     """The change (6 nb,), least in the metric of M, by which Φ_q grows by rhs (m,)."""
     mass = np.where(model.mass > 0, model.mass, 1.0)
     if model.m > LARGE:
-        return LeastChange(sparse_jacobian(model, blocks), mass)(rhs)
+        return MinimumNorm(model.sparse(blocks), mass)(rhs)
     inverse_root = 1 / np.sqrt(mass)
     return _least_norm(model.dense(blocks) * inverse_root, rhs) * inverse_root
 
@@ -150,18 +160,18 @@ def _sparse_velocities(
     """The same by sparse solutions: nearest to the given velocities first, then least where open."""
     scale = np.tile(np.repeat([1.0, 1 / scene_length(model)], 3), model.nb)
     terms = model.blocks(0.0, q, v)
-    jacobian, nu = sparse_jacobian(model, terms.jacobian), terms.nu
-    x = LeastChange(jacobian, scale**-2)(nu)
+    jacobian, nu = model.sparse(terms.jacobian), terms.nu
+    x = MinimumNorm(jacobian, scale**-2)(nu)
     if np.max(np.abs(jacobian @ x - nu)) > GROSS * np.max(np.abs(x / scale)):
         worst = int(np.argmax(np.abs(jacobian @ x - nu)))
         raise _fault(model, worst, "the driver contradicts the joints")
-    nearest, x, aim = LeastChange(jacobian, np.where(given, 1.0, LIGHT) / scale**2), v, v
-    for _ in range(NEARER):
+    nearest, x, aim = MinimumNorm(jacobian, np.where(given, 1.0, OPEN_WEIGHT) / scale**2), v, v
+    for _ in range(REPEATS):
         x = aim + nearest(nu - jacobian @ aim)
         aim = aim + np.where(given, v - x, 0.0)
     chosen = np.flatnonzero(given)
     selection = csr_array((np.ones(chosen.size), (np.arange(chosen.size), chosen)), (chosen.size, model.n))
-    x = LeastChange(csr_array(vstack([jacobian, selection])), model.mass)(np.append(nu, x[given]))
+    x = MinimumNorm(csr_array(vstack([jacobian, selection])), model.mass)(np.append(nu, x[given]))
     residual = np.abs(jacobian @ np.where(given, v, x) - nu)
     miss, wanted = np.abs((x - v) / scale)[given], np.abs(v / scale)[given]
     if np.max(miss, initial=0.0) > GROSS * np.max(wanted, initial=0.0):

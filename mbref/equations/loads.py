@@ -11,22 +11,7 @@ from math import pi
 from numpy import arctan2, floor, sqrt
 
 from mbref.kernels.compilation import inlined, kernel
-from mbref.kernels.layout import (
-    ANGLES,
-    BODIES,
-    COLUMNS,
-    FORCE,
-    FORCE_AT_POINT,
-    FRAMES,
-    GRAVITY,
-    LOAD_DATA,
-    LOADS,
-    MOMENT,
-    OMEGA,
-    POSITION,
-    SPRING,
-    VELOCITY,
-)
+from mbref.kernels.scene_layout import FORCE, MOMENT, SPRING
 from mbref.linear_algebra.vectors import (
     accumulate,
     add,
@@ -39,105 +24,104 @@ from mbref.linear_algebra.vectors import (
     vector,
 )
 
-# columns of LOAD_DATA
-FIRST, SECOND, THIRD, FOURTH, CONSTANTS = 0, 3, 6, 9, 12  # four vectors, then stiffness, damping, natural
-
 
 @inlined
-def forces(ints, floats, work):
-    """g at the state in ``work[FRAMES]``, into ``work[COLUMNS][FORCE]``."""
-    bodies, gravity, frames, g = floats[BODIES], floats[GRAVITY], work[FRAMES], work[COLUMNS][FORCE]
-    for b in range(bodies.shape[0]):
-        w = vector(frames, b, OMEGA)
-        jw = (bodies[b, 1] * w[0], bodies[b, 2] * w[1], bodies[b, 3] * w[2])
-        gyroscopic = cross(jw, w)
+def forces(equations):
+    """g at the state in ``equations.frames``, into ``equations.system.force``."""
+    scene, frames, g = equations.scene, equations.frames, equations.system.force
+    mass, inertia, gravity = scene.bodies.mass, scene.bodies.inertia, scene.gravity
+    for b in range(mass.shape[0]):
+        w = vector(frames.angular_velocity, b)
+        gyroscopic = cross((inertia[b, 0] * w[0], inertia[b, 1] * w[1], inertia[b, 2] * w[2]), w)
         for k in range(3):
-            g[6 * b + k] = bodies[b, 0] * gravity[0, k]
+            g[6 * b + k] = mass[b] * gravity[k]
             g[6 * b + 3 + k] = gyroscopic[k]
-    loads, data = ints[LOADS], floats[LOAD_DATA]
-    for k in range(loads.shape[0]):
-        kind, i, j = loads[k, 0], loads[k, 1], loads[k, 2]
+    loads = scene.loads
+    for k in range(loads.kind.shape[0]):
+        kind, body = loads.kind[k], loads.first[k]
         if kind == MOMENT:
-            accumulate(g, 6 * i + 3, to_body(frames, i, vector(data, k, FIRST)))
-        elif kind == FORCE_AT_POINT:
-            push(i, vector(data, k, FIRST), vector(data, k, SECOND), frames, g)
+            accumulate(g, 6 * body + 3, to_body(frames.rotation, body, vector(loads.force, k)))
+        elif kind == FORCE:
+            push(body, vector(loads.point_first, k), vector(loads.force, k), frames, g)
         elif kind == SPRING:
-            spring(k, i, j, frames, data, g)
+            spring(k, loads, frames, g)
         else:
-            torsion_spring(k, i, j, loads[k, 3], frames, data, work[ANGLES], g)
+            torsion_spring(k, loads, frames, equations.angles, g)
 
 
 @kernel
 def push(b, point, force, frames, g):
-    """A world force at a body-fixed point; nothing happens to the fixed frame."""
+    """A world force at a body-fixed point; a force on the fixed frame does nothing."""
     if 6 * b < g.shape[0]:
         accumulate(g, 6 * b, force)
-        accumulate(g, 6 * b + 3, cross(point, to_body(frames, b, force)))
+        accumulate(g, 6 * b + 3, cross(point, to_body(frames.rotation, b, force)))
 
 
 @kernel
 def point_motion(b, s, frames):
     """World position and velocity of a body-fixed point."""
-    w = vector(frames, b, OMEGA)
-    position = add(vector(frames, b, POSITION), to_world(frames, b, s))
-    return position, add(vector(frames, b, VELOCITY), to_world(frames, b, cross(w, s)))
+    w = vector(frames.angular_velocity, b)
+    position = add(vector(frames.position, b), to_world(frames.rotation, b, s))
+    return position, add(vector(frames.velocity, b), to_world(frames.rotation, b, cross(w, s)))
 
 
 @kernel
-def spring(k, i, j, frames, data, g):
+def spring(k, loads, frames, g):
     """Tension stiffness (l - natural length) + damping l' between two points."""
-    s_i, s_j = vector(data, k, FIRST), vector(data, k, SECOND)
+    i, j = loads.first[k], loads.second[k]
+    s_i, s_j = vector(loads.point_first, k), vector(loads.point_second, k)
     p_i, v_i = point_motion(i, s_i, frames)
     p_j, v_j = point_motion(j, s_j, frames)
     d, v = subtract(p_j, p_i), subtract(v_j, v_i)
     length = sqrt(dot(d, d))
     if length > 0.0:
         rate = dot(d, v) / length
-        tension = data[k, CONSTANTS] * (length - data[k, CONSTANTS + 2]) + data[k, CONSTANTS + 1] * rate
+        tension = loads.stiffness[k] * (length - loads.natural[k]) + loads.damping[k] * rate
         force = scale(tension / length, d)
         push(i, s_i, force, frames, g)
         push(j, s_j, scale(-1.0, force), frames, g)
 
 
 @kernel
-def relative_angle(k, i, j, reference, frames, data):
-    """Angle of body j against i about the joint axis (rad), the turn nearest to ``reference``."""
-    x, y = to_world(frames, i, vector(data, k, SECOND)), to_world(frames, i, vector(data, k, THIRD))
-    u = to_world(frames, j, vector(data, k, FOURTH))
+def relative_angle(k, reference, loads, rotation):
+    """Angle of the second body against the first about the joint axis (rad), nearest to ``reference``."""
+    i, j = loads.first[k], loads.second[k]
+    x, y = to_world(rotation, i, vector(loads.x_first, k)), to_world(rotation, i, vector(loads.y_first, k))
+    u = to_world(rotation, j, vector(loads.x_second, k))
     angle = arctan2(dot(u, y), dot(u, x))
     return angle + 2.0 * pi * floor((reference - angle) / (2.0 * pi) + 0.5)
 
 
 @kernel
-def torsion_spring(k, i, j, slot, frames, data, angles, g):
-    """Moment -stiffness (φ - natural angle) - damping φ' on j about the joint axis, the opposite on i."""
-    axis = to_world(frames, i, vector(data, k, FIRST))
-    angle = relative_angle(k, i, j, angles[0, slot], frames, data)
-    w_i = to_world(frames, i, vector(frames, i, OMEGA))
-    w_j = to_world(frames, j, vector(frames, j, OMEGA))
+def torsion_spring(k, loads, frames, angles, g):
+    """Moment -stiffness (φ - natural angle) - damping φ' on the second body, the opposite on the first."""
+    i, j, rotation = loads.first[k], loads.second[k], frames.rotation
+    axis = to_world(rotation, i, vector(loads.axis, k))
+    angle = relative_angle(k, angles[loads.angle[k]], loads, rotation)
+    w_i = to_world(rotation, i, vector(frames.angular_velocity, i))
+    w_j = to_world(rotation, j, vector(frames.angular_velocity, j))
     rate = dot(subtract(w_j, w_i), axis)
-    size = data[k, CONSTANTS] * (angle - data[k, CONSTANTS + 2]) + data[k, CONSTANTS + 1] * rate
-    moment = scale(-size, axis)
+    moment = scale(-(loads.stiffness[k] * (angle - loads.natural[k]) + loads.damping[k] * rate), axis)
     if 6 * j < g.shape[0]:
-        accumulate(g, 6 * j + 3, to_body(frames, j, moment))
+        accumulate(g, 6 * j + 3, to_body(rotation, j, moment))
     if 6 * i < g.shape[0]:
-        accumulate(g, 6 * i + 3, to_body(frames, i, scale(-1.0, moment)))
+        accumulate(g, 6 * i + 3, to_body(rotation, i, scale(-1.0, moment)))
 
 
 @kernel
 def has_angles(loads):
     """Whether there is a torsion spring, whose angle unwraps."""
-    for k in range(loads.shape[0]):  # noqa: SIM110 - numba compiles no generator expression
-        if loads[k, 3] >= 0:
+    for slot in loads.angle:  # noqa: SIM110 - numba compiles no generator expression
+        if slot >= 0:
             return True
     return False
 
 
 @kernel
-def remember_angles(ints, floats, work):
+def remember_angles(equations):
     """Keep the torsion springs' angles of the accepted state, so that they unwrap over many turns."""
-    loads, frames, angles = ints[LOADS], work[FRAMES], work[ANGLES]
-    for k in range(loads.shape[0]):
-        if loads[k, 3] >= 0:
-            i, j, slot = loads[k, 1], loads[k, 2], loads[k, 3]
-            angles[0, slot] = relative_angle(k, i, j, angles[0, slot], frames, floats[LOAD_DATA])
+    loads, angles = equations.scene.loads, equations.angles
+    for k in range(loads.angle.shape[0]):
+        slot = loads.angle[k]
+        if slot >= 0:
+            angles[slot] = relative_angle(k, angles[slot], loads, equations.frames.rotation)

@@ -6,40 +6,34 @@ turned back where trajectories are written.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from mbref import rotations
+from mbref.equations.coordinates import displace
 from mbref.equations.evaluation import evaluate_all
-from mbref.equations.joints import JOINTS
-from mbref.equations.joints.base import ROWS_OF, Primitive, driven_angle, driven_displacement, frame
-from mbref.equations.loads import CONSTANTS, FIRST, FOURTH, SECOND, THIRD
-from mbref.kernels.layout import (
-    COLUMNS,
-    FORCE,
-    FORCE_AT_POINT,
-    GAMMA,
-    INVERSE_ROOT,
-    JACOBIAN,
-    LENGTH,
-    MASS,
-    MOMENT,
-    MOVING,
-    NU,
-    PHI,
-    POINT_I,
-    POINT_J,
-    ROTATION,
-    ROWS,
-    SPRING,
-    TORSION_SPRING,
-    TURNING,
-    U_I,
-    U_J,
-    W_I,
+from mbref.equations.joints import driver_primitive, primitives_of
+from mbref.equations.joints.base import ROWS_OF, Primitive
+from mbref.equations.loads import has_angles
+from mbref.equations.packing import packed_drivers, packed_loads
+from mbref.kernels.layout import Counts, Equations, Frames, Settings, System
+from mbref.kernels.named_memory import allocate, packed, record, stacked
+from mbref.kernels.scene_layout import (
+    Bodies,
+    Primitives,
+    SceneData,
 )
-from mbref.scene import GROUND, Body, Driver, Fixed, Joint, Scene
+from mbref.scene import (
+    GROUND,
+    Body,
+    Fixed,
+    Joint,
+    Scene,
+)
 
 
 @dataclass(frozen=True)
@@ -69,45 +63,45 @@ class Model:
         self._index = {body.name: b for b, body in enumerate(self.bodies)}
         self._index.setdefault(GROUND, self.nb)
         self._index[FRAME] = self.nb
-        self._pack_bodies()
-        self._pack_primitives()
-        loads, data = self._pack_loads()
-        self.ints = (
-            self._primitives,
-            self._row_bodies,
-            loads,
-            self.entries(np.arange(7 * self.nb), np.arange(self.n)),
+        bodies = self._pack_bodies()
+        self.data = SceneData(
+            gravity=np.array(self._gravity()),
+            bodies=bodies,
+            primitives=self._pack_primitives(),
+            row_bodies=self._row_bodies,
+            drivers=packed_drivers(scene.driver),
+            loads=packed_loads(self),
         )
-        self.floats = (self._moments, self._geometry, self._drivers(), data, np.array([self._gravity()]))
-        self._work = self.workspace(1, dense=False)
+        self._own = packed(self.equations())
 
-    def workspace(self, scratch: int, dense: bool = True) -> tuple[np.ndarray, ...]:
-        """Fresh working memory (see ``tables``); ``scratch`` numbers for the formulation.
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Sizes of the model's memory (see ``kernels.layout``)."""
+        angles = max(1, int(np.sum(self.data.loads.angle >= 0)))
+        return {"nb": self.nb, "n": self.n, "m": self.m, "angles": angles, "dense_rows": 0}
 
-        Not ``dense``: without the matrices whose size is rows times columns.
-        """
-        m, n, nb = self.m, self.n, self.nb
-        big = max(m + nb, 7 * nb)
-        matrix, jacobian = ((2 * big, big), (m, n)) if dense else ((2, 16), (0, n))
-        frames = np.zeros((nb + 1, 18))
-        frames[:, ROTATION : ROTATION + 9 : 4] = 1.0
-        columns = np.zeros((5, n))
-        columns[MASS] = self.mass
-        columns[INVERSE_ROOT] = 1 / np.sqrt(np.where(self.mass > 0, self.mass, 1.0))
-        angles = np.zeros((1, max(1, int(np.sum(self.ints[2][:, 3] >= 0)))))
-        return (
-            frames, np.zeros((m, 12)), np.zeros((6, m)), columns, np.zeros((4, 7 * nb)),
-            np.zeros((4, 7 * nb)), np.zeros(matrix), np.zeros((8, big)), np.zeros((1, scratch)),
-            angles, np.zeros(jacobian), np.zeros((1, 4)),
+    def equations(self, sizes: Mapping[str, int] | None = None, **system: Any) -> Equations:
+        """Fresh memory of an evaluation; ``system`` names fields of its System that are given."""
+        sizes = sizes or self.sizes
+        defaults = {
+            "mass": self.mass.copy(),
+            "inverse_root": 1 / np.sqrt(np.where(self.mass > 0, self.mass, 1.0)),
+            "settings": record(Settings()),
+            "counts": record(Counts()),
+            "options": None,
+            "scratch": None,
+        }
+        frames = allocate(Frames, sizes)
+        frames.rotation[:, ::4] = 1.0
+        return allocate(
+            Equations, sizes, scene=self.data, frames=frames,
+            system=allocate(System, sizes, **{**defaults, **system}),
         )  # fmt: skip
 
-    def entries(self, coordinates: np.ndarray, velocities: np.ndarray) -> np.ndarray:
-        """``ints[LIVE]`` of a y that has these columns of q (7 nb) and v (6 nb)."""
-        columns = np.concatenate([coordinates, velocities])
-        live = np.zeros((2, 4 + columns.size), dtype=np.int64)
-        live[0, MOVING], live[0, TURNING] = coordinates.size, velocities.size
-        live[1, : columns.size] = columns
-        return live
+    @property
+    def has_angles(self) -> bool:
+        """Whether a torsion spring unwraps its angle."""
+        return bool(has_angles(self.data.loads))
 
     def start(self) -> np.ndarray:
         """Coordinates (7 nb,) of the scene's poses, principal frames."""
@@ -126,14 +120,21 @@ class Model:
             matrix[rows, self._row_bodies[:, side]] = blocks[:, 6 * side : 6 * side + 6]
         return matrix[:, : self.nb].reshape(self.m, self.n)
 
+    def sparse(self, blocks: np.ndarray) -> csr_array:
+        """Φ_q (m, n) from its blocks (m, 12), without zeros."""
+        columns = self.entry_columns()
+        row, entry = np.nonzero((blocks != 0) & (columns < self.n))
+        return csr_array((blocks[row, entry], (row, columns[row, entry])), shape=(self.m, self.n))
+
     def blocks(self, t: float, q: np.ndarray, v: np.ndarray) -> Terms:
         """The terms with the blocks (m, 12) of both bodies' columns in place of the Jacobian."""
-        work = self._work
-        evaluate_all(float(t), np.ascontiguousarray(q), np.ascontiguousarray(v), self.ints, self.floats, work)
-        rows = work[ROWS].copy()
+        own = self._own.values
+        evaluate_all(float(t), np.ascontiguousarray(q), np.ascontiguousarray(v), self._own.argument)
+        rows = own.rows
         return Terms(
-            self.mass, work[JACOBIAN].copy(), rows[PHI], rows[NU], rows[GAMMA], work[COLUMNS][FORCE].copy()
-        )
+            self.mass, own.system.blocks.copy(), rows.phi.copy(), rows.nu.copy(), rows.gamma.copy(),
+            own.system.force.copy(),
+        )  # fmt: skip
 
     def entry_columns(self) -> np.ndarray:
         """Column (m, 12) of every entry of the blocks; those of the fixed frame are ≥ n."""
@@ -145,11 +146,11 @@ class Model:
 
     def anchor(self, joint: Joint, q: np.ndarray) -> np.ndarray:
         """World positions (…, 3) of the joint's anchor on its second body at coordinates q (…, nb, 7)."""
-        point = joint.anchors[1] if joint.type == "distance" else joint.anchor
+        point = joint.anchor_pair[1]
         b = self._index[joint.bodies[1]]
         if b == self.nb:
             return np.broadcast_to(point, (*q.shape[:-2], 3))
-        return q[..., b, :3] + rotations.rotate(q[..., b, 3:], self._point(joint.bodies[1], point))
+        return q[..., b, :3] + rotations.rotate(q[..., b, 3:], self.point(joint.bodies[1], point))
 
     def motion(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> dict[str, np.ndarray]:
         """Poses, velocities and accelerations of the scene's bodies as a Trajectory names them.
@@ -166,100 +167,69 @@ class Model:
             "angular_acceleration": rotations.rotate(p, a[..., 3:])[:, own],
         }
 
-    def _pack_bodies(self) -> None:
+    def _pack_bodies(self) -> Bodies:
         principal = [_principal_axes(body) for body in self.bodies]
         self.principal = rotations.from_matrix(np.array([axes for _, axes in principal]))
         given = np.array([body.orientation for body in self.bodies])
         self.orientation = rotations.multiply(given, self.principal)
         mass = np.array([1.0 if self.kinematic else body.mass or 1.0 for body in self.bodies])
         inertia = np.array([np.ones(3) if self.kinematic else moments for moments, _ in principal])
-        self._moments = np.column_stack([mass, inertia])
         self.mass = np.concatenate([np.repeat(mass[:, None], 3, axis=1), inertia], axis=1).ravel()
         self._to_local = rotations.to_matrix(self.orientation).transpose(0, 2, 1)
+        return Bodies(mass, inertia)
 
-    def _direction(self, name: str, vector: tuple[float, ...]) -> np.ndarray:
+    def direction(self, name: str, vector: Sequence[float]) -> np.ndarray:
+        """A world vector (3,) at t = 0 in the principal frame of a body."""
         b = self._index[name]
         return np.asarray(vector, dtype=float) if b == self.nb else self._to_local[b] @ vector
 
-    def _point(self, name: str, point: tuple[float, ...]) -> np.ndarray:
+    def point(self, name: str, point: Sequence[float]) -> np.ndarray:
+        """A world point (3,) at t = 0 in the principal frame of a body, from its centre of mass."""
         b = self._index[name]
         origin = np.zeros(3) if b == self.nb else np.array(self.bodies[b].position)
-        return self._direction(name, np.asarray(point) - origin)
+        return self.direction(name, np.asarray(point) - origin)
 
-    def _pack_primitives(self) -> None:
+    def _pack_primitives(self) -> Primitives:
         driven = {driver.joint: k for k, driver in enumerate(self.scene.driver)}
-        primitives, geometry, bodies, names = [], [], [], []
+        rows, bodies, names = [], [], []
         for joint in self.joints:
             pair = [self._index[name] for name in joint.bodies]
-            for primitive in (*JOINTS[joint.type](joint), *_driver_rows(joint, driven)):
+            for primitive in (*primitives_of(joint), *_driver_rows(joint, driven)):
                 driver = driven[joint.name] if primitive.driven else -1
-                primitives.append([primitive.kind, *pair, driver, len(names)])
-                geometry.append(self._local(primitive, joint.bodies))
-                rows = ROWS_OF[primitive.kind]
-                bodies += [pair] * rows
-                names += [joint.name] * rows
+                rows.append(self._primitive(primitive, joint.bodies, driver, len(names)))
+                count = ROWS_OF[primitive.kind]
+                bodies += [pair] * count
+                names += [joint.name] * count
         self.row_joint = tuple(names)
         self.m = len(names)
-        self._primitives = np.array(primitives, dtype=np.int64).reshape(-1, 5)
-        self._geometry = np.array(geometry, dtype=float).reshape(-1, 16)
         self._row_bodies = np.array(bodies, dtype=np.int64).reshape(-1, 2)
+        return stacked(Primitives, rows)
 
-    def _local(self, primitive: Primitive, names: tuple[str, str]) -> np.ndarray:
+    def _primitive(self, primitive: Primitive, names: tuple[str, str], driver: int, row: int) -> Primitives:
         first, second = names
-        row = np.zeros(16)
-        row[POINT_I : POINT_I + 3] = self._point(first, primitive.point_first)
-        row[POINT_J : POINT_J + 3] = self._point(second, primitive.point_second)
-        row[U_I : U_I + 3] = self._direction(first, primitive.first)
-        row[W_I : W_I + 3] = self._direction(first, primitive.turning)
-        row[U_J : U_J + 3] = self._direction(second, primitive.second)
-        row[LENGTH] = primitive.length
-        return row
-
-    def _drivers(self) -> np.ndarray:
-        degree = max((len(d.polynomial) for d in self.scene.driver), default=1)
-        return np.array([_driver_row(d, degree) for d in self.scene.driver]).reshape(-1, 3 + degree)
+        return Primitives(
+            kind=primitive.kind,
+            first=self._index[first],
+            second=self._index[second],
+            driver=driver,
+            row=row,
+            point_first=self.point(first, primitive.point_first),
+            point_second=self.point(second, primitive.point_second),
+            direction_first=self.direction(first, primitive.first),
+            turning_first=self.direction(first, primitive.turning),
+            direction_second=self.direction(second, primitive.second),
+            length=primitive.length,
+        )
 
     def _gravity(self) -> tuple[float, ...]:
         return (0.0, 0.0, 0.0) if self.kinematic else self.scene.gravity
 
-    def _pack_loads(self) -> tuple[np.ndarray, np.ndarray]:
-        joints = {joint.name: joint for joint in self.joints}
-        index, data, slots = [], [], 0
-        for load in () if self.kinematic else self.scene.load:
-            row = np.zeros(15)
-            if load.type == "moment":
-                index.append([MOMENT, self._index[load.body], self.nb, -1])
-                row[FIRST:SECOND] = load.moment
-            elif load.type == "force":
-                index.append([FORCE_AT_POINT, self._index[load.body], self.nb, -1])
-                row[FIRST:SECOND] = self._point(load.body, load.point)
-                row[SECOND:THIRD] = load.force
-            elif load.type == "spring":
-                index.append([SPRING, *(self._index[name] for name in load.bodies), -1])
-                for column, name, point in zip((FIRST, SECOND), load.bodies, load.points, strict=True):
-                    row[column : column + 3] = self._point(name, point)
-                row[CONSTANTS:] = load.stiffness, load.damping, load.natural_length
-            else:
-                joint = joints[load.joint]
-                first, second = joint.bodies
-                index.append([TORSION_SPRING, self._index[first], self._index[second], slots])
-                slots += 1
-                x, y, z = frame(joint.axis)
-                for column, name, axis in (
-                    (FIRST, first, z), (SECOND, first, x), (THIRD, first, y), (FOURTH, second, x),
-                ):  # fmt: skip
-                    row[column : column + 3] = self._direction(name, axis)
-                row[CONSTANTS:] = load.stiffness, load.damping, load.natural_angle
-            data.append(row)
-        return np.array(index, dtype=np.int64).reshape(-1, 4), np.array(data).reshape(-1, 15)
-
 
 def displaced(q: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Coordinates (7 nb,) moved by (δr, δπ') per body (6 nb,)."""
-    bodies, change = q.reshape(-1, 7), x.reshape(-1, 6)
-    turned = rotations.multiply(bodies[:, 3:], rotations.from_vector(change[:, 3:]))
-    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
-    return np.concatenate([bodies[:, :3] + change[:, :3], turned], axis=1).ravel()
+    """q ⊕ x: coordinates (7 nb,) moved by (δr, δπ') per body (6 nb,), see ``coordinates.displace``."""
+    moved = np.ascontiguousarray(q, dtype=float).copy()
+    displace(moved, np.ascontiguousarray(x, dtype=float), np.zeros_like(moved))
+    return moved
 
 
 def _with_ground(scene: Scene) -> tuple[tuple[Body, ...], tuple[Joint, ...]]:
@@ -286,17 +256,4 @@ def _principal_axes(body: Body) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _driver_rows(joint: Joint, driven: dict[str, int]) -> list[Primitive]:
-    if joint.name not in driven:
-        return []
-    if joint.type == "translational":
-        return [driven_displacement(joint.anchor, joint.axis)]
-    return [driven_angle(joint.axis)]
-
-
-def _driver_row(driver: Driver, degree: int) -> np.ndarray:
-    sine = driver.sine
-    row = np.zeros(3 + degree)
-    if sine is not None:
-        row[:3] = sine.amplitude, sine.frequency, sine.phase
-    row[3 : 3 + len(driver.polynomial)] = driver.polynomial
-    return row
+    return [driver_primitive(joint)] if joint.name in driven else []

@@ -19,29 +19,7 @@ from __future__ import annotations
 from numpy import cos, sin
 
 from mbref.kernels.compilation import inlined, kernel
-from mbref.kernels.layout import (
-    DOT1,
-    DOT2,
-    DRIVERS,
-    FRAMES,
-    GAMMA,
-    GEOMETRY,
-    JACOBIAN,
-    LENGTH,
-    NU,
-    OMEGA,
-    PHI,
-    POINT,
-    POINT_I,
-    POINT_J,
-    POSITION,
-    PRIMITIVES,
-    ROWS,
-    U_I,
-    U_J,
-    VELOCITY,
-    W_I,
-)
+from mbref.kernels.scene_layout import DOT1, DOT2, POINT
 from mbref.linear_algebra.vectors import (
     add,
     cross,
@@ -55,17 +33,19 @@ from mbref.linear_algebra.vectors import (
     vector,
 )
 
+NOTHING = (0.0, 0.0, 0.0)
+
 
 @kernel
 def driver_value(drivers, d, t):
     """Value, rate and acceleration at time t of driver d: polynomial plus sine."""
-    amplitude, frequency, phase = drivers[d, 0], drivers[d, 1], drivers[d, 2]
+    amplitude, frequency, polynomial = drivers.amplitude[d], drivers.frequency[d], drivers.polynomial
     value, rate, acceleration = 0.0, 0.0, 0.0
-    for k in range(drivers.shape[1] - 1, 2, -1):  # Horner, with both derivatives
+    for k in range(polynomial.shape[1] - 1, -1, -1):  # Horner, with both derivatives
         acceleration = acceleration * t + 2.0 * rate
         rate = rate * t + value
-        value = value * t + drivers[d, k]
-    argument = frequency * t + phase
+        value = value * t + polynomial[d, k]
+    argument = frequency * t + drivers.phase[d]
     value += amplitude * sin(argument)
     rate += amplitude * frequency * cos(argument)
     acceleration -= amplitude * frequency * frequency * sin(argument)
@@ -73,127 +53,143 @@ def driver_value(drivers, d, t):
 
 
 @kernel
-def point(p, row, i, j, frames, geometry, jacobian, rows):
+def point(p, equations):
     """Two body-fixed points coincide: three rows."""
-    s_i, s_j = vector(geometry, p, POINT_I), vector(geometry, p, POINT_J)
-    w_i, w_j = vector(frames, i, OMEGA), vector(frames, j, OMEGA)
+    primitives, frames = equations.scene.primitives, equations.frames
+    rows, blocks, a = equations.rows, equations.system.blocks, frames.rotation
+    i, j, row = primitives.first[p], primitives.second[p], primitives.row[p]
+    s_i, s_j = vector(primitives.point_first, p), vector(primitives.point_second, p)
+    w_i, w_j = vector(frames.angular_velocity, i), vector(frames.angular_velocity, j)
     gap = subtract(
-        add(vector(frames, i, POSITION), to_world(frames, i, s_i)),
-        add(vector(frames, j, POSITION), to_world(frames, j, s_j)),
+        add(vector(frames.position, i), to_world(a, i, s_i)),
+        add(vector(frames.position, j), to_world(a, j, s_j)),
     )
     turning = subtract(
-        to_world(frames, j, cross(w_j, cross(w_j, s_j))),
-        to_world(frames, i, cross(w_i, cross(w_i, s_i))),
+        to_world(a, j, cross(w_j, cross(w_j, s_j))), to_world(a, i, cross(w_i, cross(w_i, s_i)))
     )
     for k in range(3):
         world = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
-        rows[PHI, row + k] = gap[k]
-        rows[NU, row + k] = 0.0
-        rows[GAMMA, row + k] = turning[k]
-        put(jacobian, row + k, 0, world)
-        put(jacobian, row + k, 3, cross(s_i, to_body(frames, i, world)))
-        put_negative(jacobian, row + k, 6, world)
-        put_negative(jacobian, row + k, 9, cross(s_j, to_body(frames, j, world)))
+        rows.phi[row + k] = gap[k]
+        rows.nu[row + k] = 0.0
+        rows.gamma[row + k] = turning[k]
+        put(blocks, row + k, 0, world)
+        put(blocks, row + k, 3, cross(s_i, to_body(a, i, world)))
+        put_negative(blocks, row + k, 6, world)
+        put_negative(blocks, row + k, 9, cross(s_j, to_body(a, j, world)))
 
 
 @kernel
-def dot1(p, row, i, j, d, t, frames, geometry, drivers, jacobian, rows):
+def turned_direction(p, t, scene):
+    """The direction on the first body, turned by its driver where there is one; its rate and second rate."""
+    x, d = vector(scene.primitives.direction_first, p), scene.primitives.driver[p]
+    if d < 0:
+        return x, NOTHING, NOTHING
+    y = vector(scene.primitives.turning_first, p)
+    value, rate, acceleration = driver_value(scene.drivers, d, t)
+    along = add(scale(cos(value), x), scale(sin(value), y))
+    direction = subtract(scale(cos(value), y), scale(sin(value), x))
+    second = subtract(scale(-acceleration, along), scale(rate * rate, direction))
+    return direction, scale(-rate, along), second
+
+
+@kernel
+def dot1(p, t, equations):
     """A vector on each body stay perpendicular; with a driver, the first turns by its angle."""
-    a, a_rate, a_second = vector(geometry, p, U_I), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    if d >= 0:
-        value, rate, acceleration = driver_value(drivers, d, t)
-        x, y = a, vector(geometry, p, W_I)
-        along = add(scale(cos(value), x), scale(sin(value), y))
-        a = subtract(scale(cos(value), y), scale(sin(value), x))
-        a_rate = scale(-rate, along)
-        a_second = subtract(scale(-acceleration, along), scale(rate * rate, a))
-    b = vector(geometry, p, U_J)
-    w_i, w_j = vector(frames, i, OMEGA), vector(frames, j, OMEGA)
-    a_world, b_world = to_world(frames, i, a), to_world(frames, j, b)
+    primitives, frames = equations.scene.primitives, equations.frames
+    rows, blocks, rotation = equations.rows, equations.system.blocks, frames.rotation
+    i, j, row = primitives.first[p], primitives.second[p], primitives.row[p]
+    a, a_rate, a_second = turned_direction(p, t, equations.scene)
+    b = vector(primitives.direction_second, p)
+    w_i, w_j = vector(frames.angular_velocity, i), vector(frames.angular_velocity, j)
+    a_world, b_world = to_world(rotation, i, a), to_world(rotation, j, b)
     turn_i, turn_j = add(cross(w_i, a), a_rate), cross(w_j, b)
     second_i = add(cross(w_i, add(cross(w_i, a), scale(2.0, a_rate))), a_second)
     second_j = cross(w_j, turn_j)
-    rows[PHI, row] = dot(a_world, b_world)
-    rows[NU, row] = -dot(to_world(frames, i, a_rate), b_world)
-    rows[GAMMA, row] = -(
-        dot(to_world(frames, i, second_i), b_world)
-        + 2.0 * dot(to_world(frames, i, turn_i), to_world(frames, j, turn_j))
-        + dot(a_world, to_world(frames, j, second_j))
+    rows.phi[row] = dot(a_world, b_world)
+    rows.nu[row] = -dot(to_world(rotation, i, a_rate), b_world)
+    rows.gamma[row] = -(
+        dot(to_world(rotation, i, second_i), b_world)
+        + 2.0 * dot(to_world(rotation, i, turn_i), to_world(rotation, j, turn_j))
+        + dot(a_world, to_world(rotation, j, second_j))
     )
-    put(jacobian, row, 0, (0.0, 0.0, 0.0))
-    put(jacobian, row, 3, cross(a, to_body(frames, i, b_world)))
-    put(jacobian, row, 6, (0.0, 0.0, 0.0))
-    put(jacobian, row, 9, cross(b, to_body(frames, j, a_world)))
+    put(blocks, row, 0, NOTHING)
+    put(blocks, row, 3, cross(a, to_body(rotation, i, b_world)))
+    put(blocks, row, 6, NOTHING)
+    put(blocks, row, 9, cross(b, to_body(rotation, j, a_world)))
 
 
 @kernel
-def between(p, i, j, frames, geometry):
-    """d from the point of i to that of j, its rate, and the part of its second rate without q̈ (world)."""
-    s_i, s_j = vector(geometry, p, POINT_I), vector(geometry, p, POINT_J)
-    w_i, w_j = vector(frames, i, OMEGA), vector(frames, j, OMEGA)
+def between(p, primitives, frames):
+    """d from the point of the first body to that of the second, its rate, and d'' without q̈ (world)."""
+    i, j, a = primitives.first[p], primitives.second[p], frames.rotation
+    s_i, s_j = vector(primitives.point_first, p), vector(primitives.point_second, p)
+    w_i, w_j = vector(frames.angular_velocity, i), vector(frames.angular_velocity, j)
     turn_i, turn_j = cross(w_i, s_i), cross(w_j, s_j)
     d = subtract(
-        add(vector(frames, j, POSITION), to_world(frames, j, s_j)),
-        add(vector(frames, i, POSITION), to_world(frames, i, s_i)),
+        add(vector(frames.position, j), to_world(a, j, s_j)),
+        add(vector(frames.position, i), to_world(a, i, s_i)),
     )
     rate = subtract(
-        add(vector(frames, j, VELOCITY), to_world(frames, j, turn_j)),
-        add(vector(frames, i, VELOCITY), to_world(frames, i, turn_i)),
+        add(vector(frames.velocity, j), to_world(a, j, turn_j)),
+        add(vector(frames.velocity, i), to_world(a, i, turn_i)),
     )
-    second = subtract(to_world(frames, j, cross(w_j, turn_j)), to_world(frames, i, cross(w_i, turn_i)))
-    return d, rate, second
+    return d, rate, subtract(to_world(a, j, cross(w_j, turn_j)), to_world(a, i, cross(w_i, turn_i)))
 
 
 @kernel
-def dot2(p, row, i, j, driver, t, frames, geometry, drivers, jacobian, rows):
+def dot2(p, t, equations):
     """A vector on the first body stays perpendicular to d; with a driver, d advances along it."""
-    a, s_i, s_j = vector(geometry, p, U_I), vector(geometry, p, POINT_I), vector(geometry, p, POINT_J)
-    w_i = vector(frames, i, OMEGA)
-    d, d_rate, d_second = between(p, i, j, frames, geometry)
-    a_world, a_rate = to_world(frames, i, a), to_world(frames, i, cross(w_i, a))
-    a_second = to_world(frames, i, cross(w_i, cross(w_i, a)))
-    rows[PHI, row] = dot(a_world, d)
-    rows[NU, row] = 0.0
-    rows[GAMMA, row] = -(dot(a_second, d) + 2.0 * dot(a_rate, d_rate) + dot(a_world, d_second))
-    if driver >= 0:
-        value, rate, acceleration = driver_value(drivers, driver, t)
-        rows[PHI, row] -= value
-        rows[NU, row] = rate
-        rows[GAMMA, row] += acceleration
-    put_negative(jacobian, row, 0, a_world)
-    put(jacobian, row, 3, cross(a, add(to_body(frames, i, d), s_i)))
-    put(jacobian, row, 6, a_world)
-    put(jacobian, row, 9, cross(s_j, to_body(frames, j, a_world)))
+    primitives, frames = equations.scene.primitives, equations.frames
+    rows, blocks, rotation = equations.rows, equations.system.blocks, frames.rotation
+    i, j, row = primitives.first[p], primitives.second[p], primitives.row[p]
+    a, w_i = vector(primitives.direction_first, p), vector(frames.angular_velocity, i)
+    s_i, s_j = vector(primitives.point_first, p), vector(primitives.point_second, p)
+    d, d_rate, d_second = between(p, primitives, frames)
+    a_world, a_rate = to_world(rotation, i, a), to_world(rotation, i, cross(w_i, a))
+    a_second = to_world(rotation, i, cross(w_i, cross(w_i, a)))
+    rows.phi[row] = dot(a_world, d)
+    rows.nu[row] = 0.0
+    rows.gamma[row] = -(dot(a_second, d) + 2.0 * dot(a_rate, d_rate) + dot(a_world, d_second))
+    if primitives.driver[p] >= 0:
+        value, rate, acceleration = driver_value(equations.scene.drivers, primitives.driver[p], t)
+        rows.phi[row] -= value
+        rows.nu[row] = rate
+        rows.gamma[row] += acceleration
+    put_negative(blocks, row, 0, a_world)
+    put(blocks, row, 3, cross(a, add(to_body(rotation, i, d), s_i)))
+    put(blocks, row, 6, a_world)
+    put(blocks, row, 9, cross(s_j, to_body(rotation, j, a_world)))
 
 
 @kernel
-def distance(p, row, i, j, frames, geometry, jacobian, rows):
+def distance(p, equations):
     """Two body-fixed points keep their distance."""
-    s_i, s_j, length = vector(geometry, p, POINT_I), vector(geometry, p, POINT_J), geometry[p, LENGTH]
-    d, rate, second = between(p, i, j, frames, geometry)
+    primitives, frames = equations.scene.primitives, equations.frames
+    rows, blocks, rotation = equations.rows, equations.system.blocks, frames.rotation
+    i, j, row = primitives.first[p], primitives.second[p], primitives.row[p]
+    s_i, s_j = vector(primitives.point_first, p), vector(primitives.point_second, p)
+    length = primitives.length[p]
+    d, rate, second = between(p, primitives, frames)
     along = scale(1.0 / length, d)
-    rows[PHI, row] = (dot(d, d) - length * length) / (2.0 * length)
-    rows[NU, row] = 0.0
-    rows[GAMMA, row] = -(dot(rate, rate) + dot(d, second)) / length
-    put_negative(jacobian, row, 0, along)
-    put_negative(jacobian, row, 3, cross(s_i, to_body(frames, i, along)))
-    put(jacobian, row, 6, along)
-    put(jacobian, row, 9, cross(s_j, to_body(frames, j, along)))
+    rows.phi[row] = (dot(d, d) - length * length) / (2.0 * length)
+    rows.nu[row] = 0.0
+    rows.gamma[row] = -(dot(rate, rate) + dot(d, second)) / length
+    put_negative(blocks, row, 0, along)
+    put_negative(blocks, row, 3, cross(s_i, to_body(rotation, i, along)))
+    put(blocks, row, 6, along)
+    put(blocks, row, 9, cross(s_j, to_body(rotation, j, along)))
 
 
 @inlined
-def constraints(t, ints, floats, work):
-    """Φ, Φ_q, ν and γ of every row at the state in ``work[FRAMES]``."""
-    primitives, geometry, drivers = ints[PRIMITIVES], floats[GEOMETRY], floats[DRIVERS]
-    frames, jacobian, rows = work[FRAMES], work[JACOBIAN], work[ROWS]
-    for p in range(primitives.shape[0]):
-        kind, i, j = primitives[p, 0], primitives[p, 1], primitives[p, 2]
-        d, row = primitives[p, 3], primitives[p, 4]
-        if kind == POINT:
-            point(p, row, i, j, frames, geometry, jacobian, rows)
-        elif kind == DOT1:
-            dot1(p, row, i, j, d, t, frames, geometry, drivers, jacobian, rows)
-        elif kind == DOT2:
-            dot2(p, row, i, j, d, t, frames, geometry, drivers, jacobian, rows)
+def constraints(t, equations):
+    """Φ, Φ_q, ν and γ of every row at the state in ``equations.frames``."""
+    kinds = equations.scene.primitives.kind
+    for p in range(kinds.shape[0]):
+        if kinds[p] == POINT:
+            point(p, equations)
+        elif kinds[p] == DOT1:
+            dot1(p, t, equations)
+        elif kinds[p] == DOT2:
+            dot2(p, t, equations)
         else:
-            distance(p, row, i, j, frames, geometry, jacobian, rows)
+            distance(p, equations)

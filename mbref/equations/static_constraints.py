@@ -1,46 +1,89 @@
-"""What constraint rows hold at rest although forces act on it: a slider's sides, a crank's other axes.
+"""Statically determined constraint rows: rows that hold columns at rest, such as a slider's sides.
 
-A group of rows, perpendicular to each other, of constant length and as many as the columns they bear on, that
-prescribes no motion is a square system Φ_q v = 0, nowhere singular: its only solution is v = 0, from the
-start on.  These rows and columns are left out of the factorisation, after which other rows may bear on as
-few; their multipliers follow from the forces on the columns.  How rows are is asked at random states of
-everything else: what is held need not be moved, because it rests.
+A group of rows, perpendicular to each other, of constant length and as many as the columns on which they
+bear, that prescribes no motion is a square system Φ_q v = 0 that is nowhere singular: its only solution is
+v = 0, from the start on.  Such rows and columns are eliminated before the factorisation, after which other
+rows may bear on as few columns; their multipliers balance the forces on the columns.  Rows are examined at
+random states of all other coordinates; the columns held need not be moved, because they rest.
 
-Columns on which a redundant row bears stay, because how reactions are shared depends on all of them; so do
-columns without mass, which formulations refuse.  Where a driver works against what is held, nothing is.
+Columns on which a redundant row bears stay in the system, because the sharing of reactions depends on all of
+them; so do columns without mass, which formulations refuse.  Where a driver works against a group, no row is
+eliminated.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from mbref.equations.initial_state import Start
 from mbref.equations.model import Model, displaced
 from mbref.kernels.compilation import inlined
-from mbref.kernels.layout import COLUMNS, FORCE, JACOBIAN, MULTIPLIERS, ROWS
-from mbref.linear_algebra.minimum_norm import LeastChange, sparse_jacobian
+from mbref.kernels.layout import SparseFactor, StaticRows
+from mbref.linear_algebra.minimum_norm import MinimumNorm
 from mbref.linear_algebra.redundancy import null_shares
-from mbref.linear_algebra.sparse_cholesky import part
-from mbref.linear_algebra.symbolic_factorisation import (
-    HELD_COLUMN,
-    HELD_ENTRY,
-    HELD_OTHER,
-    HELD_ROW,
-    HELD_START,
-    OTHER_START,
-    Held,
-    columns_held,
-    lies_in,
-)
+from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation, unsigned
 
-STATES = 3  # random states asked
-MOST = 3  # columns that rows together hold
+STATES = 3  # random states at which rows are examined
+MOST = 3  # columns that a group of rows holds
 SMALL = 1e-9  # length of a row (1 or m) that may be rounding
-ROUNDING = 1e-12  # relative, of what is constant or perpendicular
+ROUNDING = 1e-12  # relative, of lengths that are constant and of rows that are perpendicular
 REDUNDANT = 1e-10  # share of a row in the left null space; with singular values over 1e-2 others have 1e-12
+
+
+class Held(NamedTuple):
+    """Rows and the columns that they hold at rest, as many."""
+
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
+
+
+def columns_held(held: Sequence[Held]) -> list[int]:
+    """The columns of all groups."""
+    return [column for each in held for column in each.columns]
+
+
+def lies_in(columns: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Which entries, in these columns (m, 12), are in those wanted (n,); the fixed frame's are not."""
+    return np.append(wanted, np.zeros(6, dtype=bool))[columns]
+
+
+def reduced_factor(
+    moving: np.ndarray, entries: np.ndarray, columns: np.ndarray, held: Sequence[Held]
+) -> SparseFactor:
+    """Memory of the sparse factor over the active columns (n,) that no row holds.
+
+    ``entries`` (m, 12) says which numbers of the Jacobian's blocks are other than zero, ``columns`` (m, 12)
+    has their columns.
+    """
+    static = _static_rows(entries, columns, held)
+    active = moving & ~np.isin(np.arange(moving.size), columns_held(held))
+    row, entry = np.nonzero(entries & lies_in(columns, active))
+    symbolic = symbolic_factorisation(row, columns[row, entry], 12 * row + entry, active)
+    return sparse_factor(symbolic, static)
+
+
+def _static_rows(entries: np.ndarray, columns: np.ndarray, held: Sequence[Held]) -> StaticRows:
+    """The rows that hold; a column's other entries are of rows whose multipliers are known by then."""
+    row, entry = np.nonzero(entries)
+    in_column: dict[int, list[int]] = {}
+    for r, e in zip(row, entry, strict=True):
+        in_column.setdefault(int(columns[r, e]), []).append(12 * int(r) + int(e))
+    rows, starts, own, own_columns, firsts, others = [], [0], [], [], [0], []
+    for each in reversed(held):
+        for r in each.rows:
+            for column in each.columns:
+                (place,) = (place for place in in_column[column] if place // 12 == r)
+                own.append(place)
+                own_columns.append(column)
+                others += [place for place in in_column[column] if place // 12 not in each.rows]
+                firsts.append(len(others))
+            rows.append(r)
+            starts.append(len(own))
+    return StaticRows(*map(unsigned, (rows, starts, own, own_columns, firsts, others)))
 
 
 def held_by_rows(
@@ -104,8 +147,8 @@ def _shared(model: Model, start: Start, entries: np.ndarray, held: Sequence[Held
     rows = np.flatnonzero(_bears_on(model, entries, of_held))
     if rows.size:
         blocks = model.blocks(0.0, start.q, start.v).jacobian
-        change = LeastChange(sparse_jacobian(model, blocks), np.ones(model.n))
-        redundant = rows[null_shares(change, rows) > REDUNDANT]
+        solution = MinimumNorm(model.sparse(blocks), np.ones(model.n))
+        redundant = rows[null_shares(solution, rows) > REDUNDANT]
         columns[model.entry_columns()[redundant][entries[redundant]]] = True
     return columns[: model.n] & of_held
 
@@ -162,14 +205,13 @@ def _perpendicular(rows: np.ndarray) -> list[int]:
 
 
 @inlined
-def add_multipliers_of_held(plan, work):
-    """The multipliers of rows that hold: they balance the forces on what is held, which has no q̈."""
-    blocks, multipliers, force = work[JACOBIAN].reshape(-1), work[ROWS][MULTIPLIERS], work[COLUMNS][FORCE]
-    row, start, entry, column = (
-        part(plan, HELD_ROW), part(plan, HELD_START), part(plan, HELD_ENTRY), part(plan, HELD_COLUMN),
+def add_static_multipliers(static, system):
+    """Multipliers of the statically determined rows: they balance the forces on columns without q̈."""
+    blocks, multipliers, force = system.blocks.reshape(-1), system.multipliers, system.force
+    start, entry, column, first, other = (
+        static.start, static.entry, static.column, static.other_start, static.other,
     )  # fmt: skip
-    first, other = part(plan, OTHER_START), part(plan, HELD_OTHER)
-    for k in range(row.shape[0]):
+    for k in range(static.row.shape[0]):
         value, square = 0.0, 0.0
         for p in range(start[k], start[k + 1]):
             balance, own = force[column[p]], blocks[entry[p]]
@@ -177,4 +219,4 @@ def add_multipliers_of_held(plan, work):
                 balance -= blocks[other[o]] * multipliers[other[o] // 12]
             value += own * balance
             square += own * own
-        multipliers[row[k]] = value / square
+        multipliers[static.row[k]] = value / square

@@ -12,17 +12,41 @@ depend on units.  The number α multiplies loses digits: rounding is α times th
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Annotated, NamedTuple
 
 from numpy import sqrt
 
-from mbref.formulations.base import Formulation
+from mbref.formulations.base import Dense, Formulation
 from mbref.kernels.compilation import exchangeable, kernel
-from mbref.kernels.layout import ACCELERATE, FACTORISATIONS, FORMULATION_OPTIONS, NOT_CONVERGED, OK, SINGULAR
+from mbref.kernels.layout import ACCELERATE, NOT_CONVERGED, OK, SINGULAR
+from mbref.kernels.named_memory import Matrix, Vector, opener
 from mbref.linear_algebra.elimination import cholesky_factor, cholesky_solve
 from mbref.linear_algebra.orthogonal_factorisations import equilibrate
 from mbref.linear_algebra.vectors import copy
 
-OPTIONS = {"alpha": 1e5, "epsilon": 1e-9, "iterations": 100.0, "omega": 10.0, "mu": 1.0}
+
+class Options(NamedTuple):
+    """The penalty α, the relative change that ends the iteration (Eq. 20), its most iterations, ω and μ."""
+
+    alpha: float = 1e5
+    epsilon: float = 1e-9
+    iterations: float = 100.0
+    omega: float = 10.0
+    mu: float = 1.0
+
+
+class Scratch(NamedTuple):
+    """Memory of the iteration, scaled by M^(-1/2) and the length of rows."""
+
+    d: Annotated[Matrix, "m", "n"]  # Φ_q M^(-1/2) with rows of unit length
+    matrix: Annotated[Matrix, "n", "n"]  # M + Φ_qᵀ α Φ_q and its Cholesky factor
+    load: Annotated[Vector, "n"]
+    x: Annotated[Vector, "n"]
+    scaled: Annotated[Vector, "m"]  # right-hand side in unit rows
+    total: Annotated[Vector, "m"]  # multipliers of unit rows
+
+
+options_of, scratch_of = opener(Options), opener(Scratch)
 
 
 def feedback(options: Mapping[str, float]) -> tuple[float, float]:
@@ -58,48 +82,30 @@ def augmented(mass, inverse_root, d, alpha, a):
 
 
 @exchangeable(ACCELERATE)
-def accelerate(
-    mass, inverse_root, jacobian, force, rhs, settings, scratch, pivots, counts, acceleration, multipliers
-):
-    m, n = jacobian.shape
-    alpha, epsilon = settings[FORMULATION_OPTIONS], settings[FORMULATION_OPTIONS + 1]
-    d = scratch[: m * n].reshape((m, n))
-    a = scratch[m * n : m * n + n * n].reshape((n, n))
-    start = m * n + n * n
-    load, x = scratch[start : start + n], scratch[start + n : start + 2 * n]
-    scaled, total = (
-        scratch[start + 2 * n : start + 2 * n + m],
-        scratch[start + 2 * n + m : start + 2 * n + 2 * m],
-    )
-    equilibrate(jacobian, inverse_root, d, multipliers)
-    augmented(mass, inverse_root, d, alpha, a)
-    counts[FACTORISATIONS] += 1
-    if not cholesky_factor(a, n):
+def accelerate(system):
+    options, scratch = options_of(system.options), scratch_of(system.scratch)
+    acceleration, multipliers, root = system.acceleration, system.multipliers, system.inverse_root
+    m, n = system.jacobian.shape
+    d, x, load, scaled, total = scratch.d, scratch.x, scratch.load, scratch.scaled, scratch.total
+    equilibrate(system.jacobian, root, d, multipliers)
+    augmented(system.mass, root, d, options.alpha, scratch.matrix)
+    system.counts.factorisations += 1
+    if not cholesky_factor(scratch.matrix, n):
         return SINGULAR
     for j in range(n):
-        load[j] = force[j] * inverse_root[j]
+        load[j] = system.force[j] * root[j]
         acceleration[j] = 0.0
     for i in range(m):
-        scaled[i], total[i] = rhs[i] * multipliers[i], 0.0
+        scaled[i], total[i] = system.rhs[i] * multipliers[i], 0.0
     status = NOT_CONVERGED
-    for _ in range(int(settings[FORMULATION_OPTIONS + 2])):
+    for _ in range(int(options.iterations)):
+        iterate(options.alpha, scratch)
         for j in range(n):
-            x[j] = load[j]
-        for i in range(m):
-            for j in range(n):
-                x[j] += d[i, j] * (alpha * scaled[i])
-        cholesky_solve(a, n, x)
-        for i in range(m):  # λ grows by α (Φ_q q̈ - γ)
-            gap = -scaled[i]
-            for j in range(n):
-                gap += d[i, j] * x[j]
-            total[i] += alpha * gap
-        for j in range(n):
-            load[j] = mass[j] * inverse_root[j] * inverse_root[j] * x[j]
-            x[j] *= inverse_root[j]
+            load[j] = system.mass[j] * root[j] * root[j] * x[j]
+            x[j] *= root[j]
         change = changed(acceleration, x)
         copy(x, acceleration)
-        if change <= epsilon:
+        if change <= options.epsilon:
             status = OK
             break
     for i in range(m):
@@ -107,14 +113,30 @@ def accelerate(
     return status
 
 
+@kernel
+def iterate(alpha, scratch):
+    """One iteration of Eqs. 17 and 18: x = (M + Φ_qᵀ α Φ_q)⁻¹ (load + Φ_qᵀ α γ), λ += α (Φ_q x - γ)."""
+    d, x, scaled, total = scratch.d, scratch.x, scratch.scaled, scratch.total
+    m, n = d.shape
+    copy(scratch.load, x)
+    for i in range(m):
+        for j in range(n):
+            x[j] += d[i, j] * (alpha * scaled[i])
+    cholesky_solve(scratch.matrix, n, x)
+    for i in range(m):
+        gap = -scaled[i]
+        for j in range(n):
+            gap += d[i, j] * x[j]
+        total[i] += alpha * gap
+
+
 ALF = Formulation(
     name="alf",
     equations="Eqs. 17-20",
     accelerate=accelerate,
-    scratch=lambda m, n: m * n + n * n + 2 * n + 2 * m,
+    linear_algebra=Dense(Scratch),
     handles_redundancy=True,
     handles_singular_mass=True,
-    iterative=True,
-    options=OPTIONS,
+    numbers=Options,
     feedback=feedback,
 )

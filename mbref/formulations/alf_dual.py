@@ -4,72 +4,58 @@
 
 By the Woodbury identity its iterates are those of Eqs. 17 to 19.  But α enters as 1/α beside S instead of
 multiplying Φ_qᵀ Φ_q beside M, so that a large α costs no digits and few iterations are needed; no rank
-is decided.  Regularised rows are those of unit length in the metric of M.  Stops when the next change would
-be ≤ epsilon, relative to the larger of 1 and the acceleration, judged by how the changes shrink.
+is decided.  Regularised rows are those of unit length in the metric of M.  The iteration is
+``linear_algebra.minimum_norm`` with b = γ - Φ_q q̈_0, on a sparse factor of S + I/α; it stops when the next
+change would be ≤ epsilon, relative to the larger of 1 and the acceleration.
 """
 
 from __future__ import annotations
 
-from mbref.formulations.alf import changed, feedback
-from mbref.formulations.base import Formulation
-from mbref.formulations.moore_penrose import begin, transpose
+from typing import NamedTuple
+
+from mbref.equations.static_constraints import add_static_multipliers
+from mbref.formulations.alf import feedback
+from mbref.formulations.base import Formulation, Sparse
 from mbref.kernels.compilation import exchangeable
-from mbref.kernels.layout import ACCELERATE, FACTORISATIONS, FORMULATION_OPTIONS, NOT_CONVERGED, OK, SINGULAR
-from mbref.linear_algebra.elimination import (
-    add_product,
-    cholesky_factor,
-    cholesky_solve,
-    gram,
-    times_transpose,
-)
-from mbref.linear_algebra.vectors import copy
+from mbref.kernels.layout import ACCELERATE, SINGULAR, SparseFactor
+from mbref.kernels.named_memory import opener
+from mbref.linear_algebra.minimum_norm import solve_to_tolerance
+from mbref.linear_algebra.sparse_cholesky import regularised_factor, subtract_product
 
-TINY, NEVER = 1e-300, 1e300
 
-OPTIONS = {"alpha": 1e10, "epsilon": 1e-12, "iterations": 20.0, "omega": 0.0, "mu": 1.0}
+class Options(NamedTuple):
+    """α, the relative change that ends the iteration, its most iterations; gains of Φ' and Φ as of ALF."""
+
+    alpha: float = 1e10
+    epsilon: float = 1e-12
+    iterations: float = 20.0
+    omega: float = 0.0
+    mu: float = 1.0
+
+
+options_of, factor_of = opener(Options), opener(SparseFactor)
 
 
 @exchangeable(ACCELERATE)
-def accelerate(
-    mass, inverse_root, jacobian, force, rhs, settings, scratch, pivots, counts, acceleration, multipliers
-):
-    m, n = jacobian.shape
-    alpha, epsilon = settings[FORMULATION_OPTIONS], settings[FORMULATION_OPTIONS + 1]
-    d = scratch[: m * n].reshape((m, n))
-    s = scratch[m * n : m * n + m * m].reshape((m, m))
-    dt = scratch[m * n + m * m : 2 * m * n + m * m].reshape((n, m))
-    start = 2 * m * n + m * m
-    b, step = scratch[start : start + m], scratch[start + m : start + 2 * m]
-    total, x = scratch[start + 2 * m : start + 3 * m], scratch[start + 3 * m : start + 3 * m + n]
-    before = scratch[start + 3 * m + n : start + 3 * m + 2 * n]
-    if not begin(mass, inverse_root, jacobian, force, rhs, d, b, acceleration, multipliers):
+def accelerate(system):
+    options, factor = options_of(system.options), factor_of(system.scratch)
+    row, column, root, x = factor.symbolic.row, factor.symbolic.column, factor.root, factor.change
+    system.counts.factorisations += 1
+    if not regularised_factor(factor, system.blocks.reshape(-1), system.inverse_root, options.alpha):
         return SINGULAR
-    transpose(d, dt)
-    gram(dt, s)
-    for i in range(m):
-        s[i, i] += 1.0 / alpha
-        total[i] = 0.0
-    counts[FACTORISATIONS] += 1
-    if not cholesky_factor(s, m):
-        return SINGULAR
-    status, change, expected = NOT_CONVERGED, 0.0, NEVER
-    for _ in range(int(settings[FORMULATION_OPTIONS + 2])):
-        copy(b, step)
-        cholesky_solve(s, m, step)
-        times_transpose(d, step, x)
-        copy(acceleration, before)
-        for j in range(n):
-            acceleration[j] += inverse_root[j] * x[j]
-        for i in range(m):
-            total[i] -= step[i]
-        last, change = change, changed(before, acceleration)
-        expected = min(expected, change * min(1.0, change / max(last, TINY)))
-        if expected <= epsilon:
-            status = OK
-            break
-        add_product(dt, x, -1.0, b)
-    for i in range(m):
-        multipliers[i] *= total[i]
+    for j in range(column.shape[0]):
+        k = column[j]
+        if not system.mass[k] > 0.0:
+            return SINGULAR
+        x[j] = root[j] * system.force[k]
+        system.acceleration[k] = root[j] * x[j]
+    for i in range(row.shape[0]):
+        factor.residual[i] = system.rhs[row[i]]
+    subtract_product(factor, x, factor.residual)
+    status = solve_to_tolerance(
+        factor, options.epsilon, int(options.iterations), system.acceleration, system.multipliers
+    )
+    add_static_multipliers(factor.static, system)
     return status
 
 
@@ -77,11 +63,9 @@ ALF_DUAL = Formulation(
     name="alf-dual",
     equations="Eqs. 17-19 in the multipliers",
     accelerate=accelerate,
-    scratch=lambda m, n: 2 * m * n + m * m + 3 * m + 2 * n,
+    linear_algebra=Sparse(),
     handles_redundancy=True,
     handles_singular_mass=False,
-    iterative=True,
-    sparse=True,
-    options=OPTIONS,
+    numbers=Options,
     feedback=feedback,
 )

@@ -2,43 +2,107 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mbref.kernels.compilation import Exchangeable
-from mbref.kernels.layout import FORMULATION_OPTIONS, NEWTON_TOLERANCE, RANK_TOLERANCE
+from mbref.kernels.layout import Counts, Settings, SparseFactor, System
+from mbref.kernels.named_memory import Packed, allocate, packed, record
+from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation
+
+
+class NoOptions(NamedTuple):
+    """A formulation without numbers of its own."""
+
+
+class LinearAlgebra(ABC):
+    """Which Jacobian a formulation reads, and the memory that its kernel needs."""
+
+    sparse: bool
+
+    @abstractmethod
+    def rows(self, m: int) -> int:
+        """Rows of the dense Jacobian that the kernel reads: m or none."""
+
+    @abstractmethod
+    def scratch(self, m: int, n: int, factor: SparseFactor | None) -> Any:
+        """The kernel's memory for m rows, n velocities and a sparse factor where one is used."""
+
+    @abstractmethod
+    def factor_of(self, jacobian: np.ndarray) -> SparseFactor | None:
+        """Memory of the sparse factor of one dense Jacobian (m, n), where one is used."""
+
+
+@dataclass(frozen=True)
+class Dense(LinearAlgebra):
+    """The kernel reads the dense Jacobian; ``memory`` is the schema of its scratch."""
+
+    memory: type
+    sparse = False
+
+    def rows(self, m: int) -> int:
+        return m
+
+    def scratch(self, m: int, n: int, factor: SparseFactor | None) -> Any:
+        return allocate(self.memory, {"m": m, "n": n})
+
+    def factor_of(self, jacobian: np.ndarray) -> SparseFactor | None:
+        return None
+
+
+@dataclass(frozen=True)
+class Sparse(LinearAlgebra):
+    """The kernel reads the numbers of the Jacobian at places that a sparse factor knows: cost grows with the
+    number of joints and no faster."""
+
+    sparse = True
+
+    def rows(self, m: int) -> int:
+        return 0
+
+    def scratch(self, m: int, n: int, factor: SparseFactor | None) -> Any:
+        return factor
+
+    def factor_of(self, jacobian: np.ndarray) -> SparseFactor | None:
+        row, column = np.nonzero(jacobian)
+        entry = row * jacobian.shape[1] + column
+        everything = np.ones(jacobian.shape[1], dtype=bool)
+        return sparse_factor(symbolic_factorisation(row, column, entry, everything))
 
 
 @dataclass(frozen=True)
 class Formulation:
     """A method of solving M q̈ + Φ_qᵀ λ = g, Φ_q q̈ = γ (Eqs. 3 and 4), with its claims as data.
 
-    ``accelerate(mass (n,), inverse_root (n,), jacobian (m, n), force (n,), rhs (m,), settings,
-    scratch, pivots, counts, acceleration (n,), multipliers (m,)) -> status`` is a kernel that writes its
-    last two arguments; it sees the terms only, never the scene.
+    ``accelerate(system) -> status`` is a kernel that reads a ``layout.System`` and writes its acceleration
+    and multipliers; it sees the terms only, never the scene.
     """
 
     name: str
     equations: str  # of the paper
     accelerate: Exchangeable
-    scratch: Callable[[int, int], int]  # numbers of working memory for m rows, n columns
+    linear_algebra: LinearAlgebra
     handles_redundancy: bool
     handles_singular_mass: bool
     needs_independent_columns: bool = False  # works only where no freedom is left
-    iterative: bool = False
-    sparse: bool = False  # runs go through the kernels of mbref.sparse, the same iteration
-    pivots_by_size: bool = False  # its operations depend on the state and cannot be laid down beforehand
-    options: Mapping[str, float] = field(default_factory=dict)  # the method's numbers and their defaults
+    pivots_by_size: bool = False  # its operations depend on the state and cannot be recorded beforehand
+    numbers: type = NoOptions  # the method's own numbers, a record with their defaults
     feedback: Callable[[Mapping[str, float]], tuple[float, float]] | None = None  # gains of Φ' and Φ in γ
 
-    def settings(self, options: Mapping[str, float], rank_tolerance: float) -> np.ndarray:
-        """The settings vector of the kernels, without stabilisation."""
-        values = np.zeros(FORMULATION_OPTIONS + len(self.options))
-        values[RANK_TOLERANCE], values[NEWTON_TOLERANCE] = rank_tolerance, 1e-13
-        values[FORMULATION_OPTIONS:] = [options.get(k, default) for k, default in self.options.items()]
-        return values
+    @property
+    def options(self) -> Mapping[str, float]:
+        """Names and defaults of the method's numbers."""
+        return self.numbers()._asdict()
+
+    def packed_options(self, options: Mapping[str, float]) -> Packed | None:
+        """The method's numbers for its kernel."""
+        if not self.options:
+            return None
+        return packed(record(self.numbers(**{**self.options, **options})))
 
     def solve(
         self, mass: np.ndarray, jacobian: np.ndarray, force: np.ndarray, gamma: np.ndarray,
@@ -46,16 +110,24 @@ class Formulation:
     ) -> tuple[int, np.ndarray, np.ndarray]:  # fmt: skip
         """(status, q̈ (n,), λ (m,)) of one system; mass (n,) is the diagonal of M, jacobian (m, n).
 
-        Status is one of ``tables.OK``, ``SINGULAR``, ``NOT_CONVERGED``.
+        Status is one of ``layout.OK``, ``SINGULAR``, ``NOT_CONVERGED``.
         """
         m, n = jacobian.shape
+        numbers, factor = np.ascontiguousarray(jacobian, dtype=float), self.linear_algebra.factor_of(jacobian)
         mass = np.ascontiguousarray(mass, dtype=float)
-        inverse_root = 1 / np.sqrt(np.where(mass > 0, mass, 1.0))
-        acceleration, multipliers = np.zeros(n), np.zeros(m)
-        status = self.accelerate.callable(
-            mass, inverse_root, np.ascontiguousarray(jacobian, dtype=float),
-            np.ascontiguousarray(force, dtype=float), np.ascontiguousarray(gamma, dtype=float),
-            self.settings(options, rank_tolerance), np.zeros(self.scratch(m, n)),
-            np.zeros(2 * (m + n), dtype=np.int64), np.zeros(6, dtype=np.int64), acceleration, multipliers,
-        )  # fmt: skip
-        return status, acceleration, multipliers
+        system = System(
+            mass=mass,
+            inverse_root=1 / np.sqrt(np.where(mass > 0, mass, 1.0)),
+            force=np.ascontiguousarray(force, dtype=float),
+            acceleration=np.zeros(n),
+            blocks=numbers,
+            jacobian=numbers,
+            rhs=np.ascontiguousarray(gamma, dtype=float),
+            multipliers=np.zeros(m),
+            settings=record(Settings(rank_tolerance=rank_tolerance)),
+            counts=record(Counts()),
+            options=self.packed_options(options),
+            scratch=packed(self.linear_algebra.scratch(m, n, factor)),
+        )
+        status = self.accelerate.callable(packed(system).argument)
+        return status, system.acceleration, system.multipliers

@@ -10,40 +10,51 @@ allowed where the constraints hold them.
 
 from __future__ import annotations
 
-from mbref.formulations.base import Formulation
+from typing import Annotated, NamedTuple
+
+from mbref.formulations.base import Dense, Formulation
 from mbref.kernels.compilation import exchangeable
-from mbref.kernels.layout import ACCELERATE, FACTORISATIONS, OK, SINGULAR
+from mbref.kernels.layout import ACCELERATE, OK, SINGULAR
+from mbref.kernels.named_memory import Indices, Matrix, Vector, opener
 from mbref.linear_algebra.elimination import lu_factor, lu_solve
 from mbref.linear_algebra.orthogonal_factorisations import equilibrate
 
 SINGULAR_PIVOT = 1e-12  # of the scaled matrix, whose rows and columns have unit size
 
 
+class Scratch(NamedTuple):
+    """The augmented system."""
+
+    matrix: Annotated[Matrix, "m + n", "m + n"]
+    d: Annotated[Matrix, "m", "n"]  # Φ_q M^(-1/2) with rows of unit length
+    b: Annotated[Vector, "m + n"]
+    pivots: Annotated[Indices, "m + n"]
+
+
+scratch_of = opener(Scratch)
+
+
 @exchangeable(ACCELERATE)
-def accelerate(
-    mass, inverse_root, jacobian, force, rhs, settings, scratch, pivots, counts, acceleration, multipliers
-):
-    m, n = jacobian.shape
-    size = m + n
-    a = scratch[: size * size].reshape((size, size))
-    d = scratch[size * size : size * size + m * n].reshape((m, n))
-    b = scratch[size * size + m * n : size * size + m * n + size]
-    equilibrate(jacobian, inverse_root, d, multipliers)
+def accelerate(system):
+    scratch, root, multipliers = scratch_of(system.scratch), system.inverse_root, system.multipliers
+    a, d, b = scratch.matrix, scratch.d, scratch.b
+    m, n = system.jacobian.shape
+    equilibrate(system.jacobian, root, d, multipliers)
     a[:] = 0.0
     for j in range(n):
-        a[j, j] = mass[j] * inverse_root[j] * inverse_root[j]
-        b[j] = force[j] * inverse_root[j]
+        a[j, j] = system.mass[j] * root[j] * root[j]
+        b[j] = system.force[j] * root[j]
     for i in range(m):
-        b[n + i] = rhs[i] * multipliers[i]
+        b[n + i] = system.rhs[i] * multipliers[i]
         for j in range(n):
             a[n + i, j] = d[i, j]
             a[j, n + i] = d[i, j]
-    counts[FACTORISATIONS] += 1
-    if not lu_factor(a, size, pivots, SINGULAR_PIVOT):
+    system.counts.factorisations += 1
+    if not lu_factor(a, m + n, scratch.pivots, SINGULAR_PIVOT):
         return SINGULAR
-    lu_solve(a, size, pivots, b)
+    lu_solve(a, m + n, scratch.pivots, b)
     for j in range(n):
-        acceleration[j] = b[j] * inverse_root[j]
+        system.acceleration[j] = b[j] * root[j]
     for i in range(m):
         multipliers[i] *= b[n + i]
     return OK
@@ -53,7 +64,7 @@ LM1 = Formulation(
     name="lm1",
     equations="Eq. 5",
     accelerate=accelerate,
-    scratch=lambda m, n: (m + n) * (m + n) + m * n + m + n,
+    linear_algebra=Dense(Scratch),
     pivots_by_size=True,
     handles_redundancy=False,
     handles_singular_mass=True,

@@ -7,36 +7,47 @@ random poses; so a row nearer than 3e-6 rad to dependent counts as redundant.
 
 from __future__ import annotations
 
-from mbref.formulations.base import Formulation
+from typing import Annotated, NamedTuple
+
+from mbref.formulations.base import Dense, Formulation
 from mbref.kernels.compilation import exchangeable
-from mbref.kernels.layout import ACCELERATE, FACTORISATIONS, OK, SINGULAR
+from mbref.kernels.layout import ACCELERATE, OK, SINGULAR
+from mbref.kernels.named_memory import Matrix, Vector, opener
 from mbref.linear_algebra.elimination import cholesky_factor, cholesky_solve, gram
 
 SINGULAR_PIVOT = 1e-11  # of its diagonal entry: the square of the sine between a row and those before
 
 
+class Scratch(NamedTuple):
+    """The Schur complement and its factors."""
+
+    transposed: Annotated[Matrix, "n", "m"]  # M^(-1/2) Φ_qᵀ
+    s: Annotated[Matrix, "m", "m"]  # Φ_q M⁻¹ Φ_qᵀ and its Cholesky factor
+    b: Annotated[Vector, "m"]
+    diagonal: Annotated[Vector, "m"]  # of S
+
+
+scratch_of = opener(Scratch)
+
+
 @exchangeable(ACCELERATE)
-def accelerate(
-    mass, inverse_root, jacobian, force, rhs, settings, scratch, pivots, counts, acceleration, multipliers
-):
+def accelerate(system):
+    scratch, jacobian, acceleration = scratch_of(system.scratch), system.jacobian, system.acceleration
+    dt, s, b, diagonal = scratch.transposed, scratch.s, scratch.b, scratch.diagonal
     m, n = jacobian.shape
-    dt = scratch[: n * m].reshape((n, m))  # the transpose of D = Φ_q M^(-1/2)
-    s = scratch[n * m : n * m + m * m].reshape((m, m))
-    start = n * m + m * m
-    b, diagonal = scratch[start : start + m], scratch[start + m : start + 2 * m]
     for i in range(m):
-        b[i] = -rhs[i]
+        b[i] = -system.rhs[i]
     for j in range(n):
-        if not mass[j] > 0.0:
+        if not system.mass[j] > 0.0:
             return SINGULAR
-        acceleration[j] = force[j] / mass[j]
+        acceleration[j] = system.force[j] / system.mass[j]
         for i in range(m):
             b[i] += jacobian[i, j] * acceleration[j]
-            dt[j, i] = jacobian[i, j] * inverse_root[j]
+            dt[j, i] = jacobian[i, j] * system.inverse_root[j]
     gram(dt, s)
     for i in range(m):
         diagonal[i] = s[i, i]
-    counts[FACTORISATIONS] += 1
+    system.counts.factorisations += 1
     if not cholesky_factor(s, m):
         return SINGULAR
     for i in range(m):
@@ -45,9 +56,9 @@ def accelerate(
     cholesky_solve(s, m, b)
     for j in range(n):
         for i in range(m - 1, -1, -1):  # the solution's last entry is found first
-            acceleration[j] -= inverse_root[j] * dt[j, i] * b[i]
+            acceleration[j] -= system.inverse_root[j] * dt[j, i] * b[i]
     for i in range(m):
-        multipliers[i] = b[i]
+        system.multipliers[i] = b[i]
     return OK
 
 
@@ -55,7 +66,7 @@ LM2 = Formulation(
     name="lm2",
     equations="Eqs. 6-8",
     accelerate=accelerate,
-    scratch=lambda m, n: n * m + m * m + 2 * m,
+    linear_algebra=Dense(Scratch),
     handles_redundancy=False,
     handles_singular_mass=False,
 )

@@ -12,16 +12,20 @@ from mbref.linear_algebra.orthogonal_factorisations import equilibrate
 
 
 @kernel
-def begin(mass, inverse_root, jacobian, force, rhs, d, b, acceleration, row_scale):
-    """D, b = γ - Φ_q q̈_unc in scaled rows, and q̈_unc; False where M is singular."""
+def scaled_residual(system, d, b):
+    """D, b = γ - Φ_q q̈_unc in scaled rows, and q̈_unc; False where M is singular.
+
+    The row scale is left in ``system.multipliers``.
+    """
+    jacobian, acceleration, row_scale = system.jacobian, system.acceleration, system.multipliers
     m, n = jacobian.shape
-    equilibrate(jacobian, inverse_root, d, row_scale)
+    equilibrate(jacobian, system.inverse_root, d, row_scale)
     for j in range(n):
-        if not mass[j] > 0.0:
+        if not system.mass[j] > 0.0:
             return False
-        acceleration[j] = force[j] / mass[j]
+        acceleration[j] = system.force[j] / system.mass[j]
     for i in range(m):
-        b[i] = rhs[i]
+        b[i] = system.rhs[i]
     for j in range(n):
         for i in range(m):
             b[i] -= jacobian[i, j] * acceleration[j]
@@ -40,9 +44,9 @@ def transpose(d, dt):
 
 
 @kernel
-def finish(inverse_root, x, dual, acceleration, multipliers):
-    """q̈ from x = D⁺ b, and λ = -R (Dᵀ)⁺ x; the row scale R stands in ``multipliers``."""
+def recover_solution(x, dual, system):
+    """q̈ from x = D⁺ b, and λ = -R (Dᵀ)⁺ x; the row scale R stands in ``system.multipliers``."""
     for j in range(x.shape[0]):
-        acceleration[j] += inverse_root[j] * x[j]
+        system.acceleration[j] += system.inverse_root[j] * x[j]
     for i in range(dual.shape[0]):
-        multipliers[i] *= -dual[i]
+        system.multipliers[i] *= -dual[i]

@@ -7,32 +7,43 @@ orthogonalisation of the rows of R gives R = L Zᵀ: D⁺ = P Z L⁻¹ Qᵀ, the
 
 from __future__ import annotations
 
-from mbref.formulations.base import Formulation
-from mbref.formulations.moore_penrose import begin, finish
+from typing import Annotated, NamedTuple
+
+from mbref.formulations.base import Dense, Formulation
+from mbref.formulations.moore_penrose import recover_solution, scaled_residual, transpose
 from mbref.kernels.compilation import exchangeable
-from mbref.kernels.layout import ACCELERATE, FACTORISATIONS, OK, RANK_TOLERANCE, SINGULAR
+from mbref.kernels.layout import ACCELERATE, OK, SINGULAR
+from mbref.kernels.named_memory import Indices, Matrix, Vector, opener
 from mbref.linear_algebra.orthogonal_factorisations import gram_schmidt_solve
 
 
+class Scratch(NamedTuple):
+    """D, its columns as rows, and the triangular factors of both orthogonalisations."""
+
+    d: Annotated[Matrix, "m", "n"]
+    columns: Annotated[Matrix, "n", "m"]
+    r: Annotated[Matrix, "n", "n"]
+    l: Annotated[Matrix, "n", "n"]
+    order: Annotated[Indices, "n"]
+    order_rows: Annotated[Indices, "n"]
+    b: Annotated[Vector, "m"]
+    c: Annotated[Vector, "n"]
+    x: Annotated[Vector, "n"]
+    dual: Annotated[Vector, "m"]
+
+
+scratch_of = opener(Scratch)
+
+
 @exchangeable(ACCELERATE)
-def accelerate(
-    mass, inverse_root, jacobian, force, rhs, settings, scratch, pivots, counts, acceleration, multipliers
-):
-    m, n = jacobian.shape
-    d = scratch[: m * n].reshape((m, n))
-    columns = scratch[m * n : 2 * m * n].reshape((n, m))
-    r = scratch[2 * m * n : 2 * m * n + n * n].reshape((n, n))
-    l = scratch[2 * m * n + n * n : 2 * m * n + 2 * n * n].reshape((n, n))
-    start = 2 * m * n + 2 * n * n
-    b = scratch[start : start + m]
-    dual = scratch[start + m : start + 2 * m]
-    x = scratch[start + 2 * m : start + 2 * m + n]
-    c = scratch[start + 2 * m + n : start + 2 * m + 2 * n]
-    if not begin(mass, inverse_root, jacobian, force, rhs, d, b, acceleration, multipliers):
+def accelerate(system):
+    scratch = scratch_of(system.scratch)
+    if not scaled_residual(system, scratch.d, scratch.b):
         return SINGULAR
-    counts[FACTORISATIONS] += 1
-    gram_schmidt_solve(d, b, settings[RANK_TOLERANCE], columns, r, l, pivots, c, x, dual)
-    finish(inverse_root, x, dual, acceleration, multipliers)
+    system.counts.factorisations += 1
+    transpose(scratch.d, scratch.columns)
+    gram_schmidt_solve(system.settings.rank_tolerance, scratch)
+    recover_solution(scratch.x, scratch.dual, system)
     return OK
 
 
@@ -40,7 +51,7 @@ MPI_GS = Formulation(
     name="mpi-gs",
     equations="Eqs. 26, 29, 30",
     accelerate=accelerate,
-    scratch=lambda m, n: 2 * m * n + 2 * n * n + 2 * m + 2 * n,
+    linear_algebra=Dense(Scratch),
     pivots_by_size=True,
     handles_redundancy=True,
     handles_singular_mass=False,

@@ -6,33 +6,42 @@ coordinates, which only a fully driven mechanism has.  Fails as SINGULAR otherwi
 
 from __future__ import annotations
 
-from mbref.formulations.base import Formulation
-from mbref.formulations.moore_penrose import begin, finish
+from typing import Annotated, NamedTuple
+
+from mbref.formulations.base import Dense, Formulation
+from mbref.formulations.moore_penrose import recover_solution, scaled_residual, transpose
 from mbref.kernels.compilation import exchangeable
-from mbref.kernels.layout import ACCELERATE, FACTORISATIONS, OK, RANK_TOLERANCE, SINGULAR
+from mbref.kernels.layout import ACCELERATE, OK, SINGULAR
+from mbref.kernels.named_memory import Matrix, Vector, opener
 from mbref.linear_algebra.elimination import back_substitute
 from mbref.linear_algebra.orthogonal_factorisations import gram_schmidt
 
 
+class Scratch(NamedTuple):
+    """D, its columns as rows, R, and the two solutions."""
+
+    d: Annotated[Matrix, "m", "n"]
+    columns: Annotated[Matrix, "n", "m"]
+    r: Annotated[Matrix, "n", "n"]
+    b: Annotated[Vector, "max(m, n)"]
+    dual: Annotated[Vector, "m"]
+    x: Annotated[Vector, "n"]
+
+
+scratch_of = opener(Scratch)
+
+
 @exchangeable(ACCELERATE)
-def accelerate(
-    mass, inverse_root, jacobian, force, rhs, settings, scratch, pivots, counts, acceleration, multipliers
-):
-    m, n = jacobian.shape
-    d = scratch[: m * n].reshape((m, n))
-    columns = scratch[m * n : 2 * m * n].reshape((n, m))
-    r = scratch[2 * m * n : 2 * m * n + n * n].reshape((n, n))
-    start = 2 * m * n + n * n
-    b, dual = scratch[start : start + m], scratch[start + m : start + 2 * m]
-    x = scratch[start + 2 * m : start + 2 * m + n]
-    if not begin(mass, inverse_root, jacobian, force, rhs, d, b, acceleration, multipliers):
+def accelerate(system):
+    scratch = scratch_of(system.scratch)
+    columns, r, b, x, dual = scratch.columns, scratch.r, scratch.b, scratch.x, scratch.dual
+    n, m = columns.shape
+    if not scaled_residual(system, scratch.d, b):
         return SINGULAR
-    for i in range(m):
-        dual[i] = 0.0
-        for j in range(n):
-            columns[j, i] = d[i, j]
-    counts[FACTORISATIONS] += 1
-    if not gram_schmidt(columns, r, settings[RANK_TOLERANCE]):
+    transpose(scratch.d, columns)
+    dual[:] = 0.0
+    system.counts.factorisations += 1
+    if not gram_schmidt(columns, r, system.settings.rank_tolerance):
         return SINGULAR
     for k in range(n):  # x = R⁻¹ Qᵀ b
         x[k] = 0.0
@@ -46,7 +55,7 @@ def accelerate(
         b[k] = value / r[k, k]
         for i in range(m):
             dual[i] += columns[k, i] * b[k]
-    finish(inverse_root, x, dual, acceleration, multipliers)
+    recover_solution(x, dual, system)
     return OK
 
 
@@ -54,7 +63,7 @@ MPI_GS_LITERAL = Formulation(
     name="mpi-gs-literal",
     equations="Eqs. 26, 29, 30 as printed",
     accelerate=accelerate,
-    scratch=lambda m, n: 2 * m * n + n * n + 2 * max(m, n) + n,
+    linear_algebra=Dense(Scratch),
     pivots_by_size=True,
     handles_redundancy=True,
     handles_singular_mass=False,

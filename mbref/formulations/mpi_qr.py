@@ -7,35 +7,44 @@ Trans. Aut. Des. 108, 1986, use the same factorisation).  Redundant rows get no 
 
 from __future__ import annotations
 
-from mbref.formulations.base import Formulation
-from mbref.formulations.moore_penrose import begin, finish
+from typing import Annotated, NamedTuple
+
+from mbref.formulations.base import Dense, Formulation
+from mbref.formulations.moore_penrose import recover_solution, scaled_residual, transpose
 from mbref.kernels.compilation import exchangeable
-from mbref.kernels.layout import ACCELERATE, FACTORISATIONS, OK, RANK_TOLERANCE, SINGULAR
+from mbref.kernels.layout import ACCELERATE, OK, SINGULAR
+from mbref.kernels.named_memory import Indices, Matrix, Vector, opener
 from mbref.linear_algebra.orthogonal_factorisations import minimum_norm, qr_pivoted, row_multipliers
 
 
+class Scratch(NamedTuple):
+    """D, the factors of its transpose, and the two solutions."""
+
+    d: Annotated[Matrix, "m", "n"]
+    transposed: Annotated[Matrix, "n", "m"]
+    order: Annotated[Indices, "m"]
+    tau: Annotated[Vector, "m"]
+    work: Annotated[Vector, "m"]
+    norms: Annotated[Matrix, 2, "m"]
+    b: Annotated[Vector, "m"]
+    dual: Annotated[Vector, "m"]
+    x: Annotated[Vector, "n"]
+
+
+scratch_of = opener(Scratch)
+
+
 @exchangeable(ACCELERATE)
-def accelerate(
-    mass, inverse_root, jacobian, force, rhs, settings, scratch, pivots, counts, acceleration, multipliers
-):
-    m, n = jacobian.shape
-    d = scratch[: m * n].reshape((m, n))
-    t = scratch[m * n : 2 * m * n].reshape((n, m))
-    start = 2 * m * n
-    b, dual = scratch[start : start + m], scratch[start + m : start + 2 * m]
-    tau, work = scratch[start + 2 * m : start + 3 * m], scratch[start + 3 * m : start + 4 * m]
-    norms = scratch[start + 4 * m : start + 6 * m].reshape((2, m))
-    x = scratch[start + 6 * m : start + 6 * m + n]
-    if not begin(mass, inverse_root, jacobian, force, rhs, d, b, acceleration, multipliers):
+def accelerate(system):
+    scratch = scratch_of(system.scratch)
+    if not scaled_residual(system, scratch.d, scratch.b):
         return SINGULAR
-    for i in range(m):
-        for j in range(n):
-            t[j, i] = d[i, j]
-    counts[FACTORISATIONS] += 1
-    rank = qr_pivoted(t, n, m, pivots, tau, norms, work, settings[RANK_TOLERANCE])
-    minimum_norm(t, n, rank, pivots, tau, b, x)
-    row_multipliers(t, rank, pivots, b, work, dual)
-    finish(inverse_root, x, dual, acceleration, multipliers)
+    transpose(scratch.d, scratch.transposed)
+    system.counts.factorisations += 1
+    rank = qr_pivoted(system.settings.rank_tolerance, scratch)
+    minimum_norm(rank, scratch)
+    row_multipliers(rank, scratch)
+    recover_solution(scratch.x, scratch.dual, system)
     return OK
 
 
@@ -43,7 +52,7 @@ MPI_QR = Formulation(
     name="mpi-qr",
     equations="Eq. 26 with a pivoted QR",
     accelerate=accelerate,
-    scratch=lambda m, n: 2 * m * n + 6 * m + n,
+    linear_algebra=Dense(Scratch),
     pivots_by_size=True,
     handles_redundancy=True,
     handles_singular_mass=False,

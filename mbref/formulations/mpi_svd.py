@@ -6,28 +6,37 @@ rank tolerance times the largest count as zero.  The multipliers are those of le
 
 from __future__ import annotations
 
-from mbref.formulations.base import Formulation
-from mbref.formulations.moore_penrose import begin, finish
+from typing import Annotated, NamedTuple
+
+from mbref.formulations.base import Dense, Formulation
+from mbref.formulations.moore_penrose import recover_solution, scaled_residual
 from mbref.kernels.compilation import exchangeable
-from mbref.kernels.layout import ACCELERATE, FACTORISATIONS, NOT_FINITE, OK, RANK_TOLERANCE, SINGULAR
+from mbref.kernels.layout import ACCELERATE, NOT_FINITE, OK, SINGULAR
+from mbref.kernels.named_memory import Matrix, Vector, opener
 from mbref.linear_algebra.orthogonal_factorisations import svd_solve
 
 
+class Scratch(NamedTuple):
+    """D, its right-hand side and the two solutions."""
+
+    d: Annotated[Matrix, "m", "n"]
+    b: Annotated[Vector, "m"]
+    x: Annotated[Vector, "n"]
+    dual: Annotated[Vector, "m"]
+
+
+scratch_of = opener(Scratch)
+
+
 @exchangeable(ACCELERATE)
-def accelerate(
-    mass, inverse_root, jacobian, force, rhs, settings, scratch, pivots, counts, acceleration, multipliers
-):
-    m, n = jacobian.shape
-    d = scratch[: m * n].reshape((m, n))
-    b = scratch[m * n : m * n + m]
-    x = scratch[m * n + m : m * n + m + n]
-    dual = scratch[m * n + m + n : m * n + m + n + m]
-    if not begin(mass, inverse_root, jacobian, force, rhs, d, b, acceleration, multipliers):
+def accelerate(system):
+    scratch = scratch_of(system.scratch)
+    if not scaled_residual(system, scratch.d, scratch.b):
         return SINGULAR
-    counts[FACTORISATIONS] += 1
-    if svd_solve(d, b, settings[RANK_TOLERANCE], x, dual) < 0:
+    system.counts.factorisations += 1
+    if svd_solve(scratch.d, scratch.b, system.settings.rank_tolerance, scratch.x, scratch.dual) < 0:
         return NOT_FINITE
-    finish(inverse_root, x, dual, acceleration, multipliers)
+    recover_solution(scratch.x, scratch.dual, system)
     return OK
 
 
@@ -35,7 +44,7 @@ MPI_SVD = Formulation(
     name="mpi-svd",
     equations="Eqs. 26-28",
     accelerate=accelerate,
-    scratch=lambda m, n: m * n + 2 * m + n,
+    linear_algebra=Dense(Scratch),
     pivots_by_size=True,
     handles_redundancy=True,
     handles_singular_mass=False,

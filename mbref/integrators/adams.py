@@ -10,25 +10,52 @@ estimates object.
 
 from __future__ import annotations
 
+from typing import Annotated, NamedTuple
+
 import numpy as np
 from numpy import sqrt
 
 from mbref.integrators.base import Integrator
 from mbref.kernels.compilation import exchangeable, kernel
-from mbref.kernels.layout import LARGEST_STEP, OK, ORDER, PROPOSE, STEP
+from mbref.kernels.layout import OK, PROPOSE, STEP
+from mbref.kernels.named_memory import Matrix, Vector, opener
 from mbref.linear_algebra.vectors import copy
 
 HIGHEST = 12
-# rows of memory: STATE, φ_1 to φ_(HIGHEST + 2), then
-STATE = 0
-# y' that the prediction implies, y' evaluated there less that; then numbers indexed from 1: ψ of the past,
-# and of the attempt ψ, β, g, σ and the integrals that g follows from
-IMPLIED, CHANGE, PAST_PSI, PSI, BETA, G, SIGMA, INTEGRALS = range(HIGHEST + 3, HIGHEST + 11)
-# entries of memory[STATE]: order (0: nothing is known yet); the next order, as the attempt has it; errors
-# estimated at orders k - 1 and k; order and length of the last step; steps in a row of that length;
-# whether the start is over; failed attempts in a row
-K, NEXT_K, ERROR_BELOW, ERROR, LAST_K, LAST_H, EQUAL, SETTLED, FAILED = range(9)
 AIM = 0.5  # the error, in tolerances, that steps are chosen for
+
+
+class Progress(NamedTuple):
+    """Numbers of the order and step control."""
+
+    restart: int = -1  # ``clock.restart`` of the past that is kept
+    order: int = 0
+    next_order: int = 0  # as the attempt has it
+    error_below: float = 0.0  # estimated at the order below
+    error: float = 0.0
+    last_order: int = 0
+    last_step: float = 0.0  # s
+    equal_steps: float = 0.0  # steps in a row of that length
+    settled: int = 0  # whether the start is over
+    failed: int = 0  # attempts in a row
+
+
+class Past(NamedTuple):
+    """Modified divided differences φ_i of y' (row i), and numbers indexed from 1."""
+
+    differences: Annotated[Matrix, HIGHEST + 3, "14*nb"]
+    implied: Annotated[Vector, "14*nb"]  # y' that the prediction implies
+    change: Annotated[Vector, "14*nb"]  # y' evaluated there less that
+    past_psi: Annotated[Vector, HIGHEST + 3]  # s, time since the last state but i
+    psi: Annotated[Vector, HIGHEST + 3]  # of the attempt, as beta, g, sigma and the integrals of g
+    beta: Annotated[Vector, HIGHEST + 3]
+    g: Annotated[Vector, HIGHEST + 3]
+    sigma: Annotated[Vector, HIGHEST + 3]
+    integrals: Annotated[Vector, HIGHEST + 3]
+    progress: Progress
+
+
+past_of = opener(Past)
 
 
 def _gamma_star() -> np.ndarray:
@@ -44,20 +71,20 @@ GAMMA_STAR = _gamma_star()
 
 
 @kernel
-def norm(vector, y, tolerances):
+def norm(vector, y, control):
     """Euclidean norm of a vector in tolerances of y, as in STEP."""
     total = 0.0
     for i in range(y.shape[0]):
-        ratio = vector[i] / (tolerances[1] + tolerances[0] * abs(y[i]))
+        ratio = vector[i] / (control.atol + control.rtol * abs(y[i]))
         total += ratio * ratio
     return sqrt(total)
 
 
 @kernel
-def coefficients(h, k, memory):
+def find_coefficients(h, k, memory):
     """ψ, β, g and σ of a step of length h at order k, from the past ψ."""
-    past, psi, beta = memory[PAST_PSI], memory[PSI], memory[BETA]
-    g, sigma, integrals = memory[G], memory[SIGMA], memory[INTEGRALS]
+    past, psi, beta = memory.past_psi, memory.psi, memory.beta
+    g, sigma, integrals = memory.g, memory.sigma, memory.integrals
     psi[1], beta[1], sigma[1] = h, 1.0, 1.0
     for i in range(2, HIGHEST + 2):
         known = past[i - 1] > 0.0  # otherwise the run is younger than that
@@ -75,127 +102,139 @@ def coefficients(h, k, memory):
 
 
 @kernel
-def predict(h, k, y, y_new, memory):
+def predict(h, k, y, y_new, past):
     """y of order k after a step h, and y' that its polynomial has there."""
     for i in range(y.shape[0]):
         slope, rate = 0.0, 0.0
         for j in range(k, 0, -1):
-            difference = memory[BETA, j] * memory[j, i]
-            slope += memory[G, j] * difference
+            difference = past.beta[j] * past.differences[j, i]
+            slope += past.g[j] * difference
             rate += difference
         y_new[i] = y[i] + h * slope
-        memory[IMPLIED, i] = rate
+        past.implied[i] = rate
 
 
 @kernel
-def estimate(h, k, y, memory, tolerances):
+def estimate(h, k, y, past, control):
     """Errors at orders k and below, and the order they speak for; returns the error ratio of the step."""
-    state, change, sigma, g = memory[STATE], memory[CHANGE], memory[SIGMA], memory[G]
-    size, error = h * norm(change, y, tolerances), 0.0
-    state[ERROR] = size * sigma[k + 1] * GAMMA_STAR[k]
-    state[NEXT_K] = k
+    progress, sigma, g = past.progress, past.sigma, past.g
+    change = past.change[: y.shape[0]]
+    size, error = h * norm(change, y, control), 0.0
+    progress.error = size * sigma[k + 1] * GAMMA_STAR[k]
+    progress.next_order = k
     for order in range(k - 1, max(0, k - 3), -1):
         for i in range(y.shape[0]):
-            change[i] += memory[BETA, order + 1] * memory[order + 1, i]
-        error = h * norm(change, y, tolerances) * sigma[order + 1] * GAMMA_STAR[order]
+            change[i] += past.beta[order + 1] * past.differences[order + 1, i]
+        error = h * norm(change, y, control) * sigma[order + 1] * GAMMA_STAR[order]
         if order == k - 1:
-            state[ERROR_BELOW] = error
-    allowed = state[ERROR] if k > 2 else 0.5 * state[ERROR]
-    if k > 1 and max(error, state[ERROR_BELOW]) <= allowed:
-        state[NEXT_K] = k - 1
+            progress.error_below = error
+    allowed = progress.error if k > 2 else 0.5 * progress.error
+    if k > 1 and max(error, progress.error_below) <= allowed:
+        progress.next_order = k - 1
     return size * (g[k] - g[k + 1])
 
 
 @exchangeable(STEP)
-def step(
-    rates, accelerate, t, h, y, y_rate, y_new, memory, tolerances,
-    problem,
-):  # fmt: skip
-    n, k = y.shape[0], int(memory[STATE, K])
-    memory[STATE, NEXT_K] = k
-    coefficients(h, k, memory)
-    predict(h, k, y, y_new, memory)
-    change = memory[CHANGE, :n]
-    status = rates(accelerate, t + h, y_new, change, problem)
+def step(rates, t, h, y, y_rate, y_new, memory):
+    past = past_of(memory.integrator)
+    n, k = y.shape[0], past.progress.order
+    past.progress.next_order = k
+    find_coefficients(h, k, past)
+    predict(h, k, y, y_new, past)
+    change = past.change[:n]
+    status = rates(t + h, y_new, change, memory)
     if status != OK:
         return -float(status)
     for i in range(n):
-        change[i] -= memory[IMPLIED, i]
-        y_new[i] += h * memory[G, k + 1] * change[i]
-    return estimate(h, k, y, memory, tolerances)
+        change[i] -= past.implied[i]
+        y_new[i] += h * past.g[k + 1] * change[i]
+    return estimate(h, k, y, past, memory.control)
 
 
 @kernel
-def start(y, y_rate, memory, control, tolerances):
-    """Forget the past; a first step of order 1, its error guessed from the sizes of y and y'."""
-    memory[STATE, K] = 1.0
-    copy(y_rate, memory[1, : y.shape[0]])
-    rate, least = norm(y_rate, y, tolerances), 1e-6 * control[LARGEST_STEP]
-    return max(least, 0.25 * sqrt(max(1.0, norm(y, y, tolerances))) / rate) if rate > 0.0 else least
+def forget(past, restart):
+    """Begin a new smooth piece."""
+    past.differences[:] = 0.0
+    past.past_psi[:] = 0.0
+    progress = past.progress
+    progress.restart, progress.order, progress.last_order, progress.last_step = restart, 1, 0, 0.0
+    progress.equal_steps, progress.settled, progress.failed = 0.0, 0, 0
 
 
 @kernel
-def remember(h, k, y_rate, memory):
+def first_step(y, y_rate, control):
+    """STEP's own first step, of order 1, its error guessed from the sizes of y and y'.
+
+    Apart from ``one_step.first_step``, because a step of order 1 must be shorter than one of order 8.
+    """
+    rate, least = norm(y_rate, y, control), 1e-6 * control.largest_step
+    return max(least, 0.25 * sqrt(max(1.0, norm(y, y, control))) / rate) if rate > 0.0 else least
+
+
+@kernel
+def remember(h, k, y_rate, past):
     """Differences and ψ after a step of length h at order k that ended with rates y'."""
-    state, beta = memory[STATE], memory[BETA]
+    progress, beta, differences = past.progress, past.beta, past.differences
     for i in range(y_rate.shape[0]):
-        difference = y_rate[i] - memory[IMPLIED, i]
-        memory[k + 2, i] = difference - beta[k + 1] * memory[k + 1, i]
-        memory[k + 1, i] = difference
+        difference = y_rate[i] - past.implied[i]
+        differences[k + 2, i] = difference - beta[k + 1] * differences[k + 1, i]
+        differences[k + 1, i] = difference
         for j in range(k, 0, -1):
-            difference += beta[j] * memory[j, i]
-            memory[j, i] = difference
-    copy(memory[PSI, 1 : HIGHEST + 2], memory[PAST_PSI, 1 : HIGHEST + 2])
-    equal = state[EQUAL] if h == state[LAST_H] else 0.0
-    state[EQUAL] = min(equal, state[LAST_K]) + 1.0
-    state[LAST_K], state[LAST_H], state[FAILED] = k, h, 0.0
+            difference += beta[j] * differences[j, i]
+            differences[j, i] = difference
+    copy(past.psi[1 : HIGHEST + 2], past.past_psi[1 : HIGHEST + 2])
+    equal = progress.equal_steps if h == progress.last_step else 0.0
+    progress.equal_steps = min(equal, float(progress.last_order)) + 1.0
+    progress.last_order, progress.last_step, progress.failed = k, h, 0
 
 
 @kernel
-def choose_order(h, k, highest, y, memory, tolerances):
-    """The order of the next step, with ``ERROR`` its error; sets ``SETTLED`` when the start is over."""
-    state = memory[STATE]
-    if state[NEXT_K] < k or k == highest:
-        state[SETTLED] = 1.0
-    if state[NEXT_K] < k:
-        state[ERROR] = state[ERROR_BELOW]
+def choose_order(h, y, past, control):
+    """The order of the next step, with ``error`` its error; sets ``settled`` when the start is over."""
+    progress, highest = past.progress, int(control.order)
+    k = progress.order
+    if progress.next_order < k or k == highest:
+        progress.settled = 1
+    if progress.next_order < k:
+        progress.error = progress.error_below
         return k - 1
-    if state[SETTLED] == 0.0:
+    if progress.settled == 0:
         return k + 1
-    if k + 1 > state[EQUAL]:
+    if k + 1 > progress.equal_steps:
         return k  # the estimate at order k + 1 needs equal steps
-    above = h * norm(memory[k + 2], y, tolerances) * GAMMA_STAR[k + 1]
-    if k > 1 and state[ERROR_BELOW] <= min(state[ERROR], above):
-        state[ERROR] = state[ERROR_BELOW]
+    above = h * norm(past.differences[k + 2], y, control) * GAMMA_STAR[k + 1]
+    if k > 1 and progress.error_below <= min(progress.error, above):
+        progress.error = progress.error_below
         return k - 1
-    if k == highest or above >= (state[ERROR] if k > 1 else 0.5 * state[ERROR]):
+    if k == highest or above >= (progress.error if k > 1 else 0.5 * progress.error):
         return k
-    state[ERROR] = above
+    progress.error = above
     return k + 1
 
 
 @exchangeable(PROPOSE)
-def propose(h, suggested, ratio, y, y_rate, memory, control, tolerances):
-    state = memory[STATE]
-    if state[K] == 0.0:
-        return start(y, y_rate, memory, control, tolerances)
+def propose(h, suggested, ratio, y, y_rate, memory):
+    past, control = past_of(memory.integrator), memory.control
+    progress = past.progress
+    if progress.restart != memory.loop.clock.restart:
+        forget(past, memory.loop.clock.restart)
+        copy(y_rate, past.differences[1, : y.shape[0]])
+        return first_step(y, y_rate, control)
     if 0.0 <= ratio <= 1.0:
-        remember(h, int(state[K]), y_rate, memory)
-        k = choose_order(h, int(state[K]), int(control[ORDER]), y, memory, tolerances)
-        state[K] = k
-        if state[SETTLED] == 0.0 or state[ERROR] * 2.0 ** (k + 1) <= AIM:
+        remember(h, progress.order, y_rate, past)
+        k = choose_order(h, y, past, control)
+        progress.order = k
+        if progress.settled == 0 or progress.error * 2.0 ** (k + 1) <= AIM:
             return 2.0 * h
-        if state[ERROR] <= AIM:
+        if progress.error <= AIM:
             return h
-        return h * max(0.5, min(0.9, (AIM / state[ERROR]) ** (1.0 / (k + 1))))
-    state[SETTLED] = 1.0
-    state[FAILED] += 1.0
-    state[K] = 1.0 if state[FAILED] >= 3.0 else state[NEXT_K]
-    if state[FAILED] > 3.0 and ratio > 1.0 and 0.25 * state[ERROR] > AIM:
-        return h * sqrt(AIM / state[ERROR])
+        return h * max(0.5, min(0.9, (AIM / progress.error) ** (1.0 / (k + 1))))
+    progress.settled = 1
+    progress.failed += 1
+    progress.order = 1 if progress.failed >= 3 else progress.next_order
+    if progress.failed > 3 and ratio > 1.0 and 0.25 * progress.error > AIM:
+        return h * sqrt(AIM / progress.error)
     return 0.5 * h
 
 
-ADAMS = Integrator(
-    "adams", HIGHEST, step, propose, HIGHEST + 11, adaptive=True, options={"max_order": HIGHEST}
-)
+ADAMS = Integrator("adams", HIGHEST, step, propose, Past, adaptive=True, options={"max_order": HIGHEST})

@@ -10,26 +10,26 @@ from mbref.kernels.compilation import Exchangeable
 
 @dataclass(frozen=True)
 class Integrator:
-    """``step(rates, accelerate, t, h, y, y', y_new, memory, tolerances, …) -> error ratio``.
+    """``step(rates, t, h, y, y', y_new, memory) -> error ratio`` and ``propose`` are kernels.
 
-    The kernel writes ``y_new``; its result is the estimated local error over the tolerance (accept up to
+    ``step`` writes ``y_new``; its result is the estimated local error over the tolerance (accept up to
     1; a fixed-step method returns 0), or minus the status of an evaluation that failed.
 
-    ``propose(h, suggested, ratio, y, y', memory, control, tolerances) -> next step`` chooses the length of
-    the next attempt once the last, of length h, is judged; ``suggested`` is what h was before the sample
-    times cut it.  Accepted (ratio from 0 to 1): y and y' are the new state and its rates.  Otherwise they
-    are the old ones.  Before the first step h is 0.
+    ``propose(h, suggested, ratio, y, y', memory) -> next step`` chooses the length of the next attempt
+    once the last, of length h, is judged; ``suggested`` is h before the sample times cut it.  Accepted
+    (ratio from 0 to 1): y and y' are the new state and its rates.  Otherwise they are the old ones.  Before
+    the first step h is 0.
 
-    ``memory`` has ``rows`` rows of at least 14 numbers, at least the length of y, and is the integrator's
-    own; the loop fills it with zeros before the first step and whenever y changes its meaning or jumps.
-    An option ``max_order`` bounds the order, which reaches the kernels as ``control[ORDER]``.
+    ``schema`` declares the integrator's own memory, in ``Memory.integrator``.  The states since step
+    ``clock.restart`` are one smooth piece: y changed its meaning or jumped there.  An option ``max_order``
+    bounds the order, which reaches the kernels as ``control.order``.
     """
 
     name: str
     order: int
     step: Exchangeable
     propose: Exchangeable
-    rows: int
+    schema: type
     adaptive: bool
     options: Mapping[str, float] = field(default_factory=dict)
     integrates: bool = True  # otherwise only where drivers leave no freedom

@@ -1,25 +1,44 @@
 """DOP853: explicit Runge–Kutta of order 8 with error estimates of orders 5 and 3, adaptive.
 
-The error of a step is the largest over the components, so that components at rest do not dilute it.
+The 8(5,3) pair of Dormand and Prince (Hairer, Nørsett & Wanner, Solving Ordinary Differential Equations I,
+2nd edition, 1993, section II.5), with SciPy's coefficients.  The error of a step is the largest over the
+components, so that components at rest do not dilute it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Annotated, NamedTuple
 
+import scipy.integrate
 from numpy import sqrt
 
 from mbref.integrators.base import Integrator
-from mbref.integrators.coefficients import ERROR3, ERROR5, STAGES, A, B, C
 from mbref.integrators.one_step import propose
 from mbref.kernels.compilation import exchangeable, inlined
 from mbref.kernels.layout import OK, STEP
+from mbref.kernels.named_memory import Matrix, Vector, opener
 from mbref.linear_algebra.vectors import copy, larger
+
+STAGES = 12
+A, B, C = scipy.integrate.DOP853.A[:STAGES, :STAGES], scipy.integrate.DOP853.B, scipy.integrate.DOP853.C
+ERROR3, ERROR5 = scipy.integrate.DOP853.E3[:STAGES], scipy.integrate.DOP853.E5[:STAGES]
+
+
+class Stages(NamedTuple):
+    """Slopes of the stages, and both error estimates over the tolerance."""
+
+    slopes: Annotated[Matrix, 12, "14*nb"]
+    errors3: Annotated[Vector, "14*nb"]
+    errors5: Annotated[Vector, "14*nb"]
+
+
+stages_of = opener(Stages)
 
 
 def sum_with(weights: Sequence[float]) -> Callable:
     """A kernel (k, i) -> Σ_s weights[s] k[s, i], with the weights as constants; zeros cost nothing."""
-    count = len(weights)
+    count, weights = len(weights), tuple(map(float, weights))
 
     @inlined
     def weighted(k, i):
@@ -39,22 +58,22 @@ def stages_to(last: int) -> Callable:
     """
     if last == 0:
         return no_stage
-    before, weighted, node = stages_to(last - 1), sum_with(A[last, :last]), C[last]
+    before, weighted, node = stages_to(last - 1), sum_with(A[last, :last]), float(C[last])
 
     @inlined
-    def stages(rates, accelerate, t, h, y, y_new, k, problem):
-        status = before(rates, accelerate, t, h, y, y_new, k, problem)
+    def stages(rates, t, h, y, y_new, k, memory):
+        status = before(rates, t, h, y, y_new, k, memory)
         if status != OK:
             return status
         for i in range(y.shape[0]):
             y_new[i] = y[i] + h * weighted(k, i)
-        return rates(accelerate, t + node * h, y_new, k[last, : y.shape[0]], problem)
+        return rates(t + node * h, y_new, k[last, : y.shape[0]], memory)
 
     return stages
 
 
 @inlined
-def no_stage(rates, accelerate, t, h, y, y_new, k, problem):
+def no_stage(rates, t, h, y, y_new, k, memory):
     """Stage 0 has the slope at y, which is known."""
     return OK
 
@@ -64,21 +83,20 @@ solution, third_order, fifth_order = (sum_with(weights) for weights in (B, ERROR
 
 
 @exchangeable(STEP)
-def step(
-    rates, accelerate, t, h, y, y_rate, y_new, memory, tolerances,
-    problem,
-):  # fmt: skip
-    copy(y_rate, memory[0, : y.shape[0]])
-    status = all_stages(rates, accelerate, t, h, y, y_new, memory, problem)
+def step(rates, t, h, y, y_rate, y_new, memory):
+    control, stages = memory.control, stages_of(memory.integrator)
+    slopes, errors3, errors5 = stages.slopes, stages.errors3, stages.errors5
+    copy(y_rate, slopes[0, : y.shape[0]])
+    status = all_stages(rates, t, h, y, y_new, slopes, memory)
     if status != OK:
         return -float(status)
     for i in range(y.shape[0]):
-        y_new[i] = y[i] + h * solution(memory, i)
-    errors3, errors5, error3, error5 = memory[1], memory[2], 0.0, 0.0  # stages of no weight in these sums
+        y_new[i] = y[i] + h * solution(slopes, i)
+    rtol, atol, error3, error5 = control.rtol, control.atol, 0.0, 0.0
     for i in range(y.shape[0]):
-        weight = 1.0 / (tolerances[1] + tolerances[0] * max(abs(y[i]), abs(y_new[i])))
-        errors3[i] = third_order(memory, i) * weight
-        errors5[i] = fifth_order(memory, i) * weight
+        weight = 1.0 / (atol + rtol * max(abs(y[i]), abs(y_new[i])))
+        errors3[i] = third_order(slopes, i) * weight
+        errors5[i] = fifth_order(slopes, i) * weight
     for i in range(y.shape[0]):
         error3, error5 = larger(error3, errors3[i]), larger(error5, errors5[i])
     if error5 == 0.0:
@@ -86,4 +104,4 @@ def step(
     return abs(h) * error5 * error5 / sqrt(error5 * error5 + 0.01 * error3 * error3)
 
 
-DOP853 = Integrator("dop853", 8, step, propose, STAGES, adaptive=True)
+DOP853 = Integrator("dop853", 8, step, propose, Stages, adaptive=True)

@@ -8,69 +8,53 @@ is off is judged by the one through a state fewer, so that Newton's method stays
 
 from __future__ import annotations
 
+from typing import Annotated, NamedTuple
+
 from mbref.integrators.base import Integrator
 from mbref.integrators.one_step import propose
-from mbref.kernels.arguments import opened
 from mbref.kernels.compilation import exchangeable, kernel
-from mbref.kernels.layout import LIVE, MOVING, STEP
-from mbref.linear_algebra.vectors import copy, larger
+from mbref.kernels.layout import STEP
+from mbref.kernels.named_memory import Vector, opener
+from mbref.linear_algebra.hermite import extrapolate
+from mbref.linear_algebra.vectors import larger
 
 NODES = 3
-NEARNESS = 2e-2  # of the step: what the polynomial of a state fewer may be off; the prediction is much nearer
-ROUNDING = 1e-9  # m or rad; what moves less is at rest but for rounding
+NEARNESS = 2e-2  # of the step: how far both polynomials may differ; the prediction is much nearer
+ROUNDING = 1e-9  # m or rad; a coordinate that moves less is at rest but for rounding
 ORDER = 3  # of the estimate as a part of the step
-FOUND, TIMES, OTHER = range(2 * NODES, 2 * NODES + 3)  # rows of the memory after the nodes' states and rates
+
+
+class Scratch(NamedTuple):
+    """The prediction by a state fewer."""
+
+    other: Annotated[Vector, "14*nb"]
+
+
+scratch_of = opener(Scratch)
 
 
 @kernel
-def remember(t, y, y_rate, memory):
-    """Make (t, y, y') the first of the nodes, unless it is from an earlier attempt; their number."""
-    n, found, times = y.shape[0], int(memory[FOUND, 0]), memory[TIMES]
-    if found > 0 and times[0] == t:
-        return found
-    for k in range(min(found, NODES - 1), 0, -1):
-        copy(memory[2 * k - 2, :n], memory[2 * k, :n])
-        copy(memory[2 * k - 1, :n], memory[2 * k + 1, :n])
-        times[k] = times[k - 1]
-    copy(y, memory[0, :n])
-    copy(y_rate, memory[1, :n])
-    times[0] = t
-    memory[FOUND, 0] = min(found + 1, NODES)
-    return int(memory[FOUND, 0])
-
-
-@kernel
-def add_hermite(t, found, memory, y):
-    """y += the polynomial through the first ``found`` nodes at t."""
-    n, times = y.shape[0], memory[TIMES]
-    for j in range(found):
-        basis, slope = 1.0, 0.0
-        for k in range(found):
-            if k != j:
-                basis *= (t - times[k]) / (times[j] - times[k])
-                slope += 1.0 / (times[j] - times[k])
-        of_state = (1.0 - 2.0 * (t - times[j]) * slope) * basis * basis
-        of_rate = (t - times[j]) * basis * basis
-        for i in range(n):
-            y[i] += of_state * memory[2 * j, i] + of_rate * memory[2 * j + 1, i]
+def last_nodes(memory):
+    """Make the last states, up to NODES of the same smooth piece, the nodes; their number."""
+    history, taken = memory.loop.history, memory.equations.system.counts.steps
+    found = min(NODES, taken - memory.loop.clock.restart + 1)
+    for k in range(found):
+        history.nodes[k] = (taken - k) % history.time.shape[0]
+    return found
 
 
 @exchangeable(STEP)
-def step(
-    rates, accelerate, t, h, y, y_rate, y_new, memory, tolerances,
-    problem,
-):  # fmt: skip
-    found, other = remember(t, y, y_rate, memory), memory[OTHER, : y.shape[0]]
-    y_new[:] = 0.0
-    add_hermite(t + h, found, memory, y_new)
+def step(rates, t, h, y, y_rate, y_new, memory):
+    history, found = memory.loop.history, last_nodes(memory)
+    other = scratch_of(memory.integrator).other[: y.shape[0]]
+    extrapolate(history, found, t + h, y_new)
     if found == 1:
         return 0.0
-    other[:] = 0.0
-    add_hermite(t + h, found - 1, memory, other)
+    extrapolate(history, found - 1, t + h, other)
     off, moved = 0.0, 0.0
-    for i in range(opened(problem)[0][LIVE][0, MOVING]):
+    for i in range(memory.active.coordinates.shape[0]):
         off, moved = larger(off, y_new[i] - other[i]), larger(moved, y_new[i] - y[i])
     return off / (NEARNESS * max(moved, ROUNDING))
 
 
-PREDICTOR = Integrator("predictor", ORDER, step, propose, 2 * NODES + 3, adaptive=True, integrates=False)
+PREDICTOR = Integrator("predictor", ORDER, step, propose, Scratch, adaptive=True, integrates=False)

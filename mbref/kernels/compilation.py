@@ -1,6 +1,6 @@
 """How kernels are compiled: once per machine and source version, cached on disk, replaceable.
 
-``kernel`` marks a helper that other kernels call, ``inlined`` and ``view`` one that becomes part of them,
+``kernel`` marks a helper that other kernels call, ``inlined`` one that becomes part of them,
 ``allocating`` one that makes arrays: no other can.
 ``exchangeable(signature)`` marks one that is passed to another kernel as an argument (a formulation, a
 chart, an integrator): it is compiled when it is first asked for, and the kernels that take it need no
@@ -34,7 +34,7 @@ PLAIN = bool(numba.config.DISABLE_JIT)
 VECTOR = types.Array(f8, 1, "C")
 MATRIX = types.Array(f8, 2, "C")
 INDICES = types.Array(i8, 1, "C")
-PLAN = types.Array(u4, 1, "C")
+UNSIGNED = types.Array(u4, 1, "C")
 INDEX_TABLE = types.Array(i8, 2, "C")
 FLOAT = f8
 INT = i8
@@ -88,11 +88,6 @@ def inlined(function: Callable) -> Callable:
 def allocating(function: Callable) -> Callable:
     """A kernel that allocates: numpy's decompositions do."""
     return _compiled(function, _nrt=True)
-
-
-def view(function: Callable) -> Callable:
-    """A kernel that returns arrays, parts of its arguments: its source becomes part of its callers'."""
-    return njit(inline="always")(function)
 
 
 def _compiled(function: Callable, **options: bool) -> Callable:

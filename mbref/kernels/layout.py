@@ -1,86 +1,285 @@
-"""The scene and the working memory as tuples of arrays: what every kernel takes.
+"""The memory of a simulation: every array and number that kernels share, by name, with shapes and units.
 
-``ints`` and ``floats`` hold the scene; no kernel changes them.  ``work`` holds what an evaluation produces.
-The names below are the positions in these tuples and the columns of their tables.
-Columns of the velocity vector: 6 per body, (r', ω') with ω' in the body's principal frame; of the
-coordinate vector: 7 per body, (r, Euler parameters).  Body ``nb`` is the fixed frame.
+Sizes: nb bodies, n = 6 nb velocities, m constraint rows, k sample times.
+Velocities are (r', ω') per body, ω' in the body's principal frame; coordinates are (r, Euler parameters).
+Body ``nb`` is the fixed frame.  Units are SI.
 """
 
 from __future__ import annotations
 
-from numba import types
+from typing import Annotated, NamedTuple
 
-from mbref.kernels.compilation import FLOAT, INDEX_TABLE, INDICES, INT, MATRIX, VECTOR, pointer_to
+from mbref.kernels.compilation import FLOAT, INT, VECTOR, pointer_to
+from mbref.kernels.named_memory import (
+    Address,
+    Indices,
+    Kernel,
+    Matrix,
+    Named,
+    Unsigned,
+    Vector,
+)
+from mbref.kernels.scene_layout import SceneData
 
-# ints
-PRIMITIVES = 0  # (primitives, 5): kind, first body, second body, driver or -1, first row
-ROW_BODIES = 1  # (rows, 2): the two bodies of each row, nb for the fixed frame
-LOADS = 2  # (loads, 4): kind, first body, second body, index of its unwrapped angle
-LIVE = 3  # (2, ·): the entries of y, see below
-# floats
-BODIES = 0  # (nb, 4): mass and principal moments
-GEOMETRY = 1  # (primitives, 16): see the columns below
-DRIVERS = 2  # (drivers, 3 + degree + 1): amplitude, frequency, phase, polynomial
-LOAD_DATA = 3  # (loads, 15): points or axes, then constants
-GRAVITY = 4  # (1, 3)
-# work
-FRAMES = 0  # (nb + 1, 18): position 3, rotation matrix 9 by rows, velocity 3, body-fixed angular velocity 3
-JACOBIAN = 1  # (rows, 12): the blocks of both bodies
-ROWS = 2  # (6, rows): see the rows below
-COLUMNS = 3  # (5, 6 nb): see the rows below
-STATE = 4  # (4, 7 nb): what the chart last made of its coordinates, see the rows below
-LAST = 5  # (4, 7 nb): STATE at the last accepted step
-DENSE = 6  # a matrix for the chart, and the table of extrapolations
-DENSE_VECTORS = 7  # (8, ·) vectors for the chart
-SCRATCH = 8  # (1, ·) memory of the formulation
-ANGLES = 9  # (1, torsion springs): unwrapped angle at the last accepted step
-PHI_Q = 10  # (rows, 6 nb): the dense constraint Jacobian
-MEMO = 11  # (1, 4): what a chart remembers between steps, see below
-
-PHI, NU, GAMMA, PHI_RATE, RHS, MULTIPLIERS = range(6)  # rows of ROWS
-FORCE, ACCELERATION, MASS, INVERSE_ROOT, STEP_X = range(5)  # rows of COLUMNS
-COORDINATES, VELOCITIES, COORDINATE_RATES, COORDINATE_SECOND = range(4)  # rows of STATE and LAST
-LAST_TIME, REFERENCE_PIVOT, SMALLEST_PIVOT, GENERIC_RANK = range(4)  # entries of MEMO
-ROW_ORDER, COLUMN_ORDER, SIZES, CHART_PIVOTS, FORMULATION_PIVOTS = range(5)  # rows of pivots
-
-# ints[LIVE][0]: how many coordinates and velocities y has, and where the pieces of machine code of the
-# scene's own are (see specialised/chart.py).  ints[LIVE][1]: which coordinates, then which velocities
-MOVING, TURNING, RATES_CODE, PROJECT_CODE = range(4)
-
-POSITION, ROTATION, VELOCITY, OMEGA = 0, 3, 12, 15  # columns of FRAMES
-POINT_I, POINT_J, U_I, W_I, U_J, LENGTH = 0, 3, 6, 9, 12, 15  # columns of GEOMETRY
-POINT, DOT1, DOT2, DISTANCE = range(4)  # kinds of primitives
-MOMENT, FORCE_AT_POINT, SPRING, TORSION_SPRING = range(4)  # kinds of loads
-
-# control, an array of floats: what the loop is to keep to
-(
-    ORDER, FIXED_STEP, SMALLEST_STEP, LARGEST_STEP, LARGEST_TURN, VIOLATION, MOST_STEPS, STEPS_PER_CALL,
-    FORCED_STEP, FIRST_STEP,
-) = range(10)  # fmt: skip
-
-# counts, an array of integers that kernels add to
-STEPS, REJECTED, EVALUATIONS, FACTORISATIONS, NEWTON, CROSSINGS = range(6)
-
-# settings, an array of floats
-VELOCITY_GAIN, POSITION_GAIN, RANK_TOLERANCE, NEWTON_TOLERANCE, KEPT_PARTITION = range(5)
-FORMULATION_OPTIONS = 5  # a formulation's own numbers start here
+KEPT = 48  # states in a history
 
 # status of an evaluation or of a step
 OK, SINGULAR, NOT_CONVERGED, NOT_FINITE = range(4)
-CHANGED, HANDOVER = 4, 5  # the chart chose new coordinates; its rates leave the state to the careful ones
+CHANGED, GUARD_FAILED = 4, 5  # the chart chose new coordinates; specialised code does not hold here
 
-INTS = types.UniTuple(INDEX_TABLE, 4)
-FLOATS = types.UniTuple(MATRIX, 5)
-WORK = types.UniTuple(MATRIX, 12)
-# pivots (5, ·), an index table: orders and exchanges; pivots[SIZES] = rank (of partitioning) and length of y
-PROBLEM = INDEX_TABLE  # all of these, settings and counts behind one argument: see problem.py
+
+class Frames(NamedTuple):
+    """World positions, rotation matrices by rows, world velocities, body-fixed angular velocities."""
+
+    position: Annotated[Matrix, "nb + 1", 3]
+    rotation: Annotated[Matrix, "nb + 1", 9]
+    velocity: Annotated[Matrix, "nb + 1", 3]
+    angular_velocity: Annotated[Matrix, "nb + 1", 3]
+
+
+class Rows(NamedTuple):
+    """Per constraint row: Φ, ν and γ of Eqs. 1 to 3 and Φ' = Φ_q v - ν."""
+
+    phi: Annotated[Vector, "m"]
+    nu: Annotated[Vector, "m"]
+    gamma: Annotated[Vector, "m"]
+    phi_rate: Annotated[Vector, "m"]
+
+
+class Settings(NamedTuple):
+    """Numbers of a method: gains of Φ' and Φ in the right-hand side (Eq. 9), tolerances."""
+
+    velocity_gain: float = 0.0
+    position_gain: float = 0.0
+    rank_tolerance: float = 1e-10
+    newton_tolerance: float = 1e-13
+
+
+class Counts(NamedTuple):
+    """How often each operation was done."""
+
+    steps: int = 0
+    rejected: int = 0
+    evaluations: int = 0
+    factorisations: int = 0
+    newton: int = 0
+    crossings: int = 0
+
+
+class System(NamedTuple):
+    """M q̈ + Φ_qᵀ λ = g, Φ_q q̈ = rhs: all that a formulation sees.  It writes acceleration and multipliers.
+
+    The constraint Jacobian stands as the blocks of both bodies' columns, or as a dense matrix, or both: a
+    formulation says which one it reads (``LinearAlgebra``).
+    """
+
+    mass: Annotated[Vector, "n"]  # diagonal of M
+    inverse_root: Annotated[Vector, "n"]  # M^(-1/2); 1 where the mass is zero
+    force: Annotated[Vector, "n"]  # g
+    acceleration: Annotated[Vector, "n"]  # q̈
+    blocks: Annotated[Matrix, "m", 12]
+    jacobian: Annotated[Matrix, "dense_rows", "n"]
+    rhs: Annotated[Vector, "m"]
+    multipliers: Annotated[Vector, "m"]  # λ
+    settings: Settings
+    counts: Counts
+    options: Address  # the formulation's own numbers
+    scratch: Address  # the formulation's own memory
+
+
+class Equations(NamedTuple):
+    """What one evaluation reads and writes."""
+
+    scene: SceneData
+    frames: Frames
+    rows: Rows
+    system: System
+    angles: Annotated[Vector, "angles"]  # rad, of torsion springs at the last accepted step, unwrapped
+
+
+class State(NamedTuple):
+    """q, v, q' and q''."""
+
+    coordinates: Annotated[Vector, "7*nb"]
+    velocities: Annotated[Vector, "n"]
+    coordinate_rates: Annotated[Vector, "7*nb"]
+    coordinate_second: Annotated[Vector, "7*nb"]
+
+
+class Active(NamedTuple):
+    """Which entries of q and of v are integrated: y = (q[coordinates], v[velocities])."""
+
+    coordinates: Annotated[Indices, 0]
+    velocities: Annotated[Indices, 0]
+
+
+class Symbolic(NamedTuple):
+    """Where every number of D, S = D Dᵀ and its factor L stands; r rows and c columns take part."""
+
+    row: Annotated[Unsigned, "r"]  # the system's row of each row here, in the order of elimination
+    column: Annotated[Unsigned, "c"]  # the system's column of each column here
+    d_start: Annotated[Unsigned, "r + 1"]  # where each row of D begins
+    d_entry: Annotated[Unsigned, "nd"]  # place of each number of D among those of the constraint Jacobian
+    d_column: Annotated[Unsigned, "nd"]
+    s_start: Annotated[Unsigned, "ns + 1"]  # where the products of each number of S begin
+    s_target: Annotated[Unsigned, "ns"]  # place of that number in L
+    s_left: Annotated[Unsigned, "products"]  # the products: two numbers of D
+    s_right: Annotated[Unsigned, "products"]
+    l_start: Annotated[Unsigned, "r + 1"]  # where each column of L begins, its diagonal first
+    l_row: Annotated[Unsigned, "nl"]
+    update: Annotated[Unsigned, "updates"]  # places in L that the elimination of each column changes
+
+
+class StaticRows(NamedTuple):
+    """Statically determined rows: each holds columns at rest; its multiplier balances the force there."""
+
+    row: Annotated[Unsigned, "h"]
+    start: Annotated[Unsigned, "h + 1"]  # where the entries of each row begin
+    entry: Annotated[Unsigned, "e"]  # their places in the blocks
+    column: Annotated[Unsigned, "e"]
+    other_start: Annotated[Unsigned, "e + 1"]  # where the entries of other rows in that column begin
+    other: Annotated[Unsigned, "o"]
+
+
+class SparseFactor(NamedTuple):
+    """D = Φ_q M^(-1/2) and the factor L Δ Lᵀ of S + I/α over the rows and columns of ``symbolic``."""
+
+    symbolic: Symbolic
+    static: StaticRows
+    d: Annotated[Vector, "nd"]
+    l: Annotated[Vector, "nl"]
+    diagonal: Annotated[Vector, "r"]  # S_ii (1 + 1/α)
+    squared_pivots: Annotated[Vector, "r"]
+    residual: Annotated[Vector, "r"]
+    step: Annotated[Vector, "r"]
+    total: Annotated[Vector, "r"]
+    root: Annotated[Vector, "c"]  # M^(-1/2)
+    change: Annotated[Vector, "c"]
+
+
+class Control(NamedTuple):
+    """Limits of the stepping loop."""
+
+    order: float  # of the integrator
+    fixed_step: float  # s; 0 for an adaptive integrator
+    smallest_step: float  # s
+    largest_step: float  # s
+    largest_turn: float  # rad that a body may turn in a step
+    violation: float  # largest |Φ| (m or rad)
+    most_steps: float
+    steps_per_call: float
+    forced_step: float  # s; a step this short is taken whatever its error estimate
+    first_step: float  # s; 0 where the integrator chooses it
+    rtol: float
+    atol: float
+
+
+class Watch(NamedTuple):
+    """The pivots of the constraint Jacobian that a chart watches, and when it last accepted a state."""
+
+    smallest_pivot: float = 0.0
+    reference_pivot: float = 0.0  # the largest that smallest_pivot has been; 0 where nothing is watched
+    generic_rank: int = 0
+    accepted_time: float = 0.0  # s
+
+
+class Clock(NamedTuple):
+    """Where the stepping loop is."""
+
+    time: float = 0.0  # s
+    length: float = 0.0  # s, of the last step
+    suggested: float = 0.0  # s, that length before sample times cut it
+    ratio: float = 0.0  # error of the last step over its tolerance
+    y_size: int = 0  # length of y
+    sample: int = 0  # the next one to take
+    restart: int = 0  # the step since which the states are one smooth piece
+    violated_row: int = -1
+
+
+class Samples(NamedTuple):
+    """What is recorded at the sample times."""
+
+    coordinates: Annotated[Matrix, "k", "7*nb"]
+    velocities: Annotated[Matrix, "k", "n"]
+    accelerations: Annotated[Matrix, "k", "n"]
+    multipliers: Annotated[Matrix, "k", "m"]
+
+
+class History(NamedTuple):
+    """The last accepted states, a ring: step s stands in row s mod KEPT."""
+
+    time: Annotated[Vector, KEPT]
+    pivot: Annotated[Vector, KEPT]  # relative, see Watch
+    y: Annotated[Matrix, KEPT, "14*nb"]
+    y_rate: Annotated[Matrix, KEPT, "14*nb"]
+    nodes: Annotated[Indices, KEPT]  # rows chosen for an extrapolation
+    weights: Annotated[Matrix, 4, KEPT]  # of the nodes in an extrapolation
+
+
+class Loop(NamedTuple):
+    """Memory of the stepping loop."""
+
+    times: Annotated[Vector, "k"]
+    samples: Samples
+    clock: Clock
+    y: Annotated[Vector, "14*nb"]
+    y_rate: Annotated[Vector, "14*nb"]
+    y_new: Annotated[Vector, "14*nb"]
+    history: History
+
+
+class Kernels(NamedTuple):
+    """The exchangeable kernels of a run."""
+
+    step: Annotated[Kernel, STEP]
+    propose: Annotated[Kernel, PROPOSE]
+    rates: Annotated[Kernel, RATES]
+    rates_with_outputs: Annotated[Kernel, RATES]
+    fallback_rates: Annotated[Kernel, RATES]
+    accept: Annotated[Kernel, ACCEPT]
+    accelerate: Annotated[Kernel, ACCELERATE]
+
+
+class Addresses(NamedTuple):
+    """Addresses of the machine code made for the scene; 0 without."""
+
+    rates: int = 0
+    project: int = 0
+
+
+class SpecialisedCode(NamedTuple):
+    """Machine code made for the scene, and the results of its projection."""
+
+    addresses: Addresses
+    y: Annotated[Vector, "14*nb"]  # after one Newton step
+    outputs: Annotated[Vector, "m + 1"]  # the largest |Φ| before the step, and the squared pivots
+
+
+class Memory(NamedTuple):
+    """Everything that kernels share."""
+
+    equations: Equations
+    state: State
+    previous: State  # at the last accepted step
+    active: Active
+    factor: SparseFactor
+    control: Control
+    watch: Watch
+    loop: Loop
+    kernels: Kernels
+    code: SpecialisedCode
+    chart: Address  # the stabilisation's own memory
+    chart_options: Address  # and its numbers
+    integrator: Address  # the integrator's own memory
+
+
+MEMORY, SYSTEM = Named(Memory), Named(System)
+EQUATIONS = Named(Equations)
 
 # signatures of the exchangeable kernels
-ACCELERATE = INT(VECTOR, VECTOR, MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, INDICES, INDICES, VECTOR, VECTOR)
-ENTER = INT(FLOAT, VECTOR, PROBLEM)
-RATES = INT(pointer_to(ACCELERATE), FLOAT, VECTOR, VECTOR, PROBLEM)
-ACCEPT = INT(FLOAT, VECTOR, PROBLEM)
-STEP = FLOAT(
-    pointer_to(RATES), pointer_to(ACCELERATE), FLOAT, FLOAT, VECTOR, VECTOR, VECTOR, MATRIX, VECTOR, PROBLEM
-)  # fmt: skip
-PROPOSE = FLOAT(FLOAT, FLOAT, FLOAT, VECTOR, VECTOR, MATRIX, VECTOR, VECTOR)
+ACCELERATE = INT(SYSTEM)
+ENTER = INT(FLOAT, VECTOR, MEMORY)  # t, y
+RATES = INT(FLOAT, VECTOR, VECTOR, MEMORY)  # t, y, y'
+ACCEPT = INT(FLOAT, VECTOR, MEMORY)  # t, y
+STEP = FLOAT(pointer_to(RATES), FLOAT, FLOAT, VECTOR, VECTOR, VECTOR, MEMORY)  # rates, t, h, y, y', y_new
+PROPOSE = FLOAT(FLOAT, FLOAT, FLOAT, VECTOR, VECTOR, MEMORY)  # h, suggested, ratio, y, y'

@@ -135,28 +135,6 @@ def gram(dt, s):
 
 
 @kernel
-def add_product(dt, x, sign, y):
-    """y += sign D x from Dᵀ (n, m)."""
-    n, m = dt.shape
-    for j in range(n):
-        value = sign * x[j]
-        for i in range(m):
-            y[i] += value * dt[j, i]
-
-
-@kernel
-def times_transpose(d, y, x):
-    """x = Dᵀ y from D (m, n)."""
-    m, n = d.shape
-    for j in range(n):
-        x[j] = 0.0
-    for i in range(m):
-        value = y[i]
-        for j in range(n):
-            x[j] += value * d[i, j]
-
-
-@kernel
 def cholesky_factor(a, n):
     """Uᵀ D U of the upper half of a[:n, :n], in place; False where an entry of D is ≤ 0.
 

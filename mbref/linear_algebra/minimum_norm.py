@@ -1,46 +1,144 @@
-"""Least changes of large systems, outside the stepping loop: ALF-dual on SuperLU's factor of S + I/α."""
+"""Minimum-norm solutions of D x = b with dependent rows, by the augmented Lagrangian iteration in the dual.
+
+    (S + I/α) Δ = b - D x,   x += Dᵀ Δ,   S = D Dᵀ,   x_0 = 0
+
+With D = Φ_q M^(-1/2) and change M^(-1/2) x, the change is the least in the metric of M by which Φ_q times it
+grows by b, and redundant rows do not disturb it; the rest of the growth shrinks by 1 / (1 + α σ²) an
+iteration, σ being a singular value of unit rows.  No rank is decided.  ALF-dual (``formulations.alf_dual``),
+the projection and the consistent start are this iteration.  b stands in ``factor.residual``.
+"""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array, eye_array
-from scipy.sparse.linalg import splu
+from numpy import sqrt
+from scipy.sparse import csr_array
 
-from mbref.equations.model import Model
+from mbref.kernels.compilation import FLOAT, INT, VECTOR, entry, inlined
+from mbref.kernels.layout import NOT_CONVERGED, OK, SparseFactor
+from mbref.kernels.named_memory import Named, packed
+from mbref.linear_algebra.sparse_cholesky import regularised_factor, solve, subtract_product, times_transpose
+from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation
+from mbref.linear_algebra.vectors import copy
 
-LARGE = 40  # rows; above, dense singular values take longer
-ALPHA = 1e10  # singular values below 1e-5 of unit rows are left alone
+TINY, NEVER = 1e-300, 1e300
+LEAST = 2  # iterations of ``solve_to_tolerance``: enough but near singular positions, so that they are fixed
+ALPHA = 1e10  # of systems solved once: singular values below 1e-5 of unit rows are left alone
 ITERATIONS, ROUNDING = 20, 1e-15
+FACTOR = Named(SparseFactor)
 
 
-def sparse_jacobian(model: Model, blocks: np.ndarray) -> csr_array:
-    """Φ_q (m, n) from its blocks (m, 12), without the fixed frame's columns and without zeros."""
-    columns = model.entry_columns()
-    row, entry = np.nonzero((blocks != 0) & (columns < model.n))
-    return csr_array((blocks[row, entry], (row, columns[row, entry])), shape=(model.m, model.n))
+@inlined
+def solve_to_tolerance(factor, epsilon, most, target, multipliers):
+    """Change ``target`` (n,) by the least that makes Φ_q target grow by the residual.
+
+    Stops when the next change would be ≤ ``epsilon``, judged by how the changes shrink.  ``multipliers``
+    (m,) become the sums of -Δ in the rows that take part.  Returns OK; NOT_CONVERGED after ``most``.
+    """
+    row, step, total = factor.symbolic.row, factor.step, factor.total
+    total[:] = 0.0
+    status, change, expected = NOT_CONVERGED, 0.0, NEVER
+    for k in range(most):
+        if k > 0:
+            subtract_product(factor, factor.change, factor.residual)
+        last, change = change, iterate(factor, target)
+        for i in range(row.shape[0]):
+            total[i] -= step[i]
+        expected = min(expected, change * min(1.0, change / max(last, TINY)))
+        if k + 1 >= min(LEAST, most) and expected <= epsilon:
+            status = OK
+            break
+    for i in range(row.shape[0]):
+        multipliers[row[i]] = total[i]
+    return status
 
 
-class LeastChange:
-    """Solutions x of A x = b, least in the norm of the weights (n,); rows of A may be redundant."""
+@inlined
+def solve_fixed_iterations(factor, iterations, target):
+    """As ``solve_to_tolerance`` with a fixed number of iterations."""
+    for k in range(iterations):
+        if k > 0:
+            subtract_product(factor, factor.change, factor.residual)
+        iterate(factor, target)
+
+
+@inlined
+def iterate(factor, target):
+    """One iteration: target += M^(-1/2) x, x = Dᵀ (S + I/α)⁻¹ b; the size of that change."""
+    copy(factor.residual, factor.step)
+    solve(factor, factor.step)
+    times_transpose(factor, factor.step, factor.change)
+    return add_scaled(factor, target)
+
+
+@inlined
+def add_scaled(factor, target):
+    """target (n,) += M^(-1/2) x; the norm of that, relative to the larger of 1 and the target's norm."""
+    column, root, x, change, size = factor.symbolic.column, factor.root, factor.change, 0.0, 0.0
+    for j in range(x.shape[0]):
+        step, k = root[j] * x[j], column[j]
+        value = target[k] + step
+        target[k] = value
+        change += step * step
+        size += value * value
+    return sqrt(change / max(1.0, size))
+
+
+@entry(INT(VECTOR, VECTOR, FACTOR))
+def factorise_once(numbers, inverse_root, factor):
+    """For Python: the factor of S + I/α; 0 where it is not positive definite."""
+    return 1 if regularised_factor(factor, numbers, inverse_root, ALPHA) else 0
+
+
+@entry(FLOAT(VECTOR, FACTOR))
+def iterate_once(target, factor):
+    """For Python: one iteration on ``target`` and the residual after it; the size of the change."""
+    size = iterate(factor, target)
+    subtract_product(factor, factor.change, factor.residual)
+    return size
+
+
+@entry(INT(VECTOR, FACTOR))
+def solve_once(b, factor):
+    """For Python: b := (S + I/α)⁻¹ b."""
+    solve(factor, b)
+    return OK
+
+
+class MinimumNorm:
+    """Solutions x of A x = b, least in the norm of the weights (n,); rows of A (m, n) may be redundant.
+
+    ``d`` is A diag(weights)^(-1/2) with rows of unit length.
+    """
 
     def __init__(self, matrix: csr_array, weight: np.ndarray):
         self._root = 1 / np.sqrt(weight)
-        d = csr_array(matrix * self._root)
-        lengths = np.sqrt((d * d).sum(axis=1))
+        d = csr_array(matrix.multiply(self._root))
+        lengths = np.sqrt(np.asarray((d * d).sum(axis=1)).ravel())
         self._scale = 1 / np.where(lengths > 0, lengths, 1.0)
-        self.d = csr_array(diags_array(self._scale) @ d)
-        s = (self.d @ self.d.T).tocsc() + eye_array(d.shape[0], format="csc") / ALPHA
-        self.regularised = splu(
-            s, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
+        self.d = csr_array(d.multiply(self._scale[:, None]))
+        self.d.sort_indices()
+        row = np.repeat(np.arange(self.d.shape[0]), np.diff(self.d.indptr))
+        active = np.zeros(self.d.shape[1], dtype=bool)
+        active[self.d.indices] = True
+        symbolic = symbolic_factorisation(row, self.d.indices, np.arange(row.size), active)
+        self._factor = packed(sparse_factor(symbolic))
+        factorise_once(self.d.data, np.ones(self.d.shape[1]), self._factor.argument)
+        self._rows = symbolic.row.astype(int)
 
     def __call__(self, rhs: np.ndarray) -> np.ndarray:
         """x (n,) for b = rhs (m,); in the sense of least squares of unit rows where they contradict."""
-        b, x = self._scale * rhs, np.zeros(self.d.shape[1])
+        x, factor = np.zeros(self.d.shape[1]), self._factor.values
+        factor.residual[:] = (self._scale * rhs)[self._rows]
         for _ in range(ITERATIONS):
-            step = self.d.T @ self.regularised.solve(b)
-            x += step
-            b -= self.d @ step
-            if np.linalg.norm(step) <= ROUNDING * np.linalg.norm(x):
+            iterate_once(x, self._factor.argument)
+            if np.linalg.norm(factor.change) <= ROUNDING * np.linalg.norm(x):
                 break
         return self._root * x
+
+    def regularised_solution(self, b: np.ndarray) -> np.ndarray:
+        """(S + I/α)⁻¹ b (m,) of unit rows."""
+        solution, own = ALPHA * b, np.ascontiguousarray(b[self._rows], dtype=float)
+        solve_once(own, self._factor.argument)
+        solution[self._rows] = own
+        return solution

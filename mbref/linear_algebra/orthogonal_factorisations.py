@@ -20,13 +20,18 @@ from mbref.linear_algebra.vectors import copy
 
 
 @kernel
-def qr_pivoted(b, n, m, order, tau, norms, work, tolerance):
-    """Householder QR with column pivoting of b[:n, :m], in place; returns the rank.
+def qr_pivoted(tolerance, scratch):
+    """Householder QR with column pivoting of ``scratch.transposed`` (n, m), in place; returns the rank.
 
-    Reflector k stands below the diagonal of column k with scale ``tau[k]``.  A column counts when its
-    remaining norm exceeds ``tolerance`` times the largest column norm.  ``norms`` (2, m), ``work`` (m,).
+    Reflector k stands below the diagonal of column k with scale ``tau[k]``; ``order`` (m,) has the columns
+    in the order chosen.  A column counts when its remaining norm exceeds ``tolerance`` times the largest
+    column norm.  Scratch is ``work`` (m,) and ``norms`` (2, m).
     Golub & Van Loan, Matrix Computations, algorithm 5.4.1; norms recomputed when they have cancelled.
     """
+    b, order, tau, norms, work = (
+        scratch.transposed, scratch.order, scratch.tau, scratch.norms, scratch.work,
+    )  # fmt: skip
+    n, m = b.shape
     for j in range(m):
         order[j] = j
         norms[0, j] = 0.0
@@ -92,8 +97,13 @@ def reflect(b, n, m, k, norm, tau, work):
 
 
 @kernel
-def minimum_norm(b, n, rank, order, tau, rhs, x):
-    """x (n,) of least norm with D x = rhs in the independent rows of D, from ``qr_pivoted`` of Dᵀ."""
+def minimum_norm(rank, scratch):
+    """``scratch.x`` (n,) of least norm with D x = ``scratch.b`` in the independent rows of D.
+
+    From ``qr_pivoted`` of Dᵀ.
+    """
+    b, order, tau, rhs, x = scratch.transposed, scratch.order, scratch.tau, scratch.b, scratch.x
+    n = b.shape[0]
     for k in range(n):
         x[k] = 0.0
     for k in range(rank):
@@ -128,8 +138,11 @@ def equilibrate(jacobian, inverse_root, d, row_scale):
 
 
 @kernel
-def row_multipliers(b, rank, order, values, z, dual):
-    """dual (m,) with Dᵀ dual = x of ``minimum_norm``, zero on rows left out; ``values`` is its rhs."""
+def row_multipliers(rank, scratch):
+    """``scratch.dual`` (m,) with Dᵀ dual = x of ``minimum_norm``; zero on dependent rows."""
+    b, order, values, z, dual = (
+        scratch.transposed, scratch.order, scratch.b, scratch.work, scratch.dual,
+    )  # fmt: skip
     dual[:] = 0.0
     for k in range(rank):
         z[k] = values[order[k]]
@@ -153,7 +166,7 @@ def gram_schmidt(a, r, tolerance):
         before = row_norm(a, k)
         for _ in range(2):
             for i in range(k):
-                take_out(a, i, k, r)
+                subtract_projection(a, i, k, r)
         norm = row_norm(a, k)
         if not norm > tolerance * before:
             return False
@@ -175,8 +188,8 @@ def row_norm(a, k):
 
 
 @kernel
-def take_out(a, i, k, r):
-    """Take the component along the unit row i out of row k, and add it to r[i, k]."""
+def subtract_projection(a, i, k, r):
+    """Subtract from row k its projection on the unit row i, whose length is added to r[i, k]."""
     part = 0.0
     for l in range(a.shape[1]):
         part += a[i, l] * a[k, l]
@@ -206,7 +219,7 @@ def gram_schmidt_pivoted(a, count, order, r, tolerance):
         exchange_rows(a, length, k, best, order)
         exchange_entries(r, k, k, best)
         for i in range(k):
-            take_out(a, i, k, r)
+            subtract_projection(a, i, k, r)
         norm = row_norm(a, k)
         first = max(first, norm)
         if not norm > tolerance * first:
@@ -215,23 +228,21 @@ def gram_schmidt_pivoted(a, count, order, r, tolerance):
         for l in range(length):
             a[k, l] /= norm
         for j in range(k + 1, count):
-            take_out(a, k, j, r)
+            subtract_projection(a, k, j, r)
     return min(count, length)
 
 
 @kernel
-def gram_schmidt_solve(d, b, tolerance, columns, r, l, pivots, c, x, dual):
+def gram_schmidt_solve(tolerance, scratch):
     """x = D⁺ b and dual = (Dᵀ)⁺ x by two Gram–Schmidt orthogonalisations; returns the rank.
 
-    D P = Q R, with the columns of D as rows of ``columns`` (n, m), then R = L Zᵀ: D⁺ = P Z L⁻¹ Qᵀ.
-    ``r``, ``l`` (n, n), ``c`` (n,), ``pivots`` (2 n or more,) are scratch.
+    D P = Q R, with the columns of D as rows of ``scratch.columns`` (n, m), then R = L Zᵀ: D⁺ = P Z L⁻¹ Qᵀ.
+    Scratch is ``r``, ``l`` (n, n), ``c`` (n,), ``order`` and ``order_rows`` (n,).
     """
-    m, n = d.shape
-    for i in range(m):
-        for j in range(n):
-            columns[j, i] = d[i, j]
-    order, order_rows = pivots[:n], pivots[n:]
-    rank = gram_schmidt_pivoted(columns, n, pivots, r, tolerance)
+    columns, r, l, b, c = scratch.columns, scratch.r, scratch.l, scratch.b, scratch.c
+    order, order_rows, x, dual = scratch.order, scratch.order_rows, scratch.x, scratch.dual
+    n, m = columns.shape
+    rank = gram_schmidt_pivoted(columns, n, order, r, tolerance)
     gram_schmidt_pivoted(r, rank, order_rows, l, 0.0)
     for k in range(rank):  # c = L⁻¹ Qᵀ b
         c[k] = 0.0
@@ -292,35 +303,3 @@ def add_pseudo_solution(u, s, vt, rank, rhs, x, dual):
             x[j] += vt[k, j] * value
         for i in range(m):
             dual[i] += u[i, k] * (value / s[k])
-
-
-def pinv_svd(d: np.ndarray, tolerance: float = 1e-10) -> tuple[np.ndarray, int]:
-    """Moore–Penrose inverse (n, m) of d (m, n) and its rank, by the SVD (Eqs. 27 and 28).
-
-    Singular values up to ``tolerance`` times the largest count as zero.
-    """
-    u, s, vt = np.linalg.svd(np.asarray(d, dtype=float), full_matrices=False)
-    rank = int(np.sum(s > tolerance * s[0])) if s.size else 0
-    return (vt[:rank].T / s[:rank]) @ u[:, :rank].T, rank
-
-
-def pinv_gram_schmidt(d: np.ndarray, tolerance: float = 1e-10) -> tuple[np.ndarray, int]:
-    """Moore–Penrose inverse (n, m) of d (m, n) and its rank, by Gram–Schmidt (Eqs. 29 and 30, any rank).
-
-    A column counts while its remaining length exceeds ``tolerance`` times the largest.
-    """
-    d = np.ascontiguousarray(d, dtype=float)
-    m, n = d.shape
-    inverse, rank = np.zeros((n, m)), 0
-    scratch = (
-        np.zeros((n, m)),
-        np.zeros((n, n)),
-        np.zeros((n, n)),
-        np.zeros(2 * n, dtype=np.int64),
-        np.zeros(n),
-    )
-    for i, row in enumerate(np.eye(m)):
-        x, dual = np.zeros(n), np.zeros(m)
-        rank = gram_schmidt_solve(d, row, tolerance, *scratch, x, dual)
-        inverse[:, i] = x
-    return inverse, int(rank)

@@ -10,19 +10,16 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from mbref.linear_algebra.minimum_norm import ALPHA, LeastChange
-
-COLUMNS = 256  # of the identity solved for at a time
+from mbref.linear_algebra.minimum_norm import ALPHA, MinimumNorm
 
 
-def null_shares(change: LeastChange, rows: np.ndarray) -> np.ndarray:
-    """Share of each of these rows in the left null space of the Jacobian of ``change``, from 0 to 1."""
+def null_shares(solution: MinimumNorm, rows: np.ndarray) -> np.ndarray:
+    """Share of each of these rows in the left null space of the matrix of ``solution``, from 0 to 1."""
     shares = np.zeros(rows.size)
-    for start in range(0, rows.size, COLUMNS):
-        some = rows[start : start + COLUMNS]
-        identity = np.zeros((change.d.shape[0], some.size))
-        identity[some, np.arange(some.size)] = 1.0
-        shares[start : start + COLUMNS] = np.sum((change.regularised.solve(identity) / ALPHA) ** 2, axis=0)
+    for k, row in enumerate(rows):
+        unit = np.zeros(solution.d.shape[0])
+        unit[row] = 1.0
+        shares[k] = np.sum((solution.regularised_solution(unit) / ALPHA) ** 2)
     return shares
 
 
@@ -30,19 +27,19 @@ class Redundancy:
     """Rank and ``shares`` of a Jacobian (m, n); singular values from 1e-4 of the rows' length count fully."""
 
     def __init__(self, jacobian: csr_array):
-        self._change = LeastChange(jacobian, np.ones(jacobian.shape[1]))
-        self.shares = null_shares(self._change, np.arange(jacobian.shape[0]))
+        self._solution = MinimumNorm(jacobian, np.ones(jacobian.shape[1]))
+        self.shares = null_shares(self._solution, np.arange(jacobian.shape[0]))
         self.rank = jacobian.shape[0] - round(float(np.sum(self.shares)))
 
     def singular_values(self) -> tuple[float, float]:
         """The smallest above rank, and the largest, of the rows at unit length."""
-        d, inverse = self._change.d, self._change.regularised
+        d, inverse = self._solution.d, self._solution.regularised_solution
         m = d.shape[0]
 
         def inverted(x: np.ndarray) -> np.ndarray:
             for _ in range(2):
-                x = x - inverse.solve(x) / ALPHA  # what is left of x is in the row space
-            return inverse.solve(x)
+                x = x - inverse(x) / ALPHA  # what is left of x is in the row space
+            return inverse(x)
 
         start = np.random.default_rng(1).normal(size=m)
         largest = eigsh(

@@ -1,65 +1,31 @@
-"""Sparse kernels over a ``Plan``: D, the factors L Δ Lᵀ of S + I/α, solutions and products.
+"""Sparse kernels: D = Φ_q M^(-1/2), the factor L Δ Lᵀ of S + I/α with S = D Dᵀ, solutions and products.
 
-S = D Dᵀ with D = Φ_q M^(-1/2).  α weighs rows of unit length, S_ii = 1, so that S_ii (1 + 1/α) stands on the
-diagonal; a row without entries has 1 there and changes nothing.  Vectors of rows and columns are the plan's.
+α weighs rows of unit length, S_ii = 1, so that S_ii (1 + 1/α) stands on the diagonal; a row without entries
+has 1 there and changes nothing.  Vectors of rows and columns are in the order of ``SparseFactor.symbolic``.
 """
 
 from __future__ import annotations
 
-from mbref.kernels.compilation import inlined, view
-from mbref.linear_algebra.symbolic_factorisation import (
-    COLUMN,
-    D_COLUMN,
-    D_ENTRY,
-    D_START,
-    L_ROW,
-    L_START,
-    ROW,
-    S_LEFT,
-    S_RIGHT,
-    S_START,
-    S_TARGET,
-    UPDATE,
-)
-
-
-@view
-def part(plan, k):
-    """One of the parts of the plan's indices."""
-    return plan[plan[k] : plan[k + 1]]
-
-
-@view
-def memories(plan, memory):
-    """Views of the memory: D, L, S_ii, pivots squared, three vectors of rows, M^(-1/2), one of columns."""
-    d, l, r = part(plan, D_ENTRY).shape[0], part(plan, L_ROW).shape[0], part(plan, ROW).shape[0]
-    c = part(plan, COLUMN).shape[0]
-    a = d + l
-    return (
-        memory[:d], memory[d:a], memory[a : a + r], memory[a + r : a + 2 * r], memory[a + 2 * r : a + 3 * r],
-        memory[a + 3 * r : a + 4 * r], memory[a + 4 * r : a + 5 * r], memory[a + 5 * r : a + 5 * r + c],
-        memory[a + 5 * r + c : a + 5 * r + 2 * c],
-    )  # fmt: skip
+from mbref.kernels.compilation import inlined
 
 
 @inlined
-def assemble(plan, jacobian, inverse_root, alpha, d, l, diagonal, root):
-    """M^(-1/2) and D from the model's diagonal (n,) and blocks (m, 12), and S + I/α into the places of L."""
-    entry, column, moving = part(plan, D_ENTRY), part(plan, D_COLUMN), part(plan, COLUMN)
-    blocks = jacobian.reshape(-1)
-    for j in range(moving.shape[0]):
-        root[j] = inverse_root[moving[j]]
+def assemble(factor, numbers, inverse_root, alpha):
+    """M^(-1/2) and D from M^(-1/2) (n,) and the flat constraint Jacobian, and S + I/α into L."""
+    symbolic, d, l, diagonal, root = factor.symbolic, factor.d, factor.l, factor.diagonal, factor.root
+    entry, d_column, column = symbolic.d_entry, symbolic.d_column, symbolic.column
+    for j in range(column.shape[0]):
+        root[j] = inverse_root[column[j]]
     for k in range(entry.shape[0]):
-        d[k] = blocks[entry[k]] * root[column[k]]
+        d[k] = numbers[entry[k]] * root[d_column[k]]
     l[:] = 0.0
-    start, target = part(plan, S_START), part(plan, S_TARGET)
-    left, right = part(plan, S_LEFT), part(plan, S_RIGHT)
+    start, target = symbolic.s_start, symbolic.s_target
+    left, right, first = symbolic.s_left, symbolic.s_right, symbolic.l_start
     for k in range(target.shape[0]):
         value = 0.0
         for p in range(start[k], start[k + 1]):
             value += d[left[p]] * d[right[p]]
         l[target[k]] = value
-    first = part(plan, L_START)
     for k in range(diagonal.shape[0]):
         value = l[first[k]] * (1.0 + 1.0 / alpha)
         diagonal[k] = value if value > 0.0 else 1.0
@@ -67,9 +33,9 @@ def assemble(plan, jacobian, inverse_root, alpha, d, l, diagonal, root):
 
 
 @inlined
-def factorise(plan, l):
+def factorise(factor):
     """L of S + I/α in its place, 1/Δ instead of its unit diagonal; False where an entry of Δ is ≤ 0."""
-    first, update = part(plan, L_START), part(plan, UPDATE)
+    first, update, l = factor.symbolic.l_start, factor.symbolic.update, factor.l
     u = 0
     for k in range(first.shape[0] - 1):
         start, end = first[k], first[k + 1]
@@ -87,9 +53,16 @@ def factorise(plan, l):
 
 
 @inlined
-def solve(plan, l, b):
+def regularised_factor(factor, numbers, inverse_root, alpha):
+    """Assemble and factorise S + I/α; False where it is not positive definite."""
+    assemble(factor, numbers, inverse_root, alpha)
+    return factorise(factor)
+
+
+@inlined
+def solve(factor, b):
     """b := (S + I/α)⁻¹ b."""
-    first, row = part(plan, L_START), part(plan, L_ROW)
+    first, row, l = factor.symbolic.l_start, factor.symbolic.l_row, factor.l
     size = first.shape[0] - 1
     for k in range(size):
         value = b[k]
@@ -97,15 +70,15 @@ def solve(plan, l, b):
             b[row[p]] -= l[p] * value
     for k in range(size - 1, -1, -1):
         value = b[k] * l[first[k]]
-        for p in range(first[k + 1] - 1, first[k], -1):  # what was found last comes last, also below
+        for p in range(first[k + 1] - 1, first[k], -1):  # the entry found last is used last, also below
             value -= l[p] * b[row[p]]
         b[k] = value
 
 
 @inlined
-def subtract_product(plan, d, x, b):
+def subtract_product(factor, x, b):
     """b -= D x."""
-    start, column = part(plan, D_START), part(plan, D_COLUMN)
+    start, column, d = factor.symbolic.d_start, factor.symbolic.d_column, factor.d
     for k in range(b.shape[0]):
         value = b[k]
         for p in range(start[k], start[k + 1]):
@@ -114,9 +87,9 @@ def subtract_product(plan, d, x, b):
 
 
 @inlined
-def times_transpose(plan, d, b, x):
+def times_transpose(factor, b, x):
     """x := Dᵀ b."""
-    start, column = part(plan, D_START), part(plan, D_COLUMN)
+    start, column, d = factor.symbolic.d_start, factor.symbolic.d_column, factor.d
     x[:] = 0.0
     for k in range(b.shape[0] - 1, -1, -1):
         value = b[k]
@@ -125,8 +98,8 @@ def times_transpose(plan, d, b, x):
 
 
 @inlined
-def squared_pivots(plan, l, diagonal, squares):
+def find_squared_pivots(factor):
     """Squares (r,) of the pivots of unit rows: the sines of the angle between each row and those before."""
-    first = part(plan, L_START)
+    first, l, diagonal, squares = factor.symbolic.l_start, factor.l, factor.diagonal, factor.squared_pivots
     for k in range(diagonal.shape[0]):
         squares[k] = 1.0 / (l[first[k]] * diagonal[k])

@@ -1,125 +1,81 @@
-"""The plan of a sparse factorisation: where every number of S + I/α and of its Cholesky factor stands.
+"""Symbolic factorisation of S = D Dᵀ: where every number of D, S and its Cholesky factor L stands.
 
 Made once per scene.  The order of elimination and the fill are SuperLU's (multiple minimum degree on the
-symmetric pattern); what is added here are the lists of products that the kernels of ``factor`` go through.
-Rows are counted in the order of elimination, columns only where something moves that no row of its own holds.
+symmetric pattern); added here are the lists of products that the kernels of ``sparse_cholesky`` go through.
+Indices are unsigned, because kernels would test the sign of others.
 """
 
 from __future__ import annotations
-
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array, eye_array
 from scipy.sparse.linalg import splu
 
-# parts of the index vector, each from plan[k] to plan[k + 1]
-(
-    ROW,  # (r,) the model's row of each row here
-    COLUMN,  # (c,) the velocity vector's column of each column here
-    D_START,  # (r + 1,) where each row of D begins
-    D_ENTRY,  # (d,) position of each number of D in the Jacobian's blocks
-    D_COLUMN,  # (d,) its column
-    S_START,  # (s + 1,) where the products of each number of S begin
-    S_TARGET,  # (s,) position of that number in L
-    S_LEFT,  # (p,) the products: two numbers of D
-    S_RIGHT,
-    L_START,  # (r + 1,) where each column of L begins, its diagonal first
-    L_ROW,  # (l,) row of each number of L
-    UPDATE,  # positions in L that the elimination of each column changes, column after column
-    HELD_ROW,  # (h,) rows that hold columns at rest, those found last first
-    HELD_START,  # (h + 1,) where the entries of each begin
-    HELD_ENTRY,  # (e,) their positions in the blocks
-    HELD_COLUMN,  # (e,) and their columns
-    OTHER_START,  # (e + 1,) where the entries of other rows in that column begin
-    HELD_OTHER,  # positions of these in the blocks
-) = range(18)
-PARTS = 18
+from mbref.kernels.layout import SparseFactor, StaticRows, Symbolic
+from mbref.kernels.named_memory import allocate
 
 
-class Held(NamedTuple):
-    """Rows and the columns that they hold at rest, as many."""
+def symbolic_factorisation(
+    row: np.ndarray, column: np.ndarray, entry: np.ndarray, active: np.ndarray
+) -> Symbolic:
+    """The symbolic factorisation of a pattern: row, column and place (k,) of each number of D.
 
-    rows: tuple[int, ...]
-    columns: tuple[int, ...]
-
-
-def columns_held(held: Sequence[Held]) -> list[int]:
-    """The columns of all groups."""
-    return [column for each in held for column in each.columns]
-
-
-def lies_in(columns: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Which entries, in these columns (m, 12), are in those wanted (n,); the fixed frame's are not."""
-    return np.append(wanted, np.zeros(6, dtype=bool))[columns]
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Indices for the kernels (uint32: signed ones cost a test each), and how much memory they need."""
-
-    indices: np.ndarray  # PARTS + 1 offsets, then the parts
-    memory: int
-
-    def part(self, k: int) -> np.ndarray:
-        """One of the parts."""
-        return self.indices[self.indices[k] : self.indices[k + 1]]
-
-
-def plan_for(moving: np.ndarray, entries: np.ndarray, columns: np.ndarray, held: Sequence[Held] = ()) -> Plan:
-    """The plan of D's pattern: velocities that move (n,), ``entries`` (m, 12), and the column of each.
-
-    Of them all that rows hold at rest stays out, and rows that are then empty.
+    Places are those of the flat constraint Jacobian that the numbers are read from; ``active`` (n,) says
+    which columns take part.  Raises OverflowError for a pattern too large for 32-bit indices.
     """
-    of_held = _held_parts(entries, columns, held)
-    moving = moving & ~np.isin(np.arange(moving.size), columns_held(held))
-    entries = entries & lies_in(columns, moving)
-    kept = np.flatnonzero(entries.any(axis=1))
-    row, entry = np.nonzero(entries[kept])
-    d = csr_array((np.ones(row.size), (row, columns[kept[row], entry])), shape=(kept.size, moving.size))
+    kept, row = np.unique(row, return_inverse=True)
+    d = csr_array((np.ones(row.size), (row, column)), shape=(kept.size, active.size))
     order, l_start, l_row = _factor_pattern(d)
     place = np.empty_like(order)
     place[order] = np.arange(order.size)
-    row, entry, original = _sorted_by(place[row], entry, kept[row])
-    d_start = np.searchsorted(row, np.arange(order.size + 1))
-    d_column = columns[original, entry]
+    row, column, entry = _sorted_by(place[row], column, entry)
     l_key = np.repeat(np.arange(order.size), np.diff(l_start)) * order.size + l_row
-    target, left, right = _products(row, d_column, l_key, order.size)
+    target, left, right = _products(row, column, l_key, order.size)
     s_target, s_start = np.unique(target, return_index=True)
-    column = np.flatnonzero(moving)
-    parts = [
-        kept[order], column, d_start, 12 * original + entry, np.searchsorted(column, d_column),
-        np.append(s_start, target.size), s_target, left, right, l_start, l_row,
-        _updates(l_start, l_row, l_key, order.size), *of_held,
-    ]  # fmt: skip
-    offsets = np.cumsum([PARTS + 1, *(part.size for part in parts)])
-    indices = np.concatenate([offsets, *parts])
-    if indices.max(initial=0) > np.iinfo(np.uint32).max:
+    own = np.flatnonzero(active)
+    return Symbolic(
+        row=unsigned(kept[order]),
+        column=unsigned(own),
+        d_start=unsigned(np.searchsorted(row, np.arange(order.size + 1))),
+        d_entry=unsigned(entry),
+        d_column=unsigned(np.searchsorted(own, column)),
+        s_start=unsigned(np.append(s_start, target.size)),
+        s_target=unsigned(s_target),
+        s_left=unsigned(left),
+        s_right=unsigned(right),
+        l_start=unsigned(l_start),
+        l_row=unsigned(l_row),
+        update=unsigned(_updates(l_start, l_row, l_key, order.size)),
+    )
+
+
+def unsigned(indices: np.ndarray | list[int]) -> np.ndarray:
+    """Indices as 32-bit unsigned integers; OverflowError where one does not fit."""
+    array = np.asarray(indices, dtype=np.int64)
+    if array.max(initial=0) > np.iinfo(np.uint32).max:
         raise OverflowError("the scene is too large for 32-bit indices")
-    memory = row.size + l_row.size + 5 * order.size + 2 * column.size
-    return Plan(indices.astype(np.uint32), memory)
+    return array.astype(np.uint32)
 
 
-def _held_parts(entries: np.ndarray, columns: np.ndarray, held: Sequence[Held]) -> list[np.ndarray]:
-    """The parts of the rows that hold: a column's other entries are of rows whose multipliers are known."""
-    row, entry = np.nonzero(entries)
-    in_column: dict[int, list[int]] = {}
-    for r, e in zip(row, entry, strict=True):
-        in_column.setdefault(int(columns[r, e]), []).append(12 * int(r) + int(e))
-    rows, starts, own, own_columns, firsts, others = [], [0], [], [], [0], []
-    for each in reversed(held):
-        for r in each.rows:
-            for column in each.columns:
-                (place,) = (place for place in in_column[column] if place // 12 == r)
-                own.append(place)
-                own_columns.append(column)
-                others += [place for place in in_column[column] if place // 12 not in each.rows]
-                firsts.append(len(others))
-            rows.append(r)
-            starts.append(len(own))
-    return [np.array(part, dtype=int) for part in (rows, starts, own, own_columns, firsts, others)]
+def no_static_rows() -> StaticRows:
+    """Without statically determined rows."""
+    nothing, start = unsigned([]), unsigned([0])
+    return StaticRows(nothing, start, nothing, nothing, start, nothing)
+
+
+def empty_factor() -> SparseFactor:
+    """Memory of no factor."""
+    nothing = np.zeros(0, dtype=np.int64)
+    return sparse_factor(symbolic_factorisation(nothing, nothing, nothing, np.zeros(0, dtype=bool)))
+
+
+def sparse_factor(symbolic: Symbolic, static: StaticRows | None = None) -> SparseFactor:
+    """Memory for the factor of this pattern."""
+    sizes = {
+        "nd": symbolic.d_entry.size, "nl": symbolic.l_row.size, "r": symbolic.row.size,
+        "c": symbolic.column.size,
+    }  # fmt: skip
+    return allocate(SparseFactor, sizes, symbolic=symbolic, static=static or no_static_rows())
 
 
 def _factor_pattern(d: csr_array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,20 +1,21 @@
 """Three-vectors as tuples, for the kernels: compiled they cost nothing and allocate nothing.
 
-And what kernels do with whole vectors: copies, for which numba's slices allocate, order, and ``larger``.
+Also operations on whole vectors: copies (NumPy's slices would allocate), order, and ``larger``.
 """
 
 from __future__ import annotations
 
-from numpy import isnan
+from numpy import isfinite, isnan
 
-from mbref.kernels.compilation import kernel
-from mbref.kernels.layout import ROTATION
+from mbref.kernels.compilation import inlined, kernel
+
+TINY = 1e-100  # its cube is still a normal number
 
 
 @kernel
-def vector(table, row, column):
-    """Three consecutive entries of a row."""
-    return table[row, column], table[row, column + 1], table[row, column + 2]
+def vector(table, row):
+    """A row (3,) of a table (k, 3)."""
+    return table[row, 0], table[row, 1], table[row, 2]
 
 
 @kernel
@@ -24,6 +25,24 @@ def larger(size, value):
     return magnitude if magnitude > size or isnan(magnitude) else size
 
 
+@inlined
+def largest(values):
+    """The largest magnitude of a vector; undefined where an entry is."""
+    size = 0.0
+    for value in values:
+        size = larger(size, value)
+    return size
+
+
+@kernel
+def all_finite(values):
+    """Whether no entry is infinite or undefined."""
+    for value in values:  # noqa: SIM110 - numba compiles no generator expression
+        if not isfinite(value):
+            return False
+    return True
+
+
 @kernel
 def copy(source, target):
     """``target`` := ``source``, two vectors of one length."""
@@ -31,11 +50,12 @@ def copy(source, target):
         target[k] = source[k]
 
 
-@kernel
-def copy_rows(source, target):
-    """``target`` := ``source``, two matrices of one shape."""
-    for k in range(source.shape[0]):
-        copy(source[k], target[k])
+@inlined
+def flush_denormals(y):
+    """Zero for entries below TINY: with denormal numbers arithmetic is a hundred times slower."""
+    for k in range(y.shape[0]):
+        if abs(y[k]) < TINY:
+            y[k] = 0.0
 
 
 @kernel
@@ -80,24 +100,22 @@ def cross(a, b):
 
 
 @kernel
-def to_world(frames, body, a):
-    """A vector of the body's frame in the world."""
-    r = ROTATION
+def to_world(rotation, body, a):
+    """A vector of the body's frame in the world; ``rotation`` (nb + 1, 9) has rotation matrices by rows."""
     return (
-        frames[body, r] * a[0] + frames[body, r + 1] * a[1] + frames[body, r + 2] * a[2],
-        frames[body, r + 3] * a[0] + frames[body, r + 4] * a[1] + frames[body, r + 5] * a[2],
-        frames[body, r + 6] * a[0] + frames[body, r + 7] * a[1] + frames[body, r + 8] * a[2],
+        rotation[body, 0] * a[0] + rotation[body, 1] * a[1] + rotation[body, 2] * a[2],
+        rotation[body, 3] * a[0] + rotation[body, 4] * a[1] + rotation[body, 5] * a[2],
+        rotation[body, 6] * a[0] + rotation[body, 7] * a[1] + rotation[body, 8] * a[2],
     )
 
 
 @kernel
-def to_body(frames, body, a):
+def to_body(rotation, body, a):
     """A vector of the world in the body's frame."""
-    r = ROTATION
     return (
-        frames[body, r] * a[0] + frames[body, r + 3] * a[1] + frames[body, r + 6] * a[2],
-        frames[body, r + 1] * a[0] + frames[body, r + 4] * a[1] + frames[body, r + 7] * a[2],
-        frames[body, r + 2] * a[0] + frames[body, r + 5] * a[1] + frames[body, r + 8] * a[2],
+        rotation[body, 0] * a[0] + rotation[body, 3] * a[1] + rotation[body, 6] * a[2],
+        rotation[body, 1] * a[0] + rotation[body, 4] * a[1] + rotation[body, 7] * a[2],
+        rotation[body, 2] * a[0] + rotation[body, 5] * a[1] + rotation[body, 8] * a[2],
     )
 
 

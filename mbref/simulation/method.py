@@ -15,8 +15,9 @@ from mbref.formulations import FORMULATIONS
 from mbref.formulations.base import Formulation
 from mbref.integrators import INTEGRATORS
 from mbref.integrators.base import Integrator
-from mbref.kernels.layout import KEPT_PARTITION, POSITION_GAIN, VELOCITY_GAIN
-from mbref.stabilisation import PROJECTION, STABILISATIONS
+from mbref.kernels.layout import Settings
+from mbref.kernels.named_memory import Packed, packed, record
+from mbref.stabilisation import STABILISATIONS
 from mbref.stabilisation.base import Stabilisation
 
 DEFAULT = "alf-dual+projection/dop853"
@@ -49,14 +50,17 @@ class Method:
         """A part's options, its defaults overridden by what the name says."""
         return {**part.options, **self.options.get(part.name, {})}
 
-    def settings(self, rank_tolerance: float) -> np.ndarray:
-        """The settings vector of the kernels, the feedback gains of both parts added."""
-        values = self.formulation.settings(self.options_of(self.formulation), rank_tolerance)
+    def settings(self, rank_tolerance: float) -> Settings:
+        """The numbers that all kernels share, the feedback gains of both parts added."""
+        gains = np.zeros(2)
         for part in (self.formulation, self.stabilisation):
             if part.feedback is not None:
-                values[[VELOCITY_GAIN, POSITION_GAIN]] += part.feedback(self.options_of(part))
-        values[KEPT_PARTITION] = self.options_of(self.stabilisation).get("kept", 0.0)
-        return values
+                gains += part.feedback(self.options_of(part))
+        return Settings(*map(float, gains), rank_tolerance=rank_tolerance)
+
+    def packed_options(self, part: Formulation | Stabilisation) -> Packed | None:
+        """A part's own numbers for its kernels."""
+        return packed(record(part.numbers(**self.options_of(part)))) if part.options else None
 
     @staticmethod
     def parse(name: str) -> Method:
@@ -72,7 +76,7 @@ class Method:
             _part(stabilisation, STABILISATIONS, "stabilisation", options),
             _part(integrator or "dop853", INTEGRATORS, "integrator", options),
         )
-        if not parts[2].integrates and parts[1] is not PROJECTION:
+        if not parts[2].integrates and not parts[1].projects:
             raise MethodError(f"integrator {parts[2].name} only extrapolates: it goes with projection")
         return Method(*parts, options)
 

@@ -1,4 +1,4 @@
-"""results: what a run reached, as a trajectory; the one place where a failure becomes an Outcome."""
+"""The samples of a run as a trajectory; the one place where a failure becomes an Outcome."""
 
 from __future__ import annotations
 
@@ -6,23 +6,9 @@ from dataclasses import asdict
 
 from mbref import __version__
 from mbref.equations.joint_reactions import reactions
-from mbref.kernels.layout import (
-    CROSSINGS,
-    EVALUATIONS,
-    FACTORISATIONS,
-    NEWTON,
-    NOT_CONVERGED,
-    NOT_FINITE,
-    PHI,
-    REJECTED,
-    ROWS,
-    SINGULAR,
-    SMALLEST_STEP,
-    STEPS,
-    VIOLATION,
-)
+from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR
 from mbref.simulation.run import Run
-from mbref.simulation.stepping import DONE, ROW, SAMPLE, STEP_TOO_SMALL, TIME, TOO_MANY_STEPS, VIOLATED
+from mbref.simulation.stepping import DONE, STEP_TOO_SMALL, TOO_MANY_STEPS, VIOLATED
 from mbref.trajectory import Cost, Outcome, Trajectory
 
 OUTCOMES = {
@@ -38,11 +24,10 @@ OUTCOMES = {
 
 def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Trajectory:
     """The samples reached, in the scene's frames and units."""
-    model, reached = run.model, int(run.place[SAMPLE])
-    q, v, a, multipliers = (sample[:reached] for sample in run.samples)
-    nb = model.nb
+    model, loop, counts = run.model, run.memory.loop, run.memory.equations.system.counts
+    reached, nb = int(loop.clock.sample), run.model.nb
+    q, v, a, multipliers = (sample[:reached] for sample in loop.samples)
     q, v, a = q.reshape(reached, nb, 7), v.reshape(reached, nb, 6), a.reshape(reached, nb, 6)
-    counts = run.counts
     return Trajectory(
         scene=run.scene.name,
         engine="mbref",
@@ -54,16 +39,16 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Trajec
         **model.motion(q, v, a),
         reactions=reactions(model, run.times[:reached], q, v, multipliers),
         outcome=OUTCOMES[status],
-        t_end=float(run.clock[TIME]),
+        t_end=float(loop.clock.time),
         message=_message(run, status),
         cost=Cost(
             seconds,
             built,
-            int(counts[STEPS]),
-            int(counts[REJECTED]),
-            int(counts[EVALUATIONS]),
-            int(counts[FACTORISATIONS]),
-            int(counts[NEWTON]),
+            int(counts.steps),
+            int(counts.rejected),
+            int(counts.evaluations),
+            int(counts.factorisations),
+            int(counts.newton),
         ),
     )
 
@@ -71,20 +56,21 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Trajec
 def _message(run: Run, status: int) -> str:
     """One sentence: what ended the run, where; or what was corrected at its start."""
     if status == DONE:
-        crossings = int(run.counts[CROSSINGS])
+        crossings = int(run.memory.equations.system.counts.crossings)
         passed = f"singular positions passed: {crossings}" if crossings else ""
         return "; ".join(filter(None, (run.start.report(), passed)))
-    t = run.clock[TIME]
+    memory = run.memory
+    t = memory.loop.clock.time
     if status == VIOLATED:
-        row = int(run.place[ROW])
-        size = abs(run.work[ROWS][PHI, row])
+        row = int(memory.loop.clock.violated_row)
+        size = abs(memory.equations.rows.phi[row])
         return (
             f"joint {run.model.row_joint[row]!r} is violated by {size:.3g}, more than "
-            f"{run.control[VIOLATION]:.3g}, at t = {t:.6g} s"
+            f"{memory.control.violation:.3g}, at t = {t:.6g} s"
         )
     if status == TOO_MANY_STEPS:
         return f"{run.limits.most_steps} steps were taken without reaching the end, at t = {t:.6g} s"
     if status == STEP_TOO_SMALL:
-        h = run.control[SMALLEST_STEP]
+        h = memory.control.smallest_step
         return f"the error estimate asks for a step below {h:.3g} s at t = {t:.6g} s"
     return f"{OUTCOMES[status].sentence} at t = {t:.6g} s ({run.method.formulation.name})"

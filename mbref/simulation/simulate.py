@@ -41,7 +41,7 @@ def simulate(
     except Untraceable as reason:
         raise MethodError(f"no machine code for {scene.name!r} by {method}: {reason}") from None
     built = time.process_time() - began - run.making
-    status, seconds = run.march(progress)
+    status, seconds = run.advance(progress)
     return trajectory_of(run, status, seconds, built + run.making)
 
 

@@ -2,98 +2,41 @@
 
 from __future__ import annotations
 
-from numpy import isfinite, sqrt
-
-from mbref.equations.evaluation import expand
+from mbref.equations.coordinates import copy_state, expand, fastest_turn
 from mbref.equations.loads import remember_angles
-from mbref.kernels.arguments import opened
-from mbref.kernels.compilation import INDICES, INT, MATRIX, VECTOR, entry, kernel, pointer_to
-from mbref.kernels.layout import (
-    ACCELERATE,
-    ACCELERATION,
-    ACCEPT,
-    CHANGED,
-    COLUMNS,
-    COORDINATES,
-    CROSSINGS,
-    DENSE,
-    FIRST_STEP,
-    FIXED_STEP,
-    FORCED_STEP,
-    HANDOVER,
-    LARGEST_STEP,
-    LARGEST_TURN,
-    LAST,
-    LAST_TIME,
-    LIVE,
-    MEMO,
-    MOST_STEPS,
-    MOVING,
-    MULTIPLIERS,
-    NOT_CONVERGED,
-    NOT_FINITE,
-    OK,
-    PHI,
-    PROBLEM,
-    PROPOSE,
-    RATES,
-    REJECTED,
-    ROWS,
-    SIZES,
-    SMALLEST_STEP,
-    STATE,
-    STEP,
-    STEPS,
-    STEPS_PER_CALL,
-    TURNING,
-    VELOCITIES,
-    VIOLATION,
-)
-from mbref.kernels.pointer_table import array_at, kernel_at
-from mbref.linear_algebra.vectors import copy, copy_rows
+from mbref.kernels.compilation import INT, entry, kernel
+from mbref.kernels.layout import CHANGED, GUARD_FAILED, MEMORY, NOT_CONVERGED, NOT_FINITE, OK
+from mbref.linear_algebra.hermite import extrapolate_with_rates
+from mbref.linear_algebra.vectors import all_finite, copy
 from mbref.simulation.singular_crossing import (
     APART,
     choose_nodes,
-    extrapolate,
     has_fallen_in,
-    keep_state,
     leap_length,
-    relative_pivot,
-    to_edge,
+    remember_state,
+    step_to_edge,
 )
 
 # how a call ends; evaluation statuses (SINGULAR, …) end it too
 DONE, VIOLATED, STEP_TOO_SMALL, TOO_MANY_STEPS, PAUSED = range(10, 15)
-# clock: the state of the loop between calls; length and error ratio of the last step, and its length
-# before the sample times cut it
-TIME, LENGTH, SUGGESTED, RATIO = range(4)
-# place: sample to take next, and the violated row
-SAMPLE, ROW = range(2)
 
 
 @kernel
-def take_sample(k, work, sample_q, sample_v, sample_a, sample_m):
+def take_sample(memory):
     """Record state, accelerations and multipliers as the last evaluation left them."""
-    state, columns = work[STATE], work[COLUMNS]
-    copy(state[COORDINATES], sample_q[k])
-    copy(state[VELOCITIES][: columns.shape[1]], sample_v[k])
-    copy(columns[ACCELERATION], sample_a[k])
-    copy(work[ROWS][MULTIPLIERS], sample_m[k])
+    samples, state, system = memory.loop.samples, memory.state, memory.equations.system
+    k = memory.loop.clock.sample
+    copy(state.coordinates, samples.coordinates[k])
+    copy(state.velocities, samples.velocities[k])
+    copy(system.acceleration, samples.accelerations[k])
+    copy(system.multipliers, samples.multipliers[k])
+    memory.loop.clock.sample = k + 1
 
 
 @kernel
-def all_finite(values):
-    """Whether no entry is infinite or undefined."""
-    for value in values:  # noqa: SIM110 - numba compiles no generator expression
-        if not isfinite(value):
-            return False
-    return True
-
-
-@kernel
-def worst_row(work):
+def worst_row(phi):
     """The row with the largest violation; -1 without rows."""
-    phi, worst = work[ROWS][PHI], -1
+    worst = -1
     for row in range(phi.shape[0]):
         if worst < 0 or abs(phi[row]) > abs(phi[worst]):
             worst = row
@@ -101,209 +44,185 @@ def worst_row(work):
 
 
 @kernel
-def judge(y, y_rate, place, control, work):
-    """Whether a state can be kept: finite, and no row violated beyond what is tolerated."""
+def check_state(y, y_rate, memory):
+    """OK where a state is finite and no row is violated beyond the limit, else NOT_FINITE or VIOLATED."""
     if not (all_finite(y) and all_finite(y_rate)):
         return NOT_FINITE
-    place[ROW] = worst_row(work)
-    if place[ROW] >= 0 and abs(work[ROWS][PHI, place[ROW]]) > control[VIOLATION]:
+    phi = memory.equations.rows.phi
+    row = worst_row(phi)
+    memory.loop.clock.violated_row = row
+    if row >= 0 and abs(phi[row]) > memory.control.violation:
         return VIOLATED
     return OK
 
 
 @kernel
-def fastest_turn(work):
-    """The largest angular velocity of a body (rad/s)."""
-    v, square = work[STATE][VELOCITIES][: work[COLUMNS].shape[1]], 0.0
-    for b in range(v.shape[0] // 6):
-        a, b_, c = v[6 * b + 3], v[6 * b + 4], v[6 * b + 5]
-        square = max(square, a * a + b_ * b_ + c * c)
-    return sqrt(square)
-
-
-@kernel
-def keep(t, ints, floats, work):
+def remember_accepted_state(t, memory):
     """Remember the accepted state, from which charts predict and angles unwrap."""
-    copy_rows(work[STATE], work[LAST])
-    work[MEMO][0, LAST_TIME] = t
-    remember_angles(ints, floats, work)
+    copy_state(memory.state, memory.previous)
+    memory.watch.accepted_time = t
+    remember_angles(memory.equations)
 
 
 @kernel
-def largest_step(control, work):
+def largest_step(memory):
     """The step that the user's limit and the fastest turning body allow."""
-    fastest = fastest_turn(work)
-    h = control[LARGEST_STEP]
-    return min(h, control[LARGEST_TURN] / fastest) if fastest > 0.0 else h
+    control, fastest = memory.control, fastest_turn(memory.state.velocities)
+    h = control.largest_step
+    return min(h, control.largest_turn / fastest) if fastest > 0.0 else h
 
 
 @kernel
-def chosen(suggested, control, counts):
-    """The step to try: the user's first where one is given, else the integrator's."""
-    return control[FIRST_STEP] if counts[STEPS] == 0 and control[FIRST_STEP] > 0.0 else suggested
+def proposed_or_first_step(suggested, memory):
+    """The user's first step where one is given, else the integrator's proposal."""
+    first = memory.control.first_step
+    return first if memory.equations.system.counts.steps == 0 and first > 0.0 else suggested
 
 
 @kernel
-def place_inside(t, history, nodes, found, y, y_rate, live, work):
-    """The extrapolated state and accelerations at a sample time inside a window, for ``take_sample``."""
-    extrapolate(history, nodes, found, t, y, y_rate, work[DENSE])
-    expand(y, live, work[STATE])
-    nq, acceleration = live[0, MOVING], work[COLUMNS][ACCELERATION]
-    for k in range(live[0, TURNING]):
-        acceleration[live[1, nq + k]] = y_rate[nq + k]
-
-
-@kernel
-def part_of(interval, h):
-    """The step next taken towards the end of an interval: to the end, to the middle of it, or h."""
+def step_within(interval, h):
+    """The next step towards the end of an interval: the interval, its half, or h."""
     if h * (1.0 + 1e-9) >= interval:
         return interval
     return 0.5 * interval if 2.0 * h > interval else h
 
 
-_step, _propose, _rates = (kernel_at(pointer_to(kind)) for kind in (STEP, PROPOSE, RATES))
-_accept, _accelerate = kernel_at(pointer_to(ACCEPT)), kernel_at(pointer_to(ACCELERATE))
-_vector, _matrix, _indices = array_at(VECTOR), array_at(MATRIX), array_at(INDICES)
-
-
-@entry(INT(PROBLEM, PROBLEM))
-def march(loop, problem):
-    """Advance until the last sample time, a failure, or the number of steps per call; says which.
-
-    ``loop`` is the table of the kernels step, propose, rates, observe, careful, accept and accelerate, then
-    of the arrays named below.
-    """
-    step = _step(loop, 0)
-    propose = _propose(loop, 1)
-    rates = _rates(loop, 2)
-    observe = _rates(loop, 3)
-    careful = _rates(loop, 4)
-    accept = _accept(loop, 5)
-    accelerate = _accelerate(loop, 6)
-    times, sample_q, sample_v = _vector(loop, 7), _matrix(loop, 8), _matrix(loop, 9)
-    sample_a, sample_m = _matrix(loop, 10), _matrix(loop, 11)
-    clock, control, place = _vector(loop, 12), _vector(loop, 13), _indices(loop, 14)
-    tolerances, memory, history = _vector(loop, 15), _matrix(loop, 19), _matrix(loop, 20)
-    y, y_rate, y_new, nodes = _vector(loop, 16), _vector(loop, 17), _vector(loop, 18), _indices(loop, 21)
-    ints, floats, work, pivots, _settings, counts = opened(problem)
-    taken = 0
+@entry(INT(MEMORY))
+def advance_to_end(memory):
+    """Advance until the last sample time, a failure, or the number of steps per call; says which."""
+    loop, clock, counts = memory.loop, memory.loop.clock, memory.equations.system.counts
+    taken, times = 0, memory.loop.times
     while True:
-        t, size = clock[TIME], pivots[SIZES, 1]
-        look = observe if t >= times[place[SAMPLE]] else rates
-        status = look(accelerate, t, y[:size], y_rate[:size], problem)
-        if status == HANDOVER:
-            status = careful(accelerate, t, y[:size], y_rate[:size], problem)
-        if status == OK:
-            status = judge(y[:size], y_rate[:size], place, control, work)
+        y, y_rate = loop.y[: clock.y_size], loop.y_rate[: clock.y_size]
+        status = evaluate_state(y, y_rate, memory)
         if status != OK:
             return status
-        keep(t, ints, floats, work)
-        while place[SAMPLE] < times.shape[0] and t >= times[place[SAMPLE]]:
-            take_sample(place[SAMPLE], work, sample_q, sample_v, sample_a, sample_m)
-            place[SAMPLE] += 1
-        keep_state(history, counts[STEPS], t, relative_pivot(work), y[:size], y_rate[:size])
-        if place[SAMPLE] == times.shape[0]:
+        while clock.sample < times.shape[0] and clock.time >= times[clock.sample]:
+            take_sample(memory)
+        remember_state(counts.steps, y, y_rate, memory)
+        if clock.sample == times.shape[0]:
             return DONE
-        if counts[STEPS] >= control[MOST_STEPS]:
+        if counts.steps >= memory.control.most_steps:
             return TOO_MANY_STEPS
-        if taken >= control[STEPS_PER_CALL]:
+        if taken >= memory.control.steps_per_call:
             return PAUSED
-        length = 0.0 if control[FIXED_STEP] > 0.0 else leap_length(history, counts[STEPS])
-        if length > 0.0:
-            status = leap(
-                length, accept, times, sample_q, sample_v, sample_a, sample_m, clock, place,
-                y, y_rate, y_new, history, nodes, problem,
-            )  # fmt: skip
-            memory[:] = 0.0
-            if status != OK:
-                return status
-            if place[SAMPLE] == times.shape[0]:
-                return DONE
-            taken += 1
-            continue
-        suggested = propose(
-            clock[LENGTH], clock[SUGGESTED], clock[RATIO], y[:size], y_rate[:size],
-            memory, control, tolerances,
-        )  # fmt: skip
-        suggested = chosen(suggested, control, counts)
-        status = advance(
-            suggested, step, propose, rates, careful, accept, accelerate, times[place[SAMPLE]], clock,
-            control, tolerances, y, y_rate, y_new, memory, history, problem,
-        )  # fmt: skip
+        length = 0.0 if memory.control.fixed_step > 0.0 else leap_length(loop.history, counts.steps)
+        status = leap(length, memory) if length > 0.0 else advance(times[clock.sample], y, y_rate, memory)
         if status != OK:
             return status
+        if clock.sample == times.shape[0]:
+            return DONE
         taken += 1
 
 
 @kernel
-def leap(
-    length, accept, times, sample_q, sample_v, sample_a, sample_m, clock, place,
-    y, y_rate, y_new, history, nodes, problem,
-):  # fmt: skip
-    """Cross a window by extrapolation and projection; samples inside it are taken as extrapolated."""
-    ints, _floats, work, pivots, _settings, counts = opened(problem)
-    t, size = clock[TIME], pivots[SIZES, 1]
-    found = choose_nodes(history, counts[STEPS], APART * length, nodes)
-    while place[SAMPLE] < times.shape[0] and times[place[SAMPLE]] <= t + length:
-        clock[TIME] = times[place[SAMPLE]]
-        place_inside(clock[TIME], history, nodes, found, y_new[:size], y_rate[:size], ints[LIVE], work)
-        take_sample(place[SAMPLE], work, sample_q, sample_v, sample_a, sample_m)
-        place[SAMPLE] += 1
-    extrapolate(history, nodes, found, t + length, y_new[:size], y_rate[:size], work[DENSE])
-    status = accept(t + length, y_new, problem)
-    clock[TIME] = t + length if place[SAMPLE] < times.shape[0] else clock[TIME]
-    counts[STEPS] += 1
-    counts[CROSSINGS] += 1
+def evaluate_state(y, y_rate, memory):
+    """Evaluate y' at the present time, with outputs at a sample time; check and remember the state."""
+    clock, kernels = memory.loop.clock, memory.kernels
+    t = clock.time
+    if t >= memory.loop.times[clock.sample]:
+        status = kernels.rates_with_outputs(t, y, y_rate, memory)
+    else:
+        status = kernels.rates(t, y, y_rate, memory)
+    if status == GUARD_FAILED:
+        status = kernels.fallback_rates(t, y, y_rate, memory)
     if status == OK:
-        copy(y_new, y)
+        status = check_state(y, y_rate, memory)
+    if status == OK:
+        remember_accepted_state(t, memory)
     return status
 
 
 @kernel
-def advance(
-    suggested, step, propose, rates, careful, accept, accelerate, target, clock, control, tolerances,
-    y, y_rate, y_new, memory, history, problem,
-):  # fmt: skip
-    """One accepted step towards the target time, as many attempts as it takes."""
-    _ints, _floats, work, pivots, _settings, counts = opened(problem)
-    t, size, interval = clock[TIME], pivots[SIZES, 1], target - clock[TIME]
-    limit = min(largest_step(control, work), to_edge(history, counts[STEPS]))
-    suggested = min(max(suggested, control[FORCED_STEP]), limit)
+def set_extrapolated_state(t, count, memory):
+    """The extrapolated state and accelerations at a sample time inside a window, for ``take_sample``."""
+    loop, active, acceleration = memory.loop, memory.active, memory.equations.system.acceleration
+    y, y_rate = loop.y_new[: loop.clock.y_size], loop.y_rate[: loop.clock.y_size]
+    extrapolate_with_rates(loop.history, count, t, y, y_rate)
+    expand(y, active, memory.state)
+    nq = active.coordinates.shape[0]
+    for k in range(active.velocities.shape[0]):
+        acceleration[active.velocities[k]] = y_rate[nq + k]
+
+
+@kernel
+def leap(length, memory):
+    """Cross a window by extrapolation and projection; samples inside it are taken as extrapolated."""
+    loop, clock, counts = memory.loop, memory.loop.clock, memory.equations.system.counts
+    history, times, landing = loop.history, loop.times, clock.time + length
+    found = choose_nodes(history, counts.steps, APART * length)
+    while clock.sample < times.shape[0] and times[clock.sample] <= landing:
+        clock.time = times[clock.sample]
+        set_extrapolated_state(clock.time, found, memory)
+        take_sample(memory)
+    y_new, y_rate = loop.y_new[: clock.y_size], loop.y_rate[: clock.y_size]
+    extrapolate_with_rates(history, found, landing, y_new, y_rate)
+    status = memory.kernels.accept(landing, loop.y_new, memory)
+    clock.time = landing if clock.sample < times.shape[0] else clock.time
+    counts.steps += 1
+    counts.crossings += 1
+    clock.restart = counts.steps
+    if status == OK:
+        copy(loop.y_new, loop.y)
+    return status
+
+
+@kernel
+def attempt(t, h, y, y_rate, y_new, memory):
+    """One attempt at a step: its error ratio, or minus the status of an evaluation that failed."""
+    step, kernels = memory.kernels.step, memory.kernels
+    ratio = step(kernels.rates, t, h, y, y_rate, y_new, memory)
+    if ratio == -float(GUARD_FAILED):
+        ratio = step(kernels.fallback_rates, t, h, y, y_rate, y_new, memory)
+    return ratio
+
+
+@kernel
+def accept_step(now, h, suggested, ratio, memory):
+    """Correct and keep the new state: OK, CHANGED (new coordinates), or the status of the failure."""
+    loop, counts = memory.loop, memory.equations.system.counts
+    clock = loop.clock
+    status = memory.kernels.accept(now, loop.y_new, memory)
+    adaptive = memory.control.fixed_step == 0.0
+    if status == OK and adaptive and has_fallen_in(loop.history, counts.steps, memory.watch):
+        status = NOT_CONVERGED
+    if status == OK or status == CHANGED:  # noqa: SIM109 - no containers in kernels
+        counts.steps += 1
+        copy(loop.y_new, loop.y)
+        clock.time, clock.length, clock.suggested, clock.ratio = now, h, suggested, ratio
+        if status == CHANGED:
+            clock.restart = counts.steps
+    return status
+
+
+@kernel
+def advance(target, y, y_rate, memory):
+    """One accepted step towards the target time (s), as many attempts as it takes."""
+    loop, control, counts = memory.loop, memory.control, memory.equations.system.counts
+    propose, clock = memory.kernels.propose, loop.clock
+    t, interval, y_new = clock.time, target - clock.time, loop.y_new[: clock.y_size]
+    suggested = propose(clock.length, clock.suggested, clock.ratio, y, y_rate, memory)
+    suggested = proposed_or_first_step(suggested, memory)
+    limit = min(largest_step(memory), step_to_edge(loop.history, counts.steps))
+    suggested = min(max(suggested, control.forced_step), limit)
     while True:
-        if control[FIXED_STEP] > 0.0:
-            h = interval / max(1.0, -(-(interval / control[FIXED_STEP] - 1e-6) // 1.0))
+        if control.fixed_step > 0.0:
+            h = interval / max(1.0, -(-(interval / control.fixed_step - 1e-6) // 1.0))
         else:
-            h = part_of(interval, suggested)
-        ratio = step(
-            rates, accelerate, t, h, y[:size], y_rate[:size], y_new[:size], memory, tolerances,
-            problem,
-        )  # fmt: skip
-        if ratio == -float(HANDOVER):  # the chart's own rates leave this step to the careful ones
-            ratio = step(
-                careful, accelerate, t, h, y[:size], y_rate[:size], y_new[:size], memory, tolerances,
-                problem,
-            )  # fmt: skip
-        now = target if h == interval else t + h
+            h = step_within(interval, suggested)
+        ratio = attempt(t, h, y, y_rate, y_new, memory)
         status = OK if ratio >= 0.0 else (int(-ratio) if ratio < 0.0 else NOT_FINITE)
-        if status == OK and h <= control[FORCED_STEP]:
+        if status == OK and h <= control.forced_step:
             ratio = min(ratio, 1.0)
         if status == OK and ratio <= 1.0:
-            status = accept(now, y_new, problem)
-            if status == OK and control[FIXED_STEP] == 0.0 and has_fallen_in(history, counts[STEPS], work):
-                status = NOT_CONVERGED
+            status = accept_step(target if h == interval else t + h, h, suggested, ratio, memory)
             if status == OK or status == CHANGED:  # noqa: SIM109 - no containers in kernels
-                counts[STEPS] += 1
-                copy(y_new, y)
-                clock[TIME], clock[LENGTH], clock[SUGGESTED], clock[RATIO] = now, h, suggested, ratio
-                if status == CHANGED:
-                    memory[:] = 0.0
                 return OK
-        counts[REJECTED] += 1
-        if control[FIXED_STEP] > 0.0:
+        counts.rejected += 1
+        if control.fixed_step > 0.0:
             return status
-        verdict = ratio if status == OK else -float(status)
-        suggested = propose(h, suggested, verdict, y[:size], y_rate[:size], memory, control, tolerances)
+        suggested = propose(h, suggested, ratio if status == OK else -float(status), y, y_rate, memory)
         if status == OK:
-            suggested = max(suggested, control[FORCED_STEP])
-        if suggested < control[SMALLEST_STEP]:
+            suggested = max(suggested, control.forced_step)
+        if suggested < control.smallest_step:
             return STEP_TOO_SMALL if status == OK else status

@@ -1,7 +1,7 @@
-"""Machine code of one scene's own, traced from kernels that serve every scene."""
+"""Specialised code: machine code for one scene, recorded from the kernels that serve every scene."""
 
 from mbref.specialised.build import Part, Specialised, specialise
-from mbref.specialised.chart import with_own_code
+from mbref.specialised.chart import with_specialised_code
 from mbref.specialised.tracing import Untraceable
 
-__all__ = ["Part", "Specialised", "Untraceable", "specialise", "with_own_code"]
+__all__ = ["Part", "Specialised", "Untraceable", "specialise", "with_specialised_code"]

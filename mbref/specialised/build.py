@@ -1,8 +1,7 @@
-"""Specialise: the machine code of one scene, holding only the operations that its constants leave.
+"""Specialise: machine code for one scene, with only the operations that its constants leave.
 
-Two pieces are traced from the kernels: the rates of the moving coordinates, by the formulation's kernel on
-the rows and columns that move, and the projection of a state.  Coordinates that never move, and rows that
-bear on none that does, are left out.
+Two pieces are recorded from the kernels: the rates of the active coordinates, by the formulation's kernel on
+the active rows and columns, and one Newton step of the projection.
 """
 
 from __future__ import annotations
@@ -12,199 +11,173 @@ import hashlib
 import json
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
-from mbref.equations.evaluation import (
-    coordinate_rates,
-    dense_jacobian,
-    evaluate,
-    right_hand_side,
-    violation_rate,
-)
+from mbref.equations.coordinates import coordinate_rates
+from mbref.equations.evaluation import assemble_system
+from mbref.equations.initial_state import Start
 from mbref.equations.model import Model
-from mbref.equations.static_constraints import add_multipliers_of_held
-from mbref.formulations.augmented_lagrangian import factor
-from mbref.formulations.base import Formulation
+from mbref.equations.static_constraints import add_static_multipliers
 from mbref.kernels.compilation import CACHE, PLAIN
-from mbref.kernels.layout import (
-    ACCELERATION,
-    ANGLES,
-    COLUMNS,
-    FORCE,
-    INVERSE_ROOT,
-    MASS,
-    MULTIPLIERS,
-    OK,
-    PHI,
-    PHI_Q,
-    PHI_RATE,
-    PROJECT_CODE,
-    RATES_CODE,
-    RHS,
-    ROWS,
-    SCRATCH,
-)
-from mbref.linear_algebra.sparse_cholesky import memories, squared_pivots
-from mbref.linear_algebra.symbolic_factorisation import COLUMN, ROW, Plan
+from mbref.kernels.layout import OK, Active, Addresses, SparseFactor, State, System
+from mbref.kernels.named_memory import Packed, allocate, packed, record
+from mbref.linear_algebra.minimum_norm import NEVER
+from mbref.linear_algebra.sparse_cholesky import find_squared_pivots
+from mbref.simulation.method import Method
 from mbref.specialised.machine_code import Code, Piece, compiled, processor
 from mbref.specialised.tracing import Record, Untraceable, inputs, numbers, plain
-from mbref.stabilisation.all_coordinates import normalise
-from mbref.stabilisation.projection import (
-    ALPHA,
-    REPEATED,
-    cancel,
-    displace,
-    largest,
-)
-from mbref.stabilisation.sparse_chart import accelerations
+from mbref.stabilisation.projection import REPEATED, newton_step, project_velocities
 
-MOST_ROWS = 60  # whose record would not be too long (machine_code.MOST_OPERATIONS)
-PIECES = ("rates", "project")  # in the order of their addresses in ints[LIVE]
+MOST_ROWS = 60  # the record of more would be too long (machine_code.MOST_OPERATIONS)
 
 
 @dataclass(frozen=True)
 class Part:
-    """What of a scene moves: indices into q (7 nb) and v (6 nb), and the rows that bear on them."""
+    """The active coordinates and velocities of a scene, and the factor over the rows that bear on them."""
 
-    coordinates: np.ndarray
-    velocities: np.ndarray
-    rows: np.ndarray
-    plan: Plan
-
-    @staticmethod
-    def of(plan: Plan, coordinates: np.ndarray) -> Part:
-        """With the rows in the plan's order of elimination."""
-        velocities, rows = (plan.part(k).astype(int) for k in (COLUMN, ROW))
-        return Part(coordinates, velocities, rows, plan)
+    active: Active
+    factor: SparseFactor
 
 
 @dataclass(frozen=True)
 class Specialised:
-    """The scene's machine code and ``ints[LIVE]`` with its addresses; keep it while it is used."""
+    """The addresses of a scene's machine code; keep it while it is used."""
 
-    live: np.ndarray
+    addresses: Addresses
     operations: dict[str, int]  # per piece
     code: Code
 
 
-class State:
-    """A state of recording scalars at the start's sample, and memory for the kernels to run on."""
+class RecordingState:
+    """The start as recording scalars, and memory for the kernels to run on."""
 
-    def __init__(self, model: Model, q: np.ndarray, v: np.ndarray, moving: Part):
-        self.model, self.moving, self.record = model, moving, Record()
+    def __init__(self, model: Model, method: Method, rank_tolerance: float, start: Start, part: Part):
+        self.active, self.record, self.formulation = part.active, Record(), method.formulation
+        algebra, (q, v) = method.formulation.linear_algebra, part.active
+        sizes = {**model.sizes, "dense_rows": algebra.rows(model.m)}
+        rows, columns = part.factor.symbolic.row.size, v.size
+        equations = model.equations(
+            sizes,
+            settings=record(method.settings(rank_tolerance)),
+            options=method.packed_options(method.formulation),
+            scratch=packed(algebra.scratch(rows, columns, part.factor)),
+        )
+        self.memory = with_numbers(
+            SimpleNamespace(
+                equations=equations,
+                state=allocate(State, sizes)._replace(coordinates=start.q, velocities=start.v),
+                factor=part.factor,
+                chart=allocate(method.stabilisation.memory, sizes),
+            )
+        )
         (self.t,) = inputs(self.record, "t", np.zeros(1))
-        self.q, self.v = numbers(q), numbers(v)
-        nq = len(moving.coordinates)
-        samples = np.concatenate([q[moving.coordinates], v[moving.velocities]])
-        scalars = inputs(self.record, "y", samples)
-        self.q[moving.coordinates], self.v[moving.velocities] = scalars[:nq], scalars[nq:]
-        self.floats = tuple(map(numbers, model.floats))
-        self.work = tuple(map(numbers, model.workspace(moving.plan.memory)))
-        angles = self.work[ANGLES]
-        angles[0, :] = inputs(self.record, "angles", np.zeros(angles.shape[1]))
-        self.problem = (model.ints, self.floats, self.work)
+        scalars = inputs(self.record, "y", np.concatenate([start.q[q], start.v[v]]))
+        state = self.memory.state
+        state.coordinates[q], state.velocities[v] = scalars[: q.size], scalars[q.size :]
+        angles = self.memory.equations.angles
+        angles[:] = inputs(self.record, "angles", np.zeros(angles.size))
 
-    def evaluate(self, settings: np.ndarray) -> None:
-        """All terms of the equations of motion."""
-        plain(evaluate)(self.t, self.q, self.v, *self.problem)
-        plain(right_hand_side)(self.v, self.model.ints, self.work, settings)
-
-    def accelerate(self, formulation: Formulation, settings: np.ndarray) -> int:
-        """Accelerations of what moves and multipliers, into the workspace; the status."""
-        if formulation.sparse:
-            return plain(accelerations)(self.moving.plan.indices, self.work, settings, no_counts())
-        plain(dense_jacobian)(self.model.ints, self.work)
-        velocities, rows = self.moving.velocities, self.moving.rows
-        columns, of_rows = self.work[COLUMNS][:, velocities], self.work[ROWS][:, rows]
-        (m, n), pivots = (len(rows), len(velocities)), np.zeros(2 * (len(rows) + len(velocities)), dtype=int)
-        scratch = np.zeros(formulation.scratch(m, n)).astype(object)
-        status = plain(formulation.accelerate)(
-            columns[MASS], columns[INVERSE_ROOT], self.work[PHI_Q][np.ix_(rows, velocities)], columns[FORCE],
-            of_rows[RHS], settings, scratch, pivots, no_counts(), columns[ACCELERATION], of_rows[MULTIPLIERS],
-        )  # fmt: skip
-        self.work[COLUMNS][ACCELERATION, velocities] = columns[ACCELERATION]
-        self.work[ROWS][MULTIPLIERS, rows] = of_rows[MULTIPLIERS]
-        plain(add_multipliers_of_held)(self.moving.plan.indices, self.work)
+    def accelerate(self) -> int:
+        """Accelerations of the active velocities and multipliers of all rows; the status."""
+        system, kernel = self.memory.equations.system, plain(self.formulation.accelerate)
+        if self.formulation.linear_algebra.sparse:
+            return kernel(system)
+        rows, columns = self.memory.factor.symbolic.row.astype(int), self.active.velocities
+        reduced = _reduced(system, rows, columns)
+        status = kernel(reduced)
+        system.acceleration[columns], system.multipliers[rows] = reduced.acceleration, reduced.multipliers
+        plain(add_static_multipliers)(self.memory.factor.static, system)
         return status
 
 
-def no_counts() -> np.ndarray:
-    """Room for counts that nobody reads: those of a piece are known beforehand."""
-    return np.zeros(6, dtype=np.int64)
+def _reduced(system: System, rows: np.ndarray, columns: np.ndarray) -> System:
+    """The system of these rows and columns; its accelerations and multipliers are copies."""
+    of_columns = {k: getattr(system, k)[columns] for k in ("mass", "inverse_root", "force", "acceleration")}
+    of_rows = {k: getattr(system, k)[rows] for k in ("rhs", "multipliers")}
+    return system._replace(**of_columns, **of_rows, jacobian=system.jacobian[np.ix_(rows, columns)])
 
 
-def rates_piece(state: State, formulation: Formulation, settings: np.ndarray) -> Piece:
-    """y' of the moving coordinates by the formulation, and the multipliers of all rows."""
-    settings, moving = numbers(settings), state.moving
-    state.evaluate(settings)
-    if state.accelerate(formulation, settings) != OK:
-        raise Untraceable(f"{formulation.name} fails at the start")
-    rates = np.zeros(state.q.size, dtype=object)
-    plain(coordinate_rates)(state.q, state.v, rates)
-    acceleration, multipliers = state.work[COLUMNS][ACCELERATION], state.work[ROWS][MULTIPLIERS]
-    out = [*rates[moving.coordinates], *acceleration[moving.velocities]]
-    return Piece(PIECES[0], state.record, out, multipliers)
+def with_numbers(values: Any) -> Any:
+    """The same memory with arrays of plain numbers, on which kernels record their operations."""
+    if isinstance(values, Packed):
+        return with_numbers(values.values)
+    if isinstance(values, SimpleNamespace):
+        return SimpleNamespace(**{name: with_numbers(value) for name, value in vars(values).items()})
+    if isinstance(values, np.record):
+        return SimpleNamespace(**{name: values[name].item() for name in values.dtype.names})
+    if isinstance(values, np.ndarray):
+        return numbers(values) if values.dtype == float else values
+    return type(values)(*map(with_numbers, values)) if isinstance(values, tuple) else values
 
 
-def project_piece(state: State) -> Piece:
+def rates_piece(state: RecordingState) -> Piece:
+    """y' of the active coordinates by the formulation, and the multipliers of all rows."""
+    memory, (q, v) = state.memory, state.active
+    coordinates, velocities = memory.state.coordinates, memory.state.velocities
+    plain(assemble_system)(state.t, coordinates, velocities, memory.equations)
+    if state.accelerate() != OK:
+        raise Untraceable(f"{state.formulation.name} fails at the start")
+    plain(coordinate_rates)(coordinates, velocities, memory.state.coordinate_rates)
+    system = memory.equations.system
+    out = [*memory.state.coordinate_rates[q], *system.acceleration[v]]
+    return Piece("rates", state.record, out, system.multipliers)
+
+
+def project_piece(state: RecordingState) -> Piece:
     """One Newton step of the projection: y after it; the violation before it and the squared pivots.
 
     Velocities are corrected in every step; where one is enough they need next to no correction.
     """
-    moving, model, q, v, work = state.moving, state.model, state.q, state.v, state.work
-    plan, rows = moving.plan.indices, work[ROWS]
-    plain(evaluate)(state.t, q, v, *state.problem)
-    plain(normalise)(q)
-    if not plain(factor)(plan, work, ALPHA, no_counts()):
+    memory, (q, v) = state.memory, state.active
+    violation = plain(newton_step)(state.t, None, NEVER, memory)
+    if isinstance(violation, float) and violation < 0:
         raise Untraceable("the constraint rows cannot be factored at the start")
-    _, l, diagonal, squares, *_ = plain(memories)(plan, work[SCRATCH][0])
-    plain(squared_pivots)(plan, l, diagonal, squares)
-    violation, x = plain(largest)(rows[PHI, moving.rows]), np.zeros(model.n, dtype=object)
-    plain(cancel)(PHI, REPEATED, plan, work, x)
-    plain(violation_rate)(model.ints, work, v)
-    plain(cancel)(PHI_RATE, REPEATED, plan, work, v)
-    plain(displace)(q, x, np.zeros(q.size, dtype=object))
-    y = [*q[moving.coordinates], *v[moving.velocities]]
-    return Piece(PIECES[1], state.record, y, [violation, *squares])
+    plain(find_squared_pivots)(memory.factor)
+    plain(project_velocities)(REPEATED, memory)
+    y = [*memory.state.coordinates[q], *memory.state.velocities[v]]
+    return Piece("project", state.record, y, [violation, *memory.factor.squared_pivots])
 
 
-def specialise(
-    model: Model, formulation: Formulation, settings: np.ndarray, q: np.ndarray, v: np.ndarray, moving: Part
-) -> Specialised:
-    """The code of a scene from its start (q, v), traced and compiled, or as kept from an earlier run.
+def specialise(model: Model, method: Method, rank_tolerance: float, start: Start, part: Part) -> Specialised:
+    """The code of a scene from its start, recorded and compiled, or as kept from an earlier run.
 
     Raises Untraceable where the formulation decides at run time what it does, the scene is too large, or
     there is no JIT.
     """
     if PLAIN:
         raise Untraceable("without the JIT there is no machine code")
-    if formulation.pivots_by_size:
-        raise Untraceable(f"{formulation.name} chooses pivots at every evaluation")
-    if len(moving.rows) > MOST_ROWS:
-        raise Untraceable(f"{len(moving.rows)} rows that move, more than {MOST_ROWS}")
-    arrays = (*model.ints, *model.floats, settings, q, v, moving.coordinates, moving.plan.indices)
-    kept = CACHE / "scenes" / _key(formulation.name, arrays)
+    if method.formulation.pivots_by_size:
+        raise Untraceable(f"{method.formulation.name} chooses pivots at every evaluation")
+    if part.factor.symbolic.row.size > MOST_ROWS:
+        raise Untraceable(f"{part.factor.symbolic.row.size} rows are active, more than {MOST_ROWS}")
+    arguments = (model, method, rank_tolerance, start, part)
+    kept = CACHE / "scenes" / _key(*arguments)
     if not kept.with_suffix(".json").exists():
-        _keep(kept, _traced(model, formulation, settings, q, v, moving))
-    return _loaded(kept, model, moving)
+        _keep(kept, [rates_piece(RecordingState(*arguments)), project_piece(RecordingState(*arguments))])
+    return _loaded(kept)
 
 
-def _key(name: str, arrays: Sequence[np.ndarray]) -> str:
-    digest = hashlib.sha256(f"{name} {processor()}".encode())
-    for array in arrays:
+def _key(model: Model, method: Method, rank_tolerance: float, start: Start, part: Part) -> str:
+    digest = hashlib.sha256(f"{method} {rank_tolerance} {processor()}".encode())
+    factor = part.factor
+    for array in _arrays((model.data, start.q, start.v, part.active, factor.symbolic, factor.static)):
         digest.update(str(array.shape).encode() + array.tobytes())
     return digest.hexdigest()[:32]
 
 
-def _traced(
-    model: Model, formulation: Formulation, settings: np.ndarray, q: np.ndarray, v: np.ndarray, moving: Part
-) -> list[Piece]:
-    rates = rates_piece(State(model, q, v, moving), formulation, settings)
-    return [rates, project_piece(State(model, q, v, moving))]
+def _arrays(values: Any) -> Iterator[np.ndarray]:
+    """All arrays of nested tuples."""
+    for value in values:
+        if isinstance(value, np.ndarray):
+            yield value
+        else:
+            yield from _arrays(value)
 
 
 def _keep(path: Path, pieces: list[Piece]) -> None:
@@ -224,8 +197,6 @@ def _read(path: Path) -> tuple[dict[str, int], Code]:
     return facts["operations"], Code(path.with_suffix(".o").read_bytes())
 
 
-def _loaded(path: Path, model: Model, moving: Part) -> Specialised:
+def _loaded(path: Path) -> Specialised:
     operations, code = _read(path)
-    live = model.entries(moving.coordinates, moving.velocities)
-    live[0, [RATES_CODE, PROJECT_CODE]] = [code.address(name) for name in PIECES]
-    return Specialised(live, operations, code)
+    return Specialised(Addresses(*map(code.address, Addresses._fields)), operations, code)

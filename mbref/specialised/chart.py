@@ -1,6 +1,6 @@
-"""The chart of the coordinates that can move, by machine code of the scene's own (see ``build``).
+"""The chart of the active coordinates by code specialised for the scene (see ``build``).
 
-Where a guard of that code does not hold, the kernels that serve every scene are asked.
+Where a guard of that code does not hold, the general kernels are asked.
 """
 
 from __future__ import annotations
@@ -11,44 +11,14 @@ from llvmlite import ir
 from numba import i8
 from numba.extending import intrinsic
 
-from mbref.equations.evaluation import expand, place
+from mbref.equations.coordinates import expand
+from mbref.equations.evaluation import set_poses
 from mbref.equations.loads import has_angles
-from mbref.kernels.arguments import opened, planned
-from mbref.kernels.compilation import exchangeable, kernel
-from mbref.kernels.layout import (
-    ACCELERATION,
-    ACCEPT,
-    ANGLES,
-    COLUMNS,
-    COORDINATES,
-    DENSE_VECTORS,
-    EVALUATIONS,
-    FACTORISATIONS,
-    FRAMES,
-    HANDOVER,
-    LIVE,
-    LOADS,
-    MEMO,
-    MOVING,
-    MULTIPLIERS,
-    NEWTON,
-    NEWTON_TOLERANCE,
-    OK,
-    PHI,
-    PROJECT_CODE,
-    RATES,
-    RATES_CODE,
-    ROWS,
-    STATE,
-    TURNING,
-)
-from mbref.linear_algebra.sparse_cholesky import part
-from mbref.linear_algebra.symbolic_factorisation import ROW
-from mbref.linear_algebra.vectors import copy
-from mbref.simulation.singular_crossing import NEVER
-from mbref.stabilisation.all_coordinates import flush
+from mbref.kernels.compilation import exchangeable, inlined, kernel
+from mbref.kernels.layout import ACCEPT, GUARD_FAILED, OK, RATES
+from mbref.linear_algebra.vectors import copy, flush_denormals
 from mbref.stabilisation.base import Stabilisation
-from mbref.stabilisation.projection import MOST_ITERATIONS, ROUNDING, project, watch
+from mbref.stabilisation.projection import FACTOR_FAILED, newton_loop, project, watch
 
 
 @intrinsic
@@ -68,59 +38,61 @@ def call(typingctx, address, t, y, angles, out, more):
 
 
 @kernel
-def evaluated(t, y, y_rate, ints, work, counts):
-    """y' and the multipliers by the scene's own code; OK or HANDOVER."""
-    counts[EVALUATIONS] += 1
-    counts[FACTORISATIONS] += 1
-    status = call(ints[LIVE][0, RATES_CODE], t, y, work[ANGLES][0], y_rate, work[ROWS][MULTIPLIERS])
-    return OK if status == OK else HANDOVER
+def evaluate_by_code(t, y, y_rate, memory):
+    """y' and the multipliers by specialised code; OK or GUARD_FAILED."""
+    system, angles = memory.equations.system, memory.equations.angles
+    system.counts.evaluations += 1
+    system.counts.factorisations += 1
+    status = call(memory.code.addresses.rates, t, y, angles, y_rate, system.multipliers)
+    return OK if status == OK else GUARD_FAILED
 
 
 @exchangeable(RATES)
-def rates(accelerate, t, y, y_rate, problem):
-    ints, _floats, work, _pivots, _settings, counts = opened(problem)
-    return evaluated(t, y, y_rate, ints, work, counts)
+def rates(t, y, y_rate, memory):
+    return evaluate_by_code(t, y, y_rate, memory)
 
 
 @exchangeable(RATES)
-def observe(accelerate, t, y, y_rate, problem):
+def rates_with_outputs(t, y, y_rate, memory):
     """``rates``, with the state and the accelerations of all bodies."""
-    ints, _floats, work, _pivots, _settings, counts = opened(problem)
-    live, acceleration = ints[LIVE], work[COLUMNS][ACCELERATION]
-    status = evaluated(t, y, y_rate, ints, work, counts)
-    for k in range(live[0, TURNING]):
-        acceleration[live[1, live[0, MOVING] + k]] = y_rate[live[0, MOVING] + k]
-    expand(y, live, work[STATE])
+    active, acceleration = memory.active, memory.equations.system.acceleration
+    status = evaluate_by_code(t, y, y_rate, memory)
+    nq = active.coordinates.shape[0]
+    for k in range(active.velocities.shape[0]):
+        acceleration[active.velocities[k]] = y_rate[nq + k]
+    expand(y, active, memory.state)
     return status
 
 
+@inlined
+def newton_step_by_code(t, y, before, memory):
+    """One Newton step of the projection of y by specialised code; the largest |Φ| before it."""
+    code, size = memory.code, memory.loop.clock.y_size
+    memory.equations.system.counts.factorisations += 1
+    if call(code.addresses.project, t, y, memory.equations.angles, code.y, code.outputs) != OK:
+        return FACTOR_FAILED
+    copy(code.y[:size], y[:size])
+    return code.outputs[0]
+
+
+project_by_code = newton_loop(newton_step_by_code)
+
+
 @exchangeable(ACCEPT)
-def accept(t, y, problem):
-    """Project y by the scene's own code; the bodies' frames only where the loop needs them."""
-    ints, _floats, work, _pivots, settings, counts = opened(problem)
-    live, state = ints[LIVE], work[STATE]
-    size, rows = live[0, MOVING] + live[0, TURNING], part(planned(problem), ROW).shape[0]
-    memory = work[DENSE_VECTORS].reshape(-1)
-    out, more = memory[:size], memory[size : size + 1 + rows]
-    tolerance, violation = settings[NEWTON_TOLERANCE], NEVER
-    for _ in range(MOST_ITERATIONS):
-        counts[NEWTON] += 1
-        counts[FACTORISATIONS] += 1
-        if call(live[0, PROJECT_CODE], t, y, work[ANGLES][0], out, more) != OK:
-            break
-        copy(out, y[:size])
-        before, violation = violation, more[0]
-        if violation <= tolerance or before <= violation <= ROUNDING * tolerance:
-            watch(more[1:], work[MEMO][0])
-            flush(y[:size])
-            work[ROWS][PHI, :] = violation
-            expand(y, live, state)
-            if has_angles(ints[LOADS]):
-                place(state[COORDINATES], work[FRAMES])
-            return OK
-    return project(t, y, problem)
+def accept(t, y, memory):
+    """Project y by specialised code; the bodies' frames only where torsion springs need them."""
+    if project_by_code(t, y, memory) != OK:
+        return project(t, y, memory)
+    outputs, equations = memory.code.outputs, memory.equations
+    watch(outputs[1 : 1 + memory.factor.symbolic.row.shape[0]], memory.watch)
+    flush_denormals(y[: memory.loop.clock.y_size])
+    equations.rows.phi[:] = outputs[0]
+    expand(y, memory.active, memory.state)
+    if has_angles(equations.scene.loads):
+        set_poses(memory.state.coordinates, equations.frames)
+    return OK
 
 
-def with_own_code(chart: Stabilisation) -> Stabilisation:
-    """The chart with the scene's own code before its kernels, which serve where a guard does not hold."""
-    return replace(chart, rates=rates, observe=observe, accept=accept)
+def with_specialised_code(chart: Stabilisation) -> Stabilisation:
+    """The chart with specialised code before its kernels, which serve where a guard does not hold."""
+    return replace(chart, rates=rates, rates_with_outputs=rates_with_outputs, accept=accept)

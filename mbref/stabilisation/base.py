@@ -1,31 +1,44 @@
-"""Stabilisation: what the integrator sees of the state, and what is done about constraint violation."""
+"""Stabilisation: how the state is integrated, and how constraint violation is fed back or corrected."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import NamedTuple
 
 from mbref.kernels.compilation import Exchangeable
 
 
+class NoOptions(NamedTuple):
+    """A stabilisation without numbers of its own."""
+
+
 @dataclass(frozen=True)
 class Stabilisation:
-    """Feedback in γ and a chart: kernels between the state and the vector that is integrated.
+    """Feedback in γ and a chart: kernels between the state and the vector y that is integrated.
 
-    ``enter(t, y, …) -> length of y`` chooses y from the state in ``work[STATE]``;
-    ``rates(accelerate, t, y, y', …) -> status`` evaluates y' and leaves the state in ``work[STATE]``;
-    ``accept(t, y, …) -> status`` corrects y after an accepted step (CHANGED: new coordinates, new length);
-    ``observe`` is ``rates`` where a sample is taken: it leaves accelerations and multipliers as well.
-    ``careful`` is ``rates`` where these return HANDOVER.
+    All take ``layout.Memory``.  ``enter(t, y, memory) -> length of y`` chooses y from ``memory.state``;
+    ``rates(t, y, y', memory) -> status`` evaluates y' and leaves the state in ``memory.state``;
+    ``accept(t, y, memory) -> status`` corrects y after an accepted step (CHANGED: new coordinates, new
+    length); ``rates_with_outputs`` is ``rates`` where a sample is taken: it leaves accelerations and
+    multipliers as well; ``fallback_rates`` serves where ``rates`` returns GUARD_FAILED.
+    ``memory`` is the schema of the chart's own memory, in ``Memory.chart``.
     """
 
     name: str
     source: str  # equations of the paper, or the reference
     enter: Exchangeable
     rates: Exchangeable
-    observe: Exchangeable
-    careful: Exchangeable
+    rates_with_outputs: Exchangeable
+    fallback_rates: Exchangeable
     accept: Exchangeable
-    options: Mapping[str, float] = field(default_factory=dict)
+    memory: type | None = None
+    numbers: type = NoOptions  # the method's own numbers, a record with their defaults
     feedback: Callable[[Mapping[str, float]], tuple[float, float]] | None = None  # gains of Φ' and Φ in γ
+    projects: bool = False  # every accepted state meets the constraints, and only active coordinates are in y
     largest_turn: float = 1.0  # rad that a body may turn in an adaptive step unless the user says
+
+    @property
+    def options(self) -> Mapping[str, float]:
+        """Names and defaults of the method's numbers."""
+        return self.numbers()._asdict()

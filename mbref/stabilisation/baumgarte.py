@@ -1,9 +1,17 @@
 """Baumgarte stabilisation: Φ_q q̈ = γ - 2 α Φ' - β² Φ (Eq. 9), α = β = 5 unless said."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from mbref.stabilisation.all_coordinates import accept, enter, rates
 from mbref.stabilisation.base import Stabilisation
+
+
+class Options(NamedTuple):
+    """α and β (1/s)."""
+
+    alpha: float = 5.0
+    beta: float = 5.0
 
 
 def _feedback(options: Mapping[str, float]) -> tuple[float, float]:
@@ -11,5 +19,5 @@ def _feedback(options: Mapping[str, float]) -> tuple[float, float]:
 
 
 BAUMGARTE = Stabilisation(
-    "baumgarte", "Eq. 9", enter, rates, rates, rates, accept, {"alpha": 5.0, "beta": 5.0}, _feedback
+    "baumgarte", "Eq. 9", enter, rates, rates, rates, accept, numbers=Options, feedback=_feedback
 )

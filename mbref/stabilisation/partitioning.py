@@ -5,75 +5,68 @@ the redundant rows and the independent coordinates v (Eqs. 10 and 11).  At every
 coordinates u follow from Φ(u, v, t) = 0 by Newton–Raphson (Eq. 15), started by u + h u' + ½ h² u'' of the
 last accepted step (Eq. 16), and their rates from Φ_u u' = ν - Φ_v v' (Eq. 14).  Φ_p = 2 Φ_π' L.
 
-The partition is kept while the smallest pivot of Φ_u relative to its largest stays above ``kept`` times what
-it was when the partition was chosen; then it is chosen anew, and the integrator starts again.  Of 0.1
+The partition is kept while the smallest pivot of Φ_u relative to its largest stays above ``kept`` times its
+value when the partition was chosen; then it is chosen anew, and the integrator starts again.  With 0.1
 partitions last near turning points of a coordinate: errors 10 to 1000 times those of 0.6.
 """
 
 from __future__ import annotations
 
-from mbref.equations.evaluation import accelerations, coordinate_rates, evaluate
-from mbref.kernels.arguments import opened
+from typing import Annotated, NamedTuple
+
+from mbref.equations.coordinates import coordinate_rates, copy_state
+from mbref.equations.evaluation import assemble_system, evaluate
 from mbref.kernels.compilation import exchangeable, kernel
-from mbref.kernels.layout import (
-    ACCELERATION,
-    ACCEPT,
-    CHANGED,
-    CHART_PIVOTS,
-    COLUMN_ORDER,
-    COLUMNS,
-    COORDINATE_RATES,
-    COORDINATE_SECOND,
-    COORDINATES,
-    DENSE,
-    DENSE_VECTORS,
-    ENTER,
-    FACTORISATIONS,
-    JACOBIAN,
-    KEPT_PARTITION,
-    LAST,
-    LAST_TIME,
-    MEMO,
-    NEWTON,
-    NEWTON_TOLERANCE,
-    NOT_CONVERGED,
-    NU,
-    OK,
-    PHI,
-    RANK_TOLERANCE,
-    RATES,
-    REFERENCE_PIVOT,
-    ROW_BODIES,
-    ROW_ORDER,
-    ROWS,
-    SIZES,
-    SMALLEST_PIVOT,
-    STATE,
-    VELOCITIES,
-)
+from mbref.kernels.layout import ACCEPT, CHANGED, ENTER, NOT_CONVERGED, OK, RATES
+from mbref.kernels.named_memory import Indices, Matrix, Vector, opener
 from mbref.linear_algebra.elimination import full_pivot, lu_factor, lu_solve
-from mbref.linear_algebra.vectors import copy_rows
 from mbref.stabilisation.base import Stabilisation
 
 MOST_ITERATIONS = 20
-OPTIONS = {"kept": 0.6}
 SINGULAR_PIVOT = 1e-13
 
 
+class Options(NamedTuple):
+    """The relative pivot of Φ_u below which coordinates are partitioned anew."""
+
+    kept: float = 0.6
+
+
+class Partition(NamedTuple):
+    """Number of dependent coordinates."""
+
+    rank: int = 0
+
+
+class Scratch(NamedTuple):
+    """The Jacobian by Euler parameters, the factor of its dependent columns, and the partition."""
+
+    jacobian: Annotated[Matrix, "m + nb", "7*nb"]  # [Φ_r Φ_p; 0 2pᵀ]
+    dependent: Annotated[Matrix, "7*nb", "7*nb"]  # Φ_u of the active rows, factored
+    residual: Annotated[Vector, "7*nb"]
+    row_order: Annotated[Indices, "m + nb"]  # active rows first
+    column_order: Annotated[Indices, "7*nb"]  # dependent coordinates first
+    exchanges: Annotated[Indices, "7*nb"]  # of the factor
+    partition: Partition
+
+
+options_of, scratch_of = opener(Options), opener(Scratch)
+
+
 @kernel
-def matrix(q, ints, work, a):
-    """[Φ_r Φ_p; 0 2pᵀ] at the state last evaluated into a[: m + nb, : 7 nb]."""
-    bodies, jacobian = ints[ROW_BODIES], work[JACOBIAN]
+def jacobian_by_euler_parameters(q, equations, a):
+    """[Φ_r Φ_p; 0 2pᵀ] (m + nb, 7 nb) at the state last evaluated; Φ_p = 2 Φ_π' L."""
+    bodies, blocks = equations.scene.row_bodies, equations.system.blocks
     m, nq = bodies.shape[0], q.shape[0]
-    a[: m + nq // 7, :nq] = 0.0
+    a[:] = 0.0
     for row in range(m):
         for side in range(2):
             b = bodies[row, side]
             if 7 * b < nq:
                 i, j = 7 * b, 6 * side
                 for k in range(3):
-                    a[row, i + k] = jacobian[row, j + k]
-                r1, r2, r3 = 2 * jacobian[row, j + 3], 2 * jacobian[row, j + 4], 2 * jacobian[row, j + 5]
+                    a[row, i + k] = blocks[row, j + k]
+                r1, r2, r3 = 2 * blocks[row, j + 3], 2 * blocks[row, j + 4], 2 * blocks[row, j + 5]
                 w, x, y, z = q[i + 3], q[i + 4], q[i + 5], q[i + 6]
                 a[row, i + 3] = -x * r1 - y * r2 - z * r3
                 a[row, i + 4] = w * r1 - z * r2 + y * r3
@@ -85,71 +78,72 @@ def matrix(q, ints, work, a):
 
 
 @kernel
-def choose(ints, work, pivots, settings, counts):
-    """Choose the partition at ``work[STATE]``, last evaluated; the number of independent coordinates."""
-    q = work[STATE][COORDINATES]
-    a = work[DENSE]
-    rows, nq = work[ROWS].shape[1] + q.shape[0] // 7, q.shape[0]
-    matrix(q, ints, work, a)
-    counts[FACTORISATIONS] += 1
-    rank = full_pivot(a, rows, nq, pivots[ROW_ORDER], pivots[COLUMN_ORDER], settings[RANK_TOLERANCE])
-    pivots[SIZES, 0] = rank
-    pivots[SIZES, 1] = 2 * (nq - rank)
-    work[MEMO][0, REFERENCE_PIVOT] = 0.0
-    return nq - rank
+def choose_partition(memory):
+    """Choose the partition at ``memory.state``, last evaluated."""
+    q, scratch, system = memory.state.coordinates, scratch_of(memory.chart), memory.equations.system
+    a = scratch.jacobian
+    jacobian_by_euler_parameters(q, memory.equations, a)
+    system.counts.factorisations += 1
+    rank = full_pivot(
+        a, a.shape[0], a.shape[1], scratch.row_order, scratch.column_order, system.settings.rank_tolerance
+    )
+    scratch.partition.rank = rank
+    memory.loop.clock.y_size = 2 * (q.shape[0] - rank)
+    memory.watch.reference_pivot = 0.0
 
 
 @kernel
-def read(y, work, pivots):
-    """Copy the independent coordinates and their rates of ``work[STATE]`` into y; the length of y."""
-    state, rank, order = work[STATE], pivots[SIZES, 0], pivots[COLUMN_ORDER]
-    k = state.shape[1] - rank
+def gather_independent(y, memory):
+    """Copy the independent coordinates and their rates of ``memory.state`` into y; the length of y."""
+    state, scratch = memory.state, scratch_of(memory.chart)
+    order, rank = scratch.column_order, scratch.partition.rank
+    k = order.shape[0] - rank
     for i in range(k):
-        y[i] = state[COORDINATES, order[rank + i]]
-        y[k + i] = state[COORDINATE_RATES, order[rank + i]]
+        y[i] = state.coordinates[order[rank + i]]
+        y[k + i] = state.coordinate_rates[order[rank + i]]
     return 2 * k
 
 
 @exchangeable(ENTER)
-def enter(t, y, problem):
-    ints, floats, work, pivots, settings, counts = opened(problem)
-    state, last = work[STATE], work[LAST]
-    q, v = state[COORDINATES], state[VELOCITIES][: work[COLUMNS].shape[1]]
-    coordinate_rates(q, v, state[COORDINATE_RATES])
-    evaluate(t, q, v, ints, floats, work)
-    choose(ints, work, pivots, settings, counts)
-    copy_rows(state, last)
-    work[MEMO][0, LAST_TIME] = t
-    return read(y, work, pivots)
+def enter(t, y, memory):
+    state = memory.state
+    coordinate_rates(state.coordinates, state.velocities, state.coordinate_rates)
+    evaluate(t, state.coordinates, state.velocities, memory.equations)
+    choose_partition(memory)
+    copy_state(state, memory.previous)
+    memory.watch.accepted_time = t
+    return gather_independent(y, memory)
 
 
 @kernel
-def factor(q, ints, work, pivots, counts):
+def factorise_dependent(memory):
     """LU of Φ_u at the state last evaluated; False where it is singular."""
-    a, rank, width = work[DENSE], pivots[SIZES, 0], work[DENSE].shape[1]
-    lu = a[width:]
-    matrix(q, ints, work, a)
+    scratch = scratch_of(memory.chart)
+    a, lu, rank = scratch.jacobian, scratch.dependent, scratch.partition.rank
+    rows, columns = scratch.row_order, scratch.column_order
+    jacobian_by_euler_parameters(memory.state.coordinates, memory.equations, a)
     for i in range(rank):
         for j in range(rank):
-            lu[i, j] = a[pivots[ROW_ORDER, i], pivots[COLUMN_ORDER, j]]
-    counts[FACTORISATIONS] += 1
-    if not lu_factor(lu, rank, pivots[CHART_PIVOTS], SINGULAR_PIVOT):
+            lu[i, j] = a[rows[i], columns[j]]
+    memory.equations.system.counts.factorisations += 1
+    if not lu_factor(lu, rank, scratch.exchanges, SINGULAR_PIVOT):
         return False
     smallest, greatest = abs(lu[0, 0]), abs(lu[0, 0])
     for i in range(rank):
         smallest, greatest = min(smallest, abs(lu[i, i])), max(greatest, abs(lu[i, i]))
-    work[MEMO][0, SMALLEST_PIVOT] = smallest / greatest
+    memory.watch.smallest_pivot = smallest / greatest
     return True
 
 
 @kernel
-def residual(q, work, pivots, b):
-    """Φ and pᵀp - 1 of the active rows into b; the largest."""
-    m, rank, size = work[ROWS].shape[1], pivots[SIZES, 0], 0.0
+def find_residual(memory):
+    """Φ and pᵀp - 1 of the active rows into the residual; the largest."""
+    q, phi, scratch = memory.state.coordinates, memory.equations.rows.phi, scratch_of(memory.chart)
+    m, rank, size, b = phi.shape[0], scratch.partition.rank, 0.0, scratch.residual
     for i in range(rank):
-        row = pivots[ROW_ORDER, i]
+        row = scratch.row_order[i]
         if row < m:
-            b[i] = work[ROWS][PHI, row]
+            b[i] = phi[row]
         else:
             j = 7 * (row - m) + 3
             w, x, y, z = q[j], q[j + 1], q[j + 2], q[j + 3]
@@ -160,65 +154,80 @@ def residual(q, work, pivots, b):
 
 
 @kernel
-def solve_positions(t, y, ints, floats, work, pivots, settings, counts):
-    """The dependent coordinates of y by Newton–Raphson into ``work[STATE]``, with Φ_u factored there."""
-    state, last, order = work[STATE], work[LAST], pivots[COLUMN_ORDER]
-    rank, nq = pivots[SIZES, 0], state.shape[1]
-    q, v, b = state[COORDINATES], state[VELOCITIES][: work[COLUMNS].shape[1]], work[DENSE_VECTORS][0]
-    h = t - work[MEMO][0, LAST_TIME]
-    for i in range(rank):
-        j = order[i]
-        rate, second = last[COORDINATE_RATES, j], last[COORDINATE_SECOND, j]
-        q[j] = last[COORDINATES, j] + h * rate + 0.5 * h * h * second
-    for i in range(nq - rank):
-        q[order[rank + i]] = y[i]
+def predict_dependent(t, memory):
+    """Dependent coordinates by u + h u' + ½ h² u'' of the last accepted state (Eq. 16)."""
+    q, last, scratch = memory.state.coordinates, memory.previous, scratch_of(memory.chart)
+    h = t - memory.watch.accepted_time
+    for i in range(scratch.partition.rank):
+        j = scratch.column_order[i]
+        rate, second = last.coordinate_rates[j], last.coordinate_second[j]
+        q[j] = last.coordinates[j] + h * rate + 0.5 * h * h * second
+
+
+@kernel
+def solve_dependent_coordinates(t, y, memory):
+    """The dependent coordinates of y by Newton–Raphson into ``memory.state``, with Φ_u factored there.
+
+    Apart from ``projection.newton_step``, because only the dependent coordinates are unknown (Eq. 15).
+    """
+    state, scratch = memory.state, scratch_of(memory.chart)
+    order, rank, b = scratch.column_order, scratch.partition.rank, scratch.residual
+    system = memory.equations.system
+    predict_dependent(t, memory)
+    for i in range(order.shape[0] - rank):
+        state.coordinates[order[rank + i]] = y[i]
     for _ in range(MOST_ITERATIONS):
-        evaluate(t, q, v, ints, floats, work)
-        violation = residual(q, work, pivots, b)
-        if not factor(q, ints, work, pivots, counts):
+        evaluate(t, state.coordinates, state.velocities, memory.equations)
+        violation = find_residual(memory)
+        if not factorise_dependent(memory):
             return NOT_CONVERGED
-        if violation <= settings[NEWTON_TOLERANCE]:
+        if violation <= system.settings.newton_tolerance:
             return OK
-        counts[NEWTON] += 1
-        lu_solve(work[DENSE][work[DENSE].shape[1] :], rank, pivots[CHART_PIVOTS], b)
+        system.counts.newton += 1
+        lu_solve(scratch.dependent, rank, scratch.exchanges, b)
         for i in range(rank):
-            q[order[i]] -= b[i]
+            state.coordinates[order[i]] -= b[i]
     return NOT_CONVERGED
 
 
 @kernel
-def solve_velocities(y, work, pivots):
-    """The dependent rates of y (Eq. 14) and v of all, into ``work[STATE]``; uses ``factor``."""
-    state, order, a, m = work[STATE], pivots[COLUMN_ORDER], work[DENSE], work[ROWS].shape[1]
-    rank, nq = pivots[SIZES, 0], state.shape[1]
-    q, rates_, v, b = state[COORDINATES], state[COORDINATE_RATES], state[VELOCITIES], work[DENSE_VECTORS][0]
-    free = nq - rank
+def solve_dependent_rates(y, memory):
+    """The dependent rates of y (Eq. 14) and v of all, into ``memory.state``; uses the last factor of Φ_u."""
+    scratch, nu, q_rate = scratch_of(memory.chart), memory.equations.rows.nu, memory.state.coordinate_rates
+    order, rank, a, b = scratch.column_order, scratch.partition.rank, scratch.jacobian, scratch.residual
+    free = order.shape[0] - rank
     for i in range(rank):
-        row = pivots[ROW_ORDER, i]
-        b[i] = work[ROWS][NU, row] if row < m else 0.0
+        row = scratch.row_order[i]
+        b[i] = nu[row] if row < nu.shape[0] else 0.0
         for k in range(free):
             b[i] -= a[row, order[rank + k]] * y[free + k]
-    lu_solve(a[a.shape[1] :], rank, pivots[CHART_PIVOTS], b)
+    lu_solve(scratch.dependent, rank, scratch.exchanges, b)
     for i in range(rank):
-        rates_[order[i]] = b[i]
+        q_rate[order[i]] = b[i]
     for k in range(free):
-        rates_[order[rank + k]] = y[free + k]
-    for body in range(nq // 7):  # ω' = 2 L p'
-        i, j = 7 * body, 6 * body
-        for k in range(3):
-            v[j + k] = rates_[i + k]
-        w, x, y_, z = q[i + 3], q[i + 4], q[i + 5], q[i + 6]
-        dw, dx, dy, dz = rates_[i + 3], rates_[i + 4], rates_[i + 5], rates_[i + 6]
-        v[j + 3] = 2.0 * (-x * dw + w * dx + z * dy - y_ * dz)
-        v[j + 4] = 2.0 * (-y_ * dw - z * dx + w * dy + x * dz)
-        v[j + 5] = 2.0 * (-z * dw + y_ * dx - x * dy + w * dz)
+        q_rate[order[rank + k]] = y[free + k]
+    velocities_of_rates(memory.state)
 
 
 @kernel
-def second_rates(work):
+def velocities_of_rates(state):
+    """v of q': r' and ω' = 2 L p'."""
+    q, q_rate, v = state.coordinates, state.coordinate_rates, state.velocities
+    for body in range(q.shape[0] // 7):
+        i, j = 7 * body, 6 * body
+        for k in range(3):
+            v[j + k] = q_rate[i + k]
+        w, x, y, z = q[i + 3], q[i + 4], q[i + 5], q[i + 6]
+        dw, dx, dy, dz = q_rate[i + 3], q_rate[i + 4], q_rate[i + 5], q_rate[i + 6]
+        v[j + 3] = 2.0 * (-x * dw + w * dx + z * dy - y * dz)
+        v[j + 4] = 2.0 * (-y * dw - z * dx + w * dy + x * dz)
+        v[j + 5] = 2.0 * (-z * dw + y * dx - x * dy + w * dz)
+
+
+@kernel
+def second_rates(acceleration, state):
     """q'' of the accelerations: r'' and p'' = ½ Lᵀ ω̇' - ¼ (ω'·ω') p."""
-    state, acceleration = work[STATE], work[COLUMNS][ACCELERATION]
-    q, v, second = state[COORDINATES], state[VELOCITIES], state[COORDINATE_SECOND]
+    q, v, second = state.coordinates, state.velocities, state.coordinate_second
     coordinate_rates(q, acceleration, second)
     for body in range(q.shape[0] // 7):
         j = 6 * body
@@ -228,40 +237,41 @@ def second_rates(work):
 
 
 @exchangeable(RATES)
-def rates(accelerate, t, y, y_rate, problem):
-    ints, floats, work, pivots, settings, counts = opened(problem)
-    status = solve_positions(t, y, ints, floats, work, pivots, settings, counts)
+def rates(t, y, y_rate, memory):
+    status = solve_dependent_coordinates(t, y, memory)
     if status != OK:
         return status
-    solve_velocities(y, work, pivots)
-    state, order, rank = work[STATE], pivots[COLUMN_ORDER], pivots[SIZES, 0]
-    q, v = state[COORDINATES], state[VELOCITIES][: work[COLUMNS].shape[1]]
-    status = accelerations(accelerate, t, q, v, ints, floats, work, pivots, settings, counts)
-    second_rates(work)
-    free = state.shape[1] - rank
+    solve_dependent_rates(y, memory)
+    state, equations, scratch = memory.state, memory.equations, scratch_of(memory.chart)
+    assemble_system(t, state.coordinates, state.velocities, equations)
+    status = memory.kernels.accelerate(equations.system)
+    second_rates(equations.system.acceleration, state)
+    order, rank = scratch.column_order, scratch.partition.rank
+    free = order.shape[0] - rank
     for i in range(free):
         y_rate[i] = y[free + i]
-        y_rate[free + i] = state[COORDINATE_SECOND, order[rank + i]]
+        y_rate[free + i] = state.coordinate_second[order[rank + i]]
     return status
 
 
 @exchangeable(ACCEPT)
-def accept(t, y, problem):
-    ints, floats, work, pivots, settings, counts = opened(problem)
-    status = solve_positions(t, y, ints, floats, work, pivots, settings, counts)
+def accept(t, y, memory):
+    status = solve_dependent_coordinates(t, y, memory)
     if status != OK:
         return status
-    solve_velocities(y, work, pivots)
-    copy_rows(work[STATE], work[LAST])
-    work[MEMO][0, LAST_TIME] = t
-    memo = work[MEMO]
-    if memo[0, REFERENCE_PIVOT] == 0.0:
-        memo[0, REFERENCE_PIVOT] = memo[0, SMALLEST_PIVOT]
-    if memo[0, SMALLEST_PIVOT] < settings[KEPT_PARTITION] * memo[0, REFERENCE_PIVOT]:
-        choose(ints, work, pivots, settings, counts)
-        read(y, work, pivots)
+    solve_dependent_rates(y, memory)
+    copy_state(memory.state, memory.previous)
+    watch = memory.watch
+    watch.accepted_time = t
+    if watch.reference_pivot == 0.0:
+        watch.reference_pivot = watch.smallest_pivot
+    if watch.smallest_pivot < options_of(memory.chart_options).kept * watch.reference_pivot:
+        choose_partition(memory)
+        gather_independent(y, memory)
         return CHANGED
     return OK
 
 
-PARTITIONING = Stabilisation("partitioning", "Eqs. 10-16", enter, rates, rates, rates, accept, OPTIONS)
+PARTITIONING = Stabilisation(
+    "partitioning", "Eqs. 10-16", enter, rates, rates, rates, accept, memory=Scratch, numbers=Options
+)

@@ -10,7 +10,7 @@ from reports.sections import (
     accelerations,
     convergence,
     energy,
-    floors,
+    least_errors,
     mechanism,
     outcomes,
     provenance,
@@ -24,7 +24,7 @@ from reports.sections import (
 Chapter = Callable[[Sequence[SceneRuns]], list[Block]]
 Part = Callable[[SceneRuns], list[Block]]
 
-OPENING: Mapping[str, Chapter] = {"floors": floors.render, "summary": summary.render}
+OPENING: Mapping[str, Chapter] = {"least_errors": least_errors.render, "summary": summary.render}
 OF_A_SCENE: Mapping[str, Part] = {
     "mechanism": mechanism.render,
     "speed": speed.render,

@@ -1,4 +1,4 @@
-"""How the error falls with the step or the tolerance, family by family, and what is left at h → 0."""
+"""Order of convergence over step or tolerance, family by family, and the error that remains at h → 0."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from reports.runs import Curve, Run, SceneRuns, number, power
 STEP = "step"
 TELLING = 5.0  # times the discretisation error: a lesser bias may be the extrapolation's own
 LIMITS = ("Scene", "Engine", "Family", "Finest step (s)", "Order", "Its error", "Discretisation", "Bias",
-          "What outweighs")  # fmt: skip
+          "Larger")  # fmt: skip
 
 
 def render(groups: Sequence[SceneRuns]) -> list[Block]:
@@ -22,7 +22,8 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
     text = (
         "The slope of log(error) over log(setting) where at least three completed runs of a family lie on"
         " a line. Over a fixed step it is the order of the method; over a tolerance, 1 says that the "
-        "error follows what was asked for. A slope near zero is a floor; an en dash: no three runs lie on"
+        "error is proportional to the tolerance. A slope near zero: the error no longer falls; an en "
+        "dash: no three runs lie on"
         " a line."
     )
     curves = sorted({curve for group in groups for curve in group.curves()})
@@ -33,13 +34,13 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
 
 
 def _limits(groups: Sequence[SceneRuns]) -> list[Block]:
-    """What the fixed-step families tend to as h → 0; nothing where no three runs tell."""
+    """The limits of fixed-step families as h → 0; nothing where fewer than three runs converge."""
     text = (
         "Three runs whose differences shrink as a power of the step have a limit at h = 0 (Richardson), "
-        "found without the truth. How far the finest run is from the limit is its discretisation error; "
-        "how far the limit is from the truth, its bias, is what no smaller step cures: the give of a soft"
-        " constraint, a solver's tolerance. Up to some times the discretisation error, a bias may be the "
-        "extrapolation's own: then the last column has an en dash."
+        "found without the truth. The distance of the finest run from the limit is its discretisation error. "
+        "The distance of the limit from the truth is its bias, which no smaller step removes: the compliance "
+        "of a soft constraint, or a solver's tolerance. A bias of up to a few discretisation errors may be "
+        "an error of the extrapolation: then the last column has an en dash."
     )
     rows = [row for group in groups for row in _limit_rows(group)]
     if not rows:
@@ -51,7 +52,8 @@ def _limits(groups: Sequence[SceneRuns]) -> list[Block]:
 
 
 def _limit_rows(group: SceneRuns) -> list[tuple[str, ...]]:
-    truth, rows = truth_for(group.scene), []
+    truth = truth_for(group.scene)
+    rows: list[tuple[str, ...]] = []
     for curve, runs in group.curves().items():
         told = [run for run in runs if run.completed and math.isfinite(run.error)]
         if truth is None or swept_option(told) != STEP:
@@ -88,7 +90,7 @@ def swept_option(runs: Sequence[Run]) -> str | None:
 
 
 def slope(group: SceneRuns, curve: Curve) -> float:
-    """The measured order of one family in one scene over its swept option; NaN where runs do not tell."""
+    """The order of a family in a scene over its swept option; NaN without three runs on a line."""
     runs = group.curves().get(curve, ())
     option = swept_option(runs)
     told = [run for run in runs if run.completed and math.isfinite(run.error) and run.error > 0]

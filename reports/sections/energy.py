@@ -1,4 +1,4 @@
-"""Energy balance over time: energy less what loads and drivers have done."""
+"""Energy balance over time: energy less the work of loads and drivers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from reports.blocks import Block, Figure, Heading, Text
 from reports.runs import Run, SceneRuns, power
 
 NO_BALANCE = (
-    "No run has a balance that can be drawn up: a driver or a damper does work, the bodies have no mass, the "
+    "No run has an energy balance: a driver or a damper does work, the bodies have no mass, the "
     "samples are too far apart to count the turns, or no run reached a second sample."
 )
 

@@ -16,8 +16,9 @@ def render(scene_runs: SceneRuns) -> list[Block]:
     if shown is None:
         return [*blocks, Text("No run left a state, so there is no motion to draw.")]
     caption = (
-        f"Poses of {shown.label} ({scene_runs.swept(shown) or 'no settings'}; error {power(shown.error)}) "
-        f"from t = {shown.trajectory.times[0]:g} s to {shown.trajectory.times[-1]:g} s, the last darkest; "
+        f"Poses of {shown.label} ({scene_runs.varied_settings(shown) or 'no settings'}; "
+        f"error {power(shown.error)}) from t = {shown.trajectory.times[0]:g} s to "
+        f"{shown.trajectory.times[-1]:g} s, the last darkest; "
         f"triangles are joints to the ground, dashed lines their guides, thin grey lines the paths of the "
         f"centres of mass. Seen along z if the motion is planar, else obliquely with y to the back."
     )

@@ -12,8 +12,8 @@ HEADER = ("Engine", "Family", "Settings", "Outcome", "End time (s)", "Error", "T
 def render(scene_runs: SceneRuns) -> list[Block]:
     """The table of all runs of a scene."""
     runs = scene_runs.runs
-    caption = f"All {len(runs)} runs: how each ended, when, and its error up to there."
-    rows = [_row(run, scene_runs.swept(run)) for run in runs]
+    caption = f"All {len(runs)} runs: outcome, end time, and error up to the end."
+    rows = [_row(run, scene_runs.varied_settings(run)) for run in runs]
     return [Heading("Outcomes"), Table(caption, HEADER, rows, right=frozenset(range(4, 9)), folded=True)]
 
 

@@ -1,13 +1,13 @@
-"""The paper's Tables I to IV beside ours, cell by cell, and why the cells that differ do."""
+"""The paper's Tables I to IV beside ours, cell by cell, with reasons for the cells that differ."""
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Sequence
 
 from crosscheck.paper import settings, singular
 from crosscheck.paper.cells import CELLS, CLOSE, COUNTS_III, COUNTS_IV, SPATIAL, Cell, Counts, Match, match
+from crosscheck.paper.illustration import Illustration
 from crosscheck.paper.runs import FREE, KEPT_RTOLS, SPATIAL_DYNAMIC, Label, Records, draws, found
 from crosscheck.paper.settings import LINKAGES, SIZE, STRICT, TIGHT
 from reports.blocks import Block, Heading, Table, Text
@@ -22,7 +22,7 @@ TITLES = {
 NEAR = 0.1  # rad from a multiple of π: a run that ends so near ended at that crossing
 
 
-def render(records: Records) -> list[Block]:
+def render(records: Records, illustration: Illustration) -> list[Block]:
     """The chapter."""
     return [
         Heading("The paper's tables and figures", 2),
@@ -33,9 +33,12 @@ def render(records: Records) -> list[Block]:
             f"sample, or at {paper_sweep.SHARE_TEXT} of the end time of a run that fails before the first. "
             f"Marks: {Match.SAME.value} same outcome, end within {CLOSE:g} s; {Match.OTHER_TIME.value} same "
             f"outcome at another time; {Match.DIFFERENT.value} another outcome. A match of "
-            "outcomes says nothing about correctness: the error does. Draws: with how many draws of first "
-            f"step and data errors of {SIZE:g} m a cell has the mark {Match.SAME.value}; – where they cannot "
-            "matter. At which crossing a run ends is chance, the set of times is the mechanism's: these "
+            "outcomes does not imply correctness: see the error. Draws: the number of draws of first "
+            "step and "
+            f"data errors of {SIZE:g} m with which a cell has the mark {Match.SAME.value}; – where they "
+            f"cannot "
+            "matter. Chance determines the crossing at which a run ends, the mechanism the set of times: "
+            "these "
             "counts, not one run, say whether a cell is reproduced. All else shown is of seed 0."
         ),
         _settings(),
@@ -43,7 +46,7 @@ def render(records: Records) -> list[Block]:
         *_counts(records),
         *_differences(records),
         *paper_sweep.render(records),
-        *paper_methods.explained(),
+        *paper_methods.explained(illustration),
         *paper_figures.render(records),
         *paper_cranks.render(records),
         *paper_methods.render(records),
@@ -141,7 +144,7 @@ def _counts(records: Records) -> list[Block]:
     about = "Per second of simulation; ratios to the first row, of times by interleaved runs in one process. "
     right = frozenset({1, 2, 3, 4, 5, 6, 8})
     strict = [Run(records[Label("strict", row, SPATIAL, STRICT.name)]) for row in FREE]
-    steps = ", ".join(f"{_rate(run, 'steps'):.0f}" for run in strict)
+    steps = ", ".join(f"{run.rate('steps'):.0f}" for run in strict)
     return [
         Heading("Table III: steps and cost"),
         Table(
@@ -161,31 +164,29 @@ def _counts(records: Records) -> list[Block]:
 
 
 def _count_rows(part: str, column: str, paper: Counts, records: Records) -> list[Sequence[str]]:
-    rows = []
+    rows: list[Sequence[str]] = []
     name = next(iter(paper))
     first, first_timed = (Run(records[Label(p, name, column)]) for p in (part, "timed"))
     first_steps, first_time = paper[name]
     for row, (steps, time) in paper.items():
         run, timed = (Run(records[Label(p, row, column)]) for p in (part, "timed"))
         rows.append((
-            row, f"{steps}", f"{_rate(run, 'steps'):.0f}", f"{steps / first_steps:.3f}",
-            f"{_rate(run, 'steps') / _rate(first, 'steps'):.3f}", ratio(time / first_time),
-            ratio(_rate(timed, "seconds") / _rate(first_timed, "seconds")), ended(run), power(run.error),
+            row, f"{steps}", f"{run.rate('steps'):.0f}", f"{steps / first_steps:.3f}",
+            f"{run.rate('steps') / first.rate('steps'):.3f}", ratio(time / first_time),
+            ratio(timed.rate("seconds") / first_timed.rate("seconds")), ended(run), power(run.error),
         ))  # fmt: skip
     return rows
 
 
 def _with_tight(rows: list[Sequence[str]], records: Records) -> list[Sequence[str]]:
     """Table IV's rows with the ratio of steps at rtol 1e-9 behind that at the settings."""
-    steps = [
-        _rate(Run(records[Label("tight", row[0], SPATIAL_DYNAMIC, TIGHT.name)]), "steps") for row in rows
-    ]
+    steps = [Run(records[Label("tight", row[0], SPATIAL_DYNAMIC, TIGHT.name)]).rate("steps") for row in rows]
     ratios = [f"{count / steps[0]:.3f}" for count in steps]
     return [(*row[:5], ratio_, *row[5:]) for row, ratio_ in zip(rows, ratios, strict=True)]
 
 
 def _kept(records: Records) -> Table:
-    """What Table IV's ratio of steps depends on."""
+    """The ratio of steps of Table IV over tolerance and repartitioning."""
     rows = []
     for rtol in KEPT_RTOLS:
         runs = {
@@ -193,9 +194,9 @@ def _kept(records: Records) -> Table:
             for label, record in records.items()
             if label.part == "kept" and label.variant == f"rtol {rtol:g}"
         }
-        free = _rate(runs["none"], "steps")
+        free = runs["none"].rate("steps")
         for name, run in runs.items():
-            steps = _rate(run, "steps")
+            steps = run.rate("steps")
             rows.append(
                 (f"{rtol:g}", name, f"{steps:.0f}", f"{steps / free:.3f}", ended(run), power(run.error))
             )
@@ -207,10 +208,6 @@ def _kept(records: Records) -> Table:
     )
     header = ("rtol", "Stabilisation", "Steps/s", "Ratio", "Ended", "Error")
     return Table(caption, header, rows, right=frozenset({0, 2, 3, 5}))
-
-
-def _rate(run: Run, count: str) -> float:
-    return run.record["cost"][count] / run.t_end if run.t_end > 0 else math.nan
 
 
 def _differences(records: Records) -> list[Block]:
@@ -244,7 +241,7 @@ def _reason(cell: Cell, records: Records) -> str:
 
 
 def _drift(cell: Cell, run: Run, records: Records) -> str:
-    """Why a row of Table III ends at another time: its violation grows step by step, or not at all."""
+    """The reason for another end time of a row of Table III: drift, or its absence."""
     record = records.get(Label("strict", cell.row, cell.column, STRICT.name))
     strict = None if record is None else Run(record)
     said = "" if strict is None else (
@@ -258,7 +255,7 @@ def _drift(cell: Cell, run: Run, records: Records) -> str:
 
 
 def _papers_place(cell: Cell) -> list[str]:
-    """Where the paper's run ended, when that is at the start or between two crossings."""
+    """The place where the paper's run ended, if at the start or between two crossings."""
     if cell.end == 0:
         return [
             "the start is a singular position too, where ours converges: the errors of its state put less "
@@ -266,23 +263,17 @@ def _papers_place(cell: Cell) -> list[str]:
         ]
     if cell.end is None:
         return []
-    near = _distance(cell.column, cell.end)
+    near = singular.crossing_distance(LINKAGES[cell.column][1], cell.end)
     return [f"the paper's end is {near:.2g} rad from the nearest crossing"] if near > NEAR else []
 
 
-def _distance(column: str, time: float) -> float:
-    """How far (rad) θ₂ is from a multiple of π."""
-    times = [t for t, _ in singular.crossings(LINKAGES[column][1], 25.0)]
-    return min(abs(t - time) for t in times) * singular.CRANK_RATE
-
-
 def _where(column: str, run: Run) -> str:
-    """Which singular position a linkage's run ended at."""
+    """The singular position at which a linkage's run ended."""
     if run.completed:
         return f"passes every crossing, violation {power(run.metric('violation_position'))}"
     theta0 = LINKAGES[column][1]
     t, k = min(singular.crossings(theta0, 25.0), key=lambda crossing: abs(crossing[0] - run.t_end))
-    near, angle = abs(t - run.t_end) * singular.CRANK_RATE, singular.turns(k)
+    near, angle = singular.crossing_distance(theta0, run.t_end), singular.turns(k)
     if near > NEAR:
         return f"ends {near:.2g} rad from the crossing θ₂ = {angle}, off the branch since an earlier one"
     others = [time for time, _ in singular.crossings(theta0, t + 0.06)]

@@ -1,4 +1,4 @@
-"""The planar slider-cranks of the paper's Figures 11 to 14, run by run: how far a motion is to be trusted."""
+"""The planar slider-cranks of the paper's Figures 11 to 14, run by run: the error of every motion."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from crosscheck.judge.truth import truth_for
 from crosscheck.paper.runs import HEAVY, RAISED, TRUE_BRANCH, UNEQUAL, Label, Records, dynamic_scene
 from mbref.trajectory import Trajectory
 from reports.blocks import Block, Heading, Table, Text
-from reports.runs import Run, number, power
+from reports.runs import Run, ended_briefly, number, power
 
 OFF = 0.01  # m; a body this far from the true motion is on another branch
 
 
 def render(records: Records) -> list[Block]:
-    """What the paper says of these runs, ours one by one, and why they differ."""
+    """The paper's statement on these runs, ours one by one, and the reasons for differences."""
     rows = [
         (column, label.row, label.variant, *_cells(column, Run(record)))
         for column in (HEAVY, UNEQUAL)
@@ -50,7 +50,8 @@ def _about(records: Records) -> str:
         f"{len(heavy)} last, {len(right)} of them on the smooth branch (the one that steps over the singular "
         f"positions, {TRUE_BRANCH}): near one an unstabilised run divides its errors by the distance at "
         "which a step happens to fall, and it ends, or takes the other branch, at this or a later one; "
-        "the paper's own differing branches are this chance. ALF does not converge at the first: near it "
+        "the branches of the paper's runs differ for the same reason. ALF does not converge at the "
+        "first: near it "
         "the iteration gains a factor 1 + α σ² a time, σ the vanishing singular value. "
         f"With a ≠ b nothing is singular, and yet the run of MPI (SVD) without partitioning goes wrong, with "
         f"violations of {power(drifting.metric('violation_position'))}: nothing holds the out-of-plane "
@@ -67,24 +68,22 @@ def _about(records: Records) -> str:
 def _cells(column: str, run: Run) -> tuple[str, ...]:
     motion = run.trajectory
     if not len(motion.times):
-        return (_ended(run), *("–" for _ in range(7)))
+        return (ended_briefly(run), *("–" for _ in range(7)))
     true = _true(column, tuple(motion.times.tolist()))
     off = np.abs(motion.position - true.position).max(axis=(1, 2)) > OFF
     since = motion.times[np.argmax(off)] if off.any() else math.nan
     return (
-        _ended(run), power(run.error), power(run.metric("violation_position")), number(since, 4),
+        ended_briefly(run), power(run.error), power(run.metric("violation_position")), number(since, 4),
         str(_passed(column, since if off.any() else run.t_end)), power(_out_of_plane(motion)),
         f"{motion.angular_velocity[-1, 0, 2]:.4g}", f"{true.angular_velocity[-1, 0, 2]:.4g}",
     )  # fmt: skip
 
 
-def _ended(run: Run) -> str:
-    return "20 s" if run.completed else f"{run.t_end:.4g} s {run.outcome.letter or run.outcome.label}"
-
-
 @lru_cache(maxsize=64)
 def _true(column: str, times: tuple[float, ...]) -> Trajectory:
-    return truth_for(dynamic_scene(column)).poses(np.array(times))
+    truth = truth_for(dynamic_scene(column))
+    assert truth is not None
+    return truth.poses(np.array(times))
 
 
 def _passed(column: str, time: float) -> int | str:

@@ -24,6 +24,7 @@ from crosscheck.paper.runs import (
 )
 from crosscheck.paper.settings import BASE
 from mbref.scene import Scene
+from mbref.trajectory import Trajectory
 from reports import figures
 from reports.blocks import Block, Figure, Heading
 from reports.drawing import moved, shapes
@@ -82,7 +83,9 @@ def _ended(runs: Named) -> str:
     )
 
 
-def _poses(paper: int, scene: Scene, runs: Named, what: str, span: tuple[float, float] | None = None):
+def _poses(
+    paper: int, scene: Scene, runs: Named, what: str, span: tuple[float, float] | None = None
+) -> Figure:
     caption = (
         f"Figure {paper}. {what}: poses from the start, light, to the last sample before the end, dark; "
         f"{_ended(runs)}. Steps end at samples, so that the end may differ from the tables'."
@@ -146,8 +149,8 @@ def plot_violations(scene: Scene, runs: Named) -> Drawing:
                 t[-1], _violation(scene, run)[-1], figures.FAILED, color=figures.COLOURS[i], markersize=8
             )
     for k in range(1, 10):
-        if (t := (2 * k - 1) * math.pi / 2 / 124.8) < last * 1.05:
-            axes.axvline(t, color=figures.GREY, linestyle="--", linewidth=0.8, zorder=0)
+        if (crossing := (2 * k - 1) * math.pi / 2 / 124.8) < last * 1.05:
+            axes.axvline(crossing, color=figures.GREY, linestyle="--", linewidth=0.8, zorder=0)
     axes.set(yscale="log", xlabel="t (s)", ylabel="largest violation (rad, or of the length)")
     figures.legend_below(drawing, axes)
     return drawing
@@ -168,7 +171,8 @@ def plot_rates(runs: Named) -> Drawing:
     """Crank angular velocity over time."""
     drawing, (axes,) = figures.canvas(7.2, 3.6)
     for i, (name, run) in enumerate(runs.items()):
-        motion, look = run.trajectory, {"color": figures.COLOURS[i], "linestyle": figures.DASHES[i]}
+        motion: Trajectory = run.trajectory
+        look: figures.Look = {"color": figures.COLOURS[i], "linestyle": figures.DASHES[i]}
         rates = _along_axis(run, motion.angular_velocity)
         axes.plot(motion.times, rates, label=name, linewidth=2.4 - 0.6 * i, **look)
         if not run.completed:

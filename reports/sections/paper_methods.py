@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
@@ -11,65 +13,63 @@ from matplotlib.figure import Figure as Drawing
 from crosscheck.judge.truth import truth_for
 from crosscheck.paper import runs, settings, singular
 from crosscheck.paper.cells import SPATIAL
-from crosscheck.paper.runs import ALPHAS, DUAL, EXACT, PENALTY, Label, Records
-from mbref.formulations import FORMULATIONS
-from mbref.scenes import SCENES
-from mbref.scenes.four_bar import four_bar
-from mbref.stabilisation import STABILISATIONS
+from crosscheck.paper.illustration import DISTANCES, GAMMA_ERRORS, TURNED, Illustration
+from crosscheck.paper.runs import ALPHAS, DUAL, EXACT, PENALTY, Label, Records, digits_scene
+from mbref.trajectory import Trajectory
 from reports import figures
 from reports.blocks import Block, Figure, Heading, Table, Text
-from reports.runs import Run, number, power
+from reports.runs import Run, ended_briefly, number, power
 
-TURNED = 0.1  # rad
-DISTANCES, GAMMA_ERRORS = (1.0, 0.3, 0.1, 0.03, 0.01, 0.001), (0.0, 1e-10, 1e-8, 1e-6)
 SMALLEST = 1e-17  # magnitudes below are drawn here
 
 
-def explained() -> list[Block]:
-    """Why the failure times of Table I are what they are, from the joint equations alone."""
-    on_fold = {theta: singular.fold_residual(theta, -TURNED) for theta in (0.0, math.pi)}
-    rows = []
-    for start, theta0 in (("nπ", math.pi), ("π/4", math.pi / 4), ("π/2", math.pi / 2)):
-        for t, k in singular.crossings(theta0, 0.06):
-            if t > 0:
-                [values] = singular.scaled_singular_values(four_bar(theta0), np.array([t]))
-                parity = "meets the driven branch" if k % 2 else "is closed to it"
-                rows.append((start, f"{t:.4f}", singular.turns(k), str(singular.rank(values)),
-                             power(values[-1]), parity))  # fmt: skip
-    header = ("Start θ₂", "t (s)", "θ₂", "Rank of 19 rows", "Smallest singular value", "The fold")
-    text = (
-        "Of the rhombus the Jacobian (rows of unit length, angular columns divided by the largest distance) "
-        "has rank 18 along the motion and 17 at every θ₂ = kπ, where all links lie on one line and a second "
-        "branch, the fold, crosses the parallelogram. "
-        f"Driven {TURNED:g} rad further along the fold, the joint equations and the driver are violated by "
-        f"{power(on_fold[math.pi])} from θ₂ = π: coupler and crank turn together about A, the rocker rests, "
-        f"the driver is content, and a run can leave the true branch. From θ₂ = 0 they are violated by "
-        f"{number(on_fold[0.0])} rad: there the fold needs the crank at rest, and so it is closed. "
-        "So from π/4, π/2 and nπ the first position at which a driven linkage can leave the branch comes at "
-        "0.0315, 0.0378 and 0.0503 s: the paper's 0.031, 0.037 and 0.050 s (Table I, MPI)."
-    )
+def explained(found: Illustration) -> list[Block]:
+    """The failure times of Table I explained by the joint equations alone."""
     return [
         Heading("Singular positions explained"),
-        Text(text),
-        Table("The crossings up to 0.06 s.", header, rows, right=frozenset({1, 3, 4})),
+        Text(_about(*found["fold"])),
+        _crossings(found["crossings"]),
         Figure("paper-singular-values", "The smallest and the next smallest singular value of the scaled "
                "Jacobian over one revolution of the rhombus. At θ₂ = kπ one of them vanishes, linearly with "
-               "the distance; accelerations found from it carry errors divided by it.", plot_values),
-        _alf_near_a_crossing(),
+               "the distance; accelerations found from it carry errors divided by it.",
+               partial(plot_values, found["theta"], found["smallest"])),
+        _alf_near_a_crossing(found["alf_iterations"]),
     ]  # fmt: skip
 
 
-def _alf_near_a_crossing() -> Table:
-    """Why ALF ends at the first crossing, whatever branches meet there, and at a singular start."""
+def _about(closed: float, opened: float) -> str:
+    """The text, from the residuals on the fold from θ₂ = 0 and from θ₂ = π."""
+    return (
+        "The constraint Jacobian of the rhombus (rows of unit length, angular columns divided by the largest "
+        "distance) has rank 18 along the motion and 17 at every θ₂ = kπ, where all links lie on one line and "
+        f"a second branch, the fold, crosses the parallelogram. Driven {TURNED:g} rad further along the "
+        f"fold, the joint equations and the driver are violated by {power(opened)} from θ₂ = π: coupler and "
+        "crank turn together about A, the rocker rests, the driver's equation holds, and a run can leave the "
+        f"true branch. From θ₂ = 0 they are violated by {number(closed)} rad: on the fold the crank would "
+        "have to rest, which its driver excludes. From π/4, π/2 and nπ the first position at which a driven "
+        "linkage can leave the branch therefore comes at 0.0315, 0.0378 and 0.0503 s: the paper's 0.031, "
+        "0.037 and 0.050 s (Table I, MPI)."
+    )
+
+
+def _crossings(found: Sequence[Sequence[Any]]) -> Table:
     rows = [
-        (f"{distance:g}", *(_count(singular.alf_iterations(distance, error)) for error in GAMMA_ERRORS))
-        for distance in DISTANCES
-    ]
+        (start.removeprefix("θ₂ = "), f"{t:.4f}", singular.turns(k), str(rank), power(value),
+         "admits a turning crank" if k % 2 else "excludes a turning crank")
+        for start, t, k, rank, value in found
+    ]  # fmt: skip
+    header = ("Start θ₂", "t (s)", "θ₂", "Rank of 19 rows", "Smallest singular value", "The fold")
+    return Table("The crossings up to 0.06 s.", header, rows, right=frozenset({1, 3, 4}))
+
+
+def _alf_near_a_crossing(iterations: Sequence[Sequence[int]]) -> Table:
+    """ALF's iterations near a crossing: it ends at the first one and at a singular start."""
+    rows = [(f"{distance:g}", *map(_count, row)) for distance, row in zip(DISTANCES, iterations, strict=True)]
     caption = (
         "Iterations of ALF, as set for the tables, over the distance (rad) to θ₂ = 0 and over the error of γ "
-        "in the direction that vanishes there, relative to γ. An iteration leaves 1 / (1 + α σ²) of what "
-        "errors, rounding among them, put into it, which near a crossing is nearly all: ALF ends where the "
-        f"{settings.ALF['iterations']} allowed do not suffice, and with its first step from θ₂ = nπ."
+        "in the direction that vanishes there, relative to γ. Each iteration leaves 1 / (1 + α σ²) of the "
+        "errors, rounding among them, in that direction, which near a crossing is nearly all: ALF ends where "
+        f"the {settings.ALF['iterations']} allowed do not suffice, and with its first step from θ₂ = nπ."
     )
     header = ("Distance", *(f"γ off by {error:g}" for error in GAMMA_ERRORS))
     return Table(caption, header, rows, right=frozenset(range(len(header))))
@@ -79,14 +79,12 @@ def _count(iterations: int) -> str:
     return f"{iterations}" if iterations < singular.MOST else f"> {singular.MOST}"
 
 
-def plot_values() -> Drawing:
-    """The two smallest singular values over one revolution."""
-    turn = np.linspace(0.0, 2 * math.pi, 401)
-    values = singular.scaled_singular_values(four_bar(math.pi / 2), turn / singular.CRANK_RATE)
+def plot_values(theta: Sequence[float], smallest: Sequence[Sequence[float]]) -> Drawing:
+    """The two smallest singular values (k, 2) over θ₂ (k,), rad, of one revolution."""
     drawing, (axes,) = figures.canvas(7.2, 3.4)
-    theta = (math.pi / 2 - turn) / math.pi
-    for i, name in ((-1, "smallest"), (-2, "next")):
-        axes.plot(theta, np.maximum(values[:, i], SMALLEST), color=figures.COLOURS[-1 - i], label=name)
+    for i, (name, values) in enumerate(zip(("smallest", "next"), zip(*smallest, strict=True), strict=True)):
+        axes.plot(np.array(theta) / math.pi, np.maximum(values, SMALLEST),
+                  color=figures.COLOURS[i], label=name)  # fmt: skip
     axes.set(yscale="log", xlabel="θ₂ / π", ylabel="singular value", ylim=(1e-4, 2))
     axes.invert_xaxis()
     figures.legend_below(drawing, axes)
@@ -99,20 +97,9 @@ def render(records: Records) -> list[Block]:
 
 
 def _pairs(records: Records) -> list[Block]:
-    rows = []
-    for formulation in FORMULATIONS:
-        for stabilisation in STABILISATIONS:
-            run = Run(records[Label("pairs", formulation, stabilisation)])
-            ended = (
-                "20 s" if run.completed else f"{run.t_end:.4g} s {run.outcome.letter or run.outcome.label}"
-            )
-            steps = run.record["cost"]["steps"] / run.t_end if run.t_end > 0 else math.nan
-            seconds = run.seconds / run.t_end if run.t_end > 0 else math.nan
-            rows.append((
-                formulation, stabilisation, ended, power(run.error), power(run.metric("violation_position")),
-                number(steps, 4), f"{1e3 * seconds:.3g}" if math.isfinite(seconds) else "–",
-            ))  # fmt: skip
-    partitioned = [Run(records[Label("pairs", f, "partitioning")]) for f in FORMULATIONS]
+    pairs = {label: Run(record) for label, record in records.items() if label.part == "pairs"}
+    rows = [_pair(label, run) for label, run in pairs.items()]
+    partitioned = [run for label, run in pairs.items() if label.column == "partitioning"]
     violations = [run.metric("violation_position") for run in partitioned]
     caption = (
         f"The {SPATIAL}, 20 s at the settings above. With partitioning "
@@ -127,6 +114,16 @@ def _pairs(records: Records) -> list[Block]:
     ]
 
 
+def _pair(label: Label, run: Run) -> tuple[str, ...]:
+    """A formulation's cells with a stabilisation."""
+    seconds = 1e3 * run.rate("seconds")
+    return (
+        label.row, label.column, ended_briefly(run), power(run.error),
+        power(run.metric("violation_position")), number(run.rate("steps"), 4),
+        f"{seconds:.3g}" if math.isfinite(seconds) else "–",
+    )  # fmt: skip
+
+
 def digit_errors(records: Records) -> dict[str, list[float]]:
     """Relative error of the accelerations at t = 0 by method, over ALPHAS; NaN without convergence."""
     return {
@@ -136,13 +133,17 @@ def digit_errors(records: Records) -> dict[str, list[float]]:
 
 
 def _relative_error(run: Run) -> float:
-    true = truth_for(SCENES[run.scene]()).poses(np.zeros(1))
-    mine = run.trajectory
-    if not len(mine.times) or mine.acceleration is None:
-        return math.nan
-    parts = [(mine.acceleration, true.acceleration), (mine.angular_acceleration, true.angular_acceleration)]
-    off = math.sqrt(sum(float(np.sum((a - b) ** 2)) for a, b in parts))
-    return off / math.sqrt(sum(float(np.sum(b**2)) for _, b in parts))
+    truth = truth_for(digits_scene())
+    assert truth is not None
+    exact, found = (_accelerations(motion) for motion in (truth.poses(np.zeros(1)), run.trajectory))
+    return float(np.linalg.norm(found - exact) / np.linalg.norm(exact)) if found.size else math.nan
+
+
+def _accelerations(motion: Trajectory) -> np.ndarray:
+    """Accelerations and angular accelerations at every sample; empty where there are none."""
+    if not len(motion.times) or motion.acceleration is None or motion.angular_acceleration is None:
+        return np.zeros(0)
+    return np.stack([motion.acceleration, motion.angular_acceleration])
 
 
 def _digits(records: Records) -> list[Block]:

@@ -1,4 +1,4 @@
-"""What the settings matter for the paper's failure times: the set of times, not one, is reproducible."""
+"""Influence of the settings on the paper's failure times: the set of times is reproducible, not each time."""
 
 from __future__ import annotations
 
@@ -22,14 +22,15 @@ SWEPT = tuple(cell for cell in CELLS if cell.table != "III" and cell.letter not 
 
 
 def render(records: Records) -> list[Block]:
-    """How many cells match at every variant, the end times of every cell, and their distribution."""
+    """The number of matching cells at every variant, the end times of every cell, and their distribution."""
     return [
-        Heading("What the settings decide"),
+        Heading("Influence of the settings"),
         Text(
             "An unstabilised run is off the true branch by no more than its tolerance until the Jacobian "
             "loses rank; near that position its accelerations are errors divided by a small singular value. "
-            "Which of the crossings does the damage depends on the size of those errors and on where steps "
-            "happen to fall. The set of times is the mechanism's, the choice within it is chance: here one "
+            "The crossing at which a run leaves the branch depends on the size of those errors and on the "
+            "instants of its steps. The mechanism determines the set of times, chance the choice within "
+            "it: here one "
             "setting at a time is varied, and the draw of first step and data errors."
         ),
         _scores(records),

@@ -1,4 +1,4 @@
-"""Where the numbers come from: versions, machines, settings, seed, and how to make them again."""
+"""Provenance of the numbers: versions, machines, settings, seed, and the commands to make them again."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
         _versions(runs),
         _machines(runs),
         _settings(runs),
-        Text("To make this report again; records that are already stored are not run again:"),
+        Text("These commands make the report again; stored records are not run again:"),
         Listing(_commands(groups)),
     ]
 

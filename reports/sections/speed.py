@@ -56,11 +56,14 @@ def _caption(scene_runs: SceneRuns, drawable: Sequence[Run]) -> str:
             f"the least time {duration(quick.seconds)} ({quick.label}, error {power(quick.error)})."
         )
     if wrong := sum(run.is_false_success for run in drawable):
-        text += f" {wrong} completed with an error above {short(WRONG)}: their outcome alone would deceive."
+        text += (
+            f" {wrong} completed with an error above {short(WRONG)}: wrong, although reported as a success."
+        )
     if len(scene_runs.completed()) < len(scene_runs.runs):
         text += (
-            " The others stand in the strip on the right at the time they took, at its foot if that was less "
-            "than any completed run took; the key says why they ended."
+            " The failed runs stand in the strip on the right at the time they took, or at its foot if "
+            "that is "
+            "less than the time of any completed run; the key gives their reasons."
         )
     return text
 
@@ -92,7 +95,7 @@ def plot(scene_runs: SceneRuns, failures: Failures) -> Drawing:
     return figure
 
 
-def _draw_curve(axes: Axes, curve: Curve, runs: Sequence[Run], look: Mapping) -> None:
+def _draw_curve(axes: Axes, curve: Curve, runs: Sequence[Run], look: figures.Look) -> None:
     points = np.array([(max(r.error, SMALLEST), max(r.seconds, UNTIMED)) for r in runs])
     if len(points):
         axes.plot(*points.T, label=" ".join(curve), markersize=5, alpha=0.9, **look)
@@ -112,7 +115,7 @@ def _beside(figure: Drawing, main: Axes) -> Axes:
     return strip
 
 
-def _draw_strip(strip: Axes, failures: Failures, looks: Mapping, foot: float) -> None:
+def _draw_strip(strip: Axes, failures: Failures, looks: Mapping[Curve, figures.Look], foot: float) -> None:
     for number, ((curve, _), runs) in enumerate(failures.items(), 1):
         x = (number - 0.5) / len(failures)
         seconds = [max(run.seconds, foot) for run in runs]

@@ -1,4 +1,4 @@
-"""The first table: what every engine and family reaches, and what an error costs in it."""
+"""The summary: the least error of every engine and family, and the cost of given errors."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
     text = (
         f"Scenes: {len(groups)}; runs: {len(runs)}, in engines: {len({run.curve[0] for run in runs})}; "
         f"completed: {completed}. Under an error level stands the time to reach it, read off the family's "
-        f"curve of time against error, as a multiple of the fastest; an en dash: it never gets there. "
+        f"curve of time against error, as a multiple of the fastest; an en dash: not reached. "
         f"False successes: {wrong} of the completed runs have an error above {short(WRONG)}, and of "
         f"{len(asked)} that were given a relative tolerance {short_of} have an error above {EXCESS:g} times "
         "that."
@@ -47,11 +47,13 @@ def _scene(group: SceneRuns) -> list[Block]:
 
 
 def _gate(group: SceneRuns) -> list[Block]:
-    """Whether the engines start as the same mechanism; nothing where that was not asked."""
+    """The comparison of the engines' mechanisms at the start; nothing where it was not made."""
     if not group.gate:
         return []
     if reason := group.difference():
-        return [Text(f"The engines do not agree on the mechanism, so beware of comparing them: {reason}.")]
+        return [
+            Text(f"The engines simulate different mechanisms, so their times cannot be compared: {reason}.")
+        ]
     engines = ", ".join(dict.fromkeys(record["engine"] for record in group.gate))
     return [Text(f"The same mechanism in {engines}: start, energy and first accelerations agree.")]
 
@@ -76,15 +78,15 @@ def _rank(best: Run, costs: Sequence[float]) -> tuple[bool, float, float]:
 def _row(group: SceneRuns, best: Run, costs: Sequence[float], fastest: Sequence[float]) -> tuple[str, ...]:
     runs = group.curves()[best.curve]
     ratios = [ratio(cost / least) for cost, least in zip(costs, fastest, strict=True)]
-    floor = (
-        (power(best.error), group.swept(best), duration(best.seconds)) if best.completed else ("–", "–", "–")
-    )
+    least: tuple[str, str, str] = ("–", "–", "–")
+    if best.completed:
+        least = power(best.error), group.varied_settings(best), duration(best.seconds)
     done = f"{sum(run.completed for run in runs)} of {len(runs)}"
-    return (*best.curve, done, *floor, *ratios, _otherwise(runs))
+    return (*best.curve, done, *least, *ratios, _otherwise(runs))
 
 
 def _otherwise(runs: Sequence[Run]) -> str:
-    """How many completed and are wrong; how and when the others ended, the earliest of each outcome."""
+    """The number of wrong runs that completed, and the earliest end of each other outcome."""
     wrong = sum(run.is_false_success for run in runs)
     earliest: dict[str, float] = {}
     for run in runs:

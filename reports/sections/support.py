@@ -1,4 +1,4 @@
-"""Which engines of the study can do what: features × engines, from what the engines say, not from runs."""
+"""Support matrix of the study's engines, feature by feature, as the adapters declare it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from crosscheck.engine import engine_names
 from reports.blocks import Block, Heading, Table, Text
 from reports.runs import SceneRuns
 
-CAPTION = "✓: can; –: cannot, for the reason of that number below."
+CAPTION = "✓: supported; –: not supported, for the numbered reason below."
 
 
 def render(groups: Sequence[SceneRuns]) -> list[Block]:
@@ -22,4 +22,4 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
     notes = found.notes()
     rows = [(name, *found.row(name, notes)) for name in found.answers]
     sentences = [Text(f"{i}. {note}.") for i, note in enumerate(notes, 1)]
-    return [Heading("What the engines can do", 2), Table(CAPTION, ("Feature", *engines), rows), *sentences]
+    return [Heading("Support", 2), Table(CAPTION, ("Feature", *engines), rows), *sentences]

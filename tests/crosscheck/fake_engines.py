@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Engine, Setting, Why
+from crosscheck.engine import Cannot, Engine, Owner, Setting
 from mbref.scene import Scene
 from mbref.trajectory import Cost, Outcome, Trajectory
 
@@ -30,7 +30,7 @@ class Fake(Engine):
         return "1.2.3"
 
     def cannot(self, scene: Scene) -> Cannot | None:
-        return Cannot(Why.NEVER, "this fake has no loads") if scene.load else None
+        return Cannot(Owner.MODEL, "this fake has no loads") if scene.load else None
 
     def settings(self, scene: Scene) -> list[Setting]:
         coarse_to_fine = [Setting("plain", {"seconds": s}) for s in (0.1, 0.2)]

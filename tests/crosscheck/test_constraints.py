@@ -19,20 +19,14 @@ from crosscheck.judge import constraints
 from mbref import rotations
 from mbref.equations.model import Model
 from mbref.scene import (
-    Cylindrical,
-    Distance,
-    Fixed,
-    Revolute,
+    JOINT_TYPES,
     Scene,
-    Spherical,
-    Translational,
-    Universal,
 )  # fmt: skip
 from mbref.scenes import SCENES
 from tests.crosscheck.tree_scenes import driven, every_joint, ring
 from tests.strategies import DRIVABLE, one_joint_scenes
 
-KINDS = (Fixed, Revolute, Universal, Spherical, Translational, Cylindrical, Distance)
+KINDS = tuple(JOINT_TYPES.values())
 MECHANISMS = {scene.name: scene for scene in (every_joint(), driven(), ring("revolute"), ring("universal"))}
 # without the chain, whose redundant rows lead Newton's method from disturbed states to a singular position
 MECHANISMS |= {name: SCENES[name]() for name in SCENES if name != "four_bar_chain"}
@@ -52,9 +46,9 @@ class Consistent:
         twist = rng.normal(size=6 * nb)
         y = np.concatenate([r.ravel(), p.ravel(), twist, np.zeros(equations.springs)])
         s = equations.state(equations.projected(t, y))
-        self.r, self.p, self.v, self.spin = s.r, s.p, s.v, s.spin
+        self.r, self.p, self.v, self.omega = s.r, s.p, s.v, s.omega
         self.a = rotations.to_matrix(s.p)
-        self.w = rotations.rotate(s.p, s.spin)
+        self.w = rotations.rotate(s.p, s.omega)
         self.frames = s.frames()
         self.to_body = block_diag(*(block_diag(np.eye(3), a.T) for a in self.a))
 
@@ -130,8 +124,8 @@ def test_rates_and_difference_quotients(name: str) -> None:
     c = Constraints(scene)
 
     def at(dt: float) -> np.ndarray:
-        p = rotations.multiply(s.p, rotations.from_vector(dt * s.spin))
-        return c.levels(s.t + dt, frames(s.r + dt * s.v, p, s.v, s.spin))
+        p = rotations.multiply(s.p, rotations.from_vector(dt * s.omega))
+        return c.levels(s.t + dt, frames(s.r + dt * s.v, p, s.v, s.omega))
 
     levels, before, after = at(0.0), at(-h), at(h)
     for k, what in ((0, "Φ'"), (1, "Φ''")):
@@ -139,8 +133,8 @@ def test_rates_and_difference_quotients(name: str) -> None:
         gap = abs(quotient - levels[k + 1]).max() / (1 + abs(levels[k + 1]).max())
         assert gap < 1e-6, f"{what}: relative difference {gap:.1e}"
     jacobian = c.jacobian(s.t, s.frames)
-    rest = c.levels(s.t, frames(s.r, s.p, 0 * s.v, 0 * s.spin))[1]
-    gap = abs(jacobian @ np.hstack([s.v, s.spin]).ravel() + rest - levels[1]).max()
+    rest = c.levels(s.t, frames(s.r, s.p, 0 * s.v, 0 * s.omega))[1]
+    gap = abs(jacobian @ np.hstack([s.v, s.omega]).ravel() + rest - levels[1]).max()
     assert gap < 1e-11, f"Φ_q v - ν and Φ' differ by {gap:.1e}"
 
 
@@ -151,7 +145,7 @@ def test_forces_and_mbref(name: str) -> None:
     s = Consistent(scene, 0.0, 3, 0.02)
     forces = Forces(scene)
     angles = np.array([forces.angle(s.frames, k) for k in range(len(forces.twists))])
-    ours = s.to_body.T @ forces(s.frames, s.spin, angles)
+    ours = s.to_body.T @ forces(s.frames, s.omega, angles)
     model = Model(scene)
     start = np.array([body.orientation for body in scene.body])
     p = rotations.multiply(s.p, rotations.multiply(rotations.conjugate(start), model.orientation))

@@ -17,7 +17,7 @@ from crosscheck.engine import ENTRY_POINTS, engine_names
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from crosscheck.processes.pool import run_isolated
-from crosscheck.study.fair_timing import difference, gate_cases
+from crosscheck.study.fair_timing import identity_cases, model_difference
 from crosscheck.study.grid import run_case
 from mbref.scenes import SCENES
 
@@ -48,8 +48,8 @@ def test_installed_plug_in_and_list(installed, capsys):
 
 def test_plug_in_and_truth_and_gate(installed):
     scene = SCENES["planar_slider_crank"]().with_(duration=0.1)
-    cases = gate_cases(scene, ["tiny"], 60.0)  # compared with the truth
-    found = difference(scene, [run_case(case) for case in cases])
+    cases = identity_cases(scene, ["tiny"], 60.0)  # compared with the truth
+    found = model_difference(scene, [run_case(case) for case in cases])
     assert [case.engine for case in cases] == ["tiny"] and found is None, found
     setting = cases[0].setting
     run = run_isolated("tiny", scene, np.linspace(0, 0.1, 5), setting, 60.0)

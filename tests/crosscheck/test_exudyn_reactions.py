@@ -9,18 +9,13 @@ from crosscheck.engine import Setting
 from crosscheck.engines.exudyn.adapter import ENGINE
 from mbref import rotations
 from mbref.scene import (
+    JOINT_TYPES,
     Body,
-    Cylindrical,
-    Distance,
     Driver,
-    Fixed,
     Moment,
     Revolute,
     Scene,
     Sine,
-    Spherical,
-    Translational,
-    Universal,
 )
 from mbref.trajectory import Outcome, Trajectory
 
@@ -31,15 +26,10 @@ BODY = Body(
     orientation=tuple(rotations.from_vector([0.3, -0.5, 0.8]).tolist()),
 )  # fmt: skip
 ANCHOR, OTHER = (0.1, 0.1, -0.2), (0.3, -0.1, 0.1)
-HELD = {
-    "fixed": lambda **j: Fixed(anchor=ANCHOR, **j),
-    "revolute": lambda **j: Revolute(anchor=ANCHOR, axis=SIDEWAYS, **j),
-    "cylindrical": lambda **j: Cylindrical(anchor=ANCHOR, axis=SIDEWAYS, **j),
-    "translational": lambda **j: Translational(anchor=ANCHOR, axis=SIDEWAYS, **j),
-    "spherical": lambda **j: Spherical(anchor=ANCHOR, **j),
-    "universal": lambda **j: Universal(anchor=ANCHOR, axes=((1.0, 0.0, 0.0), (0.0, 1.0, 1.0)), **j),
-    "distance": lambda **j: Distance(anchors=(ANCHOR, OTHER), **j),
-}
+PLACES = {
+    "anchor": ANCHOR, "anchors": (ANCHOR, OTHER), "axis": SIDEWAYS,
+    "axes": ((1.0, 0.0, 0.0), (0.0, 1.0, 1.0)),
+}  # fmt: skip
 
 
 def needed_wrench(scene: Scene, trajectory: Trajectory) -> np.ndarray:
@@ -51,7 +41,7 @@ def needed_wrench(scene: Scene, trajectory: Trajectory) -> np.ndarray:
     force = body.mass * (trajectory.acceleration[:, 0] - np.array(scene.gravity))
     spin = np.einsum("kij,kj->ki", inertia, w)
     moment = np.einsum("kij,kj->ki", inertia, alpha) + np.cross(w, spin) - np.array(scene.load[0].moment)
-    anchors = joint.anchors if joint.type == "distance" else (joint.anchor,) * 2
+    anchors = joint.anchor_pair
     point = np.array(anchors[1])
     if joint.bodies[1] == "b":
         start = rotations.to_matrix(np.array(body.orientation))
@@ -63,14 +53,18 @@ def needed_wrench(scene: Scene, trajectory: Trajectory) -> np.ndarray:
 @pytest.mark.parametrize("bodies", [("ground", "b"), ("b", "ground")])
 @pytest.mark.parametrize(
     ("kind", "driven"),
-    [*((k, False) for k in HELD), ("revolute", True), ("cylindrical", True), ("translational", True)],
+    [
+        (name, driven)
+        for name, kind in JOINT_TYPES.items()
+        for driven in (False, True)[: 1 + bool(kind.facts.driven)]
+    ],
 )
 def test_reaction_and_newton_euler_agree(kind: str, driven: bool, bodies: tuple[str, str]):
     scene = Scene(
         name="held",
         body=(BODY,),
         gravity=(1.0, -9.81, 2.0),
-        joint=(HELD[kind](name="J", bodies=bodies),),
+        joint=(JOINT_TYPES[kind].at("J", bodies, **PLACES),),
         driver=(Driver(joint="J", polynomial=(0.0, 3.0)),) if driven else (),
         load=(Moment(body="b", moment=(0.3, 0.5, -0.4)),),
     )
@@ -84,7 +78,7 @@ def test_reaction_and_newton_euler_agree(kind: str, driven: bool, bodies: tuple[
 def test_reactions_without_reliable_accelerations_are_not_given():
     """With an accelerating driver Exudyn's initial multipliers leave its acceleration out."""
     driver = Driver(joint="J", sine=Sine(amplitude=0.1, frequency=3.0))
-    joint = HELD["revolute"](name="J", bodies=("ground", "b"))
+    joint = Revolute.at("J", ("ground", "b"), **PLACES)
     scene = Scene(name="shaken", body=(BODY,), joint=(joint,), driver=(driver,))
     trajectory = ENGINE.run(scene, np.linspace(0, 0.1, 3), Setting("tuned", {"step": 1e-3}))
     assert trajectory.reactions is None

@@ -8,18 +8,13 @@ from hypothesis import strategies as st
 from crosscheck.judge import constraints
 from mbref import rotations
 from mbref.scene import (
+    JOINT_TYPES,
     Body,
-    Cylindrical,
-    Distance,
     Driver,
-    Fixed,
-    Revolute,
     Scene,
     SceneError,
     Sine,
     Spherical,
-    Translational,
-    Universal,
 )  # fmt: skip
 from mbref.scenes import SCENES
 
@@ -34,6 +29,7 @@ ROWS = {
     "spherical": 3,
     "translational": 5,
     "cylindrical": 4,
+    "planar": 3,
     "distance": 1,
 }
 
@@ -44,20 +40,13 @@ def tilted(*vector):
 
 def jointed(kind, bodies=PAIR, driver=()):
     """Two bodies in general position, and a joint of each type between them."""
-    joints = {
-        "fixed": Fixed(name="j", bodies=bodies, anchor=POINT),
-        "revolute": Revolute(name="j", bodies=bodies, anchor=POINT, axis=AXIS),
-        "universal": Universal(name="j", bodies=bodies, anchor=POINT, axes=(AXIS, SIDE)),
-        "spherical": Spherical(name="j", bodies=bodies, anchor=POINT),
-        "translational": Translational(name="j", bodies=bodies, anchor=POINT, axis=AXIS),
-        "cylindrical": Cylindrical(name="j", bodies=bodies, anchor=POINT, axis=AXIS),
-        "distance": Distance(name="j", bodies=bodies, anchors=(POINT, (1.0, 0.1, 0.3))),
-    }
+    places = {"anchor": POINT, "anchors": (POINT, (1.0, 0.1, 0.3)), "axis": AXIS, "axes": (AXIS, SIDE)}
+    joint = JOINT_TYPES[kind].at("j", bodies, **places)
     bodies = (
         Body(name="first", position=(0.1, 0.2, 0.3), orientation=tilted(0.4, -0.2, 0.9)),
         Body(name="second", position=(0.9, -0.4, 0.5), orientation=tilted(-0.7, 0.5, 0.1)),
     )
-    return Scene(name=kind, body=bodies, joint=(joints[kind],), driver=driver)
+    return Scene(name=kind, body=bodies, joint=(joint,), driver=driver)
 
 
 def constrained_motion(scene, seed):

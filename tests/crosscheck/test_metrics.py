@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from crosscheck.judge import metrics
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.energy import energy_series, kinetic_energy
-from crosscheck.judge.metrics import METRICS, cost_at_error, false_success, measure, order_of_convergence
+from crosscheck.judge.metrics import METRICS, cost_at_error, measure, order_of_convergence
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import Moment
@@ -198,9 +198,3 @@ def test_cost_is_read_on_the_lower_envelope():
     assert cost_at_error(costs, errors, 0.5) == 1.0, "the cheapest run is already better"
     assert cost_at_error(costs, errors, 1e-7) is None, "no run is so good"
     assert cost_at_error([1.0, 2.0], [math.nan, math.inf], 1.0) is None
-
-
-def test_a_run_that_completes_far_from_the_truth_is_a_false_success():
-    assert false_success(EXACT, 0.5, 1e-2) and false_success(EXACT, math.inf, 1e-2)
-    assert not false_success(EXACT, 1e-3, 1e-2) and not false_success(EXACT, None, 1e-2)
-    assert not false_success(replace(EXACT, outcome=Outcome.VIOLATION), 0.5, 1e-2)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from crosscheck.engine import Setting, Why, engine
+from crosscheck.engine import Owner, Setting, engine
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import (
@@ -151,14 +151,14 @@ def test_a_distance_joint_is_refused() -> None:
     scene = clockwork(False)
     cord = Distance(name="cord", bodies=("crank", "sled"), anchors=((0.3, 0.0, 0.0), (1.0, 0.1, 0.2)))
     refusal = engine("ondsel").cannot(scene.with_(joint=(*scene.joint, cord)))
-    assert refusal is not None and refusal.why is Why.UPSTREAM and "distance" in refusal.reason, refusal
+    assert refusal is not None and refusal.owner is Owner.ENGINE and "distance" in refusal.reason, refusal
 
 
 @pytest.mark.parametrize("name", ["planar_slider_crank", "four_bar_gravity", "four_bar_straight"])
 def test_open_motion_is_refused(name: str) -> None:
     """Also what is open at the start only: OndselSolver takes the wrong branch there."""
     refusal = engine("ondsel").cannot(SCENES[name]())
-    assert refusal is not None and refusal.why is Why.UPSTREAM, refusal
+    assert refusal is not None and refusal.owner is Owner.ENGINE, refusal
 
 
 def test_reactions_only_where_the_solver_knows_every_force() -> None:

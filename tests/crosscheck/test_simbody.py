@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from crosscheck.engine import Setting, Why, engine
+from crosscheck.engine import Owner, Setting, engine
 from crosscheck.judge.constraints import closure, joint_coordinates
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
@@ -112,7 +112,7 @@ def test_a_polynomial_with_a_sine_is_refused() -> None:
     sine = Sine(amplitude=0.1, frequency=3.0)
     scene = prescribed(Driver(joint="cyl", polynomial=(0.0, 1.0), sine=sine))
     refusal = engine("simbody").cannot(scene)
-    assert refusal is not None and refusal.why is Why.UPSTREAM and "cyl" in refusal.reason, refusal
+    assert refusal is not None and refusal.owner is Owner.ENGINE and "cyl" in refusal.reason, refusal
 
 
 def test_a_singular_position_and_the_end_of_an_accurate_run() -> None:

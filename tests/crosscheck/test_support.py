@@ -1,4 +1,4 @@
-"""Support matrix: what engines say / the README's block, the suite's probes, and what they then do."""
+"""Support matrix: answers of the engines / the document's block, the suite's probes, and short runs."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import pytest
 
 from crosscheck.cli import support
 from crosscheck.conformance.features import JOINTS, LOADS, feature_scenes
-from crosscheck.engine import BUILT_IN, Cannot, Why, engine
+from crosscheck.engine import BUILT_IN, Cannot, Owner, engine
 from crosscheck.judge.constraints import initial_poses, jacobian
 from mbref.scene import Joint, Load, Scene
-from mbref.scene_validation import DRIVEN
+from mbref.scene_validation import DRIVABLE
 from mbref.trajectory import Outcome
 
-README = Path(__file__).parents[2] / "README.md"
+DOCUMENT = Path(__file__).parents[2] / "docs" / "engines.md"
 
 
-def test_readme_and_generated_block():
-    block = support.block_of(README.read_text())
+def test_document_and_generated_block():
+    block = support.block_of(DOCUMENT.read_text())
     assert block == support.markdown(support.KNOWN), (
-        "README's support matrix is stale: python -m crosscheck.cli.support README.md renews it"
+        "the support matrix is stale: python -m crosscheck.cli.support docs/engines.md renews it"
     )
 
 
@@ -32,7 +32,7 @@ def test_probes_and_the_kinds_a_scene_may_have():
     assert set(JOINTS) == kinds(Joint), set(JOINTS) ^ kinds(Joint)
     assert set(LOADS) == kinds(Load), set(LOADS) ^ kinds(Load)
     scenes = feature_scenes()
-    assert {f"{kind} driver" for kind in DRIVEN} <= set(scenes), list(scenes)
+    assert {f"{kind} driver" for kind in DRIVABLE} <= set(scenes), list(scenes)
     for name, count in {"loop": 0, "redundant loop": 1, "several loops": 5}.items():
         rows, _ = jacobian(scenes[name], 0.0, *initial_poses(scenes[name]))
         redundant = len(rows) - np.linalg.matrix_rank(rows, rtol=1e-9)
@@ -52,13 +52,13 @@ def test_support_and_a_short_run(name):
 
 def test_gaps_and_their_sentences():
     def ask(name: str, scene: Scene) -> Cannot | None:
-        return Cannot(Why.UPSTREAM, f"no {scene.joint[0].type}") if name == "b" and scene.joint else None
+        return Cannot(Owner.ENGINE, f"no {scene.joint[0].type}") if name == "b" and scene.joint else None
 
     found = support.of_features(["a", "b"], ask)
     notes = found.notes()
     assert found.row("free body", notes) == ["✓", "✓"], found.row("free body", notes)
     assert found.row("fixed joint", notes) == ["✓", "– 1"], found.row("fixed joint", notes)
-    assert notes[0] == "b: no fixed (waits for the engine)", notes
+    assert notes[0] == "b: no fixed (missing in the engine)", notes
     assert len(notes) == len(set(notes)), notes
 
 

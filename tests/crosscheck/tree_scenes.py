@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mbref import rotations
 from mbref.scene import (
+    JOINT_TYPES,
     Body,
     Cylindrical,
     Distance,
@@ -92,12 +93,7 @@ def ring(kind: str) -> Scene:
     Fixed, revolute, cylindrical or universal: the planar motion is the same; the loop is redundant.
     """
     z = (0.0, 0.0, 1.0)
-    last = {
-        "revolute": lambda **k: Revolute(axis=z, **k),
-        "cylindrical": lambda **k: Cylindrical(axis=z, **k),
-        "universal": lambda **k: Universal(axes=(z, (0.0, 1.0, 0.0)), **k),
-        "spherical": Spherical,
-    }[kind]
+    last = JOINT_TYPES[kind].at("C", ("b", "c"), anchor=(0.7, 0.5, 0.0), axis=z, axes=(z, (0.0, 1.0, 0.0)))
     return Scene(
         name=f"ring_{kind}",
         gravity=(0.0, -9.81, 0.0),
@@ -117,6 +113,6 @@ def ring(kind: str) -> Scene:
             Revolute(name="A", bodies=("ground", "a"), anchor=(0.0, 0.0, 0.0), axis=z),
             Revolute(name="B", bodies=("a", "b"), anchor=(0.0, 0.3, 0.0), axis=z),
             Revolute(name="D", bodies=("ground", "c"), anchor=(0.7, 0.0, 0.0), axis=z),
-            last(name="C", bodies=("b", "c"), anchor=(0.7, 0.5, 0.0)),
+            last,
         ),
     )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from crosscheck.conformance.random_mechanisms import random_mechanism
-from mbref.equations.active_coordinates import moving_entries
+from mbref.equations.active_coordinates import active_entries
 from mbref.equations.static_constraints import SMALL, _perpendicular, held_by_rows
 from mbref.scene import Body, Driver, Fixed, Revolute, Scene, Spring, Translational
 from mbref.scenes import SCENES, find_scene
@@ -57,11 +57,11 @@ WELD = Scene(
 def held(scene):
     """The columns that rows hold, as body and axis: x, y, z of its position, a, b, c of its own frame."""
     run = Run(scene, Method.parse(METHOD), np.array([0.1]), Limits())
-    moving, entries = moving_entries(run.model, run.start.q, run.start.v)
+    moving, entries = active_entries(run.model, run.start.q, run.start.v)
     found, left = held_by_rows(run.model, run.start, moving, entries)
     columns = [column for each in found for column in each.columns]
     assert all(len(each.rows) == len(each.columns) for each in found)
-    assert not set(columns) & set(run.moving.velocities), "what is held is not integrated"
+    assert not set(columns) & set(run.part.active.velocities), "what is held is not integrated"
     assert not (left & ~entries).any()
     return {f"{run.model.bodies[c // 6].name} {'xyzabc'[c % 6]}" for c in columns}
 
@@ -124,11 +124,11 @@ def test_rows_of_changing_length_or_at_an_angle_do_not_hold():
 def test_what_is_held_cannot_move_at_any_pose_of_the_motion(scene):
     """Φ_q v = 0 has no solution that moves it: the null space has zeros there, wherever the rest goes."""
     run = Run(scene, Method.parse(METHOD), np.linspace(0.0, 0.05, 4), Limits())
-    moving, entries = moving_entries(run.model, run.start.q, run.start.v)
+    moving, entries = active_entries(run.model, run.start.q, run.start.v)
     found, _ = held_by_rows(run.model, run.start, moving, entries)
     columns = [column for each in found for column in each.columns]
-    run.march(None)
-    for q in run.samples[0]:
+    run.advance(None)
+    for q in run.memory.loop.samples.coordinates:
         _, sizes, right = np.linalg.svd(run.model.terms(0.0, q, run.start.v).jacobian)
         null_space = right[np.sum(sizes > 1e-9 * sizes[0]) :]
         assert np.abs(null_space[:, columns]).max(initial=0.0) < 1e-8
@@ -153,8 +153,8 @@ MECHANISMS = (*(SCENES[name]() for name in NAMES), RAIL, SLEEVE, WELD, TWO_GUIDE
 def test_accelerations_and_multipliers_satisfy_all_equations_of_motion(scene, method, code):
     """M q̈ + Φ_qᵀ λ = g in every column, those held too, whose only equation this is."""
     run = Run(scene, Method.parse(method), np.linspace(0.0, 0.05, 6), Limits(code=code))
-    run.march(None)
-    for t, q, v, acceleration, multipliers in zip(run.times, *run.samples, strict=True):
+    run.advance(None)
+    for t, q, v, acceleration, multipliers in zip(run.times, *run.memory.loop.samples, strict=True):
         terms = run.model.terms(t, q, v)
         left = terms.mass * acceleration + terms.jacobian.T @ multipliers - terms.force
         size = np.abs(terms.force).max() + np.abs(terms.mass * acceleration).max()

@@ -110,6 +110,7 @@ def test_every_kind_of_entry_round_trips(tmp_path):
         {"name": "u", "type": "universal", **pair, "anchor": [0, 0, 0], "axes": [[1, 0, 0], [0, 1, 0]]},
         {"name": "t", "type": "translational", **pair, **axis},
         {"name": "c", "type": "cylindrical", **pair, **axis},
+        {"name": "p", "type": "planar", **pair, **axis},
         {"name": "d", "type": "distance", **pair, "anchors": [[0, 0, 0], [1, 1, 1]]},
     ]
     data["driver"].append({"joint": "t", "sine": {"amplitude": 0.1, "frequency": 2.0}})

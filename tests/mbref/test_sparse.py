@@ -7,18 +7,18 @@ from hypothesis import strategies as st
 
 from crosscheck.judge.truth import truth_for
 from mbref.equations import diagnosis, initial_state
-from mbref.equations.active_coordinates import moving_entries
+from mbref.equations.active_coordinates import active_entries
 from mbref.equations.model import Model
+from mbref.kernels.named_memory import packed
 from mbref.linear_algebra.sparse_cholesky import (
     assemble,
     factorise,
-    memories,
+    find_squared_pivots,
     solve,
-    squared_pivots,
     subtract_product,
     times_transpose,
 )
-from mbref.linear_algebra.symbolic_factorisation import COLUMN, ROW, plan_for
+from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation
 from mbref.scenes import find_scene
 from mbref.simulation.simulate import Limits, simulate
 
@@ -32,31 +32,32 @@ def test_factor_and_dense_algebra_on_random_blocks(bodies, rows, seed):
     entries = (rng.random((rows, 12)) < 0.6) & (columns < n)
     blocks, root, alpha = rng.normal(size=(rows, 12)), rng.uniform(0.5, 2.0, n), 10.0 ** rng.integers(1, 8)
     moving = np.isin(np.arange(n), columns[entries])
-    plan = plan_for(moving, entries, columns)
+    row, entry = np.nonzero(entries)
+    factor = sparse_factor(symbolic_factorisation(row, columns[row, entry], 12 * row + entry, moving))
+    memory, b = packed(factor).argument, factor.residual
     dense = np.zeros((rows, n))
     dense[np.nonzero(entries)[0], columns[entries]] = (blocks * entries)[entries]
-    d_true = (dense * root)[np.ix_(plan.part(ROW), plan.part(COLUMN))]
+    d_true = (dense * root)[np.ix_(factor.symbolic.row, factor.symbolic.column)]
     s_true = d_true @ d_true.T
     s_true[np.diag_indices_from(s_true)] *= 1 + 1 / alpha
     rhs, x = (rng.normal(size=size) for size in d_true.shape)
-    d, low, diagonal, seen, b, _, _, inverse_root, product = memories(plan.indices, np.zeros(plan.memory))
 
-    assemble(plan.indices, blocks, root, alpha, d, low, diagonal, inverse_root)
-    assert factorise(plan.indices, low)
+    assemble(memory, blocks.ravel(), root, alpha)
+    assert factorise(memory)
     b[:] = rhs
-    solve(plan.indices, low, b)
+    solve(memory, b)
     left = np.abs(s_true @ b - rhs).max(initial=0) / (
         1 + np.abs(s_true).max(initial=0) * np.abs(b).max(initial=0)
     )
     assert left < 1e-13, f"residual of the solution {left:.1e}"
-    times_transpose(plan.indices, d, rhs, product)
-    assert np.abs(product - d_true.T @ rhs).max(initial=0) < 1e-12
+    times_transpose(memory, rhs, factor.change)
+    assert np.abs(factor.change - d_true.T @ rhs).max(initial=0) < 1e-12
     b[:] = rhs
-    subtract_product(plan.indices, d, x, b)
+    subtract_product(memory, x, b)
     assert np.abs(b - (rhs - d_true @ x)).max(initial=0) < 1e-12
     pivots = np.sort(np.diag(np.linalg.cholesky(s_true)) / np.sqrt(np.diag(s_true)))
-    squared_pivots(plan.indices, low, diagonal, seen)
-    seen = np.sqrt(np.sort(seen))
+    find_squared_pivots(memory)
+    seen = np.sqrt(np.sort(factor.squared_pivots))
     assert np.abs(seen - pivots).max(initial=0) < 1e-6 / np.sqrt(alpha), f"pivots {seen}, dense {pivots}"
 
 
@@ -72,7 +73,7 @@ def test_factor_and_dense_algebra_on_random_blocks(bodies, rows, seed):
 def test_rows_that_move_and_the_plane(name, gravity, rows):
     model = Model(find_scene(name).with_(gravity=gravity))
     start = initial_state.consistent_start(model)
-    moving = moving_entries(model, start.q, start.v)[1].any(axis=1)
+    moving = active_entries(model, start.q, start.v)[1].any(axis=1)
     assert moving.sum() == rows, f"{moving.sum()} of {model.m} rows move"
 
 
@@ -80,13 +81,16 @@ ACCELERATIONS = ("acceleration", "angular_acceleration")  # m/s², rad/s²: leng
 SIMILAR = dict.fromkeys(ACCELERATIONS, ACCELERATIONS)
 
 
-def both(scene, method, times):
-    """The run by sparse kernels, and by dense ones."""
-    limits = (Limits(rtol=1e-10, sparse_above=rows) for rows in (0, 10**9))
-    return [simulate(scene, method, times, limit) for limit in limits]
+def both(scene, stabilisation, times, formulation="alf-dual"):
+    """The run by the sparse factor, and by the dense singular values of MPI-SVD."""
+    methods = (f"{name}+{stabilisation}" for name in (formulation, "mpi-svd"))
+    return [simulate(scene, method, times, Limits(rtol=1e-10)) for method in methods]
 
 
-@pytest.mark.parametrize("method", ["alf-dual+projection", "alf-dual+baumgarte", "alf-dual[alpha=1e6]+none"])
+@pytest.mark.parametrize(
+    ("formulation", "stabilisation"),
+    [("alf-dual", "projection"), ("alf-dual", "baumgarte"), ("alf-dual[alpha=1e6]", "none")],
+)
 @pytest.mark.parametrize(
     ("name", "gravity"),
     [
@@ -98,10 +102,10 @@ def both(scene, method, times):
         ("spatial_slider_crank", (0.0, 0.0, 0.0)),
     ],
 )
-def test_sparse_and_dense_runs(name, gravity, method):
+def test_sparse_and_dense_runs(name, gravity, formulation, stabilisation):
     scene = find_scene(name).with_(gravity=gravity)
     times = np.linspace(0, 0.01, 4)
-    sparse, dense = both(scene, method, times)
+    sparse, dense = both(scene, stabilisation, times, formulation)
     assert sparse.outcome == dense.outcome
     for key in ("position", "velocity", "angular_velocity", "acceleration", "angular_acceleration"):
         size = max(np.abs(getattr(dense, other)).max() for other in SIMILAR.get(key, (key,)))
@@ -111,7 +115,7 @@ def test_sparse_and_dense_runs(name, gravity, method):
 
 def test_reactions_of_sparse_and_dense_runs_without_redundancy():
     scene = find_scene("spatial_slider_crank")
-    sparse, dense = both(scene, "alf-dual+projection", [0.005, 0.01])
+    sparse, dense = both(scene, "projection", [0.005, 0.01])
     for joint, theirs in dense.reactions.items():
         gap = np.abs(sparse.reactions[joint] - theirs).max() / np.abs(theirs).max()
         assert gap < 1e-9, f"reactions of {joint} differ by {gap:.1e}"
@@ -185,10 +189,10 @@ def ratio(loops):
     return pull(loops) / pull(1)
 
 
-@pytest.mark.parametrize("rows", [0, 10**9])
-def test_what_decays_out_of_the_plane_is_zero_at_the_end(rows):
-    scene, method = find_scene("four_bar_chain[1]"), "alf-dual+projection/rk4[step=0.01]"
-    run = simulate(scene, method, [0.5], Limits(sparse_above=rows))
+@pytest.mark.parametrize("formulation", ["alf-dual", "mpi-svd"])
+def test_what_decays_out_of_the_plane_is_zero_at_the_end(formulation):
+    scene, method = find_scene("four_bar_chain[1]"), f"{formulation}+projection/rk4[step=0.01]"
+    run = simulate(scene, method, [0.5])
     values = np.abs(np.concatenate([run.velocity, run.angular_velocity], axis=None))
     left = values[(values > 0) & (values < 1e-90)]
     assert not left.size, f"{left.size} velocities have decayed to {left.max():.0e}"

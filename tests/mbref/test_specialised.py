@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from crosscheck.conformance.random_mechanisms import random_mechanism
-from mbref.equations.evaluation import coordinate_rates
+from mbref.equations.coordinates import coordinate_rates
+from mbref.equations.evaluation import assemble_system
 from mbref.kernels.compilation import CACHE
-from mbref.kernels.layout import COLUMNS, FORCE, OK, PHI_Q, RATES_CODE, RHS, ROWS, SIZES
-from mbref.linear_algebra.symbolic_factorisation import HELD_COLUMN, HELD_ROW
-from mbref.linear_algebra.vectors import larger
+from mbref.kernels.layout import OK, Addresses
+from mbref.linear_algebra.vectors import larger, largest
 from mbref.scene import Body, Fixed, Force, Revolute, Scene, Spring, TorsionSpring
 from mbref.scenes import SCENES, find_scene
 from mbref.simulation.method import Method, MethodError
@@ -19,10 +19,9 @@ from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.run import Run
 from mbref.simulation.simulate import Limits, simulate
 from mbref.specialised import machine_code
-from mbref.specialised.build import PIECES, State
+from mbref.specialised.build import RecordingState
 from mbref.specialised.machine_code import Code, Piece, compiled
 from mbref.specialised.tracing import Record, Scalar, Untraceable, inputs, plain
-from mbref.stabilisation.projection import largest
 
 PAPER = ("spatial_slider_crank", "planar_slider_crank", "four_bar", "five_bar")
 CALL = ctypes.CFUNCTYPE(ctypes.c_longlong, ctypes.c_double, *[ctypes.c_void_p] * 4)
@@ -66,23 +65,21 @@ def test_rates_of_the_code_are_those_of_the_kernels(name, formulation):
         return
     with_redundancy = method if method.formulation.handles_redundancy else Method.parse("alf-dual+projection")
     generic = Run(SCENES[name](), with_redundancy, np.array([1.0]), Limits(code="generic"))
-    kernel = generic.chart.rates.callable
-    live, rng = run.own.live, np.random.default_rng(7)
-    code, size = CALL(int(live[0, RATES_CODE])), int(run.pivots[SIZES, 1])
+    kernel, rng = generic.method.stabilisation.rates.callable, np.random.default_rng(7)
+    code, size = CALL(run.specialised.addresses.rates), int(run.memory.loop.clock.y_size)
     compared = 0
     for scale in (0.0, 1e-4, 1e-3, 1e-3, 1e-2):
-        y = run.y[:size] + scale * rng.normal(size=size)
+        y = run.memory.loop.y[:size] + scale * rng.normal(size=size)
         ours, angles, multipliers = np.zeros(size), np.zeros(1), np.zeros(run.model.m)
         data = [x.ctypes.data for x in (y, angles, ours, multipliers)]
         held = code(scale, *data) == OK
         theirs = np.zeros(size)
-        accelerate = generic.method.formulation.accelerate.pointer
-        assert kernel(accelerate, scale, y, theirs, generic.problem) == OK
+        assert kernel(scale, y, theirs, generic.packed.argument) == OK
         if not held:  # the number of iterations of ALF depends on the state
             assert formulation == "alf" and scale > 0.0, "a guard failed beside the start"
             continue
         compared += 1
-        nq = run.moving.coordinates.size
+        nq = run.part.active.coordinates.size
         for part in (slice(0, nq), slice(nq, size)):
             apart = np.abs(ours - theirs)[part].max() / (1.0 + np.abs(theirs[part]).max())
             assert apart < 1e-10, f"{name}: {apart:.1e} apart at {scale}"
@@ -127,7 +124,7 @@ def test_loads_agree_with_the_kernels():
 def entries(scene):
     """Coordinates and velocities that are integrated."""
     run = Run(scene, Method.parse("alf-dual+projection"), np.array([0.1]), Limits())
-    return run.moving.coordinates.size, run.moving.velocities.size
+    return run.part.active.coordinates.size, run.part.active.velocities.size
 
 
 @pytest.mark.parametrize(
@@ -139,19 +136,23 @@ def test_a_trace_shows_that_what_is_left_out_stays_at_rest(scene):
     Nor a force or γ, but on what rows of its own hold.
     """
     run = Run(scene, Method.parse("alf-dual+projection"), np.array([0.1]), Limits())
-    state = State(run.model, run.start.q, run.start.v, run.moving)
-    state.evaluate(run.settings)
-    jacobian, rates = state.work[PHI_Q], np.zeros(run.start.q.size, dtype=object)
-    bears = np.array([[is_something(x) for x in row] for row in jacobian]).reshape(jacobian.shape)
-    still = np.setdiff1d(np.arange(run.model.n), run.moving.velocities)
-    others = np.setdiff1d(np.arange(run.model.m), run.moving.rows)
-    by_rows, held = (run.moving.plan.part(k).astype(int) for k in (HELD_ROW, HELD_COLUMN))
-    plain(coordinate_rates)(state.q, state.v, rates)
-    assert not bears[np.ix_(run.moving.rows, still)].any()
-    assert not bears[np.ix_(others, run.moving.velocities)].any()
-    assert not any(map(is_something, state.work[ROWS][RHS, np.setdiff1d(others, by_rows)]))
-    assert not any(map(is_something, state.work[COLUMNS][FORCE, np.setdiff1d(still, held)]))
-    assert not any(map(is_something, np.delete(rates, run.moving.coordinates)))
+    recording = RecordingState(run.model, run.method, 1e-10, run.start, run.part)
+    state, equations = recording.memory.state, recording.memory.equations
+    plain(assemble_system)(recording.t, state.coordinates, state.velocities, equations)
+    active, system = run.part.active, equations.system
+    bears = np.zeros((run.model.m, run.model.n + 6), dtype=bool)
+    np.put_along_axis(bears, run.model.entry_columns(), np.vectorize(is_something)(system.blocks), axis=1)
+    rows = run.part.factor.symbolic.row.astype(int)
+    still = np.setdiff1d(np.arange(run.model.n), active.velocities)
+    others = np.setdiff1d(np.arange(run.model.m), rows)
+    assert bears.any(axis=1)[rows].all()
+    by_rows, held = run.part.factor.static.row.astype(int), run.part.factor.static.column.astype(int)
+    plain(coordinate_rates)(state.coordinates, state.velocities, state.coordinate_rates)
+    assert not bears[np.ix_(rows, np.setdiff1d(still, held))].any()
+    assert not bears[np.ix_(others, active.velocities)].any()
+    assert not any(map(is_something, system.rhs[np.setdiff1d(others, by_rows)]))
+    assert not any(map(is_something, system.force[np.setdiff1d(still, held)]))
+    assert not any(map(is_something, np.delete(state.coordinate_rates, active.coordinates)))
 
 
 def is_something(value):
@@ -176,12 +177,12 @@ def test_auto_takes_the_code_where_many_steps_are_ahead_and_agrees():
     )
     generic = simulate(scene, method, times, Limits(code="generic"))
     run = Run(scene, Method.parse(method), times, Limits())
-    auto = trajectory_of(run, *run.march(None), 0.0)
-    assert run.own is not None, f"{auto.cost.steps} steps by general kernels"
+    auto = trajectory_of(run, *run.advance(None), 0.0)
+    assert run.specialised is not None, f"{auto.cost.steps} steps by general kernels"
     assert apart(generic, auto) < 1e-9
     short = Run(scene, Method.parse(method), np.array([0.2]), Limits())
-    short.march(None)
-    assert short.own is None, "a short run does not make code"
+    short.advance(None)
+    assert short.specialised is None, "a short run does not make code"
 
 
 def test_code_is_kept_and_another_scene_has_its_own():
@@ -190,20 +191,20 @@ def test_code_is_kept_and_another_scene_has_its_own():
     before = set((CACHE / "scenes").glob("*.o"))
     again = Run(scene, Method.parse("alf-dual+projection"), np.array([0.1]), Limits(code="specialised"))
     assert set((CACHE / "scenes").glob("*.o")) == before
-    assert again.own.code is first.own.code, "one process loads it once"
+    assert again.specialised.code is first.specialised.code, "one process loads it once"
     body = (scene.body[0].model_copy(update={"mass": 0.75}), *scene.body[1:])
     heavier = Run(scene.with_(body=body), first.method, np.array([0.1]), Limits(code="specialised"))
-    assert heavier.own.code is not first.own.code
+    assert heavier.specialised.code is not first.specialised.code
     facts = [json.loads(path.with_suffix(".json").read_text()) for path in before]
-    assert all(set(f["operations"]) == set(PIECES) for f in facts)
+    assert all(set(f["operations"]) == set(Addresses._fields) for f in facts)
 
 
 @pytest.mark.parametrize(
     ("method", "reason"),
     [
         ("mpi-svd+projection", "chooses pivots"),
-        ("alf-dual+baumgarte", "baumgarte has no machine code"),
-        ("lm2+partitioning", "partitioning has no machine code"),
+        ("alf-dual+baumgarte", "baumgarte has no specialised code"),
+        ("lm2+partitioning", "partitioning has no specialised code"),
     ],
 )
 def test_what_cannot_be_laid_down_beforehand_is_said(method, reason):
@@ -212,7 +213,7 @@ def test_what_cannot_be_laid_down_beforehand_is_said(method, reason):
 
 
 def test_a_long_chain_has_no_code_of_its_own_and_says_so_at_once():
-    with pytest.raises(MethodError, match="122 rows that move, more than 60"):
+    with pytest.raises(MethodError, match="122 rows are active, more than 60"):
         simulate(find_scene("four_bar_chain[20]"), "alf-dual+projection", (0.01,), Limits(code="specialised"))
 
 

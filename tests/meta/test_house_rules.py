@@ -2,6 +2,7 @@
 
 import ast
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -82,9 +83,18 @@ def test_public_functions_say_what_they_do(path):
 
 
 @pytest.mark.parametrize("table", [FORMULATIONS, STABILISATIONS], ids=["formulations", "stabilisations"])
-def test_readme_tells_every_method(table):
-    told = set(re.findall(r"^\| `([\w-]+)`", (ROOT / "README.md").read_text(), flags=re.M))
-    assert set(table) <= told, f"README does not tell {set(table) - told}"
+def test_documentation_tells_every_method(table):
+    told = set(re.findall(r"^\| `([\w-]+)`", (ROOT / "docs" / "methods.md").read_text(), flags=re.M))
+    assert set(table) <= told, f"docs/methods.md does not tell {set(table) - told}"
+
+
+def test_readme_is_short_and_its_links_lead_somewhere():
+    text = (ROOT / "README.md").read_text()
+    assert len(text.splitlines()) <= 160, len(text.splitlines())
+    for path in (ROOT / "README.md", *(ROOT / "docs").glob("*.md")):
+        links = re.findall(r"\]\(([^)#:]+)\)", path.read_text())
+        missing = [link for link in links if not (path.parent / link).exists()]
+        assert not missing, f"{path.name} links to {missing}"
 
 
 def test_every_integrator_and_scene_has_its_own_name():
@@ -97,6 +107,15 @@ def test_readme_commands_are_what_the_gate_runs():
     assert "README.md" in gate
     commands = re.findall(r"^python3 -m venv .*$", (ROOT / "README.md").read_text(), flags=re.M)
     assert len(commands) == 2, commands
+    assert "'.[dev]'" in commands[1], f"{commands[1]} does not install the linters that the gate runs"
+    for check in ("ruff format --check", "ruff check", "mypy"):
+        assert f".venv/bin/{check}" in gate, f"the gate does not run {check}"
+
+
+def test_slow_tests_are_left_out_unless_asked_for():
+    options = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["pytest"]["ini_options"]
+    assert "not slow" in options["addopts"], options["addopts"]
+    assert '-m "slow or not slow"' in (ROOT / "Makefile").read_text(), "make deep leaves slow tests out"
 
 
 def test_versions_are_pinned_without_addresses():

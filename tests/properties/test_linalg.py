@@ -7,17 +7,46 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mbref.formulations import FORMULATIONS
+from mbref.formulations import FORMULATIONS, mpi_gs, mpi_qr
 from mbref.kernels.layout import OK
+from mbref.kernels.named_memory import allocate, packed
 from mbref.linear_algebra.elimination import cholesky_factor, cholesky_solve, full_pivot, lu_factor, lu_solve
 from mbref.linear_algebra.orthogonal_factorisations import (
+    add_pseudo_solution,
+    gram_schmidt_solve,
     minimum_norm,
-    pinv_gram_schmidt,
-    pinv_svd,
     qr_pivoted,
+    svd_solve,
 )
 
 RATIO = 30.0  # LAPACK's customary bound for ‖residual‖ / (ε n ‖…‖) of a stable algorithm
+
+
+def pinv_svd(d, tolerance):
+    """D⁺ and the rank, column by column from the kernels of MPI-SVD, without its refinement."""
+    m, n = d.shape
+    inverse, rank = np.zeros((n, m)), 0
+    factors = np.linalg.svd(d, full_matrices=False)
+    for i, unit in enumerate(np.eye(m)):
+        rank = svd_solve(np.ascontiguousarray(d), unit.copy(), tolerance, np.zeros(n), np.zeros(m))
+        x = np.zeros(n)
+        add_pseudo_solution(*factors, rank, unit, x, np.zeros(m))
+        inverse[:, i] = x
+    return inverse, rank
+
+
+def pinv_gram_schmidt(d, tolerance):
+    """D⁺ and the rank, column by column from the kernel of MPI-GS."""
+    m, n = d.shape
+    inverse, rank = np.zeros((n, m)), 0
+    for i, unit in enumerate(np.eye(m)):
+        scratch = allocate(mpi_gs.Scratch, {"m": m, "n": n})
+        scratch.columns[:], scratch.b[:] = d.T, unit
+        rank = gram_schmidt_solve(tolerance, packed(scratch).argument)
+        inverse[:, i] = scratch.x
+    return inverse, rank
+
+
 PSEUDO_INVERSES = {"svd": pinv_svd, "gram_schmidt": pinv_gram_schmidt}
 
 
@@ -133,11 +162,12 @@ def test_least_norm_by_qr_and_by_svd(case):
     d, rank, _ = case
     m, n = d.shape
     rhs = d @ np.random.default_rng(3).normal(size=n)
-    b, order = d.T.copy(), np.zeros(m, dtype=np.int64)
-    tau, norms, work, x = np.zeros(m), np.zeros((2, m)), np.zeros(m), np.zeros(n)
-    found = qr_pivoted(b, n, m, order, tau, norms, work, 1e-10)
+    scratch = allocate(mpi_qr.Scratch, {"m": m, "n": n})
+    scratch.transposed[:], scratch.b[:] = d.T, rhs
+    memory, x = packed(scratch), scratch.x
+    found = qr_pivoted(1e-10, memory.argument)
     assert found == rank
-    minimum_norm(b, n, found, order, tau, rhs, x)
+    minimum_norm(found, memory.argument)
     exact = np.linalg.lstsq(d, rhs, rcond=1e-10)[0]
     error = norm_of(x - exact) / max(1e-300, norm_of(exact))
     allowed = 1e-13 * np.linalg.cond(d) if rank == min(m, n) else 1e-13 * 1e6 * 30

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from mbref.equations.initial_state import displaced
 from mbref.equations.model import Model
-from mbref.scene import Cylindrical, Distance, Fixed, Revolute, Spherical, Translational, Universal
+from mbref.scene import JOINT_TYPES
 from tests.strategies import DRIVABLE, one_joint_scenes, states
 
-KINDS = [Fixed, Revolute, Universal, Spherical, Translational, Cylindrical, Distance]
+KINDS = list(JOINT_TYPES.values())
 CASES = [(kind, False) for kind in KINDS] + [(kind, True) for kind in DRIVABLE]
 STEP = 0.005
 STENCIL = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280]) / STEP  # order 8: truncation below 1e-15 here

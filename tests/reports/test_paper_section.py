@@ -16,6 +16,7 @@ from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from crosscheck.paper import runs
 from crosscheck.paper.cells import CELLS
+from crosscheck.paper.illustration import DISTANCES, GAMMA_ERRORS, illustration
 from crosscheck.paper.runs import Label, Records
 from crosscheck.study.grid import Case
 from mbref.scene import Scene
@@ -75,8 +76,8 @@ def records() -> Records:
 
 
 @pytest.fixture(scope="module")
-def blocks(records: Records) -> list:
-    return paper.render(records)
+def blocks(records: Records, tmp_path_factory) -> list:
+    return paper.render(records, illustration(tmp_path_factory.mktemp("paper") / "illustration.jsonl"))
 
 
 def tables(blocks: list, word: str) -> list[Table]:
@@ -145,6 +146,20 @@ def test_digits_of_an_exact_record(records):
                              message="")  # fmt: skip
     other = {**records, missing: {**MADE_OF, **lost.to_record(), "scene": records[missing]["scene"]}}
     assert np.isnan(paper_methods.digit_errors(other)["alf"][0]), "no accelerations, and yet an error"
+
+
+def test_illustration_is_stored_and_its_tables_are_rendered_from_it(blocks, tmp_path, monkeypatch):
+    path = tmp_path / "illustration.jsonl"
+    found = illustration(path)
+    monkeypatch.setattr("crosscheck.paper.illustration._computed", lambda: pytest.fail("computed twice"))
+    assert illustration(path) == found, "the stored record differs from the computed one"
+    [crossings] = tables(blocks, "The fold")
+    assert [row[2] for row in crossings.rows] == ["0", "-π", "0", "-π", "-2π", "0", "-π"], crossings.rows
+    assert {row[3] for row in crossings.rows} == {"17"}, crossings.rows
+    [iterations] = tables(blocks, "Distance")
+    assert len(iterations.rows) == len(DISTANCES), iterations.rows
+    assert [len(row) - 1 for row in iterations.rows] == [len(GAMMA_ERRORS)] * len(DISTANCES)
+    assert iterations.rows[0][1] == str(found["alf_iterations"][0][0]), (iterations.rows[0], found)
 
 
 def test_figures_and_no_simulation(blocks, monkeypatch):

@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 from synthetic import groups
 
+from crosscheck.cli import collection
 from crosscheck.engine import Setting
+from crosscheck.study import sweep as sweeps
 from crosscheck.study.grid import Case, default_cases, study
+from crosscheck.study.timings import LONG, with_timings
 from mbref.scene import Body, Scene
 from reports import __main__ as program
 from reports import render
-from reports import sweep as sweeps
 from reports.blocks import Heading, Table
 from reports.sections import blocks
-from reports.timings import LONG, with_timings
 
 FAKE = "fake_engines:FAKE"
 
@@ -90,7 +91,7 @@ def few(engines) -> sweeps.Sweep:
 
 @pytest.fixture
 def of_fakes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(program, "find_engines", lambda names, notice: [FAKE])
+    monkeypatch.setattr(collection, "find_engines", lambda names, notice: [FAKE])
     monkeypatch.setattr(sweeps, "quick", few)
 
 
@@ -114,7 +115,7 @@ def test_program_interrupted_and_what_to_do(tmp_path, of_fakes, capsys, monkeypa
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(program, "study", interrupted)
+    monkeypatch.setattr(collection, "study", interrupted)
     assert program.main(["--quick", "--out", str(tmp_path)]) == 130
     assert "the same command goes on from there" in capsys.readouterr().err
 

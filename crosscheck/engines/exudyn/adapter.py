@@ -19,10 +19,11 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Engine, Setting, Why
+from crosscheck.engine import Cannot, Engine, Owner, Setting
 from crosscheck.engines.driver_motion import fastest_rate
 from crosscheck.engines.exudyn.dynamic import Motion, integrate
 from crosscheck.engines.exudyn.extrapolation import RICHARDSON, extrapolate
+from crosscheck.engines.exudyn.joints import SUPPORTS
 from crosscheck.engines.exudyn.reactions import reactions
 from crosscheck.engines.exudyn.static import drive
 from crosscheck.judge.constraints import initial_poses, jacobian
@@ -46,6 +47,7 @@ class Exudyn(Engine):
 
     name = "exudyn"
     package = "exudyn"
+    supports = SUPPORTS
 
     def version(self) -> str:
         return metadata.version(self.package)
@@ -53,9 +55,11 @@ class Exudyn(Engine):
     def prepare(self, families: Sequence[str]) -> None:
         _exudyn()
 
-    def cannot(self, scene: Scene) -> Cannot | None:
+    def refuses(self, scene: Scene) -> Cannot | None:
         if not scene.has_mass() and not _fully_driven(scene):
-            return Cannot(Why.NEVER, "without masses only a mechanism driven in full can be analysed")
+            return Cannot(
+                Owner.MODEL, "without masses only a mechanism whose whole motion is driven can be analysed"
+            )
         return None
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
@@ -104,9 +108,9 @@ class Exudyn(Engine):
             position=start + q[..., :3],
             orientation=rotations.multiply(turn, orientation),
             velocity=rates[..., :3],
-            angular_velocity=_spin(turned, rates[..., 3:]),
+            angular_velocity=_angular(turned, rates[..., 3:]),
             acceleration=seconds[0][..., :3] if known else None,
-            angular_acceleration=_spin(turned, seconds[0][..., 3:]) if known else None,
+            angular_acceleration=_angular(turned, seconds[0][..., 3:]) if known else None,
             reactions=reactions(scene, q[..., :3], turn, motion.forces) if known else None,
             outcome=motion.outcome, message=motion.message, cost=motion.cost,
             t_end=motion.t_end,
@@ -140,7 +144,7 @@ def _warnings(exu: Any) -> Iterator[list[str]]:
 
 
 def _defaults(exu: Any, settings: Any, singular: bool) -> Any:
-    """What a user gets who sets nothing."""
+    """The solver's settings as a user finds them."""
     return exu.DynamicSolverType.GeneralizedAlpha
 
 
@@ -193,7 +197,7 @@ def _normalised(p: np.ndarray) -> np.ndarray:
     return p / np.linalg.norm(p, axis=-1, keepdims=True)
 
 
-def _spin(p: np.ndarray, rates: np.ndarray) -> np.ndarray:
+def _angular(p: np.ndarray, rates: np.ndarray) -> np.ndarray:
     """World angular velocity (…, 3) of Euler parameters and their rates, or acceleration of second rates."""
     product = rotations.multiply(rates, rotations.conjugate(p))
     return 2 * product[..., 1:] / np.sum(p * p, axis=-1, keepdims=True)

@@ -36,7 +36,7 @@ class State(NamedTuple):
 
 
 class Ending(NamedTuple):
-    """Why a solver stopped at time t (s), and a sentence."""
+    """The time t (s) at which a solver stopped, the outcome, and a sentence."""
 
     t: float
     outcome: Outcome
@@ -98,7 +98,7 @@ class Solver:
         return _join(times, pieces, complete=ending is None), ending
 
     def cost(self) -> Cost:
-        """What building and all runs so far have cost."""
+        """The cost of building and of all runs so far."""
         steps, factorisations, newton = map(int, self.counts)
         return Cost(self.seconds, self.built, steps=steps, factorisations=factorisations, newton=newton)
 
@@ -141,7 +141,7 @@ def finite(motion: Motion) -> Motion:
 
 
 def said(failure: Exception) -> str:
-    """What an Exudyn exception says, on one line."""
+    """The text of an Exudyn exception, on one line."""
     return " ".join(re.sub(r"\[Python file .*?\]", "", str(failure)).split())
 
 
@@ -181,7 +181,7 @@ def _accepted(system: System) -> float:
 
 
 def _failure(system: System, failure: Exception) -> Ending:
-    """Why a solve failed, from the solver's own flags."""
+    """The outcome of a failed solve, from the solver's own flags."""
     solver = system.mbs.sys["dynamicSolver"]
     t, flags = solver.it.currentTime, solver.conv
     if "not factorized" in str(failure) or flags.linearSolverFailed or flags.massMatrixNotInvertible:
@@ -199,7 +199,7 @@ def _counts(system: System) -> np.ndarray:
 
 
 def _join(times: np.ndarray, pieces: Sequence[Samples], complete: bool) -> Samples:
-    """The wanted samples out of what the stretches recorded (each repeats its start)."""
+    """The wanted samples out of the records of the stretches, each of which repeats its start."""
     recorded, values, forces = (
         np.concatenate([part if n == 0 else np.delete(part, 0, axis) for n, part in enumerate(parts)], axis)
         for axis, parts in zip((0, 1, 0), zip(*pieces, strict=True), strict=True)

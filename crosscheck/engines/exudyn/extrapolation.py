@@ -114,7 +114,7 @@ class _Walk:
         self.state = State(float(times[-1]), values[0, -1].ravel(), values[1, -1].ravel(), data)
 
     def motion(self, ending: Ending | None) -> Motion:
-        """What has been sampled, and why there is no more."""
+        """The samples so far, with the outcome of the run that ended early."""
         costs = [solver.cost() for solver in self.solvers]
         cost = Cost(*(sum(getattr(c, item.name) for c in costs) for item in fields(Cost)))
         found = [

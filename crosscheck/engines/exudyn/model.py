@@ -14,17 +14,13 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engines.driver_motion import motion
-from crosscheck.engines.exudyn.reactions import joint_frame, sensed, unit
+from crosscheck.engines.exudyn.joints import JOINTS, marker_frame
+from crosscheck.engines.geometry import unit
 from crosscheck.judge.constraints import initial_twists
 from mbref import rotations
 from mbref.scene import GROUND, Driver, Joint, Load, Scene
 
 SENSED = ("Coordinates", "Coordinates_t", "Coordinates_tt")
-GENERIC = {  # constrained axes (three translations, three rotations) in a frame with z along the axis
-    "fixed": [1, 1, 1, 1, 1, 1],
-    "cylindrical": [1, 1, 0, 1, 1, 0],
-    "universal": [1, 1, 1, 0, 0, 1],
-}
 
 
 @dataclass(frozen=True)
@@ -35,16 +31,16 @@ class System:
     nodes: list[int]
     sensors: list[list[int]]  # per node: coordinates (7), their rates and second rates
     drivers: list[int]  # objects of the driver constraints
-    joint_sensors: list[int]  # joint by joint: what `sensed` names; then the drivers' forces
+    joint_sensors: list[int]  # joint by joint: the outputs of JOINTS; then the drivers' forces
     redundant: int  # redundant constraints in the assembled configuration
 
     def samples(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What the last run recorded: times (k,), node coordinates (3, k, nb, 7) - values, rates, second
+        """The records of the last run: times (k,), node coordinates (3, k, nb, 7) - values, rates, second
         rates -, and the outputs (k, ·) of the joints' sensors side by side."""
         rows = np.array([[self.mbs.GetSensorStoredData(s) for s in node] for node in self.sensors])
         times = rows[0, 0, :, 0]
-        forces = [self.mbs.GetSensorStoredData(s)[:, 1:] for s in self.joint_sensors]
-        forces = np.concatenate([np.zeros((len(times), 0)), *forces], axis=1)
+        outputs = [self.mbs.GetSensorStoredData(s)[:, 1:] for s in self.joint_sensors]
+        forces = np.concatenate([np.zeros((len(times), 0)), *outputs], axis=1)
         return times, rows[..., 1:].transpose(1, 2, 0, 3), forces
 
 
@@ -60,7 +56,7 @@ def build(exu: Any, scene: Scene, forces: bool) -> System:
     of_joints = [
         parts.sensor(number, output)
         for joint, number in zip(scene.joint, joints, strict=True)
-        for output in sensed(joint)
+        for output in JOINTS[joint.type].outputs
     ]
     of_joints += [parts.sensor(number, "Force") for number in drivers]
     if forces:
@@ -79,7 +75,6 @@ class _Parts:
         self.exu, self.items, self.scene, self.mbs = exu, items, scene, mbs
         self.number = {GROUND: ground}
         self.position = {GROUND: np.zeros(3)} | {b.name: np.array(b.position) for b in scene.body}
-        self.joints = {joint.name: joint for joint in scene.joint}
 
     def bodies(self, forces: bool) -> list[int]:
         nb = len(self.scene.body)
@@ -110,22 +105,15 @@ class _Parts:
         return self.mbs.AddMarker(self.items.MarkerBodyRigid(bodyNumber=self.number[body], localHT=local))
 
     def joint(self, joint: Joint) -> int:
-        items, bodies = self.items, joint.bodies
-        if joint.type == "distance":
-            markers = [self.marker(b, p) for b, p in zip(bodies, joint.anchors, strict=True)]
-            length = float(np.linalg.norm(np.subtract(*joint.anchors)))
-            return self.mbs.AddObject(items.ObjectConnectorDistance(markerNumbers=markers, distance=length))
-        frame = joint_frame(joint)
-        markers = [self.marker(body, joint.anchor, frame) for body in bodies]
-        if joint.type in GENERIC:
-            axes = GENERIC[joint.type]
-            return self.mbs.AddObject(items.ObjectJointGeneric(markerNumbers=markers, constrainedAxes=axes))
-        native = {
-            "revolute": items.ObjectJointRevoluteZ,
-            "spherical": items.ObjectJointSpherical,
-            "translational": items.ObjectJointPrismaticX,
-        }
-        return self.mbs.AddObject(native[joint.type](markerNumbers=markers))
+        item, frame = JOINTS[joint.type], marker_frame(joint)
+        given: dict[str, Any] = {}
+        ends = zip(joint.bodies, joint.anchor_pair, strict=True)
+        markers = [self.marker(body, point, frame) for body, point in ends]
+        if item.constrained:
+            given["constrainedAxes"] = list(item.constrained)
+        elif joint.facts.condition == "constant distance":
+            given["distance"] = float(np.linalg.norm(np.subtract(*joint.anchor_pair)))
+        return self.mbs.AddObject(getattr(self.items, item.name)(markerNumbers=markers, **given))
 
     def sensor(self, number: int, output: str) -> int:
         """A sensor of an output variable of a joint or constraint."""
@@ -139,8 +127,8 @@ class _Parts:
         """A coordinate constraint: relative coordinate of the joint's bodies = the driver's value."""
         fixed = self.mbs.AddNode(self.items.NodePointGround())
         markers = [self.mbs.AddMarker(self.items.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0))]
-        joint = self.joints[driver.joint]
-        turning = joint.type != "translational"
+        joint = self.scene.joint_named(driver.joint)
+        turning = joint.facts.driven == "angle"
         markers.append(self._rotation(joint) if turning else self._translation(joint))
         constraint = self.items.ObjectConnectorCoordinate(
             markerNumbers=markers,
@@ -150,12 +138,13 @@ class _Parts:
         return self.mbs.AddObject(constraint)
 
     def _relative(self, joint: Joint) -> dict[str, Any]:
-        local = [np.asarray(joint.anchor) - self.position[body] for body in joint.bodies]
+        ends = zip(joint.bodies, joint.anchor_pair, strict=True)
+        local = [np.asarray(point) - self.position[body] for body, point in ends]
         return {
             "bodyNumbers": [self.number[body] for body in joint.bodies],
             "localPosition0": local[0],
             "localPosition1": local[1],
-            "axis0": unit(joint.axis),
+            "axis0": unit(joint.directions[0]),
         }
 
     def _turns(self) -> int:
@@ -192,10 +181,11 @@ class _Parts:
         self.mbs.AddObject(spring)
 
     def _torsion_spring(self, load: Any) -> None:
-        joint = self.joints[load.joint]
-        frame = joint_frame(joint)
+        joint = self.scene.joint_named(load.joint)
+        frame = marker_frame(joint)
+        ends = zip(joint.bodies, joint.anchor_pair, strict=True)
         spring = self.items.ObjectConnectorTorsionalSpringDamper(
-            markerNumbers=[self.marker(body, joint.anchor, frame) for body in joint.bodies],
+            markerNumbers=[self.marker(body, point, frame) for body, point in ends],
             nodeNumber=self._turns(), stiffness=load.stiffness, damping=load.damping,
             offset=load.natural_angle,
         )  # fmt: skip

@@ -1,6 +1,7 @@
 """MuJoCo: joint coordinates, loops closed by soft equality constraints.
 
-What MuJoCo calls hard is a softness of 1e-4 of the inverse mass, ten times that by default.  Families:
+The hardest closures that MuJoCo's documentation allows have a softness of 1e-4 of the inverse mass, its
+default ten times that.  Families:
 
 - ``defaults``: the library's own options;
 - ``stock``: as stiff as its documentation allows (time constant two steps, impedance 0.9999), RK4;
@@ -28,7 +29,7 @@ import numpy as np
 from crosscheck.engine import Cannot, Engine, Setting
 from crosscheck.engines.driver_motion import fastest_rate, motion, stated_rate
 from crosscheck.engines.initial_velocities import lacks_mass
-from crosscheck.engines.mujoco.model import compiled
+from crosscheck.engines.mujoco.model import SUPPORTS, compiled
 from crosscheck.engines.mujoco.projection import projected
 from crosscheck.engines.sampling import Adaptive, Counts, Failed, Sample, run_through, step_count
 from crosscheck.engines.tree_reactions import LinkMotion, joint_reactions, wrench
@@ -60,6 +61,7 @@ class MuJoCo(Engine):
 
     name = "mujoco"
     package = "mujoco"
+    supports = SUPPORTS
 
     def version(self) -> str:
         """Version of MuJoCo; raises ImportError when it is not installed."""
@@ -67,8 +69,8 @@ class MuJoCo(Engine):
 
         return mujoco.__version__
 
-    def cannot(self, scene: Scene) -> Cannot | None:
-        """Every joint, driver and load maps exactly; what has no mass needs its whole motion prescribed."""
+    def refuses(self, scene: Scene) -> Cannot | None:
+        """Scenes without masses whose motion is not prescribed in full."""
         return lacks_mass(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
@@ -106,7 +108,7 @@ class MuJoCo(Engine):
 
 def _stock(scene: Scene) -> list[str]:
     """The families of stock closures whose integrators differ on the scene."""
-    is_damped = any(getattr(load, "damping", 0.0) for load in scene.load)
+    is_damped = any(load.is_damped for load in scene.load)
     return [family for family in STOCK if is_damped or family != "implicitfast"]
 
 
@@ -242,9 +244,9 @@ class _Run:
             moved = {free: 3, ball: 0}.get(kind, 1)
             rates[q : q + moved] = qvel[v : v + moved]
             if kind in (free, ball):
-                spin = np.concatenate(([0.0], qvel[v + moved : v + moved + 3]))
+                omega = np.concatenate(([0.0], qvel[v + moved : v + moved + 3]))
                 unit = qpos[q + moved : q + moved + 4]
-                rates[q + moved : q + moved + 4] = rotations.multiply(unit / np.linalg.norm(unit), spin) / 2
+                rates[q + moved : q + moved + 4] = rotations.multiply(unit / np.linalg.norm(unit), omega) / 2
         return rates
 
     def sample(self, t: float) -> Sample:
@@ -264,7 +266,7 @@ class _Run:
         )
 
     def link_motion(self) -> LinkMotion:
-        """How the links move; the data's forces are those of this state."""
+        """The motion of the links; the data's forces are those of this state afterwards."""
         mujoco, model, data, links = self.mujoco, self.model, self.data, self.compiled.links
         mujoco.mj_forward(model, data)
         mujoco.mj_rnePostConstraint(model, data)

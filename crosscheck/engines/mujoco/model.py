@@ -1,8 +1,8 @@
 """A scene's tree as a MuJoCo model: bodies and joints, closures and drivers as equalities, loads.
 
 Every body frame has its origin at the centre of mass of the scene's body and world-aligned axes at t = 0.
-Masses are written after compilation, because the compiler refuses thin discs and rods by rounding; what
-it sees before has nothing special (no coinciding frames, no equal moments) that it could simplify by.
+Masses are written after compilation, because the compiler refuses thin discs and rods by rounding; the
+stand-ins until then have no coinciding frames and no equal moments that it could simplify by.
 """
 
 from __future__ import annotations
@@ -12,18 +12,42 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engine import Supports
 from crosscheck.engines.initial_velocities import initial_rates
-from crosscheck.engines.spanning_tree import GROUND_LINK, Link, Tree, spanning_tree
+from crosscheck.engines.spanning_tree import (
+    BALL_JOINT,
+    FREE,
+    GROUND_LINK,
+    SLIDE,
+    TURN,
+    Link,
+    Tree,
+    spanning_tree,
+)
 from mbref import rotations
 from mbref.scene import Driver, Force, Moment, Scene, Spring, TorsionSpring
 
+SUPPORTS = Supports(
+    joints=(
+        "fixed",
+        "revolute",
+        "universal",
+        "spherical",
+        "translational",
+        "cylindrical",
+        "planar",
+        "distance",
+    ),
+    drivers=("angle", "displacement"),
+    loads=("moment", "force", "spring", "torsion_spring"),
+)
 UNIT = (1.0, 0.0, 0.0, 0.0)
 GENERAL = ((1.0, 1.1, 1.2), (0.1, 0.2, 0.3), (0.5, 0.5, 0.1, 0.7))  # moments, centre, axes until compiled
 
 
 @dataclass(frozen=True)
 class Compiled:
-    """A compiled model with what the run needs to know of it."""
+    """A compiled model, and the numbers of its parts that a run needs."""
 
     model: Any
     tree: Tree
@@ -85,18 +109,16 @@ class _Builder:
         body = self.body[link.parent].add_body(name=_name(k), pos=link.position - self.centre(link.parent))
         _inertial(body, 1.0, *GENERAL)
         self.body[k] = body
-        hinge, slide = self.mujoco.mjtJoint.mjJNT_HINGE, self.mujoco.mjtJoint.mjJNT_SLIDE
-        if link.kind == "free":
-            body.add_freejoint(name=f"free {k}")
-            return
-        kinds = {
-            "fixed": [], "revolute": [hinge], "universal": [hinge, hinge], "translational": [slide],
-            "cylindrical": [slide, hinge], "spherical": [self.mujoco.mjtJoint.mjJNT_BALL],
-        }[link.kind]  # fmt: skip
-        axes = np.resize(link.axes, (len(kinds), 3)) if len(link.axes) else np.full((len(kinds), 3), 1.0)
-        for i, (kind, axis) in enumerate(zip(kinds, axes, strict=True)):
-            name, anchor = f"joint {k}.{i}", link.anchor - link.position
-            self.joint[self.tree.starts[k] + i] = body.add_joint(name=name, type=kind, pos=anchor, axis=axis)
+        kinds = self.mujoco.mjtJoint
+        of_kind = {SLIDE: kinds.mjJNT_SLIDE, TURN: kinds.mjJNT_HINGE, BALL_JOINT: kinds.mjJNT_BALL}
+        for i, mobility in enumerate(link.mobilities):
+            if mobility.kind == FREE:
+                body.add_freejoint(name=f"free {k}")
+                return
+            axis = mobility.axis if mobility.kind != BALL_JOINT else np.ones(3)
+            self.joint[self.tree.starts[k] + i] = body.add_joint(
+                name=f"joint {k}.{i}", type=of_kind[mobility.kind], pos=link.anchor - link.position, axis=axis
+            )
 
     def site(self, link: int, point: np.ndarray, name: str) -> str:
         """A point (world at t = 0) of a link, as a site."""
@@ -140,7 +162,7 @@ class _Builder:
         return self.tree.link_of(self.scene.body_index(body))
 
     def _force(self, k: int, load: Force) -> None:
-        """A massless body fixed at the point of attack: what is applied acts at a centre of mass."""
+        """A massless body fixed at the point of attack, because MuJoCo applies forces at centres of mass."""
         link = self.link_of(load.body)
         body = self.body[link].add_body(name=f"force {k}", pos=np.array(load.point) - self.centre(link))
         _inertial(body, 0.0, np.zeros(3), np.zeros(3), UNIT)

@@ -4,8 +4,8 @@ Positions, velocities, accelerations and reactions follow from the drivers pose 
 redundant constraints are removed by the solver.  The one option ``step`` (s) is the largest step from pose
 to pose; it decides which of several assemblies is found, not how accurate it is.  Equally spaced samples
 are one analysis; where the spacing changes, a new one starts from the pose reached.  With a cylindrical
-joint between moving bodies OndselSolver's accelerations do not satisfy the joint's own equations, by 1e-3
-of their size; they and the reactions are then left out.
+or planar joint between moving bodies OndselSolver's accelerations do not satisfy the joint's own equations,
+by 1e-3 and 0.3 of their size; they and the reactions are then left out.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from importlib import metadata
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Engine, Setting, Why
-from crosscheck.engines.ondsel.model import Assembly, Table, is_reversed, table
+from crosscheck.engine import Cannot, Engine, Owner, Setting
+from crosscheck.engines.ondsel.model import ACCURATE_ON_GROUND, SUPPORTS, Assembly, Table, is_reversed, table
 from crosscheck.engines.sampling import Counts, Failed, Sample, run_through, step_count
 from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.judge.tolerances import RANK
@@ -38,6 +38,7 @@ class Ondsel(Engine):
 
     name = "ondsel"
     package = "pyondsel"
+    supports = SUPPORTS
 
     def version(self) -> str:
         """Version of pyondsel; raises ImportError when it is not installed."""
@@ -47,13 +48,19 @@ class Ondsel(Engine):
         import pyondsel.solve_raw  # noqa: F401
 
     def cannot(self, scene: Scene) -> Cannot | None:
-        """Only what its drivers move alone: forward dynamics and loads are not exposed."""
+        """Distance joints, which OndselSolver itself lacks; then as every engine."""
         if any(isinstance(joint, Distance) for joint in scene.joint):
-            return Cannot(Why.UPSTREAM, "OndselSolver does not implement its joint of constant distance")
+            return Cannot(Owner.ENGINE, "OndselSolver does not implement its joint of constant distance")
+        return super().cannot(scene)
+
+    def refuses(self, scene: Scene) -> Cannot | None:
+        """Scenes whose motion is not prescribed in full: forward dynamics is not exposed."""
         rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
         if not scene.driver or np.linalg.matrix_rank(rows, rtol=RANK) < rows.shape[1]:
-            why = "OndselSolver offers no forward dynamics, and the drivers leave motion open at the start"
-            return Cannot(Why.UPSTREAM, why)
+            reason = (
+                "OndselSolver offers no forward dynamics, and the drivers do not prescribe the whole motion"
+            )
+            return Cannot(Owner.ENGINE, reason)
         return None
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
@@ -70,7 +77,7 @@ class Ondsel(Engine):
                   "settings": dict(setting.options)}  # fmt: skip
         built = time.process_time() - start
         trajectory = run_through(scene, times, run.advance, run.sample, run.counts, built, labels)
-        if any(joint.type == "cylindrical" and GROUND not in joint.bodies for joint in scene.joint):
+        if any(joint.type in ACCURATE_ON_GROUND and GROUND not in joint.bodies for joint in scene.joint):
             return replace(trajectory, acceleration=None, angular_acceleration=None, reactions=None)
         return trajectory
 

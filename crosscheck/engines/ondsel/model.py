@@ -7,13 +7,34 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.constraint_equations import in_body, joint_frame, point_in_body
+from crosscheck.engine import Supports
 from crosscheck.engines.driver_motion import motion
+from crosscheck.engines.geometry import in_body, joint_frame, point_in_body
 from crosscheck.judge.constraints import inertia_matrices
 from mbref import rotations
 from mbref.scene import GROUND, Driver, Joint, Scene
 
 End = tuple[str, np.ndarray, np.ndarray]  # of a joint: body, point, axes (columns)
+JOINTS = {  # joint type: OndselSolver's
+    "fixed": "fixed",
+    "revolute": "revolute",
+    "universal": "universal",
+    "spherical": "spherical",
+    "translational": "translational",
+    "cylindrical": "cylindrical",
+    "planar": "planar",
+}
+MOTIONS: dict[str | None, str] = {
+    "angle": "rotational",
+    "displacement": "translational",
+}  # driven coordinate: OndselSolver's motion
+SUPPORTS = Supports(
+    joints=tuple(JOINTS),
+    drivers=("angle", "displacement"),
+    loads=("moment", "force", "spring", "torsion_spring"),  # no load changes a motion that is prescribed
+)
+# joints whose accelerations are right only where the first body is at rest:
+ACCURATE_ON_GROUND = ("cylindrical", "planar")
 NAME = "scene"
 TOLERANCE = 1e-9
 TILT = rotations.from_vector(np.array([0.5, -0.4, 0.3]))
@@ -45,12 +66,12 @@ class Assembly:
 
     def __init__(self, scene: Scene, tilted: bool = False):
         self.scene = scene
-        driven = next(joint for joint in scene.joint if joint.name == scene.driver[0].joint)
-        upright = rotations.from_matrix(joint_frame(driven.axis).T)
+        axis = np.array(scene.joint_named(scene.driver[0].joint).directions[0])
+        upright = rotations.from_matrix(joint_frame(axis).T)
         self.world = rotations.multiply(TILT, upright) if tilted else upright
         inertia = inertia_matrices(scene) if scene.has_mass() else np.array([np.eye(3)] * len(scene.body))
         found = [
-            _principal(matrix, in_body(scene, body.name, np.array(driven.axis)))
+            _principal(matrix, in_body(scene, body.name, axis))
             for matrix, body in zip(inertia, scene.body, strict=True)
         ]
         self.moments = [moments for moments, _ in found]
@@ -93,7 +114,7 @@ class Assembly:
 
         paths = []
         sign = -1.0 if is_reversed(joint) else 1.0
-        turned = sign * motion(driver, t0)[0] if driver and joint.type != "translational" else 0.0
+        turned = sign * motion(driver, t0)[0] if driver and joint.facts.driven == "angle" else 0.0
         ends = self.ends(joint)[:: int(sign)]
         for side, (name, point, frame) in enumerate([ends[0], _turned_back(*ends[1], turned)]):
             world = rotations.to_matrix(self.world) if name == GROUND else np.eye(3)
@@ -105,16 +126,19 @@ class Assembly:
                 part = parts[self.scene.body_index(name)]
                 part.add_marker(marker)
                 paths.append(model.part_path(part.name, marker.name))
-        model.add_joint(OndselJoint(f"j{k}", joint.type, *paths))
+        model.add_joint(OndselJoint(f"j{k}", JOINTS[joint.type], *paths))
         if driver:
-            kind = "translational" if joint.type == "translational" else "rotational"
-            model.add_motion(Motion(f"d{k}", f"j{k}", _expression(driver, t0, turned, sign), kind))
+            text = _expression(driver, t0, turned, sign)
+            model.add_motion(Motion(f"d{k}", f"j{k}", text, MOTIONS[joint.facts.driven]))
 
     def ends(self, joint: Joint) -> list[End]:
         """Body, point and axes (3, 3, columns) of a joint's two markers, in principal axes."""
         ends = []
         for name, frame in zip(joint.bodies, _frames(joint), strict=True):
-            point, axes = point_in_body(self.scene, name, joint.anchor), in_body(self.scene, name, frame.T).T
+            point, axes = (
+                point_in_body(self.scene, name, joint.anchor_pair[0]),
+                in_body(self.scene, name, frame.T).T,
+            )
             if name != GROUND:
                 own = self.axes[self.scene.body_index(name)]
                 point, axes = own.T @ point, own.T @ axes
@@ -123,9 +147,8 @@ class Assembly:
 
 
 def is_reversed(joint: Joint) -> bool:
-    """Whether the solver has the joint's second body first: of a cylindrical joint the accelerations are
-    right only where the first body is at rest."""
-    return joint.type == "cylindrical" and joint.bodies[1] == GROUND
+    """Whether the solver is given the joint's second body as its first, because that is the ground."""
+    return joint.type in ACCURATE_ON_GROUND and joint.bodies[1] == GROUND
 
 
 def _turned_back(name: str, point: np.ndarray, axes: np.ndarray, angle: float) -> End:
@@ -145,15 +168,12 @@ def _principal(inertia: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.nd
 
 def _frames(joint: Joint) -> list[np.ndarray]:
     """Axes (3, 3, columns, world at t = 0) of the two markers; the joint's axis is the third."""
-    if joint.type in ("fixed", "spherical"):
-        return [np.eye(3)] * 2
-    if joint.type == "universal":
-        return [joint_frame(axis) for axis in joint.axes]
-    return [joint_frame(joint.axis)] * 2
+    frames = [joint_frame(axis) for axis in joint.directions] or [np.eye(3)]
+    return [frames[0], frames[-1]]
 
 
 def _expression(driver: Driver, t0: float, turned: float, sign: float) -> str:
-    """The driver's value times ``sign``, less what is ``turned``, in OndselSolver's syntax."""
+    """The driver's value times ``sign``, less the angle ``turned`` (rad), in OndselSolver's syntax."""
     t = f"(time + {t0!r})"
     terms = ["*".join([f"({sign * c!r})"] + [t] * n) for n, c in enumerate(driver.polynomial)]
     if s := driver.sine:

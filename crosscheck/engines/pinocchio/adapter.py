@@ -1,7 +1,7 @@
 """Pinocchio: rigid-body dynamics in joint coordinates, closed by its proximal constraint solver.
 
-Pinocchio has no integrator of its own; the families differ in what is put around
-``constraintDynamics``:
+Pinocchio has no integrator of its own; the families differ in the integrator and the stabilisation put
+around ``constraintDynamics``:
 
 - ``defaults``: the solver as it comes (no regularisation, one iteration), fixed-step RK4;
 - ``proximal``: the same with the solver iterated to convergence, which redundant closures need;
@@ -24,7 +24,7 @@ from scipy.linalg import solve_triangular
 from crosscheck.engine import Cannot, Engine, Setting
 from crosscheck.engines.driver_motion import fastest_rate, motion, stated_rate
 from crosscheck.engines.initial_velocities import lacks_mass
-from crosscheck.engines.pinocchio.model import Loads, Mechanism
+from crosscheck.engines.pinocchio.model import SUPPORTS, Loads, Mechanism
 from crosscheck.engines.sampling import Adaptive, Counts, Failed, Sample, rk4, run_through
 from crosscheck.engines.tree_reactions import LinkMotion, joint_reactions
 from mbref import rotations
@@ -63,6 +63,7 @@ class Pinocchio(Engine):
 
     name = "pinocchio"
     package = "pin"
+    supports = SUPPORTS
 
     def version(self) -> str:
         """Version of Pinocchio; raises ImportError when it is not installed."""
@@ -70,8 +71,8 @@ class Pinocchio(Engine):
 
         return pinocchio.__version__
 
-    def cannot(self, scene: Scene) -> Cannot | None:
-        """Every joint, driver and load maps exactly; what has no mass needs its whole motion prescribed."""
+    def refuses(self, scene: Scene) -> Cannot | None:
+        """Scenes without masses whose motion is not prescribed in full."""
         return lacks_mass(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
@@ -260,7 +261,7 @@ class _Run:
         )
 
     def link_motion(self, t: float, q: np.ndarray, v: np.ndarray) -> LinkMotion:
-        """How the links move; leaves the closure forces of this state in the closures' data."""
+        """The motion of the links; leaves the closure forces of this state in the closures' data."""
         pin, model, data = self.pin, self.model, self.data
         a = self._finite(t, self.accelerations(t, q, v, self.sampler))
         pin.forwardKinematics(model, data, q, v, a)

@@ -12,11 +12,35 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engine import Supports
 from crosscheck.engines.driver_motion import motion
 from crosscheck.engines.initial_velocities import initial_rates, twist_maps
-from crosscheck.engines.spanning_tree import GROUND_LINK, Link, Tree, spanning_tree
+from crosscheck.engines.spanning_tree import (
+    BALL_JOINT,
+    FREE,
+    GROUND_LINK,
+    SLIDE,
+    TURN,
+    Link,
+    Tree,
+    spanning_tree,
+)
 from mbref.scene import Force, Moment, Scene, Spring, TorsionSpring
 
+SUPPORTS = Supports(
+    joints=(
+        "fixed",
+        "revolute",
+        "universal",
+        "spherical",
+        "translational",
+        "cylindrical",
+        "planar",
+        "distance",
+    ),
+    drivers=("angle", "displacement"),
+    loads=("moment", "force", "spring", "torsion_spring"),
+)
 DRIVEN_ARMATURE = 1e18  # inertia of a driven coordinate: it then moves with its torque alone
 
 
@@ -94,16 +118,13 @@ class Mechanism:
 
 def _joint_models(pin: Any, link: Link) -> list[Any]:
     """The chain of Pinocchio joints that carries a link."""
-    turn, slide = pin.JointModelRevoluteUnaligned, pin.JointModelPrismaticUnaligned
-    return {
-        "fixed": lambda: [],
-        "revolute": lambda: [turn(a) for a in link.axes],
-        "universal": lambda: [turn(a) for a in link.axes],
-        "translational": lambda: [slide(a) for a in link.axes],
-        "cylindrical": lambda: [joint(a) for a in link.axes for joint in (slide, turn)],
-        "spherical": lambda: [pin.JointModelSpherical()],
-        "free": lambda: [pin.JointModelFreeFlyer()],
-    }[link.kind]()
+    of_kind = {
+        SLIDE: pin.JointModelPrismaticUnaligned,
+        TURN: pin.JointModelRevoluteUnaligned,
+        BALL_JOINT: lambda axis: pin.JointModelSpherical(),
+        FREE: lambda axis: pin.JointModelFreeFlyer(),
+    }
+    return [of_kind[mobility.kind](mobility.axis) for mobility in link.mobilities]
 
 
 @dataclass(frozen=True)
@@ -209,9 +230,9 @@ def _turns_about_one_direction(tree: Tree, link: int) -> bool:
     """Whether every rotation between the ground and a link is about parallel axes."""
     axes: list[np.ndarray] = []
     while link != GROUND_LINK:
-        item = tree.links[link]
-        if item.kind in ("spherical", "free"):
+        mobilities = tree.links[link].mobilities
+        if any(mobility.kind in (BALL_JOINT, FREE) for mobility in mobilities):
             return False
-        axes += list(item.axes) if item.kind in ("revolute", "universal", "cylindrical") else []
-        link = item.parent
+        axes += [mobility.axis for mobility in mobilities if mobility.kind == TURN]
+        link = tree.links[link].parent
     return all(abs(a @ axes[0]) > 1 - 1e-14 for a in axes)

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Engine, Setting, Why
+from crosscheck.engine import Cannot, Engine, Owner, Setting
 from crosscheck.engines.initial_velocities import lacks_mass
 from crosscheck.engines.sampling import Counts, Failed, Sample, run_through
-from crosscheck.engines.simbody.model import Mechanism
+from crosscheck.engines.simbody.model import SUPPORTS, Mechanism
 from crosscheck.engines.spanning_tree import GROUND_LINK
 from crosscheck.engines.tree_reactions import LinkMotion, joint_reactions, wrench
 from mbref import rotations
@@ -33,6 +33,7 @@ class Simbody(Engine):
 
     name = "simbody"
     package = "opensim"
+    supports = SUPPORTS
 
     def version(self) -> str:
         """Version of OpenSim; raises ImportError when it is not installed."""
@@ -41,12 +42,13 @@ class Simbody(Engine):
     def prepare(self, families: Sequence[str]) -> None:
         import opensim  # noqa: F401
 
-    def cannot(self, scene: Scene) -> Cannot | None:
-        """Every joint and load maps; a driver is a polynomial or a sine; without mass all is prescribed."""
+    def refuses(self, scene: Scene) -> Cannot | None:
+        """Drivers that add a sine to a polynomial; scenes without masses whose motion is not prescribed in
+        full."""
         mixed = [d.joint for d in scene.driver if d.sine and any(d.polynomial[1:])]
         if mixed:
-            why = "OpenSim has no sum of a polynomial and a sine with a right second derivative"
-            return Cannot(Why.UPSTREAM, f"{why}, which drives {', '.join(mixed)}")
+            reason = "OpenSim's sum of a polynomial and a sine has a wrong second derivative; it would drive"
+            return Cannot(Owner.ENGINE, f"{reason} {', '.join(mixed)}")
         return lacks_mass(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
@@ -106,7 +108,7 @@ class _Run:
         )
 
     def _motion(self) -> LinkMotion:
-        """How the links move."""
+        """The motion of the links."""
         state, bodies = self.state, self.mechanism.bodies
         self.mechanism.model.realizeAcceleration(state)
         of = {name: np.array([_three(getattr(body, f"get{name}InGround")(state)) for body in bodies])
@@ -134,7 +136,7 @@ class _Run:
             at = next(k for k in range(labels.getSize()) if labels.get(k).endswith(name))
             force, moment = np.array([values.get(at + k) for k in range(6)]).reshape(2, 3)
             origin = motion.position[second] if second != GROUND_LINK else np.zeros(3)
-            found.append(-wrench(force, origin, moment))  # OpenSim records what the bodies exert
+            found.append(-wrench(force, origin, moment))  # OpenSim records the wrench that the bodies exert
         return found
 
 

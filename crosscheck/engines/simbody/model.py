@@ -5,15 +5,32 @@ Every body frame has the link's origin and world-aligned axes at t = 0; coordina
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.constraint_equations import joint_frame
+from crosscheck.engine import Supports
+from crosscheck.engines.geometry import joint_frame, unit
 from crosscheck.engines.initial_velocities import initial_rates
-from crosscheck.engines.spanning_tree import GROUND_LINK, Closure, Link, spanning_tree
+from crosscheck.engines.spanning_tree import FREE, GROUND_LINK, Closure, Link, spanning_tree
 from mbref.scene import Driver, Force, Moment, Scene, Spring, TorsionSpring
 
+JOINTS = {  # joint type: OpenSim's joint, and its coordinates in the order of the tree's
+    "fixed": ("WeldJoint", ()),
+    "revolute": ("PinJoint", (0,)),
+    "universal": ("UniversalJoint", (0, 1)),
+    "spherical": ("BallJoint", (0, 1, 2)),
+    "translational": ("SliderJoint", (0,)),
+    "cylindrical": ("CylindricalJoint", (1, 0)),
+    "planar": ("PlanarJoint", (1, 2, 0)),
+    FREE: ("FreeJoint", (3, 4, 5, 0, 1, 2)),
+}
+SUPPORTS = Supports(
+    joints=(*(kind for kind in JOINTS if kind != FREE), "distance"),  # a distance joint is a rod in the tree
+    drivers=("angle", "displacement"),
+    loads=("moment", "force", "spring", "torsion_spring"),
+)
 UNLIMITED = 1e9  # rad or m; coordinates have a range
 LOCKED = 1e-12  # cosine of the second angle below which the first and third are one
 
@@ -174,24 +191,24 @@ def _torsion_spring(mechanism: Mechanism, name: str, load: TorsionSpring) -> Any
     return force
 
 
-FORCES = {Moment: _moment, Force: _point_force, Spring: _spring, TorsionSpring: _torsion_spring}
+FORCES: dict[type, Callable[..., Any]] = {
+    Moment: _moment,
+    Force: _point_force,
+    Spring: _spring,
+    TorsionSpring: _torsion_spring,
+}
 
 
 def _joint(link: Link) -> tuple[str, np.ndarray, tuple[int, ...]]:
-    """OpenSim's joint of a link, its frame (3, 3), and which of its coordinates the tree's are."""
+    """OpenSim's joint of a link, its frame (3, 3), and the indices of its coordinates in the tree's order."""
+    kind, order = JOINTS[link.kind]
     axes = link.axes
-    if link.kind == "universal":
-        y = axes[1] - (axes[1] @ axes[0]) * axes[0]
-        y /= np.linalg.norm(y)
-        return "UniversalJoint", np.column_stack([axes[0], y, np.cross(axes[0], y)]), (0, 1)
-    if link.kind == "translational":
-        return "SliderJoint", np.roll(joint_frame(axes[0]), 1, axis=1), (0,)
-    if link.kind in ("revolute", "cylindrical"):
-        kind, order = {"revolute": ("PinJoint", (0,)), "cylindrical": ("CylindricalJoint", (1, 0))}[link.kind]
-        return kind, joint_frame(axes[0]), order
-    kind, order = {"fixed": ("WeldJoint", ()), "spherical": ("BallJoint", (0, 1, 2)),
-                   "free": ("FreeJoint", (3, 4, 5, 0, 1, 2))}[link.kind]  # fmt: skip
-    return kind, np.eye(3), order
+    if kind == "UniversalJoint":
+        y = unit(axes[1] - (axes[1] @ axes[0]) * axes[0])
+        return kind, np.column_stack([axes[0], y, np.cross(axes[0], y)]), order
+    if kind == "SliderJoint":
+        return kind, np.roll(joint_frame(axes[0]), 1, axis=1), order
+    return kind, joint_frame(axes[0]) if len(axes) else np.eye(3), order
 
 
 def _angles(r: np.ndarray) -> tuple[float, float, float]:

@@ -20,7 +20,7 @@ from importlib import metadata
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Engine, Setting
+from crosscheck.engine import Cannot, Engine, Setting, Supports
 from crosscheck.engines.initial_velocities import lacks_mass
 from crosscheck.engines.sampling import run_through
 from crosscheck.engines.sundials.ida import Run
@@ -36,6 +36,20 @@ class Sundials(Engine):
 
     name = "sundials"
     package = "scikit-sundae"
+    supports = Supports(
+        joints=(
+            "fixed",
+            "revolute",
+            "universal",
+            "spherical",
+            "translational",
+            "cylindrical",
+            "planar",
+            "distance",
+        ),
+        drivers=("angle", "displacement"),
+        loads=("moment", "force", "spring", "torsion_spring"),
+    )
 
     def version(self) -> str:
         """Version of scikit-sundae; raises ImportError when it is not installed."""
@@ -44,8 +58,8 @@ class Sundials(Engine):
     def prepare(self, families: Sequence[str]) -> None:
         import sksundae.ida  # noqa: F401
 
-    def cannot(self, scene: Scene) -> Cannot | None:
-        """Every joint, driver and load is written out; without masses all motion must be prescribed."""
+    def refuses(self, scene: Scene) -> Cannot | None:
+        """Scenes without masses whose motion is not prescribed in full."""
         return lacks_mass(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:

@@ -22,11 +22,11 @@ class State:
     r: np.ndarray
     p: np.ndarray
     v: np.ndarray
-    spin: np.ndarray
+    omega: np.ndarray
     angles: np.ndarray
 
     def frames(self) -> Frames:
-        return frames(self.r, self.p, self.v, self.spin)
+        return frames(self.r, self.p, self.v, self.omega)
 
 
 class Equations:
@@ -75,7 +75,7 @@ class Equations:
         jacobian = self.constraints.jacobian(t, f)[..., self.rows, :]
         moved = (y[..., self.at_v] + yp[self.at_mu] @ jacobian).reshape(*s.r.shape[:-1], 6)
         turned = rotations.multiply(s.p, pure(moved[..., 3:])) / 2
-        acting = self.forces(f, s.spin, s.angles) + yp[self.at_lambda] @ jacobian
+        acting = self.forces(f, s.omega, s.angles) + yp[self.at_lambda] @ jacobian
         flat = (*y.shape[:-1], -1)
         return np.concatenate([
             yp[self.at_r] - moved[..., :3].reshape(flat), yp[self.at_p] - turned.reshape(flat),
@@ -107,7 +107,7 @@ class Equations:
         s = self.state(y)
         r, p = s.r, s.p / np.linalg.norm(s.p, axis=-1, keepdims=True)
         for _ in range(CORRECTIONS):
-            f = frames(r, p, s.v, s.spin)
+            f = frames(r, p, s.v, s.omega)
             phi, rate, _ = self.constraints.levels(t, f)[:, self.rows]
             jacobian = self.constraints.jacobian(t, f)[self.rows]
             if np.abs(phi).max(initial=0.0) < CLOSED:
@@ -123,7 +123,7 @@ class Equations:
         j, gamma = self.constraints.jacobian(t, f)[self.rows], -self.constraints.levels(t, f)[2, self.rows]
         m = len(self.rows)
         matrix = np.block([[self.forces.mass, -j.T], [j, np.zeros((m, m))]])
-        solved = np.linalg.solve(matrix, np.concatenate([self.forces(f, s.spin, s.angles), gamma]))
+        solved = np.linalg.solve(matrix, np.concatenate([self.forces(f, s.omega, s.angles), gamma]))
         return solved[: 6 * self.nb], solved[6 * self.nb :]
 
 

@@ -76,7 +76,7 @@ class Run:
         s = e.state(start)
         acceleration, multipliers = e.accelerations(t, s)
         m = len(e.rows)
-        turned = rotations.multiply(s.p, pure(s.spin)) / 2
+        turned = rotations.multiply(s.p, pure(s.omega)) / 2
         yp = np.concatenate([s.v.ravel(), turned.ravel(), acceleration, e.forces.turning(s.frames()),
                              multipliers, np.zeros(m)])  # fmt: skip
         self.y = np.concatenate([start, np.zeros(2 * m)])
@@ -146,7 +146,7 @@ class Run:
         rates = acceleration.reshape(-1, 6)
         return Sample(
             position=s.r, orientation=s.p / np.linalg.norm(s.p, axis=1, keepdims=True), velocity=s.v,
-            angular_velocity=(a @ s.spin[..., None])[..., 0], acceleration=rates[:, :3],
+            angular_velocity=(a @ s.omega[..., None])[..., 0], acceleration=rates[:, :3],
             angular_acceleration=(a @ rates[:, 3:, None])[..., 0],
             reactions=self._reactions(t, f, multipliers) if self.scene.has_mass() else {},
         )  # fmt: skip

@@ -44,16 +44,16 @@ class FreeBody:
         state = self._solution(times)
         motion, force, moment = self._loaded(state)
         momentum = state[:, 10:13]
-        spin = motion.spin[:, 0]
+        spin = motion.angular_velocity[:, 0]
         rate = self._spin_of(motion.rotation[:, 0], moment[:, 0] - cross(spin, momentum))
         return trajectory(
             self._scene, self.name, times, motion.position, motion.rotation,
-            (motion.velocity, motion.spin), (force / self._mass, rate[:, None]),
+            (motion.velocity, motion.angular_velocity), (force / self._mass, rate[:, None]),
         )  # fmt: skip
 
     def _derivative(self, state: np.ndarray) -> np.ndarray:
         motion, force, moment = self._loaded(state)
-        w, q = motion.spin[:, 0], state[:, 6:10]
+        w, q = motion.angular_velocity[:, 0], state[:, 6:10]
         scalar = -np.sum(w * q[:, 1:], axis=1, keepdims=True)
         turning = np.concatenate([scalar, w * q[:, :1] + cross(w, q[:, 1:])], axis=1) / 2
         return np.concatenate([state[:, 3:6], force[:, 0] / self._mass, turning, moment[:, 0]], axis=1)

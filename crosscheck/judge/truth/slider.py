@@ -7,12 +7,12 @@ import numpy as np
 from crosscheck.judge.loads import initial_rotations
 from crosscheck.judge.truth.one_dof import Path, Pose
 from crosscheck.judge.truth.parallelogram import unit
-from mbref.scene import GROUND, Scene
+from mbref.scene import GROUND, Scene, Translational
 
 
 def slider(scene: Scene) -> Path | None:
     """The path of a scene that looks like the family, or None."""
-    if len(scene.body) != 1 or len(scene.joint) != 1 or scene.joint[0].type != "translational":
+    if len(scene.body) != 1 or len(scene.joint) != 1 or not isinstance(scene.joint[0], Translational):
         return None
     joint = scene.joint[0]
     axis = unit(joint.axis)

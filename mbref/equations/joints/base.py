@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mbref.kernels.layout import DISTANCE, DOT1, DOT2, POINT
+from mbref.kernels.scene_layout import DISTANCE, DOT1, DOT2, POINT
 
 ZERO = (0.0, 0.0, 0.0)
 ROWS_OF = {POINT: 3, DOT1: 1, DOT2: 1, DISTANCE: 1}

@@ -3,7 +3,7 @@
 import math
 
 from mbref.equations.joints.base import Primitive
-from mbref.kernels.layout import DISTANCE
+from mbref.kernels.scene_layout import DISTANCE
 from mbref.scene import Distance
 
 

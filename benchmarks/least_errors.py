@@ -1,8 +1,8 @@
 """Least error of every engine on every built-in scene, with its setting and cost.
 
-``python benchmarks/floors.py [--records FILE] [--engine NAME …] [SCENE …]``: runs the finest settings of
-every family, resumes from FILE, prints the table that the report opens with; its status is 1 where an engine
-stays above the floor asked of it.
+``python benchmarks/least_errors.py [--records FILE] [--engine NAME …] [SCENE …]``: runs the finest settings
+of every family, resumes from FILE and prints the table that the report opens with; its exit status is 1 where
+an engine has no completed run within FLOOR of the truth.
 """
 
 import argparse
@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from crosscheck.study.grid import study
-from crosscheck.study.least_errors import HEADER, Floor, candidates, floors
+from crosscheck.study.least_errors import HEADER, LeastError, candidates, least_errors
 from crosscheck.study.progress import shown
 from mbref.scene import Scene
 from mbref.scenes import SCENES
@@ -21,18 +21,18 @@ ENGINES = ("mujoco", "pinocchio", "exudyn")
 
 
 def main() -> int:
-    """Run and print; returns 1 where a floor is not reached."""
+    """Run and print; returns 1 where FLOOR is not reached."""
     _, found, _ = asked_for(__doc__)
-    table = Table(*HEADER, title="floors")
-    for floor in found:
-        table.add_row(*floor.row())
+    table = Table(*HEADER, title="least errors")
+    for least in found:
+        table.add_row(*least.row())
     Console(width=None if sys.stdout.isatty() else 220).print(table)
-    return 0 if all(floor.is_reached for floor in found) else 1
+    return 0 if all(least.is_reached for least in found) else 1
 
 
-def asked_for(about: str) -> tuple[dict[str, Scene], list[Floor], str | None]:
-    """The scenes that the command line asks for, by name, the floors of the engines on them, and the file of
-    their records."""
+def asked_for(about: str) -> tuple[dict[str, Scene], list[LeastError], str | None]:
+    """The scenes that the command line asks for, by name, the least errors of the engines on them, and the
+    file of their records."""
     parser = argparse.ArgumentParser(description=about)
     parser.add_argument("scene", nargs="*", default=list(SCENES), metavar="SCENE")
     parser.add_argument("--engine", action="append", metavar="NAME")
@@ -40,8 +40,8 @@ def asked_for(about: str) -> tuple[dict[str, Scene], list[Floor], str | None]:
     arguments = parser.parse_args()
     scenes = {name: SCENES[name]() for name in arguments.scene}
     cases = [c for scene in scenes.values() for c in candidates(scene, arguments.engine or ENGINES)]
-    with shown("finding the floors", len(cases)) as progress:
-        found = floors(study(cases, records_path=arguments.records, progress=progress))
+    with shown("finding the least errors", len(cases)) as progress:
+        found = least_errors(study(cases, records_path=arguments.records, progress=progress))
     return scenes, found, arguments.records
 
 

@@ -1,4 +1,4 @@
-"""Which runs a report is made of: the whole sweep, or the quick one."""
+"""The runs of a report: the whole sweep, or the quick one."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""Floors: rows of the table / records made by hand."""
+"""Least errors: rows of the table / records made by hand."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from crosscheck.study.least_errors import floors
+from crosscheck.study.least_errors import least_errors
 
 
 def record(
@@ -27,14 +27,14 @@ RECORDS = [
 
 
 def test_rows_and_records():
-    good, bad = floors(RECORDS)
+    good, bad = least_errors(RECORDS)
     assert good.row() == ("bar", "good", "fine", "step=2e-10", "2.0e-10", "2", "fine",
                           "coarse 1.0e-03, early not converged at 0.4 s")  # fmt: skip
     assert (good.is_reached, bad.is_reached) == (True, False)
     assert bad.row()[4:] == ("2.0e-08", "2", "", "only 2.0e-08"), bad.row()
 
 
-def test_engine_without_a_completed_run_and_its_floor():
-    (floor,) = floors([r for r in RECORDS if r["family"] == "early"])
-    assert not floor.is_reached
-    assert floor.best["outcome"] == "NOT_CONVERGED", "the run that got furthest stands for the engine"
+def test_engine_without_a_completed_run():
+    (least,) = least_errors([r for r in RECORDS if r["family"] == "early"])
+    assert not least.is_reached
+    assert least.best["outcome"] == "NOT_CONVERGED", "the run that got furthest stands for the engine"

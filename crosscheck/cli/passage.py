@@ -1,0 +1,49 @@
+"""The runs behind the README's moving picture: a slider-crank through singular positions in two engines."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from crosscheck.engine import Setting
+from crosscheck.judge.truth import truth_for
+from crosscheck.paper.singular import rank, scaled_singular_values
+from crosscheck.study.grid import Case, Record, settings, study
+from mbref.scene import Scene
+from mbref.scenes import SCENES
+from mbref.trajectory import Trajectory
+
+SCENE, SAMPLES = "planar_slider_crank_equal", 161
+FINE = 4001  # instants at which the Jacobian is looked at
+NEAR = 0.05  # a smallest singular value below this, and least among its neighbours, is a passage
+
+
+class Passage(NamedTuple):
+    """The scene, its exact motion, the instants (s) of its singular positions, and the records."""
+
+    scene: Scene
+    exact: Trajectory
+    singular: list[float]
+    records: list[Record]
+
+
+def passage() -> Passage:
+    """mbref's default method and MuJoCo at its defaults with the smallest step of the sweep."""
+    scene = SCENES[SCENE]()
+    truth, times = truth_for(scene), np.linspace(0.0, scene.duration, SAMPLES)
+    assert truth is not None
+    finest = [s for s in settings("mujoco", scene) if s.family == "defaults"][-1]
+    chosen = (("mbref", Setting("alf-dual+projection", {"rtol": 1e-9})), ("mujoco", finest))
+    records = study([Case(scene, times, engine, setting) for engine, setting in chosen])
+    return Passage(scene, truth.poses(times), singular_instants(scene), records)
+
+
+def singular_instants(scene: Scene) -> list[float]:
+    """Instants (s) at which the constraint Jacobian loses rank along the exact motion."""
+    times = np.linspace(0.0, scene.duration, FINE)
+    values = scaled_singular_values(scene, times)
+    smallest = values[:, rank(np.median(values, axis=0)) - 1]
+    inner = smallest[1:-1]
+    least = (inner < NEAR) & (inner <= smallest[:-2]) & (inner < smallest[2:])
+    return times[1:-1][least].tolist()

@@ -1,0 +1,88 @@
+"""Coordinates q = (r, p) and velocities v = (r', ω') of every body: q' of v, q ⊕ δ, the entries of y."""
+
+from __future__ import annotations
+
+from numpy import sqrt
+
+from mbref.kernels.compilation import inlined, kernel
+from mbref.linear_algebra.vectors import copy
+
+
+@inlined
+def coordinate_rates(q, v, rates):
+    """q' (7 nb,) of v (6 nb,): r' and p' = ½ Lᵀ ω'."""
+    for b in range(q.shape[0] // 7):
+        i, j = 7 * b, 6 * b
+        for k in range(3):
+            rates[i + k] = v[j + k]
+        w, x, y, z = q[i + 3], q[i + 4], q[i + 5], q[i + 6]
+        a, b_, c = 0.5 * v[j + 3], 0.5 * v[j + 4], 0.5 * v[j + 5]
+        rates[i + 3] = -x * a - y * b_ - z * c
+        rates[i + 4] = w * a - z * b_ + y * c
+        rates[i + 5] = z * a + w * b_ - x * c
+        rates[i + 6] = -y * a + x * b_ + w * c
+
+
+@inlined
+def normalise(q):
+    """Euler parameters of every body back to unit length."""
+    for b in range(q.shape[0] // 7):
+        square = 0.0
+        for k in range(3, 7):
+            square += q[7 * b + k] * q[7 * b + k]
+        inverse = 1.0 / sqrt(square)
+        for k in range(3, 7):
+            q[7 * b + k] *= inverse
+
+
+@inlined
+def displace(q, x, change):
+    """q := q ⊕ x with x (6 nb,) = (δr, δπ') per body: p + ½ Lᵀ δπ', back to unit length.
+
+    ``change`` (7 nb,) is scratch.
+    """
+    coordinate_rates(q, x, change)
+    for k in range(q.shape[0]):
+        q[k] += change[k]
+    normalise(q)
+
+
+@inlined
+def expand(y, active, state):
+    """The whole state of y; entries that y does not have stay as they are."""
+    coordinates, velocities = active.coordinates, active.velocities
+    nq = coordinates.shape[0]
+    for k in range(nq):
+        state.coordinates[coordinates[k]] = y[k]
+    for k in range(velocities.shape[0]):
+        state.velocities[velocities[k]] = y[nq + k]
+
+
+@inlined
+def contract(q, v, active, y):
+    """The entries of y among all coordinates and velocities, or their rates."""
+    coordinates, velocities = active.coordinates, active.velocities
+    nq = coordinates.shape[0]
+    for k in range(nq):
+        y[k] = q[coordinates[k]]
+    for k in range(velocities.shape[0]):
+        y[nq + k] = v[velocities[k]]
+
+
+@kernel
+def fastest_turn(v):
+    """The largest angular velocity of a body (rad/s)."""
+    square = 0.0
+    for b in range(v.shape[0] // 6):
+        x, y, z = v[6 * b + 3], v[6 * b + 4], v[6 * b + 5]
+        square = max(square, x * x + y * y + z * z)
+    return sqrt(square)
+
+
+@kernel
+def copy_state(source, target):
+    """``target`` := ``source``."""
+    copy(source.coordinates, target.coordinates)
+    copy(source.velocities, target.velocities)
+    copy(source.coordinate_rates, target.coordinate_rates)
+    copy(source.coordinate_second, target.coordinate_second)

@@ -1,0 +1,10 @@
+"""Planar joint: parallel normals and a point that stays in a plane, three rows."""
+
+from mbref.equations.joints.base import Primitive, frame, in_plane, perpendicular
+from mbref.scene import Planar
+
+
+def primitives(joint: Planar) -> list[Primitive]:
+    """Displacement in the plane and rotation about its normal."""
+    x, y, z = frame(joint.axis)
+    return [perpendicular(x, z), perpendicular(y, z), in_plane(joint.anchor, z)]

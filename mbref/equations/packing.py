@@ -1,0 +1,81 @@
+"""Drivers and loads of a scene as the arrays that kernels read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbref.equations.joints.base import frame
+from mbref.kernels.named_memory import stacked
+from mbref.kernels.scene_layout import FORCE, MOMENT, SPRING, TORSION_SPRING, Drivers, Loads
+from mbref.scene import Driver, Force, Load, Moment, SceneError, Sine, Spring, TorsionSpring
+
+if TYPE_CHECKING:
+    from mbref.equations.model import Model
+
+AT_REST = Sine(amplitude=0.0, frequency=0.0, phase=0.0)
+
+
+def packed_drivers(drivers: Sequence[Driver]) -> Drivers:
+    """All drivers, their polynomials filled up with zeros to the highest degree."""
+    terms = max((len(driver.polynomial) for driver in drivers), default=1)
+    return stacked(Drivers, [_driver(driver, terms) for driver in drivers], {"degree": terms - 1})
+
+
+def _driver(driver: Driver, terms: int) -> Drivers:
+    sine, polynomial = driver.sine or AT_REST, np.zeros(terms)
+    polynomial[: len(driver.polynomial)] = driver.polynomial
+    return Drivers(sine.amplitude, sine.frequency, sine.phase, polynomial)
+
+
+def packed_loads(model: Model) -> Loads:
+    """All loads of the model's scene; none where it has no masses."""
+    loads, slots = [], 0
+    for place, load in enumerate(() if model.kinematic else model.scene.load):
+        fields = _fields(place, load, model)
+        if isinstance(load, TorsionSpring):
+            fields["angle"] = slots
+            slots += 1
+        loads.append(Loads(**{**_no_load(), **fields}))
+    return stacked(Loads, loads)
+
+
+def _fields(place: int, load: Load, model: Model) -> dict[str, Any]:
+    """The fields of ``Loads`` that load[place] uses; SceneError for a type without equations."""
+    if isinstance(load, Moment):
+        return {"kind": MOMENT, "first": model.index(load.body), "force": load.moment}
+    if isinstance(load, Force):
+        acts_at = {"first": model.index(load.body), "point_first": model.point(load.body, load.point)}
+        return {"kind": FORCE, "force": load.force, **acts_at}
+    if isinstance(load, Spring):
+        first, second = load.bodies
+        return {
+            **_constants(load, load.natural_length), "kind": SPRING,
+            "first": model.index(first), "second": model.index(second),
+            "point_first": model.point(first, load.points[0]),
+            "point_second": model.point(second, load.points[1]),
+        }  # fmt: skip
+    if not isinstance(load, TorsionSpring):
+        raise SceneError([f"load[{place}]: mbref has no equations for loads of type {load.type!r}"])
+    joint = next(joint for joint in model.joints if joint.name == load.joint)
+    first, second = joint.bodies
+    x, y, z = frame(joint.axis)
+    return {
+        **_constants(load, load.natural_angle), "kind": TORSION_SPRING,
+        "first": model.index(first), "second": model.index(second),
+        "axis": model.direction(first, z), "x_first": model.direction(first, x),
+        "y_first": model.direction(first, y), "x_second": model.direction(second, x),
+    }  # fmt: skip
+
+
+def _constants(load: Spring | TorsionSpring, natural: float) -> dict[str, float]:
+    return {"stiffness": load.stiffness, "damping": load.damping, "natural": natural}
+
+
+def _no_load() -> dict[str, Any]:
+    """Zero for every field of ``Loads``, and no unwrapped angle."""
+    numbers = dict.fromkeys(("kind", "first", "second", "stiffness", "damping", "natural"), 0)
+    vectors = ("force", "point_first", "point_second", "axis", "x_first", "y_first", "x_second")
+    return {**numbers, "angle": -1, **dict.fromkeys(vectors, (0.0, 0.0, 0.0))}

@@ -1,0 +1,270 @@
+"""Named memory: a schema of NamedTuples, declared once, from which allocation, packing and opening follow.
+
+A field of a schema is an array, a record of numbers, a kernel, another schema, or an ``Address``:
+
+    class Rows(NamedTuple):
+        phi: Annotated[Vector, "m"]          # m
+        limits: Limits                       # a NamedTuple of int and float fields is a record
+        step: Annotated[Kernel, STEP]
+
+Kernels write ``rows.phi[i]`` and ``limits.steps += 1``.  Compiled, a schema is one pointer to a table of
+addresses, and only the fields that a kernel names are loaded.  Without compilation and while tracing, it is
+the NamedTuple itself.  The table and its arrays stay in place while kernels run.
+"""
+
+from __future__ import annotations
+
+import functools
+import typing
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.imputils import lower_getattr_generic
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import NativeValue, infer_getattr, intrinsic, models, register_model, typeof_impl, unbox
+from numba.np.numpy_support import from_dtype
+
+from mbref.kernels.compilation import INDEX_TABLE, INDICES, MATRIX, PLAIN, UNSIGNED, VECTOR
+
+Vector = Annotated[np.ndarray, VECTOR]  # float64 (k,)
+Matrix = Annotated[np.ndarray, MATRIX]  # float64 (k, l)
+Indices = Annotated[np.ndarray, INDICES]  # int64 (k,)
+IndexTable = Annotated[np.ndarray, INDEX_TABLE]  # int64 (k, l)
+Unsigned = Annotated[np.ndarray, UNSIGNED]  # uint32 (k,): indices without a test of their sign
+Kernel = Callable[..., Any]  # annotated with its signature
+Address = Annotated[Any, "address"]  # of a packed schema that the reader names with ``opener``
+
+WORD, WORDS = ir.IntType(64), 3  # words of a field: address, rows, columns
+
+
+class Named(types.Type):
+    """The numba type of a packed schema: a pointer to its table."""
+
+    def __init__(self, schema: type):
+        self.schema = schema
+        super().__init__(name=f"Named({schema.__module__}.{schema.__qualname__})")
+
+
+@register_model(Named)
+class _NamedModel(models.PrimitiveModel):
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, WORD.as_pointer())
+
+
+@unbox(Named)
+def _unbox_named(kind, value, context):
+    attribute = context.pyapi.object_getattr_string(value, "address")
+    number = context.pyapi.long_as_longlong(attribute)
+    context.pyapi.decref(attribute)
+    return NativeValue(context.builder.inttoptr(number, WORD.as_pointer()))
+
+
+class Field(typing.NamedTuple):
+    """One field of a schema: its numba type, its shape in names of dimensions, its first row in the table."""
+
+    name: str
+    kind: types.Type
+    shape: tuple[str, ...]
+    row: int
+
+
+def is_record(schema: type) -> bool:
+    """Whether all fields of a NamedTuple are numbers."""
+    return all(hint in (int, float) for hint in typing.get_type_hints(schema).values())
+
+
+@functools.cache
+def dtype_of(record: type) -> np.dtype:
+    """The NumPy structure of a record; TypeError for a field name that NumPy has taken."""
+    hints = typing.get_type_hints(record)
+    if taken := [name for name in hints if hasattr(np.record, name)]:
+        raise TypeError(f"{record.__name__}: NumPy's records have attributes called {', '.join(taken)}")
+    return np.dtype([(name, "i8" if hint is int else "f8") for name, hint in hints.items()])
+
+
+@functools.cache
+def fields_of(schema: type) -> Mapping[str, Field]:
+    """Fields of a schema by name, in the order of its table."""
+    fields, row = {}, 0
+    for name, hint in typing.get_type_hints(schema, include_extras=True).items():
+        kind, shape = _kind_of(hint)
+        fields[name] = Field(name, kind, shape, row)
+        row += rows_of(kind.schema) if isinstance(kind, Named) else 1
+    return fields
+
+
+def rows_of(schema: type) -> int:
+    """Rows that a schema takes in a table of addresses."""
+    return sum(rows_of(f.kind.schema) if isinstance(f.kind, Named) else 1 for f in fields_of(schema).values())
+
+
+def _kind_of(hint: Any) -> tuple[types.Type, tuple[str, ...]]:
+    metadata = getattr(hint, "__metadata__", ())
+    if metadata[:1] == ("address",):
+        return types.intp, ()
+    if metadata and isinstance(metadata[0], types.Array):
+        return metadata[0], tuple(map(str, metadata[1:]))
+    if metadata:
+        return types.FunctionType(metadata[0]), ()
+    return (from_dtype(dtype_of(hint)) if is_record(hint) else Named(hint)), ()
+
+
+def allocate(schema: type, sizes: Mapping[str, int], **given: Any) -> Any:
+    """The schema with the fields ``given``, and zeros of the declared shapes for the others."""
+    values = {}
+    for field, hint in zip(fields_of(schema).values(), typing.get_type_hints(schema).values(), strict=True):
+        if field.name in given:
+            values[field.name] = given[field.name]
+        elif isinstance(field.kind, Named):
+            values[field.name] = allocate(field.kind.schema, sizes)
+        elif isinstance(field.kind, types.Record):
+            values[field.name] = record(hint())
+        else:
+            shape = tuple(_size(part, sizes) for part in field.shape)
+            values[field.name] = np.zeros(shape, dtype=str(field.kind.dtype))
+    return schema(**values)
+
+
+def stacked(schema: type, rows: Sequence[Any], sizes: Mapping[str, int] | None = None) -> Any:
+    """A schema of arrays from one instance for each of their rows; ``sizes`` are of further dimensions."""
+    columns = {}
+    for k, field in enumerate(fields_of(schema).values()):
+        width = [_size(part, sizes or {}) for part in field.shape[1:]]
+        values = [row[k] for row in rows]
+        columns[field.name] = np.array(values, dtype=str(field.kind.dtype)).reshape(len(rows), *width)
+    return schema(**columns)
+
+
+def _size(expression: str, sizes: Mapping[str, int]) -> int:
+    """The length of a dimension, an expression in the sizes' names that the schema's author wrote."""
+    return int(eval(expression, {"max": max}, dict(sizes)))
+
+
+def record(values: Any) -> np.record:
+    """The numbers of a record in memory of their own, to be read and written by name."""
+    return np.array([tuple(values)], dtype=dtype_of(type(values))).view(np.recarray)[0]
+
+
+class Packed:
+    """A schema or a record ready for kernels: ``argument`` is what they take.  Keep it while they run."""
+
+    def __init__(self, values: Any):
+        self.values = values
+        if isinstance(values, np.record):
+            self.address = _record_address(values)
+        else:
+            self.table = np.array(list(_words(values)), dtype=np.int64).reshape(-1, WORDS)
+            self.address = self.table.ctypes.data
+        self.argument = values if PLAIN else self
+
+
+@typeof_impl.register(Packed)
+def _typeof_packed(value, context):
+    return Named(type(value.values))
+
+
+def packed(values: Any) -> Packed:
+    """A schema or record for kernels; TypeError names the field whose array does not fit."""
+    return Packed(values)
+
+
+def _words(values: Any) -> Iterator[tuple[int, int, int]]:
+    for field, value in zip(fields_of(type(values)).values(), values, strict=True):
+        kind = field.kind
+        if isinstance(kind, Named):
+            yield from _words(value)
+        elif isinstance(kind, types.Array):
+            _check(type(values), field, value)
+            yield value.ctypes.data, value.shape[0], value.shape[-1]
+        elif isinstance(kind, types.Record):
+            yield _record_address(value), 0, 0
+        elif isinstance(kind, types.FunctionType):
+            yield (0 if PLAIN else value.address), 0, 0
+        else:
+            yield (0 if value is None else value.address), 0, 0
+
+
+def _record_address(values: np.record) -> int:
+    return values.__array_interface__["data"][0]
+
+
+def _check(schema: type, field: Field, value: np.ndarray) -> None:
+    """TypeError unless an array has the type of its field: wrong bytes are memory corruption."""
+    kind = field.kind
+    fits = isinstance(value, np.ndarray) and str(value.dtype) == str(kind.dtype) and value.ndim == kind.ndim
+    if not fits or not value.flags.c_contiguous:
+        found = f"{value.dtype} {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
+        raise TypeError(f"{schema.__name__}.{field.name}: needs a contiguous {kind}, got {found}")
+
+
+@infer_getattr
+class _NamedAttributes(AttributeTemplate):
+    key = Named
+
+    def generic_resolve(self, kind, name):
+        field = fields_of(kind.schema).get(name)
+        return field.kind if field is not None else None
+
+
+@lower_getattr_generic(Named)
+def _load_field(context, builder, kind, pointer, name):
+    field = fields_of(kind.schema)[name]
+    place = builder.gep(pointer, [WORD(WORDS * field.row)])
+    if isinstance(field.kind, Named):
+        return place
+    address = _load(builder, place)
+    if isinstance(field.kind, types.Array):
+        return _array(context, builder, field.kind, place, address)
+    if isinstance(field.kind, types.FunctionType):
+        made = cgutils.create_struct_proxy(field.kind)(context, builder)
+        made.c_addr = builder.inttoptr(address, made.c_addr.type)
+        return made._getvalue()
+    if isinstance(field.kind, types.Record):
+        return builder.inttoptr(address, context.get_value_type(field.kind))
+    return address
+
+
+def _load(builder, place) -> ir.Value:
+    """A word of the table, which no kernel changes: LLVM may load it once for a whole loop."""
+    word = builder.load(place)
+    word.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return word
+
+
+def _array(context, builder, kind, place, address) -> ir.Value:
+    rows, columns = (_load(builder, builder.gep(place, [WORD(k)])) for k in (1, 2))
+    size = WORD(kind.dtype.bitwidth // 8)
+    made = context.make_array(kind)(context, builder)
+    context.populate_array(
+        made,
+        data=builder.inttoptr(address, made.data.type),
+        shape=[rows, columns] if kind.ndim == 2 else [columns],
+        strides=[builder.mul(columns, size), size] if kind.ndim == 2 else [size],
+        itemsize=size,
+        meminfo=None,
+    )
+    return made._getvalue()
+
+
+def opener(schema: type) -> Callable[[Any], Any]:
+    """A kernel function (address) -> the packed schema, or the record, there."""
+    kind = from_dtype(dtype_of(schema)) if is_record(schema) else Named(schema)
+
+    @intrinsic
+    def opened(typingctx, address):
+        def generate(context, builder, signature, arguments):
+            return builder.inttoptr(arguments[0], context.get_value_type(kind))
+
+        return kind(types.intp), generate
+
+    opened.function = _as_it_is  # for tracing
+    return _as_it_is if PLAIN else opened
+
+
+def _as_it_is(memory: Any) -> Any:
+    """Without compilation an address is the schema itself."""
+    return memory.values if isinstance(memory, Packed) else memory

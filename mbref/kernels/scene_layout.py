@@ -1,0 +1,75 @@
+"""A scene as kernels read it: bodies, primitive constraints, drivers and loads as named arrays.
+
+Sizes: nb bodies, m constraint rows, p primitives, d drivers, l loads.  Body ``nb`` is the fixed frame.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from mbref.kernels.named_memory import IndexTable, Indices, Matrix, Vector
+
+POINT, DOT1, DOT2, DISTANCE = range(4)  # kinds of primitives
+MOMENT, FORCE, SPRING, TORSION_SPRING = range(4)  # kinds of loads
+
+
+class Bodies(NamedTuple):
+    """Masses (kg) and principal moments of inertia (kg m²)."""
+
+    mass: Annotated[Vector, "nb"]
+    inertia: Annotated[Matrix, "nb", 3]
+
+
+class Primitives(NamedTuple):
+    """Primitive constraints: bodies, first row, and vectors fixed in the first and the second body."""
+
+    kind: Annotated[Indices, "p"]
+    first: Annotated[Indices, "p"]
+    second: Annotated[Indices, "p"]
+    driver: Annotated[Indices, "p"]  # -1 without
+    row: Annotated[Indices, "p"]
+    point_first: Annotated[Matrix, "p", 3]
+    point_second: Annotated[Matrix, "p", 3]
+    direction_first: Annotated[Matrix, "p", 3]
+    turning_first: Annotated[Matrix, "p", 3]  # a quarter turn from direction_first, where a driver turns it
+    direction_second: Annotated[Matrix, "p", 3]
+    length: Annotated[Vector, "p"]
+
+
+class Drivers(NamedTuple):
+    """amplitude sin(frequency t + phase) + Σ polynomial[k] t^k, in rad or m."""
+
+    amplitude: Annotated[Vector, "d"]
+    frequency: Annotated[Vector, "d"]
+    phase: Annotated[Vector, "d"]
+    polynomial: Annotated[Matrix, "d", "degree + 1"]
+
+
+class Loads(NamedTuple):
+    """Loads; a kind uses the vectors that it needs.  Points and axes are body-fixed, forces are world."""
+
+    kind: Annotated[Indices, "l"]
+    first: Annotated[Indices, "l"]
+    second: Annotated[Indices, "l"]
+    angle: Annotated[Indices, "l"]  # index of the unwrapped angle of a torsion spring, else -1
+    force: Annotated[Matrix, "l", 3]  # N, or the moment in N m
+    point_first: Annotated[Matrix, "l", 3]
+    point_second: Annotated[Matrix, "l", 3]
+    axis: Annotated[Matrix, "l", 3]  # of a torsion spring, in the first body, with x and y across it
+    x_first: Annotated[Matrix, "l", 3]
+    y_first: Annotated[Matrix, "l", 3]
+    x_second: Annotated[Matrix, "l", 3]  # x_first at t = 0, in the second body
+    stiffness: Annotated[Vector, "l"]
+    damping: Annotated[Vector, "l"]
+    natural: Annotated[Vector, "l"]  # length (m) or angle (rad)
+
+
+class SceneData(NamedTuple):
+    """A scene as kernels read it; none changes it."""
+
+    gravity: Annotated[Vector, 3]
+    bodies: Bodies
+    primitives: Primitives
+    row_bodies: Annotated[IndexTable, "m", 2]  # the two bodies of each row
+    drivers: Drivers
+    loads: Loads

@@ -1,0 +1,176 @@
+"""Joints as data: the fields of every joint type, and its facts, from which all tables over types derive."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal, Self, get_args
+
+from pydantic import Discriminator, field_validator
+
+from mbref.scene_fields import Entry, Name, Pair, Vector, VectorPair, direction
+
+X, Y, Z = 0, 1, 2
+Coordinate = Literal["angle", "displacement"]
+Condition = Literal["perpendicular axes", "constant distance"]
+
+
+@dataclass(frozen=True)
+class JointFacts:
+    """The relative motion that a joint type forbids, and what can act on the motion it leaves free.
+
+    ``forbidden_translations`` and ``forbidden_rotations`` are components (0, 1, 2) of the second body's
+    motion relative to the first, in the joint's frame on the first body; its third axis is along the
+    joint's axis.  ``condition`` is one further equation: the axes of both bodies stay perpendicular, or
+    the anchors keep their distance.  ``driven`` is the coordinate a driver prescribes: the angle about or
+    the displacement along the axis, None where the joint cannot be driven.
+    """
+
+    forbidden_translations: tuple[int, ...] = ()
+    forbidden_rotations: tuple[int, ...] = ()
+    condition: Condition | None = None
+    driven: Coordinate | None = None
+    takes_torsion_spring: bool = False
+
+    @property
+    def rows(self) -> int:
+        """Number of constraint rows without a driver."""
+        return len(self.forbidden_translations) + len(self.forbidden_rotations) + bool(self.condition)
+
+    @property
+    def free_translations(self) -> int:
+        """Number of relative translations that stay free."""
+        return 3 - len(self.forbidden_translations) - (self.condition == "constant distance")
+
+    @property
+    def free_rotations(self) -> int:
+        """Number of relative rotations that stay free."""
+        return 3 - len(self.forbidden_rotations) - (self.condition == "perpendicular axes")
+
+
+class JointEntry(Entry):
+    """The fields and facts that all joints have."""
+
+    facts: ClassVar[JointFacts]
+    name: Name
+    bodies: Pair
+
+    @classmethod
+    def at(cls, name: str, bodies: tuple[str, str], **places: Any) -> Self:
+        """A joint of this type with those of the ``places`` (anchor, anchors, axis, axes) that it has."""
+        return cls(name=name, bodies=bodies, **{k: v for k, v in places.items() if k in cls.model_fields})
+
+    @property
+    def anchor_pair(self) -> tuple[Vector, Vector]:
+        """The anchors on the first and on the second body, world at t = 0 (m)."""
+        raise NotImplementedError
+
+    @property
+    def directions(self) -> tuple[Vector, ...]:
+        """The joint's axes, world at t = 0, of any length: none, one of both bodies, or one of each body."""
+        return ()
+
+
+class _AnchorJoint(JointEntry):
+    anchor: Vector
+
+    @property
+    def anchor_pair(self) -> tuple[Vector, Vector]:
+        return self.anchor, self.anchor
+
+
+class _AxisJoint(_AnchorJoint):
+    axis: Vector
+
+    _axis = field_validator("axis")(direction)
+
+    @property
+    def directions(self) -> tuple[Vector, ...]:
+        return (self.axis,)
+
+
+class Fixed(_AnchorJoint):
+    """No relative motion."""
+
+    facts = JointFacts(forbidden_translations=(X, Y, Z), forbidden_rotations=(X, Y, Z))
+    type: Literal["fixed"] = "fixed"
+
+
+class Revolute(_AxisJoint):
+    """Rotation about ``axis`` through ``anchor``."""
+
+    facts = JointFacts((X, Y, Z), (X, Y), driven="angle", takes_torsion_spring=True)
+    type: Literal["revolute"] = "revolute"
+
+
+class Universal(_AnchorJoint):
+    """Coincident ``anchor``; ``axes`` (first on the first body, second on the second) stay perpendicular."""
+
+    facts = JointFacts((X, Y, Z), condition="perpendicular axes")
+    type: Literal["universal"] = "universal"
+    axes: VectorPair
+
+    @field_validator("axes")
+    @classmethod
+    def _axes_have_length(cls, axes: tuple[Vector, Vector]) -> tuple[Vector, ...]:
+        return tuple(direction(axis) for axis in axes)
+
+    @property
+    def directions(self) -> tuple[Vector, ...]:
+        return self.axes
+
+
+class Spherical(_AnchorJoint):
+    """Coincident ``anchor``, free rotation."""
+
+    facts = JointFacts(forbidden_translations=(X, Y, Z))
+    type: Literal["spherical"] = "spherical"
+
+
+class Translational(_AxisJoint):
+    """Displacement along ``axis``, no rotation."""
+
+    facts = JointFacts((X, Y), (X, Y, Z), driven="displacement")
+    type: Literal["translational"] = "translational"
+
+
+class Cylindrical(_AxisJoint):
+    """Displacement along and rotation about ``axis``."""
+
+    facts = JointFacts((X, Y), (X, Y), driven="angle", takes_torsion_spring=True)
+    type: Literal["cylindrical"] = "cylindrical"
+
+
+class Planar(_AxisJoint):
+    """Displacement in the plane through ``anchor`` with normal ``axis``, and rotation about the normal."""
+
+    facts = JointFacts(forbidden_translations=(Z,), forbidden_rotations=(X, Y))
+    type: Literal["planar"] = "planar"
+
+
+class Distance(JointEntry):
+    """Constant distance between two ``anchors`` (first on the first body, second on the second)."""
+
+    facts = JointFacts(condition="constant distance")
+    type: Literal["distance"] = "distance"
+    anchors: VectorPair
+
+    @field_validator("anchors")
+    @classmethod
+    def _anchors_are_apart(cls, anchors: tuple[Vector, Vector]) -> tuple[Vector, Vector]:
+        if math.dist(*anchors) == 0:
+            raise ValueError("must be two different points (coincident points are a spherical joint)")
+        return anchors
+
+    @property
+    def anchor_pair(self) -> tuple[Vector, Vector]:
+        return self.anchors
+
+
+Joint = Annotated[
+    Fixed | Revolute | Universal | Spherical | Translational | Cylindrical | Planar | Distance,
+    Discriminator("type"),
+]
+JOINT_TYPES: dict[str, type[JointEntry]] = {
+    joint.model_fields["type"].default: joint for joint in get_args(get_args(Joint)[0])
+}

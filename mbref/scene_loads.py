@@ -1,0 +1,69 @@
+"""Loads as data: the fields of every load type, and its facts."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal, get_args
+
+from pydantic import Discriminator
+
+from mbref.scene_fields import Entry, Name, NotNegative, Pair, Real, Vector, VectorPair
+
+
+class LoadEntry(Entry):
+    """The facts that all loads have: the field that names the one body, the two bodies or the joint a load
+    acts on."""
+
+    acts_on: ClassVar[Literal["body", "bodies", "joint"]]
+
+    @property
+    def is_damped(self) -> bool:
+        """Whether the load takes energy out of the mechanism."""
+        return getattr(self, "damping", 0.0) > 0
+
+
+class Moment(LoadEntry):
+    """Constant moment on a body (N m, world axes)."""
+
+    acts_on = "body"
+    type: Literal["moment"] = "moment"
+    body: Name
+    moment: Vector
+
+
+class Force(LoadEntry):
+    """Constant force (N, world axes) at a body-fixed point (given in the world at t = 0)."""
+
+    acts_on = "body"
+    type: Literal["force"] = "force"
+    body: Name
+    point: Vector
+    force: Vector
+
+
+class Spring(LoadEntry):
+    """Spring and damper between two body-fixed points (world at t = 0); N/m, N s/m, m."""
+
+    acts_on = "bodies"
+    type: Literal["spring"] = "spring"
+    bodies: Pair
+    points: VectorPair
+    stiffness: NotNegative
+    damping: NotNegative = 0.0
+    natural_length: NotNegative
+
+
+class TorsionSpring(LoadEntry):
+    """Spring and damper about a joint's axis; N m/rad, N m s/rad; angle measured from t = 0."""
+
+    acts_on = "joint"
+    type: Literal["torsion_spring"] = "torsion_spring"
+    joint: Name
+    stiffness: NotNegative
+    damping: NotNegative = 0.0
+    natural_angle: Real = 0.0
+
+
+Load = Annotated[Moment | Force | Spring | TorsionSpring, Discriminator("type")]
+LOAD_TYPES: dict[str, type[LoadEntry]] = {
+    load.model_fields["type"].default: load for load in get_args(get_args(Load)[0])
+}

@@ -1,0 +1,137 @@
+"""Declarations of adapters / joints, drivers and loads of types none of them knows; facts / equations."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import pytest
+
+from crosscheck.conformance.features import BODY, JOINTS
+from crosscheck.engine import BUILT_IN, OPTIONAL, Cannot, Engine, Owner, Setting, Supports, engine
+from crosscheck.engines.constraint_equations import Constraints
+from crosscheck.engines.spanning_tree import spanning_tree
+from crosscheck.judge.constraints import initial_poses, jacobian
+from mbref import cli
+from mbref.equations.joints import JOINTS as PRIMITIVES
+from mbref.equations.joints import primitives_of
+from mbref.equations.joints.base import ROWS_OF
+from mbref.scene import JOINT_TYPES, Driver, JointFacts, Revolute, Scene
+from mbref.scene_joints import JointEntry
+from mbref.scene_loads import LoadEntry
+from mbref.trajectory import Trajectory
+
+EVERY_ENGINE = (*BUILT_IN, *OPTIONAL)
+
+
+class Screw(JointEntry):
+    """A joint type that no engine knows."""
+
+    facts = JointFacts((0, 1), (0, 1), driven="angle")
+    type: Literal["screw"] = "screw"
+    anchor: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    anchor_pair = property(lambda self: (self.anchor, self.anchor))
+    directions = property(lambda self: (self.axis,))
+
+
+class Magnet(LoadEntry):
+    """A load type that no engine knows."""
+
+    acts_on = "body"
+    type: Literal["magnet"] = "magnet"
+    body: str = "body"
+
+
+class Telescopic(Revolute):
+    """A known joint with a driven coordinate that no engine knows."""
+
+    facts = JointFacts((0, 1, 2), (0, 1), driven="length")  # type: ignore[arg-type]
+
+
+def with_unknown(**parts: tuple) -> Scene:
+    """A swinging body with parts that a scene file could not have."""
+    scene = Scene(name="unknown", body=(BODY,), joint=(JOINTS["revolute"],))
+    return scene.model_copy(update=parts)
+
+
+def screwed() -> Scene:
+    return with_unknown(joint=(Screw(name="thread", bodies=("ground", "body")),))
+
+
+@pytest.mark.parametrize("name", EVERY_ENGINE)
+def test_an_undeclared_joint_type_is_refused_by_name(name: str) -> None:
+    refusal = engine(name).cannot(screwed())
+    assert refusal is not None, f"{name} would run a screw"
+    assert refusal.owner is Owner.ADAPTER and "'thread'" in str(refusal) and "'screw'" in str(refusal), (
+        refusal
+    )
+
+
+@pytest.mark.parametrize("name", EVERY_ENGINE)
+def test_an_undeclared_driven_coordinate_is_refused_by_name(name: str) -> None:
+    pulled = Telescopic(name="mast", bodies=("ground", "body"), anchor=(0, 0, 0), axis=(0, 0, 1))
+    refusal = engine(name).cannot(with_unknown(joint=(pulled,), driver=(Driver(joint="mast"),)))
+    assert refusal is not None, f"{name} would drive a length"
+    assert "'mast'" in str(refusal) and "length" in str(refusal), refusal
+
+
+@pytest.mark.parametrize("name", EVERY_ENGINE)
+def test_an_undeclared_load_type_is_refused_by_name(name: str) -> None:
+    refusal = engine(name).cannot(with_unknown(load=(Magnet(),)))
+    assert refusal is not None and "load[0]" in str(refusal) and "'magnet'" in str(refusal), refusal
+
+
+@pytest.mark.parametrize(("parts", "named"), [
+    ({"joint": screwed().joint}, ("'thread'", "'screw'")), ({"load": (Magnet(),)}, ("load[0]", "'magnet'")),
+])  # fmt: skip
+def test_mbref_run_refuses_them_too(parts: dict, named: tuple, monkeypatch, capsys) -> None:
+    monkeypatch.setattr(cli, "find_scene", lambda name: with_unknown(**parts))
+    assert cli.main(["run", "unknown"]) == cli.BAD_INPUT
+    said = capsys.readouterr().err
+    assert all(word in said for word in named) and "Traceback" not in said, said
+
+
+class Bare(Engine):
+    """An engine that declares nothing."""
+
+    name, package = "bare", "bare"
+
+    def version(self) -> str:
+        return "1"
+
+    def settings(self, scene: Scene) -> list[Setting]:
+        return []
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        raise NotImplementedError
+
+
+def test_an_engine_without_declarations_takes_a_free_body_alone() -> None:
+    assert Bare().cannot(with_unknown(joint=())) is None
+    assert isinstance(Bare().cannot(with_unknown()), Cannot)
+
+
+def test_the_first_undeclared_part_is_named() -> None:
+    supports = Supports(joints=("revolute",), loads=("moment",))
+    assert supports.missing(with_unknown()) is None
+    driven = supports.missing(with_unknown(driver=(Driver(joint="J"),)))
+    assert driven is not None and "'J'" in driven.reason and "angle" in driven.reason, driven
+
+
+@pytest.mark.parametrize("kind", JOINT_TYPES)
+def test_rows_and_freedoms_of_the_facts_and_of_all_equations(kind: str) -> None:
+    joint, facts = JOINTS[kind], JOINT_TYPES[kind].facts
+    scene = Scene(name="one", body=(BODY,), joint=(joint,))
+    assert facts.rows + facts.free_translations + facts.free_rotations == 6, facts
+    found = {
+        "mbref": sum(ROWS_OF[primitive.kind] for primitive in primitives_of(joint)),
+        "judge": np.linalg.matrix_rank(jacobian(scene, 0.0, *initial_poses(scene))[0]),
+        "sundials": len(Constraints(scene).joint),
+        "tree": 6 - spanning_tree(scene).nv if facts.condition != "constant distance" else facts.rows,
+    }
+    assert set(found.values()) == {facts.rows}, f"{kind}: {found}, the facts say {facts.rows}"
+
+
+def test_every_joint_type_has_primitives() -> None:
+    assert set(PRIMITIVES) == set(JOINT_TYPES), set(PRIMITIVES) ^ set(JOINT_TYPES)

@@ -1,0 +1,172 @@
+"""Planar joints in every engine / closed forms, and the truth of the mechanism whose guide one replaces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Setting, engine
+from crosscheck.judge.truth import truth_for
+from mbref import rotations
+from mbref.scene import Body, Cylindrical, Driver, Planar, Revolute, Scene, SceneError, TorsionSpring
+from mbref.scenes import SCENES
+from mbref.trajectory import Outcome, Trajectory
+
+FINE = {
+    "mbref": Setting("alf-dual+projection", {"rtol": 1e-10}),
+    "mujoco": Setting("tuned", {"step": 5e-4, "beta": 50.0, "hard": 1e-8}),
+    "pinocchio": Setting("tuned", {"rtol": 1e-10, "min_step": 1e-4}),
+    "exudyn": Setting("tuned", {"step": 1e-3}),
+    "simbody": Setting("merson", {"accuracy": 1e-8}),
+    "sundials": Setting("ggl", {"rtol": 1e-8}),
+    "ondsel": Setting("kinematics", {"step": 1e-3}),
+}
+FREE = [name for name in FINE if name != "ondsel"]  # engines that move what is not driven
+PACKAGES = {"simbody": "opensim", "sundials": "sksundae", "ondsel": "pyondsel"}
+CLOSE = 1e-6  # m, rad: ten times the error of the coarsest of these settings
+
+NORMAL = np.array([0.3, 0.9, -0.2]) / np.linalg.norm([0.3, 0.9, -0.2])
+ALONG = np.cross(NORMAL, [1.0, 0.0, 0.0])
+SPEED, RATE = 0.7, 4.0  # m/s along the plane, rad/s about its normal
+PLACE, ANCHOR = np.array([0.1, 0.4, -0.2]), np.array([0.2, 0.25, 0.1])
+MASS, INERTIA = 2.0, np.array([[0.02, 0.002, -0.001], [0.002, 0.03, 0.003], [-0.001, 0.003, 0.025]])
+TURNED = rotations.from_vector(np.array([0.3, -0.5, 0.8]))
+GRAVITY = np.array([0.5, -9.81, 1.0])
+TIMES = np.linspace(0, 0.5, 6)
+ORDERS = (("ground", "block"), ("block", "ground"))
+
+
+def run_fine(name: str, scene: Scene, times: np.ndarray) -> Trajectory:
+    pytest.importorskip(PACKAGES.get(name, name))
+    run = engine(name).run(scene, times, FINE[name])
+    assert run.outcome is Outcome.COMPLETED, f"{name}: {run.outcome.label} {run.message}"
+    return run
+
+
+def incline(bodies: tuple[str, str], joints: int = 1) -> Scene:
+    """A block that slides on an inclined plane and spins about the normal, held off its centre of mass."""
+    block = Body(
+        name="block", mass=MASS, inertia=INERTIA, position=PLACE, orientation=TURNED,
+        velocity=SPEED * ALONG, angular_velocity=RATE * NORMAL,
+    )  # fmt: skip
+    planes = tuple(
+        Planar(name=f"plane{k}", bodies=bodies, anchor=ANCHOR + k * ALONG, axis=NORMAL) for k in range(joints)
+    )
+    return Scene(name="incline", gravity=GRAVITY, duration=0.5, body=(block,), joint=planes)
+
+
+def exact_poses() -> tuple[np.ndarray, np.ndarray]:
+    """Positions (k, 3) and orientations (k, 4): the fall along the plane, and a constant spin."""
+    fall = GRAVITY - (GRAVITY @ NORMAL) * NORMAL
+    position = PLACE + np.outer(TIMES, SPEED * ALONG) + np.outer(TIMES**2 / 2, fall)
+    return position, rotations.multiply(rotations.from_vector(np.outer(RATE * TIMES, NORMAL)), TURNED)
+
+
+def exact_wrenches(bodies: tuple[str, str]) -> np.ndarray:
+    """Forces and moments (k, 6) on the second body at the anchor on it, by Newton's and Euler's equations."""
+    position, orientation = exact_poses()
+    turn = rotations.to_matrix(orientation)
+    momentum = RATE * turn @ INERTIA @ np.swapaxes(turn, 1, 2) @ NORMAL
+    force = np.broadcast_to(-MASS * (GRAVITY @ NORMAL) * NORMAL, position.shape)
+    arm = ANCHOR - position
+    if bodies[1] == "block":
+        arm = rotations.rotate(orientation, rotations.rotate(rotations.conjugate(TURNED), ANCHOR - PLACE))
+    moment = np.cross(RATE * NORMAL, momentum) - np.cross(arm, force)
+    return np.hstack([force, moment]) * (1 if bodies[1] == "block" else -1)
+
+
+def off(run: Trajectory) -> float:
+    """Largest distance (m) or angle (rad) from the closed form."""
+    position, orientation = exact_poses()
+    turned = rotations.angle_between(run.orientation[:, 0], orientation).max()
+    return float(max(np.abs(run.position[:, 0] - position).max(), turned))
+
+
+@pytest.mark.parametrize("bodies", ORDERS, ids="-".join)
+@pytest.mark.parametrize("name", FREE)
+def test_a_block_on_an_incline_and_its_closed_form(name: str, bodies: tuple[str, str]) -> None:
+    run = run_fine(name, incline(bodies), TIMES)
+    assert off(run) < CLOSE, f"{name}: off by {off(run):.1e} m, rad"
+    assert run.reactions is not None
+    gap = np.abs(run.reactions["plane0"] - exact_wrenches(bodies)).max()
+    assert gap < 1e-5, f"{name}: reaction off by {gap:.1e} N, N m of 17 N"
+
+
+@pytest.mark.parametrize("name", FREE)
+def test_a_second_planar_joint_in_the_same_plane_changes_nothing(name: str) -> None:
+    scene = incline(ORDERS[0], joints=2)
+    assert scene.counts().redundant == 3, scene.counts()
+    run = run_fine(name, scene, TIMES)
+    assert off(run) < CLOSE, f"{name}: off by {off(run):.1e} m, rad"
+
+
+def guided() -> tuple[Scene, Scene]:
+    """A slider-crank of revolutes, and the same with a plane in place of the slider's guide: one redundant
+    row instead of three."""
+    base = SCENES["planar_slider_crank_gravity"]()
+    a, b, c, d = base.joint
+    end = Revolute(name="C", bodies=c.bodies, anchor=c.anchor, axis=(0.0, 0.0, 1.0))
+    plane = Planar(name="D", bodies=d.bodies, anchor=d.anchor, axis=(0.0, 1.0, 0.0))
+    return base.with_(joint=(a, b, end, d)), base.with_(joint=(a, b, end, plane))
+
+
+@pytest.mark.parametrize("name", FREE)
+def test_a_plane_in_place_of_the_guide_of_a_slider_crank(name: str) -> None:
+    base, planar = guided()
+    assert (base.counts().redundant, planar.counts().redundant) == (3, 1)
+    times = np.linspace(0, 0.1, 4)
+    truth = truth_for(base).poses(times)
+    run = run_fine(name, planar, times)
+    gap = np.abs(run.position - truth.position).max()
+    assert gap < CLOSE, f"{name}: off by {gap:.1e} m"
+
+
+def test_ondsel_moves_the_driven_slider_crank_with_a_plane() -> None:
+    driver = (Driver(joint="A", polynomial=(0.0, 30.0)),)
+    base, planar = (scene.with_(body=at_rest(scene), driver=driver) for scene in guided())
+    times = np.linspace(0, 0.1, 4)
+    run = run_fine("ondsel", planar, times)
+    truth = truth_for(base).poses(times)
+    gaps = [np.abs(getattr(run, f) - getattr(truth, f)).max() for f in ("position", "acceleration")]
+    assert gaps[0] < CLOSE and gaps[1] < 1e-3, (
+        f"off by {gaps} m, m/s² of {np.abs(truth.acceleration).max():.0f}"
+    )
+
+
+def at_rest(scene: Scene) -> tuple[Body, ...]:
+    """The bodies, their velocities left to the driver."""
+    return tuple(body.model_copy(update={"angular_velocity": None}) for body in scene.body)
+
+
+def swash_plate(bodies: tuple[str, str]) -> tuple[Scene, np.ndarray]:
+    """A driven inclined plate that lifts a pin beside it, and the heights (k,) of the pin."""
+    inertia, slope, radius, rate = (0.01, 0.02, 0.03), 0.3, 0.5, 3.0
+    foot = (radius, 0.0, 0.0)
+    scene = Scene(
+        name="swash_plate", duration=1.0,
+        body=(Body(name="plate", mass=1.0, inertia=inertia, position=(0.0, 0.0, 0.0)),
+              Body(name="pin", mass=1.0, inertia=inertia, position=(radius, 0.0, 0.2))),
+        joint=(Revolute(name="A", bodies=("ground", "plate"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),
+               Cylindrical(name="B", bodies=("ground", "pin"), anchor=foot, axis=(0.0, 0.0, 1.0)),
+               Planar(name="P", bodies=bodies, anchor=foot, axis=(slope, 0.0, 1.0))),
+        driver=(Driver(joint="A", polynomial=(0.0, rate)),),
+    )  # fmt: skip
+    return scene, 0.2 + slope * radius * (1 - np.cos(rate * TIMES))
+
+
+@pytest.mark.parametrize("bodies", [("plate", "pin"), ("pin", "plate")], ids="-".join)
+@pytest.mark.parametrize("name", FINE)
+def test_a_swash_plate_lifts_a_pin(name: str, bodies: tuple[str, str]) -> None:
+    scene, heights = swash_plate(bodies)
+    run = run_fine(name, scene, TIMES)
+    gap = np.abs(run.position[:, 1, 2] - heights).max()
+    assert gap < CLOSE, f"{name}: the pin is off by {gap:.1e} m"
+    assert name != "ondsel" or run.acceleration is None, "accelerations that miss the joint's equations"
+
+
+def test_a_planar_joint_takes_neither_driver_nor_torsion_spring() -> None:
+    scene = incline(ORDERS[0])
+    with pytest.raises(SceneError, match=r"driver\[0\].joint: 'plane0' is planar; only .* can be driven"):
+        scene.with_(driver=(Driver(joint="plane0"),))
+    with pytest.raises(SceneError, match=r"load\[0\].joint: 'plane0' is planar; only .* torsion spring"):
+        scene.with_(load=(TorsionSpring(joint="plane0", stiffness=1.0),))

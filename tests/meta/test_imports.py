@@ -1,0 +1,84 @@
+"""Imports: packages, floors of their folders, no circle; judging apart from what is judged."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from imports import circles, graph, imported, sources, upward
+
+DOORS = r"scene|scenes(\.\w+)?|scene_validation|trajectory|rotations|records|__version__"
+ALLOWED = {  # package → the names of mbref that it may import
+    "crosscheck": re.compile(rf"mbref(\.({DOORS})(\.\w+)?)?"),
+    "reports": re.compile(r"mbref(\.(scene|trajectory|rotations|records)(\.\w+)?)?"),
+}
+ADAPTER = "crosscheck.engines.mbref"  # the one module that may import all of mbref
+
+FLOORS = {  # lowest first; an arrow within a floor or downwards
+    "crosscheck": (
+        ["engine"], ["judge"], ["engines"], ["processes"], ["study"], ["conformance"], ["paper"], ["cli"],
+        ["__main__"],
+    ),
+    "reports": (
+        ["blocks"], ["runs"], ["figures"], ["drawing", "animation", "time_series", "benchmark_plot"],
+        ["sections"], ["render"], ["__main__"],
+    ),
+}  # fmt: skip
+
+MAKING = {"study", "run", "run_case", "run_here", "run_isolated", "time_interleaved", "observe", "collection"}
+MAKERS = (
+    "crosscheck.processes",
+    "crosscheck.engines",
+    "crosscheck.cli.collection",
+    "crosscheck.cli.passage",
+    "crosscheck.study.sweep",
+    "crosscheck.study.timings",
+)
+
+
+def modules(package: str) -> list[str]:
+    return list(sources(package))
+
+
+def of(package: str, module: str) -> set[str]:
+    return set(imported(sources(package)[module]))
+
+
+@pytest.mark.parametrize("package", FLOORS)
+def test_no_import_circle(package):
+    assert not circles(graph(package))
+
+
+@pytest.mark.parametrize("package", FLOORS)
+def test_no_arrow_from_a_lower_floor_to_a_higher_one(package):
+    assert not upward(graph(package), FLOORS[package])
+
+
+@pytest.mark.parametrize(("package", "module"), [(p, m) for p in ALLOWED for m in modules(p) if m != ADAPTER])
+def test_names_of_mbref_that_a_module_may_import(package, module):
+    names = {name for name in of(package, module) if name.split(".")[0] == "mbref"}
+    wrong = sorted(name for name in names if not ALLOWED[package].fullmatch(name))
+    assert not wrong, f"{module} imports {wrong}: only engines/mbref.py knows mbref's numerics"
+
+
+@pytest.mark.parametrize("module", [m for m in modules("reports") if m != "reports.__main__"])
+def test_no_module_that_renders_can_make_a_record(module):
+    names = of("reports", module)
+    wrong = sorted(n for n in names if n.startswith(MAKERS) or n.rpartition(".")[2] in MAKING)
+    assert not wrong, f"{module} imports {wrong}: records are made before, by crosscheck"
+
+
+def test_the_program_asks_crosscheck_s_command_line_for_its_records():
+    names = {n for n in of("reports", "reports.__main__") if n.startswith("crosscheck.")}
+    allowed = {"crosscheck.cli", "crosscheck.cli.collection", "crosscheck.cli.request",
+               "crosscheck.cli.request.RequestError", "crosscheck.cli.passage",
+               "crosscheck.cli.passage.passage"}  # fmt: skip
+    assert names <= allowed, sorted(names - allowed)
+
+
+def test_circles_and_upward_arrows_are_found():
+    arrows = {"p": set(), "p.a.x": {"p.b.y"}, "p.b.y": {"p.a.z"}, "p.a.z": {"p.a.x"}, "p.c": {"p.a.x"}}
+    assert circles(arrows) == [["p.a.x", "p.a.z", "p.b.y"]]
+    assert upward(arrows, [["a"], ["b"], ["c"]]) == ["p.a.x → p.b.y"]
+    with pytest.raises(ValueError, match="on no floor: c"):
+        upward(arrows, [["a"], ["b"]])
