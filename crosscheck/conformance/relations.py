@@ -144,7 +144,7 @@ def in_other_units(scene: Scene, length: float, time: float) -> Scene:
     loads = {**places, "force": by(push), "moment": by(length * push)}
     linear = {"stiffness": by(1 / time**2), "damping": by(1 / time)}
     turning = {"stiffness": by(length * push), "damping": by(length * speed)}
-    slides = {joint.name for joint in scene.joint if joint.type == "translational"}
+    slides = {joint.name for joint in scene.joint if joint.facts.driven == "displacement"}
     return scene.with_(
         gravity=by(push)(scene.gravity).tolist(), duration=scene.duration * time,
         body=tuple(mapped(body, bodies) for body in scene.body),

@@ -132,7 +132,7 @@ def replayed(scene: Scene, motion: Trajectory) -> Scene | Outside:
     if len(scene.driver) != 1 or not motion.reactions:
         return Outside("it has not one driver, or the engine gives no reactions")
     joint = next(j for j in scene.joint if j.name == scene.driver[0].joint)
-    if joint.type == "translational" or joint.bodies[0] != GROUND:
+    if joint.facts.driven == "displacement" or joint.bodies[0] != GROUND:
         return Outside("its driver does not turn a body about an axis on the ground")
     axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
     moment = motion.reactions[joint.name][:, 3:] @ axis

@@ -15,22 +15,13 @@ from crosscheck.judge.constraints import inertia_matrices, initial_twists
 from mbref import rotations
 from mbref.trajectory import Cost, Outcome, Trajectory
 
-HELD = {
-    "fixed": (0, 1, 2),
-    "revolute": (0, 1, 2),
-    "universal": (0, 1, 2),
-    "spherical": (0, 1, 2),
-    "translational": (0, 1),
-    "cylindrical": (0, 1),
-    "distance": (),
-}  # displacements, axes of frame 1
-SQUARE = {
-    "fixed": ((0, 1), (1, 2), (2, 0)),
-    "translational": ((0, 1), (1, 2), (2, 0)),
-    "universal": ((2, 2),),
-    "revolute": ((0, 2), (1, 2)),
-    "cylindrical": ((0, 2), (1, 2)),
-}  # axes kept at right angles
+# axes of the first frame that displacement keeps off, and pairs of axes kept at right angles
+ALL, HINGE = (0, 1, 2), ((0, 2), (1, 2))
+RIGHT = ((0, 1), (1, 2), (2, 0))
+HELD = {"fixed": ALL, "revolute": ALL, "universal": ALL, "spherical": ALL, "translational": (0, 1),
+        "cylindrical": (0, 1), "planar": (2,), "distance": ()}  # fmt: skip
+SQUARE = {"fixed": RIGHT, "translational": RIGHT, "universal": ((2, 2),), "revolute": HINGE,
+          "cylindrical": HINGE, "planar": HINGE}  # fmt: skip
 RANK = 1e-11  # pivots of redundant rows are rounding, 1e-15
 
 
