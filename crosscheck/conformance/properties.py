@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crosscheck.conformance.reaction_cards import balance, idle
 from crosscheck.conformance.relations import RELATIONS
 from crosscheck.conformance.trial import Bench, Outside, Specimen, difference
 from crosscheck.engine import Cannot
@@ -17,6 +16,7 @@ from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.energy import energy_series
 from crosscheck.judge.gauss_principle import stacked
 from crosscheck.judge.metrics import in_scene_order, violation_series
+from crosscheck.judge.reaction_balance import balance, idle
 from crosscheck.judge.tolerances import (
     LIKE_TRUTH,
     OWN_ACCURACY,

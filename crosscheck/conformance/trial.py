@@ -10,10 +10,10 @@ import numpy as np
 
 from crosscheck.conformance.closed_forms import CLOSED_FORMS, Exact
 from crosscheck.conformance.features import feature_scenes
-from crosscheck.conformance.gauss_motion import gauss_motion
 from crosscheck.conformance.moving import moving_probes
 from crosscheck.conformance.runners import Runner
 from crosscheck.engine import Cannot, Setting
+from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.metrics import error_series, in_scene_order
 from crosscheck.judge.tolerances import OWN_ACCURACY, ROUNDING, SAME_MOTION, TWINS
 from crosscheck.judge.truth import truth_for

@@ -7,17 +7,17 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from crosscheck.conformance.gauss_motion import accelerations, applied, gauss_motion
-from crosscheck.conformance.reaction_cards import balance, idle
 from crosscheck.conformance.replays import started
 from crosscheck.conformance.strategies import goes_on, matrices, mechanisms, paper_mechanisms
 from crosscheck.conformance.trial import difference
 from crosscheck.judge.constraints import initial_poses, jacobian, scene_length
 from crosscheck.judge.energy import energy_series
+from crosscheck.judge.gauss_motion import accelerations, applied, gauss_motion
 from crosscheck.judge.gauss_principle import singular_values
 from crosscheck.judge.joint_reactions import resultants
 from crosscheck.judge.loads import world_inertia
 from crosscheck.judge.metrics import violation_series
+from crosscheck.judge.reaction_balance import balance, idle
 from crosscheck.judge.tolerances import RANK
 from mbref import Limits, rotations, simulate
 from mbref.equations.diagnosis import diagnose

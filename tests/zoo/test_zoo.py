@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from pathlib import Path
 
 import pytest
 
@@ -11,6 +12,7 @@ from crosscheck.conformance.features import undetermined
 from crosscheck.conformance.properties import PROPERTIES
 from crosscheck.conformance.runners import InProcess
 from tests.zoo.defects import DEFECTS, engine
+from tests.zoo.table import page
 
 SPECIMENS = {s.scene.name: s for s in [trial.Specimen(undetermined()), *trial.specimens()]}
 
@@ -45,3 +47,9 @@ def test_sound_engine_and_the_whole_suite():
     found = suite.held_against(InProcess(engine()), trial.specimens(deep=True))
     failed = [v for v in found.verdicts if v.status == suite.FAIL]
     assert found.conforms, failed
+
+
+def test_page_of_cards_and_the_table():
+    """docs/conformance.md is what its command writes."""
+    path = Path(__file__).parents[2] / "docs" / "conformance.md"
+    assert path.read_text() == page(), "python -m tests.zoo.table docs/conformance.md renews it"
