@@ -11,10 +11,10 @@ from tests.zoo.defects import DEFECTS
 
 HEAD = f"""# What the conformance suite checks, and what proves that it does
 
-`crosscheck verify ENGINE` holds an engine against the cards below; `docs/verify-your-engine.md` tells how to use it.
-A card passes, fails, or says why it does not apply: the engine cannot run the scene, or the scene is outside the
-card's domain. A card's number counts up when its check becomes another, so that verdicts of different checks
-are never compared.
+`crosscheck verify ENGINE` holds an engine against the cards below; `docs/verify-your-engine.md` tells how.
+A card passes, fails, or says why it does not apply: the engine cannot run the scene, or the scene is outside
+the card's domain. A card's number counts up when its check becomes another, so that verdicts of different
+checks are never compared.
 
 Every card is proved by defects: {len(DEFECTS)} changes of one line, planted one at a time in
 `examples/spatial_engine` (`tests/zoo/defects.toml`). Each makes the card beside it fail on the scene named,
