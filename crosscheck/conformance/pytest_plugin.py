@@ -59,7 +59,9 @@ class Session:
         self.config, self.name = config, config.getoption("engine")
         limit = config.getoption("time_limit")
         self.runner = (
-            InProcess(engine(self.name)) if config.getoption("in_process") else Isolated(self.name, limit)
+            InProcess(engine(self.name), self.name)
+            if config.getoption("in_process")
+            else Isolated(self.name, limit)
         )
         deep, first = config.getoption("depth") == "deep", config.getoption("mechanism_seed")
         seeds = range(first, first + config.getoption("mechanisms"))

@@ -61,13 +61,17 @@ class Isolated:
 
 @dataclass(frozen=True)
 class InProcess:
-    """Runs in this process, in an empty directory, without limits: for engines that are trusted to return."""
+    """Runs in this process, in an empty directory, without limits: for engines that are trusted to return.
+
+    ``called`` is the name by which commands know the engine, where that is not its own.
+    """
 
     engine: Engine
+    called: str = ""
 
     @property
     def name(self) -> str:
-        return self.engine.name
+        return self.called or self.engine.name
 
     def offers(self, scene: Scene) -> tuple[str, Cannot | None, list[Setting]]:
         cannot = self.engine.cannot(scene)
