@@ -63,13 +63,21 @@ def find_engines(names: Sequence[str] | None, notice: Notice) -> list[str]:
 
 
 def find_specimens(names: Sequence[str] | None, reference_time: float) -> list[Specimen]:
-    """The conformance suite's specimens of those scenes, or all, with so much time (s) for a reference;
-    RequestError for a name it has not."""
+    """The conformance suite's specimens of those scenes, or all, with so much time (s) for a reference.
+
+    A ``.toml`` file is a specimen of its own, held against every card.  RequestError for a name the suite
+    has not, SceneError for a faulty file.
+    """
     known = {s.scene.name: dataclasses.replace(s, reference_time=reference_time) for s in specimens()}
-    if unknown := [name for name in names or () if name not in known]:
+    given = {
+        name: Specimen(Scene.from_file(name), None, True, reference_time=reference_time)
+        for name in names or ()
+        if name.endswith(".toml")
+    }
+    if unknown := [name for name in names or () if name not in known and name not in given]:
         listed = ", ".join(known)
         raise RequestError(*(f"unknown scene of the suite {name!r}; known: {listed}" for name in unknown))
-    return [known[name] for name in dict.fromkeys(names or known)]
+    return [{**known, **given}[name] for name in dict.fromkeys(names or known)]
 
 
 def _unknown_engine(name: str) -> str | None:

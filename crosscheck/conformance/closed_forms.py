@@ -102,7 +102,21 @@ def driven() -> tuple[Scene, Exact]:
     return scene, exact
 
 
-CLOSED_FORMS = (free_fall, pendulum, oscillator, torsion, driven)
+def turntable() -> tuple[Scene, Exact]:
+    """A body off the axis that a driver speeds up evenly, gravity along the axis: the moment is constant."""
+    driver = Driver(joint="pivot", polynomial=(0.0, 1.5, 2.0))
+    place = (ARM, 0.0, 0.0)
+    joint = Revolute(name="pivot", bodies=("ground", "body"), anchor=ORIGIN, axis=Z)
+    scene = Scene(name="turntable", gravity=(0.0, 0.0, -9.81), duration=0.8, body=(_body(place),),
+                  joint=(joint,), driver=(driver,))  # fmt: skip
+
+    def exact(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return _swung(1.5 * t + 2.0 * t**2, place)
+
+    return scene, exact
+
+
+CLOSED_FORMS = (free_fall, pendulum, oscillator, torsion, driven, turntable)
 
 
 def _body(place: tuple[float, float, float]) -> Body:

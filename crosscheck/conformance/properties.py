@@ -10,16 +10,28 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck.conformance.relations import RELATIONS
-from crosscheck.conformance.trial import Bench, Specimen, difference
-from crosscheck.engine import Cannot, engine
+from crosscheck.conformance.trial import Bench, Outside, Specimen, difference
+from crosscheck.engine import Cannot
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.energy import energy_series
+from crosscheck.judge.gauss_principle import stacked
 from crosscheck.judge.metrics import in_scene_order, violation_series
-from crosscheck.judge.tolerances import LIKE_TRUTH, SAME_MOTION, STAYS_CLOSED, UNIT_NORM
+from crosscheck.judge.reaction_balance import balance, idle
+from crosscheck.judge.tolerances import (
+    LIKE_TRUTH,
+    OWN_ACCURACY,
+    REACTIONS,
+    SAME_MOTION,
+    STAYS_CLOSED,
+    UNIT_NORM,
+)
 from mbref import rotations
+from mbref.scene import Moment
 from mbref.trajectory import Trajectory
 
 STATE = ("position", "orientation", "velocity", "angular_velocity")
+TRUSTED = 1e-7  # what the exact motions are certainly better than, after a motion of some turns
+DENSE = 65  # samples from which the work of a moment is summed to 1e-8
 STEP = 1e-4  # of the duration: central differences of it are off by 1e-8 of what a motion does in its time
 
 
@@ -31,15 +43,17 @@ class Finding(NamedTuple):
     remark: str = ""
 
 
-Check = Callable[[Bench], Finding | Cannot | None]  # None: the property says nothing of this scene
+Check = Callable[[Bench], Finding | Cannot | Outside]
 
 
 class Property(NamedTuple):
-    """``about`` is what is checked, against what; ``of`` tells which specimens it is checked on."""
+    """A card: ``about`` is what is checked, against what; ``of`` tells which specimens it is checked on, and
+    ``version`` is counted up when the check becomes another, so that verdicts of different ones are told."""
 
     about: str
     check: Check
     of: Callable[[Specimen], bool]
+    version: int = 1
 
 
 def sample_times(bench: Bench) -> Finding:
@@ -78,20 +92,87 @@ def velocities(bench: Bench) -> Finding:
     return Finding(float(np.linalg.norm(off, axis=1).max() / scale), LIKE_TRUTH)
 
 
-def truth(bench: Bench) -> Finding | None:
-    """Poses against a closed form, or a truth of the judge."""
-    if bench.exact is None:
-        return None
+def truth(bench: Bench) -> Finding:
+    """Poses against a closed form, a truth of the judge, or Gauss's principle integrated."""
     return Finding(difference(bench.scene, bench.motion, bench.exact), LIKE_TRUTH, bench.exact.engine)
 
 
-def energy(bench: Bench) -> Finding | None:
+def convergence(bench: Bench) -> Finding | Outside:
+    """Finer settings come to the exact motion, not to another: the error is what the finest two differ by."""
+    if len(bench.settings) < 2:
+        return Outside("the engine offers one setting")
+    error = difference(bench.scene, bench.motion, bench.exact)
+    allowed = max(TRUSTED, OWN_ACCURACY * bench.steps_apart)
+    return Finding(error, allowed, f"two finest settings {bench.steps_apart:.1e} apart")
+
+
+def rates_closed(bench: Bench) -> Finding:
+    """Velocities obey joints and drivers at every sample."""
+    off = violation_series(bench.scene, bench.motion, 1)
+    return Finding(float(off.max()) / _rate(bench), LIKE_TRUTH)
+
+
+def true_velocities(bench: Bench) -> Finding | Outside:
+    """Velocities and angular velocities (world) against the exact ones."""
+    exact, length = bench.exact, scene_length(bench.scene)
+    if np.isnan(exact.velocity).any():
+        return Outside("the formula of this scene gives poses alone")
+    linear = np.linalg.norm(bench.motion.velocity - exact.velocity, axis=-1) / length
+    angular = np.linalg.norm(bench.motion.angular_velocity - exact.angular_velocity, axis=-1)
+    return Finding(float(max(linear.max(), angular.max())) / _rate(bench), LIKE_TRUTH)
+
+
+def true_accelerations(bench: Bench) -> Finding | Outside:
+    """Accelerations and angular accelerations (world), where the engine gives them, against exact ones."""
+    if bench.motion.acceleration is None:
+        return Outside("the engine gives no accelerations")
+    if bench.exact.acceleration is None:
+        return Outside("the formula of this scene gives poses alone")
+    found = [
+        (stacked(bench.scene, bench.motion, k), stacked(bench.scene, bench.exact, k))
+        for k in range(len(bench.times))
+    ]
+    scale = max(float(np.abs(true).max()) for _, true in found)
+    scale = max(scale, scene_length(bench.scene) / bench.scene.duration**2)
+    return Finding(max(float(np.abs(got - true).max()) for got, true in found) / scale, REACTIONS)
+
+
+def energy(bench: Bench) -> Finding | Outside:
     """Energy less the work of loads stays what it was, where something moves, nothing damps or drives."""
-    moved = difference(bench.scene, bench.motion, _at(bench.motion, np.zeros(len(bench.times), dtype=int)))
-    if moved < SAME_MOTION:
-        return None
-    drift = energy_series(bench.scene, bench.motion)
-    return None if drift is None else Finding(float(drift.max()), LIKE_TRUTH)
+    motion = bench.motion
+    if any(isinstance(load, Moment) for load in bench.scene.load):  # its work is summed over the samples
+        motion = bench.run(bench.scene, np.linspace(0.0, bench.scene.duration, DENSE))
+    if difference(bench.scene, motion, _at(motion, np.zeros(len(motion.times), dtype=int))) < SAME_MOTION:
+        return Outside("nothing moves")
+    drift = energy_series(bench.scene, motion)
+    if drift is None:
+        return Outside("a driver or a damper does work, or nothing has mass or energy")
+    return Finding(float(drift.max()), LIKE_TRUTH)
+
+
+def balanced(bench: Bench) -> Finding | Outside:
+    """Reactions and loads on every body are what moves it: the judge's own loads, the exact accelerations."""
+    return _of_reactions(bench, balance)
+
+
+def workless(bench: Bench) -> Finding | Outside:
+    """No reaction acts along a motion that its joint leaves free: the judge's own joint equations."""
+    return _of_reactions(bench, idle)
+
+
+def _of_reactions(bench: Bench, measured: Callable) -> Finding | Outside:
+    if not bench.motion.reactions:
+        return Outside("the engine gives no reactions, or the scene has no joint")
+    if bench.exact.acceleration is None or not bench.scene.has_mass():
+        return Outside("the accelerations are not known here")
+    return Finding(measured(bench.scene, bench.motion, bench.exact), REACTIONS)
+
+
+def _rate(bench: Bench) -> float:
+    """A rate (1/s) of the motion, no less than one over its time."""
+    moved = np.linalg.norm(bench.motion.velocity, axis=-1).max() / scene_length(bench.scene)
+    turned = np.linalg.norm(bench.motion.angular_velocity, axis=-1).max()
+    return max(float(moved), float(turned), 1 / bench.scene.duration)
 
 
 def silence(bench: Bench) -> Finding:
@@ -117,17 +198,21 @@ def other_times(bench: Bench) -> Finding:
     between = bench.times[:-1] + np.diff(bench.times) * np.resize([0.3, 0.7], len(bench.times) - 1)
     times = np.sort([*bench.times[1:], *between])
     common = _at(bench.run(bench.scene, times), np.isin(times, bench.times))
-    return Finding(difference(bench.scene, _at(bench.motion, slice(1, None)), common), bench.own_accuracy)
+    apart = difference(bench.scene, _at(bench.motion, slice(1, None)), common)
+    return Finding(apart, bench.own_accuracy, bench.floors)
 
 
-def related(name: str, bench: Bench) -> Finding | Cannot:
+def related(name: str, bench: Bench) -> Finding | Cannot | Outside:
     """The scene changed as the relation says moves as it says."""
     relation = RELATIONS[name]
-    scene = relation.change(bench.scene)
-    if cannot := engine(bench.engine).cannot(scene):
+    scene = relation.change(bench.scene, bench.motion)
+    if isinstance(scene, Outside):
+        return scene
+    if cannot := bench.runner.cannot(scene):
         return cannot
-    expected = in_scene_order(scene, relation.expect(bench.motion))
-    return Finding(difference(scene, expected, bench.run(scene, bench.times)), bench.own_accuracy)
+    expected = in_scene_order(scene, relation.expect(bench.scene, bench.motion))
+    found = bench.run(scene, expected.times)
+    return Finding(difference(scene, expected, found), bench.own_accuracy, bench.floors)
 
 
 def _at(run: Trajectory, samples: slice | np.ndarray) -> Trajectory:
@@ -144,22 +229,28 @@ def _related(specimen: Specimen) -> bool:
     return specimen.related
 
 
-def _property(check: Check, of: Callable[[Specimen], bool] = _every) -> Property:
-    return Property((check.__doc__ or "").splitlines()[0], check, of)
+def _property(check: Check, of: Callable[[Specimen], bool] = _every, version: int = 1) -> Property:
+    return Property((check.__doc__ or "").splitlines()[0], check, of, version)
 
 
 PROPERTIES: Mapping[str, Property] = {
     "times": _property(sample_times),
     "unit": _property(unit_orientations),
     "closure": _property(closure),
+    "rates": _property(rates_closed),
     "velocities": _property(velocities),
-    "truth": _property(truth),
-    "energy": _property(energy),
+    "truth": _property(truth, version=2),
+    "convergence": _property(convergence),
+    "speeds": _property(true_velocities),
+    "accelerations": _property(true_accelerations),
+    "energy": _property(energy, version=2),
+    "balance": _property(balanced),
+    "workless": _property(workless),
     "silence": _property(silence),
     "repeated": _property(determinism, _related),
-    "resampled": _property(other_times, _related),
+    "resampled": _property(other_times, _related, version=2),
     **{
-        name: Property(f"The scene {name}: {relation.about}.", partial(related, name), _related)
+        name: Property(f"The scene {name}: {relation.about}.", partial(related, name), _related, 2)
         for name, relation in RELATIONS.items()
     },
 }

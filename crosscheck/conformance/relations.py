@@ -8,9 +8,23 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.conformance.changes import mapped, replaced
+from crosscheck.conformance.replays import RESTARTED, REVERSED, replayed
+from crosscheck.conformance.rewritings import (
+    duplicated,
+    negated,
+    of_halves,
+    relabelled,
+    renamed,
+    satisfied,
+    split,
+    stretched,
+    swapped,
+)
+from crosscheck.conformance.trial import Outside
 from crosscheck.judge.tolerances import ROUNDING
 from mbref import rotations
-from mbref.scene import Scene
+from mbref.scene import Driver, Scene
 from mbref.trajectory import Trajectory
 
 FLIP = np.diag([1.0, -1.0, 1.0])  # of the body frames of a mirrored scene, which stay right-handed
@@ -18,12 +32,12 @@ FLIP = np.diag([1.0, -1.0, 1.0])  # of the body frames of a mirrored scene, whic
 
 @dataclass(frozen=True)
 class Relation:
-    """``about`` says it; ``change(scene)`` is another scene, and ``expect(trajectory)`` its motion, made of
-    the motion of the first."""
+    """``about`` says it; ``change(scene, motion)`` is another scene, or why there is none, and
+    ``expect(scene, motion)`` the other scene's motion, made of the motion of the first."""
 
     about: str
-    change: Callable[[Scene], Scene]
-    expect: Callable[[Trajectory], Trajectory]
+    change: Callable[[Scene, Trajectory], Scene | Outside]
+    expect: Callable[[Scene, Trajectory], Trajectory]
 
 
 @dataclass(frozen=True)
@@ -67,14 +81,14 @@ class Isometry:
         }  # fmt: skip
         along = {"displacement": self.polar}  # the axis of a driven displacement; others are of rotations
         joints = [
-            _with(joint, {**fields, "axis": along.get(joint.facts.driven, self.axial)})
+            mapped(joint, {**fields, "axis": along.get(joint.facts.driven, self.axial)})
             for joint in scene.joint
         ]
         return scene.with_(
             gravity=self.polar(scene.gravity),
-            body=tuple(_with(body, fields) for body in scene.body),
+            body=tuple(mapped(body, fields) for body in scene.body),
             joint=tuple(joints),
-            load=tuple(_with(load, fields) for load in scene.load),
+            load=tuple(mapped(load, fields) for load in scene.load),
         )
 
     def expect(self, motion: Trajectory) -> Trajectory:
@@ -86,13 +100,6 @@ class Isometry:
         )  # fmt: skip
 
 
-def _with(item: Any, fields: dict[str, Callable[[Any], Any]]) -> Any:
-    """A validated copy of a body, joint or load with the named fields mapped, where it has them."""
-    given = {name: getattr(item, name) for name in type(item).model_fields}
-    changed = {n: f(given[n]).tolist() for n, f in fields.items() if given.get(n) is not None}
-    return type(item)(**{**given, **changed})
-
-
 def scaled(scene: Scene, factor: float) -> Scene:
     """Masses, inertias, forces, stiffnesses and dampings times a factor: the motion stays the same."""
 
@@ -101,8 +108,8 @@ def scaled(scene: Scene, factor: float) -> Scene:
 
     fields = dict.fromkeys(("mass", "inertia", "force", "moment", "stiffness", "damping"), times)
     return scene.with_(
-        body=tuple(_with(body, fields) for body in scene.body),
-        load=tuple(_with(load, fields) for load in scene.load),
+        body=tuple(mapped(body, fields) for body in scene.body),
+        load=tuple(mapped(load, fields) for load in scene.load),
     )
 
 
@@ -111,25 +118,63 @@ def reordered(scene: Scene) -> Scene:
     return scene.with_(body=scene.body[::-1], joint=scene.joint[::-1], load=scene.load[::-1])
 
 
-def shaken(seed: int) -> Relation:
+def shaken(scene: Scene, seed: int) -> Scene:
     """Every place (m) and direction of a scene is off by rounding, at random."""
+    random = np.random.default_rng(seed)
 
-    def change(scene: Scene) -> Scene:
-        random = np.random.default_rng(seed)
+    def shake(value: Any) -> np.ndarray:
+        return np.asarray(value) + ROUNDING * random.standard_normal(np.shape(value))
 
-        def shake(value: Any) -> np.ndarray:
-            return np.asarray(value) + ROUNDING * random.standard_normal(np.shape(value))
-
-        fields = dict.fromkeys(("position", "orientation", "anchor", "anchors", "axis", "axes"), shake)
-        return scene.with_(
-            body=tuple(_with(body, fields) for body in scene.body),
-            joint=tuple(_with(joint, fields) for joint in scene.joint),
-        )
-
-    return Relation("places and directions off by rounding, the motion stays, to rounding", change, _same)
+    fields = dict.fromkeys(("position", "orientation", "anchor", "anchors", "axis", "axes"), shake)
+    return scene.with_(
+        body=tuple(mapped(body, fields) for body in scene.body),
+        joint=tuple(mapped(joint, fields) for joint in scene.joint),
+    )
 
 
-def _same(motion: Trajectory) -> Trajectory:
+def in_other_units(scene: Scene, length: float, time: float) -> Scene:
+    """The scene with its lengths and times multiplied, and all else as its units say; masses stay."""
+    speed, push = length / time, length / time**2
+
+    def by(factor: float) -> Callable[[Any], np.ndarray]:
+        return lambda value: factor * np.asarray(value)
+
+    places = dict.fromkeys(("position", "anchor", "anchors", "point", "points", "natural_length"), by(length))
+    bodies = {**places, "velocity": by(speed), "angular_velocity": by(1 / time), "inertia": by(length**2)}
+    loads = {**places, "force": by(push), "moment": by(length * push)}
+    linear = {"stiffness": by(1 / time**2), "damping": by(1 / time)}
+    turning = {"stiffness": by(length * push), "damping": by(length * speed)}
+    slides = {joint.name for joint in scene.joint if joint.facts.driven == "displacement"}
+    return scene.with_(
+        gravity=by(push)(scene.gravity).tolist(), duration=scene.duration * time,
+        body=tuple(mapped(body, bodies) for body in scene.body),
+        joint=tuple(mapped(joint, places) for joint in scene.joint),
+        driver=tuple(_slower(d, length if d.joint in slides else 1.0, time) for d in scene.driver),
+        load=tuple(mapped(x, {**loads, **(linear if x.type == "spring" else turning)}) for x in scene.load),
+    )  # fmt: skip
+
+
+def _slower(driver: Driver, amount: float, time: float) -> Driver:
+    polynomial = tuple(amount * c / time**k for k, c in enumerate(driver.polynomial))
+    wave = driver.sine and replaced(
+        driver.sine, amplitude=amount * driver.sine.amplitude, frequency=driver.sine.frequency / time
+    )
+    return replaced(driver, polynomial=polynomial, sine=wave)
+
+
+def _other_units(about: str, length: float, time: float) -> Relation:
+    def expect(scene: Scene, motion: Trajectory) -> Trajectory:
+        return replace(
+            motion, times=time * motion.times, position=length * motion.position,
+            velocity=length / time * motion.velocity, angular_velocity=motion.angular_velocity / time,
+            acceleration=None, angular_acceleration=None, reactions=None,
+        )  # fmt: skip
+
+    return Relation(about, lambda scene, motion: in_other_units(scene, length, time), expect)
+
+
+def same(scene: Scene, motion: Trajectory) -> Trajectory:
+    """The motion itself, of a change that leaves it what it is."""
     return motion
 
 
@@ -140,7 +185,12 @@ NORMAL = np.array([0.6, 0.8, 0.0])
 
 def _isometry(about: str, matrix: np.ndarray, shift: Sequence[float] = (0.0, 0.0, 0.0)) -> Relation:
     isometry = Isometry(matrix, np.array(shift))
-    return Relation(about, isometry.change, isometry.expect)
+    return Relation(about, lambda scene, _: isometry.change(scene), lambda _, motion: isometry.expect(motion))
+
+
+def unchanged(about: str, change: Callable[[Scene], Scene | Outside]) -> Relation:
+    """The relation of a change that leaves the motion what it is."""
+    return Relation(about, lambda scene, motion: change(scene), same)
 
 
 RELATIONS = {
@@ -148,6 +198,18 @@ RELATIONS = {
     "turned": _isometry("about z, its motion rotates with it", IN_PLANE),
     "translated": _isometry("its motion moves with it", np.eye(3), (0.3, -0.5, 0.0)),
     "mirrored": _isometry("its motion is the mirror image", np.eye(3) - 2 * np.outer(NORMAL, NORMAL)),
-    "scaled": Relation("masses and loads times 2.5, the motion stays", lambda s: scaled(s, 2.5), _same),
-    "reordered": Relation("bodies and joints listed in reverse, the motion stays", reordered, _same),
+    "scaled": unchanged("masses and loads times 2.5, the motion stays", lambda s: scaled(s, 2.5)),
+    "reordered": unchanged("bodies and joints listed in reverse, the motion stays", reordered),
+    "relabelled": Relation("under other names, the motion stays", lambda s, _: relabelled(s), renamed),
+    "swapped": unchanged("with the bodies of every joint exchanged, the motion stays", swapped),
+    "stretched": unchanged("with axes 1000 times as long, the motion stays", stretched),
+    "duplicated": unchanged("with a joint given twice, the motion stays", duplicated),
+    "satisfied": unchanged("with a joint that the motion satisfies anyway, the motion stays", satisfied),
+    "split": Relation("with a body as two welded halves, the motion stays", lambda s, _: split(s), of_halves),
+    "negated": unchanged("with the other sign of every quaternion, the motion stays", negated),
+    "enlarged": _other_units("four times as large, twice as slow under its gravity (Froude)", 4.0, 2.0),
+    "in millimetres": _other_units("with its lengths in millimetres, the motion stays", 1000.0, 1.0),
+    "restarted": Relation("from its state half way, the motion goes on", *RESTARTED),
+    "reversed": Relation("from its last state with velocities reversed, the motion goes back", *REVERSED),
+    "replayed": Relation("by its driver's moment instead, the motion stays", replayed, same),
 }

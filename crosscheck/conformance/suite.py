@@ -15,12 +15,13 @@ from rich.text import Text
 
 from crosscheck.conformance.features import undetermined
 from crosscheck.conformance.properties import PROPERTIES, Finding
-from crosscheck.conformance.trial import Bench, Broken, Specimen, set_up
-from crosscheck.engine import Cannot
+from crosscheck.conformance.runners import InProcess, Isolated, Runner
+from crosscheck.conformance.trial import Bench, Broken, Outside, Specimen, set_up
 from crosscheck.processes.pool import ChildFailed
 
-PASS, FAIL, CANNOT = "pass", "fail", "cannot"
+PASS, FAIL, CANNOT, OUTSIDE = "pass", "fail", "cannot", "outside"
 REFUSAL, RUN = "refusal", "run"
+MARKS = {PASS: ("✓", "green"), FAIL: ("✗", "bold red"), CANNOT: ("–", "yellow"), OUTSIDE: ("○", "dim")}
 FIRST = {
     REFUSAL: "What cannot be run is refused by cannot() with a reason, and what is not refused has settings.",
     RUN: "The run at the finest setting of the engine's best family completes.",
@@ -29,8 +30,9 @@ FIRST = {
 
 @dataclass(frozen=True)
 class Verdict:
-    """One property on one scene: ``status`` pass, fail or cannot; ``measured`` against ``allowed`` where a
-    number decides; ``reason`` a sentence where one is needed."""
+    """One property on one scene: ``status`` pass, fail, cannot (the engine), or outside (the scene is out of
+    the property's domain); ``measured`` against ``allowed`` where a number decides; ``reason`` a sentence
+    where one is needed; ``card`` names the property and its version."""
 
     property: str
     scene: str
@@ -38,6 +40,10 @@ class Verdict:
     measured: float | None = None
     allowed: float | None = None
     reason: str = ""
+
+    def card(self) -> str:
+        """The property with its version: verdicts of different cards are not compared."""
+        return f"{self.property}/{PROPERTIES[self.property].version if self.property in PROPERTIES else 1}"
 
 
 @dataclass(frozen=True)
@@ -56,7 +62,10 @@ class Conformance:
 
     def to_record(self) -> dict[str, Any]:
         """What ``verify --json`` prints; numbers that are not finite are null."""
-        verdicts = [{k: _finite(v) for k, v in asdict(verdict).items()} for verdict in self.verdicts]
+        verdicts = [
+            {"card": verdict.card(), **{k: _finite(v) for k, v in asdict(verdict).items()}}
+            for verdict in self.verdicts
+        ]
         return {**asdict(self), "conforms": self.conforms, "verdicts": verdicts}
 
 
@@ -68,11 +77,18 @@ def verify(
 ) -> Conformance:
     """Hold the suite against an engine (a name or ``module:attribute``); every run is in a child
     process with a ``time_limit`` (s).  ``progress`` is told the scene just done.  Raises LookupError."""
+    return held_against(Isolated(engine, time_limit), specimens, progress)
+
+
+def held_against(
+    runner: Runner, specimens: Sequence[Specimen], progress: Callable[[str], None] | None = None
+) -> Conformance:
+    """The verdicts on a runner's engine; runs in this process take place one after another."""
     versions: set[str] = set()
 
     def examined(specimen: Specimen) -> list[Verdict]:
         try:
-            bench = set_up(engine, specimen, time_limit)
+            bench = set_up(runner, specimen)
         except ChildFailed as failure:
             verdicts = [Verdict(REFUSAL, specimen.scene.name, FAIL, reason=str(failure))]
         else:
@@ -82,40 +98,58 @@ def verify(
             progress(specimen.scene.name)
         return verdicts
 
-    with ThreadPoolExecutor(os.cpu_count()) as threads:
+    with ThreadPoolExecutor(1 if isinstance(runner, InProcess) else os.cpu_count()) as threads:
         groups = threads.map(examined, [Specimen(undetermined()), *specimens])
         verdicts = [verdict for group in groups for verdict in group]
-    return Conformance(engine, ", ".join(sorted(versions)), verdicts)
+    return Conformance(runner.name, ", ".join(sorted(versions)), verdicts)
 
 
 def examine(bench: Bench) -> Iterator[Verdict]:
     """The verdicts on one bench."""
+    yield (first := refusal(bench))
+    if first.status == PASS and not bench.cannot:
+        yield from _run(bench)
+
+
+def refusal(bench: Bench) -> Verdict:
+    """Whether the engine refuses what it cannot run, and has settings for what it can."""
     name = bench.scene.name
     impossible = bench.scene == undetermined()
     if bench.cannot:
-        yield Verdict(REFUSAL, name, PASS if impossible else CANNOT, reason=str(bench.cannot))
-    elif impossible or not bench.settings:
+        return Verdict(REFUSAL, name, PASS if impossible else CANNOT, reason=str(bench.cannot))
+    if impossible or not bench.settings:
         reason = "cannot() is silent on a motion without masses" if impossible else "it offers no setting"
-        yield Verdict(REFUSAL, name, FAIL, reason=reason)
-    else:
-        yield Verdict(REFUSAL, name, PASS)
-        yield from _run(bench)
+        return Verdict(REFUSAL, name, FAIL, reason=reason)
+    return Verdict(REFUSAL, name, PASS)
+
+
+def verdict_on(card: str, bench: Bench) -> Verdict:
+    """The verdict of one card, named as in `abouts`, on a bench."""
+    known = {REFUSAL: refusal, RUN: first_run}
+    return known[card](bench) if card in known else judged(card, bench)
 
 
 def _run(bench: Bench) -> Iterator[Verdict]:
     """Whether the run at the finest setting completes, and what it shows if it does."""
+    yield (first := first_run(bench))
+    if first.status == FAIL:
+        return
+    for label, entry in PROPERTIES.items():
+        if entry.of(bench.specimen):
+            yield judged(label, bench)
+
+
+def first_run(bench: Bench) -> Verdict:
+    """Whether the run at the finest setting completes."""
     try:
         reached = bench.motion.t_end
     except Broken as broken:
-        yield Verdict(RUN, bench.scene.name, FAIL, reason=str(broken))
-        return
-    yield Verdict(RUN, bench.scene.name, PASS, reason=f"reached {reached:g} s")
-    for label, entry in PROPERTIES.items():
-        if entry.of(bench.specimen) and (found := _judged(label, bench)):
-            yield found
+        return Verdict(RUN, bench.scene.name, FAIL, reason=str(broken))
+    return Verdict(RUN, bench.scene.name, PASS, reason=f"reached {reached:g} s")
 
 
-def _judged(label: str, bench: Bench) -> Verdict | None:
+def judged(label: str, bench: Bench) -> Verdict:
+    """The verdict of one property on a bench whose engine can run the scene."""
     try:
         found = PROPERTIES[label].check(bench)
     except Broken as broken:
@@ -123,23 +157,38 @@ def _judged(label: str, bench: Bench) -> Verdict | None:
     if isinstance(found, Finding):
         status = PASS if found.measured <= found.allowed else FAIL
         return Verdict(label, bench.scene.name, status, found.measured, found.allowed, found.remark)
-    return Verdict(label, bench.scene.name, CANNOT, reason=str(found)) if isinstance(found, Cannot) else None
+    if isinstance(found, Outside):
+        return Verdict(label, bench.scene.name, OUTSIDE, reason=found.reason)
+    return Verdict(label, bench.scene.name, CANNOT, reason=str(found))
 
 
 def tables(conformance: Conformance) -> Iterator[Table | Text]:
     """A table of scenes × properties, then what the failures and gaps are."""
     by_place = {(v.scene, v.property): v for v in conformance.verdicts}
     properties = [n for n in (*FIRST, *PROPERTIES) if any(v.property == n for v in conformance.verdicts)]
-    title = f"{conformance.engine} {conformance.version}: ✓ pass, ✗ fail, – cannot; the number measured"
+    title = f"{conformance.engine} {conformance.version}: ✓ pass, ✗ fail, – cannot, ○ outside; measured"
     table = Table(Column("scene", no_wrap=True), *properties, title=title, box=SIMPLE, padding=(0, 1, 0, 0))
     for scene in dict.fromkeys(v.scene for v in conformance.verdicts):
         table.add_row(scene, *(_cell(by_place.get((scene, name))) for name in properties))
     yield table
-    for verdict in conformance.verdicts:
-        if verdict.status != PASS:
-            yield _sentence(verdict)
-    yield from (Text(f"{name}: {abouts()[name]}", style="dim") for name in properties)
+    yield from (_sentence(verdict) for verdict in conformance.verdicts if verdict.status in (FAIL, CANNOT))
+    yield from _domains(conformance)
+    yield from (Text(f"{_card(name)}: {abouts()[name]}", style="dim") for name in properties)
     yield _summary(conformance)
+
+
+def _domains(conformance: Conformance) -> Iterator[Text]:
+    """Why cards do not apply, one line for a card and a reason."""
+    places: dict[tuple[str, str], list[str]] = {}
+    for verdict in conformance.verdicts:
+        if verdict.status == OUTSIDE:
+            places.setdefault((verdict.property, verdict.reason), []).append(verdict.scene)
+    for (name, reason), scenes in places.items():
+        yield Text(f"outside: {name}: {reason} ({', '.join(scenes)})", style="dim")
+
+
+def _card(name: str) -> str:
+    return Verdict(name, "", PASS).card()
 
 
 def abouts() -> dict[str, str]:
@@ -150,7 +199,7 @@ def abouts() -> dict[str, str]:
 def _cell(verdict: Verdict | None) -> Text:
     if verdict is None:
         return Text("")
-    mark, style = {PASS: ("✓", "green"), FAIL: ("✗", "bold red"), CANNOT: ("–", "yellow")}[verdict.status]
+    mark, style = MARKS[verdict.status]
     number = "" if verdict.measured is None else f"{verdict.measured:.0e}" if verdict.measured else "0"
     return Text(mark + number, style=style)
 
@@ -164,9 +213,7 @@ def _sentence(verdict: Verdict) -> Text:
 
 
 def _summary(conformance: Conformance) -> Text:
-    counts = [
-        f"{sum(v.status == status for v in conformance.verdicts)} {status}" for status in (PASS, FAIL, CANNOT)
-    ]
+    counts = [f"{sum(v.status == status for v in conformance.verdicts)} {status}" for status in MARKS]
     return Text(f"{conformance.engine}: {', '.join(counts)}")
 
 

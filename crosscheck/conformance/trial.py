@@ -10,12 +10,15 @@ import numpy as np
 
 from crosscheck.conformance.closed_forms import CLOSED_FORMS, Exact
 from crosscheck.conformance.features import feature_scenes
+from crosscheck.conformance.moving import moving_probes
+from crosscheck.conformance.runners import Runner
 from crosscheck.engine import Cannot, Setting
+from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.metrics import error_series, in_scene_order
 from crosscheck.judge.reference.reference import SECONDS
-from crosscheck.judge.tolerances import OWN_ACCURACY, SAME_MOTION
+from crosscheck.judge.tolerances import OWN_ACCURACY, ROUNDING, SAME_MOTION, TWINS
 from crosscheck.judge.truth import NoSolution, truth_for
-from crosscheck.processes.pool import Observation, capabilities, observe, run_isolated
+from crosscheck.processes.pool import Observation
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
@@ -29,11 +32,21 @@ SHORT = {  # built-in scenes with a truth, and end times (s) before their first 
     "spatial_slider_crank": 0.02,
     "spatial_slider_crank_driven": 0.02,
 }
-RELATED = ("pendulum", "torsion", "oscillator", "four_bar_gravity", "spatial_slider_crank")
+RELATED = (  # the scenes that are changed as relations say at quick depth
+    "pendulum", "torsion", "oscillator", "driven", "turntable", "four_bar_gravity", "spinning loop",
+    "cylindrical driver", "force load", "tumbling body",
+)  # fmt: skip
 
 
 class Broken(Exception):
     """A run that a property needs did not complete."""
+
+
+@dataclass(frozen=True)
+class Outside:
+    """A scene is out of a card's domain, and the reason."""
+
+    reason: str
 
 
 @dataclass(frozen=True)
@@ -47,31 +60,27 @@ class Specimen:
     reference_time: float = SECONDS
 
 
-def specimens() -> list[Specimen]:
-    """Closed forms, scenes with a truth, and one probe for every feature."""
-    forms = [Specimen(*make(), make.__name__ in RELATED) for make in CLOSED_FORMS]
-    truths = [
-        Specimen(SCENES[name]().with_(duration=end), None, name in RELATED) for name, end in SHORT.items()
-    ]
-    known = {specimen.scene.name for specimen in truths}
-    probes = feature_scenes().items()
-    return forms + truths + [Specimen(_named(n, scene)) for n, scene in probes if scene.name not in known]
-
-
-def _named(feature: str, scene: Scene) -> Scene:
-    return scene.with_(name=feature)
+def specimens(deep: bool = False) -> list[Specimen]:
+    """Closed forms, scenes with a truth, and one probe for every feature; ``deep`` relates all of them."""
+    forms = [Specimen(*make(), deep or make.__name__ in RELATED) for make in CLOSED_FORMS]
+    scenes = [SCENES[name]().with_(duration=end) for name, end in SHORT.items()]
+    known = {scene.name for scene in scenes}
+    probes = {
+        name: scene.with_(name=name) for name, scene in feature_scenes().items() if scene.name not in known
+    }
+    scenes += (probes | moving_probes()).values()
+    return forms + [Specimen(scene, None, deep or scene.name in RELATED) for scene in scenes]
 
 
 @dataclass(frozen=True)
 class Bench:
-    """``engine`` is a name or ``module:attribute``; ``settings`` are the best family's, coarse to fine."""
+    """``settings`` are the best family's, coarse to fine."""
 
-    engine: str
+    runner: Runner
     specimen: Specimen
     version: str
     cannot: Cannot | None
     settings: Sequence[Setting]
-    time_limit: float  # s, of each run
 
     @property
     def scene(self) -> Scene:
@@ -98,33 +107,48 @@ class Bench:
 
     def observed(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
         """A run in a process of its own, and what it printed and left behind."""
-        return observe(self.engine, scene, times, setting, self.time_limit)
+        return self.runner.observe(scene, times, setting)
 
     @property
     def shared_runs(self) -> list[Trajectory]:
         """Completed runs at the finest setting, with one at the coarsest between them, in one process."""
         settings = self.settings[-1], self.settings[0], self.settings[-1]
-        runs = [run_isolated(self.engine, self.scene, self.times, s, self.time_limit) for s in settings]
+        runs = self.runner.in_turn(self.scene, self.times, settings)
         return [completed(self.scene, run, len(self.times)) for run in (runs[0], runs[2])]
 
     @cached_property
-    def own_accuracy(self) -> float:
-        """Largest error that runs which should agree may have between them: multiples of the difference
-        of the two finest settings, and no less than SAME_MOTION."""
+    def steps_apart(self) -> float:
+        """Difference of the runs at the two finest settings."""
         coarser = self.observed(self.scene, self.times, self.settings[-2:][0])
-        apart = difference(self.scene, self.motion, completed(self.scene, coarser.value, len(self.times)))
-        return max(SAME_MOTION, OWN_ACCURACY * apart)
+        return difference(self.scene, self.motion, completed(self.scene, coarser.value, len(self.times)))
 
     @cached_property
-    def exact(self) -> Trajectory | None:
-        """The exact motion at the sample times, where it is known."""
+    def twins_apart(self) -> float:
+        """Difference of two runs whose scenes differ by two units in the last place of every number."""
+        twin = self.run(nudged(self.scene), self.times)
+        return difference(self.scene, self.motion, twin)
+
+    @cached_property
+    def own_accuracy(self) -> float:
+        """Largest difference of runs which should agree: multiples of what the two finest settings and twin
+        runs differ by, and no less than SAME_MOTION."""
+        return max(SAME_MOTION, OWN_ACCURACY * self.steps_apart, TWINS * self.twins_apart)
+
+    @property
+    def floors(self) -> str:
+        """What `own_accuracy` was measured from, in words."""
+        return f"twin runs {self.twins_apart:.1e} apart, two finest settings {self.steps_apart:.1e}"
+
+    @cached_property
+    def exact(self) -> Trajectory:
+        """The exact motion at the sample times."""
         return exact_motion(self.specimen, self.times)
 
 
-def set_up(engine: str, specimen: Specimen, time_limit: float) -> Bench:
+def set_up(runner: Runner, specimen: Specimen) -> Bench:
     """A bench with what the engine says of the specimen; raises ChildFailed when it cannot even say."""
-    version, cannot, settings = capabilities(engine, specimen.scene, time_limit)
-    return Bench(engine, specimen, version, cannot, best_family(settings), time_limit)
+    version, cannot, settings = runner.offers(specimen.scene)
+    return Bench(runner, specimen, version, cannot, best_family(settings))
 
 
 def best_family(settings: Sequence[Setting]) -> list[Setting]:
@@ -144,19 +168,37 @@ def completed(scene: Scene, run: Trajectory, samples: int) -> Trajectory:
 
 
 def difference(scene: Scene, first: Trajectory, second: Trajectory) -> float:
-    """Largest position difference over the scene's length, or rotation angle, between two runs."""
-    return float(error_series(scene, first, second).max())
+    """Largest position difference over the scene's length, or rotation angle, between two runs; infinite
+    where one is not finite."""
+    worst = float(error_series(scene, first, second).max())
+    return worst if np.isfinite(worst) else np.inf
 
 
-def exact_motion(specimen: Specimen, times: np.ndarray) -> Trajectory | None:
-    """Exact poses at times (k,); None where there is neither formula nor reference. Velocities of a formula
-    are NaN."""
+def nudged(scene: Scene) -> Scene:
+    """The scene with masses, gravity and positions moved by two units in the last place."""
+    factor = 1.0 + 2.0 * ROUNDING
+
+    def grown(values: Sequence[float] | None) -> tuple[float, ...] | None:
+        return None if values is None else tuple(factor * x for x in values)
+
+    bodies = [
+        body.model_copy(update={"mass": body.mass and factor * body.mass, "position": grown(body.position),
+                                "velocity": grown(body.velocity)})
+        for body in scene.body
+    ]  # fmt: skip
+    return scene.with_(body=tuple(bodies), gravity=grown(scene.gravity))
+
+
+def exact_motion(specimen: Specimen, times: np.ndarray) -> Trajectory:
+    """Exact poses at times (k,): of a formula (its velocities are NaN), a truth, or Gauss's principle."""
     if specimen.exact is None:
         truth = truth_for(specimen.scene, specimen.reference_time)
         try:
-            return None if truth is None else truth.poses(times)
+            if truth is not None:
+                return truth.poses(times)
         except NoSolution:
-            return None
+            pass  # no reference within its time: accelerations at the start are still known
+        return gauss_motion(specimen.scene, tuple(times.tolist()))
     position, orientation = specimen.exact(times)
     unknown = np.full_like(position, np.nan)
     names = tuple(body.name for body in specimen.scene.body)

@@ -19,6 +19,7 @@ from mbref import rotations
 from mbref.scene import GROUND, Joint, Scene
 from mbref.trajectory import Trajectory
 
+LEAST = 1e-3  # m/s²: forces that accelerate the masses by less count as none
 SAMPLES = 11  # of a trajectory, spread over it, that are compared
 
 
@@ -26,7 +27,7 @@ SAMPLES = 11  # of a trajectory, spread over it, that are compared
 class Reaction:
     """One joint's reactions in two runs: ``shared`` dimensions of the wrench that redundancy leaves open,
     and the largest differences across (``unique``) and in (``chosen``) them, relative to the largest
-    reaction of the sample; moments count divided by the scene's length."""
+    reaction of the first run; moments count divided by the scene's length."""
 
     shared: int
     unique: float
@@ -56,15 +57,17 @@ def shared_wrenches(
     for joint in scene.joint:
         count = len(length_rows(scene)[joint.name])
         own = slice(start, start + count)
-        wrenches = _on_second(scene, joint, rows[own], position, orientation) @ open_[own]
+        wrenches = on_second(scene, joint, rows[own], position, orientation) @ open_[own]
         found[joint.name] = _span(wrenches / np.repeat([1.0, length], 3)[:, None], np.abs(rows).max())
         start += count
     return found
 
 
 def compare(scene: Scene, first: Trajectory, second: Trajectory) -> Comparison:
-    """Reactions of two runs of a scene at some common samples; both have reactions and the same times.
+    """Reactions of a reference and of a run of a scene at some common samples; both have the same times.
 
+    Differences count relative to the reference's largest reaction, so that absurd answers show as large
+    numbers.
     Raises ValueError when one has no reactions or their times differ.
     """
     samples = min(len(first.times), len(second.times))
@@ -73,7 +76,8 @@ def compare(scene: Scene, first: Trajectory, second: Trajectory) -> Comparison:
     if not samples or not np.array_equal(first.times[:samples], second.times[:samples]):
         raise ValueError("runs are compared at common times")
     chosen = np.unique(np.linspace(0, samples - 1, min(samples, SAMPLES)).round().astype(int))
-    tables = [_at_sample(scene, first, second, int(k)) for k in chosen]
+    scale = _largest(scene, first)
+    tables = [_at_sample(scene, first, second, int(k), scale) for k in chosen]
     joints = {
         name: Reaction(*(max(found) for found in zip(*(joints[name] for joints, _ in tables), strict=True)))
         for name in first.reactions
@@ -113,15 +117,22 @@ def resultants(scene: Scene, run: Trajectory, sample: int) -> np.ndarray:
     return total
 
 
+def _largest(scene: Scene, run: Trajectory) -> float:
+    """The largest reaction of a run, N; no less than what moves the masses by LEAST."""
+    units = np.repeat([1.0, scene_length(scene)], 3)
+    sizes = [
+        float(np.linalg.norm(wrench / units, axis=-1).max()) for wrench in (run.reactions or {}).values()
+    ]
+    return max(*sizes, 0.0, LEAST * sum(body.mass or 1.0 for body in scene.body))
+
+
 def _at_sample(
-    scene: Scene, first: Trajectory, second: Trajectory, k: int
+    scene: Scene, first: Trajectory, second: Trajectory, k: int, scale: float
 ) -> tuple[dict[str, tuple[int, float, float]], float]:
     """(shared, unique, chosen) by joint and the difference of resultants, at one sample."""
     assert first.reactions is not None and second.reactions is not None
     units = np.repeat([1.0, scene_length(scene)], 3)
     shared = shared_wrenches(scene, first.times[k], first.position[k], first.orientation[k])
-    sizes = [np.linalg.norm(w[k] / units) for r in (first.reactions, second.reactions) for w in r.values()]
-    scale = max(*sizes, 1e-300)
     joints = {}
     for name, basis in shared.items():
         apart = (second.reactions[name][k] - first.reactions[name][k]) / units / scale
@@ -131,10 +142,10 @@ def _at_sample(
     return joints, float(np.abs(off).max(initial=0.0))
 
 
-def _on_second(
+def on_second(
     scene: Scene, joint: Joint, rows: np.ndarray, position: np.ndarray, orientation: np.ndarray
 ) -> np.ndarray:
-    """(6, rows): wrench on the second body at its anchor of unit multipliers of the joint's rows."""
+    """(6, rows): wrench on the second body at its anchor of unit multipliers of its rows (rows, 6 nb)."""
     first, second = (scene.body_index(name) for name in joint.bodies)
     b, sign = (second, 1.0) if second >= 0 else (first, -1.0)
     wrench = sign * rows[:, 6 * b : 6 * b + 6].T

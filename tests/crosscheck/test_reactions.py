@@ -10,12 +10,15 @@ import pytest
 from crosscheck.conformance.trial import best_family
 from crosscheck.engine import engine
 from crosscheck.judge.constraints import initial_poses
+from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.joint_reactions import compare, resultants, shared_wrenches, side_by_side
+from crosscheck.judge.reaction_balance import absurd, with_exact_reactions
 from mbref.scene import Body, Revolute, Scene, Spherical
 from mbref.scenes import SCENES
 from mbref.trajectory import Trajectory
 
 Z = (0.0, 0.0, 1.0)
+WILD = np.array([1e7, 0.0, 0.0, 0.0, 0.0, 0.0])  # N, N m
 TIMES = np.array([0.0, 0.01, 0.02, 0.03])
 AGREE = {  # of the largest reaction, at the finest setting of every engine
     "mujoco": 1e-3,  # forces of springs of softness 1e-13: rounding of the accelerations shows in them
@@ -90,3 +93,25 @@ def test_choices_side_by_side_and_weight():
     found = compare(scene, motion, replace(motion, reactions=moved))
     assert found.resultant < 1e-12 and max(r.unique for r in found.joints.values()) < 1e-12, found
     assert min(r.chosen for r in found.joints.values()) > 0.05, found
+
+
+@pytest.mark.parametrize("name", ["spatial_slider_crank_gravity", "planar_slider_crank_gravity", "door"])
+def test_mbref_and_exact_reactions(name):
+    """The unique parts by Newton, Euler and the exact accelerations, mbref apart."""
+    scene = door(Spherical) if name == "door" else SCENES[name]()
+    exact = with_exact_reactions(scene, gauss_motion(scene, tuple(TIMES.tolist())))
+    found = compare(scene, exact, run("mbref", scene))
+    worst = max(reaction.unique for reaction in found.joints.values())
+    assert worst < 1e-7 and found.resultant < 1e-7, f"{name}: {worst:.1e} and {found.resultant:.1e}"
+
+
+def test_absurd_reactions_and_their_size():
+    """Ten million newtons where a hundred are right show as what they are, and are named."""
+    scene = door(Spherical)
+    exact = with_exact_reactions(scene, gauss_motion(scene, tuple(TIMES.tolist())))
+    assert absurd(scene, exact, exact) == []
+    wild = {name: wrench + WILD for name, wrench in exact.reactions.items()}
+    found = compare(scene, exact, replace(exact, reactions=wild))
+    assert min(reaction.unique for reaction in found.joints.values()) > 1e4, found
+    sentences = absurd(scene, replace(exact, reactions=wild), exact)
+    assert len(sentences) == 2 and "1e+07 N in low" in sentences[0], sentences

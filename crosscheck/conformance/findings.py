@@ -1,0 +1,123 @@
+"""What the suite finds, made small and kept: a scene file and the command that replays it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from crosscheck.conformance import suite
+from crosscheck.conformance.changes import replaced
+from crosscheck.conformance.runners import Runner
+from crosscheck.conformance.trial import Bench, Specimen, set_up
+from mbref.scene import GROUND, Scene, SceneError
+
+TRIES = 60  # scenes tried while a violation is made small
+
+
+def violates(runner: Runner, card: str) -> Callable[[Scene], bool]:
+    """Whether a scene makes a card fail on the runner's engine."""
+
+    def fails(scene: Scene) -> bool:
+        bench = set_up(runner, Specimen(scene, None, True))
+        return not bench.cannot and suite.verdict_on(card, bench).status == suite.FAIL
+
+    return fails
+
+
+def shrunk(scene: Scene, fails: Callable[[Scene], bool], tries: int = TRIES) -> Scene:
+    """The smallest scene found that still fails: with fewer loads, drivers, joints and bodies, a shorter
+    duration and rounder numbers; the scene itself when nothing can go."""
+    left, found = tries, True
+    while found and left > 0:
+        found = False
+        for smaller in _smaller(scene):
+            left -= 1
+            if left < 0:
+                break
+            if fails(smaller):
+                scene, found = smaller, True
+                break
+    return scene
+
+
+def keep(scene: Scene, verdict: suite.Verdict, engine: str, folder: Path) -> Path:
+    """Write a scene file that begins with the violation and the command that replays it; its path."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{engine}_{verdict.property}_{scene.name}.toml".replace(" ", "_").replace(":", "_")
+    scene.save(path)
+    numbers = "" if verdict.measured is None else f" {verdict.measured:.3g}, allowed {verdict.allowed:.3g}"
+    words = [
+        f"{engine}: {verdict.card()} fails{numbers} {verdict.reason}".rstrip(),
+        f"crosscheck verify {engine} --scene {path}",
+    ]
+    path.write_text("".join(f"# {word}\n" for word in words) + path.read_text())
+    return path
+
+
+def found(bench: Bench, verdict: suite.Verdict, folder: Path) -> Path:
+    """Make a violation small and keep it; the file's path."""
+    small = shrunk(bench.scene, violates(bench.runner, verdict.property))
+    again = verdict
+    if small != bench.scene:
+        again = suite.verdict_on(verdict.property, set_up(bench.runner, Specimen(small, None, True)))
+    return keep(small, replace(again, scene=small.name), bench.runner.name, folder)
+
+
+def _smaller(scene: Scene) -> Iterator[Scene]:
+    """Valid scenes with less in them, the largest cuts first."""
+    for candidate in (*_without_bodies(scene), *_without_items(scene), *_simpler(scene)):
+        try:
+            smaller = candidate()
+        except SceneError:
+            continue
+        if smaller != scene:
+            yield smaller
+
+
+def _without_bodies(scene: Scene) -> list[Callable[[], Scene]]:
+    def without(name: str) -> Scene:
+        def kept(item) -> bool:
+            return name not in (getattr(item, "body", None), *getattr(item, "bodies", ()))
+
+        joints = tuple(filter(kept, scene.joint))
+        names = {joint.name for joint in joints}
+        return scene.with_(
+            body=tuple(body for body in scene.body if body.name != name), joint=joints,
+            driver=tuple(d for d in scene.driver if d.joint in names),
+            load=tuple(x for x in scene.load if kept(x) and getattr(x, "joint", None) in (*names, None)),
+        )  # fmt: skip
+
+    names = [body.name for body in scene.body] if len(scene.body) > 1 else []
+    return [lambda name=name: without(name) for name in names if name != GROUND]
+
+
+def _without_items(scene: Scene) -> list[Callable[[], Scene]]:
+    return [
+        lambda kind=kind, k=k: scene.with_(**{kind: getattr(scene, kind)[:k] + getattr(scene, kind)[k + 1 :]})
+        for kind in ("load", "driver", "joint")
+        for k in range(len(getattr(scene, kind)))
+    ]
+
+
+def _simpler(scene: Scene) -> list[Callable[[], Scene]]:
+    def rounded(value, digits: int):
+        if isinstance(value, float):
+            return round(value, digits)
+        return tuple(rounded(v, digits) for v in value) if isinstance(value, tuple) else value
+
+    def bodies(**fields) -> Scene:
+        return scene.with_(body=tuple(replaced(body, **fields) for body in scene.body))
+
+    def round_bodies(digits: int) -> Scene:
+        names = ("mass", "inertia", "velocity", "angular_velocity")
+        return scene.with_(body=tuple(
+            replaced(b, **{n: rounded(getattr(b, n), digits) for n in names}) for b in scene.body
+        ))  # fmt: skip
+
+    return [
+        lambda: scene.with_(gravity=(0.0, 0.0, 0.0)),
+        lambda: bodies(velocity=None, angular_velocity=None),
+        lambda: scene.with_(duration=scene.duration / 2),
+        *(lambda digits=digits: round_bodies(digits) for digits in (1, 2)),
+    ]

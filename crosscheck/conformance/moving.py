@@ -1,0 +1,181 @@
+"""Probes that move: bodies that tumble, joints and loads between moving bodies, loops that spin in space.
+
+Every probe has bodies off their joints, full inertias, turned body frames, a gravity along no axis and
+initial velocities that the joints allow, so that every term of the equations takes part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from crosscheck.conformance.features import DRIVERS, JOINTS, LOADS
+from crosscheck.judge.constraints import initial_poses, jacobian
+from crosscheck.judge.tolerances import RANK
+from mbref import rotations
+from mbref.scene import (
+    Body,
+    Driver,
+    Force,
+    Joint,
+    Moment,
+    Revolute,
+    Scene,
+    Sine,
+    Spherical,
+    Spring,
+    TorsionSpring,
+    Universal,
+)
+
+GRAVITY = (2.0, -6.5, -5.0)
+DURATION = 0.2  # s: the bodies turn by about half a radian
+HUB = Body(
+    name="hub", mass=2.0, inertia=((0.05, -0.004, 0.006), (-0.004, 0.04, 0.003), (0.006, 0.003, 0.06)),
+    position=(-0.25, 0.15, -0.1), orientation=tuple(rotations.from_vector([-0.5, 0.9, 0.4]).tolist()),
+)  # fmt: skip
+BODY = Body(
+    name="body", mass=1.5, inertia=((0.02, 0.004, -0.003), (0.004, 0.03, 0.005), (-0.003, 0.005, 0.026)),
+    position=(0.3, -0.2, 0.1), orientation=tuple(rotations.from_vector([0.3, -1.2, 0.5]).tolist()),
+)  # fmt: skip
+BEARING = Spherical(name="bearing", bodies=("ground", "hub"), anchor=(-0.4, 0.3, 0.1))
+SPIN = (1.5, -2.0, 2.5)  # rad/s
+DRIVEN = Driver(joint="J", polynomial=(-0.3 * float(np.sin(0.7)), 0.8, -0.5),
+                sine=Sine(amplitude=0.3, frequency=6.0, phase=0.7))  # fmt: skip
+
+
+def moving_probes() -> dict[str, Scene]:
+    """Scenes by feature; the names of joints, drivers and loads are those of `feature_scenes`."""
+    found = {f"{kind} joint": _pair(joint) for kind, joint in JOINTS.items()}
+    found |= {f"{kind} driver": _pair(JOINTS[kind], driver=(DRIVEN,)) for kind in DRIVERS}
+    found |= {f"{kind} load": _pair(_carrier(kind), load=(_load(kind),)) for kind in LOADS}
+    found |= {
+        "tumbling body": _alone(load=()),
+        "pushed body": _alone(load=(_load("force"), _load("moment"))),
+        "heavy top": heavy_top(),
+        "spinning loop": spinning_loop(),
+        "door": door(),
+        "wound spring": wound_spring(),
+    }
+    return {name: scene.with_(name=name) for name, scene in found.items()}
+
+
+def heavy_top() -> Scene:
+    """A symmetric top on its tip, spinning, nutating: I₁ = 0.02, I₃ = 0.012 kg m² about its centre."""
+    turned = rotations.from_vector([0.6, 0.0, 0.0])
+    arm = rotations.rotate(turned, np.array([0.0, 0.0, 0.15]))
+    spin = rotations.rotate(turned, np.array([0.5, 1.0, 40.0]))
+    top = Body(name="top", mass=1.0, inertia=(0.02, 0.02, 0.012), position=arm, orientation=turned,
+               velocity=np.cross(spin, arm), angular_velocity=spin)  # fmt: skip
+    tip = Spherical(name="tip", bodies=("ground", "top"), anchor=(0.0, 0.0, 0.0))
+    return Scene(name="heavy top", gravity=(0.0, 0.0, -9.81), duration=0.3, body=(top,), joint=(tip,))
+
+
+def spinning_loop() -> Scene:
+    """Ground, crank, rod and lever in a closed spatial chain of hinge, universal, ball and skew hinge."""
+    rng = np.random.default_rng(5)
+    crank, rod, lever = (
+        BODY.model_copy(update={"name": name, "position": place, "orientation": _turn(rng)})
+        for name, place in (
+            ("crank", (0.1, 0.1, 0.05)),
+            ("rod", (0.4, 0.3, 0.2)),
+            ("lever", (0.75, 0.2, 0.1)),
+        )
+    )
+    joints = (
+        Revolute(name="A", bodies=("ground", "crank"), anchor=(0.0, 0.0, 0.0), axis=(0.2, -0.1, 1.0)),
+        Universal(name="B", bodies=("crank", "rod"), anchor=(0.2, 0.25, 0.1),
+                  axes=((0.3, 0.2, 1.0), (1.0, -1.0, -0.1))),
+        Spherical(name="C", bodies=("rod", "lever"), anchor=(0.65, 0.35, 0.3)),
+        Revolute(name="D", bodies=("lever", "ground"), anchor=(0.8, 0.0, 0.0), axis=(-0.5, 0.3, 1.0)),
+    )  # fmt: skip
+    return _launched(
+        Scene(name="loop", gravity=GRAVITY, duration=DURATION, body=(crank, rod, lever), joint=joints)
+    )
+
+
+def door() -> Scene:
+    """A leaf in two hinges on one slanted axis: five redundant rows."""
+    axis = np.array([0.3, -0.2, 1.0])
+    hinges = tuple(
+        Revolute(name=name, bodies=("ground", "body"), anchor=(0.1 + h * axis).tolist(), axis=axis)
+        for name, h in (("low", -0.4), ("high", 0.5))
+    )
+    return _launched(Scene(name="door", gravity=GRAVITY, duration=DURATION, body=(BODY,), joint=hinges))
+
+
+def wound_spring() -> Scene:
+    """A body turning by some turns about a slanted hinge on the ground, against a torsion spring."""
+    hinge = JOINTS["revolute"]
+    axis = np.array(hinge.axis) / np.linalg.norm(hinge.axis)
+    swing = np.cross(40.0 * axis, np.array(BODY.position) - np.array(hinge.anchor))
+    body = _with(BODY, {"angular_velocity": 40.0 * axis, "velocity": swing})
+    spring = TorsionSpring(joint="J", stiffness=0.4, damping=0.01, natural_angle=0.4)
+    return Scene(name="wound spring", duration=0.25, body=(body,), joint=(hinge,), load=(spring,))
+
+
+def consistent(scene: Scene, twists: np.ndarray) -> Scene:
+    """The scene with the velocities nearest to twists (nb, 6), world, that its joints allow."""
+    still = scene.with_(driver=())
+    rows, _ = jacobian(still, 0.0, *initial_poses(scene))
+    _, s, vt = np.linalg.svd(rows) if len(rows) else (0, np.zeros(0), np.eye(6 * len(scene.body)))
+    free = vt[int(np.sum(s > RANK * s.max(initial=0.0))) :]
+    found = (free.T @ (free @ np.ravel(twists))).reshape(-1, 6)
+    bodies = [
+        _with(body, {"velocity": x[:3], "angular_velocity": x[3:]})
+        for body, x in zip(scene.body, found, strict=True)
+    ]
+    return scene.with_(body=tuple(bodies))
+
+
+def _pair(joint: Joint, **causes) -> Scene:
+    """Ground, hub on a ball joint, and the body on the joint in question; a driver's start is its own."""
+    between = type(joint)(**{**_fields(joint), "bodies": ("hub", "body")})
+    scene = Scene(name="pair", gravity=GRAVITY, duration=DURATION, body=(HUB, BODY), joint=(BEARING, between),
+                  **causes)  # fmt: skip
+    moving = _launched(scene)
+    if not scene.driver:
+        return moving
+    hub, body = moving.body  # the driver says how the body moves beside the hub
+    return moving.with_(body=(hub, _with(body, {"velocity": None, "angular_velocity": None})))
+
+
+def _launched(scene: Scene) -> Scene:
+    return consistent(scene, np.tile([0.4, 0.3, -0.5, *SPIN], (len(scene.body), 1)) * _sides(scene))
+
+
+def _sides(scene: Scene) -> np.ndarray:
+    """Factors (nb, 1) that set neighbours turning against each other."""
+    return np.array([[1.0 if k % 2 else -0.8] for k in range(len(scene.body))])
+
+
+def _alone(load: tuple) -> Scene:
+    body = _with(BODY, {"velocity": (1.0, 0.5, -0.7), "angular_velocity": (3.0, -6.0, 8.0)})
+    return Scene(name="alone", gravity=GRAVITY, duration=DURATION, body=(body,), load=load)
+
+
+def _load(kind: str):
+    return {
+        "moment": Moment(body="body", moment=(0.3, 0.2, -0.4)),
+        "force": Force(body="body", point=(0.5, -0.1, 0.2), force=(1.0, -2.0, 3.0)),
+        "spring": Spring(bodies=("hub", "body"), points=((-0.3, 0.6, 0.0), (0.4, -0.1, 0.1)), stiffness=30.0,
+                         damping=0.5, natural_length=0.5),
+        "torsion_spring": TorsionSpring(joint="J", stiffness=4.0, damping=0.1, natural_angle=0.4),
+    }.get(kind, LOADS[kind])  # fmt: skip
+
+
+def _carrier(load: str) -> Joint:
+    return JOINTS["cylindrical" if load == "torsion_spring" else "spherical"]
+
+
+def _turn(rng: np.random.Generator) -> tuple[float, ...]:
+    return tuple(rotations.from_vector(rng.normal(size=3)).tolist())
+
+
+def _fields(item) -> Mapping:
+    return {name: getattr(item, name) for name in type(item).model_fields}
+
+
+def _with(body: Body, changes: Mapping) -> Body:
+    return Body(**{**_fields(body), **changes})

@@ -1,0 +1,146 @@
+"""Scenes made of a motion: started from a state of it, run back from its end, driven by its own moment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from crosscheck.conformance.changes import replaced
+from crosscheck.conformance.trial import Outside
+from crosscheck.judge.constraints import joint_coordinates
+from crosscheck.judge.joint_residuals import driver_value
+from mbref import rotations
+from mbref.scene import GROUND, Driver, Joint, Moment, Scene
+from mbref.trajectory import Trajectory
+
+CONSTANT = 1e-6  # relative: what a moment given by reactions may vary by and be one number
+
+
+def started(scene: Scene, motion: Trajectory, sample: int, sense: float) -> Scene:
+    """The scene from a sample of its motion on, velocities times ``sense``; drivers and springs go on."""
+    t, carry = float(motion.times[sample]), _Carry(scene, motion, sample)
+    angles = joint_coordinates(
+        scene, motion.times, motion.position, motion.orientation, motion.angular_velocity
+    )
+    bodies = [
+        replaced(body, position=motion.position[sample, b], orientation=motion.orientation[sample, b],
+                 velocity=sense * motion.velocity[sample, b],
+                 angular_velocity=sense * motion.angular_velocity[sample, b])
+        for b, body in enumerate(scene.body)
+    ]  # fmt: skip
+    loads = []
+    for load in scene.load:
+        if load.type == "torsion_spring":
+            loads.append(
+                replaced(load, natural_angle=load.natural_angle - float(angles[load.joint][sample, 0]))
+            )
+        elif load.type == "spring":
+            points = [carry.point(*end) for end in zip(load.bodies, load.points, strict=True)]
+            loads.append(replaced(load, points=[point.tolist() for point in points]))
+        elif load.type == "force":
+            loads.append(replaced(load, point=carry.point(load.body, load.point)))
+        else:
+            loads.append(load)
+    return scene.with_(
+        body=tuple(bodies), joint=tuple(map(carry.joint, scene.joint)), load=tuple(loads),
+        driver=tuple(_later(driver, t) for driver in scene.driver),
+    )  # fmt: skip
+
+
+class _Carry:
+    """Points and directions given at t = 0, carried by their bodies to a sample."""
+
+    def __init__(self, scene: Scene, motion: Trajectory, sample: int):
+        self.scene, self.motion, self.sample = scene, motion, sample
+
+    def point(self, name: str, point: Sequence[float]) -> np.ndarray:
+        if name == GROUND:
+            return np.array(point)
+        b = self.scene.body_index(name)
+        arm = np.array(point) - np.array(self.scene.body[b].position)
+        return self.motion.position[self.sample, b] + self.direction(name, arm)
+
+    def direction(self, name: str, vector: Any) -> np.ndarray:
+        if name == GROUND:
+            return np.array(vector)
+        b = self.scene.body_index(name)
+        start = rotations.conjugate(np.array(self.scene.body[b].orientation))
+        return rotations.rotate(
+            rotations.multiply(self.motion.orientation[self.sample, b], start), np.array(vector)
+        )
+
+    def joint(self, joint: Joint) -> Joint:
+        fields: dict[str, Any] = {}
+        if joint.type == "distance":
+            fields["anchors"] = [
+                self.point(*end).tolist() for end in zip(joint.bodies, joint.anchors, strict=True)
+            ]
+        else:
+            fields["anchor"] = self.point(joint.bodies[0], joint.anchor)
+        if joint.type == "universal":
+            fields["axes"] = [self.direction(*e).tolist() for e in zip(joint.bodies, joint.axes, strict=True)]
+        elif hasattr(joint, "axis"):
+            fields["axis"] = self.direction(joint.bodies[0], joint.axis)
+        return replaced(joint, **fields)
+
+
+def _later(driver: Driver, t: float) -> Driver:
+    """The driver from time t on, measured from where it has come."""
+    moved = np.polynomial.Polynomial(driver.polynomial)(np.polynomial.Polynomial([t, 1.0])).coef
+    wave = driver.sine and replaced(driver.sine, phase=driver.sine.phase + driver.sine.frequency * t)
+    moved[0] -= float(driver_value(driver, t))
+    return replaced(driver, polynomial=moved, sine=wave)
+
+
+def _half_way(scene: Scene, motion: Trajectory) -> Scene:
+    half = len(motion.times) // 2
+    return started(scene, motion, half, 1.0).with_(duration=float(motion.times[-1] - motion.times[half]))
+
+
+def _second_half(scene: Scene, motion: Trajectory) -> Trajectory:
+    half = len(motion.times) // 2
+    return _samples(motion, np.arange(half, len(motion.times)), motion.times[half:] - motion.times[half], 1.0)
+
+
+def _from_the_end(scene: Scene, motion: Trajectory) -> Scene | Outside:
+    if scene.driver or any(getattr(load, "damping", 0.0) for load in scene.load):
+        return Outside("a driver or a damper acts, whose motion cannot be run back")
+    return started(scene, motion, len(motion.times) - 1, -1.0)
+
+
+def _backwards(scene: Scene, motion: Trajectory) -> Trajectory:
+    return _samples(motion, np.arange(len(motion.times))[::-1], motion.times, -1.0)
+
+
+def _samples(motion: Trajectory, chosen: np.ndarray, times: np.ndarray, sense: float) -> Trajectory:
+    return replace(
+        motion, times=times, position=motion.position[chosen], orientation=motion.orientation[chosen],
+        velocity=sense * motion.velocity[chosen], angular_velocity=sense * motion.angular_velocity[chosen],
+        acceleration=None, angular_acceleration=None, reactions=None,
+    )  # fmt: skip
+
+
+RESTARTED = _half_way, _second_half
+REVERSED = _from_the_end, _backwards
+
+
+def replayed(scene: Scene, motion: Trajectory) -> Scene | Outside:
+    """The driver of a hinge to the ground replaced by the moment that the engine says it gives."""
+    if len(scene.driver) != 1 or not motion.reactions:
+        return Outside("it has not one driver, or the engine gives no reactions")
+    joint = next(j for j in scene.joint if j.name == scene.driver[0].joint)
+    if joint.facts.driven == "displacement" or joint.bodies[0] != GROUND:
+        return Outside("its driver does not turn a body about an axis on the ground")
+    axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+    moment = motion.reactions[joint.name][:, 3:] @ axis
+    if np.ptp(moment) > CONSTANT * np.abs(moment).max():
+        return Outside("its driver's moment varies, and the scene format has constant moments only")
+    load = Moment(body=joint.bodies[1], moment=float(moment.mean()) * axis)
+    bodies = [
+        replaced(body, velocity=motion.velocity[0, k], angular_velocity=motion.angular_velocity[0, k])
+        for k, body in enumerate(scene.body)
+    ]
+    return scene.with_(driver=(), load=(*scene.load, load), body=tuple(bodies))

@@ -1,0 +1,149 @@
+"""The same mechanism written in another way: other names, other orders, joints twice, a body in halves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from crosscheck.conformance.changes import mapped, replaced
+from crosscheck.conformance.trial import Outside
+from mbref import rotations
+from mbref.scene import GROUND, Body, Cylindrical, Fixed, Joint, Scene, SceneError
+from mbref.trajectory import Trajectory
+
+HALF, LIMIT = " half", 0.2  # the halves' distance uses this part of what the inertia allows
+
+
+def relabelled(scene: Scene) -> Scene:
+    """Other names, in the other alphabetical order."""
+    names = {body.name: _name(scene, k) for k, body in enumerate(scene.body)} | {GROUND: GROUND}
+    joints = {joint.name: f"joint {chr(122 - k % 26)}{k}" for k, joint in enumerate(scene.joint)}
+
+    def pair(bodies: Any) -> tuple[str, ...]:
+        return tuple(names[name] for name in bodies)
+
+    fields = {"bodies": pair, "body": names.__getitem__, "joint": joints.__getitem__}
+    return scene.with_(
+        body=tuple(replaced(body, name=names[body.name]) for body in scene.body),
+        joint=tuple(replaced(mapped(j, fields), name=joints[j.name]) for j in scene.joint),
+        driver=tuple(mapped(driver, fields) for driver in scene.driver),
+        load=tuple(mapped(load, fields) for load in scene.load),
+    )
+
+
+def renamed(scene: Scene, motion: Trajectory) -> Trajectory:
+    """The motion under the names of `relabelled`."""
+    return replace(motion, bodies=tuple(_name(scene, k) for k in range(len(scene.body))), reactions=None)
+
+
+def _name(scene: Scene, k: int) -> str:
+    return f"part {chr(122 - k % 26)}{k}"
+
+
+def swapped(scene: Scene) -> Scene | Outside:
+    """The bodies of every joint exchanged; an axis turns round, so that what drives it keeps its sense."""
+    if not scene.joint:
+        return Outside("it has no joint")
+    return scene.with_(joint=tuple(map(_exchanged, scene.joint)))
+
+
+def _exchanged(joint: Joint) -> Joint:
+    turn = {"axis": lambda axis: -np.array(axis)}
+    fields = {"bodies": _back, "anchors": _back, "axes": _back, **turn}
+    return mapped(joint, fields)
+
+
+def _back(pair: Any) -> Any:
+    return pair[::-1]
+
+
+def stretched(scene: Scene) -> Scene | Outside:
+    """Axes 1000 times as long: directions, not lengths."""
+    if not any(hasattr(joint, "axis") or hasattr(joint, "axes") for joint in scene.joint):
+        return Outside("no joint has an axis")
+    longer = {name: lambda axes: 1000.0 * np.array(axes) for name in ("axis", "axes")}
+    return scene.with_(joint=tuple(mapped(joint, longer) for joint in scene.joint))
+
+
+def duplicated(scene: Scene) -> Scene | Outside:
+    """The last joint given twice: redundant rows."""
+    if not scene.joint:
+        return Outside("it has no joint")
+    return scene.with_(joint=(*scene.joint, replaced(scene.joint[-1], name="again")))
+
+
+def satisfied(scene: Scene) -> Scene | Outside:
+    """A cylindrical joint on the axis of a revolute one, elsewhere on it: redundant rows of another kind."""
+    hinges = [joint for joint in scene.joint if joint.type == "revolute"]
+    if not hinges:
+        return Outside("it has no revolute joint on whose axis another could be")
+    hinge = hinges[0]
+    axis = np.array(hinge.axis) / np.linalg.norm(hinge.axis)
+    place = np.array(hinge.anchor) + 0.3 * axis
+    twin = Cylindrical(name="sleeve", bodies=hinge.bodies, anchor=place, axis=axis)
+    return scene.with_(joint=(*scene.joint, twin))
+
+
+def split(scene: Scene) -> Scene | Outside:
+    """The last body as two halves, one on either side of its centre, welded; joints and loads stay on one."""
+    body = scene.body[-1]
+    if body.mass is None:
+        return Outside("bodies have no mass to split")
+    if body.velocity is None or body.angular_velocity is None:
+        return Outside("the velocities of the body are left open")
+    try:
+        return _in_halves(scene, body)
+    except SceneError as error:
+        return Outside(f"the halves are no bodies: {error.faults[0]}")
+    except ValueError:
+        return Outside("the body is too thin to have halves beside each other")
+
+
+def _in_halves(scene: Scene, body: Body) -> Scene:
+    arm = _arm(body)
+    matrix = np.diag(body.inertia) if np.ndim(body.inertia) == 1 else np.array(body.inertia)
+    moved = (body.mass or 0.0) * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    reach = rotations.rotate(np.array(body.orientation), arm)
+    swing = np.cross(np.array(body.angular_velocity), reach)
+    common = {"mass": (body.mass or 0.0) / 2, "inertia": (matrix - moved) / 2}
+    halves = [
+        replaced(body, **common, name=name, position=np.array(body.position) + side * reach,
+                 velocity=np.array(body.velocity) + side * swing)
+        for name, side in ((body.name, 1.0), (body.name + HALF, -1.0))
+    ]  # fmt: skip
+    weld = Fixed(name="weld", bodies=(body.name, body.name + HALF), anchor=body.position)
+    return scene.with_(body=(*scene.body[:-1], *halves), joint=(*scene.joint, weld))
+
+
+def of_halves(scene: Scene, motion: Trajectory) -> Trajectory:
+    """The motion with the last body's as that of its halves."""
+    arm = rotations.rotate(motion.orientation[:, -1], _arm(scene.body[-1]))
+    swing = np.cross(motion.angular_velocity[:, -1], arm)
+    name = scene.body[-1].name
+    parts = {
+        "position": [motion.position[:, -1] + arm, motion.position[:, -1] - arm],
+        "velocity": [motion.velocity[:, -1] + swing, motion.velocity[:, -1] - swing],
+        "orientation": [motion.orientation[:, -1]] * 2,
+        "angular_velocity": [motion.angular_velocity[:, -1]] * 2,
+    }
+    arrays: dict[str, Any] = {
+        key: np.concatenate([getattr(motion, key)[:, :-1], np.stack(ends, axis=1)], axis=1)
+        for key, ends in parts.items()
+    }
+    return replace(motion, bodies=(*motion.bodies[:-1], name, name + HALF), acceleration=None,
+                   angular_acceleration=None, reactions=None, **arrays)  # fmt: skip
+
+
+def _arm(body: Body) -> np.ndarray:
+    """From the centre of a body to that of its first half (body axes), along its least moment's axis."""
+    matrix = np.diag(body.inertia) if np.ndim(body.inertia) == 1 else np.array(body.inertia)
+    moments, axes = np.linalg.eigh(matrix)
+    spare = min(moments[1], moments[1] + moments[2] - moments[0]) * LIMIT
+    return np.sqrt(spare / (body.mass or 1.0)) * axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0])), 0])
+
+
+def negated(scene: Scene) -> Scene:
+    """Every orientation by the other of its two quaternions."""
+    return scene.with_(body=tuple(replaced(b, orientation=[-x for x in b.orientation]) for b in scene.body))

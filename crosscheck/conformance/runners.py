@@ -1,0 +1,100 @@
+"""How the suite runs an engine: in child processes, or in this process for tests of small pure ones."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from crosscheck.engine import Cannot, Engine, Setting, engine
+from crosscheck.processes.pool import Observation, capabilities, observe, run_isolated
+from crosscheck.processes.serve import failed
+from mbref.scene import Scene
+from mbref.trajectory import Outcome, Trajectory
+
+
+class Runner(Protocol):
+    """One engine, asked and run; raises ChildFailed where the engine cannot even answer."""
+
+    @property
+    def name(self) -> str:
+        """The engine's name."""
+
+    def offers(self, scene: Scene) -> tuple[str, Cannot | None, list[Setting]]:
+        """Version, what the engine cannot do with the scene, and else its settings."""
+
+    def cannot(self, scene: Scene) -> Cannot | None:
+        """What the engine cannot do with the scene."""
+
+    def observe(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
+        """A run at times (k,), s, with nothing left of runs before, and what it printed and left behind."""
+
+    def in_turn(self, scene: Scene, times: np.ndarray, settings: Sequence[Setting]) -> list[Trajectory]:
+        """Runs at the settings, one after another in one process."""
+
+
+@dataclass(frozen=True)
+class Isolated:
+    """Every run in a child process with a time limit (s); ``name`` is known, or ``module:attribute``."""
+
+    name: str
+    time_limit: float
+
+    def offers(self, scene: Scene) -> tuple[str, Cannot | None, list[Setting]]:
+        return capabilities(self.name, scene, self.time_limit)
+
+    def cannot(self, scene: Scene) -> Cannot | None:
+        return engine(self.name).cannot(scene)
+
+    def observe(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
+        return observe(self.name, scene, times, setting, self.time_limit)
+
+    def in_turn(self, scene: Scene, times: np.ndarray, settings: Sequence[Setting]) -> list[Trajectory]:
+        return [run_isolated(self.name, scene, times, setting, self.time_limit) for setting in settings]
+
+
+@dataclass(frozen=True)
+class InProcess:
+    """Runs in this process, in an empty directory, without limits: for engines that are trusted to return.
+
+    ``called`` is the name by which commands know the engine, where that is not its own.
+    """
+
+    engine: Engine
+    called: str = ""
+
+    @property
+    def name(self) -> str:
+        return self.called or self.engine.name
+
+    def offers(self, scene: Scene) -> tuple[str, Cannot | None, list[Setting]]:
+        cannot = self.engine.cannot(scene)
+        return self.engine.version(), cannot, [] if cannot else list(self.engine.settings(scene))
+
+    def cannot(self, scene: Scene) -> Cannot | None:
+        return self.engine.cannot(scene)
+
+    def observe(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
+        said = io.StringIO()
+        with tempfile.TemporaryDirectory() as place, contextlib.chdir(place):
+            with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+                run = self._run(scene, times, setting)
+            files = tuple(sorted(path.name for path in Path(place).iterdir()))
+        return Observation(run, said.getvalue(), files)
+
+    def in_turn(self, scene: Scene, times: np.ndarray, settings: Sequence[Setting]) -> list[Trajectory]:
+        return [self.observe(scene, times, setting).value for setting in settings]
+
+    def _run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        """A run; an exception is the outcome CRASHED with its words, as in a child process."""
+        try:
+            return self.engine.run(scene, times, setting)
+        except Exception as error:
+            words = f"{type(error).__name__}: {error}"
+            return failed(self.name, self.engine.version(), scene, setting, Outcome.CRASHED, words)

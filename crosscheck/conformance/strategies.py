@@ -1,0 +1,177 @@
+"""Hypothesis strategies for tests of engines and methods: mechanisms, the paper's parameters, matrices.
+
+``mechanisms()`` draws closed-loop mechanisms of any graph: a tree of bodies, then joints that close loops.
+Every joint is given in the pose at t = 0, so that poses are consistent by construction; velocities are
+projected onto what the joints allow.  Numbers are drawn from coarse grids, so that what shrinks is readable:
+fewer bodies, fewer loops, joints of the simplest kind, unturned bodies at rest.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from hypothesis import strategies as st
+
+from crosscheck.conformance.moving import consistent
+from crosscheck.judge.constraints import initial_poses, jacobian
+from crosscheck.judge.gauss_principle import bias
+from crosscheck.judge.tolerances import RANK
+from mbref import rotations
+from mbref.scene import (
+    GROUND,
+    Body,
+    Cylindrical,
+    Distance,
+    Fixed,
+    Force,
+    Joint,
+    Moment,
+    Revolute,
+    Scene,
+    Spherical,
+    Spring,
+    Translational,
+    Universal,
+)
+from mbref.scenes import SCENES
+
+KINDS = ("revolute", "spherical", "universal", "cylindrical", "translational", "distance", "fixed")
+CONTINUES = 1e-8  # of the accelerations: what a mobility of the instant, which stops at once, leaves
+PAPER = ("four_bar", "five_bar", "planar_slider_crank", "spatial_slider_crank")
+grid = st.integers(-8, 8).map(lambda k: k / 8)
+vectors = st.tuples(grid, grid, grid)
+directions = vectors.filter(lambda v: np.linalg.norm(v) > 0.2)
+
+
+@st.composite
+def mechanisms(
+    draw: st.DrawFn,
+    most_bodies: int = 4,
+    most_loops: int = 2,
+    kinds: Sequence[str] = KINDS,
+    redundant: bool = False,
+) -> Scene:
+    """A mechanism with mass, gravity, loads and consistent velocities; ``redundant`` adds a second hinge on
+    the axis of a first, whose rows are redundant by construction."""
+    bodies = [draw(_bodies(f"b{k}", k)) for k in range(draw(st.integers(1, most_bodies)))]
+    names = [GROUND, *(body.name for body in bodies)]
+    joints = [draw(_joints(f"J{k}", (names[draw(st.integers(0, k))], names[k + 1]), bodies, kinds))
+              for k in range(len(bodies))]  # fmt: skip
+    pairs = list(itertools.combinations(names, 2))
+    for loop in range(draw(st.integers(0, most_loops)) if len(bodies) > 1 else 0):
+        closing = draw(_joints(f"L{loop}", draw(st.sampled_from(pairs)), bodies, kinds))
+        if _freedoms(bodies, [*joints, closing]) > 0:
+            joints.append(closing)
+    if redundant:
+        joints += draw(_two_hinges(bodies, joints))
+    scene = Scene(name="drawn", gravity=draw(vectors.map(lambda v: tuple(8 * x for x in v))), duration=0.05,
+                  body=bodies, joint=joints, load=draw(_loads(bodies)))  # fmt: skip
+    twists = np.array([[*draw(vectors), *draw(vectors)] for _ in bodies])
+    moving = consistent(scene, twists)
+    return moving if goes_on(moving) else consistent(scene, 0 * twists)
+
+
+def goes_on(scene: Scene) -> bool:
+    """Whether accelerations exist that keep the velocities on the joints: no mobility of the instant."""
+    rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
+    coasting = bias(scene)
+    left = rows @ np.linalg.lstsq(rows, coasting, rcond=RANK)[0] - coasting if len(rows) else coasting
+    return bool(np.linalg.norm(left) <= CONTINUES * max(1.0, np.linalg.norm(coasting)))
+
+
+@st.composite
+def paper_mechanisms(draw: st.DrawFn, names: Sequence[str] = PAPER) -> Scene:
+    """One of the paper's mechanisms with its masses and moments of inertia times factors of 1/4 to 4."""
+    scene = SCENES[draw(st.sampled_from(list(names)))]()
+    factors = st.sampled_from((1.0, 0.25, 0.5, 2.0, 4.0))
+    bodies = []
+    for body in scene.body:
+        mass, inertia = draw(factors), draw(factors)
+        moments = (inertia * np.array(body.inertia)).tolist()
+        bodies.append(Body(**{**{n: getattr(body, n) for n in Body.model_fields},
+                              "mass": mass * (body.mass or 1.0), "inertia": moments}))  # fmt: skip
+    return scene.with_(body=bodies)
+
+
+@st.composite
+def matrices(
+    draw: st.DrawFn, rank: int | None = None, spectrum: Sequence[float] | None = None, most: int = 8
+) -> np.ndarray:
+    """A matrix (m, n) of a prescribed rank (or any) and singular values (or within two decades of 1)."""
+    least = max(rank or 0, len(spectrum or ()), 1)
+    m, n = draw(st.integers(least, max(least, most))), draw(st.integers(least, max(least, most)))
+    if spectrum is None:
+        count = rank if rank is not None else draw(st.integers(0, min(m, n)))
+        spectrum = [10.0 ** draw(st.integers(-1, 1)) for _ in range(count)]
+    rng = np.random.default_rng(draw(st.integers(0, 10**6)))
+    left, right = (np.linalg.qr(rng.normal(size=(size, size)))[0] for size in (m, n))
+    return left[:, : len(spectrum)] * np.array(spectrum) @ right[: len(spectrum)]
+
+
+@st.composite
+def _bodies(draw: st.DrawFn, name: str, k: int) -> Body:
+    """A body within half a metre of its place in a row, with a full inertia."""
+    place = np.array(draw(vectors)) / 2 + np.array([0.6 * (k + 1), 0.0, 0.0])
+    turn, principal = (rotations.from_vector(np.array(draw(vectors))) for _ in range(2))
+    spread = np.array(draw(st.tuples(*[st.integers(1, 4)] * 3))) / 100
+    axes = rotations.to_matrix(principal)
+    inertia = axes @ np.diag(spread.sum() - spread) @ axes.T
+    return Body(name=name, mass=draw(st.integers(1, 8)) / 2, inertia=(inertia + inertia.T) / 2,
+                position=place, orientation=turn)  # fmt: skip
+
+
+@st.composite
+def _joints(
+    draw: st.DrawFn, name: str, pair: tuple[str, str], bodies: Sequence[Body], kinds: Sequence[str]
+) -> Joint:
+    """A joint of some kind between two bodies, near the middle of their centres."""
+    places = {GROUND: np.zeros(3), **{body.name: np.array(body.position) for body in bodies}}
+    anchor = ((places[pair[0]] + places[pair[1]]) / 2 + np.array(draw(vectors)) / 4).tolist()
+    along = np.array(draw(directions), dtype=float)
+    across = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+    kind, common = draw(st.sampled_from(list(kinds))), {"name": name, "bodies": pair}
+    made: dict[str, Any] = {
+        "revolute": lambda: Revolute(**common, anchor=anchor, axis=along),
+        "spherical": lambda: Spherical(**common, anchor=anchor),
+        "universal": lambda: Universal(**common, anchor=anchor, axes=(along.tolist(), across.tolist())),
+        "cylindrical": lambda: Cylindrical(**common, anchor=anchor, axis=along),
+        "translational": lambda: Translational(**common, anchor=anchor, axis=along),
+        "distance": lambda: Distance(**common, anchors=(anchor, (np.array(anchor) + along / 2).tolist())),
+        "fixed": lambda: Fixed(**common, anchor=anchor),
+    }
+    return made[kind]()
+
+
+@st.composite
+def _two_hinges(draw: st.DrawFn, bodies: Sequence[Body], joints: Sequence[Joint]) -> list[Joint]:
+    """Another joint on the axis of a revolute one; on a new pair of hinges' where there is none."""
+    hinges = [joint for joint in joints if isinstance(joint, Revolute)]
+    if not hinges:
+        return [joints[-1].model_copy(update={"name": "R"})]  # a joint twice is redundant too
+    hinge = draw(st.sampled_from(hinges))
+    axis = np.array(hinge.axis) / np.linalg.norm(hinge.axis)
+    kind = draw(st.sampled_from((Revolute, Cylindrical)))
+    return [kind(name="R", bodies=hinge.bodies, anchor=np.array(hinge.anchor) + 0.4 * axis, axis=axis)]
+
+
+@st.composite
+def _loads(draw: st.DrawFn, bodies: Sequence[Body]) -> list[Any]:
+    """Some of a moment, a force and a spring to the ground, all on the last body."""
+    name, place = bodies[-1].name, np.array(bodies[-1].position)
+    point = (place + np.array(draw(vectors)) / 4).tolist()
+    known = [
+        Moment(body=name, moment=draw(vectors)),
+        Force(body=name, point=point, force=draw(vectors)),
+        Spring(bodies=(GROUND, name), points=((0.0, 2.0, 0.0), point), stiffness=20.0, natural_length=0.5),
+    ]
+    return [load for load in known if draw(st.booleans())]
+
+
+def _freedoms(bodies: Sequence[Body], joints: Sequence[Joint]) -> int:
+    scene = Scene(name="trial", body=list(bodies), joint=list(joints))
+    rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
+    values = np.linalg.svd(rows, compute_uv=False)
+    return int(rows.shape[1] - np.sum(values > RANK * values[0]))

@@ -1,0 +1,165 @@
+"""Motion of any scene by Gauss's principle with the judge's own equations, integrated at 1e-10 by SciPy.
+
+It is the exact motion of the suite's scenes that belong to no family of a truth.  Its error is what the
+integrations at two tolerances differ by, and what is left of the joint residuals.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from crosscheck.judge.constraints import closure_accelerations, inertia_matrices, initial_twists, jacobian
+from crosscheck.judge.energy import kinetic_energy
+from crosscheck.judge.loads import Motion, wrenches
+from crosscheck.judge.tolerances import RANK
+from mbref import rotations
+from mbref.scene import Scene, TorsionSpring
+from mbref.trajectory import Outcome, Trajectory
+
+NAME = "Gauss's principle"
+RTOL = 1e-10
+NO_AXIS = np.zeros(3)  # torsion springs are added here, about their joints' axes in the world
+State = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+@functools.lru_cache(maxsize=128)
+def gauss_motion(scene: Scene, times: tuple[float, ...], rtol: float = RTOL) -> Trajectory:
+    """Poses, velocities and accelerations at times (s), increasing.
+
+    Raises RuntimeError when the integration ends before, as at a singular position.
+    """
+    velocity, spin = initial_twists(scene)
+    position = np.array([body.position for body in scene.body])
+    orientation = np.array([body.orientation for body in scene.body])
+    parts = (position, orientation, velocity, spin, np.zeros(len(_springs(scene))))
+    start = np.concatenate([np.ravel(part) for part in parts])
+    if times[-1] == 0:
+        return _trajectory(scene, np.array(times), np.repeat(start[None], len(times), axis=0))
+    done = solve_ivp(
+        _rates, (0.0, times[-1]), start, "DOP853", np.array(times), rtol=rtol, atol=rtol, args=(scene,)
+    )
+    if not done.success:
+        raise RuntimeError(f"{scene.name}: {done.message}")
+    return _trajectory(scene, done.t, done.y.T)
+
+
+def accelerations(scene: Scene, t: float, state: State) -> np.ndarray:
+    """Accelerations and angular accelerations (nb, 6), world, at a state (position (nb, 3), unit orientation
+    (nb, 4), velocity, spin (nb, 3), angles of the torsion springs): of all that joints and drivers allow,
+    the nearest in the mass metric to those without joints."""
+    position, orientation, velocity, spin, _ = state
+    turn = rotations.to_matrix(orientation)
+    force = applied(scene, state)
+    inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
+    roots = np.zeros((len(scene.body), 6, 6))  # W with WᵀW the mass matrix
+    roots[:, :3, :3] = np.sqrt([body.mass or 0.0 for body in scene.body])[:, None, None] * np.eye(3)
+    roots[:, 3:, 3:] = np.swapaxes(np.linalg.cholesky(inertia), 1, 2)
+    inverses = np.linalg.inv(roots)
+    unbound = np.einsum("bji,bj->bi", inverses, force)
+    rows, _ = jacobian(scene, t, position, orientation)
+    by_body = rows.reshape(len(rows), len(position), 6)
+    weighted = np.einsum("rbi,bij->rbj", by_body, inverses).reshape(rows.shape)
+    still = np.zeros_like(position)
+    bias = closure_accelerations(scene, t, position, orientation, velocity, spin, still, still)
+    wanted = -np.concatenate([np.zeros(0), *bias.values()]) - weighted @ unbound.ravel()
+    found = unbound.ravel() + (np.linalg.lstsq(weighted, wanted, rcond=RANK)[0] if len(rows) else 0.0)
+    return np.einsum("bij,bj->bi", inverses, found.reshape(-1, 6))
+
+
+def applied(scene: Scene, state: State) -> np.ndarray:
+    """Forces and moments about the centres of mass (nb, 6), world: gravity, loads, gyroscopic moments."""
+    position, orientation, velocity, spin, angles = state
+    turn = rotations.to_matrix(orientation)
+    still = np.zeros((1, len(position)))
+    motion = Motion(position[None], turn[None], velocity[None], spin[None], still)
+    force, moment = (w[0] for w in wrenches(scene, motion, NO_AXIS))
+    inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
+    gyroscopic = np.cross(spin, np.einsum("bij,bj->bi", inertia, spin))
+    return np.hstack([force, moment - gyroscopic + _torsion(scene, orientation, spin, angles)])
+
+
+def power(scene: Scene, state: State) -> float:
+    """Power (W) of gravity and loads on a state."""
+    twist = np.hstack([state[2], state[3]])
+    return float(np.sum(applied(scene, state) * twist))  # gyroscopic moments have none
+
+
+def kinetic(scene: Scene, state: State) -> float:
+    """Kinetic energy (J) of a state."""
+    return float(kinetic_energy(scene, state[1][None], state[2][None], state[3][None])[0])
+
+
+def _springs(scene: Scene) -> list[TorsionSpring]:
+    return [load for load in scene.load if isinstance(load, TorsionSpring)]
+
+
+def _axes(scene: Scene, orientation: np.ndarray) -> np.ndarray:
+    """World axes (springs, 3) of the torsion springs' joints, carried by the first bodies."""
+    found = np.zeros((len(_springs(scene)), 3))
+    for k, load in enumerate(_springs(scene)):
+        joint: Any = next(j for j in scene.joint if j.name == load.joint)
+        first = scene.body_index(joint.bodies[0])
+        axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+        start = np.array(scene.body[first].orientation)
+        turned = rotations.multiply(orientation[first], rotations.conjugate(start))
+        found[k] = axis if first < 0 else rotations.rotate(turned, axis)
+    return found
+
+
+def _rates_about(scene: Scene, orientation: np.ndarray, spin: np.ndarray) -> np.ndarray:
+    """Rates (springs,) of the torsion springs' angles."""
+    spins = np.vstack([spin, np.zeros(3)])
+    pairs = [next(j.bodies for j in scene.joint if j.name == load.joint) for load in _springs(scene)]
+    parting = [spins[scene.body_index(b)] - spins[scene.body_index(a)] for a, b in pairs]
+    return np.array([axis @ w for axis, w in zip(_axes(scene, orientation), parting, strict=True)])
+
+
+def _torsion(scene: Scene, orientation: np.ndarray, spin: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Moments (nb, 3), world, of the torsion springs."""
+    moment = np.zeros((len(scene.body) + 1, 3))  # the ground's last
+    found = zip(
+        _springs(scene),
+        _axes(scene, orientation),
+        _rates_about(scene, orientation, spin),
+        angles,
+        strict=True,
+    )
+    for load, axis, rate, angle in found:
+        joint = next(j for j in scene.joint if j.name == load.joint)
+        resistance = (load.stiffness * (angle - load.natural_angle) + load.damping * rate) * axis
+        moment[scene.body_index(joint.bodies[1])] -= resistance
+        moment[scene.body_index(joint.bodies[0])] += resistance
+    return moment[:-1]
+
+
+def _state(scene: Scene, y: np.ndarray) -> State:
+    n = len(scene.body)
+    position, rest = y[: 3 * n].reshape(n, 3), y[3 * n :]
+    orientation = rest[: 4 * n].reshape(n, 4)
+    velocity, spin = rest[4 * n : 10 * n].reshape(2, n, 3)
+    unit = orientation / np.linalg.norm(orientation, axis=1, keepdims=True)
+    return position, unit, velocity, spin, rest[10 * n :]
+
+
+def _rates(t: float, y: np.ndarray, scene: Scene) -> np.ndarray:
+    state = _state(scene, y)
+    _, orientation, velocity, spin, _ = state
+    second = accelerations(scene, t, state)
+    pure = np.concatenate([np.zeros((len(spin), 1)), spin], axis=1)
+    n = len(spin)
+    turning = rotations.multiply(pure, y[3 * n : 7 * n].reshape(n, 4)) / 2
+    parts = velocity, turning, second[:, :3], second[:, 3:], _rates_about(scene, orientation, spin)
+    return np.concatenate([np.ravel(part) for part in parts])
+
+
+def _trajectory(scene: Scene, times: np.ndarray, samples: np.ndarray) -> Trajectory:
+    states = [_state(scene, y) for y in samples]
+    second = np.array([accelerations(scene, t, state) for t, state in zip(times, states, strict=True)])
+    arrays = [np.array(part) for part in list(zip(*states, strict=True))[:4]]
+    names = tuple(body.name for body in scene.body)
+    return Trajectory(scene.name, NAME, "", "", {"rtol": RTOL}, times, names, *arrays, second[..., :3],
+                      second[..., 3:], outcome=Outcome.COMPLETED, t_end=float(times[-1]))  # fmt: skip

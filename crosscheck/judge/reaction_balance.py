@@ -1,0 +1,117 @@
+"""Joint reactions of the exact motion, and those of a run: they move the bodies, and do no work."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from crosscheck.judge.constraints import jacobian, joint_coordinates, length_rows, scene_length
+from crosscheck.judge.gauss_motion import applied
+from crosscheck.judge.joint_reactions import LEAST, on_second, resultants
+from crosscheck.judge.loads import world_inertia
+from crosscheck.judge.tolerances import RANK
+from mbref import rotations
+from mbref.scene import Joint, Scene, TorsionSpring
+from mbref.trajectory import Trajectory
+
+ABSURD = 10.0  # multiples of the largest exact force beyond which a reaction is no answer
+
+
+def with_exact_reactions(scene: Scene, exact: Trajectory) -> Trajectory:
+    """The exact motion with the reactions that move it (least squares of the joints' rows): their unique
+    parts are exact, and what redundancy leaves open is of least norm in the rows' own units.
+
+    Raises ValueError when the motion has no accelerations.
+    """
+    if exact.acceleration is None or exact.angular_acceleration is None:
+        raise ValueError(f"{exact.engine} gives no accelerations of {scene.name}")
+    found = {joint.name: np.zeros((len(exact.times), 6)) for joint in scene.joint}
+    wanted = demanded(scene, exact)
+    for k in range(len(exact.times)):
+        position, orientation = exact.position[k], exact.orientation[k]
+        rows, _ = jacobian(scene, exact.times[k], position, orientation)
+        pushes = np.linalg.lstsq(rows.T, wanted[k].ravel(), rcond=RANK)[0]
+        for joint, own in _own_rows(scene):
+            found[joint.name][k] = on_second(scene, joint, rows[own], position, orientation) @ pushes[own]
+    return replace(exact, reactions=found)
+
+
+def absurd(scene: Scene, run: Trajectory, exact: Trajectory) -> list[str]:
+    """Sentences on reactions of a run that exceed the largest exact force ABSURD times, moments divided by
+    the scene's length; ``exact`` has reactions."""
+    units = np.repeat([1.0, scene_length(scene)], 3)
+    sizes = {
+        name: float(np.linalg.norm(w / units, axis=-1).max(initial=0.0))
+        for name, w in (run.reactions or {}).items()
+    }
+    true = [
+        float(np.linalg.norm(w / units, axis=-1).max(initial=0.0)) for w in (exact.reactions or {}).values()
+    ]
+    largest = max(*true, 0.0)
+    return [
+        f"{run.engine} gives {size:.3g} N in {name}, where no force exceeds {largest:.3g} N"
+        for name, size in sizes.items()
+        if size > ABSURD * max(largest, LEAST * sum(body.mass or 0.0 for body in scene.body))
+    ]
+
+
+def _own_rows(scene: Scene) -> Iterator[tuple[Joint, slice]]:
+    """Every joint with its rows of the Jacobian."""
+    start = 0
+    for joint in scene.joint:
+        stop = start + len(length_rows(scene)[joint.name])
+        yield joint, slice(start, stop)
+        start = stop
+
+
+def balance(scene: Scene, run: Trajectory, exact: Trajectory) -> float:
+    """Largest part of the largest force (moments over the scene's length) by which the joints' resultants
+    on a body miss mass times exact acceleration less the loads."""
+    units = np.repeat([1.0, scene_length(scene)], 3)
+    wanted = demanded(scene, exact) / units
+    found = np.array([resultants(scene, run, k) for k in range(len(run.times))]) / units
+    return float(np.abs(found - wanted).max() / _scale(scene, wanted))
+
+
+def demanded(scene: Scene, exact: Trajectory) -> np.ndarray:
+    """Forces and moments about the centres (k, nb, 6), world, that the joints must give for the motion."""
+    pose = exact.times, exact.position, exact.orientation, exact.angular_velocity
+    coordinates = joint_coordinates(scene, *pose)
+    springs = [load.joint for load in scene.load if isinstance(load, TorsionSpring)]
+    mass = np.array([body.mass for body in scene.body])[:, None]
+    found = []
+    for k in range(len(exact.times)):
+        angles = np.array([coordinates[name][k, 0] for name in springs])
+        state = exact.position[k], exact.orientation[k], exact.velocity[k], exact.angular_velocity[k], angles
+        inertia = world_inertia(scene, rotations.to_matrix(exact.orientation[k]))
+        turning = np.einsum("bij,bj->bi", inertia, exact.angular_acceleration[k])
+        found.append(np.hstack([mass * exact.acceleration[k], turning]) - applied(scene, state))
+    return np.array(found)
+
+
+def idle(scene: Scene, run: Trajectory, exact: Trajectory) -> float:
+    """Largest part of the largest force by which a reaction is not of its joint's and driver's rows."""
+    length = scene_length(scene)
+    wanted = demanded(scene, exact) / np.repeat([1.0, length], 3)
+    units = np.repeat([1.0, length], 3)
+    worst = max(_idle_at(scene, run, k, units) for k in range(len(run.times)))
+    return worst / _scale(scene, wanted)
+
+
+def _idle_at(scene: Scene, run: Trajectory, k: int, units: np.ndarray) -> float:
+    position, orientation = run.position[k], run.orientation[k]
+    rows, _ = jacobian(scene, run.times[k], position, orientation)
+    worst = 0.0
+    for joint, own in _own_rows(scene):
+        held = on_second(scene, joint, rows[own], position, orientation) / units[:, None]
+        wrench = (run.reactions or {})[joint.name][k] / units
+        left = wrench - held @ np.linalg.lstsq(held, wrench, rcond=RANK)[0]
+        worst = max(worst, float(np.abs(left).max()))
+    return worst
+
+
+def _scale(scene: Scene, wanted: np.ndarray) -> float:
+    weight = sum(body.mass or 0.0 for body in scene.body)
+    return max(float(np.abs(wanted).max()), LEAST * weight)

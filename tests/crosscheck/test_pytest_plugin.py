@@ -1,0 +1,83 @@
+"""The suite as pytest tests: a sound engine and a faulty one / what a developer sees, keeps and replays."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crosscheck.cli.commands import main
+from crosscheck.conformance.findings import shrunk, violates
+from crosscheck.conformance.moving import moving_probes
+from crosscheck.conformance.runners import InProcess
+from mbref.scene import Scene
+from tests.zoo.defects import DEFECTS, SOURCE, engine
+
+ROOT = Path(__file__).parents[2]
+
+
+def held(place: Path, chosen: str, *options: str) -> subprocess.CompletedProcess[str]:
+    """pytest on the suite in an empty directory, the example engine in this place."""
+    plugin = ["-p", "crosscheck.conformance.pytest_plugin", "-p", "cacheprovider", "-o", "addopts="]
+    named = [
+        "--pyargs",
+        "crosscheck.conformance",
+        "--engine",
+        "spatial_engine:ENGINE",
+        "--in-process",
+        "-k",
+        chosen,
+    ]
+    return subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", *plugin, "--rootdir", place, *named, *options], cwd=place,
+        env={**os.environ, "PYTHONPATH": f"{place}{os.pathsep}{ROOT}", "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
+        capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+
+
+def test_sound_engine_and_a_second_run_that_resumes(tmp_path):
+    (tmp_path / "spatial_engine.py").write_text(SOURCE.read_text())
+    first = held(tmp_path, "free_fall")
+    assert first.returncode == 0 and " passed" in first.stdout, first.stdout[-1500:] + first.stderr[-500:]
+    faulty = SOURCE.read_text().replace("np.array(self.scene.gravity)", "np.zeros(3)")
+    (tmp_path / "spatial_engine.py").write_text(faulty)
+    assert held(tmp_path, "free_fall", "--resume").returncode == 0, "passes of the run before were not taken"
+    assert held(tmp_path, "free_fall").returncode == 1, "an engine without gravity passed"
+
+
+def test_faulty_engine_and_its_finding(tmp_path, capsys, monkeypatch):
+    """What fails is kept as a scene file, and the command in its first lines fails again."""
+    defect = DEFECTS["a rod's speed of turning left out"]
+    (tmp_path / "spatial_engine.py").write_text(SOURCE.read_text().replace(defect.old, defect.new))
+    run = held(tmp_path, "distance and joint and closure", "--findings", str(tmp_path / "found"))
+    assert run.returncode == 1 and "kept as" in run.stdout, run.stdout[-1500:] + run.stderr[-500:]
+    (path,) = (tmp_path / "found").glob("*.toml")
+    scene = Scene.from_file(path)
+    assert len(scene.joint) == 1 and not any(scene.gravity), f"not made small: {scene}"
+    command = path.read_text().splitlines()[1].removeprefix("# crosscheck ").split()
+    assert command == ["verify", "spatial_engine:ENGINE", "--scene", str(path)], command
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    assert main(command) == 1
+    assert "closure" in capsys.readouterr().out
+
+
+def test_shrinking_and_what_still_fails():
+    """A scene gets smaller only as long as the card fails; a sound engine's stays as it is."""
+    scene = moving_probes()["spring load"]
+    faulty = violates(InProcess(engine(DEFECTS["spring's damping with the wrong sign"])), "truth")
+    small = shrunk(scene, faulty, tries=12)
+    assert faulty(small) and len(small.joint) < len(scene.joint), small
+    assert shrunk(scene, lambda candidate: False) == scene
+
+
+@pytest.mark.parametrize("defect", ["spring's damping ignored"])
+def test_violation_and_the_sound_engine(defect):
+    scene = moving_probes()["spring load"].with_(gravity=(0.0, 0.0, 0.0))
+    assert np.all(np.array(scene.gravity) == 0.0)
+    assert violates(InProcess(engine(DEFECTS[defect])), "truth")(scene)
+    assert not violates(InProcess(engine()), "truth")(scene)

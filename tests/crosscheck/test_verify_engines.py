@@ -1,0 +1,44 @@
+"""The built-in engines / the cards of the suite, in this process; what fails is known, with its reason."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from crosscheck.conformance import suite, trial
+from crosscheck.conformance.runners import InProcess
+from crosscheck.engine import BUILT_IN, engine
+
+SPECIMENS = {specimen.scene.name: specimen for specimen in trial.specimens()}
+QUICK = ("heavy top", "universal joint", "cylindrical driver", "torsion_spring load", "door")
+KNOWN: dict[tuple[str, str, str], str] = {}  # (engine, scene, card): why it fails
+
+
+def violations(name: str, scenes: tuple[str, ...], related: bool) -> dict[tuple[str, str, str], str]:
+    """What fails, by engine, scene and card."""
+    found = {}
+    for scene in scenes:
+        bench = trial.set_up(InProcess(engine(name)), replace(SPECIMENS[scene], related=related))
+        for verdict in suite.examine(bench):
+            if verdict.status == suite.FAIL:
+                found[name, scene, verdict.property] = f"{verdict.measured}, allowed {verdict.allowed}"
+    return found
+
+
+def known(name: str, scenes: tuple[str, ...]) -> set[tuple[str, str, str]]:
+    return {key for key in KNOWN if key[0] == name and key[1] in scenes}
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_engine_and_moving_probes(name):
+    found = violations(name, QUICK, related=False)
+    assert set(found) == known(name, QUICK), found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_engine_and_relations(name):
+    scenes = trial.RELATED
+    found = violations(name, scenes, related=True)
+    assert set(found) == known(name, scenes), found

@@ -1,0 +1,154 @@
+"""Drawn mechanisms: mbref's motion and reactions / the judge's own equations, work, energy, its way back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from crosscheck.conformance.replays import started
+from crosscheck.conformance.strategies import goes_on, matrices, mechanisms, paper_mechanisms
+from crosscheck.conformance.trial import difference
+from crosscheck.judge.constraints import initial_poses, jacobian, scene_length
+from crosscheck.judge.energy import energy_series
+from crosscheck.judge.gauss_motion import accelerations, applied, gauss_motion
+from crosscheck.judge.gauss_principle import singular_values
+from crosscheck.judge.joint_reactions import resultants
+from crosscheck.judge.loads import world_inertia
+from crosscheck.judge.metrics import violation_series
+from crosscheck.judge.reaction_balance import balance, idle
+from crosscheck.judge.tolerances import RANK
+from mbref import Limits, rotations, simulate
+from mbref.equations.diagnosis import diagnose
+from mbref.scene import Scene
+from mbref.trajectory import Outcome, Trajectory
+
+METHOD = "alf-dual+projection"
+NEAR = 1e-4  # least singular value below which a scene counts as at a singular position
+EXACT, MOVED = (
+    1e-7,
+    1e-6,
+)  # of equations at a state; of motions, which leave the neighbourhood of singular ones
+
+
+def is_regular(scene: Scene) -> bool:
+    """Whether a scene is neither at a singular position nor in a mobility of the instant."""
+    values = singular_values(scene)
+    return bool(np.all((values < RANK * values[0]) | (values > NEAR * values[0]))) and goes_on(scene)
+
+
+def run(scene: Scene, samples: int = 3) -> Trajectory:
+    """mbref's motion, and that it completed."""
+    found = simulate(scene, METHOD, np.linspace(0.0, scene.duration, samples), Limits(rtol=1e-10))
+    assert found.outcome is Outcome.COMPLETED, f"{found.outcome} {found.message}: {scene}"
+    return found
+
+
+def state(motion: Trajectory, k: int) -> tuple[np.ndarray, ...]:
+    """Positions, orientations, velocities and spins at a sample, without torsion springs."""
+    return (
+        motion.position[k],
+        motion.orientation[k],
+        motion.velocity[k],
+        motion.angular_velocity[k],
+        np.zeros(0),
+    )
+
+
+@given(mechanisms())
+def test_state_and_equations(scene):
+    """Constraints at three levels; Gauss's principle; Newton and Euler with reactions; virtual work."""
+    assume(is_regular(scene))
+    motion = run(scene)
+    length, pace = scene_length(scene), max(1.0, float(np.abs(motion.angular_velocity).max()))
+    for level in (0, 1, 2):
+        off = float(violation_series(scene, motion, level).max())
+        assert off < EXACT * pace**level, f"joints are off by {off:.1e} at level {level}: {scene}"
+    assert balance(scene, motion, motion) < EXACT, f"reactions do not move the bodies: {scene}"
+    assert idle(scene, motion, motion) < EXACT, f"a reaction acts along a freedom: {scene}"
+    for k in range(len(motion.times)):
+        found = np.hstack([motion.acceleration[k], motion.angular_acceleration[k]])
+        least = accelerations(scene, float(motion.times[k]), state(motion, k))
+        scale = max(1.0, np.abs(least).max())
+        assert np.abs(found - least).max() < EXACT * scale / NEAR**0.5, (
+            f"Gauss's principle, {length} m: {scene}"
+        )
+
+
+@given(mechanisms())
+def test_power_and_what_changes_the_energy(scene):
+    """Kinetic energy grows by the power of the loads: the reactions of joints at rest do none."""
+    assume(is_regular(scene))
+    motion = run(scene)
+    mass = np.array([body.mass for body in scene.body])[:, None]
+    for k in range(len(motion.times)):
+        twist = np.hstack([motion.velocity[k], motion.angular_velocity[k]])
+        inertia = world_inertia(scene, rotations.to_matrix(motion.orientation[k]))
+        pushes = [
+            mass * motion.acceleration[k],
+            np.einsum("bij,bj->bi", inertia, motion.angular_acceleration[k]),
+        ]
+        growth = float(np.sum(np.hstack(pushes) * twist))
+        power = float(np.sum(applied(scene, state(motion, k)) * twist))
+        work = float(np.sum(resultants(scene, motion, k) * twist))
+        scale = max(1.0, np.abs(np.hstack(pushes) * twist).max())
+        assert abs(growth - power) < 1e-6 * scale, f"power {power} W, energy grows by {growth} W: {scene}"
+        assert abs(work) < 1e-6 * scale, f"reactions work by {work} W: {scene}"
+
+
+@settings(max_examples=8)
+@given(mechanisms(most_bodies=3, most_loops=1))
+def test_motion_and_reference_and_way_back(scene):
+    """The motion is Gauss's; energy less work is kept; with velocities reversed it comes back."""
+    assume(is_regular(scene))
+    motion = run(scene, 9)
+    exact = gauss_motion(scene, tuple(motion.times.tolist()))
+    apart = difference(scene, motion, exact)
+    assert apart < MOVED, f"mbref and Gauss's principle differ by {apart:.1e}: {scene}"
+    drift = energy_series(scene, motion)
+    assert drift is None or drift.max() < 1e-5, f"energy drifts by {drift.max():.1e}: {scene}"
+    back = run(started(scene, motion, len(motion.times) - 1, -1.0), 9)
+    position, orientation = back.position[-1] - motion.position[0], back.orientation[-1]
+    turned = rotations.angle_between(orientation, motion.orientation[0]).max()
+    off = max(float(np.abs(position).max()) / scene_length(scene), float(turned))
+    assert off < MOVED, f"it comes back off by {off:.1e}: {scene}"
+
+
+@given(mechanisms(redundant=True))
+def test_redundancy_by_construction_and_diagnosis(scene):
+    """A joint is there twice: its rows count as redundant, and the rank is the judge's."""
+    values = singular_values(scene)
+    assume(np.all((values < RANK * values[0]) | (values > NEAR * values[0])))
+    found = diagnose(scene)
+    rank = int(np.sum(values > RANK * values[0]))
+    assert found.counts.rank == rank, f"rank {found.counts.rank}, by the judge {rank}: {scene}"
+    assert found.counts.redundant > 0 and "R" in found.redundant_by_joint, f"{found}: {scene}"
+    assert "R" not in found.unique_reactions, f"{found}: {scene}"
+
+
+@given(mechanisms())
+def test_drawn_scenes_and_what_is_promised_of_them(scene):
+    """Joints hold and velocities obey them; the scene file is the scene."""
+    pose = initial_poses(scene)
+    rows, _ = jacobian(scene, 0.0, *pose)
+    twists = np.array([[*body.velocity, *body.angular_velocity] for body in scene.body]).ravel()
+    assert np.abs(rows @ twists).max(initial=0.0) < 1e-12 * max(1.0, np.abs(twists).max()), scene
+    assert Scene(**scene.to_dict()) == scene
+
+
+@settings(max_examples=6)
+@given(paper_mechanisms(("planar_slider_crank", "spatial_slider_crank")))
+def test_paper_mechanisms_of_any_mass_and_equations(scene):
+    motion = run(scene.with_(duration=0.005))
+    assert balance(scene, motion, motion) < 1e-6, scene
+    assert float(violation_series(scene, motion).max()) < 1e-8, scene
+
+
+@given(st.integers(0, 5), st.data())
+def test_drawn_matrices_and_their_rank_and_spectrum(rank, data):
+    matrix = data.draw(matrices(rank=rank))
+    assert np.linalg.matrix_rank(matrix, rtol=1e-9) == rank, matrix.shape
+    spectrum = (3.0, 1e-3)
+    values = np.linalg.svd(data.draw(matrices(spectrum=spectrum)), compute_uv=False)
+    assert values[:2] == pytest.approx(spectrum, rel=1e-9) and np.all(values[2:] < 1e-12), values

@@ -1,0 +1,55 @@
+"""The zoo: every defect / a named card that tells it; every card / a defect; the sound engine / all cards."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+
+import pytest
+
+from crosscheck.conformance import suite, trial
+from crosscheck.conformance.features import undetermined
+from crosscheck.conformance.properties import PROPERTIES
+from crosscheck.conformance.runners import InProcess
+from tests.zoo.defects import DEFECTS, engine
+from tests.zoo.table import page
+
+SPECIMENS = {s.scene.name: s for s in [trial.Specimen(undetermined()), *trial.specimens()]}
+
+
+@functools.cache
+def sound_bench(scene: str) -> trial.Bench:
+    return trial.set_up(InProcess(engine()), SPECIMENS[scene])
+
+
+@pytest.mark.parametrize("about", DEFECTS)
+def test_defect_and_the_card_that_tells(about):
+    """The named card fails with the defect, and passes without it."""
+    defect = DEFECTS[about]
+    bench = trial.set_up(InProcess(engine(defect)), SPECIMENS[defect.scene])
+    faulty, sound = (suite.verdict_on(defect.card, b) for b in (bench, sound_bench(defect.scene)))
+    assert faulty.status == suite.FAIL, f"{about}: {defect.card} on {defect.scene} says {faulty}"
+    assert sound.status == suite.PASS, f"the sound engine: {sound}"
+
+
+def test_every_card_and_a_defect_that_trips_it():
+    idle = {*suite.FIRST, *PROPERTIES} - {defect.card for defect in DEFECTS.values()}
+    assert not idle, f"no defect of the zoo trips {sorted(idle)}"
+
+
+def test_every_scene_of_a_defect_and_the_suite():
+    unknown = {defect.scene for defect in DEFECTS.values()} - set(SPECIMENS)
+    assert not unknown, unknown
+
+
+@pytest.mark.slow
+def test_sound_engine_and_the_whole_suite():
+    found = suite.held_against(InProcess(engine()), trial.specimens(deep=True))
+    failed = [v for v in found.verdicts if v.status == suite.FAIL]
+    assert found.conforms, failed
+
+
+def test_page_of_cards_and_the_table():
+    """docs/conformance.md is what its command writes."""
+    path = Path(__file__).parents[2] / "docs" / "conformance.md"
+    assert path.read_text() == page(), "python -m tests.zoo.table docs/conformance.md renews it"
