@@ -117,7 +117,7 @@ class Scene(Entry):
     @classmethod
     def _collect_every_fault(cls, data: Any, handler: Any) -> Scene:
         faults: dict[str, str] = {}
-        scene = None
+        scene: Scene | None = None
         try:
             scene = handler(data)
         except ValidationError as error:
@@ -126,9 +126,9 @@ class Scene(Entry):
         if isinstance(data, Mapping):
             for path, message in reference_faults(data):
                 faults.setdefault(path, message)
-        if faults:
+        if faults or scene is None:
             raise SceneError([f"{path}: {message}" for path, message in faults.items()])
-        return scene  # type: ignore[return-value]
+        return scene
 
     def body_index(self, name: str) -> int:
         """Index of a body in ``body``; -1 for the ground."""

@@ -171,6 +171,6 @@ Joint = Annotated[
     Fixed | Revolute | Universal | Spherical | Translational | Cylindrical | Planar | Distance,
     Discriminator("type"),
 ]
-JOINT_TYPES: dict[str, type[JointEntry]] = {
+JOINT_TYPES: dict[str, type[Joint]] = {
     joint.model_fields["type"].default: joint for joint in get_args(get_args(Joint)[0])
 }

@@ -64,6 +64,6 @@ class TorsionSpring(LoadEntry):
 
 
 Load = Annotated[Moment | Force | Spring | TorsionSpring, Discriminator("type")]
-LOAD_TYPES: dict[str, type[LoadEntry]] = {
+LOAD_TYPES: dict[str, type[Load]] = {
     load.model_fields["type"].default: load for load in get_args(get_args(Load)[0])
 }

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from mbref import rotations
 from mbref.scene import (
     JOINT_TYPES,
@@ -25,7 +27,7 @@ AXIS = (0.2, 0.1, 1.0)
 INERTIA = ((0.02, 0.002, -0.001), (0.002, 0.03, 0.003), (-0.001, 0.003, 0.025))
 BODY = Body(
     name="body", mass=1.5, inertia=INERTIA, position=PLACE,
-    orientation=tuple(rotations.from_vector([0.3, -0.2, 0.5]).tolist()),
+    orientation=tuple(rotations.from_vector(np.array([0.3, -0.2, 0.5])).tolist()),
 )  # fmt: skip
 ACROSS = (1.0, -1.0, 0.5)  # axis of joints without rotation, along which the body can fall
 PLACES = {"anchor": PIVOT, "anchors": (PIVOT, (0.4, -0.1, 0.1)), "axes": ((0.0, 0.0, 1.0), (1.0, 0.3, 0.0))}
@@ -83,8 +85,9 @@ def _carrier(load: Load) -> Joint:
     return TURNS if load.acts_on == "joint" else JOINTS["spherical"]
 
 
-def _probe(name: str, *joint: Joint, **causes) -> Scene:
-    return Scene(name=name, gravity=(0.0, -9.81, 0.0), duration=0.2, body=(BODY,), joint=joint, **causes)
+def _probe(name: str, *joint: Joint, driver: tuple[Driver, ...] = (), load: tuple[Load, ...] = ()) -> Scene:
+    return Scene(name=name, gravity=(0.0, -9.81, 0.0), duration=0.2, body=(BODY,), joint=joint,
+                 driver=driver, load=load)  # fmt: skip
 
 
 def _short(name: str, duration: float) -> Scene:

@@ -28,6 +28,7 @@ from mbref.scene import (
 )
 from mbref.trajectory import Outcome
 
+Triple = tuple[float, float, float]
 REFERENCE, PRINCIPLE = "mbref", "Gauss's principle"
 KINDS = ("revolute", "universal", "spherical", "translational", "cylindrical", "distance", "fixed", "planar")
 TREE = (0.34, 0.14, 0.14, 0.12, 0.12, 0.08, 0.03, 0.03)  # probability of each kind to join a body to the tree
@@ -57,7 +58,7 @@ def random_mechanism(seed: int) -> Scene:
     the instant (a singular position) is drawn again.  The same seed gives the same scene.
     """
     rng = np.random.default_rng(seed)
-    while (scene := _Draw(rng).scene(f"random_{seed}")) is None:
+    while (scene := _Drawing(rng).scene(f"random_{seed}")) is None:
         pass
     return scene
 
@@ -93,7 +94,7 @@ def _apart(found: np.ndarray | None, reference: np.ndarray) -> float:
     return np.inf if found is None else float(np.linalg.norm(found - reference, axis=-1).max())
 
 
-class _Draw:
+class _Drawing:
     """One drawing: random numbers, the direction planar mechanisms share, and what is drawn so far."""
 
     def __init__(self, rng: np.random.Generator):
@@ -143,7 +144,8 @@ class _Draw:
         coasting = bias(scene)
         rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
         left = rows @ np.linalg.lstsq(rows, coasting, rcond=RANK)[0] - coasting
-        return scene if np.linalg.norm(left) <= CONTINUES * max(1.0, np.linalg.norm(coasting)) else None
+        size = max(1.0, float(np.linalg.norm(coasting)))
+        return scene if np.linalg.norm(left) <= CONTINUES * size else None
 
     def loads(self) -> tuple[Moment | Force | Spring, ...]:
         first, second = self.rng.choice(len(self.bodies), 2, replace=False)
@@ -184,12 +186,12 @@ class _Draw:
         """Another joint on the axis of a revolute one, between the same bodies: redundant."""
         axis = np.array(hinge.axis)
         anchor = _triple(np.array(hinge.anchor) + self.rng.uniform(0.2, 0.6) * axis)
-        common = {"name": f"J{len(self.joints)}", "bodies": hinge.bodies, "anchor": anchor}
-        if self.rng.random() < 0.3:
-            return Spherical(**common)
-        return (Revolute if self.rng.random() < 0.5 else Cylindrical)(**common, axis=hinge.axis)
+        kind: type[Joint] = Spherical
+        if self.rng.random() >= 0.3:
+            kind = Revolute if self.rng.random() < 0.5 else Cylindrical
+        return kind.at(f"J{len(self.joints)}", hinge.bodies, anchor=anchor, axis=hinge.axis)
 
-    def point(self, near: np.ndarray) -> tuple[float, ...]:
+    def point(self, near: np.ndarray) -> Triple:
         return _triple(near + self.rng.uniform(-0.3, 0.3, 3))
 
     def direction(self) -> np.ndarray:
@@ -197,8 +199,9 @@ class _Draw:
         return v / np.linalg.norm(v)
 
 
-def _triple(v: np.ndarray) -> tuple[float, ...]:
-    return tuple(np.asarray(v, dtype=float).tolist())
+def _triple(v: np.ndarray) -> Triple:
+    x, y, z = map(float, v)
+    return x, y, z
 
 
 def _null_space(scene: Scene) -> np.ndarray:

@@ -47,7 +47,7 @@ def stated_rate(scene: Scene) -> float:
     return max(rates)
 
 
-def _middle_moment(inertia: Sequence) -> float:
+def _middle_moment(inertia: Sequence[float] | Sequence[Sequence[float]]) -> float:
     """The middle principal moment; the least one is next to zero for thin rods."""
     matrix = np.array(inertia)
     return float(np.linalg.eigvalsh(np.diag(matrix) if matrix.ndim == 1 else matrix)[1])

@@ -5,6 +5,8 @@ Arrays may have leading shape (…); vectors are columns, as in the constraints'
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from crosscheck.engines.constraint_equations import Frames
@@ -45,7 +47,7 @@ class Forces:
         ]  # fmt: skip
         self.twists = [(x, *self._hinge(x.joint)) for x in loads if isinstance(x, TorsionSpring)]
 
-    def _end(self, name: str, point: tuple) -> tuple[int, np.ndarray]:
+    def _end(self, name: str, point: Sequence[float]) -> tuple[int, np.ndarray]:
         place = point_in_body(self.scene, name, np.array(point))
         return self.scene.body_index(name), place[:, None]
 

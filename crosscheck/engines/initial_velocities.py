@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from crosscheck.engine import Cannot, Owner
@@ -72,7 +74,7 @@ def _joint_map(link: Link) -> np.ndarray:
     """(6, freedoms): the twist of the link's frame of its own joint's velocities."""
     turning = np.vstack([-cross_matrix(link.position - link.anchor), np.eye(3)])
     sliding = np.vstack([np.eye(3), np.zeros((3, 3))])
-    of_kind = {
+    of_kind: dict[str, Callable[[np.ndarray], np.ndarray]] = {
         SLIDE: lambda axis: sliding @ axis[:, None],
         TURN: lambda axis: turning @ axis[:, None],
         BALL_JOINT: lambda axis: turning,

@@ -5,12 +5,16 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, FamilyParts, Owner, Setting, Supports
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from mbref.method import Method
 
 METHODS = (
     "alf-dual+projection, specialised",
@@ -37,7 +41,7 @@ class Mbref(Engine):
     package = "mbref"
 
     @functools.cached_property
-    def supports(self) -> Supports:  # type: ignore[override]
+    def supports(self) -> Supports:  # type: ignore[override]  # naming the engine imports nothing
         """mbref has equations for every joint in its table, and for every load of a scene file."""
         from mbref.equations.joints import JOINTS
 
@@ -110,7 +114,7 @@ class Mbref(Engine):
         return simulate(scene, _method(setting.family), times, Limits(code=code, **setting.options))
 
 
-def _method(family: str):
+def _method(family: str) -> Method:
     from mbref.method import Method
 
     return Method.parse(family.removesuffix(SPECIALISED))

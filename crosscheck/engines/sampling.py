@@ -81,10 +81,13 @@ def run_through(
             t = target
     except Failed as failure:
         outcome, t, message = failure.outcome, failure.t, str(failure)
+    states = {name: _stacked(samples, name, len(scene.body), width) for name, width in WIDTHS.items()}
     return Trajectory(
         scene=scene.name, **labels, times=np.array(times[: len(samples)], dtype=float),
         bodies=tuple(body.name for body in scene.body),
-        **{name: _stacked(samples, name, len(scene.body), width) for name, width in WIDTHS.items()},
+        position=states["position"], orientation=states["orientation"],
+        velocity=states["velocity"], angular_velocity=states["angular_velocity"],
+        acceleration=states["acceleration"], angular_acceleration=states["angular_acceleration"],
         reactions=_by_joint([s.reactions for s in samples]),
         outcome=outcome, t_end=t, message=message,
         cost=Cost(seconds, build_seconds, counts.steps, counts.rejected, counts.rhs),
@@ -202,15 +205,15 @@ class Adaptive:
         error = h * squares / math.sqrt((squares + 0.01 * (third @ third)) * len(y)) if squares else 0.0
         if self.settle is None:
             return new, k[-1], error
-        return self._settled(t + h, new, k[-1], h / scale, error)
+        return self._settled(self.settle, t + h, new, k[-1], h / scale, error)
 
     def _settled(
-        self, t: float, y: np.ndarray, slope: np.ndarray, weight: np.ndarray, error: float
+        self, settle: Settle, t: float, y: np.ndarray, slope: np.ndarray, weight: np.ndarray, error: float
     ) -> tuple[np.ndarray, np.ndarray, float]:
         """The settled state and its slope. The slope before counts as another estimate of the error: where
         the little that settling changes turns it into another, a step would go on from noise."""
         try:
-            settled = self.settle(t, y)
+            settled = settle(t, y)
         except Failed:
             return y, slope, math.inf
         after = self._evaluate(t, settled)

@@ -235,9 +235,9 @@ def _depth_first(nodes: list[Link], edges: list[_Edge], closures: list[Closure],
     number: dict[int, int] = {GROUND_LINK: GROUND_LINK}
     links: list[Link] = []
 
-    def add(node: int, **carrier) -> None:
+    def add(node: int, link: Link) -> None:
         number[node] = len(links)
-        links.append(replace(nodes[node], **carrier))
+        links.append(link)
         grow(node)
 
     def grow(node: int) -> None:
@@ -247,13 +247,13 @@ def _depth_first(nodes: list[Link], edges: list[_Edge], closures: list[Closure],
             forward = edge.nodes[0] == node
             child = edge.nodes[1] if forward else edge.nodes[0]
             axes = edge.axes if forward else -edge.axes[::-1]
-            add(child, kind=edge.kind, mobilities=mobilities(edge.facts, axes), joint=edge.joint,
-                parent=number[node], anchor=edge.anchor, axes=axes)  # fmt: skip
+            add(child, replace(nodes[child], kind=edge.kind, mobilities=mobilities(edge.facts, axes),
+                joint=edge.joint, parent=number[node], anchor=edge.anchor, axes=axes))  # fmt: skip
 
     grow(GROUND_LINK)
     for node in range(len(nodes)):
         if node not in number:
-            add(node, anchor=nodes[node].position)
+            add(node, replace(nodes[node], anchor=nodes[node].position))
     starts = np.cumsum([0, *(link.freedoms for link in links)])[:-1]
     return Tree(
         links=tuple(links),

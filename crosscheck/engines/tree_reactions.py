@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.engines.spanning_tree import GROUND_LINK, Tree
-from mbref.scene import Distance, Force, Moment, Scene, Spring, TorsionSpring
+from mbref.scene import Distance, Force, Load, Moment, Scene, Spring, TorsionSpring
 
 ZERO = np.zeros(3)
 
@@ -101,7 +101,7 @@ def _point(
     return motion.position[link] + arm, motion.velocity[link] + np.cross(motion.angular_velocity[link], arm)
 
 
-def _applied(scene: Scene, tree: Tree, motion: LinkMotion, load) -> list[tuple[int, np.ndarray]]:
+def _applied(scene: Scene, tree: Tree, motion: LinkMotion, load: Load) -> list[tuple[int, np.ndarray]]:
     """The links that a load acts on, each with the wrench on it."""
     if isinstance(load, Moment):
         return [(tree.link_of(scene.body_index(load.body)), np.array([*ZERO, *load.moment]))]

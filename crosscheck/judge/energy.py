@@ -7,7 +7,7 @@ moment; elsewhere its work is the integral of the power through the samples (cub
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -87,7 +87,9 @@ def _potential_gains(scene: Scene, trajectory: Trajectory) -> Iterator[np.ndarra
             yield -_work_of_moment(scene, load, trajectory)
 
 
-def _point(scene: Scene, name: str, point, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+def _point(
+    scene: Scene, name: str, point: Sequence[float], position: np.ndarray, orientation: np.ndarray
+) -> np.ndarray:
     body, local = attachment(scene, name, point)
     fixed = np.broadcast_to(local, position[:, 0].shape)
     return fixed if body < 0 else position[:, body] + rotations.rotate(orientation[:, body], local)

@@ -213,7 +213,7 @@ def _rows(
     joint: JointFrames,
     linear: np.ndarray,
     angular: np.ndarray,
-    crossing: list,
+    crossing: list[np.ndarray],
     t: np.ndarray,
     derivative: int,
 ) -> np.ndarray:
@@ -235,7 +235,7 @@ def _crossing(frames: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, list[np
     return normal / size, size, axes
 
 
-def _crossing_acceleration(frames: list, w: list[np.ndarray], dw: list[np.ndarray]) -> np.ndarray:
+def _crossing_acceleration(frames: list[np.ndarray], w: list[np.ndarray], dw: list[np.ndarray]) -> np.ndarray:
     normal, size, axes = _crossing(frames)
     turning = np.cross(np.cross(w[1], axes[1]), axes[0]) + np.cross(axes[1], np.cross(w[0], axes[0]))
     turning = (turning - normal * _dot(normal, turning)) / size

@@ -50,16 +50,22 @@ def attachment(scene: Scene, name: str, point: Sequence[float]) -> tuple[int, np
     return scene.body_index(name), rotations.rotate(rotations.conjugate(np.array(body.orientation)), arm)
 
 
-def _moment(scene, load: Moment, motion: Motion, axis, force, moment) -> None:
+def _moment(
+    scene: Scene, load: Moment, motion: Motion, axis: np.ndarray, force: np.ndarray, moment: np.ndarray
+) -> None:
     moment[:, scene.body_index(load.body)] += np.array(load.moment)
 
 
-def _force(scene, load: Force, motion: Motion, axis, force, moment) -> None:
+def _force(
+    scene: Scene, load: Force, motion: Motion, axis: np.ndarray, force: np.ndarray, moment: np.ndarray
+) -> None:
     body, local = attachment(scene, load.body, load.point)
-    _push(motion, body, motion.rotation[:, body] @ local, np.array(load.force), force, moment)
+    _push(body, motion.rotation[:, body] @ local, np.array(load.force), force, moment)
 
 
-def _spring(scene, load: Spring, motion: Motion, axis, force, moment) -> None:
+def _spring(
+    scene: Scene, load: Spring, motion: Motion, axis: np.ndarray, force: np.ndarray, moment: np.ndarray
+) -> None:
     ends = [attachment(scene, *end) for end in zip(load.bodies, load.points, strict=True)]
     (start, start_rate), (stop, stop_rate) = (_point(motion, *end) for end in ends)
     offset = stop - start
@@ -69,10 +75,12 @@ def _spring(scene, load: Spring, motion: Motion, axis, force, moment) -> None:
     pull = (load.stiffness * (length - load.natural_length) + load.damping * rate) * direction
     for (body, local), sign in zip(ends, (1, -1), strict=True):
         if body >= 0:
-            _push(motion, body, motion.rotation[:, body] @ local, sign * pull, force, moment)
+            _push(body, motion.rotation[:, body] @ local, sign * pull, force, moment)
 
 
-def _torsion_spring(scene, load: TorsionSpring, motion: Motion, axis, force, moment) -> None:
+def _torsion_spring(
+    scene: Scene, load: TorsionSpring, motion: Motion, axis: np.ndarray, force: np.ndarray, moment: np.ndarray
+) -> None:
     joint = scene.joint_named(load.joint)
     along = np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
     bodies = [scene.body_index(name) for name in joint.bodies]
@@ -106,7 +114,7 @@ def _point(motion: Motion, body: int, local: np.ndarray) -> tuple[np.ndarray, np
     )
 
 
-def _push(motion: Motion, body: int, arm: np.ndarray, push: np.ndarray, force, moment) -> None:
+def _push(body: int, arm: np.ndarray, push: np.ndarray, force: np.ndarray, moment: np.ndarray) -> None:
     force[:, body] += push
     moment[:, body] += cross(arm, np.broadcast_to(push, arm.shape))
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from mbref.scene import Body, Revolute, Scene, Universal
+from mbref.scene import Body, Joint, Revolute, Scene, Universal
 from mbref.scenes.links import about_z
 
 Y, Z = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -28,7 +28,7 @@ def four_bar_chain(loops: int = 2, name: str = "four_bar_chain") -> Scene:
         Body(name=f"bar{i}", mass=1.0, inertia=INERTIA, position=(i - 0.5, 1.0, 0.0), orientation=level)
         for i in range(1, loops + 1)
     ]
-    joints = [
+    joints: list[Joint] = [
         Revolute(name=f"A{i}", bodies=("ground", f"upright{i}"), anchor=(float(i), 0.0, 0.0), axis=Z)
         for i in range(loops + 1)
     ]
@@ -41,7 +41,7 @@ def four_bar_chain(loops: int = 2, name: str = "four_bar_chain") -> Scene:
     return Scene(name=name, gravity=(0.0, -9.81, 0.0), duration=0.5, body=tuple(bodies), joint=tuple(joints))
 
 
-def _upright(i: int, orientation: tuple[float, ...]) -> Body:
+def _upright(i: int, orientation: tuple[float, float, float, float]) -> Body:
     return Body(
         name=f"upright{i}", mass=1.0, inertia=INERTIA, position=(float(i), 0.5, 0.0),
         orientation=orientation, angular_velocity=(0.0, 0.0, -1.0),

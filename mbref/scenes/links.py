@@ -31,11 +31,11 @@ def link(
     **velocities: tuple[float, float, float],
 ) -> Body:
     """A rod of 1 kg per metre between two points; its x axis runs from start to end."""
-    middle = tuple((p + q) / 2 for p, q in zip(start, end, strict=True))
+    (a, b, c), (x, y, z) = start, end
     mass = DENSITY * length
     return Body(
-        name=name, mass=mass, inertia=rod_inertia(mass, length), position=middle,
-        orientation=orientation, **velocities,
+        name=name, mass=mass, inertia=rod_inertia(mass, length),
+        position=((a + x) / 2, (b + y) / 2, (c + z) / 2), orientation=orientation, **velocities,
     )  # fmt: skip
 
 

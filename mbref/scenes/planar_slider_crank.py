@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from mbref.scene import Moment, Revolute, Scene, Spherical, Translational
-from mbref.scenes.links import about_z, link, slider
+from mbref.scenes.links import DENSITY, about_z, link, rod_inertia, slider
 
 X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 TORQUE = (0.0, 0.0, 100.0)  # N m
@@ -31,11 +31,11 @@ def planar_slider_crank_equal(name: str = "planar_slider_crank_equal") -> Scene:
 
 def planar_slider_crank_heavy(name: str = "planar_slider_crank_heavy") -> Scene:
     """a = b = 0.308 m with a flywheel disc on the crank: 61 singular positions in 20 s."""
-    base = planar_slider_crank(0.308, 0.308, name)
-    crank = base.body[0]
-    disc = (FLYWHEEL / 2, FLYWHEEL / 2, FLYWHEEL)
-    inertia = tuple(i + j for i, j in zip(crank.inertia, disc, strict=True))
-    crank = crank.model_copy(update={"inertia": inertia})
+    length = 0.308
+    base = planar_slider_crank(length, length, name)
+    along, across, _ = rod_inertia(DENSITY * length, length)
+    inertia = (along + FLYWHEEL / 2, across + FLYWHEEL / 2, across + FLYWHEEL)
+    crank = base.body[0].model_copy(update={"inertia": inertia})
     return base.with_(body=(crank, *base.body[1:]), duration=20.0)
 
 

@@ -97,11 +97,12 @@ class Exudyn(Engine):
         return self._trajectory(scene, setting, replace(motion, message=message))
 
     def _trajectory(self, scene: Scene, setting: Setting, motion: Motion) -> Trajectory:
-        q, rates, *seconds = motion.coordinates
+        q, rates = motion.coordinates[:2]
         turned = q[..., 3:] + [1.0, 0.0, 0.0, 0.0]
         turn = _normalised(turned)
         start, orientation = initial_poses(scene)
-        known = bool(seconds) and not any(_accelerates(driver) for driver in scene.driver)
+        forces = None if any(_accelerates(driver) for driver in scene.driver) else motion.forces
+        seconds = None if forces is None else motion.coordinates[2]
         return Trajectory(
             scene.name, self.name, self.version(), setting.family, dict(setting.options), motion.times,
             tuple(body.name for body in scene.body),
@@ -109,9 +110,9 @@ class Exudyn(Engine):
             orientation=rotations.multiply(turn, orientation),
             velocity=rates[..., :3],
             angular_velocity=_angular(turned, rates[..., 3:]),
-            acceleration=seconds[0][..., :3] if known else None,
-            angular_acceleration=_angular(turned, seconds[0][..., 3:]) if known else None,
-            reactions=reactions(scene, q[..., :3], turn, motion.forces) if known else None,
+            acceleration=None if seconds is None else seconds[..., :3],
+            angular_acceleration=None if seconds is None else _angular(turned, seconds[..., 3:]),
+            reactions=None if forces is None else reactions(scene, q[..., :3], turn, forces),
             outcome=motion.outcome, message=motion.message, cost=motion.cost,
             t_end=motion.t_end,
         )  # fmt: skip

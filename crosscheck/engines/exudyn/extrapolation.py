@@ -9,7 +9,9 @@ The functions take the exudyn module and do not import it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import fields
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -84,18 +86,12 @@ class _Walk:
         runs = []
         for solver, divisor in zip(self.solvers, RICHARDSON, strict=True):
             solver.put(self.state)
-            run, ending = solver.run(
-                to, lambda span, n=divisor: 2 * n * step_count(span, 2 * self.step), self.configure
-            )
+            run, ending = solver.run(to, partial(_even_steps, self.step, divisor), self.configure)
             if ending:
                 self.pieces.append(_at(run, times[:0]))  # shows the sizes
                 return run, ending
             runs.append(run)
-        values, forces = (
-            sum(weight * run[i] for weight, run in zip(RICHARDSON.values(), runs, strict=True))
-            for i in (1, 2)
-        )
-        found = (to, values, forces)
+        found = (to, _limit([run[1] for run in runs]), _limit([run[2] for run in runs]))
         self.pieces.append(_at(found, times))
         self.arrive(found)
         return found, None
@@ -117,12 +113,23 @@ class _Walk:
         """The samples so far, with the outcome of the run that ended early."""
         costs = [solver.cost() for solver in self.solvers]
         cost = Cost(*(sum(getattr(c, item.name) for c in costs) for item in fields(Cost)))
-        found = [
+        times, coordinates, forces = (
             np.concatenate(parts, axis)
             for axis, parts in zip((0, 1, 0), zip(*self.pieces, strict=True), strict=True)
-        ]
+        )
         ended = (ending.outcome, ending.message) if ending else ()
-        return finite(Motion(*found, cost, self.state.t, *ended))
+        return finite(Motion(times, coordinates, forces, cost, self.state.t, *ended))
+
+
+def _even_steps(step: float, divisor: int, interval: float) -> int:
+    """An even number of steps, none longer than ``step`` (s) over the divisor, that fill an interval (s)."""
+    return 2 * divisor * step_count(interval, 2 * step)
+
+
+def _limit(results: Sequence[np.ndarray]) -> np.ndarray:
+    """Richardson's limit h → 0 of an array's values by the runs with the divisors of RICHARDSON."""
+    weighted = [weight * result for weight, result in zip(RICHARDSON.values(), results, strict=True)]
+    return np.sum(weighted, axis=0)
 
 
 def _onto(times: np.ndarray, nodes: np.ndarray, spacing: float) -> np.ndarray:

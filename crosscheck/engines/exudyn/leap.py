@@ -59,9 +59,10 @@ def _least(scene: Scene, orientation: np.ndarray, rows: np.ndarray, wanted: np.n
     """The change (nb, 6) of the bodies' twists with these values of the rows and the least kinetic energy:
     the noise of a light body is not handed on to a heavy one."""
     root = np.zeros((len(scene.body), 6, 6))  # one root a body of the mass matrix's inverse
-    for k, (body, inertia) in enumerate(zip(scene.body, inertia_matrices(scene), strict=True)):
+    masses = np.array([body.mass for body in scene.body], dtype=float)
+    for k, (mass, inertia) in enumerate(zip(masses, inertia_matrices(scene), strict=True)):
         moments, principal = np.linalg.eigh(inertia)
-        root[k, :3, :3] = np.eye(3) / np.sqrt(body.mass)
+        root[k, :3, :3] = np.eye(3) / np.sqrt(mass)
         root[k, 3:, 3:] = rotations.to_matrix(orientation[k]) @ principal / np.sqrt(moments)
     spread = block_diag(*root)
     return (spread @ np.linalg.lstsq(rows @ spread, wanted, rcond=RANK)[0]).reshape(-1, 6)

@@ -107,7 +107,9 @@ class Assembly:
             for k, body in enumerate(self.scene.body)
         ]  # fmt: skip
 
-    def _join(self, model: Any, parts: list, k: int, joint: Joint, driver: Driver | None, t0: float) -> None:
+    def _join(
+        self, model: Any, parts: list[Any], k: int, joint: Joint, driver: Driver | None, t0: float
+    ) -> None:
         from pyondsel.model.joint import Joint as OndselJoint
         from pyondsel.model.marker import Marker
         from pyondsel.model.motion import Motion
@@ -199,9 +201,9 @@ def table(answer: str, frames: int) -> Table:
     return Table(series)
 
 
-def _tuple(values: Any) -> tuple:
+def _tuple(values: np.ndarray) -> tuple[float, ...]:
     return tuple(map(float, values))
 
 
-def _matrix(values: np.ndarray) -> tuple:
+def _matrix(values: np.ndarray) -> tuple[tuple[float, ...], ...]:
     return tuple(map(_tuple, values))

@@ -15,7 +15,8 @@ A driven coordinate has an armature of 1e18 and the torque that goes with it: ex
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,7 @@ from mbref import rotations
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
+Step = Callable[[np.ndarray, float, float], np.ndarray]  # (state, its time, a later time) -> state then
 CONVERGED = (
     1e-9,
     1e-8,
@@ -143,8 +145,7 @@ class _Run:
         given = ((), ()) if family == "defaults" else (CONVERGED, FORCES)
         self.solver, self.sampler = (pin.ProximalSettings(*options) for options in given)
         if family in FIXED:
-            step = setting.options["step"]
-            self.step = lambda y, t0, t1: rk4(self.rhs, self.on_spheres, y, t0, t1, step, self.counts)
+            self.step: Step = partial(self._rk4, setting.options["step"])
         elif family in ("dop853", "tuned"):
             settle = self.projected if family == "tuned" else None
             limits = (setting.options["min_step"], self._max_step())
@@ -157,6 +158,9 @@ class _Run:
         if not self.driven:
             return np.inf
         return TURN_PER_STEP / stated_rate(self.mechanism.scene)
+
+    def _rk4(self, step: float, y: np.ndarray, t0: float, t1: float) -> np.ndarray:
+        return rk4(self.rhs, self.on_spheres, y, t0, t1, step, self.counts)
 
     def advance(self, t0: float, t1: float) -> None:
         """Moves the state from t0 to t1; raises Failed."""

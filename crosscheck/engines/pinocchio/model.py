@@ -21,6 +21,7 @@ from crosscheck.engines.spanning_tree import (
     GROUND_LINK,
     SLIDE,
     TURN,
+    Closure,
     Link,
     Tree,
     spanning_tree,
@@ -84,7 +85,7 @@ class Mechanism:
         model.appendBodyToJoint(joint, pin.Inertia(link.mass, lever, link.inertia), pin.SE3.Identity())
         self.joint.append(joint)
 
-    def _closure(self, closure) -> Any | None:
+    def _closure(self, closure: Closure) -> Any | None:
         """The RigidConstraintModel of a closure; None where both links hang from one joint."""
         pin = self.pin
         joints = [self.joint[k] if k != GROUND_LINK else 0 for k in closure.links]

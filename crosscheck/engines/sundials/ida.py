@@ -102,7 +102,9 @@ class Run:
     def _residual(self, t: float, y: np.ndarray, yp: np.ndarray, res: np.ndarray) -> None:
         res[:] = self.equations.residual(t, y, yp)
 
-    def _matrix(self, t: float, y: np.ndarray, yp: np.ndarray, res: np.ndarray, cj: float, out) -> None:
+    def _matrix(
+        self, t: float, y: np.ndarray, yp: np.ndarray, res: np.ndarray, cj: float, out: np.ndarray
+    ) -> None:
         steps = np.maximum(self.steps, INCREMENT * np.abs(y[: self.equations.motion]))
         out[:] = self.equations.matrix(t, y, yp, cj, steps)
 

@@ -16,8 +16,9 @@ def crankshaft(scene: Scene) -> Path | None:
     groups = _without_shaft(scene)
     if len(groups) < 2:
         return None
-    paths = [planar_slider_crank(_part(scene, group)) for group in groups]
-    if any(path is None for path in paths):
+    guesses = [planar_slider_crank(_part(scene, group)) for group in groups]
+    paths = [path for path in guesses if path is not None]
+    if len(paths) < len(groups):
         return None
     order = np.argsort(np.concatenate(groups))
 

@@ -23,6 +23,7 @@ from mbref.trajectory import Trajectory
 
 EYE = np.eye(3)
 TURNS = (Revolute, Cylindrical)  # joints that carry a torsion spring
+Pair = tuple[np.ndarray, np.ndarray]  # of linear and angular rates, (k, nb, 3) each
 PROBES = (0.0, 0.31, -0.83)  # path coordinates (rad, or lengths of the scene) where a path is tried
 
 
@@ -43,6 +44,9 @@ class Pose:
     dspin: np.ndarray
 
 
+DrivenSign = Callable[[Driver], float | None]  # the sign with which a driver moves q; None: it does not
+
+
 @dataclass(frozen=True)
 class Path:
     """A family's guess for a scene: poses at q (q = 0 at t = 0), the axis of the turns, and the sign
@@ -51,7 +55,7 @@ class Path:
     family: str
     poses: Callable[[np.ndarray], Pose]
     axis: np.ndarray
-    driven_sign: Callable[[Driver], float | None]
+    driven_sign: DrivenSign
 
 
 class OneDof:
@@ -161,7 +165,10 @@ def initial_rate(scene: Scene, path: Path) -> float | None:
     return rate if off <= ON_PATH * np.abs(wanted).max() else None
 
 
-def trajectory(scene: Scene, family: str, times, position, rotation, rates, accelerations) -> Trajectory:
+def trajectory(
+    scene: Scene, family: str, times: np.ndarray, position: np.ndarray, rotation: np.ndarray,
+    rates: Pair, accelerations: Pair,
+) -> Trajectory:  # fmt: skip
     """A Trajectory of engine "truth" in double precision; rates and accelerations are pairs (k, nb, 3)."""
     velocity, spin = (np.asarray(a, dtype=float) for a in rates)
     acceleration, spin_rate = (np.asarray(a, dtype=float) for a in accelerations)

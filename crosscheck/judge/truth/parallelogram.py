@@ -7,11 +7,13 @@ the circle of the crank pin that holds it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from crosscheck.judge.loads import initial_rotations
 from crosscheck.judge.tolerances import PARALLEL
-from crosscheck.judge.truth.one_dof import Path, Pose, circle, turned
+from crosscheck.judge.truth.one_dof import DrivenSign, Path, Pose, circle, turned
 from mbref.scene import GROUND, Cylindrical, Distance, Driver, Revolute, Scene
 
 
@@ -51,7 +53,7 @@ def pivots_of(scene: Scene) -> dict[str, Revolute]:
     return {name: joint for joint in found for name in joint.bodies if name != GROUND}
 
 
-def turning_driver(scene: Scene, axis: np.ndarray, turns: np.ndarray):
+def turning_driver(scene: Scene, axis: np.ndarray, turns: np.ndarray) -> DrivenSign:
     """driven_sign of a path whose bodies turn by `turns` (nb,) times q about `axis`."""
 
     def sign(driver: Driver) -> float | None:
@@ -65,7 +67,7 @@ def turning_driver(scene: Scene, axis: np.ndarray, turns: np.ndarray):
     return sign
 
 
-def unit(vector) -> np.ndarray:
+def unit(vector: Sequence[float] | np.ndarray) -> np.ndarray:
     """The vector (3,) at length one."""
     return np.array(vector, dtype=float) / np.linalg.norm(vector)
 

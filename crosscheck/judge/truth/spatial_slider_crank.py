@@ -68,7 +68,9 @@ def spatial_slider_crank(scene: Scene) -> Path | None:
     return Path("spatial_slider_crank", poses, axis, turning_driver(scene, axis, with_q))
 
 
-def _slide(pins: tuple[np.ndarray, ...], c0: np.ndarray, line: np.ndarray, length: float, side: float):
+def _slide(
+    pins: tuple[np.ndarray, ...], c0: np.ndarray, line: np.ndarray, length: float, side: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Displacement s (k,) along the line that keeps |c0 + s line - pin| = length, and s', s''."""
     gap = c0 - pins[0]
     along = gap @ line
@@ -88,7 +90,9 @@ def _held(x: np.ndarray, e: np.ndarray, lean: float, hand: float) -> np.ndarray:
     return share * p / size + hand * np.sqrt(1 - share**2) * cross(e, p / size)
 
 
-def _spin(x, dx, ddx, z, e, axis) -> tuple[np.ndarray, np.ndarray]:
+def _spin(
+    x: np.ndarray, dx: np.ndarray, ddx: np.ndarray, z: np.ndarray, e: np.ndarray, axis: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Angular velocity of the rod per crank angle, and its derivative."""
     normal = cross(z, e)
     base, down = axis - cross(x, dx), np.sum(x * normal, axis=-1, keepdims=True)
