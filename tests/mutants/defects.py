@@ -199,7 +199,6 @@ DEFECTS = (
         JUDGE,
     ),
     Defect(T, "dw[1] - dw[0] - np.cross(w[0], w[1])", "dw[1] - dw[0]", KINEMATICS),
-    Defect(T, "expected = step * (rate + before) / 2", "expected = step * rate", KINEMATICS),
     Defect(
         M,
         "return distance.max(axis=-1) / constraints",
