@@ -10,10 +10,11 @@ import pytest
 
 from crosscheck.engines import sampling
 from crosscheck.engines.driver_motion import motion
+from crosscheck.judge.constraints import closure_accelerations
 from crosscheck.judge.joint_residuals import driver_value
 from crosscheck.judge.metrics import METRICS
 from crosscheck.study.fair_timing import _with_cost
-from mbref.scene import Body, Driver, Scene, Sine
+from mbref.scene import Body, Distance, Driver, Scene, Sine
 
 DRIVER = Driver(
     joint="J", polynomial=(-0.3 * math.sin(0.4), 0.7, -0.2, 0.05),
@@ -66,3 +67,14 @@ def test_cost_is_cpu_time_of_the_steps_alone(monkeypatch: pytest.MonkeyPatch):
         sampling.Counts(), 7.0, labels,
     )  # fmt: skip
     assert (run.cost.seconds, run.cost.build_seconds) == (3.0, 7.0)
+
+
+def test_second_rate_of_a_distance_that_is_not_kept():
+    """At 2 m, moving out at 1 m/s and across at 3 m/s, accelerating out at 4 m/s²: l'' = 4 + 3²/2."""
+    ball = Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(2.0, 0.0, 0.0))
+    rod = Distance(name="J", bodies=("ground", "b"), anchors=((0.0, 0.0, 0.0), (2.0, 0.0, 0.0)))
+    scene, still = Scene(name="s", body=(ball,), joint=(rod,)), np.zeros((1, 3))
+    pose = (0.0, np.array([[2.0, 0.0, 0.0]]), np.array([[1.0, 0.0, 0.0, 0.0]]))
+    rates = (np.array([[1.0, 3.0, 0.0]]), still)
+    found = closure_accelerations(scene, *pose, *rates, np.array([[4.0, 0.0, 0.0]]), still)
+    assert found["J"] == pytest.approx([8.5])
