@@ -1,0 +1,128 @@
+"""Published hard problems: the values printed for them, how errors are measured, what is accepted, and where.
+
+The printed values are data to be checked, not truths: `benchmarks/errata.py` tells how far each is from the
+reference.  An observation is one number of a motion at one time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.judge import constraints
+from crosscheck.judge.reference.arithmetic import doubles
+from crosscheck.judge.reference.motion import Motion
+from mbref.scene import Scene
+from mbref.scenes import find_scene
+
+Observe = Callable[[Scene, Motion], dict[str, float]]
+
+
+@dataclass(frozen=True)
+class Published:
+    """One problem: the scene's name, printed values by name at ``time`` (s) and how they are read off a
+    motion sampled on ``times``, the ``measure`` of error with its level of ``acceptance`` (None: none is
+    published), and the ``source``."""
+
+    scene: str
+    time: float
+    samples: int
+    values: dict[str, float]
+    observe: Observe
+    measure: str
+    acceptance: float | None
+    source: str
+
+    def times(self) -> np.ndarray:
+        """Sample times (samples,), close enough to count the turns of joints."""
+        return np.linspace(0.0, self.time, self.samples)
+
+    def deviations(self, motion: Motion) -> dict[str, float]:
+        """Printed value less the motion's, by name, of a motion sampled on `times` to the end."""
+        found = self.observe(find_scene(self.scene), motion)
+        return {name: value - found[name] for name, value in self.values.items()}
+
+
+def _squeezer(scene: Scene, motion: Motion) -> dict[str, float]:
+    """The seven angles of the test set and their rates, from the hinges' angles."""
+    position, orientation = doubles(motion.position), doubles(motion.orientation)
+    spin = doubles(motion.angular_velocity)
+    angles = constraints.joint_coordinates(scene, motion.times, position, orientation, spin)
+    turn = {name: float(angles[name][-1, 0]) for name in angles}
+    rate = dict(zip((body.name for body in scene.body), spin[-1, :, 2], strict=True))
+    beta, delta, epsilon = (
+        STARTS["beta"] + turn["O"],
+        STARTS["delta"] + turn["A5"],
+        STARTS["epsilon"] + turn["A7"],
+    )
+    return {
+        "beta": beta, "Theta": STARTS["Theta"] + turn["F"], "gamma": STARTS["gamma"] + turn["B"],
+        "Phi": STARTS["Phi"] + turn["G"], "delta": delta, "Omega": STARTS["Omega"] + turn["H"],
+        "epsilon": epsilon, "beta'": rate["K1"], "Theta'": rate["K2"] - rate["K1"], "gamma'": rate["K3"],
+        "Phi'": rate["K4"] - rate["K5"], "delta'": rate["K5"], "Omega'": rate["K6"] - rate["K7"],
+        "epsilon'": rate["K7"],
+    }  # fmt: skip
+
+
+STARTS = {
+    "beta": -0.0617138900142764496, "Theta": 0.0, "gamma": 0.455279819163070380,
+    "Phi": 0.222668390165885884, "delta": 0.487364979543842550, "Omega": -0.222668390165885884,
+    "epsilon": 1.23054744454982119,
+}  # fmt: skip
+
+
+def _top_of_first_upright(scene: Scene, motion: Motion) -> dict[str, float]:
+    """The top is twice as far from the pivot as the centre of mass."""
+    (x, y, _), (vx, vy, _) = 2 * doubles(motion.position[-1, 0]), 2 * doubles(motion.velocity[-1, 0])
+    return {"x": x, "y": y, "x'": vx, "y'": vy}
+
+
+def _nothing(scene: Scene, motion: Motion) -> dict[str, float]:
+    return {}
+
+
+ENERGY = "largest |E(t) - E(0)| (J)"
+IFTOMM = (
+    "M. González et al., Multibody System Dynamics 16, 2006, and the IFToMM library of benchmark problems"
+)
+PUBLISHED: dict[str, Published] = {
+    "A01": Published("point_pendulum", 10.0, 401, {}, _nothing, ENERGY, 5e-5, IFTOMM),
+    "A02": Published(
+        "four_bar_chain", 10.0, 401,
+        {"x": 0.3284573768, "y": 0.9445187937, "x'": 1.423050003, "y'": -0.4948670827},
+        _top_of_first_upright, "largest relative error of place and velocity of the first top",
+        1e-3, "values: Exudyn, test model fourBarMechanismIftomm, step 0.125 ms; problem: " + IFTOMM,
+    ),
+    "A03": Published(
+        "andrews_squeezer", 0.03, 301,
+        {
+            "beta": 15.81077119629904, "Theta": -15.75637105984298, "gamma": 0.04082224013073101,
+            "Phi": -0.5347301163226948, "delta": 0.5244099658805303, "Omega": 0.5347301163226948,
+            "epsilon": 1.048080741042263, "beta'": 1139.920302151208, "Theta'": -1424.379294994111,
+            "gamma'": 11.03291221937134, "Phi'": 19.29337464421385, "delta'": 0.5735699284790808,
+            "Omega'": -19.29337464421385, "epsilon'": 0.3231791658026955,
+        },
+        _squeezer, "largest relative error of the angles", None,
+        "Test Set for IVP Solvers, Andrews' squeezing mechanism: PSIDE, tolerance 1e-14",
+    ),
+    "A04": Published("bricard", 10.0, 401, {}, _nothing, ENERGY, None, IFTOMM),
+    "A04, thin rods": Published("bricard_thin", 10.0, 401, {}, _nothing, ENERGY, None, IFTOMM),
+    "A05": Published(
+        "flyball_governor", 10.0, 401, {}, _nothing, "root of the mean square error of s(t) (m)", None,
+        IFTOMM,
+    ),
+    "rigid slider-crank": Published(
+        "rigid_slider_crank", 5.0, 401, {}, _nothing, "largest error of the slider's place (m)", None,
+        "IFToMM library, problem 54; Haug 1989, section 12.2",
+    ),
+    "rigid slider-crank, middle": Published(
+        "rigid_slider_crank_middle", 5.0, 401, {}, _nothing, "largest error of the slider's place (m)", None,
+        "IFToMM library, problem 54; Haug 1989, section 12.2",
+    ),
+    "heavy top": Published(
+        "heavy_top", 2.0, 401, {}, _nothing, "relative error of the centre's place", None,
+        "O. Brüls, A. Cardona, M. Arnold, Mechanism and Machine Theory 48, 2012, 121-137",
+    ),
+}  # fmt: skip
