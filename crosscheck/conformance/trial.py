@@ -12,8 +12,8 @@ from crosscheck.conformance.closed_forms import CLOSED_FORMS, Exact
 from crosscheck.conformance.features import feature_scenes
 from crosscheck.engine import Cannot, Setting
 from crosscheck.judge.metrics import error_series, in_scene_order
-from crosscheck.judge.tolerances import OWN_ACCURACY, SAME_MOTION
 from crosscheck.judge.reference.reference import SECONDS
+from crosscheck.judge.tolerances import OWN_ACCURACY, SAME_MOTION
 from crosscheck.judge.truth import NoSolution, truth_for
 from crosscheck.processes.pool import Observation, observe, offers, run_isolated
 from mbref.scene import Scene

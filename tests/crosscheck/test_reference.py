@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -242,6 +245,18 @@ def test_twenty_digits_are_certified_by_both_formulations():
     place = np.array(table["position"][1][0], dtype=float)
     assert np.abs(place - exact(np.array([0.3]))[0][0, 0]).max() < 1e-15
     assert len(table["position"][1][0][0].strip("-")) >= 22
+
+
+TABLES = sorted((Path(cache.__file__).parent / "certified").glob("*.json"))
+
+
+@pytest.mark.parametrize("path", TABLES, ids=lambda path: path.stem)
+def test_certified_table_is_whole_and_as_the_reference_says(path):
+    table = json.loads(path.read_text())
+    assert table["hash"] == digest(table), "the table was edited"
+    motion = natural_motion(SCENES[path.stem](), table["times"], EXTENDED, seconds=SECONDS)
+    place = np.array(table["position"], dtype=np.longdouble)
+    assert np.abs(motion.position - place).max() < 1e-15
 
 
 # --- planted defects --------------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 """Certified references: the motion of a scene to so many digits by both formulations, as a table to be kept.
 
-The scene's doubles count as exact.  The digits are those on which formulations A and B agree, in arithmetics of
-more; the bound is ten times their difference.  Tables are never edited, only superseded.
+The scene's doubles count as exact.  The digits are those on which formulations A and B agree in arithmetics
+of more; the bound is ten times their difference.  Tables are never edited, only superseded.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class NotCertified(ArithmeticError):
 
 
 def certified(scene: Scene, times: np.ndarray, digits: int, seconds: float = np.inf) -> dict[str, Any]:
-    """A table of positions (m) and orientations (w, x, y, z) at ascending times (k,), as decimal strings, with
+    """A table of positions (m) and orientations (w, x, y, z) at ascending times (k,) as decimal strings, with
     its ``id`` (of scene and times), ``digits``, ``bound``, both ``methods`` and the ``hash`` of all this.
 
     Raises NotCertified, and ImportError without python-flint.
