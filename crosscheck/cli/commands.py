@@ -1,4 +1,4 @@
-"""The command `crosscheck`: list, run, compare, verify and report."""
+"""The command `crosscheck`: list, run, compare, verify, report and certify."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -123,6 +124,23 @@ def _verify(arguments: argparse.Namespace) -> int:
     return COMPLETED if found.conforms else OTHERWISE
 
 
+def _certify(arguments: argparse.Namespace) -> int:
+    from crosscheck.judge.reference.certify import NotCertified, certified
+
+    (scene,) = request.find_scenes([arguments.scene])
+    times = request.sample_times(scene, None, arguments.samples, arguments.duration)
+    try:
+        table = certified(scene, times, arguments.digits)
+    except (NotCertified, ImportError) as error:
+        raise RequestError(str(error)) from None
+    text = json.dumps(table, indent=1, ensure_ascii=False)
+    if arguments.out:
+        Path(arguments.out).write_text(text + "\n")
+    else:
+        print(text)
+    return COMPLETED
+
+
 def _report(arguments: argparse.Namespace) -> int:
     """The report stands above this package, so it is started as a program and never imported."""
     with subprocess.Popen([sys.executable, "-m", "reports", *_report_options(arguments)]) as program:
@@ -197,6 +215,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_compare(commands)
     _add_verify(commands)
     _add_report(commands)
+    _add_certify(commands)
     return parser
 
 
@@ -208,6 +227,17 @@ def _add(
     )
     parser.set_defaults(command=command)
     return parser
+
+
+def _add_certify(commands: Commands) -> None:
+    example = "crosscheck certify four_bar_gravity --digits 20 --duration 0.1 --out four_bar_gravity.json"
+    about = "the motion of a scene to many digits, on which two formulations agree (needs python-flint)"
+    parser = _add(commands, "certify", about, example, _certify)
+    parser.add_argument("scene", metavar="SCENE", help="a built-in name or a .toml file")
+    parser.add_argument("--digits", type=int, default=20, metavar="N", help="default: 20")
+    parser.add_argument("--samples", type=int, default=3, metavar="N", help="from 0 to the end (default: 3)")
+    parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
+    parser.add_argument("--out", metavar="FILE", help="default: standard output")
 
 
 def _add_list(commands: Commands) -> None:

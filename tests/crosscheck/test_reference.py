@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -18,8 +21,10 @@ from crosscheck.judge.reference import cache, tree_loads
 from crosscheck.judge.reference import reference as module
 from crosscheck.judge.reference.arithmetic import DOUBLE, EXTENDED
 from crosscheck.judge.reference.bound import differences
+from crosscheck.judge.reference.certify import certified, digest
 from crosscheck.judge.reference.natural import NaturalCoordinates
 from crosscheck.judge.reference.reference import NoReference, Reference, judged, reference, runs
+from crosscheck.judge.reference.saddle_point import SaddlePoint
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from crosscheck.judge.truth import NoSolution, closed_form, truth_for
@@ -219,6 +224,39 @@ def test_double_precision_gives_thirteen_digits():
     one, other = (natural_motion(scene, times, a, seconds=SECONDS) for a in (DOUBLE, EXTENDED))
     assert one.position.dtype == float
     assert np.abs(np.asarray(one.position - other.position, dtype=float)).max() < 1e-13
+
+
+def test_saddle_points_are_solved_to_the_last_digit():
+    rng = np.random.default_rng(3)
+    root, rows = rng.normal(size=(8, 8)), rng.normal(size=(5, 3, 8))
+    mass = EXTENDED.array(root @ root.T)
+    force, rate = EXTENDED.array(rng.normal(size=(3, 8))), EXTENDED.array(rng.normal(size=5))
+    x, y = SaddlePoint(mass, EXTENDED.array(rows), EXTENDED).solve(force, rate)
+    left = x @ mass + np.einsum("m,min->in", y, EXTENDED.array(rows)) - force
+    assert np.abs(left).max() < 200 * EXTENDED.eps * np.abs(x).max() * np.abs(mass).max()
+    assert np.abs(np.einsum("min,in->m", rows, x) - rate).max() < 200 * EXTENDED.eps * np.abs(x).max()
+
+
+def test_twenty_digits_are_certified_by_both_formulations():
+    pytest.importorskip("flint", reason="python-flint is the extra `certify`")
+    scene, exact = pendulum()
+    table = certified(scene, np.array([0.0, 0.3]), 20)
+    assert float(table["bound"]) <= 1e-20 and table["hash"] == digest(table)
+    place = np.array(table["position"][1][0], dtype=float)
+    assert np.abs(place - exact(np.array([0.3]))[0][0, 0]).max() < 1e-15
+    assert len(table["position"][1][0][0].strip("-")) >= 22
+
+
+TABLES = sorted((Path(cache.__file__).parent / "certified").glob("*.json"))
+
+
+@pytest.mark.parametrize("path", TABLES, ids=lambda path: path.stem)
+def test_certified_table_is_whole_and_as_the_reference_says(path):
+    table = json.loads(path.read_text())
+    assert table["hash"] == digest(table), "the table was edited"
+    motion = natural_motion(SCENES[path.stem](), table["times"], EXTENDED, seconds=SECONDS)
+    place = np.array(table["position"], dtype=np.longdouble)
+    assert np.abs(motion.position - place).max() < 1e-15
 
 
 # --- planted defects --------------------------------------------------------------------------------------

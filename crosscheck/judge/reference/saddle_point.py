@@ -13,6 +13,7 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
 
 ROUNDS = 40  # of refinement, at most
+FIRST = 4.0  # so that the first round, which finds the solution itself, is not the last
 TINY = 1e-300
 STALLED = 0.5  # a round that leaves more than this part of the last correction is the last one
 
@@ -53,7 +54,7 @@ class SaddlePoint:
     def solve(self, force: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """x (3, n) and y (m,) of f (3, n) and g (m,)."""
         wanted = np.concatenate([force.ravel(), rate])
-        found, left, last = 0 * wanted, wanted, 1.0
+        found, left, last = 0 * wanted, wanted, FIRST
         for _ in range(ROUNDS):
             size = np.abs(left).max()
             if float(size) == 0.0:

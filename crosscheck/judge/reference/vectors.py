@@ -32,7 +32,7 @@ def apply(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 def unit(v: np.ndarray) -> np.ndarray:
     """Vectors (…, n) brought to length one."""
-    return v / np.sqrt(dot(v, v))[..., None]
+    return v / np.sqrt((v * v).sum(axis=-1, keepdims=True))
 
 
 def product(p: np.ndarray, q: np.ndarray) -> np.ndarray:

@@ -1,0 +1,76 @@
+"""Certified references: the motion of a scene to so many digits by both formulations, as a table to be kept.
+
+The scene's doubles count as exact.  The digits are those on which formulations A and B agree in arithmetics
+of more; the bound is ten times their difference.  Tables are never edited, only superseded.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import Any
+
+import numpy as np
+
+from crosscheck.judge.reference.arithmetic import many_digits
+from crosscheck.judge.reference.bound import SAFETY, differences
+from crosscheck.judge.reference.cache import canonical
+from crosscheck.judge.reference.motion import Motion
+from crosscheck.judge.reference.taylor import natural_motion
+from crosscheck.judge.reference.tree import tree_motion
+from mbref.scene import Scene
+
+SPARE = 6  # digits beyond those asked for, of a step's tolerance
+METHODS = {
+    "A": "natural coordinates, Taylor series",
+    "B": "joint coordinates of a spanning tree, Chebyshev–Picard panels",
+}
+
+
+class NotCertified(ArithmeticError):
+    """The formulations do not agree to the digits asked for, or one of them ends before."""
+
+
+def certified(scene: Scene, times: np.ndarray, digits: int, seconds: float = np.inf) -> dict[str, Any]:
+    """A table of positions (m) and orientations (w, x, y, z) at ascending times (k,) as decimal strings, with
+    its ``id`` (of scene and times), ``digits``, ``bound``, both ``methods`` and the ``hash`` of all this.
+
+    Raises NotCertified, and ImportError without python-flint.
+    """
+    exact = many_digits(2 * digits)
+    wanted = {"order": 2 * digits, "tolerance": 10.0 ** -(digits + SPARE)}
+    a = natural_motion(scene, times, exact, seconds=seconds, **wanted)
+    b = tree_motion(scene, times, many_digits(digits + SPARE), seconds=seconds)
+    for motion, name in ((a, "A"), (b, "B")):
+        if motion.reason:
+            raise NotCertified(f"{scene.name}: {name} ends at t = {motion.reached:.6g} s: {motion.reason}")
+    bound = SAFETY * float(differences(scene, a, b).max(initial=0.0))
+    if bound > 10.0**-digits:
+        raise NotCertified(f"{scene.name}: the formulations agree to {bound:.0e} only")
+    return _table(scene, a, digits, max(bound, 10.0 ** -(digits + SPARE)))
+
+
+def _table(scene: Scene, motion: Motion, digits: int, bound: float) -> dict[str, Any]:
+    identity = canonical(scene) + json.dumps(motion.times.tolist())
+    signs = np.where(np.asarray(motion.orientation[..., :1]).astype(float) < 0, -1, 1)
+    table = {
+        "scene": scene.name, "id": hashlib.sha256(identity.encode()).hexdigest()[:16], "version": 1,
+        "digits": digits, "bound": f"{bound:.0e}", "methods": METHODS, "times": motion.times.tolist(),
+        "bodies": [body.name for body in scene.body],
+        "position": _decimals(motion.position, digits),
+        "orientation": _decimals(motion.orientation * signs, digits),
+    }  # fmt: skip
+    return table | {"hash": digest(table)}
+
+
+def digest(table: dict[str, Any]) -> str:
+    """The hash of a table, its own ``hash`` left out."""
+    content = {key: value for key, value in table.items() if key != "hash"}
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _decimals(values: Any, digits: int) -> Any:
+    """Numbers as decimal strings of two digits more than asked for, nested as the array."""
+    if isinstance(values, np.ndarray):
+        return [_decimals(value, digits) for value in values]
+    return values.str(digits + 2, radius=False) if float(values) else "0"
