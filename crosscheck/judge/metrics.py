@@ -41,8 +41,8 @@ def measure(scene: Scene, trajectory: Trajectory, truth: Truth | None = None) ->
     exact = exact_motion(trajectory, truth)
     with np.errstate(all="ignore"):  # states that are not finite are told by the metrics, not by warnings
         found = {name: metric.function(scene, trajectory, exact) for name, metric in METRICS.items()}
-    known = exact is not None and truth is not None
-    return found | {"error_bound": exact.settings.get("bound", truth.accuracy) if known else None}
+    bound = None if exact is None or truth is None else exact.settings.get("bound", truth.accuracy)
+    return found | {"error_bound": bound}
 
 
 def exact_motion(trajectory: Trajectory, truth: Truth | None) -> Trajectory | None:

@@ -1,4 +1,4 @@
-"""Model-identity gate: do two engines simulate the same mechanism? Asked before their speeds are compared.
+"""Model identity: do two engines simulate the same mechanism? Asked before their speeds are compared.
 
 Every engine makes a short run.  The initial poses and the changes of the velocities must agree, so that
 masses, inertias, axes and loads are the same.

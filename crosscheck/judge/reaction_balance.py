@@ -77,6 +77,9 @@ def balance(scene: Scene, run: Trajectory, exact: Trajectory) -> float:
 
 def demanded(scene: Scene, exact: Trajectory) -> np.ndarray:
     """Forces and moments about the centres (k, nb, 6), world, that the joints must give for the motion."""
+    second, spin_rate = exact.acceleration, exact.angular_acceleration
+    if second is None or spin_rate is None:
+        raise ValueError(f"{scene.name}: the exact motion has no accelerations")
     pose = exact.times, exact.position, exact.orientation, exact.angular_velocity
     coordinates = joint_coordinates(scene, *pose)
     springs = [load.joint for load in scene.load if isinstance(load, TorsionSpring)]
@@ -86,8 +89,8 @@ def demanded(scene: Scene, exact: Trajectory) -> np.ndarray:
         angles = np.array([coordinates[name][k, 0] for name in springs])
         state = exact.position[k], exact.orientation[k], exact.velocity[k], exact.angular_velocity[k], angles
         inertia = world_inertia(scene, rotations.to_matrix(exact.orientation[k]))
-        turning = np.einsum("bij,bj->bi", inertia, exact.angular_acceleration[k])
-        found.append(np.hstack([mass * exact.acceleration[k], turning]) - applied(scene, state))
+        turning = np.einsum("bij,bj->bi", inertia, spin_rate[k])
+        found.append(np.hstack([mass * second[k], turning]) - applied(scene, state))
     return np.array(found)
 
 

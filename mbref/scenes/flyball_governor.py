@@ -8,15 +8,15 @@ Dynamics 16, 2006).
 from __future__ import annotations
 
 import math
-from typing import Any
 
-from mbref.scene import Body, Revolute, Scene, Spring, Translational
+from mbref.scene import Body, Joint, Revolute, Scene, Spring, Translational
 
 DENSITY, LENGTH, SIDE, CUBE, BALL = 3000.0, 1.0, 0.01, 0.1, 5.0  # kg/m³, m, m, m, kg
 OFFSET, TOP, HEIGHT, SLOPE = 0.05, 1.0, 0.5, math.radians(30)  # m, m, m, rad below the horizontal
 STIFFNESS, DAMPING, NATURAL_LENGTH = 8.0e5, 4.0e4, 0.5  # N/m, N s/m, m
 SPIN = 2 * math.pi  # rad/s
 Z = (0.0, 0.0, 1.0)
+Triple = tuple[float, float, float]
 
 
 def flyball_governor() -> Scene:
@@ -27,19 +27,21 @@ def flyball_governor() -> Scene:
     cube = DENSITY * CUBE**3
     slider = _part("slider", cube, (cube * CUBE**2 / 6,) * 3, (0.0, 0.0, HEIGHT))
     arms = [_arm(side, mass, across, about) for side in (1.0, -1.0)]
-    joints: Any = [
+    joints: list[Joint] = [
         Revolute(name="bearing", bodies=("ground", "shaft"), anchor=(0.0, 0.0, 0.0), axis=Z),
         Translational(name="slide", bodies=("shaft", "slider"), anchor=(0.0, 0.0, HEIGHT), axis=Z),
         *(_hinge(side) for side in (1.0, -1.0)),
     ]
-    springs: Any = [_spring(side) for side in (1.0, -1.0)]
     return Scene(
         name="flyball_governor", gravity=(0.0, 0.0, -9.81), duration=10.0, body=(shaft, slider, *arms),
-        joint=joints, load=springs,
+        joint=tuple(joints), load=(_spring(1.0), _spring(-1.0)),
     )  # fmt: skip
 
 
-def _part(name: str, mass: float, inertia, position, orientation=(1.0, 0.0, 0.0, 0.0)) -> Body:
+def _part(
+    name: str, mass: float, inertia: Triple, position: Triple,
+    orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
+) -> Body:  # fmt: skip
     """A body that turns with the shaft."""
     velocity = (-SPIN * position[1], SPIN * position[0], 0.0)
     return Body(

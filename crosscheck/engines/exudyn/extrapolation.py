@@ -2,7 +2,7 @@
 
 The trapezoidal rule with index-2 constraints has an error that is even in the step h, as long as steps end
 at regular positions; a step that ends beside a singular one fails.  Where a run fails, all runs are taken up
-to a window about the failure, which the extrapolated states leap, and start again behind it.
+to a window about the failure, which is crossed by extrapolation of the states, and start again behind it.
 All numbers of steps are even: the multipliers have an error that changes its sign from step to step.
 The functions take the exudyn module and do not import it.
 """
@@ -26,15 +26,15 @@ from crosscheck.engines.exudyn.dynamic import (
     finite,
     step_count,
 )
-from crosscheck.engines.exudyn.leap import leap
+from crosscheck.engines.exudyn.singular_crossing import extrapolated_states
 from mbref.scene import Scene
 from mbref.trajectory import Cost
 
 RICHARDSON = {4: 64 / 45, 2: -20 / 45, 1: 1 / 45}  # divisor of the step: weight; cancels h² and h⁴
-BEFORE, BEHIND = 2.0, 2.0  # steps from the failure to the ends of the window that is leapt
-NODES = 12  # states a leap is extrapolated from
+BEFORE, BEHIND = 2.0, 2.0  # steps from the failure to the ends of the window that is crossed
+NODES = 12  # states that the extrapolation across the window takes
 BESIDE = 0.05  # of their spacing: a node nearer to a sample is taken there
-APART = 6.0  # steps between them, where the last leap does not end nearer
+APART = 6.0  # steps between them, where the last crossing does not end nearer
 
 
 def extrapolate(exu: Any, scene: Scene, times: np.ndarray, step: float, configure: Configure) -> Motion:
@@ -43,10 +43,10 @@ def extrapolate(exu: Any, scene: Scene, times: np.ndarray, step: float, configur
     Positions, Euler parameters (normalised when they are read), their rates and the joint sensors' outputs
     are extrapolated.
     """
-    return _Walk(exu, scene, step, configure).through(np.asarray(times, dtype=float))
+    return _ExtrapolatedRuns(exu, scene, step, configure).through(np.asarray(times, dtype=float))
 
 
-class _Walk:
+class _ExtrapolatedRuns:
     """Three solvers, finest first as it is the first to fail; all start from the same, extrapolated
     ``state``."""
 
@@ -97,9 +97,9 @@ class _Walk:
         return found, None
 
     def cross(self, times: np.ndarray, nodes: Samples, end: float) -> None:
-        """Leaps to ``end`` (s), with the samples on the way."""
+        """Crosses the window to ``end`` (s), with the samples on the way."""
         within = times[(times > self.state.t) & (times < end)]
-        landed = leap(self.scene, nodes, np.append(within, end))
+        landed = extrapolated_states(self.scene, nodes, np.append(within, end))
         self.pieces.append(_at(landed, times))
         self.arrive(landed)
 

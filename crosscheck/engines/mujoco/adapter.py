@@ -94,7 +94,7 @@ class MuJoCo(Engine):
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         """Simulate; raises ValueError for a family it does not have."""
         start = time.process_time()
-        run = _Run(scene, setting)
+        run = _MujocoSimulation(scene, setting)
         labels = {"engine": self.name, "version": self.version(), "method": setting.family,
                   "settings": dict(setting.options)}  # fmt: skip
         built = time.process_time() - start
@@ -118,7 +118,7 @@ def _steps(scene: Scene, rate: float, angles: Sequence[float]) -> list[float]:
     return [h for h in steps if scene.duration / h <= MAX_STEPS] or steps[:1]
 
 
-class _Run:
+class _MujocoSimulation:
     """One simulation: model, data and how they are advanced."""
 
     def __init__(self, scene: Scene, setting: Setting):

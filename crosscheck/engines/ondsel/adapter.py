@@ -72,7 +72,7 @@ class Ondsel(Engine):
         if setting.family != FAMILY:
             raise ValueError(f"ondsel has no family {setting.family!r}")
         start = time.process_time()
-        run = _Run(scene, np.array(times, dtype=float), setting.options["step"])
+        run = _OndselSimulation(scene, np.array(times, dtype=float), setting.options["step"])
         labels = {"engine": self.name, "version": self.version(), "method": setting.family,
                   "settings": dict(setting.options)}  # fmt: skip
         built = time.process_time() - start
@@ -82,7 +82,7 @@ class Ondsel(Engine):
         return trajectory
 
 
-class _Run:
+class _OndselSimulation:
     """One simulation: the samples computed so far, and the pose the next analysis starts from."""
 
     def __init__(self, scene: Scene, times: np.ndarray, step: float):

@@ -60,14 +60,14 @@ class Simbody(Engine):
         if setting.family not in INTEGRATORS:
             raise ValueError(f"simbody has no family {setting.family!r}")
         start = time.process_time()
-        run = _Run(scene, INTEGRATORS[setting.family], setting.options["accuracy"])
+        run = _SimbodySimulation(scene, INTEGRATORS[setting.family], setting.options["accuracy"])
         labels = {"engine": self.name, "version": self.version(), "method": setting.family,
                   "settings": dict(setting.options)}  # fmt: skip
         built = time.process_time() - start
         return run_through(scene, times, run.advance, run.sample, Counts(), built, labels)
 
 
-class _Run:
+class _SimbodySimulation:
     """One simulation: the mechanism, its state and the integrator."""
 
     def __init__(self, scene: Scene, integrator: str, accuracy: float):

@@ -41,8 +41,10 @@ class Truth(Protocol):
 
     name: str
     """The family."""
-    accuracy: float
-    """Bound on the error of the poses, relative to the scene's length and to the angle turned."""
+
+    @property
+    def accuracy(self) -> float:
+        """Bound on the error of the poses, relative to the scene's length and to the angle turned."""
 
     def poses(self, times: np.ndarray) -> Trajectory:
         """Poses, velocities and accelerations (world) at times (k,) ≥ 0, double precision."""

@@ -36,7 +36,7 @@ class ReferenceTruth:
         ends before."""
         times = np.asarray(times, dtype=float)
         with self._asked:
-            found = reference(self._scene, times, self._seconds)
+            found = reference(self._scene, times.tolist(), self._seconds)
         if isinstance(found, NoReference):
             raise NoSolution(f"no reference after t = {found.until:.6g} s: {found.reason}")
         self._accuracy = max(self._accuracy or 0.0, float(found.bound.max(initial=0.0)))

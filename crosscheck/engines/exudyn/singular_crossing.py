@@ -1,4 +1,4 @@
-"""A leap over a singular position: Exudyn's states before it extrapolated, and put back onto the joints."""
+"""Crossing a singular position: Exudyn's states before it are extrapolated and projected onto the joints."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ITERATIONS = 8  # Newton iterations at most; two are usual
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])  # Euler parameters of a node that has not turned
 
 
-def leap(scene: Scene, nodes: Samples, times: np.ndarray) -> Samples:
+def extrapolated_states(scene: Scene, nodes: Samples, times: np.ndarray) -> Samples:
     """Samples at ``times`` (k,) beyond those at the nodes, extrapolated by one polynomial through all of
     them; coordinates and rates are then the nearest that satisfy the judge's joint equations."""
     known, values, forces = nodes

@@ -1,4 +1,4 @@
-"""Exudyn's extrapolated runs through singular positions / truths; the leap's projection / joint equations."""
+"""Exudyn's extrapolated runs through singular positions / truths; projection / joint equations."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from crosscheck.engine import Setting
 from crosscheck.engines.exudyn.adapter import ENGINE
 from crosscheck.engines.exudyn.dynamic import stretches
-from crosscheck.engines.exudyn.leap import UPRIGHT, leap, projected
+from crosscheck.engines.exudyn.singular_crossing import UPRIGHT, extrapolated_states, projected
 from crosscheck.judge.constraints import closure, closure_rates, initial_poses
 from crosscheck.judge.metrics import error_series, measure
 from crosscheck.judge.truth import truth_for
@@ -59,11 +59,11 @@ def true_nodes(scene: Scene, times: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     return times, np.array([coordinates, rates, 0 * rates]), np.zeros((len(times), 0))
 
 
-def test_leap_and_truth_agree():
+def test_extrapolated_states_and_truth_agree():
     scene = SCENES["planar_slider_crank_equal"]()
     nodes = true_nodes(scene, SINGULAR - 2e-4 - 6e-4 * np.arange(12)[::-1])
     landing = np.array([SINGULAR, SINGULAR + 2e-4])
-    found, exact = leap(scene, nodes, landing)[1], true_nodes(scene, landing)[1]
+    found, exact = extrapolated_states(scene, nodes, landing)[1], true_nodes(scene, landing)[1]
     apart = np.abs(found[0] - exact[0]).max(), np.abs(found[1] - exact[1]).max()
     assert apart[0] < 1e-9 and apart[1] < 1e-6, f"off by {apart[0]:.1e} m and {apart[1]:.1e} m/s"
 
