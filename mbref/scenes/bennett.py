@@ -8,6 +8,7 @@ Sizes and inertias are ours: links of 1 kg per metre, 0.3 m and 0.5 m, gravity a
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -27,23 +28,24 @@ def bennett() -> Scene:
     angles = (OPENING, second, -OPENING, -second)
     sizes = ((SHORT, TWIST), (LONG, twist)) * 2
     place, frame = np.zeros(3), np.eye(3)
-    hinges, links = [], []
+    hinges: list[Any] = []
+    links: list[Any] = []
     for angle, (length, turn) in zip(angles, sizes, strict=True):
         hinges.append((place, frame[:, 2]))
         frame = frame @ _about(2, angle)
         links.append((place + length / 2 * frame[:, 0], frame, length))
         place, frame = place + length * frame[:, 0], frame @ _about(0, turn)
-    bodies = [_link(f"link{n}", *link) for n, link in enumerate(links[1:], start=1)]
+    bodies: Any = [_link(f"link{n}", *link) for n, link in enumerate(links[1:], start=1)]
     chain = ["ground", *(body.name for body in bodies), "ground"]
     order = (*hinges[1:], hinges[0])
-    joints = [
+    joints: Any = [
         Revolute(name=f"R{n + 1}", bodies=(chain[n], chain[n + 1]), anchor=point, axis=axis)
         for n, (point, axis) in enumerate(order)
     ]
     return Scene(name="bennett", gravity=(0.0, 0.0, -9.81), duration=1.0, body=bodies, joint=joints)
 
 
-def _link(name: str, middle: np.ndarray, frame: np.ndarray, length: float) -> Body:
+def _link(name: str, middle: Any, frame: np.ndarray, length: float) -> Body:
     mass = DENSITY * length
     return Body(
         name=name, mass=mass, inertia=rod_inertia(mass, length), position=middle,

@@ -8,6 +8,7 @@ Dynamics 16, 2006).
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from mbref.scene import Body, Revolute, Scene, Spring, Translational
 
@@ -26,12 +27,12 @@ def flyball_governor() -> Scene:
     cube = DENSITY * CUBE**3
     slider = _part("slider", cube, (cube * CUBE**2 / 6,) * 3, (0.0, 0.0, HEIGHT))
     arms = [_arm(side, mass, across, about) for side in (1.0, -1.0)]
-    joints = [
+    joints: Any = [
         Revolute(name="bearing", bodies=("ground", "shaft"), anchor=(0.0, 0.0, 0.0), axis=Z),
         Translational(name="slide", bodies=("shaft", "slider"), anchor=(0.0, 0.0, HEIGHT), axis=Z),
         *(_hinge(side) for side in (1.0, -1.0)),
     ]
-    springs = [_spring(side) for side in (1.0, -1.0)]
+    springs: Any = [_spring(side) for side in (1.0, -1.0)]
     return Scene(
         name="flyball_governor", gravity=(0.0, 0.0, -9.81), duration=10.0, body=(shaft, slider, *arms),
         joint=joints, load=springs,

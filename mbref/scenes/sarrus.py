@@ -7,6 +7,7 @@ says none.  Sizes and inertias are ours: bars of 0.5 m and 0.5 kg, a platform of
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from mbref.scene import Body, Revolute, Scene
 from mbref.scenes.links import rod_inertia
@@ -19,7 +20,8 @@ def sarrus() -> Scene:
     """From rest, the bars at 60 degrees to the ground."""
     rise, reach = LENGTH * math.sin(SLOPE), LENGTH * math.cos(SLOPE)
     platform = Body(name="platform", mass=PLATFORM, inertia=(MOMENT,) * 3, position=(0.0, 0.0, 2 * rise))
-    bodies, joints = [platform], []
+    bodies: Any = [platform]
+    joints: Any = []
     for side, turn in (("x", 0.0), ("y", math.pi / 2)):
         c, s = math.cos(turn), math.sin(turn)
         feet = [(HALF, 0.0), (HALF + reach, rise), (HALF, 2 * rise)]
@@ -35,7 +37,7 @@ def sarrus() -> Scene:
     return Scene(name="sarrus", gravity=(0.0, 0.0, -9.81), duration=0.3, body=bodies, joint=joints)
 
 
-def _bar(name: str, middle: tuple[float, ...], turn: float, tilt: float) -> Body:
+def _bar(name: str, middle: Any, turn: float, tilt: float) -> Body:
     """A bar along its x axis: turned about z, then tilted about its own y."""
     ct, st, c, s = math.cos(turn / 2), math.sin(turn / 2), math.cos(tilt / 2), math.sin(tilt / 2)
     orientation = (ct * c, -st * s, ct * s, st * c)

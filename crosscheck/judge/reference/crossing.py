@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.polynomial import chebyshev
 
-NEAR = 0.35  # of the median distance from singularity: points to be bridged
+NEAR = 0.15  # of the median distance from singularity: points to be bridged
 MOST = 0.25  # of the points may be bridged
 DEGREE = 8  # of the polynomial that tells whether the distance changes its sign
 WINDOW = 12  # points on either side that it goes through

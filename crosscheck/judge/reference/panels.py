@@ -85,7 +85,7 @@ class Panels:
             return matrix @ values
         from flint import arb_mat
 
-        a, b = (arb_mat(*x.shape, x.ravel().tolist()) for x in (matrix, values))
+        a, b = (arb_mat(x.tolist()) for x in (matrix, values))
         out = np.array([*(a * b).entries(), None], dtype=object)[:-1]
         return self.arithmetic.settled(out.reshape(matrix.shape[0], values.shape[1]))
 

@@ -100,7 +100,8 @@ class _Run:
 
     def _advance(self, panel: Panel, after: Any, state: np.ndarray) -> None:
         self.t, self.state, self.steps = after, state, self.steps + 1
-        self.crossings += [panel.time(panel.crossing)] if panel.crossing is not None else []
+        if (crossed := panel.time(panel.crossing)) is not None:
+            self.crossings.append(crossed)
 
     def motion(self, reason: str, seconds: float) -> Motion:
         """The samples as the motion of the bodies."""

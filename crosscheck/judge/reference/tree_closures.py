@@ -47,7 +47,9 @@ class Closures:
     arms or directions (m, ·, 3)."""
 
     def __init__(self, tree: Tree):
-        shifts, lengths, angles = [], [], []
+        shifts: list[Any] = []
+        lengths: list[Any] = []
+        angles: list[Any] = []
         for joint in tree.cut:
             pair = tuple(tree.scene.body_index(name) for name in joint.bodies)
             if joint.type == "distance":

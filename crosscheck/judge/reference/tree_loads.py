@@ -6,8 +6,11 @@ columnᵀ · (load - inertia · drift); a torsion spring works on its joint's an
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from crosscheck.judge.constraints import inertia_matrices
 from crosscheck.judge.reference.tree_closures import Rows
 from crosscheck.judge.reference.tree_joints import Placed, Tree
 from crosscheck.judge.reference.vectors import apply, cross, dot, matrices, unit
@@ -27,7 +30,9 @@ class Loads:
         self.tree, self.gravity = tree, numbers.array(scene.gravity)
         self.mass = numbers.array([b.mass if massive else 1.0 for b in scene.body])[:, None]
         self.inertia = _inertias(tree) if massive else numbers.array([np.eye(3)] * len(scene.body))
-        of = {kind: [l for l in scene.load if massive and isinstance(l, kind)] for kind in LOADS}
+        of: dict[type, list[Any]] = {
+            kind: [l for l in scene.load if massive and isinstance(l, kind)] for kind in LOADS
+        }
         self.moments, self.forces, self.springs = of[Moment], of[Force], of[Spring]
         self.torsion = np.array([measured[load.joint] for load in of[TorsionSpring]], dtype=int)
         values = [(l.stiffness, l.damping, l.natural_angle) for l in of[TorsionSpring]]
@@ -130,6 +135,5 @@ def _push(wrench: np.ndarray, body: int, arm: np.ndarray, force: np.ndarray) -> 
 def _inertias(tree: Tree) -> np.ndarray:
     """(nb, 3, 3) along the world's axes at t = 0."""
     scene, numbers = tree.scene, tree.arithmetic
-    given = [np.diag(b.inertia) if np.ndim(b.inertia) == 1 else np.array(b.inertia) for b in scene.body]
     frames = matrices(unit(numbers.array([b.orientation for b in scene.body])))
-    return frames @ numbers.array(given) @ np.swapaxes(frames, -1, -2)
+    return frames @ numbers.array(inertia_matrices(scene)) @ np.swapaxes(frames, -1, -2)
