@@ -61,7 +61,7 @@ def saddle_solve(
     M (K, n, n) is positive semidefinite, G (K, m, n), force (K, n), right (K, m).  The inverse is taken in
     doubles, the residuals in the data's arithmetic (iterative refinement; Wilkinson, Rounding Errors in
     Algebraic Processes, 1963).  The distance is the inverse's Frobenius norm to the power -1/2, which
-    follows the least singular value of G.
+    follows the least singular value of G; infinite without coordinates.
     """
     n = mass.shape[-1]
     scale, inverse = _scaled_inverse(doubles(mass), doubles(rows))
@@ -76,7 +76,8 @@ def saddle_solve(
         if not settling.any():
             break
         x, last = x + np.where(settling, step, 0.0), np.where(settling, size, last)
-    return x[:, :n], 1 / np.sqrt(np.linalg.norm(inverse, axis=(1, 2)))
+    with np.errstate(divide="ignore"):  # without coordinates nothing is singular
+        return x[:, :n], 1 / np.sqrt(np.linalg.norm(inverse, axis=(1, 2)))
 
 
 def _scaled_inverse(mass: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
