@@ -35,14 +35,17 @@ class Metric:
 
 
 def measure(scene: Scene, trajectory: Trajectory, truth: Truth | None = None) -> dict[str, float | None]:
-    """Every metric of a trajectory by name, and ``error_bound``: how far the truth may be off, None without
-    one.  Raises ValueError when the bodies are not the scene's."""
+    """Every metric of a trajectory by name, and ``error_bound``, the bound on the truth's own error.
+
+    The bound is None without a truth or without a sample.  Raises ValueError when the bodies are not the
+    scene's.
+    """
     trajectory = in_scene_order(scene, trajectory)
     exact = exact_motion(trajectory, truth)
     with np.errstate(all="ignore"):  # states that are not finite are told by the metrics, not by warnings
         found = {name: metric.function(scene, trajectory, exact) for name, metric in METRICS.items()}
-    bound = None if exact is None or truth is None else exact.settings.get("bound", truth.accuracy)
-    return found | {"error_bound": bound}
+    judged = exact is not None and truth is not None and trajectory.times.size > 0
+    return found | {"error_bound": exact.settings.get("bound", truth.accuracy) if judged else None}
 
 
 def exact_motion(trajectory: Trajectory, truth: Truth | None) -> Trajectory | None:

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from truth_scenes import CLOSED
 
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
+from mbref.formulations import FORMULATIONS
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
 
@@ -42,6 +44,16 @@ CROSSINGS = [
 PER_CROSSING = 1e-10  # rounding of 1e-16 over the window of 1e-3, magnified by the leap's extrapolation
 
 
+def has_singular_mass(scene):
+    """Whether a body has no inertia about some axis."""
+    return any(np.min(np.linalg.eigvalsh(_matrix(body.inertia))) <= 0 for body in scene.body if body.inertia)
+
+
+def _matrix(inertia):
+    array = np.array(inertia)
+    return np.diag(array) if array.ndim == 1 else array
+
+
 def judged(name, end, method, rtol):
     scene = SCENES[name]()
     trajectory = simulate(scene, method, np.linspace(0.0, end, 6), Limits(rtol=rtol))
@@ -64,13 +76,16 @@ def test_singular_positions_and_truth(name, end, crossings, rtol):
     assert measured["error"] < allowed, f"{name}, rtol {rtol:g}: {measured['error']:.2e}, not {allowed:.1e}"
 
 
-@pytest.mark.parametrize("name", [n for n in SCENES if n != "four_bar_straight"])
+@pytest.mark.parametrize("name", [n for n in CLOSED if n != "four_bar_straight"])
 @pytest.mark.parametrize("formulation", ["lm1", "mpi-svd"])
 def test_first_acceleration_and_truth(name, formulation):
     scene = SCENES[name]()
     if formulation == "lm1" and scene.counts().redundant:
         pytest.skip("lm1 claims no redundancy; that it fails is tested with the formulations")
     found = simulate(scene, f"{formulation}+none", [0.0])
+    if not FORMULATIONS[formulation].handles_singular_mass and has_singular_mass(scene):
+        assert found.outcome.name == "SINGULAR_MATRIX", f"{name}, {formulation}: {found.outcome}"
+        return
     true = truth_for(scene).poses(np.zeros(1))
     for key in ("acceleration", "angular_acceleration"):
         error = np.max(np.abs(getattr(found, key) - getattr(true, key)))
