@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 
@@ -41,8 +41,9 @@ def measure(scene: Scene, trajectory: Trajectory, truth: Truth | None = None) ->
     exact = exact_motion(trajectory, truth)
     with np.errstate(all="ignore"):  # states that are not finite are told by the metrics, not by warnings
         found = {name: metric.function(scene, trajectory, exact) for name, metric in METRICS.items()}
-    known = exact is not None and truth is not None
-    return found | {"error_bound": exact.settings.get("bound", truth.accuracy) if known else None}
+    if truth is None or exact is None:
+        return found | {"error_bound": None}
+    return found | {"error_bound": exact.settings.get("bound", truth.accuracy)}
 
 
 def exact_motion(trajectory: Trajectory, truth: Truth | None) -> Trajectory | None:
@@ -84,6 +85,10 @@ def error_series(scene: Scene, trajectory: Trajectory, exact: Trajectory) -> np.
     )
 
 
+@overload
+def violation_series(scene: Scene, trajectory: Trajectory, level: Literal[0, 1] = 0) -> np.ndarray: ...
+@overload
+def violation_series(scene: Scene, trajectory: Trajectory, level: int) -> np.ndarray | None: ...
 def violation_series(scene: Scene, trajectory: Trajectory, level: int = 0) -> np.ndarray | None:
     """Largest joint residual (k,) at position (0), velocity (1) or acceleration (2) level; lengths are
     divided by the scene's, so that the unit is rad, rad/s, rad/s². None when accelerations are missing."""

@@ -25,8 +25,6 @@ def with_exact_reactions(scene: Scene, exact: Trajectory) -> Trajectory:
 
     Raises ValueError when the motion has no accelerations.
     """
-    if exact.acceleration is None or exact.angular_acceleration is None:
-        raise ValueError(f"{exact.engine} gives no accelerations of {scene.name}")
     found = {joint.name: np.zeros((len(exact.times), 6)) for joint in scene.joint}
     wanted = demanded(scene, exact)
     for k in range(len(exact.times)):
@@ -76,7 +74,12 @@ def balance(scene: Scene, run: Trajectory, exact: Trajectory) -> float:
 
 
 def demanded(scene: Scene, exact: Trajectory) -> np.ndarray:
-    """Forces and moments about the centres (k, nb, 6), world, that the joints must give for the motion."""
+    """Forces and moments about the centres (k, nb, 6), world, that the joints must give for the motion.
+
+    Raises ValueError when the motion has no accelerations.
+    """
+    if exact.acceleration is None or exact.angular_acceleration is None:
+        raise ValueError(f"{exact.engine} gives no accelerations of {scene.name}")
     pose = exact.times, exact.position, exact.orientation, exact.angular_velocity
     coordinates = joint_coordinates(scene, *pose)
     springs = [load.joint for load in scene.load if isinstance(load, TorsionSpring)]

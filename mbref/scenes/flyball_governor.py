@@ -12,6 +12,7 @@ from typing import Any
 
 from mbref.scene import Body, Revolute, Scene, Spring, Translational
 
+Triple = tuple[float, float, float]
 DENSITY, LENGTH, SIDE, CUBE, BALL = 3000.0, 1.0, 0.01, 0.1, 5.0  # kg/m³, m, m, m, kg
 OFFSET, TOP, HEIGHT, SLOPE = 0.05, 1.0, 0.5, math.radians(30)  # m, m, m, rad below the horizontal
 STIFFNESS, DAMPING, NATURAL_LENGTH = 8.0e5, 4.0e4, 0.5  # N/m, N s/m, m
@@ -39,7 +40,10 @@ def flyball_governor() -> Scene:
     )  # fmt: skip
 
 
-def _part(name: str, mass: float, inertia, position, orientation=(1.0, 0.0, 0.0, 0.0)) -> Body:
+def _part(
+    name: str, mass: float, inertia: Triple, position: Triple,
+    orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
+) -> Body:  # fmt: skip
     """A body that turns with the shaft."""
     velocity = (-SPIN * position[1], SPIN * position[0], 0.0)
     return Body(
@@ -58,7 +62,7 @@ def _arm(side: float, rod: float, across: float, about: float) -> Body:
     return _part(_name(side), mass, (about, across, across), _along(side, reach), turn)
 
 
-def _along(side: float, reach: float) -> tuple[float, float, float]:
+def _along(side: float, reach: float) -> Triple:
     return side * (OFFSET + reach * math.cos(SLOPE)), 0.0, TOP - reach * math.sin(SLOPE)
 
 

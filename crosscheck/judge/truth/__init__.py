@@ -39,10 +39,13 @@ __all__ = ["NoSolution", "Truth", "closed_form", "truth_for"]
 class Truth(Protocol):
     """The exact motion of one scene."""
 
-    name: str
-    """The family."""
-    accuracy: float
-    """Bound on the error of the poses, relative to the scene's length and to the angle turned."""
+    @property
+    def name(self) -> str:
+        """The family."""
+
+    @property
+    def accuracy(self) -> float:
+        """Bound on the error of the poses, relative to the scene's length and to the angle turned."""
 
     def poses(self, times: np.ndarray) -> Trajectory:
         """Poses, velocities and accelerations (world) at times (k,) ≥ 0, double precision."""
