@@ -86,9 +86,15 @@ def error_series(scene: Scene, trajectory: Trajectory, exact: Trajectory) -> np.
 
 
 @overload
-def violation_series(scene: Scene, trajectory: Trajectory, level: Literal[0, 1] = 0) -> np.ndarray: ...
+def violation_series(scene: Scene, trajectory: Trajectory, level: Literal[0, 1] = 0) -> np.ndarray:
+    """At position and velocity level there is always a residual."""
+
+
 @overload
-def violation_series(scene: Scene, trajectory: Trajectory, level: int) -> np.ndarray | None: ...
+def violation_series(scene: Scene, trajectory: Trajectory, level: int) -> np.ndarray | None:
+    """At any level, as below."""
+
+
 def violation_series(scene: Scene, trajectory: Trajectory, level: int = 0) -> np.ndarray | None:
     """Largest joint residual (k,) at position (0), velocity (1) or acceleration (2) level; lengths are
     divided by the scene's, so that the unit is rad, rad/s, rad/s². None when accelerations are missing."""
