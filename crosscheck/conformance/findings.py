@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from crosscheck.conformance import suite
 from crosscheck.conformance.changes import replaced
 from crosscheck.conformance.runners import Runner
 from crosscheck.conformance.trial import Bench, Specimen, set_up
-from mbref.scene import GROUND, Scene, SceneError
+from mbref.scene import GROUND, Joint, Load, Scene, SceneError
 
 TRIES = 60  # scenes tried while a violation is made small
 
@@ -77,7 +79,7 @@ def _smaller(scene: Scene) -> Iterator[Scene]:
 
 def _without_bodies(scene: Scene) -> list[Callable[[], Scene]]:
     def without(name: str) -> Scene:
-        def kept(item) -> bool:
+        def kept(item: Joint | Load) -> bool:
             return name not in (getattr(item, "body", None), *getattr(item, "bodies", ()))
 
         joints = tuple(filter(kept, scene.joint))
@@ -89,24 +91,28 @@ def _without_bodies(scene: Scene) -> list[Callable[[], Scene]]:
         )  # fmt: skip
 
     names = [body.name for body in scene.body] if len(scene.body) > 1 else []
-    return [lambda name=name: without(name) for name in names if name != GROUND]
+    return [partial(without, name) for name in names if name != GROUND]
 
 
 def _without_items(scene: Scene) -> list[Callable[[], Scene]]:
+    def without(kind: str, k: int) -> Scene:
+        items = getattr(scene, kind)
+        return scene.with_(**{kind: items[:k] + items[k + 1 :]})
+
     return [
-        lambda kind=kind, k=k: scene.with_(**{kind: getattr(scene, kind)[:k] + getattr(scene, kind)[k + 1 :]})
+        partial(without, kind, k)
         for kind in ("load", "driver", "joint")
         for k in range(len(getattr(scene, kind)))
     ]
 
 
 def _simpler(scene: Scene) -> list[Callable[[], Scene]]:
-    def rounded(value, digits: int):
+    def rounded(value: Any, digits: int) -> Any:
         if isinstance(value, float):
             return round(value, digits)
         return tuple(rounded(v, digits) for v in value) if isinstance(value, tuple) else value
 
-    def bodies(**fields) -> Scene:
+    def bodies(**fields: Any) -> Scene:
         return scene.with_(body=tuple(replaced(body, **fields) for body in scene.body))
 
     def round_bodies(digits: int) -> Scene:
@@ -119,5 +125,5 @@ def _simpler(scene: Scene) -> list[Callable[[], Scene]]:
         lambda: scene.with_(gravity=(0.0, 0.0, 0.0)),
         lambda: bodies(velocity=None, angular_velocity=None),
         lambda: scene.with_(duration=scene.duration / 2),
-        *(lambda digits=digits: round_bodies(digits) for digits in (1, 2)),
+        *(partial(round_bodies, digits) for digits in (1, 2)),
     ]

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from crosscheck.conformance.changes import replaced
 from crosscheck.conformance.features import DRIVERS, JOINTS, LOADS
 from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.judge.tolerances import RANK
@@ -19,6 +20,7 @@ from mbref.scene import (
     Driver,
     Force,
     Joint,
+    Load,
     Moment,
     Revolute,
     Scene,
@@ -33,11 +35,12 @@ GRAVITY = (2.0, -6.5, -5.0)
 DURATION = 0.2  # s: the bodies turn by about half a radian
 HUB = Body(
     name="hub", mass=2.0, inertia=((0.05, -0.004, 0.006), (-0.004, 0.04, 0.003), (0.006, 0.003, 0.06)),
-    position=(-0.25, 0.15, -0.1), orientation=tuple(rotations.from_vector([-0.5, 0.9, 0.4]).tolist()),
+    position=(-0.25, 0.15, -0.1),
+    orientation=tuple(rotations.from_vector(np.array([-0.5, 0.9, 0.4])).tolist()),
 )  # fmt: skip
 BODY = Body(
     name="body", mass=1.5, inertia=((0.02, 0.004, -0.003), (0.004, 0.03, 0.005), (-0.003, 0.005, 0.026)),
-    position=(0.3, -0.2, 0.1), orientation=tuple(rotations.from_vector([0.3, -1.2, 0.5]).tolist()),
+    position=(0.3, -0.2, 0.1), orientation=tuple(rotations.from_vector(np.array([0.3, -1.2, 0.5])).tolist()),
 )  # fmt: skip
 BEARING = Spherical(name="bearing", bodies=("ground", "hub"), anchor=(-0.4, 0.3, 0.1))
 SPIN = (1.5, -2.0, 2.5)  # rad/s
@@ -63,11 +66,12 @@ def moving_probes() -> dict[str, Scene]:
 
 def heavy_top() -> Scene:
     """A symmetric top on its tip, spinning, nutating: I₁ = 0.02, I₃ = 0.012 kg m² about its centre."""
-    turned = rotations.from_vector([0.6, 0.0, 0.0])
+    turned = rotations.from_vector(np.array([0.6, 0.0, 0.0]))
     arm = rotations.rotate(turned, np.array([0.0, 0.0, 0.15]))
     spin = rotations.rotate(turned, np.array([0.5, 1.0, 40.0]))
-    top = Body(name="top", mass=1.0, inertia=(0.02, 0.02, 0.012), position=arm, orientation=turned,
-               velocity=np.cross(spin, arm), angular_velocity=spin)  # fmt: skip
+    top = Body(name="top", mass=1.0, inertia=(0.02, 0.02, 0.012), position=arm.tolist(),
+               orientation=turned.tolist(), velocity=np.cross(spin, arm).tolist(),
+               angular_velocity=spin.tolist())  # fmt: skip
     tip = Spherical(name="tip", bodies=("ground", "top"), anchor=(0.0, 0.0, 0.0))
     return Scene(name="heavy top", gravity=(0.0, 0.0, -9.81), duration=0.3, body=(top,), joint=(tip,))
 
@@ -99,7 +103,7 @@ def door() -> Scene:
     """A leaf in two hinges on one slanted axis: five redundant rows."""
     axis = np.array([0.3, -0.2, 1.0])
     hinges = tuple(
-        Revolute(name=name, bodies=("ground", "body"), anchor=(0.1 + h * axis).tolist(), axis=axis)
+        Revolute(name=name, bodies=("ground", "body"), anchor=(0.1 + h * axis).tolist(), axis=axis.tolist())
         for name, h in (("low", -0.4), ("high", 0.5))
     )
     return _launched(Scene(name="door", gravity=GRAVITY, duration=DURATION, body=(BODY,), joint=hinges))
@@ -108,9 +112,9 @@ def door() -> Scene:
 def wound_spring() -> Scene:
     """A body turning by some turns about a slanted hinge on the ground, against a torsion spring."""
     hinge = JOINTS["revolute"]
-    axis = np.array(hinge.axis) / np.linalg.norm(hinge.axis)
-    swing = np.cross(40.0 * axis, np.array(BODY.position) - np.array(hinge.anchor))
-    body = _with(BODY, {"angular_velocity": 40.0 * axis, "velocity": swing})
+    axis = np.array(hinge.directions[0]) / np.linalg.norm(hinge.directions[0])
+    swing = np.cross(40.0 * axis, np.array(BODY.position) - np.array(hinge.anchor_pair[0]))
+    body = replaced(BODY, angular_velocity=40.0 * axis, velocity=swing)
     spring = TorsionSpring(joint="J", stiffness=0.4, damping=0.01, natural_angle=0.4)
     return Scene(name="wound spring", duration=0.25, body=(body,), joint=(hinge,), load=(spring,))
 
@@ -123,22 +127,22 @@ def consistent(scene: Scene, twists: np.ndarray) -> Scene:
     free = vt[int(np.sum(s > RANK * s.max(initial=0.0))) :]
     found = (free.T @ (free @ np.ravel(twists))).reshape(-1, 6)
     bodies = [
-        _with(body, {"velocity": x[:3], "angular_velocity": x[3:]})
+        replaced(body, velocity=x[:3], angular_velocity=x[3:])
         for body, x in zip(scene.body, found, strict=True)
     ]
     return scene.with_(body=tuple(bodies))
 
 
-def _pair(joint: Joint, **causes) -> Scene:
+def _pair(joint: Joint, driver: tuple[Driver, ...] = (), load: tuple[Load, ...] = ()) -> Scene:
     """Ground, hub on a ball joint, and the body on the joint in question; a driver's start is its own."""
-    between = type(joint)(**{**_fields(joint), "bodies": ("hub", "body")})
+    between = replaced(joint, bodies=("hub", "body"))
     scene = Scene(name="pair", gravity=GRAVITY, duration=DURATION, body=(HUB, BODY), joint=(BEARING, between),
-                  **causes)  # fmt: skip
+                  driver=driver, load=load)  # fmt: skip
     moving = _launched(scene)
     if not scene.driver:
         return moving
     hub, body = moving.body  # the driver says how the body moves beside the hub
-    return moving.with_(body=(hub, _with(body, {"velocity": None, "angular_velocity": None})))
+    return moving.with_(body=(hub, replaced(body, velocity=None, angular_velocity=None)))
 
 
 def _launched(scene: Scene) -> Scene:
@@ -150,19 +154,20 @@ def _sides(scene: Scene) -> np.ndarray:
     return np.array([[1.0 if k % 2 else -0.8] for k in range(len(scene.body))])
 
 
-def _alone(load: tuple) -> Scene:
-    body = _with(BODY, {"velocity": (1.0, 0.5, -0.7), "angular_velocity": (3.0, -6.0, 8.0)})
+def _alone(load: tuple[Load, ...]) -> Scene:
+    body = replaced(BODY, velocity=(1.0, 0.5, -0.7), angular_velocity=(3.0, -6.0, 8.0))
     return Scene(name="alone", gravity=GRAVITY, duration=DURATION, body=(body,), load=load)
 
 
-def _load(kind: str):
-    return {
+def _load(kind: str) -> Load:
+    between: Mapping[str, Load] = {
         "moment": Moment(body="body", moment=(0.3, 0.2, -0.4)),
         "force": Force(body="body", point=(0.5, -0.1, 0.2), force=(1.0, -2.0, 3.0)),
         "spring": Spring(bodies=("hub", "body"), points=((-0.3, 0.6, 0.0), (0.4, -0.1, 0.1)), stiffness=30.0,
                          damping=0.5, natural_length=0.5),
         "torsion_spring": TorsionSpring(joint="J", stiffness=4.0, damping=0.1, natural_angle=0.4),
-    }.get(kind, LOADS[kind])  # fmt: skip
+    }  # fmt: skip
+    return between.get(kind, LOADS[kind])
 
 
 def _carrier(load: str) -> Joint:
@@ -171,11 +176,3 @@ def _carrier(load: str) -> Joint:
 
 def _turn(rng: np.random.Generator) -> tuple[float, ...]:
     return tuple(rotations.from_vector(rng.normal(size=3)).tolist())
-
-
-def _fields(item) -> Mapping:
-    return {name: getattr(item, name) for name in type(item).model_fields}
-
-
-def _with(body: Body, changes: Mapping) -> Body:
-    return Body(**{**_fields(body), **changes})

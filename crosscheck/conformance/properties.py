@@ -26,7 +26,7 @@ from crosscheck.judge.tolerances import (
     UNIT_NORM,
 )
 from mbref import rotations
-from mbref.scene import Moment
+from mbref.scene import Moment, Scene
 from mbref.trajectory import Trajectory
 
 STATE = ("position", "orientation", "velocity", "angular_velocity")
@@ -160,7 +160,9 @@ def workless(bench: Bench) -> Finding | Outside:
     return _of_reactions(bench, idle)
 
 
-def _of_reactions(bench: Bench, measured: Callable) -> Finding | Outside:
+def _of_reactions(
+    bench: Bench, measured: Callable[[Scene, Trajectory, Trajectory], float]
+) -> Finding | Outside:
     if not bench.motion.reactions:
         return Outside("the engine gives no reactions, or the scene has no joint")
     if bench.exact.acceleration is None or not bench.scene.has_mass():

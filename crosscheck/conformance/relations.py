@@ -79,7 +79,8 @@ class Isometry:
             "angular_velocity": self.axial, "moment": self.axial, "inertia": self.inertia,
             "orientation": self.turn,
         }  # fmt: skip
-        along = {"displacement": self.polar}  # the axis of a driven displacement; others are of rotations
+        # the axis of a driven displacement; others are of rotations
+        along: dict[str | None, Callable[[Any], Any]] = {"displacement": self.polar}
         joints = [
             mapped(joint, {**fields, "axis": along.get(joint.facts.driven, self.axial)})
             for joint in scene.joint
@@ -178,8 +179,8 @@ def same(scene: Scene, motion: Trajectory) -> Trajectory:
     return motion
 
 
-ASKEW = rotations.to_matrix(rotations.from_vector([0.7, -0.4, 1.1]))
-IN_PLANE = rotations.to_matrix(rotations.from_vector([0.0, 0.0, 0.8]))
+ASKEW = rotations.to_matrix(rotations.from_vector(np.array([0.7, -0.4, 1.1])))
+IN_PLANE = rotations.to_matrix(rotations.from_vector(np.array([0.0, 0.0, 0.8])))
 NORMAL = np.array([0.6, 0.8, 0.0])
 
 

@@ -13,7 +13,7 @@ from crosscheck.conformance.trial import Outside
 from crosscheck.judge.constraints import joint_coordinates
 from crosscheck.judge.joint_residuals import driver_value
 from mbref import rotations
-from mbref.scene import GROUND, Driver, Joint, Moment, Scene
+from mbref.scene import GROUND, Driver, Joint, Load, Moment, Scene
 from mbref.trajectory import Trajectory
 
 CONSTANT = 1e-6  # relative: what a moment given by reactions may vary by and be one number
@@ -31,7 +31,7 @@ def started(scene: Scene, motion: Trajectory, sample: int, sense: float) -> Scen
                  angular_velocity=sense * motion.angular_velocity[sample, b])
         for b, body in enumerate(scene.body)
     ]  # fmt: skip
-    loads = []
+    loads: list[Load] = []
     for load in scene.load:
         if load.type == "torsion_spring":
             loads.append(
@@ -134,7 +134,7 @@ def replayed(scene: Scene, motion: Trajectory) -> Scene | Outside:
     joint = next(j for j in scene.joint if j.name == scene.driver[0].joint)
     if joint.facts.driven == "displacement" or joint.bodies[0] != GROUND:
         return Outside("its driver does not turn a body about an axis on the ground")
-    axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+    axis = np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
     moment = motion.reactions[joint.name][:, 3:] @ axis
     if np.ptp(moment) > CONSTANT * np.abs(moment).max():
         return Outside("its driver's moment varies, and the scene format has constant moments only")

@@ -103,11 +103,10 @@ def split(scene: Scene) -> Scene | Outside:
 
 def _in_halves(scene: Scene, body: Body) -> Scene:
     arm = _arm(body)
-    matrix = np.diag(body.inertia) if np.ndim(body.inertia) == 1 else np.array(body.inertia)
     moved = (body.mass or 0.0) * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     reach = rotations.rotate(np.array(body.orientation), arm)
     swing = np.cross(np.array(body.angular_velocity), reach)
-    common = {"mass": (body.mass or 0.0) / 2, "inertia": (matrix - moved) / 2}
+    common = {"mass": (body.mass or 0.0) / 2, "inertia": (_inertia(body) - moved) / 2}
     halves = [
         replaced(body, **common, name=name, position=np.array(body.position) + side * reach,
                  velocity=np.array(body.velocity) + side * swing)
@@ -138,10 +137,15 @@ def of_halves(scene: Scene, motion: Trajectory) -> Trajectory:
 
 def _arm(body: Body) -> np.ndarray:
     """From the centre of a body to that of its first half (body axes), along its least moment's axis."""
-    matrix = np.diag(body.inertia) if np.ndim(body.inertia) == 1 else np.array(body.inertia)
-    moments, axes = np.linalg.eigh(matrix)
+    moments, axes = np.linalg.eigh(_inertia(body))
     spare = min(moments[1], moments[1] + moments[2] - moments[0]) * LIMIT
     return np.sqrt(spare / (body.mass or 1.0)) * axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0])), 0])
+
+
+def _inertia(body: Body) -> np.ndarray:
+    """Inertia matrix (3, 3) about the centre of a body, along its axes."""
+    given = np.array(body.inertia)
+    return np.diag(given) if given.ndim == 1 else given
 
 
 def negated(scene: Scene) -> Scene:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
@@ -22,19 +21,16 @@ from crosscheck.judge.tolerances import RANK
 from mbref import rotations
 from mbref.scene import (
     GROUND,
+    JOINT_TYPES,
     Body,
     Cylindrical,
-    Distance,
-    Fixed,
     Force,
     Joint,
+    Load,
     Moment,
     Revolute,
     Scene,
-    Spherical,
     Spring,
-    Translational,
-    Universal,
 )
 from mbref.scenes import SCENES
 
@@ -67,8 +63,9 @@ def mechanisms(
             joints.append(closing)
     if redundant:
         joints += draw(_two_hinges(bodies, joints))
-    scene = Scene(name="drawn", gravity=draw(vectors.map(lambda v: tuple(8 * x for x in v))), duration=0.05,
-                  body=bodies, joint=joints, load=draw(_loads(bodies)))  # fmt: skip
+    gravity = draw(vectors.map(lambda v: (8 * v[0], 8 * v[1], 8 * v[2])))
+    scene = Scene(name="drawn", gravity=gravity, duration=0.05, body=tuple(bodies),
+                  joint=tuple(joints), load=tuple(draw(_loads(bodies))))  # fmt: skip
     twists = np.array([[*draw(vectors), *draw(vectors)] for _ in bodies])
     moving = consistent(scene, twists)
     return moving if goes_on(moving) else consistent(scene, 0 * twists)
@@ -79,7 +76,7 @@ def goes_on(scene: Scene) -> bool:
     rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
     coasting = bias(scene)
     left = rows @ np.linalg.lstsq(rows, coasting, rcond=RANK)[0] - coasting if len(rows) else coasting
-    return bool(np.linalg.norm(left) <= CONTINUES * max(1.0, np.linalg.norm(coasting)))
+    return bool(np.linalg.norm(left) <= CONTINUES * max(1.0, float(np.linalg.norm(coasting))))
 
 
 @st.composite
@@ -120,7 +117,7 @@ def _bodies(draw: st.DrawFn, name: str, k: int) -> Body:
     axes = rotations.to_matrix(principal)
     inertia = axes @ np.diag(spread.sum() - spread) @ axes.T
     return Body(name=name, mass=draw(st.integers(1, 8)) / 2, inertia=(inertia + inertia.T) / 2,
-                position=place, orientation=turn)  # fmt: skip
+                position=place.tolist(), orientation=turn.tolist())  # fmt: skip
 
 
 @st.composite
@@ -132,17 +129,10 @@ def _joints(
     anchor = ((places[pair[0]] + places[pair[1]]) / 2 + np.array(draw(vectors)) / 4).tolist()
     along = np.array(draw(directions), dtype=float)
     across = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
-    kind, common = draw(st.sampled_from(list(kinds))), {"name": name, "bodies": pair}
-    made: dict[str, Any] = {
-        "revolute": lambda: Revolute(**common, anchor=anchor, axis=along),
-        "spherical": lambda: Spherical(**common, anchor=anchor),
-        "universal": lambda: Universal(**common, anchor=anchor, axes=(along.tolist(), across.tolist())),
-        "cylindrical": lambda: Cylindrical(**common, anchor=anchor, axis=along),
-        "translational": lambda: Translational(**common, anchor=anchor, axis=along),
-        "distance": lambda: Distance(**common, anchors=(anchor, (np.array(anchor) + along / 2).tolist())),
-        "fixed": lambda: Fixed(**common, anchor=anchor),
-    }
-    return made[kind]()
+    kind = JOINT_TYPES[draw(st.sampled_from(list(kinds)))]
+    anchors = anchor, (np.array(anchor) + along / 2).tolist()
+    axes = along.tolist(), across.tolist()
+    return kind.at(name, pair, anchor=anchor, anchors=anchors, axis=axes[0], axes=axes)
 
 
 @st.composite
@@ -158,11 +148,11 @@ def _two_hinges(draw: st.DrawFn, bodies: Sequence[Body], joints: Sequence[Joint]
 
 
 @st.composite
-def _loads(draw: st.DrawFn, bodies: Sequence[Body]) -> list[Any]:
+def _loads(draw: st.DrawFn, bodies: Sequence[Body]) -> list[Load]:
     """Some of a moment, a force and a spring to the ground, all on the last body."""
     name, place = bodies[-1].name, np.array(bodies[-1].position)
     point = (place + np.array(draw(vectors)) / 4).tolist()
-    known = [
+    known: list[Load] = [
         Moment(body=name, moment=draw(vectors)),
         Force(body=name, point=point, force=draw(vectors)),
         Spring(bodies=(GROUND, name), points=((0.0, 2.0, 0.0), point), stiffness=20.0, natural_length=0.5),
@@ -171,7 +161,7 @@ def _loads(draw: st.DrawFn, bodies: Sequence[Body]) -> list[Any]:
 
 
 def _freedoms(bodies: Sequence[Body], joints: Sequence[Joint]) -> int:
-    scene = Scene(name="trial", body=list(bodies), joint=list(joints))
+    scene = Scene(name="trial", body=tuple(bodies), joint=tuple(joints))
     rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
     values = np.linalg.svd(rows, compute_uv=False)
     return int(rows.shape[1] - np.sum(values > RANK * values[0]))

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from crosscheck.conformance.suite import Verdict
 
-def test_card(crosscheck_verdict):
+
+def test_card(crosscheck_verdict: Verdict) -> None:
     """A card fails, passes, or is skipped with the reason why it says nothing here."""
     verdict = crosscheck_verdict
     if verdict.status in ("cannot", "outside"):

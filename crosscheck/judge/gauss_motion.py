@@ -159,8 +159,9 @@ def _rates(t: float, y: np.ndarray, scene: Scene) -> np.ndarray:
 def _trajectory(scene: Scene, times: np.ndarray, samples: np.ndarray) -> Trajectory:
     states = [_state(scene, y) for y in samples]
     second = np.array([accelerations(scene, t, state) for t, state in zip(times, states, strict=True)])
-    position, orientation, velocity, spin, _ = map(np.array, zip(*states, strict=True))
+    position, orientation, velocity, spin = (np.array([state[k] for state in states]) for k in range(4))
     names = tuple(body.name for body in scene.body)
-    return Trajectory(scene.name, NAME, "", "", {"rtol": RTOL}, times, names, position, orientation, velocity,
-                      spin, second[..., :3], second[..., 3:], outcome=Outcome.COMPLETED,
-                      t_end=float(times[-1]))  # fmt: skip
+    return Trajectory(
+        scene.name, NAME, "", "", {"rtol": RTOL}, times, names, position, orientation, velocity, spin,
+        second[..., :3], second[..., 3:], outcome=Outcome.COMPLETED, t_end=float(times[-1]),
+    )  # fmt: skip

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 
@@ -44,8 +44,9 @@ def measure(scene: Scene, trajectory: Trajectory, truth: Truth | None = None) ->
     exact = exact_motion(trajectory, truth)
     with np.errstate(all="ignore"):  # states that are not finite are told by the metrics, not by warnings
         found = {name: metric.function(scene, trajectory, exact) for name, metric in METRICS.items()}
-    judged = exact is not None and truth is not None and trajectory.times.size > 0
-    return found | {"error_bound": exact.settings.get("bound", truth.accuracy) if judged else None}
+    if truth is None or exact is None or not trajectory.times.size:
+        return found | {"error_bound": None}
+    return found | {"error_bound": exact.settings.get("bound", truth.accuracy)}
 
 
 def exact_motion(trajectory: Trajectory, truth: Truth | None) -> Trajectory | None:
@@ -85,6 +86,16 @@ def error_series(scene: Scene, trajectory: Trajectory, exact: Trajectory) -> np.
     return np.maximum(
         position_error_series(scene, trajectory, exact), rotation_error_series(scene, trajectory, exact)
     )
+
+
+@overload
+def violation_series(scene: Scene, trajectory: Trajectory, level: Literal[0, 1] = 0) -> np.ndarray:
+    """At position and velocity level there is always a residual."""
+
+
+@overload
+def violation_series(scene: Scene, trajectory: Trajectory, level: int) -> np.ndarray | None:
+    """At any level, as below."""
 
 
 def violation_series(scene: Scene, trajectory: Trajectory, level: int = 0) -> np.ndarray | None:

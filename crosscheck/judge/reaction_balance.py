@@ -25,8 +25,6 @@ def with_exact_reactions(scene: Scene, exact: Trajectory) -> Trajectory:
 
     Raises ValueError when the motion has no accelerations.
     """
-    if exact.acceleration is None or exact.angular_acceleration is None:
-        raise ValueError(f"{exact.engine} gives no accelerations of {scene.name}")
     found = {joint.name: np.zeros((len(exact.times), 6)) for joint in scene.joint}
     wanted = demanded(scene, exact)
     for k in range(len(exact.times)):
@@ -76,10 +74,12 @@ def balance(scene: Scene, run: Trajectory, exact: Trajectory) -> float:
 
 
 def demanded(scene: Scene, exact: Trajectory) -> np.ndarray:
-    """Forces and moments about the centres (k, nb, 6), world, that the joints must give for the motion."""
-    second, spin_rate = exact.acceleration, exact.angular_acceleration
-    if second is None or spin_rate is None:
-        raise ValueError(f"{scene.name}: the exact motion has no accelerations")
+    """Forces and moments about the centres (k, nb, 6), world, that the joints must give for the motion.
+
+    Raises ValueError when the motion has no accelerations.
+    """
+    if exact.acceleration is None or exact.angular_acceleration is None:
+        raise ValueError(f"{exact.engine} gives no accelerations of {scene.name}")
     pose = exact.times, exact.position, exact.orientation, exact.angular_velocity
     coordinates = joint_coordinates(scene, *pose)
     springs = [load.joint for load in scene.load if isinstance(load, TorsionSpring)]
@@ -89,8 +89,8 @@ def demanded(scene: Scene, exact: Trajectory) -> np.ndarray:
         angles = np.array([coordinates[name][k, 0] for name in springs])
         state = exact.position[k], exact.orientation[k], exact.velocity[k], exact.angular_velocity[k], angles
         inertia = world_inertia(scene, rotations.to_matrix(exact.orientation[k]))
-        turning = np.einsum("bij,bj->bi", inertia, spin_rate[k])
-        found.append(np.hstack([mass * second[k], turning]) - applied(scene, state))
+        turning = np.einsum("bij,bj->bi", inertia, exact.angular_acceleration[k])
+        found.append(np.hstack([mass * exact.acceleration[k], turning]) - applied(scene, state))
     return np.array(found)
 
 

@@ -11,12 +11,12 @@ import math
 
 from mbref.scene import Body, Joint, Revolute, Scene, Spring, Translational
 
+Triple = tuple[float, float, float]
 DENSITY, LENGTH, SIDE, CUBE, BALL = 3000.0, 1.0, 0.01, 0.1, 5.0  # kg/m³, m, m, m, kg
 OFFSET, TOP, HEIGHT, SLOPE = 0.05, 1.0, 0.5, math.radians(30)  # m, m, m, rad below the horizontal
 STIFFNESS, DAMPING, NATURAL_LENGTH = 8.0e5, 4.0e4, 0.5  # N/m, N s/m, m
 SPIN = 2 * math.pi  # rad/s
 Z = (0.0, 0.0, 1.0)
-Triple = tuple[float, float, float]
 
 
 def flyball_governor() -> Scene:
@@ -60,7 +60,7 @@ def _arm(side: float, rod: float, across: float, about: float) -> Body:
     return _part(_name(side), mass, (about, across, across), _along(side, reach), turn)
 
 
-def _along(side: float, reach: float) -> tuple[float, float, float]:
+def _along(side: float, reach: float) -> Triple:
     return side * (OFFSET + reach * math.cos(SLOPE)), 0.0, TOP - reach * math.sin(SLOPE)
 
 

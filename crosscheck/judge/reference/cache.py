@@ -11,6 +11,7 @@ import os
 import tempfile
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -42,7 +43,8 @@ def load(scene: Scene) -> dict[str, np.ndarray]:
 def save(scene: Scene, arrays: dict[str, np.ndarray]) -> None:
     """Keep the arrays of a scene; a reader sees the old file or the new one, never a part."""
     body, path = io.BytesIO(), _path(scene)
-    np.savez(body, **arrays)
+    named: dict[str, Any] = {**arrays}  # of one type, they would count as the switch that savez also takes
+    np.savez(body, **named)
     with contextlib.suppress(OSError):  # a cache that cannot be written is no cache
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:

@@ -38,8 +38,8 @@ def certified(scene: Scene, times: np.ndarray, digits: int, seconds: float = np.
     Raises NotCertified, and ImportError without python-flint.
     """
     exact = many_digits(2 * digits)
-    wanted = {"order": 2 * digits, "tolerance": 10.0 ** -(digits + SPARE)}
-    a = natural_motion(scene, times, exact, seconds=seconds, **wanted)
+    tolerance = 10.0 ** -(digits + SPARE)
+    a = natural_motion(scene, times, exact, seconds=seconds, order=2 * digits, tolerance=tolerance)
     b = tree_motion(scene, times, many_digits(digits + SPARE), seconds=seconds)
     for motion, name in ((a, "A"), (b, "B")):
         if motion.reason:

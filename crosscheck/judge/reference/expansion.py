@@ -36,7 +36,8 @@ class Expansion:
         self._u, self._w = zeros(2, terms, 3, p)
         self._products, self._multipliers, self._factors = zeros(terms, p), zeros(terms, m), zeros(terms, p)
         self.x[0], self.x[1] = start
-        self._grow(0), self._grow(1)
+        self._grow(0)
+        self._grow(1)
         for k in range(order + 1):
             self._solve(k)
 

@@ -6,7 +6,7 @@ Redundant rows are left out: columns of Gᵀ are taken in the order of a QR fact
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -23,14 +23,14 @@ from mbref.scene import Driver
 class HeldRows:
     """Some m of a scene's rows (``numbers``), and the p products they are made of."""
 
-    def __init__(self, of: NaturalCoordinates, rows: Sequence[int]):
+    def __init__(self, of: NaturalCoordinates, rows: Iterable[int]):
         self.numbers = tuple(map(int, rows))
         self._arithmetic, self._length = of.arithmetic, of.length
         driven = [(self.numbers.index(k), k, row) for k, row in of.driven if k in self.numbers]
         second = [of.second[k] for _, k, _ in driven if k in of.second]
         self._c = of.c[list(self.numbers)]
-        self._moved = [(at, row.driver) for at, k, row in driven if k not in of.second]
-        turned = [(at, row.driver) for at, k, row in driven if k in of.second]
+        self._moved = [(at, row.driver) for at, k, row in driven if row.driver and k not in of.second]
+        turned = [(at, row.driver) for at, k, row in driven if row.driver and k in of.second]
         self._turned = [(at, len(self.numbers) + i, driver) for i, (at, driver) in enumerate(turned)]
         self.products = [*self.numbers, *second]
         u, w = of.u[self.products], of.w[self.products]

@@ -6,9 +6,12 @@ from t ≥ 0, and after so many CPU seconds of the calling thread the motion end
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+Times = Sequence[float] | np.ndarray
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ PERPENDICULAR = {
 SLIDING = {"translational": (0, 1), "cylindrical": (0, 1), "planar": (2,)}
 """Axes of the first body's frame along which the anchors do not part; all three of the world's elsewhere."""
 EYE = np.eye(3)
+Sampled = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ class NaturalCoordinates:
             v[:, axes] = skew(self.arithmetic.array(spin)) @ self.axes[b]
         return x, v
 
-    def bodies(self, x: np.ndarray, v: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, ...]:
+    def bodies(self, x: np.ndarray, v: np.ndarray, a: np.ndarray) -> Sampled:
         """Positions, orientations, velocities, angular velocities and both accelerations, as in Motion, of
         coordinates and their derivatives (k, 3, n)."""
         blocks = [s[..., :-4].reshape(len(s), 3, self.nb, 4).transpose(0, 2, 1, 3) for s in (x, v, a)]
@@ -175,7 +176,9 @@ class NaturalCoordinates:
         first, second = self.indices(joint.bodies)
         return Row(self.direction(first, a), self.direction(second, b), (a * b).sum())
 
-    def _driven(self, kind: str, driver: Driver, e: Sequence, f: Sequence, apart: np.ndarray) -> Row:
+    def _driven(
+        self, kind: str, driver: Driver, e: Sequence[np.ndarray], f: Sequence[np.ndarray], apart: np.ndarray
+    ) -> Row:
         """Of an angle ψ: the first axis on the second body stays perpendicular to cos ψ e₂ - sin ψ e₁."""
         if kind == "translational":
             return Row(e[2], apart, 0.0, driver)

@@ -59,7 +59,10 @@ class LoadSeries:
         self.torsions = [
             TorsionSeries(form, angle, terms) for form, angle in zip(loads.torsions, angles, strict=True)
         ]
-        self._all = [*(SpringSeries(form, terms) for form in loads.springs), *self.torsions]
+        self._all: list[SpringSeries | TorsionSeries] = [
+            *(SpringSeries(form, terms) for form in loads.springs),
+            *self.torsions,
+        ]
 
     def grow(self, k: int, x: np.ndarray) -> None:
         """Take order k of the coordinates in; x (terms, 3, n)."""

@@ -7,7 +7,6 @@ before A, as in a singular position, the two runs of A bound each other.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +14,7 @@ import numpy as np
 from crosscheck.judge.reference import cache
 from crosscheck.judge.reference.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference.bound import USEFUL, bounds, differences
-from crosscheck.judge.reference.motion import Motion
+from crosscheck.judge.reference.motion import Motion, Times
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from mbref.scene import Scene
@@ -61,7 +60,7 @@ class NoReference:
     part: Reference
 
 
-def reference(scene: Scene, times: Sequence[float], seconds: float = SECONDS) -> Reference | NoReference:
+def reference(scene: Scene, times: Times, seconds: float = SECONDS) -> Reference | NoReference:
     """The reference motion at times (k,) ≥ 0, from the cache where it has them.
 
     Takes about so many CPU seconds of the calling thread at most.  Raises SceneError where the scene's
@@ -96,9 +95,10 @@ def judged(scene: Scene, times: np.ndarray, a: Motion, twin: Motion, b: Motion) 
         apart[: len(other.times)] = np.maximum(apart[: len(other.times)], differences(scene, a, other))
     bound = bounds(apart)
     good = int((bound <= USEFUL).sum())
+    arrays = {name: doubles(getattr(a, name)[:good]) for name in FIELDS}
     samples = Reference(
-        a.times[:good], *(doubles(getattr(a, name)[:good]) for name in FIELDS), bound[:good],
-        np.arange(good) < len(b.times), a.seconds + twin.seconds + b.seconds,
+        times=a.times[:good], **arrays, bound=bound[:good], both=np.arange(good) < len(b.times),
+        seconds=a.seconds + twin.seconds + b.seconds,
     )  # fmt: skip
     if good < len(apart):
         return samples, f"independent motions of it differ by {apart[good]:.0e} at t = {a.times[good]:.6g} s"
@@ -135,5 +135,6 @@ def _load(scene: Scene) -> _Kept | None:
     arrays = cache.load(scene)
     if not arrays:
         return None
-    reason, given = str(arrays.pop("reason")), float(arrays.pop("given"))
-    return _Kept(Reference(**arrays | {"seconds": float(arrays["seconds"])}), reason, given)
+    reason = str(arrays.pop("reason"))
+    given, seconds = (float(arrays.pop(name)) for name in ("given", "seconds"))
+    return _Kept(Reference(**arrays, seconds=seconds), reason, given)

@@ -8,7 +8,7 @@ lost in rounding noise, is never stepped on but leapt over, along the branch tha
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from scipy.optimize import minimize_scalar
 from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
 from crosscheck.judge.reference.expansion import Expansion, Series, value
 from crosscheck.judge.reference.held_rows import HeldRows, independent
-from crosscheck.judge.reference.motion import Motion
+from crosscheck.judge.reference.motion import Motion, Times
 from crosscheck.judge.reference.natural import NaturalCoordinates
 from crosscheck.judge.reference.natural_loads import Loads
 from crosscheck.judge.reference.saddle_point import SaddlePoint
@@ -47,7 +47,7 @@ class Ended(ArithmeticError):
 
 
 def natural_motion(
-    scene: Scene, times: Sequence[float], arithmetic: Arithmetic, *, seconds: float = np.inf,
+    scene: Scene, times: Times, arithmetic: Arithmetic, *, seconds: float = np.inf,
     order: int = ORDER, tolerance: float | None = None, seed: int = 0,
 ) -> Motion:  # fmt: skip
     """The motion at ascending times (k,) ≥ 0 in natural coordinates (see Motion), by series of an order.
@@ -78,7 +78,8 @@ class Stepper:
     def __init__(self, scene: Scene, arithmetic: Arithmetic, order: int, tolerance: float, seed: int):
         self.of = NaturalCoordinates(scene, arithmetic)
         self.t: Any = arithmetic.number(0.0)
-        self.steps, self.crossings = 0, []
+        self.steps = 0
+        self.crossings: list[float] = []
         self._loads = Loads(self.of)
         self._order, self._tolerance = order, tolerance
         self._x, self._v = self.of.start()
@@ -98,7 +99,7 @@ class Stepper:
         displaced = DATA * rng.uniform(-1, 1, len(self.of.c[joints]))
         self.of.c[joints] = self.of.c[joints] + self.of.arithmetic.array(displaced)
 
-    def samples(self, times: Sequence[float], deadline: float) -> Iterator[Sample]:
+    def samples(self, times: Times, deadline: float) -> Iterator[Sample]:
         """X, X', X'' (3, n) at ascending times; raises Ended where the motion cannot be followed."""
         self._refuse_undetermined()
         self._project()

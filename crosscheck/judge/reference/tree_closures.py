@@ -16,6 +16,7 @@ from crosscheck.judge.reference.arithmetic import Arithmetic
 from crosscheck.judge.reference.tree_joints import Placed, Tree, joint_frame
 from crosscheck.judge.reference.vectors import apply, cross, dot, unit
 
+Carried = tuple[np.ndarray, np.ndarray, np.ndarray]  # value, rate and drift (K, m, 3)
 SLIDING = {"translational": (0, 1), "cylindrical": (0, 1), "planar": (2,)}
 """Numbers of the directions (two normal to the axis, the axis) that nothing may slide along; else all."""
 ALL, TILTS = ((1, 2), (0, 2), (0, 1)), ((2, 0), (2, 1))
@@ -135,7 +136,7 @@ class _Packed:
         self.vectors = arithmetic.array([vectors for _, vectors in rows]).reshape(-1, size, 3)
         self._carriers = self.bodies[:, [0, 1, 0][:size]]
 
-    def carried(self, placed: Placed) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    def carried(self, placed: Placed) -> list[Carried]:
         """Value, rate and drift (K, m, 3) of each vector."""
         value = apply(placed.rotation[:, self._carriers], self.vectors)
         spin = placed.spin[:, self._carriers]
@@ -143,7 +144,7 @@ class _Packed:
         drift = cross(placed.spin_drift[:, self._carriers], value) + cross(spin, rate)
         return [(value[:, :, k], rate[:, :, k], drift[:, :, k]) for k in range(self.vectors.shape[1])]
 
-    def offset(self, placed: Placed, p: tuple, q: tuple) -> list[np.ndarray]:
+    def offset(self, placed: Placed, p: Carried, q: Carried) -> list[np.ndarray]:
         """Value, rate and drift (K, m, 3) from arm p of the first body to arm q of the second."""
         first, second = self.bodies.T
         centres = (placed.position, placed.velocity, placed.drift)

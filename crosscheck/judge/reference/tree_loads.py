@@ -6,6 +6,7 @@ columnᵀ · (load - inertia · drift); a torsion spring works on its joint's an
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -104,7 +105,9 @@ class Loads:
         for body, end, sign in zip(pair, ends, (1, -1), strict=True):
             _push(wrench, body, end[0], sign * size[:, None] * direction)
 
-    def _point(self, placed: Placed, body: int, point) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _point(
+        self, placed: Placed, body: int, point: Sequence[float]
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Arm, position and velocity (K, 3) of a point, given in the world at t = 0, of a body."""
         arm = apply(placed.rotation[:, body], self.tree.arithmetic.array(point) - self.tree.start[body])
         return (

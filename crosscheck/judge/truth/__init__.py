@@ -39,8 +39,9 @@ __all__ = ["NoSolution", "Truth", "closed_form", "truth_for"]
 class Truth(Protocol):
     """The exact motion of one scene."""
 
-    name: str
-    """The family."""
+    @property
+    def name(self) -> str:
+        """The family."""
 
     @property
     def accuracy(self) -> float:
