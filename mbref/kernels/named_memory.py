@@ -219,9 +219,12 @@ def _check_sizes(leaves: Sequence[Leaf]) -> None:
     sizes: dict[str, int] = {}
     for leaf in arrays:
         for dimension, length in zip(leaf.field.shape, leaf.value.shape, strict=True):
-            if dimension.isidentifier() or not _names(dimension) <= sizes.keys():
+            if dimension.isidentifier():
                 sizes.setdefault(dimension, length)
     for leaf in arrays:
+        for dimension, length in zip(leaf.field.shape, leaf.value.shape, strict=True):
+            if not _names(dimension) <= sizes.keys():
+                sizes.setdefault(dimension, length)
         declared = tuple(_size(dimension, sizes) for dimension in leaf.field.shape)
         if declared != leaf.value.shape:
             shape = ", ".join(leaf.field.shape)

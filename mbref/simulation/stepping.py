@@ -7,7 +7,7 @@ from mbref.equations.loads import remember_angles
 from mbref.kernels.compilation import INT, entry, kernel
 from mbref.kernels.layout import CHANGED, GUARD_FAILED, MEMORY, NOT_CONVERGED, NOT_FINITE, OK
 from mbref.linear_algebra.hermite import extrapolate_with_rates
-from mbref.linear_algebra.vectors import all_finite, copy
+from mbref.linear_algebra.vectors import all_finite, copy, larger
 from mbref.simulation.singular_crossing import (
     APART,
     choose_nodes,
@@ -16,6 +16,8 @@ from mbref.simulation.singular_crossing import (
     remember_state,
     step_to_edge,
 )
+
+LARGEST_CORRECTION = 1e-2  # of a landing, relative; good extrapolations need less
 
 # how a call ends; evaluation statuses (SINGULAR, …) end it too
 DONE, VIOLATED, STEP_TOO_SMALL, TOO_MANY_STEPS, PAUSED = range(10, 15)
@@ -146,8 +148,21 @@ def set_extrapolated_state(t, count, memory):
 
 
 @kernel
+def correction(y, predicted):
+    """The largest difference of an entry from its prediction, relative to the larger of 1 and the entry."""
+    size = 0.0
+    for i in range(y.shape[0]):
+        size = larger(size, (y[i] - predicted[i]) / max(1.0, abs(y[i])))
+    return size
+
+
+@kernel
 def leap(length, memory):
-    """Cross a window by extrapolation and projection; samples inside it are taken as extrapolated."""
+    """Cross a window by extrapolation and projection; samples inside it are taken as extrapolated.
+
+    NOT_CONVERGED where the projection moves the landing further than a good extrapolation is off: the
+    window was none, or the polynomial does not reach across it.
+    """
     loop, clock, counts = memory.loop, memory.loop.clock, memory.equations.system.counts
     history, times, landing = loop.history, loop.times, clock.time + length
     found = choose_nodes(history, counts.steps, APART * length)
@@ -155,9 +170,12 @@ def leap(length, memory):
         clock.time = times[clock.sample]
         set_extrapolated_state(clock.time, found, memory)
         take_sample(memory)
-    y_new, y_rate = loop.y_new[: clock.y_size], loop.y_rate[: clock.y_size]
-    extrapolate_with_rates(history, found, landing, y_new, y_rate)
+    y_new, predicted = loop.y_new[: clock.y_size], loop.y_rate[: clock.y_size]
+    extrapolate_with_rates(history, found, landing, y_new, predicted)
+    copy(y_new, predicted)
     status = memory.kernels.accept(landing, loop.y_new, memory)
+    if status == OK and correction(y_new, predicted) > max(LARGEST_CORRECTION, 300.0 * memory.control.rtol):
+        status = NOT_CONVERGED
     clock.time = landing if clock.sample < times.shape[0] else clock.time
     counts.steps += 1
     counts.crossings += 1
