@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import block_diag
-from truth_scenes import CLOSED
 
 from crosscheck.engines.constraint_equations import Constraints, frames
 from crosscheck.engines.generalised_forces import Forces
@@ -25,6 +24,7 @@ from mbref.scene import (
 )  # fmt: skip
 from mbref.scenes import SCENES
 from tests.crosscheck.tree_scenes import driven, every_joint, ring
+from tests.crosscheck.truth_scenes import CLOSED
 from tests.strategies import DRIVABLE, one_joint_scenes
 
 KINDS = tuple(JOINT_TYPES.values())

@@ -4,13 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from truth_scenes import CLOSED
 
 from crosscheck.judge.model_identity import gate, gate_times
 from crosscheck.judge.truth import truth_for
 from mbref.scene import Body
 from mbref.scenes import SCENES
-from tests.crosscheck.truth_scenes import ALL
+from tests.crosscheck.truth_scenes import ALL, CLOSED
 
 MODELS = {name: ALL[name] for name in ("planar_slider_crank_gravity", "spatial_slider_crank_gravity",
           "four_bar_gravity", "slider_spring", "pendulum_all")}  # fmt: skip

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from truth_scenes import CLOSED
 
 from crosscheck.judge import constraints
 from mbref import rotations
@@ -18,6 +17,7 @@ from mbref.scene import (
     Spherical,
 )  # fmt: skip
 from mbref.scenes import SCENES
+from tests.crosscheck.truth_scenes import CLOSED
 
 AXIS = (0.3, -0.5, 0.8)
 SIDE = (0.8, 0.0, -0.3)  # perpendicular to AXIS

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from truth_scenes import CLOSED
 
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from mbref.formulations import FORMULATIONS
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
+from tests.crosscheck.truth_scenes import CLOSED
 
 # scene, end time (s), method, rtol, largest error allowed.  A tenth of what is asked of each in the
 # comparison; measured errors are another ten to a thousand times smaller.

@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from truth_scenes import CLOSED
 
 from crosscheck.judge.truth import closed_form, truth_for
 from mbref import rotations
 from mbref.scene import Body, Driver, Revolute, Scene, Spherical, Translational, Universal
 from mbref.scenes import SCENES
 from mbref.scenes.planar_slider_crank import planar_slider_crank
-from tests.crosscheck.truth_scenes import ALL, Z, free, pendulum, turned_scene
+from tests.crosscheck.truth_scenes import ALL, CLOSED, Z, free, pendulum, turned_scene
 
 FAMILY = {name: name for name in ("planar_slider_crank", "spatial_slider_crank")} | {
     "four_bar": "parallelogram",
     "five_bar": "parallelogram",
     "slider_crank_chain": "crankshaft",
+    "point_pendulum": "pendulum",
 }
 
 
