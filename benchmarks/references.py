@@ -1,4 +1,4 @@
-"""References of built-in scenes and of random mechanisms: what they cost, and how sure they are.
+"""Cost and bounds of the references of built-in scenes and of random mechanisms.
 
     python benchmarks/references.py [--random 200] [--duration 0.5] [--seconds 60]
 

@@ -14,10 +14,10 @@ from typing import Any
 from rich.console import Console
 
 from crosscheck.cli import listing, request, tables
-from crosscheck.cli.options import add_reference_time, add_selection
+from crosscheck.cli.options import add_limits, add_selection
 from crosscheck.cli.request import RequestError
 from crosscheck.study import fair_timing
-from crosscheck.study.grid import TIME_LIMIT, Case, Record, key, study
+from crosscheck.study.grid import Case, Record, key, study
 from crosscheck.study.progress import counted, shown
 from crosscheck.study.record_view import public
 from mbref.scene import SceneError
@@ -278,15 +278,7 @@ def _add_verify(commands: Commands) -> None:
     parser.add_argument(
         "--scene", action="append", metavar="S", help="a scene of the suite; may repeat; default: all"
     )
-    parser.add_argument(
-        "--time-limit",
-        type=float,
-        default=TIME_LIMIT,
-        metavar="T",
-        help="wall time a run may take (s); default: %(default)g",
-    )
-    add_reference_time(parser)
-    parser.add_argument("--json", action="store_true", help="print records as JSON on standard output")
+    add_limits(parser)
 
 
 def _add_report(commands: Commands) -> None:

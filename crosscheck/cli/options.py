@@ -40,15 +40,7 @@ def add_selection(parser: argparse.ArgumentParser) -> None:
         "--rtol", type=float, help="one relative tolerance instead of the sweep over tolerances"
     )
     parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
-    parser.add_argument(
-        "--time-limit",
-        type=float,
-        default=TIME_LIMIT,
-        metavar="T",
-        help="wall time a run may take (s); default: %(default)g",
-    )
-    add_reference_time(parser)
-    parser.add_argument("--json", action="store_true", help="print records as JSON on standard output")
+    add_limits(parser)
 
 
 def _not_negative(text: str) -> float:
@@ -63,6 +55,19 @@ def _numbers(text: str) -> list[float]:
         return [float(part) for part in text.split(",")]
     except ValueError:
         raise argparse.ArgumentTypeError(f"must be numbers separated by commas, got {text!r}") from None
+
+
+def add_limits(parser: argparse.ArgumentParser) -> None:
+    """Times that a run and a reference may take, and the form of the output."""
+    parser.add_argument(
+        "--time-limit",
+        type=float,
+        default=TIME_LIMIT,
+        metavar="T",
+        help="wall time a run may take (s); default: %(default)g",
+    )
+    add_reference_time(parser)
+    parser.add_argument("--json", action="store_true", help="print records as JSON on standard output")
 
 
 def add_reference_time(parser: argparse.ArgumentParser) -> None:

@@ -21,7 +21,7 @@ from crosscheck.study.record_view import (
     varied_settings,
 )
 
-MEASURED = ("violation_position", "energy_error")  # of the metrics, what the table of runs shows too
+MEASURED = ("violation_position", "energy_error")  # metrics that the table of runs shows beside the error
 
 
 def print_runs(console: Console, records: Sequence[Record]) -> None:

@@ -1,4 +1,4 @@
-"""What the suite finds, made small and kept: a scene file and the command that replays it."""
+"""Violations that the suite finds, shrunk and kept: a scene file and the command that replays it."""
 
 from __future__ import annotations
 

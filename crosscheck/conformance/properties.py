@@ -30,7 +30,7 @@ from mbref.scene import Moment, Scene
 from mbref.trajectory import Trajectory
 
 STATE = ("position", "orientation", "velocity", "angular_velocity")
-TRUSTED = 1e-7  # what the exact motions are certainly better than, after a motion of some turns
+TRUSTED = 1e-7  # the exact motions are certainly more accurate, after a motion of some turns
 DENSE = 65  # samples from which the work of a moment is summed to 1e-8
 STEP = 1e-4  # of the duration: central differences of it are off by 1e-8 of what a motion does in its time
 

@@ -190,7 +190,7 @@ def _isometry(about: str, matrix: np.ndarray, shift: Sequence[float] = (0.0, 0.0
 
 
 def unchanged(about: str, change: Callable[[Scene], Scene | Outside]) -> Relation:
-    """The relation of a change that leaves the motion what it is."""
+    """The relation of a change that leaves the motion unchanged."""
     return Relation(about, lambda scene, motion: change(scene), same)
 
 

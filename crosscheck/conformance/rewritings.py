@@ -13,7 +13,7 @@ from mbref import rotations
 from mbref.scene import GROUND, Body, Cylindrical, Fixed, Joint, Scene, SceneError
 from mbref.trajectory import Trajectory
 
-HALF, LIMIT = " half", 0.2  # the halves' distance uses this part of what the inertia allows
+HALF, LIMIT = " half", 0.2  # the halves' distance as a part of the largest that the inertia allows
 
 
 def relabelled(scene: Scene) -> Scene:
