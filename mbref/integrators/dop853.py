@@ -15,7 +15,7 @@ from numpy import sqrt
 
 from mbref.integrators.base import Integrator
 from mbref.integrators.one_step import propose
-from mbref.kernels.compilation import exchangeable, inlined
+from mbref.kernels.compilation import exchangeable, inlined, kernel
 from mbref.kernels.layout import OK, STEP
 from mbref.kernels.named_memory import Matrix, Vector, opener
 from mbref.linear_algebra.vectors import copy, larger
@@ -60,7 +60,7 @@ def stages_to(last: int) -> Callable:
         return no_stage
     before, weighted, node = stages_to(last - 1), sum_with(A[last, :last]), float(C[last])
 
-    @inlined
+    @kernel
     def stages(rates, t, h, y, y_new, k, memory):
         status = before(rates, t, h, y, y_new, k, memory)
         if status != OK:
@@ -72,7 +72,7 @@ def stages_to(last: int) -> Callable:
     return stages
 
 
-@inlined
+@kernel
 def no_stage(rates, t, h, y, y_new, k, memory):
     """Stage 0 has the slope at y, which is known."""
     return OK

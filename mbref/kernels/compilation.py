@@ -69,9 +69,9 @@ def kernel(function: Callable) -> Callable:
 def inlined(function: Callable) -> Callable:
     """A kernel compiled into each of its callers: of an evaluation, half of whose time calls would take.
 
-    A closure is not kept on disk, where numba would not find it again.
+    Each caller compiles it again: inlined kernels that call each other take long to compile.
     """
-    return _compiled(function, forceinline=True, cache=function.__closure__ is None)
+    return _compiled(function, forceinline=True)
 
 
 def allocating(function: Callable) -> Callable:
@@ -80,6 +80,8 @@ def allocating(function: Callable) -> Callable:
 
 
 def _compiled(function: Callable, **options: bool) -> Callable:
+    """A closure is not kept on disk, where numba would not find it again."""
+    options.setdefault("cache", function.__closure__ is None)
     with kept_in(CACHE):
         return njit(**{**OPTIONS, **options})(function)
 

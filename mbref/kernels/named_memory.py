@@ -26,7 +26,7 @@ from numba import types
 from numba.core import cgutils
 from numba.core.imputils import lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate
-from numba.extending import NativeValue, infer_getattr, intrinsic, models, register_model, typeof_impl, unbox
+from numba.extending import NativeValue, infer_getattr, intrinsic, models, register_model, unbox
 from numba.np.numpy_support import from_dtype
 
 from mbref.kernels.compilation import INDEX_TABLE, INDICES, MATRIX, PLAIN, UNSIGNED, VECTOR
@@ -167,12 +167,14 @@ class Packed:
             _check_sizes(leaves)
             self.table = np.array([_words(leaf) for leaf in leaves], dtype=np.int64).reshape(-1, WORDS)
             self.address = self.table.ctypes.data
+            self._numba_type_ = _kind(type(values))  # of this argument, read by numba's dispatcher
         self.argument = values if PLAIN else self
 
 
-@typeof_impl.register(Packed)
-def _typeof_packed(value, context):
-    return Named(type(value.values))
+@functools.cache
+def _kind(schema: type) -> Named:
+    """One numba type a schema: making one takes longer than a call."""
+    return Named(schema)
 
 
 def packed(values: Any) -> Packed:

@@ -17,7 +17,7 @@ from numpy import sqrt
 
 from mbref.equations.coordinates import contract, displace, expand
 from mbref.equations.evaluation import evaluate, violation_rate
-from mbref.kernels.compilation import exchangeable, inlined
+from mbref.kernels.compilation import exchangeable, inlined, kernel
 from mbref.kernels.layout import ACCEPT, ENTER, NOT_CONVERGED, OK, SINGULAR
 from mbref.kernels.named_memory import Vector, opener
 from mbref.linear_algebra.minimum_norm import NEVER, solve_fixed_iterations
@@ -100,7 +100,7 @@ def remove_violation(violation, iterations, factor, target):
     solve_fixed_iterations(factor, iterations, target)
 
 
-@inlined
+@kernel
 def newton_step(t, y, before, memory):
     """One step of Newton's method for Φ(q, t) = 0 in ``memory.state``; the largest |Φ| before it.
 
@@ -124,7 +124,7 @@ def newton_loop(step: Callable) -> Callable:
     A negative violation ends it as SINGULAR: no factor exists, or a guard of specialised code failed.
     """
 
-    @inlined
+    @kernel
     def loop(t, y, memory):
         system, before = memory.equations.system, NEVER
         tolerance = system.settings.newton_tolerance
@@ -144,7 +144,7 @@ def newton_loop(step: Callable) -> Callable:
 project_positions = newton_loop(newton_step)
 
 
-@inlined
+@kernel
 def project(t, y, memory):
     """Project y; OK, SINGULAR or NOT_CONVERGED."""
     state = memory.state
