@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mbref.equations.diagnosis import Diagnosis, counts, diagnose
     from mbref.method import Method, MethodError
+    from mbref.motion import Motion
     from mbref.scene import Scene, SceneError
     from mbref.scenes import SCENES, find_scene
     from mbref.simulation.ensemble import ensemble
@@ -26,6 +27,7 @@ _MODULE_OF = {
     "Limits": "mbref.simulation.simulate",
     "Method": "mbref.method",
     "MethodError": "mbref.method",
+    "Motion": "mbref.motion",
     "Outcome": "mbref.trajectory",
     "SCENES": "mbref.scenes",
     "Scene": "mbref.scene",
@@ -41,8 +43,9 @@ _MODULE_OF = {
 }
 
 __all__ = [
-    "SCENES", "Cost", "Diagnosis", "Limits", "Method", "MethodError", "Outcome", "Scene", "SceneError",
-    "Trajectory", "Variation", "counts", "diagnose", "ensemble", "find_scene", "simulate", "variants",
+    "SCENES", "Cost", "Diagnosis", "Limits", "Method", "MethodError", "Motion", "Outcome", "Scene",
+    "SceneError", "Trajectory", "Variation", "counts", "diagnose", "ensemble", "find_scene", "simulate",
+    "variants",
 ]  # fmt: skip
 
 

@@ -32,6 +32,7 @@ from mbref.scene_joints import (
     Universal,
 )
 from mbref.scene_loads import LOAD_TYPES, Force, Load, Moment, Spring, TorsionSpring
+from mbref.scene_paths import replaced_at
 from mbref.scene_validation import GROUND, SceneError, checked_inertia, field_faults, reference_faults
 
 if TYPE_CHECKING:
@@ -151,9 +152,21 @@ class Scene(Entry):
 
         return counts(self)
 
-    def with_(self, **changes: Any) -> Scene:
-        """A validated copy with some top-level fields replaced."""
-        return Scene(**{**{k: getattr(self, k) for k in type(self).model_fields}, **changes})
+    def with_(self, path: str | None = None, value: Any = None, /, **changes: Any) -> Scene:
+        """A validated copy with some top-level fields replaced, or with the value at a path.
+
+        ``scene.with_(duration=2.0)``, ``scene.with_("body[slider].mass", 2.0)``.  Raises SceneError where
+        the path leads nowhere or the copy is no valid scene.
+        """
+        data = {k: getattr(self, k) for k in type(self).model_fields}
+        if path is not None:
+            data = replaced_at(data, path, lambda _: value)
+        return Scene(**{**data, **changes})
+
+    def _repr_html_(self) -> str:
+        from mbref.drawing.picture import still
+
+        return still(self)
 
     def to_dict(self) -> dict[str, Any]:
         """The scene as the file's nested tables; fields at their default are left out."""

@@ -42,6 +42,25 @@ class Cost:
 
 
 @dataclass(frozen=True)
+class BodyMotion:
+    """One body's share of a trajectory: the rows (k, …) of its arrays, in the same frames and units."""
+
+    name: str
+    position: np.ndarray
+    orientation: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+    acceleration: np.ndarray | None
+    angular_acceleration: np.ndarray | None
+
+    def __repr__(self) -> str:
+        return f"<BodyMotion of {self.name!r}: {len(self.position)} samples>"
+
+
+PER_BODY = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
+
+
+@dataclass(frozen=True, repr=False)
 class Trajectory:
     """Poses of every body at the caller's times, as far as the run got.
 
@@ -72,6 +91,22 @@ class Trajectory:
     message: str = ""
     cost: Cost = field(default_factory=Cost)
 
+    def __repr__(self) -> str:
+        return (
+            f"<{type(self).__name__} of {self.scene!r} by {self.engine} {self.method}: {self.outcome.label}, "
+            f"{len(self.times)} samples to t = {self.t_end:g} s>"
+        )
+
+    def __getitem__(self, name: str) -> BodyMotion:
+        """The motion of the body of that name; raises KeyError that lists the bodies."""
+        if name not in self.bodies:
+            raise KeyError(f"no body {name!r}; bodies: {', '.join(self.bodies)}")
+        b = self.bodies.index(name)
+        rows: dict[str, Any] = {
+            key: None if (array := getattr(self, key)) is None else array[:, b] for key in PER_BODY
+        }
+        return BodyMotion(name, **rows)
+
     @staticmethod
     def failed(
         *, scene: str, engine: str, version: str, method: str, settings: Mapping[str, Any],
@@ -87,8 +122,7 @@ class Trajectory:
 
     def to_record(self) -> dict[str, Any]:
         """The record that ``run --json`` prints (its ``metrics`` are added by crosscheck)."""
-        per_body = ["position", "orientation", "velocity", "angular_velocity"]
-        per_body += [n for n in ("acceleration", "angular_acceleration") if getattr(self, n) is not None]
+        per_body = [key for key in PER_BODY if getattr(self, key) is not None]
         return {
             "engine": self.engine,
             "version": self.version,

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from mbref.scene import Scene, SceneError
+from mbref.scene_paths import replaced_at
 
 INTERVAL, DEVIATION = ":", "+-"
-STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[([^\]]+)\]")
 
 
 @dataclass(frozen=True)
@@ -59,9 +59,14 @@ def variants(scene: Scene, variations: Sequence[Variation], count: int, seed: in
         data = {field: getattr(scene, field) for field in Scene.model_fields}
         random = np.random.default_rng([seed, k])
         for variation in variations:
-            steps = _steps(variation.path)
-            data[steps[0]] = _replaced(data[steps[0]], steps[1:], variation.draw(random), variation.path)
+            data = replaced_at(data, variation.path, partial(_drawn, variation, random))
         yield _valid(data, k)
+
+
+def _drawn(variation: Variation, random: np.random.Generator, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise SceneError([f"{variation.path}: is not a number that the scene gives"])
+    return variation.draw(random)
 
 
 def _valid(data: dict[str, Any], k: int) -> Scene:
@@ -69,37 +74,3 @@ def _valid(data: dict[str, Any], k: int) -> Scene:
         return Scene(**data)
     except SceneError as error:
         raise SceneError([f"variant {k}: {fault}" for fault in error.faults]) from None
-
-
-def _steps(path: str) -> list[str]:
-    """The fields and entries that a path leads through."""
-    found = [name or entry for name, entry in STEP.findall(path)]
-    if STEP.sub("", path) or not found or found[0] not in Scene.model_fields:
-        raise SceneError([f"{path}: is not a path of a scene, such as body[0].mass or joint[B].anchor[0]"])
-    return found
-
-
-def _replaced(value: Any, steps: Sequence[str], number: float, path: str) -> Any:
-    """The value with the number at the end of the steps replaced; tables become dictionaries."""
-    if not steps:
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise SceneError([f"{path}: is not a number that the scene gives"])
-        return number
-    step, rest = steps[0], steps[1:]
-    if isinstance(value, tuple):
-        place = _place(value, step, path)
-        return tuple(_replaced(v, rest, number, path) if i == place else v for i, v in enumerate(value))
-    if step not in getattr(type(value), "model_fields", {}):
-        raise SceneError([f"{path}: the scene has no {step!r} there"])
-    fields = {field: getattr(value, field) for field in type(value).model_fields}
-    return {**fields, step: _replaced(fields[step], rest, number, path)}
-
-
-def _place(entries: tuple[Any, ...], step: str, path: str) -> int:
-    """The index that a step names: a number, or the name of the entry (a driver has its joint's)."""
-    names = [getattr(entry, "name", getattr(entry, "joint", None)) for entry in entries]
-    if step in names:
-        return names.index(step)
-    if step.isdigit() and int(step) < len(entries):
-        return int(step)
-    raise SceneError([f"{path}: the scene has no {step!r} there"])

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mbref.drawing.shapes import moved, shapes
+from mbref.drawing.svg import COLOURS, GREY, INK
 from mbref.scene import GROUND, Scene
 from mbref.trajectory import Trajectory
-from reports.drawing import moved, shapes
-from reports.figures import COLOURS, GREY, INK
 from reports.runs import Run, power
 
 WIDTH, PANEL, FOOT, HEAD, MARGIN = 720.0, 172.0, 46.0, 44.0, 14.0  # px

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.interpolate import CubicHermiteSpline
 
-from mbref import rotations
+from mbref.drawing.shapes import anchors, is_planar, moved, shapes
 from mbref.scene import GROUND, Joint, Scene
 from mbref.trajectory import Trajectory
 from reports import figures
@@ -20,46 +18,6 @@ from reports import figures
 POSES = 8
 FINE = 12  # points of a path between two samples
 DEPTH, DEPTH_ANGLE = 0.5, math.radians(35)  # cabinet projection: depth halved, drawn at 35°
-FLAT = 1e-6  # a mechanism this thin, relative to its size, is planar
-
-
-@dataclass(frozen=True)
-class Shape:
-    """A body's points in its own frame (n, 3): joint anchors, in order along their main direction."""
-
-    name: str
-    points: np.ndarray
-
-
-def shapes(scene: Scene) -> list[Shape]:
-    """The body-fixed anchors of every body's joints; the centre of mass where it has none."""
-    out = []
-    for body in scene.body:
-        anchors = [a for joint in scene.joint for name, a in _anchors(joint) if name == body.name]
-        local = _inverse(body.orientation, np.array(anchors or [body.position]) - np.array(body.position))
-        out.append(Shape(body.name, _in_line(local)))
-    return out
-
-
-def _anchors(joint: Joint) -> list[tuple[str, tuple[float, float, float]]]:
-    return list(zip(joint.bodies, joint.anchor_pair, strict=True))
-
-
-def _inverse(orientation: Sequence[float], vectors: np.ndarray) -> np.ndarray:
-    return rotations.rotate(rotations.conjugate(np.array(orientation)), vectors)
-
-
-def _in_line(points: np.ndarray) -> np.ndarray:
-    """Distinct points, sorted along the direction in which they spread most."""
-    points = np.unique(points.round(12), axis=0)
-    along = np.linalg.svd(points - points.mean(axis=0))[2][0]
-    return points[np.argsort(points @ along)]
-
-
-def moved(shape: Shape, trajectory: Trajectory, body: int) -> np.ndarray:
-    """World points (k, n, 3) of a shape at the times of a trajectory."""
-    q, r = trajectory.orientation[:, body, None], trajectory.position[:, body, None]
-    return r + rotations.rotate(q, shape.points[None])
 
 
 def project(points: np.ndarray, planar: bool) -> np.ndarray:
@@ -68,11 +26,6 @@ def project(points: np.ndarray, planar: bool) -> np.ndarray:
         return points[..., :2]
     depth = DEPTH * points[..., 1:2] * np.array([math.cos(DEPTH_ANGLE), math.sin(DEPTH_ANGLE)])
     return points[..., [0, 2]] + depth
-
-
-def is_planar(points: np.ndarray) -> bool:
-    """Whether points (n, 3) stay in one plane of constant z."""
-    return np.ptp(points[:, 2]) <= FLAT * max(np.ptp(points[:, :2], axis=0).max(), 1e-300)
 
 
 def mechanism(scene: Scene, trajectory: Trajectory) -> Figure:
@@ -118,7 +71,7 @@ def _draw_body(axes: Axes, poses: np.ndarray, colour: str, name: str) -> None:
 
 def _guide(scene: Scene, trajectory: Trajectory, joint: Joint, size: float) -> np.ndarray:
     """Ends (2, 3) of the line a joint to the ground slides along, a little longer than its travel."""
-    point = np.array(_anchors(joint)[joint.bodies.index(GROUND)][1])
+    point = np.array(anchors(joint)[joint.bodies.index(GROUND)][1])
     if joint.facts.free_translations != 1 or not joint.directions:
         return np.stack([point, point])
     axis = np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
@@ -129,7 +82,7 @@ def _guide(scene: Scene, trajectory: Trajectory, joint: Joint, size: float) -> n
 
 def _draw_ground(axes: Axes, joint: Joint, guide: np.ndarray, planar: bool) -> None:
     """A triangle at a joint to the ground, its name beside it, and its guide dashed."""
-    at = project(np.array(_anchors(joint)[joint.bodies.index(GROUND)][1]), planar)
+    at = project(np.array(anchors(joint)[joint.bodies.index(GROUND)][1]), planar)
     axes.plot(*project(guide, planar).T, color=figures.GREY, linestyle="--", linewidth=0.9, zorder=1)
     axes.plot(*at, marker="^", color=figures.INK, markersize=8, zorder=4)
     axes.annotate(

@@ -12,14 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from crosscheck.engine import engine_names
+from mbref.drawing.svg import COLOURS, GREY, INK
 from reports.runs import Curve
 
-# Okabe and Ito's colours, distinguishable with every common colour blindness; yellow is left out
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKERS = ("o", "s", "^", "D", "v", "P", "h", "<", ">", "p")
 DASHES = ("-", "--", ":", "-.", (0, (6, 1.5, 1, 1.5, 1, 1.5)), (0, (1, 3)))
 FAILED = "X"
-INK, GREY = "#222222", "#8a8a8a"
 STYLE: Any = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans", "sans-serif"],

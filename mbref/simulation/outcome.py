@@ -1,4 +1,4 @@
-"""The samples of a run as a trajectory; the one place where a failure becomes an Outcome."""
+"""The samples of a run as a motion; the one place where a failure becomes an Outcome."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from dataclasses import asdict
 from mbref import __version__
 from mbref.equations.joint_reactions import reactions
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR
+from mbref.motion import Motion
 from mbref.simulation.run import Run
 from mbref.simulation.stepping import DONE, STEP_TOO_SMALL, TOO_MANY_STEPS, VIOLATED
-from mbref.trajectory import Cost, Outcome, Trajectory
+from mbref.trajectory import Cost, Outcome
 
 OUTCOMES = {
     DONE: Outcome.COMPLETED,
@@ -22,13 +23,14 @@ OUTCOMES = {
 }
 
 
-def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Trajectory:
+def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion:
     """The samples reached, in the scene's frames and units."""
     model, loop, counts = run.model, run.memory.loop, run.memory.equations.system.counts
     reached, nb = int(loop.clock.sample), run.model.nb
     q, v, a, multipliers = (sample[:reached] for sample in loop.samples)
     q, v, a = q.reshape(reached, nb, 7), v.reshape(reached, nb, 6), a.reshape(reached, nb, 6)
-    return Trajectory(
+    return Motion(
+        mechanism=run.scene,
         scene=run.scene.name,
         engine="mbref",
         version=__version__,

@@ -4,36 +4,43 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 
-from mbref.method import Method, MethodError
+from mbref.method import DEFAULT, Method, MethodError
+from mbref.motion import Motion
 from mbref.scene import Scene
+from mbref.scenes import find_scene
 from mbref.simulation.limits import SPECIALISED, Limits
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.run import Run, prepare
 from mbref.specialised import Untraceable
-from mbref.trajectory import Trajectory
 
 __all__ = ["Limits", "checked_times", "prepare", "simulate", "why_no_code"]
 
+SAMPLES = 101  # where no times are asked for
+
 
 def simulate(
-    scene: Scene,
-    method: Method | str,
-    times: Sequence[float] | np.ndarray,
+    scene: Scene | str | Path,
+    method: Method | str = DEFAULT,
+    times: Sequence[float] | np.ndarray | None = None,
     limits: Limits | None = None,
     progress: Callable[[float], None] | None = None,
-) -> Trajectory:
+) -> Motion:
     """Simulate from t = 0 and sample at ``times`` (k,), increasing, s; ``progress`` is told the time reached.
 
-    The method "kinematic" integrates nothing (``integrators.predictor``).
+    ``scene`` is a Scene, the name of a built-in one or a .toml file; without ``times``, 101 equally spaced
+    ones from 0 to the scene's duration.  The method "kinematic" integrates nothing
+    (``integrators.predictor``).
     Returns the states reached, with accelerations and reactions; a failure of the method is the
-    trajectory's outcome.  Raises SceneError for a scene that cannot be simulated, ValueError for times
+    motion's outcome.  Raises SceneError for a scene that cannot be simulated, ValueError for times
     that do not increase or an order the integrator does not have, MethodError for an unknown method name
     and where ``limits`` ask for machine code that the method or the scene cannot have.
     """
-    times = checked_times(times)
+    scene = scene if isinstance(scene, Scene) else find_scene(str(scene))
+    times = checked_times(np.linspace(0.0, scene.duration, SAMPLES) if times is None else times)
     method = Method.parse(method) if isinstance(method, str) else method
     limits = limits or Limits()
     began = time.process_time()

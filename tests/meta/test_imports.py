@@ -13,14 +13,15 @@ DOORS = (
 )
 ALLOWED = {  # package → the names of mbref that it may import
     "crosscheck": re.compile(rf"mbref(\.({DOORS})(\.\w+)?)?"),
-    "reports": re.compile(r"mbref(\.(scene|trajectory|rotations|records)(\.\w+)?)?"),
+    "reports": re.compile(r"mbref(\.(scene|trajectory|rotations|records|drawing\.(shapes|svg))(\.\w+)?)?"),
 }
 ADAPTER = "crosscheck.engines.mbref"  # the one module that may import all of mbref
 
 FLOORS = {  # lowest first; an arrow within a floor or downwards
     "mbref": (
         ["rotations", "records", "trajectory"],
-        ["scene", "scene_fields", "scene_joints", "scene_loads", "scene_validation"], ["scenes", "variation"],
+        ["scene", "scene_fields", "scene_joints", "scene_loads", "scene_paths", "scene_validation"],
+        ["scenes", "variation"], ["drawing"], ["joint_motion", "energy"], ["motion"],
         ["kernels"], ["linear_algebra"], ["equations"], ["formulations"], ["stabilisation"], ["integrators"],
         ["method"], ["specialised"], ["simulation"], ["cli"], ["__main__"],
     ),

@@ -1,0 +1,210 @@
+"""The signs of joints, of the ground and of loads, each at its place on the page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from mbref.drawing import svg
+from mbref.drawing.shapes import anchors, attached, attack
+from mbref.drawing.svg import GREY, INK, PAPER
+from mbref.drawing.view import Page
+from mbref.scene import GROUND, Driver, Joint, Load, Scene
+from mbref.trajectory import Trajectory
+
+ACTION = "#b3261e"  # of loads and drivers
+STUB = 20.0  # px, half of an axis drawn at a joint
+ARROW = 52.0  # px
+FACING = 0.7  # cosine to the line of sight above which an axis is seen as a point
+
+
+class Stage(NamedTuple):
+    """A scene, its motion, the page it is drawn on, and the time (s) that one round of the motion takes."""
+
+    scene: Scene
+    motion: Trajectory
+    page: Page
+    seconds: float
+
+    def place(self, body: str, point: tuple[float, float, float]) -> np.ndarray:
+        """Pixels (k, 2) of a point (world, t = 0) of a body."""
+        return self.page.pixels(attached(self.scene, self.motion, body, [point])[:, 0])
+
+    def points(self, body: str, points: np.ndarray) -> np.ndarray:
+        """Pixels (k, n, 2) of points (n, 3, world, t = 0) of a body."""
+        return self.page.pixels(attached(self.scene, self.motion, body, points.tolist()))
+
+
+def _unit(vector: tuple[float, ...]) -> np.ndarray:
+    unit: np.ndarray = np.array(vector) / np.linalg.norm(vector)
+    return unit
+
+
+def _along(
+    stage: Stage, body: str, point: tuple[float, float, float], axis: np.ndarray, px: float
+) -> np.ndarray:
+    """Pixels (k, 2, 2) of the ends of an axis through a point, each at most ``px`` away."""
+    half = axis * px / stage.page.scale
+    return stage.points(body, np.array([np.array(point) - half, np.array(point) + half]))
+
+
+def ground_mark(stage: Stage, joint: Joint) -> Iterator[str]:
+    """A hatched triangle below a joint to the ground, or the dashed guide of one that slides."""
+    side = joint.bodies.index(GROUND)
+    point = joint.anchor_pair[side]
+    if joint.facts.free_translations == 1 and joint.directions:
+        yield svg.line(_guide(stage, joint, side), f'stroke="{GREY}" stroke-dasharray="6 5" fill="none"', 0.0)
+        return
+    x, y = stage.place(GROUND, point)[0]
+    hatch = "".join(f"M{x + dx:.1f} {y + 16:.1f}l-5 6" for dx in (-9, -3, 3, 9))
+    yield f'<path d="M{x:.1f} {y:.1f}l-10 16h20z" fill="{PAPER}" stroke="{INK}" stroke-width="1.6"/>'
+    yield f'<path d="M{x - 13:.1f} {y + 16:.1f}h26{hatch}" stroke="{INK}" stroke-width="1.3" fill="none"/>'
+
+
+def _guide(stage: Stage, joint: Joint, side: int) -> np.ndarray:
+    """Pixels (1, 2, 2) of the line a joint to the ground slides along, a little longer than its travel."""
+    axis, point = _unit(joint.directions[0]), np.array(joint.anchor_pair[side])
+    moving = attached(stage.scene, stage.motion, joint.bodies[1 - side], [joint.anchor_pair[1 - side]])[:, 0]
+    travel, over = (moving - point) @ axis, 42 / stage.page.scale
+    ends = point + axis * np.array([[travel.min() - over], [travel.max() + over]])
+    return stage.page.pixels(ends)[None]
+
+
+def joint_mark(stage: Stage, joint: Joint) -> Iterator[str]:
+    """The sign of a joint's type, moving with its second body, and its axes where they are seen."""
+    names, (first, second) = joint.bodies, joint.anchor_pair
+    if joint.type == "distance":
+        ends = np.stack([stage.place(names[0], first), stage.place(names[1], second)], axis=1)
+        yield svg.line(
+            ends, f'stroke="{INK}" stroke-width="2" stroke-dasharray="9 3 2 3" fill="none"', stage.seconds
+        )
+    sliding = joint.facts.free_translations == 1 and bool(joint.directions)
+    for k, axis in enumerate(map(_unit, joint.directions)):
+        body, point = (names[k], joint.anchor_pair[k]) if len(joint.directions) > 1 else (names[1], second)
+        if sliding:
+            yield from _sleeve(stage, body, point, axis)
+        elif abs(axis @ stage.page.view.axes[2]) < 1 - 1e-9 and joint.type != "planar":
+            ends = _along(stage, body, point, axis, STUB)
+            yield svg.line(
+                ends,
+                f'stroke="{INK}" stroke-width="1.2" stroke-dasharray="7 2 1 2" fill="none"',
+                stage.seconds,
+            )
+    if joint.type == "planar":
+        yield from _plane(stage, names[0], first, _unit(joint.directions[0]))
+    yield svg.follow(stage.place(names[1], second), SIGNS[joint.type](), stage.seconds)
+
+
+def _sleeve(stage: Stage, body: str, point: tuple[float, float, float], axis: np.ndarray) -> Iterator[str]:
+    ends = _along(stage, body, point, axis, 15.0)
+    butt = 'fill="none" stroke-linecap="butt"'
+    yield svg.line(ends, f'{butt} stroke="{INK}" stroke-width="15"', stage.seconds)
+    inner = ends + (ends.mean(axis=1, keepdims=True) - ends) * 0.11
+    yield svg.line(inner, f'{butt} stroke="{PAPER}" stroke-width="11.6"', stage.seconds)
+
+
+def _plane(stage: Stage, body: str, point: tuple[float, float, float], normal: np.ndarray) -> Iterator[str]:
+    across = np.cross(normal, np.eye(3)[np.argmin(abs(normal))])
+    across /= np.linalg.norm(across)
+    other, half = np.cross(normal, across), 34 / stage.page.scale
+    corners = np.array(point) + half * np.array(
+        [across + other, across - other, -across - other, other - across]
+    )
+    look = f'stroke="{GREY}" fill="{GREY}" fill-opacity="0.15"'
+    yield svg.line(stage.points(body, corners), look, stage.seconds, closed=True)
+
+
+def _ball(fill: str, radius: float = 5.5) -> str:
+    return f'<circle r="{radius:g}" fill="{fill}" stroke="{INK}" stroke-width="1.8"/>'
+
+
+SIGNS: dict[str, Callable[[], str]] = {
+    "fixed": lambda: f'<rect x="-5.5" y="-5.5" width="11" height="11" fill="{INK}"/>',
+    "revolute": lambda: _ball(PAPER),
+    "universal": lambda: _ball(PAPER, 6.5) + f'<path d="M-4 -4L4 4M-4 4L4 -4" stroke="{INK}"/>',
+    "spherical": lambda: _ball(INK),
+    "translational": lambda: "",
+    "cylindrical": lambda: _ball(PAPER, 4),
+    "planar": lambda: _ball(GREY, 4),
+    "distance": lambda: _ball(PAPER, 3.5),
+}  # fmt: skip
+
+
+def driver_mark(stage: Stage, driver: Driver) -> str:
+    """A turn about, or an arrow along, the axis of a driven joint, in the sense in which it begins."""
+    joint = stage.scene.joint_named(driver.joint)
+    axis, point = _unit(joint.directions[0]), joint.anchor_pair[1]
+    rate = driver.polynomial[1] if len(driver.polynomial) > 1 else 0.0
+    sense = -1.0 if rate < 0 else 1.0
+    if joint.facts.driven == "angle":
+        sign = _turning(stage, axis * sense, 15.0)
+    else:
+        sign = _arrow_from_origin(stage, axis * sense)
+    return svg.follow(stage.place(joint.bodies[1], point), sign, stage.seconds)
+
+
+def load_mark(stage: Stage, load: Load) -> str:
+    """The sign of a load: an arrow, a turn, a zigzag between its ends, or a spiral at its joint."""
+    if load.type == "force":
+        return svg.follow(
+            stage.place(load.body, load.point),
+            _arrow_from_origin(stage, _unit_or_zero(load.force)),
+            stage.seconds,
+        )
+    if load.type == "moment":
+        body = stage.scene.body[stage.scene.body_index(load.body)]
+        sign = _turning(stage, _unit_or_zero(load.moment), 20.0)
+        return svg.follow(stage.place(load.body, body.position), sign, stage.seconds)
+    if load.type == "spring":
+        first, second = (stage.place(*end) for end in attack(load))
+        look = f'stroke="{ACTION}" stroke-width="1.6" fill="none"'
+        return svg.line(_zigzag(first, second), look, stage.seconds)
+    joint = stage.scene.joint_named(load.joint)
+    return svg.follow(stage.place(joint.bodies[1], joint.anchor_pair[1]), _spiral(), stage.seconds)
+
+
+def _unit_or_zero(vector: tuple[float, ...]) -> np.ndarray:
+    return _unit(vector) if any(vector) else np.zeros(3)
+
+
+def _arrow_from_origin(stage: Stage, direction: np.ndarray) -> str:
+    return svg.arrow(np.zeros(2), ARROW * stage.page.directions(direction), ACTION)
+
+
+def _turning(stage: Stage, axis: np.ndarray, radius: float) -> str:
+    """A turn where the axis faces the reader, else the axis as an arrow with two heads."""
+    facing = float(axis @ stage.page.view.axes[2])
+    if abs(facing) > FACING or not axis.any():
+        return svg.turn(radius, facing, ACTION)
+    end = ARROW * stage.page.directions(axis)
+    return svg.arrow(np.zeros(2), 0.8 * end, ACTION) + svg.arrow(0.6 * end, end, ACTION)
+
+
+def _zigzag(first: np.ndarray, second: np.ndarray, turns: int = 12) -> np.ndarray:
+    """Pixels (k, turns + 2, 2) of a spring between its ends (k, 2)."""
+    along = second - first
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
+    share = np.linspace(0.15, 0.85, turns)
+    sway = 7.0 * np.where(np.arange(turns) % 2, 1.0, -1.0)
+    sway[[0, -1]] = 0.0
+    inner = first[:, None] + share[:, None] * along[:, None] + sway[:, None] * across[:, None]
+    return np.concatenate([first[:, None], inner, second[:, None]], axis=1)
+
+
+def _spiral() -> str:
+    angle = np.linspace(0, 4.5 * np.pi, 60)
+    radius = np.linspace(8, 17, 60)
+    points = " ".join(
+        f"{x:.1f},{y:.1f}" for x, y in zip(radius * np.cos(angle), radius * np.sin(angle), strict=True)
+    )
+    return f'<polyline points="{points}" stroke="{ACTION}" stroke-width="1.5" fill="none"/>'
+
+
+def joint_name(stage: Stage, joint: Joint) -> str:
+    """The joint's name, up and to the left of its second body's anchor."""
+    name = svg.text(-9, -10, joint.name, f'fill="{INK}" font-weight="600"', "end")
+    side = anchors(joint)[1]
+    return svg.follow(stage.place(*side), name, stage.seconds)

@@ -1,0 +1,144 @@
+"""The picture of a scene, still or moving: bodies, joints, ground and loads, and axes with a length."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from mbref.drawing import svg
+from mbref.drawing.marks import Stage, driver_mark, ground_mark, joint_mark, joint_name, load_mark
+from mbref.drawing.shapes import Shape, anchors, at_rest, attack, moved, shapes
+from mbref.drawing.svg import COLOURS, GREY, INK
+from mbref.drawing.view import Page, View, view_of
+from mbref.scene import GROUND, Scene
+from mbref.trajectory import Trajectory
+
+WIDTH, TALLEST, MARGIN, FOOT = 720.0, 520.0, 64.0, 30.0  # px
+FRAMES = 120  # of a moving picture at most
+SHORTEST, LONGEST = 4.0, 12.0  # s of one round of a moving picture
+
+
+def still(scene: Scene, view: View | None = None, width: float = WIDTH) -> str:
+    """The scene at t = 0 as SVG, across its plane unless a view is given."""
+    return _picture(scene, at_rest(scene), view, width, 0.0)
+
+
+def moving(scene: Scene, motion: Trajectory, view: View | None = None, width: float = WIDTH) -> str:
+    """The motion as SVG that moves by itself, in real time where one round of it takes 4 to 12 s.
+
+    Samples are shown as they are, at most 120 of them, evenly in time where the trajectory is.
+    Raises ValueError where the trajectory has no sample.
+    """
+    if not motion.times.size:
+        raise ValueError(f"the motion of {motion.scene!r} has no sample to draw: {motion.outcome.sentence}")
+    seconds = float(np.clip(motion.times[-1] - motion.times[0], SHORTEST, LONGEST))
+    return _picture(scene, thinned(motion), view, width, seconds)
+
+
+def thinned(motion: Trajectory) -> Trajectory:
+    """The trajectory with every n-th of its samples only, at most 120."""
+    every = slice(None, None, math.ceil(len(motion.times) / FRAMES))
+    keys = ("times", "position", "orientation", "velocity", "angular_velocity")
+    return Trajectory(
+        scene=motion.scene, engine=motion.engine, version=motion.version, method=motion.method, settings={},
+        bodies=motion.bodies, outcome=motion.outcome, t_end=motion.t_end,
+        **{key: getattr(motion, key)[every] for key in keys},
+    )  # fmt: skip
+
+
+def _picture(scene: Scene, motion: Trajectory, view: View | None, width: float, seconds: float) -> str:
+    bodies = shapes(scene)
+    lines = [moved(shape, motion, b) for b, shape in enumerate(bodies)]
+    shown = np.concatenate(
+        [p.reshape(-1, 3) for p in lines] + [np.array(_fixed_points(scene)).reshape(-1, 3)]
+    )
+    page = Page.around(shown, view or view_of(shown, _turning_axes(scene)), width, MARGIN, TALLEST)
+    stage = Stage(scene, motion, page, seconds)
+    parts = list(_parts(stage, bodies, [page.pixels(p) for p in lines]))
+    parts += [*_axes(page), *_caption(stage)]
+    words = f"{scene.name}: {len(scene.body)} bodies, {len(scene.joint)} joints"
+    return svg.document(width, page.height + FOOT, parts, words)
+
+
+def _fixed_points(scene: Scene) -> list[tuple[float, float, float]]:
+    """Anchors on the ground and ends of springs there."""
+    found = [a for joint in scene.joint for name, a in anchors(joint) if name == GROUND]
+    return found + [p for load in scene.load for name, p in attack(load) if name == GROUND]
+
+
+def _turning_axes(scene: Scene) -> list[tuple[float, float, float]]:
+    """The axes of the revolute joints."""
+    return [joint.axis for joint in scene.joint if joint.type == "revolute"]
+
+
+def _parts(stage: Stage, bodies: list[Shape], lines: list[np.ndarray]) -> Iterator[str]:
+    scene = stage.scene
+    for joint in scene.joint:
+        if GROUND in joint.bodies:
+            yield from ground_mark(stage, joint)
+    for b, (shape, frames) in enumerate(zip(bodies, lines, strict=True)):
+        yield _body(shape, frames, COLOURS[b % len(COLOURS)], stage.seconds)
+    yield from (load_mark(stage, load) for load in scene.load)
+    for joint in scene.joint:
+        yield from joint_mark(stage, joint)
+    yield from (driver_mark(stage, driver) for driver in scene.driver)
+    yield from (joint_name(stage, joint) for joint in scene.joint)
+    for b, frames in enumerate(lines):
+        yield _body_name(bodies[b].name, frames, COLOURS[b % len(COLOURS)], stage.seconds)
+
+
+def _body(shape: Shape, frames: np.ndarray, colour: str, seconds: float) -> str:
+    """A plate, a bar, or a block where the body has one point only."""
+    if shape.is_plate:
+        look = f'fill="{colour}" fill-opacity="0.18" stroke="{colour}" stroke-width="4"'
+        return svg.line(frames[:, :-1], look, seconds, closed=True)
+    if frames.shape[1] == 1:
+        look = f'x="-17" y="-12" width="34" height="24" rx="3" stroke="{colour}" stroke-width="3"'
+        return svg.follow(frames[:, 0], f'<rect {look} fill="{colour}" fill-opacity="0.18"/>', seconds)
+    return svg.line(frames, f'fill="none" stroke="{colour}" stroke-width="6"', seconds)
+
+
+def _body_name(name: str, frames: np.ndarray, colour: str, seconds: float) -> str:
+    """The name beside the middle of a bar, in the middle of a plate, below a block."""
+    points = frames[:, :-1] if frames.shape[1] > 3 else frames
+    places = points.mean(axis=1) + 4.0 * np.array([0.0, 1.0])
+    if frames.shape[1] == 1:
+        places = places + np.array([0.0, 26.0])
+    elif frames.shape[1] < 4:
+        along = frames[:, -1] - frames[:, 0]
+        across = np.stack([along[:, 1], -along[:, 0]], axis=1)
+        reach = np.array([8.0 + 3.5 * len(name), 13.0])  # half of the name's width and height
+        places = places + reach * across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
+    return svg.follow(places, svg.text(0, 0, name, f'fill="{colour}"'), seconds)
+
+
+def _axes(page: Page) -> Iterator[str]:
+    """Arrows of x, y and z in the lower left corner, without the one along the line of sight."""
+    corner = np.array([30.0, page.height + FOOT - 26])
+    for name, seen in zip("xyz", page.directions(np.eye(3)), strict=True):
+        if np.hypot(*seen) > 0.2:
+            end = corner + 30 * seen
+            yield svg.arrow(corner, end, GREY, 1.3)
+            x, y = end + 10 * seen / np.hypot(*seen)
+            yield svg.text(x, y + 4, name, f'fill="{GREY}" font-size="12"')
+
+
+def _caption(stage: Stage) -> Iterator[str]:
+    """A bar of a round length, and of a moving picture how its time runs."""
+    page, motion = stage.page, stage.motion
+    length = _round_length(110 / page.scale)
+    left, y = page.width - 40 - length * page.scale, page.height + FOOT - 20
+    ends = f"M{left:.1f} {y - 4:.1f}v8m0 -4h{length * page.scale:.1f}m0 -4v8"
+    yield f'<path d="{ends}" stroke="{INK}" fill="none"/>'
+    yield svg.text(left + length * page.scale / 2, y - 7, f"{length:g} m", f'fill="{INK}" font-size="12"')
+    if stage.seconds:
+        words = f"{motion.times[-1]:g} s in {stage.seconds:g} s"
+        yield svg.text(page.width / 2, y + 4, words, f'fill="{INK}" font-size="12"')
+
+
+def _round_length(longest: float) -> float:
+    """The largest of 1, 2 or 5 times a power of ten that is not longer."""
+    power = 10.0 ** math.floor(math.log10(longest))
+    return float(f"{max(k for k in (1, 2, 5) if k * power <= longest * (1 + 1e-9)) * power:.6g}")

@@ -1,0 +1,112 @@
+"""Bodies as lines and plates between their joints, moved by a trajectory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbref import rotations
+from mbref.scene import Body, Joint, Load, Scene
+from mbref.trajectory import Trajectory
+
+FLAT = 1e-6  # a mechanism or a body this thin, relative to its size, is planar or straight
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A body's points (n, 3) in its own frame, m, in the order in which a line joins them.
+
+    The line of a body with three or more points that are not in line closes at its first point.
+    """
+
+    name: str
+    points: np.ndarray
+
+    @property
+    def is_plate(self) -> bool:
+        """Whether the line encloses an area."""
+        return len(self.points) > 3 and bool((self.points[0] == self.points[-1]).all())
+
+
+def shapes(scene: Scene) -> list[Shape]:
+    """The shape of every body: its joints and the points where springs and forces act on it.
+
+    The centre of mass is added where that is a single point.
+    """
+    return [Shape(body.name, _ordered(_own_points(scene, body))) for body in scene.body]
+
+
+def anchors(joint: Joint) -> list[tuple[str, tuple[float, float, float]]]:
+    """Body and anchor (world, t = 0) of both sides of a joint."""
+    return list(zip(joint.bodies, joint.anchor_pair, strict=True))
+
+
+def attack(load: Load) -> list[tuple[str, tuple[float, float, float]]]:
+    """Body and point (world, t = 0) of the ends of a spring, or of a force."""
+    if load.type == "spring":
+        return list(zip(load.bodies, load.points, strict=True))
+    return [(load.body, load.point)] if load.type == "force" else []
+
+
+def _own_points(scene: Scene, body: Body) -> np.ndarray:
+    """Distinct points (n, 3) of a body in its frame, its origin added to a single one."""
+    found = [a for joint in scene.joint for name, a in anchors(joint) if name == body.name]
+    found += [p for load in scene.load for name, p in attack(load) if name == body.name]
+    points = np.array(found or [body.position]) - np.array(body.position)
+    local = rotations.rotate(rotations.conjugate(np.array(body.orientation)), points)
+    local = np.unique(local.round(12), axis=0)
+    return local if len(local) > 1 else np.unique(np.concatenate([local, np.zeros((1, 3))]), axis=0)
+
+
+def _ordered(points: np.ndarray) -> np.ndarray:
+    """Points along the direction in which they spread most; their convex hull, closed, where not in line."""
+    centred = points - points.mean(axis=0)
+    _, sizes, axes = np.linalg.svd(centred)
+    if len(points) < 3 or sizes[1] <= FLAT * sizes[0]:
+        return points[np.argsort(centred @ axes[0])]
+    from scipy.spatial import ConvexHull  # a fifth of a second to load
+
+    order = ConvexHull(centred @ axes[:2].T).vertices
+    return points[np.append(order, order[0])]
+
+
+def moved(shape: Shape, trajectory: Trajectory, body: int) -> np.ndarray:
+    """World points (k, n, 3) of a shape at the times of a trajectory."""
+    return carried(shape.points, trajectory, body)
+
+
+def carried(points: np.ndarray, trajectory: Trajectory, body: int) -> np.ndarray:
+    """World points (k, n, 3) of points (n, 3) in the frame of a body."""
+    q, r = trajectory.orientation[:, body, None], trajectory.position[:, body, None]
+    return r + rotations.rotate(q, points[None])
+
+
+def attached(
+    scene: Scene, trajectory: Trajectory, name: str, points: Sequence[Sequence[float]]
+) -> np.ndarray:
+    """World points (k, n, 3) of points (n, 3, world at t = 0) that move with a body or stay on the ground."""
+    b, at_start = scene.body_index(name), np.array(points, dtype=float)
+    if b < 0:
+        return np.broadcast_to(at_start, (len(trajectory.times), *at_start.shape))
+    body = scene.body[b]
+    turned_back = rotations.conjugate(np.array(body.orientation))
+    return carried(rotations.rotate(turned_back, at_start - np.array(body.position)), trajectory, b)
+
+
+def is_planar(points: np.ndarray) -> bool:
+    """Whether points (n, 3) stay in one plane of constant z."""
+    return bool(np.ptp(points[:, 2]) <= FLAT * max(np.ptp(points[:, :2], axis=0).max(), 1e-300))
+
+
+def at_rest(scene: Scene) -> Trajectory:
+    """The trajectory of one sample, t = 0, at the scene's own poses, with zero velocities."""
+    nb = len(scene.body)
+    return Trajectory(
+        scene=scene.name, engine="mbref", version="", method="", settings={}, times=np.zeros(1),
+        bodies=tuple(body.name for body in scene.body),
+        position=np.array([[body.position for body in scene.body]]),
+        orientation=np.array([[body.orientation for body in scene.body]]),
+        velocity=np.zeros((1, nb, 3)), angular_velocity=np.zeros((1, nb, 3)),
+    )  # fmt: skip

@@ -1,0 +1,53 @@
+"""Kinetic and potential energy of a scene along a trajectory."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbref import rotations
+from mbref.joint_motion import joint_motion, place_of
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+
+
+def kinetic(scene: Scene, motion: Trajectory) -> np.ndarray:
+    """Σ (m v·v + ω·J ω)/2 over the bodies (k,), J; raises ValueError where a body has no mass."""
+    _need_masses(scene)
+    mass = np.array([body.mass for body in scene.body])
+    inertia = np.array([_matrix(body.inertia) for body in scene.body])
+    turned_back = rotations.conjugate(motion.orientation)
+    own = rotations.rotate(turned_back, motion.angular_velocity)
+    turning = np.einsum("kbi,bij,kbj->k", own, inertia, own)
+    moving = np.einsum("b,kbi,kbi->k", mass, motion.velocity, motion.velocity)
+    return np.asarray((moving + turning) / 2)
+
+
+def potential(scene: Scene, motion: Trajectory) -> np.ndarray:
+    """Of gravity, springs and torsion springs (k,), J, zero of gravity at the origin.
+
+    Constant forces and moments have none here: their work changes the energy.  Raises ValueError where a
+    body has no mass.
+    """
+    _need_masses(scene)
+    mass = np.array([body.mass for body in scene.body])
+    total = -np.einsum("b,kbi,i->k", mass, motion.position, np.array(scene.gravity))
+    for load in scene.load:
+        if load.type == "spring":
+            ends = [place_of(scene, motion, b, p) for b, p in zip(load.bodies, load.points, strict=True)]
+            stretch = np.linalg.norm(ends[1] - ends[0], axis=1) - load.natural_length
+            total = total + load.stiffness * stretch**2 / 2
+        elif load.type == "torsion_spring":
+            twist = np.asarray(joint_motion(scene, motion, load.joint).angle) - load.natural_angle
+            total = total + load.stiffness * twist**2 / 2
+    return np.asarray(total)
+
+
+def _need_masses(scene: Scene) -> None:
+    if not scene.has_mass():
+        without = next(body.name for body in scene.body if body.mass is None)
+        raise ValueError(f"body {without!r} has no mass; energies need the mass and inertia of every body")
+
+
+def _matrix(inertia: tuple[float, ...] | tuple[tuple[float, ...], ...] | None) -> np.ndarray:
+    array = np.array(inertia, dtype=float)
+    return np.diag(array) if array.ndim == 1 else array

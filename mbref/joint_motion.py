@@ -1,0 +1,109 @@
+"""Motion in a joint: the angle about and the displacement along its axis, from a trajectory of bodies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbref import rotations
+from mbref.scene import Joint, Scene
+from mbref.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class JointMotion:
+    """The second body's motion relative to the first from t = 0 at k times; None where a joint has no such.
+
+    ``angle`` (k,) about the axis in rad, counted on over full turns from the first sample, and its ``rate``
+    (k,) in rad/s: revolute, cylindrical and planar joints.  ``displacement`` (k,) along the axis in m:
+    translational and cylindrical joints.  ``rotation`` (k, 3) is the rotation vector of the second body
+    relative to the first (rad, along the world's axes as they are fixed to the first body).  ``force`` and
+    ``moment`` (k, 3), N and N m in the world, act on the second body at its anchor.
+    """
+
+    name: str
+    angle: np.ndarray | None
+    rate: np.ndarray | None
+    displacement: np.ndarray | None
+    rotation: np.ndarray
+    force: np.ndarray | None
+    moment: np.ndarray | None
+
+    def __repr__(self) -> str:
+        has = [key for key in ("angle", "displacement", "force") if getattr(self, key) is not None]
+        return (
+            f"<JointMotion of {self.name!r}: {len(self.rotation)} samples of {', '.join([*has, 'rotation'])}>"
+        )
+
+
+def joint_motion(scene: Scene, motion: Trajectory, name: str) -> JointMotion:
+    """The motion in the joint of that name; raises KeyError that lists the joints."""
+    if name not in {joint.name for joint in scene.joint}:
+        raise KeyError(f"no joint {name!r}; joints: {', '.join(joint.name for joint in scene.joint)}")
+    joint = scene.joint_named(name)
+    turned = [_turned(scene, motion, body) for body in joint.bodies]
+    relative = rotations.multiply(rotations.conjugate(turned[0]), turned[1])
+    turns = joint.facts.free_rotations == 1 and bool(joint.directions)
+    slides = joint.facts.free_translations == 1 and bool(joint.directions)
+    angle, rate = _angle(scene, motion, joint, turned[0], relative) if turns else (None, None)
+    displacement = _displacement(scene, motion, joint, turned[0]) if slides else None
+    wrench = (motion.reactions or {}).get(name)
+    force, moment = (None, None) if wrench is None else (wrench[:, :3], wrench[:, 3:])
+    return JointMotion(name, angle, rate, displacement, _vector(relative), force, moment)
+
+
+def place_of(scene: Scene, motion: Trajectory, name: str, point: tuple[float, float, float]) -> np.ndarray:
+    """World places (k, 3) of a point (world, t = 0) that moves with a body, or stays on the ground."""
+    b = scene.body_index(name)
+    if b < 0:
+        return np.tile(np.array(point), (len(motion.times), 1))
+    arm = np.array(point) - np.array(scene.body[b].position)
+    return np.asarray(motion.position[:, b] + rotations.rotate(_turned(scene, motion, name), arm))
+
+
+def _turned(scene: Scene, motion: Trajectory, name: str) -> np.ndarray:
+    """Rotations (k, 4) of a body since the scene's orientation at t = 0."""
+    b = scene.body_index(name)
+    if b < 0:
+        return np.tile(np.array([1.0, 0.0, 0.0, 0.0]), (len(motion.times), 1))
+    start = rotations.conjugate(np.array(scene.body[b].orientation))
+    return rotations.multiply(motion.orientation[:, b], start)
+
+
+def _axis(joint: Joint) -> np.ndarray:
+    axis = np.array(joint.directions[0])
+    return np.asarray(axis / np.linalg.norm(axis))
+
+
+def _angle(
+    scene: Scene, motion: Trajectory, joint: Joint, first: np.ndarray, relative: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """The angle about the axis, its full turns found by the mean rate between samples; and the rate."""
+    axis = _axis(joint)
+    spins = [_angular_velocity(scene, motion, name) for name in joint.bodies]
+    rate = np.einsum("ki,ki->k", spins[1] - spins[0], rotations.rotate(first, axis[None]))
+    wrapped = 2 * np.arctan2(relative[:, 1:] @ axis, relative[:, 0])
+    expected = (rate[1:] + rate[:-1]) / 2 * np.diff(motion.times)
+    turns = np.round((expected - np.diff(wrapped)) / (2 * np.pi))
+    start = -2 * np.pi * np.round(wrapped[:1] / (2 * np.pi))
+    return wrapped + start + 2 * np.pi * np.concatenate([np.zeros(len(wrapped[:1])), np.cumsum(turns)]), rate
+
+
+def _angular_velocity(scene: Scene, motion: Trajectory, name: str) -> np.ndarray:
+    b = scene.body_index(name)
+    return np.zeros((len(motion.times), 3)) if b < 0 else motion.angular_velocity[:, b]
+
+
+def _displacement(scene: Scene, motion: Trajectory, joint: Joint, first: np.ndarray) -> np.ndarray:
+    """(r₂ - r₁)·axis, the anchors' distance along the axis that the first body carries."""
+    ends = [place_of(scene, motion, *end) for end in zip(joint.bodies, joint.anchor_pair, strict=True)]
+    return np.einsum("ki,ki->k", ends[1] - ends[0], rotations.rotate(first, _axis(joint)[None]))
+
+
+def _vector(p: np.ndarray) -> np.ndarray:
+    """Rotation vectors (k, 3), at most half a turn long, of unit quaternions (k, 4)."""
+    p = np.where(p[:, :1] < 0, -p, p)
+    sine = np.linalg.norm(p[:, 1:], axis=1, keepdims=True)
+    angle = 2 * np.arctan2(sine, p[:, :1])
+    return np.where(sine > 0, angle / np.where(sine > 0, sine, 1.0), 2.0) * p[:, 1:]

@@ -1,0 +1,158 @@
+"""Pictures: points of bodies / the poses of a trajectory; views; signs of every joint and load."""
+
+from __future__ import annotations
+
+import dataclasses
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+
+from mbref.drawing.marks import SIGNS
+from mbref.drawing.picture import moving, still, thinned
+from mbref.drawing.png import png
+from mbref.drawing.shapes import at_rest, shapes
+from mbref.drawing.view import Page, View, view_of
+from mbref.scene import JOINT_TYPES, Scene
+from mbref.scenes import SCENES
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.fixture
+def turning():
+    """A four-bar whose poses are those of t = 0, turned about the origin: 40 samples."""
+    scene = SCENES["four_bar"]()
+    start, turn = at_rest(scene), np.linspace(0.0, 1.0, 300)
+    c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
+    x, y = start.position[0, :, 0], start.position[0, :, 1]
+    position = np.stack([c * x - s * y, s * x + c * y, 0 * s * x], axis=2)
+    half = np.stack([np.cos(turn / 2), 0 * turn, 0 * turn, np.sin(turn / 2)], axis=1)
+    from mbref import rotations
+
+    orientation = rotations.multiply(half[:, None], start.orientation)
+    zeros = np.zeros_like(position)
+    return scene, dataclasses.replace(
+        start, times=turn, position=position, orientation=orientation, velocity=zeros, angular_velocity=zeros
+    )
+
+
+def texts(picture: str) -> list[str]:
+    return [node.text or "" for node in ET.fromstring(picture).iter(f"{SVG}text")]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_scene_is_drawn_with_the_names_of_its_parts(name):
+    scene = SCENES[name]()
+    words = texts(still(scene))
+    assert {body.name for body in scene.body} | {joint.name for joint in scene.joint} <= set(words)
+
+
+def test_bars_keep_their_length_in_a_moving_picture(turning):
+    scene, motion = turning
+    lines = [
+        node for node in ET.fromstring(moving(scene, motion)).iter(f"{SVG}polyline")
+        if node.get("stroke-width") == "6"
+    ]  # fmt: skip
+    assert len(lines) == len(scene.body)
+    for line in lines:
+        values = line.find(f"{SVG}animate").attrib["values"].split(";")
+        frames = np.array([[p.split(",") for p in frame.split()] for frame in values], dtype=float)
+        length = np.linalg.norm(frames[:, 1] - frames[:, 0], axis=1)
+        assert len(frames) == 100 and np.ptp(length) < 0.3 and np.ptp(frames[:, 1, 0]) > 50
+
+
+def test_long_motions_are_thinned_evenly(turning):
+    _, motion = turning
+    short = thinned(motion)
+    assert len(short.times) == 100 and np.allclose(np.diff(short.times, 2), 0)
+    assert (short.position == motion.position[::3]).all()
+
+
+def test_a_motion_without_samples_is_refused(turning):
+    scene, motion = turning
+    with pytest.raises(ValueError, match="has no sample"):
+        moving(scene, dataclasses.replace(motion, times=np.zeros(0)))
+
+
+def test_link_with_three_joints_is_a_plate_and_a_pendulum_a_bar():
+    plates = [shape.name for shape in shapes(SCENES["andrews_squeezer"]()) if shape.is_plate]
+    assert plates == ["K3"]
+    (top,) = shapes(SCENES["heavy_top"]())
+    assert len(top.points) == 2 and not top.is_plate
+
+
+@pytest.mark.parametrize(
+    ("name", "right", "up"),
+    [("xy", "x", "y"), ("xz", "x", "z"), ("yz", "y", "z"), ("-90,90", "x", "y")],
+)
+def test_named_views(name, right, up):
+    axes = View.parse(name).axes
+    assert np.allclose(axes[0], np.eye(3)["xyz".index(right)])
+    assert np.allclose(axes[1], np.eye(3)["xyz".index(up)])
+    assert np.allclose(axes @ axes.T, np.eye(3)) and np.linalg.det(axes) > 0
+
+
+@pytest.mark.parametrize("text", ["front", "10", "0,91", "nan,0", "a,b"])
+def test_views_that_are_none(text):
+    with pytest.raises(ValueError, match="view: "):
+        View.parse(text)
+
+
+def test_plane_mechanisms_are_seen_across_their_plane():
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 1.0]])
+    assert view_of(points, [(0.0, 2.0, 0.0)]) == View.parse("xz")
+    assert view_of(points, [(0.0, 0.0, 1.0)]) == View.parse("oblique")
+    assert view_of(points + np.diag([0.0, 0.5, 0.0]), []) == View.parse("oblique")
+
+
+def test_page_shows_all_points_within_its_margins():
+    points = np.random.default_rng(1).normal(size=(30, 3)) * np.array([5.0, 1.0, 0.1])
+    page = Page.around(points, View.parse("oblique"), 600.0, 40.0, 400.0)
+    seen = page.pixels(points)
+    assert (seen >= 40 - 1e-9).all() and (seen <= np.array([page.width, page.height]) - 40 + 1e-9).all()
+
+
+def test_every_joint_type_has_a_sign_and_is_drawn():
+    assert set(SIGNS) == set(JOINT_TYPES)
+    ends = {"anchor": [1.0, 0, 0], "anchors": [[1.0, 0, 0], [2.0, 0, 0]], "axis": [0, 0, 1.0],
+            "axes": [[0, 0, 1.0], [0, 1.0, 0]]}  # fmt: skip
+    bodies = [{"name": n, "position": [x, 0.2, 0.1]} for n, x in (("a", 0.5), ("b", 1.5))]
+    pictures = set()
+    for joint in JOINT_TYPES.values():
+        made = joint.at("J", ("a", "b"), **ends)
+        picture = still(Scene(name="pair", body=bodies, joint=(made,)), View.parse("oblique"))
+        ET.fromstring(picture)
+        pictures.add(picture)
+    assert len(pictures) == len(JOINT_TYPES), "two joint types look the same"
+
+
+def test_every_load_and_driver_changes_the_picture():
+    scene = SCENES["planar_slider_crank"]().with_(load=())
+    loads = [
+        {"type": "force", "body": "rod", "point": [0.5, 0, 0], "force": [0, 1, 0]},
+        {"type": "moment", "body": "crank", "moment": [0, 0, -1]},
+        {"type": "moment", "body": "crank", "moment": [0, 0, 1]},
+        {"type": "spring", "bodies": ["ground", "slider"], "points": [[1, 0, 0], [0.7, 0, 0]],
+         "stiffness": 1, "natural_length": 1},
+        {"type": "torsion_spring", "joint": "A", "stiffness": 1},
+    ]  # fmt: skip
+    pictures = {still(scene.with_(load=(load,))) for load in loads}
+    drivers = [{"joint": "A", "polynomial": [0.0, 1.0]}, {"joint": "A", "polynomial": [0.0, -1.0]},
+               {"joint": "D", "polynomial": [0.0, 1.0]}]  # fmt: skip
+    pictures |= {still(scene.with_(driver=(driver,))) for driver in drivers} | {still(scene)}
+    assert len(pictures) == 9
+
+
+def test_names_are_escaped_and_there_is_no_script():
+    scene = SCENES["point_pendulum"]().with_(name="<a & b>")
+    picture = still(scene)
+    assert "&lt;a &amp; b&gt;" in picture and "<script" not in picture
+
+
+def test_png_is_twice_the_size_of_the_svg():
+    picture = still(SCENES["four_bar"](), width=300.0)
+    data = png(picture)
+    height = float(ET.fromstring(picture).attrib["height"])
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    assert (int.from_bytes(data[16:20]), int.from_bytes(data[20:24])) == (600, 2 * height)

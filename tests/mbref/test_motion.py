@@ -1,0 +1,189 @@
+"""Motion: bodies and joints by name / closed forms; energies / the judge's; tables, files, notebook."""
+
+from __future__ import annotations
+
+import ast
+import csv
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crosscheck.judge.energy import kinetic_energy, potential_energy
+from mbref import Limits, Motion, Scene, SceneError, Trajectory, find_scene, simulate
+from mbref.drawing.plot import grouped
+
+ROOT = Path(__file__).parents[2]
+TIMES = np.linspace(0.0, 0.1, 21)
+
+
+@pytest.fixture(scope="module")
+def driven() -> Motion:
+    """The four-bar, its crank driven at -124.8 rad/s: two full turns, six samples each."""
+    return simulate("four_bar", times=np.linspace(0.0, 0.1, 13))
+
+
+@pytest.fixture(scope="module")
+def crank() -> Motion:
+    return simulate("planar_slider_crank", times=TIMES)
+
+
+@pytest.fixture(scope="module")
+def door() -> Motion:
+    """A spring and a torsion spring, without their dampers."""
+    scene = Scene.from_file(ROOT / "examples" / "door_closer.toml")
+    loads = tuple(load.model_copy(update={"damping": 0.0}) for load in scene.load)
+    return simulate(scene.with_(load=loads), times=np.linspace(0.0, 1.0, 6), limits=Limits(rtol=1e-11))
+
+
+def test_angle_of_a_driven_joint_is_counted_over_full_turns(driven):
+    joint = driven.joint("A")
+    assert np.abs(joint.angle + 124.8 * driven.times).max() < 1e-9
+    assert np.abs(joint.rate + 124.8).max() < 1e-8
+    assert joint.displacement is None and driven.joint("B").angle is None
+
+
+def test_displacement_of_a_guide_is_the_slider_s(crank):
+    joint, slider = crank.joint("D"), crank["slider"]
+    assert np.allclose(joint.displacement, slider.position[:, 0] - slider.position[0, 0], atol=1e-12)
+    assert joint.angle is None and joint.displacement[-1] != 0
+
+
+def test_rotation_vector_of_a_universal_joint_is_the_relative_rotation(driven):
+    vector = driven.joint("B").rotation
+    turned = np.arctan2(np.sin(124.8 * driven.times), np.cos(124.8 * driven.times))
+    assert np.abs(vector[:, 2] - turned).max() < 1e-8 and np.abs(vector[:, :2]).max() < 1e-8
+
+
+def test_bodies_and_joints_that_are_not_there_are_told(crank):
+    with pytest.raises(KeyError, match="no body 'lid'; bodies: crank, rod, slider"):
+        crank["lid"]
+    with pytest.raises(KeyError, match="no joint 'Z'; joints: A, B"):
+        crank.joint("Z")
+
+
+@pytest.mark.parametrize("name", ["crank", "door"])
+def test_energies_are_the_judge_s(name, request):
+    motion = request.getfixturevalue(name)
+    scene = motion.mechanism
+    scene = scene.with_(load=[load for load in scene.load if load.type == "spring"])
+    of_springs = Motion.of(scene, motion).potential_energy
+    rates = motion.velocity, motion.angular_velocity
+    assert np.allclose(motion.kinetic_energy, kinetic_energy(scene, motion.orientation, *rates), rtol=1e-12)
+    judged = potential_energy(scene, motion.position, motion.orientation)
+    assert np.allclose(of_springs, judged, rtol=1e-12)
+
+
+def test_energy_is_kept_by_springs_and_torsion_springs(door):
+    assert np.ptp(door.energy) < 1e-8, door.energy
+    assert np.ptp(door.kinetic_energy) > 1.0
+
+
+def test_energy_is_kept_by_gravity_alone():
+    motion = simulate("four_bar_gravity", times=TIMES, limits=Limits(rtol=1e-11))
+    assert np.ptp(motion.energy) < 1e-8 < np.ptp(motion.kinetic_energy)
+
+
+def test_energy_without_masses_names_the_body():
+    scene = find_scene("four_bar")
+    bare = scene.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in scene.body))
+    motion = simulate(bare, "kinematic", [0.0, 0.01])
+    with pytest.raises(ValueError, match="body 'crank' has no mass"):
+        motion.energy  # noqa: B018
+    assert "energy" not in motion.columns()
+
+
+def test_saved_and_loaded_is_equal(crank, tmp_path):
+    crank.save(tmp_path / "run.json")
+    again = Motion.load(tmp_path / "run.json")
+    assert again.mechanism == crank.mechanism and again.outcome is crank.outcome and again.cost == crank.cost
+    assert again.to_record() == crank.to_record()
+    assert list(again.columns()) == list(crank.columns())
+    (tmp_path / "other.json").write_text('{"scene": 1}')
+    with pytest.raises(ValueError, match=r"other\.json: is not a file that Motion\.save wrote"):
+        Motion.load(tmp_path / "other.json")
+
+
+def test_csv_and_frame_have_the_columns(crank, tmp_path):
+    crank.to_csv(tmp_path / "run.csv")
+    with open(tmp_path / "run.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(TIMES)
+    assert float(rows[-1]["slider.position.x"]) == crank["slider"].position[-1, 0]
+    frame = crank.to_dataframe()
+    assert (frame.index == TIMES).all()
+    assert (frame["A.force.y"] == crank.joint("A").force[:, 1]).all()
+
+
+def test_without_pandas_the_frame_says_what_to_install(crank, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ImportError, match="pip install pandas"):
+        crank.to_dataframe()
+
+
+def test_plot_has_a_panel_for_each_quantity(crank):
+    axes = crank.plot("slider.position.x", "rod.position", "A.angle").axes
+    assert [a.get_ylabel() for a in axes] == ["position, m", "angle, rad"]
+    assert [line.get_label() for line in axes[0].lines] == [
+        "slider.position.x", "rod.position.x", "rod.position.y", "rod.position.z",
+    ]  # fmt: skip
+    assert (axes[1].lines[0].get_ydata() == crank.joint("A").angle).all()
+    with pytest.raises(ValueError, match=r"no column 'slider\.colour'"):
+        crank.plot("slider.colour")
+
+
+def test_without_names_joints_and_energy_are_plotted(crank):
+    groups = grouped(list(crank.columns())[1:], ())
+    assert set(groups) == {"angle", "displacement", "energy"}
+    assert groups["angle"] == ["A.angle", "B.angle"]
+
+
+def test_repr_is_one_short_line(crank):
+    assert repr(crank) == (
+        "<Motion of 'planar_slider_crank' by mbref alf-dual+projection/dop853: COMPLETED, "
+        "21 samples to t = 0.1 s>"
+    )
+    assert len(repr(crank["rod"])) < 80 and len(repr(crank.joint("A"))) < 80
+    assert "<animate" in crank._repr_html_() and "&#x27;planar_slider_crank&#x27;" in crank._repr_html_()
+
+
+def test_a_trajectory_of_another_engine_becomes_a_motion(crank):
+    bare = Trajectory.from_record(crank.scene, crank.to_record())
+    assert np.allclose(Motion.of(crank.mechanism, bare).energy, crank.energy, rtol=1e-14)
+
+
+def test_a_path_changes_one_value():
+    scene = find_scene("planar_slider_crank")
+    heavy = scene.with_("body[slider].mass", 2.0)
+    assert heavy.body[2].mass == 2.0 and heavy.body[:2] == scene.body[:2] and heavy.joint == scene.joint
+    assert scene.with_("gravity", [0.0, -1.0, 0.0], duration=3.0).gravity == (0.0, -1.0, 0.0)
+    assert scene.with_("joint[A].axis[2]", 2.0).joint[0].axis == (0.0, 0.0, 2.0)
+    for path, says in [
+        ("body[lid].mass", "no 'lid' there"),
+        ("mass", "not a path"),
+        ("name.x", "no 'x' there"),
+    ]:
+        with pytest.raises(SceneError, match=says):
+            scene.with_(path, 1.0)
+    with pytest.raises(SceneError, match="must be positive"):
+        scene.with_("body[slider].mass", -1.0)
+
+
+def test_notebook_runs(capsys):
+    """Every code cell in turn; the value of a cell's last line is what a notebook shows."""
+    cells = json.loads((ROOT / "examples" / "04_first_steps.ipynb").read_text())["cells"]
+    names: dict[str, object] = {}
+    shown = []
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            assert cell["outputs"] == [], "the notebook is committed without outputs"
+            tree = ast.parse("".join(cell["source"]))
+            last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None
+            exec(compile(tree, "notebook", "exec"), names)
+            if last:
+                shown.append(eval(compile(ast.Expression(last.value), "notebook", "eval"), names))
+    assert "<svg" in shown[0]._repr_html_() and "<animate" in shown[1]._repr_html_()
+    assert shown[-1].shape == (3, 3)
+    assert "rad behind" in capsys.readouterr().out
