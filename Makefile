@@ -40,7 +40,7 @@ coverage: $(VENV)/ready ## coverage of mbref, its kernels run as plain Python
 	$(BIN)/coverage report
 
 report: $(VENV)/ready ## the whole comparison report, into report/
-	$(BIN)/crosscheck report
+	$(BIN)/crosscheck report --depth whole
 
 quick: $(VENV)/ready ## a comparison report in about three minutes, into report/
 	$(BIN)/crosscheck report --quick

@@ -9,8 +9,10 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from crosscheck.cli import collection
+from crosscheck.cli.options import add_depth, add_reference_time
 from crosscheck.cli.passage import passage
-from crosscheck.cli.request import RequestError
+from crosscheck.cli.request import RequestError, find_scenes
+from mbref.scene import Scene, SceneError
 from reports.blocks import Block
 from reports.runs import Run, by_scene
 
@@ -28,11 +30,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = _parser((*NAMES, PAPER)).parse_args(argv)
     if arguments.picture:
         return _picture(Path(arguments.picture))
-    names = arguments.section or (NAMES if arguments.quick else (*NAMES, PAPER))
+    is_quick, out = arguments.depth == "quick", Path(arguments.out)
+    names = arguments.section or (NAMES if is_quick or arguments.scene else (*NAMES, PAPER))
     try:
-        blocks = _blocks(Path(arguments.out), arguments.quick, names)
-    except RequestError as error:
-        _notice(str(error))
+        scenes = find_scenes(arguments.scene) if arguments.scene else None
+        blocks = _blocks(out, scenes, is_quick, names, arguments.reference_time)
+    except (RequestError, SceneError) as error:
+        for fault in error.faults:
+            _notice(fault)
         return 2
     except KeyboardInterrupt:
         _notice(f"interrupted; what has been run is in {arguments.out}, the same command goes on from there")
@@ -52,15 +57,18 @@ def _picture(path: Path) -> int:
     return 0
 
 
-def _blocks(out: Path, is_quick: bool, names: Sequence[str]) -> list[Block]:
+def _blocks(
+    out: Path, scenes: Sequence[Scene] | None, is_quick: bool, names: Sequence[str], reference_time: float
+) -> list[Block]:
     """The blocks of the named sections; only the records they need are made."""
     from reports import sections
     from reports.sections import paper
 
     blocks: list[Block] = []
     if set(names) - {PAPER}:
-        scenes, records, gates = collection.comparison(out, is_quick, _notice)
-        groups = by_scene(records, {scene.name: scene for scene in scenes}, gates)
+        found = collection.comparison(out, scenes, is_quick, reference_time, _notice)
+        named = {scene.name: scene for scene in found.scenes}
+        groups = by_scene(found.records, named, found.identities, found.truths, found.motions)
         blocks += sections.blocks(groups, names)
     if PAPER in names:
         records_of_paper, illustration = collection.paper(out, _notice)
@@ -82,7 +90,10 @@ def _parser(sections: Sequence[str]) -> argparse.ArgumentParser:
         description="Run the study, or what is missing of it, and render the report.",
         epilog="example: python -m reports --quick --out report",
     )
-    parser.add_argument("--quick", action="store_true", help="fewer scenes and settings, minutes")
+    parser.add_argument("scene", nargs="*", metavar="SCENE", help="default: built-in scenes")
+    add_depth(parser)
+    parser.add_argument("--quick", dest="depth", action="store_const", const="quick")
+    add_reference_time(parser)
     parser.add_argument("--section", action="append", choices=sections, help="only this one; may repeat")
     parser.add_argument("--out", default="report", metavar="DIR", help="folder to write (default: report)")
     parser.add_argument("--picture", metavar="FILE", help="write only the moving picture of the README")

@@ -94,6 +94,8 @@ class SceneRuns:
     scene: Scene
     runs: Sequence[Run]
     gate: Sequence[Record] = ()  # short runs that show whether the engines simulate the same mechanism
+    truth: Record | None = None  # of `crosscheck.study.truths`
+    motion: Record | None = None  # the run of largest error at the instants shown of the truth's motion
 
     def difference(self) -> str | None:
         """The first field in which an engine's mechanism is another one; None when all agree."""
@@ -124,17 +126,20 @@ def _rank(run: Run) -> tuple[bool, float, float]:
 
 
 def by_scene(
-    records: Iterable[Record], scenes: Mapping[str, Scene], gates: Iterable[Record] = ()
-) -> list[SceneRuns]:
-    """Runs grouped by scene, in the order of ``scenes``, with the scene's records of the gate; scenes
-    without runs are left out."""
+    records: Iterable[Record], scenes: Mapping[str, Scene], gates: Iterable[Record] = (),
+    truths: Iterable[Record] = (), motions: Iterable[Record] = (),
+) -> list[SceneRuns]:  # fmt: skip
+    """Runs grouped by scene, in the order of ``scenes``, with the scene's records of the gate, of its truth
+    and of the motion shown; scenes without runs are left out."""
     runs: dict[str, list[Run]] = {name: [] for name in scenes}
     gate: dict[str, list[Record]] = {name: [] for name in scenes}
     for record in records:
         runs[record["scene"]].append(Run(record))
     for record in gates:
         gate[record["scene"]].append(record)
-    return [SceneRuns(scene, runs[name], gate[name]) for name, scene in scenes.items() if runs[name]]
+    truth, motion = ({record["scene"]: record for record in group} for group in (truths, motions))
+    return [SceneRuns(scene, runs[name], gate[name], truth.get(name), motion.get(name))
+            for name, scene in scenes.items() if runs[name]]  # fmt: skip
 
 
 def ended_briefly(run: Run) -> str:

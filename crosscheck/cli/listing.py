@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from rich.console import Console
 from rich.table import Table
 
+import mbref
 from crosscheck.cli import support
 from crosscheck.cli.request import missing_package
 from crosscheck.engine import default_engines, engine, engine_names
@@ -18,6 +19,13 @@ def show(console: Console, what: str | None) -> None:
     """Print one of TABLES, or all of them."""
     for name in [what] if what else TABLES:
         console.print(TABLES[name]())
+
+
+def show_versions(console: Console) -> None:
+    """The versions of crosscheck and of every engine, a line each."""
+    console.print(f"crosscheck {mbref.__version__}")
+    for name in engine_names():
+        console.print(f"{name} {missing_package(name) or engine(name).version()}")
 
 
 def _scenes() -> Table:
@@ -56,6 +64,20 @@ def _methods() -> Table:
     return table
 
 
+def _settings() -> Table:
+    title = "settings: a family is a way of running an engine, its options set how accurately"
+    table = Table("engine", "name", "meaning", title=title)
+    for name in engine_names():
+        found = engine(name)
+        for entry, meaning in [
+            *found.families.items(),
+            *((f"option {o}", m) for o, m in found.options.items()),
+        ]:
+            table.add_row(name, entry, meaning)
+        table.add_section()
+    return table
+
+
 def _metrics() -> Table:
     from crosscheck.judge.metrics import METRICS
 
@@ -80,6 +102,7 @@ TABLES: Mapping[str, Callable[[], Table]] = {
     "scenes": _scenes,
     "engines": _engines,
     "methods": _methods,
+    "settings": _settings,
     "metrics": _metrics,
     "support": _support,
 }

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import argparse
 import math
+from typing import Any
 
 from crosscheck.engine import engine_names
 from crosscheck.judge.reference.reference import SECONDS
+from crosscheck.study.command import parsed_option
 from crosscheck.study.grid import TIME_LIMIT
+from crosscheck.study.sweep import QUICK_LIMIT
 
 
 def add_selection(parser: argparse.ArgumentParser) -> None:
@@ -33,6 +36,11 @@ def add_selection(parser: argparse.ArgumentParser) -> None:
         metavar="FAMILY",
         help="an engine's family of settings, such as defaults or tuned; may repeat; default: all",
     )
+    parser.add_argument(
+        "--option", action="append", type=_option, metavar="NAME=VALUE",
+        help="an option of the one engine and family named, instead of its sweep; may repeat",
+    )  # fmt: skip
+    add_depth(parser)
     when = parser.add_mutually_exclusive_group()
     when.add_argument("--times", type=_numbers, metavar="a,b,c", help="sample times (s), increasing")
     when.add_argument("--samples", type=int, metavar="N", help="equally spaced samples, both ends included")
@@ -40,7 +48,22 @@ def add_selection(parser: argparse.ArgumentParser) -> None:
         "--rtol", type=float, help="one relative tolerance instead of the sweep over tolerances"
     )
     parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
-    add_limits(parser)
+    add_limits(parser, None)
+
+
+def add_depth(parser: argparse.ArgumentParser) -> None:
+    """How many settings of the engines are run."""
+    parser.add_argument(
+        "--depth", choices=("quick", "whole"), default="quick",
+        help="quick: at most two families of an engine and three settings of a family; whole: every setting",
+    )  # fmt: skip
+
+
+def _option(text: str) -> tuple[str, Any]:
+    try:
+        return parsed_option(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def _not_negative(text: str) -> float:
@@ -57,15 +80,14 @@ def _numbers(text: str) -> list[float]:
         raise argparse.ArgumentTypeError(f"must be numbers separated by commas, got {text!r}") from None
 
 
-def add_limits(parser: argparse.ArgumentParser) -> None:
-    """Times that a run and a reference may take, and the form of the output."""
+def add_limits(parser: argparse.ArgumentParser, time_limit: float | None = TIME_LIMIT) -> None:
+    """Times that a run and a reference may take, and the form of the output; a ``time_limit`` of None depends
+    on the depth."""
+    default = f"{time_limit:g}" if time_limit else f"{QUICK_LIMIT:g} at quick depth, {TIME_LIMIT:g} else"
     parser.add_argument(
-        "--time-limit",
-        type=float,
-        default=TIME_LIMIT,
-        metavar="T",
-        help="wall time a run may take (s); default: %(default)g",
-    )
+        "--time-limit", type=float, default=time_limit, metavar="T",
+        help=f"wall time a run may take (s); default: {default}",
+    )  # fmt: skip
     add_reference_time(parser)
     parser.add_argument("--json", action="store_true", help="print records as JSON on standard output")
 
@@ -74,3 +96,11 @@ def add_reference_time(parser: argparse.ArgumentParser) -> None:
     """The time that a reference may take."""
     about = "CPU seconds for the reference of a scene without a closed form (default: %(default)g); 0: none"
     parser.add_argument("--reference-time", type=_not_negative, default=SECONDS, metavar="T", help=about)
+
+
+def positive(text: str) -> float:
+    """A positive number of a command line."""
+    number = float(text)
+    if not 0 < number < math.inf:
+        raise argparse.ArgumentTypeError(f"must be finite and positive, got {text}")
+    return number

@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from crosscheck.conformance.trial import Specimen, specimens
 from crosscheck.engine import BUILT_IN, Setting, default_engines, engine
 from crosscheck.study.grid import Case, default_cases
+from crosscheck.study.sweep import thinned
 from mbref.scene import Scene, SceneError
 from mbref.scenes import find_scene
 
@@ -102,17 +104,36 @@ def missing_package(name: str) -> str | None:
     return None
 
 
-def sample_times(
-    scene: Scene, times: Sequence[float] | None, samples: int | None, duration: float | None
-) -> np.ndarray:
-    """Sample times (k,) in s: those given, or ``samples`` equally spaced from 0 to ``duration``.
+def lasting(scene: Scene, times: Sequence[float] | None, duration: float | None) -> Scene:
+    """The scene with the end that was asked for, so that engines choose their settings for that motion.
+
+    ``times`` alone end it at the last of them.  Raises RequestError when the end is not positive or comes
+    before a sample.
+    """
+    if times is not None:
+        _check_times(times)
+    end = duration if duration is not None else times[-1] if times else scene.duration
+    if not (math.isfinite(end) and end > 0):
+        raise RequestError(f"--duration: must be positive, got {end:g}")
+    if times and times[-1] > end:
+        raise RequestError(f"--times: must end by --duration {end:g}, got {times[-1]:g}")
+    return scene if end == scene.duration else scene.with_(duration=end)
+
+
+def sample_times(scene: Scene, times: Sequence[float] | None, samples: int) -> np.ndarray:
+    """Sample times (k,) in s: those given, or ``samples`` equally spaced over the scene's duration.
 
     Raises RequestError when they are not finite, not ≥ 0 or do not increase.
     """
-    if times is None:
-        return _equally_spaced(scene, SAMPLES if samples is None else samples, duration)
-    if samples is not None or duration is not None:
-        raise RequestError("--times says when to sample; --samples and --duration cannot be added to it")
+    if times is not None:
+        _check_times(times)
+        return np.array(times)
+    if samples < 2:
+        raise RequestError(f"--samples: must be at least 2, got {samples}")
+    return np.linspace(0.0, scene.duration, samples)
+
+
+def _check_times(times: Sequence[float]) -> None:
     for before, after in zip((-math.inf, *times), times, strict=False):
         if not (math.isfinite(after) and after >= 0):
             raise RequestError(f"--times: must be finite and not negative, got {after:g}")
@@ -120,29 +141,66 @@ def sample_times(
             raise RequestError(f"--times: must increase, got {after:g} after {before:g}")
     if times[-1] == 0:
         raise RequestError("--times: must have a time after 0")
-    return np.array(times)
 
 
-def _equally_spaced(scene: Scene, samples: int, duration: float | None) -> np.ndarray:
-    end = scene.duration if duration is None else duration
-    if samples < 2:
-        raise RequestError(f"--samples: must be at least 2, got {samples}")
-    if not (math.isfinite(end) and end > 0):
-        raise RequestError(f"--duration: must be positive, got {end:g}")
-    return np.linspace(0.0, end, samples)
+class Choice(NamedTuple):
+    """Which settings of the engines are run: of these ``families`` (None: all) or the one setting given, at
+    this tolerance (None: the sweep's), at quick depth only a few."""
+
+    families: Sequence[str] | None = None
+    setting: Setting | None = None
+    rtol: float | None = None
+    is_quick: bool = True
+
+
+def choice(
+    engines: Sequence[str], families: Sequence[str], options: Sequence[tuple[str, Any]] | None,
+    rtol: float | None, is_quick: bool,
+) -> Choice:  # fmt: skip
+    """The choice of a command line; RequestError for options without the engine and family they are of."""
+    if options is None:
+        return Choice(families or None, None, rtol, is_quick)
+    if len(engines) != 1 or len(families) != 1:
+        raise RequestError("--option: needs one --engine and one --setting that it is of")
+    return Choice(families, Setting(families[0], dict(options)), rtol, is_quick)
 
 
 def plan(
-    scenes: Sequence[Scene], engines: Sequence[str], families: Sequence[str] | None, rtol: float | None,
-    times: Sequence[np.ndarray], time_limit: float, notice: Notice,
+    scenes: Sequence[Scene], engines: Sequence[str], chosen: Choice, times: Sequence[np.ndarray],
+    time_limit: float, notice: Notice,
 ) -> list[Case]:  # fmt: skip
-    """The runs of every scene in every engine that can, with its settings of ``families`` (default all).
+    """The runs of every scene in every engine that can, with the settings chosen.
 
     ``times`` has one array a scene.  An engine that cannot run a scene is left out with a ``notice``.
     Raises RequestError for families that no engine has, and with the reasons when nothing is left.
     """
     if not time_limit > 0:
         raise RequestError(f"--time-limit: must be positive, got {time_limit:g}")
+    if chosen.setting is not None:
+        return _single(scenes, engines[0], chosen.setting, times, time_limit)
+    cases = _able(scenes, engines, times, time_limit, notice)
+    if chosen.families is not None:
+        cases = _named(cases, chosen.families, notice)
+    if chosen.rtol is not None:
+        return _at_tolerance(cases, chosen.rtol)
+    return thinned(cases, chosen.families or ()) if chosen.is_quick else cases
+
+
+def _single(
+    scenes: Sequence[Scene], name: str, setting: Setting, times: Sequence[np.ndarray], time_limit: float
+) -> list[Case]:
+    """One run a scene; RequestError for the scenes that the engine cannot run."""
+    gaps = {scene.name: engine(name).cannot(scene) for scene in scenes}
+    if faults := [f"{name} cannot run {scene}: {gap}" for scene, gap in gaps.items() if gap]:
+        raise RequestError(*faults)
+    return [Case(s, when, name, setting, time_limit) for s, when in zip(scenes, times, strict=True)]
+
+
+def _able(
+    scenes: Sequence[Scene], engines: Sequence[str], times: Sequence[np.ndarray], time_limit: float,
+    notice: Notice,
+) -> list[Case]:  # fmt: skip
+    """Every setting of every engine that can run a scene; RequestError where none can."""
     cases, reasons = [], []
     for scene, when in zip(scenes, times, strict=True):
         able, unable = default_cases(scene, engines, None, when, time_limit)
@@ -152,13 +210,16 @@ def plan(
         raise RequestError(*reasons)
     for reason in reasons:
         notice(reason)
-    if families is not None:
-        chosen = _of_families(cases, families)
-        for name in dict.fromkeys(case.engine for case in cases):
-            if all(case.engine != name for case in chosen):
-                notice(f"{name} has no setting {' or '.join(families)} here and is left out")
-        cases = chosen
-    return cases if rtol is None else _at_tolerance(cases, rtol)
+    return cases
+
+
+def _named(cases: Sequence[Case], families: Sequence[str], notice: Notice) -> list[Case]:
+    """The cases of the families; an engine that has none of them is left out with a ``notice``."""
+    chosen = _of_families(cases, families)
+    for name in dict.fromkeys(case.engine for case in cases):
+        if all(case.engine != name for case in chosen):
+            notice(f"{name} has no setting {' or '.join(families)} here and is left out")
+    return chosen
 
 
 def _of_families(cases: Sequence[Case], families: Sequence[str]) -> list[Case]:

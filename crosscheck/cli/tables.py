@@ -1,16 +1,18 @@
-"""The tables that `crosscheck run` and `crosscheck compare` print."""
+"""The verdict and the tables that `crosscheck run`, `compare` and `tune` print, in 80 columns."""
 
 from __future__ import annotations
 
 import math
 import string
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+from rich import box
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from crosscheck.cli.terminal_plot import scatter
+from crosscheck.study.command import command
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import (
     by_scene,
@@ -20,8 +22,12 @@ from crosscheck.study.record_view import (
     is_completed,
     varied_settings,
 )
+from crosscheck.study.sentences import LEVEL, verdict
+from crosscheck.study.verdict import Grade, Judged, grade
 
 MEASURED = ("violation_position", "energy_error")  # metrics that the table of runs shows beside the error
+BEST = {"violation_position": "violation", "energy_error": "energy", "reaction_error": "reactions"}
+TEXT_COLUMNS = 4  # the columns from the left that hold words and may be folded
 
 
 def print_runs(console: Console, records: Sequence[Record]) -> None:
@@ -38,54 +44,114 @@ def print_runs(console: Console, records: Sequence[Record]) -> None:
         "time (s)",
     )
     for name, group in by_scene(records).items():
-        table = _table(name, header, right_from=4)
+        table = _table(name, header)
         for r in group:
             numbers = [error_text(r), *(_number(r["metrics"].get(m)) for m in MEASURED)]
-            table.add_row(
-                *_identity(r, group),
-                _outcome(r),
-                f"{r['t_end']:.4g}",
-                *numbers,
-                _number(r["cost"]["seconds"]),
-            )
+            table.add_row(*_identity(r, group), _outcome(r), f"{r['t_end']:.4g}", *numbers, _seconds(r))
         console.print(table)
         _print_messages(console, group)
 
 
-def print_comparison(console: Console, records: Sequence[Record]) -> None:
-    """One table a scene, least error first, with times and ratios to the fastest; then the plot."""
-    header = (
-        "",
-        "engine",
-        "family",
-        "settings",
-        "outcome",
-        "end (s)",
-        "error",
-        "best (s)",
-        "median (s)",
-        "ratio",
-    )
-    for name, group in by_scene(records).items():
-        letters = _letters(group)
-        fastest = min((r["cost"]["seconds"] for r in group if is_completed(r)), default=math.nan)
-        table = _table(name, header, right_from=5)
-        for r in sorted(group, key=lambda r: (not is_completed(r), error(r))):
-            measured = (f"{r['t_end']:.4g}", error_text(r), *_times(r, fastest))
-            table.add_row(letters[engine_and_family(r)], *_identity(r, group), _outcome(r), *measured)
-        console.print(table)
-        console.print(scatter(group, letters))
-        _print_messages(console, group)
+def print_comparison(console: Console, group: Judged, path: str, difference: str | None) -> None:
+    """The verdict on a scene, its runs with the least error first, the plot, the engines' best runs and the
+    settings to use; no ratios of times where the engines simulate different mechanisms."""
+    records = group.records
+    console.print(f"\n{group.scene.name}, {group.scene.duration:g} s: {_counts(group)}\n")
+    _print_verdict(console, group, difference)
+    letters = _letters(records)
+    console.print(_ranked(records, letters, with_ratio=not difference))
+    console.print(scatter(records, letters))
+    _print_best(console, group)
+    _print_advice(console, group, path)
+    _print_messages(console, records)
 
 
-def _times(record: Record, fastest: float) -> tuple[str, str, str]:
-    seconds = record["cost"]["seconds"]
-    middle = _number(record.get("timing", {}).get("median"))
-    return (
-        _number(seconds),
-        middle,
-        f"{seconds / fastest:.1f}" if is_completed(record) and fastest > 0 else "–",
+def _ranked(records: Sequence[Record], letters: Mapping[tuple[str, str], str], with_ratio: bool) -> Table:
+    """The runs with the least error first, and times as multiples of the fastest if asked for."""
+    fastest = min((_cost(r) for r in records if is_completed(r)), default=math.nan)
+    header = ("", "engine", "family", "settings", "verdict", "error", "time (s)", *["ratio"] * with_ratio)
+    table = _table("runs", header, 5)
+    for r in sorted(records, key=lambda r: (not is_completed(r), error(r))):
+        row = letters[engine_and_family(r)], *_identity(r, records), _graded(r), error_text(r), _seconds(r)
+        ratio = f"{_cost(r) / fastest:.1f}" if is_completed(r) and fastest > 0 else "–"
+        table.add_row(*row, *[ratio] * with_ratio)
+    return table
+
+
+def print_tuning(
+    console: Console, level: float, reached: Sequence[Record], records: Sequence[Record], path: str
+) -> None:
+    """The settings that reach an error, the cheapest first, with their commands; else the nearest run."""
+    if not reached:
+        nearest = min(records, key=lambda r: (not is_completed(r), error(r)))
+        console.print(f"No setting reaches an error of {level:g}; the nearest run has {error_text(nearest)}:")
+    table = _table("settings", ("engine", "family", "settings", "error", "time (s)"), 3)
+    for r in reached or [nearest]:
+        table.add_row(*engine_and_family(r), _options(r), error_text(r), _seconds(r))
+    console.print(table)
+    for r in reached[:1]:
+        console.print(f"The cheapest: {command(r, path)}", soft_wrap=True)
+
+
+def _print_verdict(console: Console, group: Judged, difference: str | None) -> None:
+    said = verdict([group])
+    console.print(said.headline)
+    if difference:
+        fast = f"Times are not compared, the engines simulate different mechanisms: {difference}."
+        said = said._replace(fast=fast)
+    for label, sentence in said.labelled().items():
+        console.print(f"\n{label}: {sentence}")
+
+
+def _counts(group: Judged) -> str:
+    counts = group.scene.counts()
+    return (f"bodies: {len(group.scene.body)}, degrees of freedom: {counts.degrees_of_freedom}, constraint "
+            f"rows: {counts.rows}, of which redundant: {counts.redundant}")  # fmt: skip
+
+
+def _print_best(console: Console, group: Judged) -> None:
+    """What else is off in every engine's run of least error."""
+    table = _table(
+        "every engine's run of least error", ("engine", "family", "settings", "error", *BEST.values()), 3
     )
+    for name, r in group.best().items():
+        measured = [_number(r["metrics"].get(metric)) for metric in BEST]
+        table.add_row(name, r["family"], varied_settings(r, group.records), error_text(r), *measured)
+    console.print(table)
+
+
+def _print_advice(console: Console, group: Judged, path: str) -> None:
+    """The command of every engine's fastest run that reaches LEVEL, else of its best one."""
+    cheapest, best = group.cheapest(LEVEL), group.best()
+    console.print(f"settings to use: the fastest run within {LEVEL:.0e}, else the best")
+    for name in best:
+        r = cheapest.get(name, best[name])
+        if is_completed(r):
+            console.print(f"  error {error_text(r)}, {_seconds(r)} s: {command(r, path)}", soft_wrap=True)
+
+
+def _options(record: Record) -> str:
+    return ", ".join(f"{k}={v:g}" if isinstance(v, float) else f"{k}={v}"
+                     for k, v in record["asked"]["options"].items())  # fmt: skip
+
+
+def _graded(record: Record) -> str:
+    found = grade(record)
+    return str(found) if found is not Grade.FAILED else f"{_outcome(record)}{_at(record)}"
+
+
+def _at(record: Record) -> str:
+    """`` at 0.1 s``; nothing for a run that was ended from outside."""
+    return f" at {record['t_end']:.4g} s" if record["outcome"] not in ("TIMED_OUT", "CRASHED") else ""
+
+
+def _cost(record: Record) -> float:
+    return record["cost"]["seconds"]
+
+
+def _seconds(record: Record) -> str:
+    """The time of stepping; – where nothing was stepped."""
+    return _number(_cost(record)) if record["times"] or record["t_end"] else "–"
 
 
 def _print_messages(console: Console, records: Sequence[Record]) -> None:
@@ -112,8 +178,14 @@ def _number(value: float | None) -> str:
     return "–" if value is None or not math.isfinite(value) else f"{value:.2e}"
 
 
-def _table(title: str, header: Sequence[str], right_from: int) -> Table:
-    table = Table(title=title)
+def listing_table(title: str, header: Sequence[str]) -> Table:
+    """A table of words, folded where it must be."""
+    return _table(title, header, len(header))
+
+
+def _table(title: str, header: Sequence[str], words: int = TEXT_COLUMNS) -> Table:
+    """A table whose first columns hold words and may be folded; its numbers are never broken."""
+    table = Table(title=title, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), title_justify="left")
     for i, name in enumerate(header):
-        table.add_column(name, justify="right" if i >= right_from else "left", overflow="fold")
+        table.add_column(name, justify="left" if i < words else "right", overflow="fold", no_wrap=i >= words)
     return table

@@ -30,6 +30,16 @@ METHODS = (
 )
 KINEMATIC = "kinematic"  # of driven scenes; integrates nothing, so has no tolerance
 SPECIALISED = ", specialised"  # machine code of the scene, made before the clock runs
+FAMILIES = {
+    "alf-dual+projection": "augmented Lagrangian in dual form, projection, DOP853; the default method",
+    "lm2+projection": "Lagrange multipliers eliminated by blocks, projection, DOP853",
+    "kinematic": "Newton-Raphson on the constraints of a fully driven mechanism",
+    "mpi-svd+partitioning": "Moore-Penrose inverse by SVD, coordinate partitioning, DOP853",
+    "mpi-svd+projection": "Moore-Penrose inverse by SVD, projection, DOP853",
+    "mpi-svd+none": "Moore-Penrose inverse by SVD without stabilisation, DOP853",
+    "mpi-qr+projection": "Moore-Penrose inverse by QR, projection, DOP853",
+    "… , specialised": "the method before the comma as machine code of the scene, made before the clock runs",
+}
 LOADS = ("moment", "force", "spring", "torsion_spring")
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-10, 1e-11)
 
@@ -39,6 +49,7 @@ class Mbref(Engine):
 
     name = "mbref"
     package = "mbref"
+    families, options = FAMILIES, {"rtol": "relative tolerance of a step"}
 
     @functools.cached_property
     def supports(self) -> Supports:  # type: ignore[override]  # naming the engine imports nothing

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 from crosscheck.judge import constraints
 from crosscheck.judge.joint_residuals import counted
 from crosscheck.judge.loads import attachment, world_inertia
-from crosscheck.judge.tolerances import PARALLEL
+from crosscheck.judge.tolerances import AT_REST, PARALLEL
 from mbref import rotations
 from mbref.scene import GROUND, Force, Joint, Moment, Scene, Spring, TorsionSpring
 from mbref.trajectory import Trajectory
@@ -25,7 +25,8 @@ def energy_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
     """Drift (k,) of energy minus work since t = 0, J divided by the largest energy seen.
 
     None when a driver or a damper does work, when the scene has no masses, when the samples are too far
-    apart to count a body's turns, or when nothing ever has energy; infinite when a state is not finite.
+    apart to count a body's turns, or when nothing ever has energy beyond rounding; infinite when a state is
+    not finite.
     """
     damped = any(load.is_damped for load in scene.load)
     if scene.driver or damped or not scene.has_mass() or not len(trajectory.times):
@@ -36,7 +37,18 @@ def energy_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
     start = kinetic_energy(scene, *(a[None] for a in _initial(scene)[1:]))[0]
     gains = np.array([kinetic - start, *_potential_gains(scene, trajectory)])
     scale = max(start, kinetic.max(), np.abs(gains).max())
-    return None if np.isnan(gains).any() or scale == 0 else np.abs(gains.sum(axis=0)) / scale
+    least = AT_REST * _possible(scene, trajectory)
+    return None if np.isnan(gains).any() or scale <= least else np.abs(gains.sum(axis=0)) / scale
+
+
+def _possible(scene: Scene, trajectory: Trajectory) -> float:
+    """The energy (J) of the weight and the loads over the scene's length and of the masses that cross it in
+    the motion's time: what rounding of places and velocities is measured by."""
+    length, mass = constraints.scene_length(scene), sum(body.mass or 0.0 for body in scene.body)
+    time = float(trajectory.times[-1]) or scene.duration
+    forces = mass * float(np.linalg.norm(scene.gravity))
+    forces += sum(float(np.linalg.norm(load.force)) for load in scene.load if isinstance(load, Force))
+    return length * forces + mass * (length / time) ** 2 / 2
 
 
 def kinetic_energy(

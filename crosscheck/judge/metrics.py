@@ -14,11 +14,15 @@ import numpy as np
 
 from crosscheck.judge import constraints
 from crosscheck.judge.energy import energy_series
+from crosscheck.judge.joint_reactions import SAMPLES, compare
+from crosscheck.judge.reaction_balance import with_exact_reactions
 from crosscheck.judge.tolerances import LEAST_ORDER, ROUNDING, STRAIGHT_LINE
 from crosscheck.judge.truth import NoSolution, Truth
 from mbref import rotations
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
+
+MANY = 50  # bodies; reactions of more are left to `crosscheck.judge.joint_reactions`
 
 
 @dataclass(frozen=True)
@@ -163,6 +167,29 @@ def _largest(series: np.ndarray | None) -> float | None:
     return float(series.max()) if np.isfinite(series).all() else math.inf
 
 
+def reaction_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
+    """Largest difference of what redundancy leaves unique in the reactions from those of the exact motion,
+    relative to the largest of them, at some samples; None without reactions, masses or a truth, and for more
+    than MANY bodies."""
+    given = exact is not None and trajectory.reactions is not None and len(trajectory.times)
+    if not given or exact is None or not (scene.joint and scene.has_mass()) or len(scene.body) > MANY:
+        return None
+    chosen = np.unique(np.linspace(0, len(exact.times) - 1, SAMPLES).round().astype(int))
+    true = with_exact_reactions(scene, _at(exact, chosen))
+    found = compare(scene, true, _at(trajectory, chosen))
+    worst = max([found.resultant, *(joint.unique for joint in found.joints.values())])
+    return worst if math.isfinite(worst) else math.inf
+
+
+def _at(trajectory: Trajectory, chosen: np.ndarray) -> Trajectory:
+    """The trajectory at some of its samples (n,)."""
+    keys = ("times", "position", "orientation", "velocity", "angular_velocity", "acceleration",
+            "angular_acceleration")  # fmt: skip
+    arrays: dict[str, Any] = {k: None if (a := getattr(trajectory, k)) is None else a[chosen] for k in keys}
+    reactions = trajectory.reactions and {name: w[chosen] for name, w in trajectory.reactions.items()}
+    return replace(trajectory, **arrays, reactions=reactions)
+
+
 _error = _against_exact(error_series)
 
 METRICS: dict[str, Metric] = {
@@ -175,6 +202,7 @@ METRICS: dict[str, Metric] = {
     "violation_velocity": Metric(_violation(1), "rad/s", "violation of velocity constraints"),
     "violation_acceleration": Metric(_violation(2), "rad/s²", "violation of acceleration constraints"),
     "energy_error": Metric(_energy, "", "drift of the energy balance / largest energy"),
+    "reaction_error": Metric(reaction_error, "", "error of unique reactions / largest true reaction"),
 }
 
 

@@ -36,6 +36,10 @@ TRUTH_DYNAMIC = 1e-12
 """Accuracy of reduced equations, solved in extended precision: measured 1e-15 on all built-in scenes
 (rounding of the result to double); where extended precision is double, 1e-13."""
 
+AT_REST = 1e-12
+"""Part of the energies a mechanism could have (its weight over its length, its mass crossing its length in
+the motion's time) below which those it has are rounding: thousands of roundings."""
+
 STRAIGHT_LINE = 0.1
 """Root mean square distance, in decades, from a line of a convergence curve's asymptotic range: error
 constants of rejected-step or event effects scatter by tens of percent, a floor bends by decades."""

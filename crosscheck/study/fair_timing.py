@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable, Sequence
 from statistics import median
 
-from crosscheck.engine import engine
 from crosscheck.judge.model_identity import gate, gate_times
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth import NoSolution, truth_for
 from crosscheck.processes.pool import ChildFailed, time_interleaved
-from crosscheck.study.grid import Case, Record, settings
+from crosscheck.study.grid import Case, Record
 from crosscheck.study.record_view import is_completed
+from crosscheck.study.scouting import settings
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
@@ -20,8 +20,8 @@ from mbref.trajectory import Trajectory
 def identity_cases(scene: Scene, engines: Sequence[str], time_limit: float) -> list[Case]:
     """The short runs from which `model_difference` tells whether all engines simulate the scene: each at the
     finest of its settings."""
-    able = [name for name in engines if not engine(name).cannot(scene)]
-    return [Case(scene, gate_times(scene), name, settings(name, scene)[-1], time_limit) for name in able]
+    finest = {name: found[-1] for name in engines if (found := settings(name, scene))}
+    return [Case(scene, gate_times(scene), name, s, time_limit) for name, s in finest.items()]
 
 
 def model_difference(scene: Scene, records: Sequence[Record], reference_time: float = SECONDS) -> str | None:

@@ -8,8 +8,10 @@ import hashlib
 import json
 import os
 import platform
+import subprocess
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor, as_completed, wait
+from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,6 +26,7 @@ from crosscheck.judge.truth import Truth, truth_for
 from crosscheck.processes.child import stop_all
 from crosscheck.processes.pool import end_idle, run_isolated
 from crosscheck.processes.serve import run_once
+from crosscheck.study.scouting import offer
 from mbref.records import append, stored
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
@@ -71,20 +74,13 @@ def default_cases(
     times = np.linspace(0.0, scene.duration, SAMPLES) if times is None else times
     cases, unable = [], []
     for name in engines:
-        simulator = engine(name)
-        cannot = simulator.cannot(scene)
-        if cannot:
-            unable.append(Unable(scene, name, cannot))
+        found = offer(name, scene)
+        if isinstance(found, Cannot):
+            unable.append(Unable(scene, name, found))
             continue
-        wanted = [s for s in settings(name, scene) if families is None or s.family in families]
+        wanted = [s for s in found if families is None or s.family in families]
         cases += [Case(scene, times, name, setting, time_limit) for setting in wanted]
     return cases, unable
-
-
-@functools.lru_cache(maxsize=256)
-def settings(engine_name: str, scene: Scene) -> tuple[Setting, ...]:
-    """An engine's settings for a scene; found out once, as engines try a scene out for them."""
-    return tuple(engine(engine_name).settings(scene))
 
 
 def study(
@@ -134,27 +130,60 @@ def key(case: Case) -> str:
 
 def run_case(case: Case) -> Record:
     """The raw record of one run, its metrics included."""
-    return _record(case, run_isolated(case.engine, case.scene, case.times, case.setting, case.time_limit))
+    return record_of(case, run_isolated(case.engine, case.scene, case.times, case.setting, case.time_limit))
 
 
 def run_here(case: Case) -> Record:
     """As ``run_case`` in the calling process, without its time limit and its protection."""
-    return _record(case, run_once(case.engine, case.scene, case.times, case.setting))
+    return record_of(case, run_once(case.engine, case.scene, case.times, case.setting))
 
 
-def _record(case: Case, trajectory: Trajectory) -> Record:
+def record_of(case: Case, trajectory: Trajectory) -> Record:
+    """The record of a case and its run: what was asked for, what came, its metrics, and what made it."""
     return {
         "schema": SCHEMA,
         "key": key(case),
         "scene": case.scene.name,
         **trajectory.to_record(),
         "family": case.setting.family,
+        "asked": _asked(case),
         "time_limit": case.time_limit,
         "metrics": metrics.measure(case.scene, trajectory, _truth(case.scene, case.reference_time)),
         "seed": 0,
         "versions": versions(),
+        "commit": commit(),
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "machine": machine(),
     }
+
+
+def _asked(case: Case) -> dict[str, Any]:
+    """The request: engine, options, end of the scene, and how many equally spaced samples there are up to it,
+    else all their times."""
+    end, times = case.scene.duration, np.asarray(case.times, dtype=float)
+    even = len(times) > 1 and np.array_equal(times, np.linspace(0.0, end, len(times)))
+    when = {"samples": len(times)} if even else {"times": times.tolist()}
+    return {"engine": case.engine, "options": dict(case.setting.options), "end": end, **when}
+
+
+@functools.cache
+def commit() -> str | None:
+    """The commit of the checkout that this code is in, ``+`` where it has been changed; None outside one."""
+    root = Path(__file__).parents[2]
+    if not (root / ".git").exists():
+        return None
+    told = [_git(root, "rev-parse", "--short=12", "HEAD"), _git(root, "status", "--porcelain", "-uno")]
+    return None if told[0] is None else told[0] + ("+" if told[1] else "")
+
+
+def _git(root: Path, *arguments: str) -> str | None:
+    try:
+        done = subprocess.run(
+            ["git", "-C", str(root), *arguments], capture_output=True, text=True, check=True
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return done.stdout.strip()
 
 
 @functools.cache

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -20,45 +20,56 @@ QUICK_SCENES = {  # name → end time (s)
 QUICK_FAMILIES = ("defaults", "tuned")  # of an engine that has them, else its first ones
 MOST_FAMILIES, MOST_SETTINGS = 2, 3  # in the quick sweep, of an engine and of a family
 QUICK_SAMPLES, SAMPLES = 31, 101
-QUICK_LIMIT, LIMIT = 60.0, 120.0  # s of a run; mbref's kernels, compiled once a machine, take some
+QUICK_LIMIT, LIMIT = 10.0, 120.0  # s of a run
 
-Sweep = tuple[list[Scene], list[Case], list[Unable]]
-
-
-def whole(engines: Sequence[str]) -> Sweep:
-    """Every built-in scene in every engine at every setting."""
-    return _sweep([make() for make in SCENES.values()], engines, SAMPLES, LIMIT)
+LONG, QUICK_LONG = 0.5, 0.05  # s; runs that take longer are timed by their single run
+Sweep = tuple[list[Case], list[Unable]]
 
 
-def quick(engines: Sequence[str]) -> Sweep:
-    """A few short scenes, a few settings of a few families of every engine."""
-    scenes = [SCENES[name]().with_(duration=end) for name, end in QUICK_SCENES.items()]
-    scenes, cases, unable = _sweep(scenes, engines, QUICK_SAMPLES, QUICK_LIMIT)
-    return scenes, thinned(cases), unable
+def whole_scenes() -> list[Scene]:
+    """Every built-in scene."""
+    return [make() for make in SCENES.values()]
 
 
-def _sweep(scenes: list[Scene], engines: Sequence[str], samples: int, limit: float) -> Sweep:
+def quick_scenes() -> list[Scene]:
+    """A few short ones."""
+    return [SCENES[name]().with_(duration=end) for name, end in QUICK_SCENES.items()]
+
+
+def whole(scenes: Sequence[Scene], engines: Sequence[str]) -> Sweep:
+    """The scenes in every engine at every setting."""
+    return _sweep(scenes, engines, SAMPLES, LIMIT)
+
+
+def quick(scenes: Sequence[Scene], engines: Sequence[str]) -> Sweep:
+    """The scenes at a few settings of a few families of every engine."""
+    cases, unable = _sweep(scenes, engines, QUICK_SAMPLES, QUICK_LIMIT)
+    return thinned(cases), unable
+
+
+def _sweep(scenes: Sequence[Scene], engines: Sequence[str], samples: int, limit: float) -> Sweep:
     cases, unable = [], []
     for scene in scenes:
         able, not_able = default_cases(scene, engines, None, np.linspace(0, scene.duration, samples), limit)
         cases += able
         unable += not_able
-    return scenes, cases, unable
+    return cases, unable
 
 
-def thinned(cases: Sequence[Case]) -> list[Case]:
-    """Of every scene and engine MOST_FAMILIES families, of each MOST_SETTINGS settings, ends included."""
+def thinned(cases: Sequence[Case], named: Collection[str] = ()) -> list[Case]:
+    """Of every scene and engine the ``named`` families, else MOST_FAMILIES, of each MOST_SETTINGS settings,
+    ends included."""
     groups: dict[tuple[str, str], list[Case]] = {}
     for case in cases:
         groups.setdefault((case.scene.name, case.engine), []).append(case)
-    return [case for group in groups.values() for case in _thinned_engine(group)]
+    return [case for group in groups.values() for case in _thinned_engine(group, named or QUICK_FAMILIES)]
 
 
-def _thinned_engine(cases: Sequence[Case]) -> list[Case]:
+def _thinned_engine(cases: Sequence[Case], named: Collection[str]) -> list[Case]:
     families: dict[str, list[Case]] = {}
     for case in cases:
         families.setdefault(case.setting.family, []).append(case)
-    wanted = [f for f in families if f in QUICK_FAMILIES] or list(families)[:MOST_FAMILIES]
+    wanted = [f for f in families if f in named] or list(families)[:MOST_FAMILIES]
     return [case for family in wanted for case in spread(families[family], MOST_SETTINGS)]
 
 

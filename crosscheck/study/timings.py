@@ -16,25 +16,29 @@ LONG = 0.5  # s; a run that takes longer is timed by its single run, whose noise
 
 
 def with_timings(
-    cases: Sequence[Case], records: Sequence[Record], path: Path, notice: Callable[[str], None]
-) -> list[Record]:
-    """The records with the times of ``path`` (JSON lines); a scene of which one is missing is timed."""
+    cases: Sequence[Case], records: Sequence[Record], path: Path | None, notice: Callable[[str], None],
+    long: float = LONG, repeats: int = REPEATS,
+) -> list[Record]:  # fmt: skip
+    """The records with the times of ``path`` (JSON lines); a scene of which one is missing is timed.
+
+    Only completed runs of up to ``long`` s are timed again, in turns.
+    """
     done, known = list(records), stored(path)
     for name in dict.fromkeys(case.scene.name for case in cases):
-        places = [i for i, record in enumerate(records) if record["scene"] == name and _is_short(record)]
+        places = [i for i, r in enumerate(records) if r["scene"] == name and _is_short(r, long)]
         if any(records[i]["key"] not in known for i in places):
-            notice(f"{name}: timing, {REPEATS} interleaved repeats")
-            for record in timed([cases[i] for i in places], [records[i] for i in places], REPEATS, notice):
+            notice(f"{name}: timing, {repeats} interleaved repeats")
+            for record in timed([cases[i] for i in places], [records[i] for i in places], repeats, notice):
                 if "timing" in record:
-                    append(path, _entry(record))
-            known = stored(path)
+                    known[record["key"]] = _entry(record)
+                    append(path, known[record["key"]])
         for i in places:
             done[i] = _with_cost(records[i], known)
     return done
 
 
-def _is_short(record: Record) -> bool:
-    return record["outcome"] == Outcome.COMPLETED.label and record["cost"]["seconds"] <= LONG
+def _is_short(record: Record, long: float) -> bool:
+    return record["outcome"] == Outcome.COMPLETED.label and record["cost"]["seconds"] <= long
 
 
 def _with_cost(record: Record, known: dict[str, dict[str, Any]]) -> Record:

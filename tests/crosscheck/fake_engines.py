@@ -58,6 +58,11 @@ class Segfault(Fake):
         os.kill(os.getpid(), signal.SIGSEGV)
 
 
+class NoSettings(Fake):
+    def settings(self, scene: Scene) -> list[Setting]:
+        raise ValueError("none")
+
+
 class Hang(Fake):
     """Sleeps, and so does a grandchild, whose process id is left in the file the scene's name gives."""
 
@@ -184,7 +189,7 @@ class Versionless(Fake):
 
 FAKE, SEGFAULT, HANG, CHATTER, RAISE, QUIT = Fake(), Segfault(), Hang(), Chatter(), Raise(), Quit()
 THREADS, MISSING, RECORDER, AGING = Threads(), Missing(), Recorder(), Aging()
-SLOW, STUCK = Slow(), Stuck()
+SLOW, STUCK, NO_SETTINGS = Slow(), Stuck(), NoSettings()
 MALFORMED, SCALARS, VERSIONLESS = Malformed(), Scalars(), Versionless()
 
 

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import contextlib
 import json
+import shlex
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from crosscheck.cli import commands, request
+from crosscheck.cli import request, running
 from crosscheck.cli.commands import main
-from crosscheck.engine import engine
+from crosscheck.engine import BUILT_IN, engine
 from crosscheck.processes.pool import ChildFailed
 from crosscheck.study import grid
+from crosscheck.study.command import command
 from crosscheck.study.fair_timing import timed
+from crosscheck.study.hurried import NOT_STARTED, Hurried
 from crosscheck.study.record_view import PUBLIC
 from mbref.scene import Body, Moment, Scene
 from mbref.scenes import SCENES
@@ -125,7 +131,9 @@ def test_a_run_that_crashes_and_exit_status_one(capsys, still):
         (["--times=-1,0.2"], "--times: must be finite and not negative, got -1"),
         (["--times", "0"], "--times: must have a time after 0"),
         (["--times", "0,nan"], "--times: must be finite and not negative, got nan"),
-        (["--times", "0,1", "--duration", "2"], "--samples and --duration cannot be added"),
+        (["--times", "0,1", "--duration", "0.5"], "--times: must end by --duration 0.5, got 1"),
+        (["--option", "seconds=1", "--setting", "plain", "--setting", "noisy"], "needs one --engine and one"),
+        (["--option", "seconds"], "must be name=value, got 'seconds'"),
         (["--times", "0,x"], "must be numbers separated by commas, got '0,x'"),
         (["--samples", "1"], "--samples: must be at least 2, got 1"),
         (["--duration", "-2"], "--duration: must be positive, got -2"),
@@ -221,24 +229,27 @@ def test_method_that_means_nothing_and_the_known_ones(capsys, still):
 
 
 def test_interrupt_and_the_records_finished_before(capsys, still, monkeypatch):
-    def interrupted(cases, progress):
+    def interrupted(cases, progress, run):
         progress(1, len(cases), grid.run_case(cases[1]))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(commands, "study", interrupted)
+    monkeypatch.setattr(running, "study", interrupted)
     status, out, err = run_main(capsys, "run", still, "--engine", FAKE, "--json")
     [record] = json.loads(out)["records"]
     assert status == 130 and "interrupted" in err, (status, err)
     assert record["settings"] == {"seconds": 0.2}, record
 
 
-@pytest.mark.parametrize("what", ["scenes", "engines", "methods", "metrics"])
+@pytest.mark.parametrize("what", ["scenes", "engines", "methods", "settings", "metrics"])
 def test_list_and_the_tables(capsys, what):
     from crosscheck.engine import engine_names
     from crosscheck.judge.metrics import METRICS
     from mbref.formulations import FORMULATIONS
 
-    known = {"scenes": SCENES, "engines": engine_names(), "methods": FORMULATIONS, "metrics": METRICS}[what]
+    known = {
+        "scenes": SCENES, "engines": engine_names(), "methods": FORMULATIONS, "metrics": METRICS,
+        "settings": ["projected", "proximal", "SolveDynamic"],
+    }[what]  # fmt: skip
     status, out, _ = run_main(capsys, "list", what)
     squeezed = "".join(out.split())
     assert status == 0
@@ -252,8 +263,78 @@ def test_help_and_an_example(capsys, command):
     assert status == 0 and f"example: crosscheck {command}" in " ".join(out.split()), out
 
 
+def test_times_that_end_early_and_the_scene_planned_for_them(still):
+    scene = Scene.from_file(still)
+    assert request.lasting(scene, [0.0, 0.2], None).duration == 0.2, "settings are of the motion asked for"
+    assert request.lasting(scene, [0.0, 0.2], 0.4).duration == 0.4
+    assert request.lasting(scene, None, None) is scene
+
+
+def test_one_option_and_the_run_it_names(capsys, still):
+    asked = ("--engine", FAKE, "--setting", "plain", "--option", "seconds=0.125", "--json")
+    status, out, err = run_main(capsys, "run", still, *asked)
+    [record] = json.loads(out)["records"]
+    assert status == 0 and record["settings"] == {"seconds": 0.125}, (err, record)
+    assert "looking for settings" not in err, "no sweep was asked for"
+
+
+def test_pasted_command_and_the_same_record(capsys, still):
+    """Of a sweep's records, whatever their options, samples and end, the command that is printed."""
+    scene = Scene.from_file(still).with_(duration=0.3)
+    asked = [(np.linspace(0, 0.3, 4), {"seconds": 1 / 3}),
+             (np.array([0.1, 0.25]), {"seconds": 0.5, "outcome": "NOT_FINITE"})]  # fmt: skip
+    cases = [grid.Case(scene, times, FAKE, grid.Setting("a b", options)) for times, options in asked]
+    for record in grid.study(cases):
+        program, *words = shlex.split(command(record, still))
+        _, out, err = run_main(capsys, *words, "--json")
+        [again] = json.loads(out)["records"]
+        assert program == "crosscheck", program
+        for name in ("times", "settings", "metrics", "outcome", "method"):
+            assert again[name] == record[name], (name, again[name], record[name], err)
+
+
+def test_engine_that_hangs_over_its_settings_is_left_out(capsys, still):
+    asked = ("--engine", FAKE, "--engine", "fake_engines:NO_SETTINGS")
+    status, out, err = run_main(capsys, "run", still, *asked)
+    assert status == 0 and "its settings cannot be found out: ValueError: none" in err, err
+    assert "plain" in out
+
+
+def test_finer_settings_behind_a_time_out_are_not_started(tmp_path):
+    scene = Scene(name=str(tmp_path / "log"), body=Scene.from_file(saved(tmp_path, "s")).body)
+    settings = [grid.Setting("a", {"sleep": s}) for s in (0.0, 30.0, 40.0)]
+    times = np.array([0.0, 1.0])
+    slow = [grid.Case(scene, times, "fake_engines:RECORDER", setting, 0.5) for setting in settings]
+    records = grid.study(slow, ThreadPoolExecutor(1), run=Hurried())
+    assert [r["outcome"] for r in records] == ["COMPLETED", "TIMED_OUT", "TIMED_OUT"], records
+    assert records[2]["message"] == NOT_STARTED and len((tmp_path / "log").read_text().splitlines()) == 2
+
+
+def test_tuning_and_the_cheapest_setting(capsys, still):
+    status, out, err = run_main(capsys, "tune", FAKE, still, "--error", "1e-6", "--json")
+    document = json.loads(out)
+    assert status == 0, err
+    assert [r["settings"] for r in document["records"]] == [{"seconds": 0.1}, {"seconds": 0.5}], document
+    assert "--option seconds=0.1 " in document["records"][0]["command"], document["records"][0]["command"]
+    status, out, err = run_main(capsys, "tune", "elsewhere:ENGINE", still)
+    assert status == 1 and "No setting reaches an error of 1e-06" in out, (out, err)
+
+
+def test_versions_of_engines(capsys):
+    status, out, _ = run_main(capsys, "--version")
+    assert status == 0 and out.startswith("crosscheck ") and "\nmujoco " in out, out
+
+
+def test_every_family_and_option_of_an_engine_is_explained():
+    for name in BUILT_IN:
+        simulator = engine(name)
+        for setting in simulator.settings(SCENES["four_bar_gravity"]().with_(duration=0.01)):
+            assert setting.family.removesuffix(", specialised") in simulator.families, (name, setting)
+            assert set(setting.options) <= set(simulator.options), (name, setting)
+
+
 def test_comparison_and_interleaved_times(capsys, still):
-    status, out, err = run_main(capsys, "compare", still, "--engine", FAKE, "--json")
+    status, out, err = run_main(capsys, "compare", still, "--engine", FAKE, "--depth", "whole", "--json")
     records = json.loads(out)["records"]
     costs = [(r["cost"]["seconds"], r["timing"]["median"], r["timing"]["repeats"]) for r in records]
     assert status == 0, err
@@ -261,10 +342,12 @@ def test_comparison_and_interleaved_times(capsys, still):
     ], costs  # fmt: skip
 
 
-def test_comparison_table_and_ratio_to_the_fastest(capsys, still):
+def test_comparison_and_its_verdict(capsys, still):
     status, out, _ = run_main(capsys, "compare", still, "--engine", FAKE)
     assert status == 0
-    for word in ("ratio", "1.0", "2.0", "5.0", "fake plain"):
+    for word in ("ratio", "1.0", "2.0", "5.0", "fake plain", "Who is right: fake agrees with the truth",
+                 "How fast: fake reaches", "Where each breaks: ", "known in closed form", "settings to use",
+                 f"crosscheck run {still} --engine {FAKE} --setting plain --option seconds=0.1"):  # fmt: skip
         assert word in out, (word, out)
 
 
@@ -275,7 +358,7 @@ def test_another_mechanism_and_a_comparison_refused(capsys, still):
     assert "still: times are not compared" in err and "initial position: truth and elsewhere differ" in err, (
         err
     )
-    assert "plain" in out and "ratio" not in out, out
+    assert "plain" in out and " ratio" not in out, out
 
 
 def test_fewer_than_five_repeats_is_a_fault(capsys, still):
@@ -308,9 +391,10 @@ def test_report_command_and_the_program_it_starts(monkeypatch):
         def __enter__(self):
             return self
 
-    monkeypatch.setattr(commands.subprocess, "Popen", Program)
-    assert main(["report", "--quick", "--out", "x", "--section", "speed"]) == 130
-    assert started[1][1:] == ["-m", "reports", "--out", "x", "--quick", "--section", "speed"], started
+    monkeypatch.setattr(subprocess, "Popen", Program)
+    assert main(["report", "my.toml", "--quick", "--out", "x", "--section", "speed"]) == 130
+    asked = ["my.toml", "--out", "x", "--depth", "quick", "--reference-time", "20", "--section", "speed"]
+    assert started[1][1:] == ["-m", "reports", *asked], started
 
 
 def test_cost_fields_and_the_trajectory_s():

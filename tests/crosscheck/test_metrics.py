@@ -13,6 +13,7 @@ from crosscheck.judge import metrics
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.energy import energy_series, kinetic_energy
 from crosscheck.judge.metrics import METRICS, cost_at_error, measure, order_of_convergence
+from crosscheck.judge.reaction_balance import with_exact_reactions
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import Moment
@@ -160,7 +161,8 @@ def test_states_that_are_not_finite_have_infinite_errors(value):
 def test_without_truth_only_errors_are_missing():
     found = measure(SCENE, EXACT)
     missing = {name for name, value in found.items() if value is None}
-    of_truth = {"error", "error_bound", "position_error", "rotation_error", "scd", "velocity_error"}
+    of_truth = {"error", "error_bound", "position_error", "rotation_error", "scd", "velocity_error",
+                "reaction_error"}  # fmt: skip
     assert missing == of_truth, missing
 
 
@@ -199,3 +201,26 @@ def test_cost_is_read_on_the_lower_envelope():
     assert cost_at_error(costs, errors, 0.5) == 1.0, "the cheapest run is already better"
     assert cost_at_error(costs, errors, 1e-7) is None, "no run is so good"
     assert cost_at_error([1.0, 2.0], [math.nan, math.inf], 1.0) is None
+
+
+def test_energy_of_a_mechanism_at_rest_is_no_rounding_over_rounding():
+    """A bar that hangs still, its places rounded: nothing to divide by, so no drift."""
+    scene = pendulum(gravity=(0.0, -9.81, 0.0))
+    times = np.linspace(0.0, 1.0, 5)
+    noise = 1e-16 * np.random.default_rng(0).standard_normal((5, 1, 3))
+    rest = Trajectory("rest", "e", "1", "m", {}, times, ("bar",), scene.body[0].position + noise,
+                      np.tile([1.0, 0.0, 0.0, 0.0], (5, 1, 1)), noise, noise)  # fmt: skip
+    assert energy_series(scene, rest) is None
+
+
+def test_reaction_error_and_one_percent_put_in():
+    scene = SCENES["spatial_slider_crank_gravity"]().with_(duration=0.02)
+    truth = truth_for(scene)
+    exact = truth.poses(np.linspace(0.0, 0.02, 5))
+    true = with_exact_reactions(scene, exact)
+    larger = replace(true, reactions={n: 1.01 * w for n, w in true.reactions.items()})
+    assert measure(scene, true, truth)["reaction_error"] < 1e-12
+    assert measure(scene, larger, truth)["reaction_error"] == pytest.approx(0.01, rel=0.5)
+    assert measure(scene, exact, truth)["reaction_error"] is None, (
+        "a run without reactions has no error of them"
+    )

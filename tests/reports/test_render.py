@@ -84,21 +84,22 @@ def still(name: str) -> Scene:
     return Scene(name=name, body=(block,), duration=0.5)
 
 
-def few(engines) -> sweeps.Sweep:
-    cases, unable = default_cases(still("still"), engines, None, np.linspace(0, 0.5, 4))
-    return [still("still")], cases, unable
+def few(scenes, engines) -> sweeps.Sweep:
+    return default_cases(scenes[0], engines, None, np.linspace(0, 0.5, 4))
 
 
 @pytest.fixture
 def of_fakes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(collection, "find_engines", lambda names, notice: [FAKE])
     monkeypatch.setattr(sweeps, "quick", few)
+    monkeypatch.setattr(sweeps, "QUICK_LONG", LONG)
+    monkeypatch.setattr(sweeps, "quick_scenes", lambda: [still("still")])
 
 
 def test_program_and_a_report_that_is_not_run_twice(tmp_path, of_fakes, capsys):
     out = tmp_path / "report"
     assert program.main(["--quick", "--out", str(out)]) == 0
-    names = ("records.jsonl", "timings.jsonl", "scenes/still.toml")
+    names = ("records.jsonl", "timings.jsonl", "scenes/still.toml", "truths.jsonl", "motions.jsonl")
     before = [(out / name).read_text() for name in names]
     assert "fake plain" in (out / "index.html").read_text()
     assert len(before[0].splitlines()) == 4, "three runs and the gate"
@@ -127,7 +128,7 @@ def test_program_without_its_packages_and_what_to_install(capsys, monkeypatch):
 
 
 def test_short_runs_and_interleaved_times(tmp_path):
-    _, cases, _ = few([FAKE])
+    cases, _ = few([still("still")], [FAKE])
     long = cases[0]._replace(setting=Setting("plain", {"seconds": 2 * LONG}))
     cases = [*cases, long]
     timed = with_timings(cases, study(cases), tmp_path / "timings.jsonl", lambda _: None)

@@ -1,10 +1,4 @@
-"""Exudyn: rigid bodies with Euler parameters, implicit solvers with multipliers, static driven kinematics.
-
-Families: "defaults" is SolveDynamic as it comes; "trapezoidal" and "alpha" are single runs of the
-trapezoidal rule with index-2 constraints and of generalised alpha; "tuned" extrapolates three trapezoidal
-runs to h = 0 and starts anew behind singular positions; "static" solves a fully driven mechanism pose by
-pose.
-"""
+"""Exudyn: rigid bodies with Euler parameters, implicit solvers with multipliers, static driven kinematics."""
 
 from __future__ import annotations
 
@@ -40,6 +34,14 @@ SHORTEST = 5e-6  # s; below, the full-pivoting solver loses rows of the scaled N
 SPECTRAL_RADIUS = 0.9
 SCOUT = (250, 2000)  # steps of the coarse run that finds how fast a scene turns
 SCOUT_SAMPLES = 26
+FAMILIES = {
+    "defaults": "SolveDynamic as it comes",
+    "tuned": "three trapezoidal runs extrapolated to h = 0, restarted behind singular positions",
+    "trapezoidal": "the trapezoidal rule with index-2 constraints",
+    "alpha": "generalised alpha",
+    "static": "static analysis of a fully driven mechanism, pose by pose",
+}
+OPTIONS = {"step": "largest time step, s"}
 
 
 class Exudyn(Engine):
@@ -48,6 +50,7 @@ class Exudyn(Engine):
     name = "exudyn"
     package = "exudyn"
     supports = SUPPORTS
+    families, options = FAMILIES, OPTIONS
 
     def version(self) -> str:
         return metadata.version(self.package)

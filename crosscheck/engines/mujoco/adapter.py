@@ -1,18 +1,8 @@
 """MuJoCo: joint coordinates, loops closed by soft equality constraints.
 
 The hardest closures that MuJoCo's documentation allows have a softness of 1e-4 of the inverse mass, its
-default ten times that.  Families:
-
-- ``defaults``: the library's own options;
-- ``stock``: as stiff as its documentation allows (time constant two steps, impedance 0.9999), RK4;
-- ``euler``, ``implicit``, ``implicitfast``: the same with its integrators of first order, the last only where
-  a load damps, for else it moves as ``euler``;
-- ``tuned``: the regulariser scaled away through ``invweight0``, critically damped closures at five times
-  the fastest rate of the scene, RK4, Newton's method iterated to convergence;
-- ``stiff``: the tuned model with closures as stiff as the step bears, which costs an order of convergence
-  and brings a run through singular positions with less left of the closure errors they magnify;
-- ``forward``: the tuned model's accelerations (``mj_forward``) integrated by DOP853;
-- ``projected``: the same, every accepted state projected onto the closures.
+default ten times that.  Of the FAMILIES ``stiff`` costs an order of convergence, and brings
+a run through singular positions with less left of the closure errors that they magnify.
 
 A driver is an equality of one joint whose reference acceleration is rewritten at every evaluation.
 """
@@ -52,6 +42,25 @@ RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10)  # finer ones get lost in the noise at s
 TURN_PER_STEP = 0.25  # rad a driver may move within one adaptive step: closures can fold in between
 ADAPTIVE = {"forward": 1e-7, "projected": 1e-9}  # factor of the regulariser: less leaves noise to integrate
 LEAST_TURN = 0.03  # rad turned within the shortest adaptive step
+FAMILIES = {
+    "defaults": "the library's own options",
+    "stock": "closures as stiff as its documentation allows (time constant two steps, impedance 0.9999), RK4",
+    "euler": "stock closures, its first-order integrator Euler",
+    "implicit": "stock closures, its first-order integrator implicit",
+    "implicitfast": "stock closures, its first-order integrator implicitfast; only where a load damps",
+    "tuned": "the regulariser scaled away through invweight0, critically damped closures at five times the "
+    "fastest rate of the scene, RK4, Newton's method iterated to convergence",
+    "stiff": "the tuned model with closures as stiff as the step bears",
+    "forward": "the tuned model's accelerations (mj_forward) integrated by DOP853",
+    "projected": "as forward, every accepted state projected onto the closures",
+}
+OPTIONS = {
+    "step": "time step, s",
+    "rtol": "relative tolerance of a step",
+    "min_step": "shortest step, s",
+    "beta": "double root of the closure errors, 1/s",
+    "hard": "factor of the regulariser",
+}
 SCOUT_SAMPLES = 41  # of the coarse run that finds how fast a scene turns
 MAX_STEPS = 250_000
 
@@ -62,6 +71,7 @@ class MuJoCo(Engine):
     name = "mujoco"
     package = "mujoco"
     supports = SUPPORTS
+    families, options = FAMILIES, OPTIONS
 
     def version(self) -> str:
         """Version of MuJoCo; raises ImportError when it is not installed."""

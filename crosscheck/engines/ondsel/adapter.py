@@ -27,6 +27,7 @@ from mbref.scene import GROUND, Distance, Joint, Scene
 from mbref.trajectory import Outcome, Trajectory
 
 FAMILY = "kinematics"
+FAMILIES = {FAMILY: "kinematics and inverse dynamics of a driven mechanism, pose by pose"}
 STEPS = (100, 400, 1600)  # over a scene's duration
 BRYANT = ("Bryantx", "Bryanty", "Bryantz")
 LOCKED = 1e-3  # cosine of the second angle below which the other two lose digits
@@ -39,6 +40,7 @@ class Ondsel(Engine):
     name = "ondsel"
     package = "pyondsel"
     supports = SUPPORTS
+    families, options = FAMILIES, {"step": "largest step from pose to pose, s"}
 
     def version(self) -> str:
         """Version of pyondsel; raises ImportError when it is not installed."""

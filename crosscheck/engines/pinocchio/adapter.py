@@ -1,13 +1,7 @@
 """Pinocchio: rigid-body dynamics in joint coordinates, closed by its proximal constraint solver.
 
 Pinocchio has no integrator of its own; the families differ in the integrator and the stabilisation put
-around ``constraintDynamics``:
-
-- ``defaults``: the solver as it comes (no regularisation, one iteration), fixed-step RK4;
-- ``proximal``: the same with the solver iterated to convergence, which redundant closures need;
-- ``baumgarte``: RK4 with the closures' own Baumgarte terms, double root 0.1/step;
-- ``dop853``: DOP853 without stabilisation;
-- ``tuned``: DOP853, every accepted state projected onto the closures.
+around ``constraintDynamics`` (FAMILIES).
 
 A driven coordinate has an armature of 1e18 and the torque that goes with it: exact to rounding.
 """
@@ -58,6 +52,18 @@ FINEST = 0.0007  # rad per step, of the stabilised family alone: only there the 
 MAX_FIXED_STEPS = 250_000
 HINTS = {"defaults": ": without regularisation the default solver settings cannot bear redundant closures"}
 FIXED = ("defaults", "proximal", "baumgarte")
+FAMILIES = {
+    "defaults": "the constraint solver as it comes (no regularisation, one iteration), RK4",
+    "proximal": "the solver iterated to convergence, which redundant closures need, RK4",
+    "baumgarte": "RK4 with the closures' own Baumgarte terms, double root 0.1/step",
+    "dop853": "DOP853 without stabilisation",
+    "tuned": "DOP853, every accepted state projected onto the closures",
+}
+OPTIONS = {
+    "step": "time step, s",
+    "rtol": "relative tolerance of a step",
+    "min_step": "shortest step, s",
+}
 
 
 class Pinocchio(Engine):
@@ -66,6 +72,7 @@ class Pinocchio(Engine):
     name = "pinocchio"
     package = "pin"
     supports = SUPPORTS
+    families, options = FAMILIES, OPTIONS
 
     def version(self) -> str:
         """Version of Pinocchio; raises ImportError when it is not installed."""

@@ -25,6 +25,12 @@ from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
 INTEGRATORS = {"merson": "RungeKuttaMerson", "feldberg": "RungeKuttaFeldberg", "cpodes": "CPodes"}
+FAMILIES = {
+    "merson": "Simbody's error-controlled Runge-Kutta-Merson",
+    "feldberg": "Simbody's error-controlled Runge-Kutta-Fehlberg",
+    "cpodes": "Simbody's CPodes, multistep with projection",
+}
+OPTIONS = {"accuracy": "tolerance of one step"}
 ACCURACIES = (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10)
 
 
@@ -34,6 +40,7 @@ class Simbody(Engine):
     name = "simbody"
     package = "opensim"
     supports = SUPPORTS
+    families, options = FAMILIES, OPTIONS
 
     def version(self) -> str:
         """Version of OpenSim; raises ImportError when it is not installed."""

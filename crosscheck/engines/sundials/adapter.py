@@ -29,6 +29,7 @@ from mbref.trajectory import Trajectory
 
 RTOLS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 FAMILY = "ggl"
+FAMILIES = {FAMILY: "IDA on the equations of Gear, Gupta and Leimkuhler, of index 1"}
 
 
 class Sundials(Engine):
@@ -36,6 +37,7 @@ class Sundials(Engine):
 
     name = "sundials"
     package = "scikit-sundae"
+    families, options = FAMILIES, {"rtol": "relative tolerance"}
     supports = Supports(
         joints=(
             "fixed",

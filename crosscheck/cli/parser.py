@@ -1,0 +1,131 @@
+"""The command line of crosscheck: its commands, their options and examples."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from crosscheck.cli.listing import TABLES
+from crosscheck.cli.options import add_depth, add_limits, add_reference_time, add_selection, positive
+from crosscheck.study.timings import REPEATS
+
+Commands = Any  # the object that argparse adds subcommands to; its type is private
+EXIT = (
+    "exit status: 0 when the command did what was asked, 1 otherwise, 2 for bad input, 130 when interrupted. "
+    "`run` gives 1 where a run did not complete; `compare`, `tune` and `report` give 0 although engines "
+    "fail, since that is what they are asked to find out, and `compare` 1 where two engines simulate "
+    "different mechanisms. `verify` gives 1 where a card is violated, `diff` where sets differ beyond noise."
+)
+
+
+def parser() -> argparse.ArgumentParser:
+    """The parser; ``command`` of what it parses is the name of the command."""
+    found = argparse.ArgumentParser(
+        prog="crosscheck", description="The same mechanism in several engines, against truth.", epilog=EXIT
+    )
+    found.add_argument(
+        "--version", action="store_true", help="print the versions of crosscheck and the engines"
+    )
+    commands = found.add_subparsers(dest="command", metavar="COMMAND")
+    for add in (
+        _add_list,
+        _add_run,
+        _add_compare,
+        _add_tune,
+        _add_verify,
+        _add_report,
+        _add_diff,
+        _add_certify,
+    ):
+        add(commands)
+    return found
+
+
+def _add(commands: Commands, name: str, about: str, example: str) -> argparse.ArgumentParser:
+    return commands.add_parser(
+        name, help=about, description=about, epilog=f"example: {example}", allow_abbrev=False
+    )
+
+
+def _add_certify(commands: Commands) -> None:
+    example = "crosscheck certify four_bar_gravity --digits 20 --duration 0.1 --out four_bar_gravity.json"
+    about = "the motion of a scene to many digits, on which two formulations agree (needs python-flint)"
+    parser = _add(commands, "certify", about, example)
+    parser.add_argument("scene", metavar="SCENE", help="a built-in name or a .toml file")
+    parser.add_argument("--digits", type=int, default=20, metavar="N", help="default: 20")
+    parser.add_argument("--samples", type=int, default=3, metavar="N", help="from 0 to the end (default: 3)")
+    parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
+    parser.add_argument("--out", metavar="FILE", help="default: standard output")
+
+
+def _add_list(commands: Commands) -> None:
+    about = "print the known scenes, engines, methods, settings, metrics and the support matrix"
+    parser = _add(commands, "list", about, "crosscheck list engines")
+    parser.add_argument("what", nargs="?", choices=tuple(TABLES), help="the table to print; default: all")
+
+
+def _add_run(commands: Commands) -> None:
+    example = "crosscheck run four_bar --engine mujoco --engine exudyn --samples 21 --json"
+    about = "run scenes in engines, one record for every engine and setting"
+    add_selection(_add(commands, "run", about, example))
+
+
+def _add_compare(commands: Commands) -> None:
+    example = "crosscheck compare my.toml"
+    about = "compare engines on a mechanism: who is right, how accurate, how fast, where each breaks"
+    parser = _add(commands, "compare", about, example)
+    add_selection(parser)
+    parser.add_argument(
+        "--repeats", type=int, default=REPEATS, help=f"timed runs of every setting, at least {REPEATS}"
+    )
+
+
+def _add_tune(commands: Commands) -> None:
+    example = "crosscheck tune mujoco my.toml --error 1e-6"
+    about = "find the cheapest settings of an engine that reach an error on a mechanism"
+    parser = _add(commands, "tune", about, example)
+    parser.add_argument("engine", metavar="ENGINE", help="a known engine (`crosscheck list engines`)")
+    parser.add_argument("scene", metavar="SCENE", help="a built-in scene or a .toml file")
+    parser.add_argument("--error", type=positive, default=1e-6, metavar="E", help="default: %(default)g")
+    parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
+    add_limits(parser, None)
+
+
+def _add_verify(commands: Commands) -> None:
+    about = "test an engine by the conformance suite: every property on every scene of the suite"
+    parser = _add(commands, "verify", about, "crosscheck verify mujoco")
+    parser.add_argument(
+        "engine", metavar="ENGINE", help="a known engine (`crosscheck list engines`), or module:attribute"
+    )
+    parser.add_argument(
+        "--scene", action="append", metavar="S", help="a scene of the suite; may repeat; default: all"
+    )
+    add_limits(parser)
+
+
+def _add_report(commands: Commands) -> None:
+    example = "crosscheck report my.toml --out report"
+    about = "make the missing records and render the report; resumes where it was interrupted"
+    parser = _add(commands, "report", about, example)
+    parser.add_argument(
+        "scene", nargs="*", metavar="SCENE",
+        help="built-in scenes or .toml files; default: five short built-in ones, at whole depth all of them",
+    )  # fmt: skip
+    add_depth(parser)
+    parser.add_argument(
+        "--quick", dest="depth", action="store_const", const="quick", help="the same as --depth quick"
+    )
+    parser.add_argument(
+        "--section", action="append", metavar="S", help="render only this section, such as speed; may repeat"
+    )
+    parser.add_argument("--out", default="report", metavar="DIR", help="folder to write (default: report)")
+    add_reference_time(parser)
+
+
+def _add_diff(commands: Commands) -> None:
+    example = "crosscheck diff report-before report-after"
+    about = "list what changed beyond noise between two sets of records: versions, settings or machines"
+    parser = _add(commands, "diff", about, example)
+    parser.add_argument("old", metavar="OLD", help="a records.jsonl, or the folder of a report")
+    parser.add_argument("new", metavar="NEW", help="the same")
+    parser.add_argument("--all", action="store_true", help="list the runs too that did not change")

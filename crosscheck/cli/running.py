@@ -1,0 +1,75 @@
+"""What the commands that run engines share: the runs asked for, their progress, and the output."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from rich.console import Console
+
+from crosscheck.cli import request
+from crosscheck.cli.collection import scouted
+from crosscheck.study.grid import TIME_LIMIT, Case, Record, study
+from crosscheck.study.hurried import Hurried
+from crosscheck.study.progress import shown
+from crosscheck.study.record_view import public
+from crosscheck.study.sweep import QUICK_LIMIT
+
+Document = dict[str, Any]
+COMPLETED, OTHERWISE = 0, 1
+SAMPLES = 101
+PIPED_WIDTH = 180  # characters of a line
+
+
+def cases_of(arguments: argparse.Namespace, samples: int = SAMPLES) -> list[Case]:
+    """The runs asked for; a scene that an engine cannot run is reported on standard error."""
+    scenes = request.find_scenes(arguments.scene)
+    engines = request.find_engines(arguments.engine, notice)
+    named = [*(arguments.method or ()), *(arguments.setting or ())]
+    is_quick = arguments.depth == "quick"
+    chosen = request.choice(engines, named, arguments.option, arguments.rtol, is_quick)
+    scenes = [request.lasting(s, arguments.times, arguments.duration) for s in scenes]
+    count = samples if arguments.samples is None else arguments.samples
+    times = [request.sample_times(s, arguments.times, count) for s in scenes]
+    limit = arguments.time_limit
+    if limit is None:
+        limit = QUICK_LIMIT if is_quick and chosen.setting is None else TIME_LIMIT
+    if chosen.setting is None:
+        scouted(scenes, engines)
+    cases = request.plan(scenes, engines, chosen, times, limit, notice)
+    return [case._replace(reference_time=arguments.reference_time) for case in cases]
+
+
+def studied(cases: Sequence[Case], finished: list[Record]) -> list[Record]:
+    """The records of the cases with progress; each is appended to ``finished`` as it ends."""
+    with shown("running", len(cases)) as advance:
+
+        def progress(done: int, total: int, record: Record) -> None:
+            finished.append(record)
+            advance(done, total, record)
+
+        return study(cases, progress=progress, run=Hurried())
+
+
+def by_scene(cases: Sequence[Case], records: Sequence[Record]) -> list[Document]:
+    """{"scene", "records"} of every scene."""
+    names = dict.fromkeys(case.scene.name for case in cases)
+    return [{"scene": name, "records": [public(r) for r in records if r["scene"] == name]} for name in names]
+
+
+def print_json(documents: Sequence[Document]) -> None:
+    """The document of one scene, or the list of those of several."""
+    print(json.dumps(documents[0] if len(documents) == 1 else documents, allow_nan=False))
+
+
+def console() -> Console:
+    """Standard output; wide when it is no terminal, so that no cell of a table is folded."""
+    return Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, markup=False, highlight=False)
+
+
+def notice(sentence: str) -> None:
+    """A sentence for the user, on standard error."""
+    print(sentence, file=sys.stderr)

@@ -1,0 +1,40 @@
+"""The command line that makes a record again: its scene, engine, family, options and sample times."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Mapping
+from typing import Any
+
+from crosscheck.study.grid import TIME_LIMIT, Record
+
+
+def command(record: Record, scene: str) -> str:
+    """``crosscheck run`` with what the record was asked for; ``scene`` is a built-in name or a path."""
+    asked = record["asked"]
+    words = ["crosscheck", "run", scene, "--engine", asked["engine"], "--setting", record["family"]]
+    for name, value in asked["options"].items():
+        words += ["--option", f"{name}={json.dumps(value)}"]
+    return shlex.join([*words, *_when(asked), *_limit(record["time_limit"])])
+
+
+def parsed_option(text: str) -> tuple[str, Any]:
+    """(name, value) of ``name=value``, the value as JSON or else as the text; ValueError without ``=``."""
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise ValueError(f"must be name=value, got {text!r}")
+    try:
+        return name, json.loads(value)
+    except json.JSONDecodeError:
+        return name, value
+
+
+def _when(asked: Mapping[str, Any]) -> list[str]:
+    if "times" in asked:
+        return ["--times", ",".join(map(repr, asked["times"])), "--duration", repr(asked["end"])]
+    return ["--samples", str(asked["samples"]), "--duration", repr(asked["end"])]
+
+
+def _limit(seconds: float) -> list[str]:
+    return [] if seconds == TIME_LIMIT else ["--time-limit", f"{seconds:g}"]

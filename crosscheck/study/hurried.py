@@ -1,0 +1,28 @@
+"""Runs of which none holds the others up: behind one that ran out of time, finer settings are not started."""
+
+from __future__ import annotations
+
+from crosscheck.processes.serve import failed
+from crosscheck.study.grid import Case, Record, record_of, run_case
+from mbref.trajectory import Outcome
+
+NOT_STARTED = "not started: a coarser setting of the family reached the time limit"
+
+
+class Hurried:
+    """``run_case`` for cases that come coarse to fine in each family."""
+
+    def __init__(self) -> None:
+        self._slow: set[tuple[str, str, str]] = set()
+
+    def __call__(self, case: Case) -> Record:
+        """The record of a case; TIMED_OUT without a run where a coarser one was."""
+        family = case.scene.name, case.engine, case.setting.family
+        if family in self._slow:
+            return record_of(
+                case, failed(case.engine, "", case.scene, case.setting, Outcome.TIMED_OUT, NOT_STARTED)
+            )
+        record = run_case(case)
+        if record["outcome"] == Outcome.TIMED_OUT.label:
+            self._slow.add(family)
+        return record

@@ -1,0 +1,59 @@
+"""The settings of engines for scenes, found out once: engines try a scene out for them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+from crosscheck.engine import Cannot, Owner, Setting, engine
+from crosscheck.processes.child import ChildFailed
+from crosscheck.processes.pool import READY_SECONDS, capabilities
+from mbref.scene import Scene
+
+Offer = tuple[Setting, ...] | Cannot  # the settings of an engine for a scene, or its refusal
+
+_found: dict[tuple[str, Scene], Offer] = {}
+
+
+def scout(engines: Sequence[str], scenes: Sequence[Scene], advance: Callable[[str], None]) -> None:
+    """Find out the offers in child processes, one a core; ``advance`` is told each pair that is done.
+
+    An engine that crashes or hangs over a scene is counted as refusing it, with the reason.
+    """
+    pairs = [(name, scene) for scene in scenes for name in engines if (name, scene) not in _found]
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        for pair, offer in zip(pairs, threads.map(_asked, pairs), strict=True):
+            _found[pair] = offer
+            advance(f"{pair[0]} {pair[1].name}")
+
+
+def offer(engine_name: str, scene: Scene) -> Offer:
+    """What ``scout`` found out, else what the engine says in this process."""
+    if (engine_name, scene) not in _found:
+        _found[engine_name, scene] = _offered(engine_name, scene)
+    return _found[engine_name, scene]
+
+
+def settings(engine_name: str, scene: Scene) -> tuple[Setting, ...]:
+    """An engine's settings for a scene, coarse to fine in each family; none where it cannot run it."""
+    found = offer(engine_name, scene)
+    return () if isinstance(found, Cannot) else found
+
+
+def unasked(engines: Sequence[str], scenes: Sequence[Scene]) -> int:
+    """The number of pairs that ``scout`` would ask."""
+    return sum((name, scene) not in _found for scene in scenes for name in engines)
+
+
+def _offered(engine_name: str, scene: Scene) -> Offer:
+    simulator = engine(engine_name)
+    return simulator.cannot(scene) or tuple(simulator.settings(scene))
+
+
+def _asked(pair: tuple[str, Scene]) -> Offer:
+    try:
+        _, cannot, found = capabilities(*pair, READY_SECONDS)
+    except ChildFailed as failure:
+        return Cannot(Owner.ADAPTER, f"its settings cannot be found out: {failure}")
+    return cannot or tuple(found)

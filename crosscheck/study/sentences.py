@@ -1,0 +1,309 @@
+"""The verdict in words: who is right, how fast, and where each breaks, computed from records."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+from crosscheck.judge.tolerances import ERROR_LEVELS
+from crosscheck.study.grid import Record
+from crosscheck.study.record_view import error, error_text
+from crosscheck.study.verdict import Grade, Judged, grade
+
+TITLES = {"mujoco": "MuJoCo", "pinocchio": "Pinocchio", "exudyn": "Exudyn", "simbody": "Simbody",
+          "sundials": "SUNDIALS IDA", "ondsel": "OndselSolver"}  # fmt: skip
+LEVEL = ERROR_LEVELS[1]  # the error at which speeds are compared in words
+
+
+class Verdict(NamedTuple):
+    """Sentences; ``headline`` is the shortest of them."""
+
+    headline: str
+    right: str
+    fast: str
+    breaks: str
+    truth: str
+
+    def labelled(self) -> dict[str, str]:
+        """The sentences below the headline, by what they answer."""
+        answers = {"Who is right": self.right, "How fast": self.fast, "Where each breaks": self.breaks}
+        return {**answers, "How the truth is known": self.truth}
+
+
+def verdict(groups: Sequence[Judged]) -> Verdict:
+    """The verdict on one scene or several, of the same engines where they can run them."""
+    return Verdict(headline(groups), right(groups), fast(groups), breaks(groups), truth(groups))
+
+
+def title(engine: str) -> str:
+    """An engine's name as its makers write it."""
+    return TITLES.get(engine, engine)
+
+
+def listed(names: Iterable[str]) -> str:
+    """``a, b and c``."""
+    *most, last = [*names] or [""]
+    return f"{', '.join(most)} and {last}" if most else last
+
+
+def headline(groups: Sequence[Judged]) -> str:
+    """Who is right at best and at the defaults, in one line."""
+    at_best = _worst(groups, Judged.best)
+    if not any(g is not Grade.UNJUDGED for g in at_best.values()):
+        return "There is no reference for this motion: the engines are compared with each other."
+    good = [name for name, found in at_best.items() if found is Grade.RIGHT]
+    first = (
+        f"All {len(good)} engines are right at their best settings"
+        if len(good) == len(at_best) > 1
+        else f"{listed(map(title, good))} {_is(good)} right at {_its(good)} best settings"
+        if good
+        else "No engine is right at any setting that was run"
+    )
+    return f"{first}{_on(groups)}; {_defaults_in_short(groups)}."
+
+
+def right(groups: Sequence[Judged]) -> str:
+    """Errors of the engines at their best settings; without a truth, how far they agree."""
+    told = [group for group in groups if group.truth["kind"]]
+    if not told:
+        return " ".join(map(_agreement, groups))
+    errors: dict[str, list[float]] = {}
+    for group in told:
+        for name, record in group.best().items():
+            errors.setdefault(name, []).append(
+                error(record) if grade(record) is not Grade.FAILED else math.inf
+            )
+    worst = {name: max(found) for name, found in errors.items()}
+    sure = max(group.truth["bound"] or 0.0 for group in told)
+    good = [name for name, e in worst.items() if math.isfinite(e) and _of(told, name) is Grade.RIGHT]
+    sentences = [f"{listed(map(title, good))} {_agree(good)} with the truth to "
+                 f"{_most(max(worst[n] for n in good), sure)}{_on(told)}."] if good else []  # fmt: skip
+    return " ".join([*sentences, *(_less_than_right(told, name) for name in worst if name not in good)])
+
+
+def fast(groups: Sequence[Judged]) -> str:
+    """Times of stepping that reach LEVEL, as multiples of the fastest engine's."""
+    found = {group.scene.name: group.costs(LEVEL) for group in groups}
+    costs = {name: cost for name, cost in found.items() if cost}
+    if not costs:
+        return f"No engine reaches an error of {LEVEL:.0e}, so speeds are not compared."
+    never = [n for n in _engines(groups) if not any(n in cost for cost in costs.values())]
+    end = f" {listed(map(title, never))} {'does' if len(never) == 1 else 'do'} not reach it." if never else ""
+    return (_fast_on_one(*costs.values()) if len(groups) == 1 else _fast_on_several(costs)) + end
+
+
+def breaks(groups: Sequence[Judged]) -> str:
+    """Defaults that fail or are wrong, and the scenes they do it on."""
+    failed, wrong = (_where(groups, bad) for bad in (Grade.FAILED, Grade.WRONG))
+    sentences = [_failed(groups, name, scenes) for name, scenes in _merged(failed).items()]
+    sentences += [_wrong(name, scenes, groups) for name, scenes in wrong.items()]
+    if not sentences:
+        return "No engine's defaults fail or are wrong." + _other_failures(groups)
+    return " ".join(sentences) + _other_failures(groups)
+
+
+def truth(groups: Sequence[Judged]) -> str:
+    """The kinds of truth, the bounds on their errors, and their cost."""
+    parts = []
+    closed = [g for g in groups if g.truth["kind"] not in ("", "reference")]
+    if closed:
+        bound = max(g.truth["bound"] for g in closed)
+        parts.append(f"The exact motion of {_names(closed)} is known in closed form or by a reduced "
+                     f"equation, to {bound:.0e}.")  # fmt: skip
+    parts += [_reference(group) for group in groups if group not in closed]
+    return " ".join(parts)
+
+
+def _reference(group: Judged) -> str:
+    known, name = group.truth, group.scene.name
+    if not known["kind"]:
+        return f"There is no reference for {name}: {known['reason']}."
+    ways = (
+        "two formulations that share no code agree" if known["both"] else "two runs of one formulation agree"
+    )
+    until = f" up to t = {known['until']:.4g} s ({known['reason']})" if known["reason"] else ""
+    return (f"The reference of {name} is known to {known['bound']:.0e}{until}: {ways}; "
+            f"it took {known['seconds']:.1f} s of CPU time.")  # fmt: skip
+
+
+def _agreement(group: Judged) -> str:
+    """The engines that agree best, and how far each other is from them."""
+    apart = group.agreement()
+    if not apart:
+        return f"{group.scene.name}: no two engines completed the motion, so nothing can be compared."
+    (a, b), least = min(apart.items(), key=lambda item: item[1])
+    others = [n for n in group.engines() if n not in (a, b) and any(n in pair for pair in apart)]
+    far = [f"{title(n)} {min(d for pair, d in apart.items() if n in pair):.1e}" for n in others]
+    ends = f"; the nearest of them from the others: {', '.join(far)}" if far else ""
+    return f"The finest runs of {title(a)} and {title(b)} agree to {least:.1e}{ends}."
+
+
+def _less_than_right(groups: Sequence[Judged], name: str) -> str:
+    """One engine that is not right everywhere: its worst scene."""
+    found = {g.scene.name: g.best()[name] for g in groups if name in g.best()}
+    graded = {scene: grade(record) for scene, record in found.items()}
+    lost = [scene for scene, verdict in graded.items() if verdict is Grade.FAILED]
+    if lost:
+        place = "" if len(groups) == 1 else f" on {listed(lost)}"
+        return f"{title(name)} completes no run{place}: {_end(found[lost[0]])}."
+    scene = max(found, key=lambda s: error(found[s]))
+    place = "" if len(groups) == 1 else f" on {scene}"
+    return f"{title(name)} is {graded[scene]} at best{place}: off by {error_text(found[scene])}."
+
+
+def _fast_on_one(costs: Mapping[str, float]) -> str:
+    (first, least), *others = sorted(costs.items(), key=lambda item: item[1])
+    text = f"{title(first)} reaches an error of {LEVEL:.0e} in {seconds(least)} of stepping"
+    if not others:
+        return f"{text}."
+    return (
+        f"{text}; {listed(f'{title(name)} takes {multiple(cost / least)} as long' for name, cost in others)}."
+    )
+
+
+def _fast_on_several(costs: Mapping[str, Mapping[str, float]]) -> str:
+    winners = {scene: min(cost, key=lambda n: cost[n]) for scene, cost in costs.items()}
+    count = {name: list(winners.values()).count(name) for name in dict.fromkeys(winners.values())}
+    first = max(count, key=lambda n: count[n])
+    ratios = [min(c for n, c in cost.items() if n != first) / cost[first]
+              for cost in costs.values() if first in cost and len(cost) > 1]  # fmt: skip
+    text = (
+        f"{title(first)} is the fastest to an error of {LEVEL:.0e} on {count[first]} of {len(costs)} scenes"
+    )
+    if ratios:
+        text += f"; the best other engine takes {span(min(ratios), max(ratios))} as long"
+    others = [f"{title(n)} on {listed(s for s, w in winners.items() if w == n)}" for n in count if n != first]
+    return text + (f". Elsewhere the fastest is {listed(others)}." if others else ".")
+
+
+def _where(groups: Sequence[Judged], bad: Grade) -> dict[str, list[Judged]]:
+    """The scenes on which the defaults of an engine have a grade."""
+    found: dict[str, list[Judged]] = {}
+    for group in groups:
+        for name, record in group.defaults().items():
+            if grade(record) is bad:
+                found.setdefault(name, []).append(group)
+    return found
+
+
+def _merged(found: Mapping[str, list[Judged]]) -> dict[tuple[str, ...], list[Judged]]:
+    """Engines that do the same on the same scenes, together."""
+    scenes = {name: tuple(g.scene.name for g in groups) for name, groups in found.items()}
+    return {tuple(n for n in found if scenes[n] == key): found[next(n for n in found if scenes[n] == key)]
+            for key in dict.fromkeys(scenes.values())}  # fmt: skip
+
+
+def _failed(groups: Sequence[Judged], names: Sequence[str], scenes: Sequence[Judged]) -> str:
+    ends = {f"{g.defaults()[n]['t_end']:.3g}" for g in scenes for n in names}
+    when = f"end at t = {next(iter(ends))} s" if len(ends) == 1 else "do not complete"
+    rows = [g.redundant for g in scenes]
+    cause = ""
+    if all(rows):
+        cause = (
+            ", where constraints are redundant"
+            if len(rows) > 1 or rows[0] > 1
+            else ", where a constraint is redundant"
+        )
+    where = "" if len(groups) == 1 else f" on {_names(scenes)}"
+    return f"The defaults of {listed(map(title, names))} {when}{where}{cause}."
+
+
+def _wrong(name: str, scenes: Sequence[Judged], groups: Sequence[Judged]) -> str:
+    errors = [error(group.defaults()[name]) for group in scenes]
+    off = f"{errors[0]:.2g}" if len(errors) == 1 else f"{min(errors):.2g} to {max(errors):.2g}"
+    where = "" if len(groups) == 1 else f" on {_names(scenes)}"
+    return f"{title(name)}'s defaults complete{where}, but with an error of {off} at best."
+
+
+def _other_failures(groups: Sequence[Judged]) -> str:
+    """Runs at other settings than defaults that failed or were wrong, counted."""
+    runs = [r for group in groups for r in group.records if r["family"] != "defaults"]
+    bad = {verdict: [r for r in runs if grade(r) is verdict] for verdict in (Grade.FAILED, Grade.WRONG)}
+    told = [f"{len(found)} {verdict}" for verdict, found in bad.items() if found]
+    return f" Of {len(runs)} runs at other settings, {listed(told)}." if told else ""
+
+
+def _defaults_in_short(groups: Sequence[Judged]) -> str:
+    at_defaults = _worst(groups, Judged.defaults)
+    good = [name for name, found in at_defaults.items() if found is Grade.RIGHT]
+    if not at_defaults:
+        return "no library has defaults for it"
+    if not good:
+        return (
+            "with the library's defaults it is not"
+            if len(at_defaults) == 1
+            else "with their libraries' defaults none is"
+        )
+    if len(good) == len(at_defaults):
+        return "so are their libraries' defaults"
+    return f"with their libraries' defaults only {listed(map(title, good))} {_is(good)}"
+
+
+def _worst(groups: Sequence[Judged], records: Callable[[Judged], Mapping[str, Record]]) -> dict[str, Grade]:
+    """The worst grade of every engine over the scenes it has records of."""
+    order = list(Grade)
+    found: dict[str, Grade] = {}
+    for group in groups:
+        for name, record in records(group).items():
+            found[name] = max(found.get(name, Grade.RIGHT), grade(record), key=order.index)
+    return found
+
+
+def _of(groups: Sequence[Judged], name: str) -> Grade:
+    return _worst(groups, Judged.best)[name]
+
+
+def _engines(groups: Sequence[Judged]) -> list[str]:
+    return list(dict.fromkeys(name for group in groups for name in group.engines()))
+
+
+def _end(record: Record) -> str:
+    return f"{record['outcome'].lower().replace('_', ' ')} at t = {record['t_end']:.3g} s"
+
+
+def _names(groups: Sequence[Judged]) -> str:
+    return listed(group.scene.name for group in groups)
+
+
+def _on(groups: Sequence[Judged]) -> str:
+    return "" if len(groups) == 1 else f" on all {len(groups)} scenes"
+
+
+def _most(value: float, bound: float) -> str:
+    """An error rounded up to two digits, or the truth's own bound where that is larger."""
+    if value < bound:
+        return f"less than the truth's own bound, {bound:.0e}"
+    exponent = math.floor(math.log10(value))
+    return f"{math.ceil(value / 10.0 ** (exponent - 1)) / 10:.1f}e{exponent}"
+
+
+def _is(names: Sequence[str]) -> str:
+    return "is" if len(names) == 1 else "are"
+
+
+def _its(names: Sequence[str]) -> str:
+    return "its" if len(names) == 1 else "their"
+
+
+def _agree(names: Sequence[str]) -> str:
+    return "agrees" if len(names) == 1 else "agree"
+
+
+def seconds(value: float) -> str:
+    """A time with the unit that suits it."""
+    for unit, scale in (("s", 1.0), ("ms", 1e-3)):
+        if value >= scale:
+            return f"{value / scale:.3g} {unit}"
+    return f"{value * 1e6:.3g} µs"
+
+
+def multiple(ratio: float) -> str:
+    """``3.2 times`` or ``140 times``."""
+    return f"{ratio:.1f} times" if ratio < 9.95 else f"{ratio:.0f} times"
+
+
+def span(least: float, most: float) -> str:
+    """``3.2 to 140 times``, or one multiple where both are the same."""
+    low, high = multiple(least), multiple(most)
+    return low if low == high else f"{low.removesuffix(' times')} to {high}"

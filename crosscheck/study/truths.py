@@ -1,0 +1,92 @@
+"""The truth of a scene as a record: its kind, its cost, the bound on its error, and a motion to show."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from typing import Any
+
+import numpy as np
+
+from crosscheck.judge.model_identity import gate_times
+from crosscheck.judge.reference.reference import NoReference, reference
+from crosscheck.judge.truth import NoSolution, Truth, closed_form
+from crosscheck.judge.truth.reference_truth import trajectory
+from crosscheck.study.grid import Record
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+
+DENSE = 600  # equal parts of a scene's duration at which its true motion is looked at
+FRAMES = 90  # instants of the motion shown, at most
+TURN = 0.35  # rad between two of them, at most, of the body that turns fastest
+
+
+def truth_record(scene: Scene, times: np.ndarray, reference_time: float) -> Record:
+    """What is known of the true motion of a scene at times (k,), and at the instants that show it moving.
+
+    ``kind`` is the family of the closed form, "reference", or "" where there is none; ``bound`` is on the
+    error, ``until`` (s) how far it is known and ``reason`` why no further.
+    """
+    dense = np.linspace(0.0, scene.duration, DENSE + 1)
+    wanted = np.unique(np.concatenate([times, gate_times(scene), dense]))
+    start = time.process_time()
+    family = closed_form(scene)
+    found = _of_family(scene, family, wanted) if family else _of_reference(scene, wanted, reference_time)
+    found.setdefault("seconds", time.process_time() - start)
+    return {"key": key(scene, times), "scene": scene.name, "given": reference_time, **found}
+
+
+def key(scene: Scene, times: np.ndarray) -> str:
+    """Hash of the scene and the times."""
+    identity = ["truth", scene.to_dict(), np.asarray(times, dtype=float).tolist()]
+    return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
+
+
+def shown(exact: Trajectory) -> np.ndarray:
+    """Which samples (n,) of a motion to show: FRAMES over all of it, or over its beginning where a body would
+    turn by more than TURN between two."""
+    speed = np.linalg.norm(exact.angular_velocity, axis=-1).max(axis=-1, initial=0.0)
+    turned = np.concatenate([[0.0], np.cumsum(np.diff(exact.times) * (speed[1:] + speed[:-1]) / 2)])
+    last = int(np.searchsorted(turned, FRAMES * TURN, side="right")) - 1
+    return np.unique(np.linspace(0, last, min(FRAMES, last) + 1).round().astype(int))
+
+
+def _of_family(scene: Scene, family: Truth, times: np.ndarray) -> dict[str, Any]:
+    try:
+        exact = family.poses(times)
+    except NoSolution as reason:
+        return _nothing(str(reason), 0.0)
+    return {"kind": family.name, "bound": family.accuracy, "reason": "", "until": float(times[-1]),
+            "both": True, "motion": _motion(exact)}  # fmt: skip
+
+
+def _of_reference(scene: Scene, times: np.ndarray, reference_time: float) -> dict[str, Any]:
+    if not reference_time:
+        return _nothing("none was asked for", 0.0)
+    found = reference(scene, times.tolist(), reference_time)
+    part = found.part if isinstance(found, NoReference) else found
+    if not len(part.times):
+        return _nothing(getattr(found, "reason", ""), 0.0)
+    return {
+        "kind": "reference", "bound": float(part.bound.max()), "both": bool(part.both.all()),
+        "reason": getattr(found, "reason", ""), "until": float(part.times.max()), "seconds": part.seconds,
+        "motion": _motion(trajectory(scene, part)),
+    }  # fmt: skip
+
+
+def _nothing(reason: str, until: float) -> dict[str, Any]:
+    return {"kind": "", "bound": None, "reason": reason, "until": until, "both": False, "motion": None}
+
+
+def _motion(exact: Trajectory) -> dict[str, Any]:
+    """The record of the instants shown: times, and the bodies' poses."""
+    chosen = shown(exact)
+    poses = {
+        name: {
+            "position": exact.position[chosen, b].tolist(),
+            "orientation": exact.orientation[chosen, b].tolist(),
+        }
+        for b, name in enumerate(exact.bodies)
+    }
+    return {"times": exact.times[chosen].tolist(), "bodies": poses}

@@ -1,0 +1,159 @@
+"""Verdicts and differences: records of known errors and times / grades, sentences, changes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from crosscheck.study.difference import changes, circumstances, load
+from crosscheck.study.sentences import breaks, fast, headline, multiple, right, span, truth
+from crosscheck.study.tuning import tuned
+from crosscheck.study.verdict import Grade, Judged, grade, judged
+from mbref.records import append
+from mbref.scenes import SCENES
+
+REDUNDANT, SOUND = SCENES["planar_slider_crank"](), SCENES["spatial_slider_crank"]()
+TRUTH = {"kind": "reference", "bound": 3e-14, "reason": "", "until": 1.0, "seconds": 2.4, "both": True}
+
+
+def record(
+    engine: str, family: str, error: float | None, seconds: float = 0.1, **more: Any
+) -> dict[str, Any]:
+    asked = {"engine": engine, "options": {"s": seconds}, "samples": 3, "end": 1.0}
+    found = {
+        "scene": REDUNDANT.name, "engine": engine, "family": family, "settings": {"seconds": seconds},
+        "outcome": "COMPLETED", "message": "", "t_end": 1.0, "cost": {"seconds": seconds}, "versions": {},
+        "metrics": {"error": error, "error_bound": 3e-14}, "key": f"{engine} {family} {seconds}",
+        "version": "1", "machine": {"cpu": "a"}, "asked": asked,
+    }  # fmt: skip
+    return {**found, **more}
+
+
+def failed(engine: str, family: str, t_end: float = 0.0) -> dict[str, Any]:
+    return record(engine, family, None, outcome="NOT_FINITE", t_end=t_end)
+
+
+RECORDS = (
+    record("mbref", "own", 5e-12, 0.001), record("mujoco", "tuned", 4e-9, 0.5),
+    record("mujoco", "defaults", 2.8), failed("pinocchio", "defaults"), failed("exudyn", "defaults"),
+    record("pinocchio", "tuned", 6.04e-9, 0.032), record("exudyn", "tuned", 1.7e-4, 0.2),
+)  # fmt: skip
+
+
+def group(records=RECORDS, scene=REDUNDANT, **known: Any) -> Judged:
+    return Judged(scene, {"scene": scene.name, **TRUTH, **known}, records)
+
+
+@pytest.mark.parametrize(
+    ("error", "verdict"),
+    [(1e-8, Grade.RIGHT), (1.1e-8, Grade.INACCURATE), (1e-2, Grade.INACCURATE), (1.1e-2, Grade.WRONG),
+     (None, Grade.UNJUDGED)],
+)  # fmt: skip
+def test_grades_by_the_error_alone(error, verdict):
+    assert grade(record("a", "b", error)) is verdict
+    assert grade(record("a", "b", error, outcome="TIMED_OUT")) is Grade.FAILED
+
+
+def test_sentences_of_one_scene():
+    assert headline([group()]) == (
+        "mbref, MuJoCo and Pinocchio are right at their best settings; "
+        "with their libraries' defaults none is."
+    )
+    assert right([group()]) == (
+        "mbref, MuJoCo and Pinocchio agree with the truth to 6.1e-9. "
+        "Exudyn is inaccurate at best: off by 1.70e-04."
+    ), right([group()])
+    assert fast([group()]) == (
+        "mbref reaches an error of 1e-06 in 1 ms of stepping; Pinocchio takes 32 times as long and MuJoCo "
+        "takes 500 times as long. Exudyn does not reach it."
+    ), fast([group()])
+    assert breaks([group()]) == (
+        "The defaults of Pinocchio and Exudyn end at t = 0 s, where a constraint is redundant. "
+        "MuJoCo's defaults complete, but with an error of 2.8 at best."
+    ), breaks([group()])
+    assert "known to 3e-14: two formulations that share no code agree; it took 2.4 s" in truth([group()])
+
+
+def test_other_results_and_other_sentences():
+    good = [record(name, family, 1e-10) for name in ("mujoco", "exudyn") for family in ("defaults", "tuned")]
+    assert headline([group(good)]) == (
+        "All 2 engines are right at their best settings; so are their libraries' defaults."
+    )
+    assert breaks([group(good)]) == "No engine's defaults fail or are wrong."
+    assert "No engine reaches an error of 1e-06" in fast([group([record("mujoco", "tuned", 1e-3)])])
+    lost = [record("mbref", "own", 1e-15), failed("exudyn", "tuned", 0.25)]
+    assert right([group(lost)]) == (
+        "mbref agrees with the truth to less than the truth's own bound, 3e-14. "
+        "Exudyn completes no run: not finite at t = 0.25 s."
+    ), right([group(lost)])
+    cut = group(kind="reference", reason="singular", until=0.5, both=False)
+    assert "up to t = 0.5 s (singular): two runs of one formulation agree" in truth([cut]), truth([cut])
+
+
+def test_sentences_of_several_scenes():
+    runs = (("mbref", "own", 0.1), ("pinocchio", "defaults", 0.05))
+    sound = [record(engine, family, 1e-9, s, scene=SOUND.name) for engine, family, s in runs]
+    truths = [{"scene": scene.name, **TRUTH} for scene in (REDUNDANT, SOUND)]
+    groups = judged([REDUNDANT, SOUND], truths, [*RECORDS, *sound])
+    assert "fastest to an error of 1e-06 on 1 of 2 scenes" in fast(groups), fast(groups)
+    assert "Elsewhere the fastest is Pinocchio on spatial_slider_crank" in fast(groups), fast(groups)
+    assert "Pinocchio and Exudyn end at t = 0 s on planar_slider_crank, where a" in breaks(groups)
+    assert "MuJoCo and Pinocchio are right at their best settings on all 2 scenes" in headline(groups)
+
+
+def test_no_truth_and_no_claim_of_right():
+    still = [record(name, "tuned", None, times=[0.0]) for name in ("mbref", "exudyn")]
+    unknown = group(still, kind="", reason="two ways", bound=None)
+    assert "no reference for this motion" in headline([unknown])
+    assert "There is no reference for planar_slider_crank: two ways." in truth([unknown])
+
+
+def test_multiples():
+    assert (multiple(3.24), multiple(139.6), span(1.5, 20.2)) == ("3.2 times", "140 times", "1.5 to 20 times")
+
+
+def test_tuning_and_the_families_given_up():
+    """Of three families one reaches the error, one costs more before it does, one runs out of time."""
+
+    class Case:
+        def __init__(self, family, record):
+            self.setting, self.record = type("S", (), {"family": family}), record
+
+    sweep = [Case("quick", record("e", "quick", e, s)) for e, s in ((1e-3, 0.1), (1e-7, 0.2), (1e-9, 0.9))]
+    sweep += [Case("dear", record("e", "dear", e, s)) for e, s in ((1e-4, 0.15), (1e-5, 0.3), (1e-8, 0.6))]
+    late = record("e", "hangs", None, outcome="TIMED_OUT")
+    sweep += [Case("hangs", late), Case("hangs", record("e", "hangs", 0.0))]
+    found = tuned(sweep, 1e-6, lambda cases: [case.record for case in cases])
+    assert [r["cost"]["seconds"] for r in found.reached] == [0.2], found.reached
+    assert len(found.records) == 5, "the finer settings of all families were run"
+
+
+def saved(folder: Path, records: list[dict]) -> Path:
+    folder.mkdir()
+    for one in records:
+        append(folder / "records.jsonl", one)
+    return folder
+
+
+def test_differences_beyond_noise(tmp_path):
+    known = (("x", 1e-5, 0.1), ("y", 1e-5, 0.2), ("z", 1e-15, 0.3), ("gone", 0.0, 0.4))
+    old = [record("a", family, e, s) for family, e, s in known]
+    lost = failed("a", "y", 0.5) | {"asked": old[1]["asked"]}
+    slow = record("a", "x", 1e-5, 0.1, version="2", cost={"seconds": 0.25})
+    new = [slow, lost, record("a", "z", 9e-14, 0.3)]
+    before, after = (load(saved(tmp_path / name, records)) for name, records in (("old", old), ("new", new)))
+    found = {change.identity[2]: change.sentences for change in changes(before, after)}
+    assert found == {
+        "x": ["time 1.00e-01 s → 2.50e-01 s"], "y": ["outcome completed → not finite at 0.5 s"], "z": [],
+        "gone": ["only in the old set"],
+    }, found  # fmt: skip
+    assert circumstances(before, after) == ["a: 1 → 1, 2"], circumstances(before, after)
+    assert not any(change.sentences for change in changes(before, before))
+
+
+def test_times_of_other_machines_are_not_compared():
+    slow = record("a", "x", 1e-5, 0.1, machine={"cpu": "b"}, cost={"seconds": 9.0})
+    named = [{"run": {**r, "repeated": False}} for r in (record("a", "x", 1e-5, 0.1), slow)]
+    assert not changes(*named)[0].sentences
