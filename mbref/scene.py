@@ -31,9 +31,17 @@ from mbref.scene_joints import (
     Translational,
     Universal,
 )
+from mbref.scene_lines import with_lines
 from mbref.scene_loads import LOAD_TYPES, Force, Load, Moment, Spring, TorsionSpring
 from mbref.scene_paths import replaced_at
-from mbref.scene_validation import GROUND, SceneError, checked_inertia, field_faults, reference_faults
+from mbref.scene_validation import (
+    GROUND,
+    SceneError,
+    checked_inertia,
+    field_faults,
+    named_paths,
+    reference_faults,
+)
 
 if TYPE_CHECKING:
     from mbref.equations.diagnosis import Counts
@@ -47,6 +55,9 @@ __all__ = [
 UNIT_TOLERANCE = 1e-6  # a quaternion further than this from unit length is a fault, nearer is rounding
 
 
+Inertia = tuple[float, float, float] | tuple[Vector, Vector, Vector] | None
+
+
 class Body(Entry):
     """A rigid body; its frame sits at the centre of mass.
 
@@ -58,13 +69,13 @@ class Body(Entry):
 
     name: Name
     mass: Positive | None = None
-    inertia: tuple[float, float, float] | tuple[Vector, Vector, Vector] | None = None
+    inertia: Inertia = None
     position: Vector
     orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
     velocity: Vector | None = None
     angular_velocity: Vector | None = None
 
-    @field_validator("inertia", mode="plain")
+    @field_validator("inertia", mode="plain", json_schema_input_type=Inertia)
     @classmethod
     def _inertia_is_physical(cls, value: Any) -> Any:
         return None if value is None else checked_inertia(as_list(value))
@@ -122,13 +133,13 @@ class Scene(Entry):
         try:
             scene = handler(data)
         except ValidationError as error:
-            for path, message in field_faults(error):
+            for path, message in field_faults(error, TABLES):
                 faults.setdefault(path, message)
         if isinstance(data, Mapping):
             for path, message in reference_faults(data):
                 faults.setdefault(path, message)
         if faults or scene is None:
-            raise SceneError([f"{path}: {message}" for path, message in faults.items()])
+            raise SceneError(list(named_paths(data if isinstance(data, Mapping) else {}, faults)))
         return scene
 
     def body_index(self, name: str) -> int:
@@ -183,16 +194,25 @@ class Scene(Entry):
 
     @staticmethod
     def from_file(path: str | Path) -> Scene:
-        """Read a scene file (TOML, UTF-8); raises SceneError naming the file, or every faulty field."""
+        """Read a scene file (TOML, UTF-8); SceneError names the file, or every faulty field and line."""
         try:
-            data = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
+            text = Path(path).read_text(encoding="utf-8-sig")
+            data = tomllib.loads(text)
         except OSError as error:
             raise SceneError([f"{path}: cannot be read: {error.strerror}"]) from None
         except ValueError as error:  # no UTF-8, no TOML, or a number of thousands of digits
             raise SceneError([f"{path}: is not TOML: {error}"]) from None
         except RecursionError:
             raise SceneError([f"{path}: is nested too deeply"]) from None
-        return Scene(**data)
+        try:
+            return Scene(**data)
+        except SceneError as error:
+            raise SceneError(with_lines(text, error.faults)) from None
+
+
+TABLES = {"": tuple(Scene.model_fields)} | {
+    name: tuple(table.model_fields) for name, table in (("body", Body), ("driver", Driver), ("sine", Sine))
+}
 
 
 def _lists(value: Any) -> Any:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from difflib import get_close_matches
 from reprlib import Repr
 from typing import Annotated, Any
 
@@ -19,6 +21,12 @@ def shown(value: Any) -> str:
         return SHOWN.repr(value)
     except ValueError:  # Python writes no integers of so many digits
         return "a number of thousands of digits"
+
+
+def meant(word: str, known: Iterable[str]) -> str:
+    """ "; did you mean 'rod'?" of the known word that is most alike, or nothing."""
+    alike = get_close_matches(word, [k for k in known if k], n=1)
+    return f"; did you mean {alike[0]!r}?" if alike else ""
 
 
 def checked_size(value: float) -> float:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
-from mbref.scene_fields import LARGEST, SMALLEST, checked_length, checked_size, shown
+from mbref.scene_fields import LARGEST, SMALLEST, checked_length, checked_size, meant, shown
 from mbref.scene_joints import JOINT_TYPES
 from mbref.scene_loads import LOAD_TYPES
 
@@ -59,14 +60,19 @@ def checked_inertia(value: Any) -> tuple[Any, ...]:
     return tuple(array.tolist()) if array.ndim == 1 else tuple(map(tuple, array.tolist()))
 
 
-def field_faults(error: ValidationError) -> Iterator[tuple[str, str]]:
-    """(path, message) of every fault pydantic found, in the words of the file."""
+def field_faults(error: ValidationError, tables: Mapping[str, Sequence[str]]) -> Iterator[tuple[str, str]]:
+    """(path, message) of every fault pydantic found, in the words of the file.
+
+    ``tables`` has the names of the fields by table; those of joints and loads are known here.
+    """
     for fault in error.errors(include_url=False):
         kind, got, limit = fault["type"], shown(fault["input"]), fault.get("ctx", {})
-        tags = f"{limit.get('expected_tags')}, got {shown(limit.get('tag'))}"
+        expected = str(limit.get("expected_tags"))
+        alike = meant(str(limit.get("tag")), re.findall(r"\w+", expected))
+        tags = f"{expected}, got {shown(limit.get('tag'))}{alike}"
         messages = {
             "missing": "is required",
-            "extra_forbidden": "is not a known field",
+            "extra_forbidden": f"is not a known field{_meant_field(fault['loc'], tables)}",
             "greater_than": f"must be positive, got {got}",
             "greater_than_equal": f"must not be negative, got {got}",
             "finite_number": f"must be finite, got {got}",
@@ -87,6 +93,38 @@ def field_faults(error: ValidationError) -> Iterator[tuple[str, str]]:
             continue  # entries are there, but faulty ones were left out
         path = _path(fault["loc"]) + (".type" if kind.startswith("union_tag") else "")
         yield path, messages.get(kind, default)
+
+
+def _meant_field(location: Sequence[str | int], tables: Mapping[str, Sequence[str]]) -> str:
+    """The suggestion for an unknown field at a location such as ("joint", 0, "revolute", "axsi")."""
+    key, above = str(location[-1]), [part for part in location[:-1] if isinstance(part, str)]
+    types: dict[str, Any] = {**JOINT_TYPES, **LOAD_TYPES}
+    table = above[-1] if above else ""
+    return meant(key, types[table].model_fields if table in types else tables.get(table, ()))
+
+
+def named_paths(data: Mapping[str, Any], faults: Mapping[str, str]) -> Iterator[str]:
+    """``path: message`` of every fault, an entry by its name where it has one of its own: body[rod].mass."""
+    for path, message in faults.items():
+        match = re.match(r"(body|joint|driver)\[(\d+)\](?=\.)", path)
+        name = _own_name(data, match[1], int(match[2])) if match else ""
+        yield (
+            f"{match[1]}[{name}]{path[match.end() :]}: {message}" if match and name else f"{path}: {message}"
+        )
+
+
+def _own_name(data: Mapping[str, Any], key: str, place: int) -> str:
+    """The name of an entry that no other has; empty where there is none, or a path could not hold it."""
+    names = [_text(entry, "joint" if key == "driver" else "name") for entry in _entries(data, key)]
+    name = names[place] if place < len(names) else ""
+    fit = (
+        name
+        and names.count(name) == 1
+        and not name.isdigit()
+        and not set(name) & set("[]")
+        and len(name) < 80
+    )
+    return name if fit else ""
 
 
 def _path(location: Sequence[str | int]) -> str:
@@ -193,7 +231,8 @@ def _duplicates(key: str, names: Sequence[str], reserved: Sequence[str] = ()) ->
 
 
 def _unknown(what: str, name: str, known: Sequence[str] | set[str]) -> str:
-    return f"unknown {what} {name!r}; known: {', '.join(sorted(filter(None, known))) or 'none'}"
+    told = ", ".join(sorted(filter(None, known))) or "none"
+    return f"unknown {what} {name!r}; known: {told}{meant(name, known)}"
 
 
 def _pair_faults(path: str, pair: Any, known: set[str]) -> Iterator[tuple[str, str]]:

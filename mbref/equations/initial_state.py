@@ -56,8 +56,7 @@ def scene_length(model: Model) -> float:
 
 def _fault(model: Model, row: int, what: str) -> SceneError:
     name = model.row_joint[row]
-    index = next((j for j, joint in enumerate(model.scene.joint) if joint.name == name), 0)
-    return SceneError([f"joint[{index}]: {what} at joint {name!r}"])
+    return SceneError([f"joint[{name}]: {what} at joint {name!r}"])
 
 
 def corrected_positions(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]:

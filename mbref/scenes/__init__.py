@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from mbref.scene import Scene, SceneError
+from mbref.scene_fields import meant
 from mbref.scenes.andrews_squeezer import andrews_squeezer
 from mbref.scenes.bennett import bennett
 from mbref.scenes.bricard import bricard
@@ -79,4 +80,5 @@ def find_scene(name: str) -> Scene:
         return CHAINS[chain[1]](int(chain[2]), name)
     if name.endswith(".toml") or Path(name).exists():
         return Scene.from_file(name)
-    raise SceneError([f"unknown scene {name!r}; built-in: {', '.join(SCENES)}; or a .toml file"])
+    known = f"built-in: {', '.join(SCENES)}; or a .toml file"
+    raise SceneError([f"unknown scene {name!r}; {known}{meant(name, SCENES)}"])

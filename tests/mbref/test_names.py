@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mbref.cli import _show, main
+from mbref.cli import main
+from mbref.cli.run import show
 from mbref.scene import Body, Scene
 from mbref.trajectory import Trajectory
 
@@ -32,7 +33,7 @@ def test_a_name_is_shown_as_it_is(name: str, capsys: pytest.CaptureFixture[str])
     still = np.zeros((1, 1, 3))
     first = (name, "mbref", "1", name, {}, np.zeros(1), (name,))
     run = Trajectory(*first, still, np.zeros((1, 1, 4)), still, still, message=name)
-    _show(Scene(name=name, body=(body,)), run)
+    show(Scene(name=name, body=(body,)), run)
     out = capsys.readouterr().out
     assert out.count(name.strip()) >= 4, out
 

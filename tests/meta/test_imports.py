@@ -20,10 +20,11 @@ ADAPTER = "crosscheck.engines.mbref"  # the one module that may import all of mb
 FLOORS = {  # lowest first; an arrow within a floor or downwards
     "mbref": (
         ["rotations", "records", "trajectory"],
-        ["scene", "scene_fields", "scene_joints", "scene_loads", "scene_paths", "scene_validation"],
-        ["scenes", "variation"], ["drawing"], ["joint_motion", "energy"], ["motion"],
+        ["scene", "scene_fields", "scene_joints", "scene_lines", "scene_loads", "scene_paths",
+         "scene_validation"],
+        ["scenes", "scene_slips", "variation"], ["drawing"], ["joint_motion", "energy"], ["motion"],
         ["kernels"], ["linear_algebra"], ["equations"], ["formulations"], ["stabilisation"], ["integrators"],
-        ["method"], ["specialised"], ["simulation"], ["cli"], ["__main__"],
+        ["method"], ["specialised"], ["simulation"], ["design"], ["cli"], ["__main__"],
     ),
     "crosscheck": (
         ["judge"], ["engine"], ["engines"], ["processes"], ["study"], ["conformance"], ["paper"], ["cli"],

@@ -148,7 +148,7 @@ DEFECTS = (
         LIMITS,
     ),
     Defect("mbref/simulation/limits.py", "isinstance(value, str | bool)", "isinstance(value, str)", LIMITS),
-    Defect("mbref/cli.py", '.replace("largest_step", "max-step")', "", LIMITS),
+    Defect("mbref/cli/options.py", '.replace("largest_step", "max-step")', "", LIMITS),
     # records and caches
     Defect(
         R,

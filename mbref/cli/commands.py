@@ -1,0 +1,70 @@
+"""The commands of mbref, what they exit with, and how faults are told."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from mbref import __version__
+from mbref.cli import diagnose, ensemble, pictures, run, scene_files, tables
+from mbref.cli.options import TEXT
+from mbref.method import MethodError
+from mbref.scene import SceneError
+
+BAD_INPUT, INCOMPLETE, INTERRUPTED = 2, 1, 130
+EPILOG = """\
+first steps:
+  mbref new my.toml             a commented scene to start from
+  mbref draw my.toml            its picture, my.svg
+  mbref diagnose my.toml        redundant constraints, degrees of freedom, singular positions
+  mbref run my.toml             simulate it
+  mbref animate my.toml         see it move
+
+exit status: 0 done, 1 a run ended early, 2 bad input, 130 interrupted"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; the exit status: 0 completed, 1 ended otherwise, 2 bad input."""
+    options = parser().parse_args(arguments)
+    try:
+        return int(options.action(options))
+    except SceneError as error:
+        return _refuse(error.faults)
+    except (MethodError, ValueError) as error:
+        return _refuse([str(error)])
+    except KeyboardInterrupt:
+        print("mbref: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:  # the reader of our output has gone, as `head` does
+        sys.stdout = None
+        return INCOMPLETE
+    except OSError as error:  # of a file that is written
+        return _refuse([f"{error.filename or options.out}: {error.strerror}"])
+
+
+def _refuse(faults: Sequence[str]) -> int:
+    for fault in faults:
+        print(fault, file=sys.stderr)
+    return BAD_INPUT
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line's grammar."""
+    whole = argparse.ArgumentParser(
+        prog="mbref", formatter_class=TEXT, epilog=EPILOG,
+        description="Reference implementation of the constraint-handling methods of multibody dynamics.",
+    )  # fmt: skip
+    whole.add_argument("--version", action="version", version=_versions())
+    commands = whole.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    for module in (scene_files, pictures, diagnose, run, ensemble, tables):
+        module.add(commands)
+    return whole
+
+
+def _versions() -> str:
+    """This package and those its numbers depend on."""
+    from importlib.metadata import version
+
+    others = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "numba"))
+    return f"mbref {__version__} (Python {sys.version.split()[0]}, {others})"

@@ -1,0 +1,145 @@
+"""mbref diagnose: links, joints, redundancy at t = 0 and along the motion, singular positions."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from mbref.cli.options import TEXT, add_scene
+from mbref.cli.output import console, warn
+from mbref.records import strict_json
+from mbref.scene import Scene, SceneError
+from mbref.scene_slips import link_lengths
+from mbref.scenes import find_scene
+
+if TYPE_CHECKING:
+    from mbref.design.along_motion import AlongMotion
+    from mbref.equations.diagnosis import Diagnosis
+
+
+def add(commands: Any) -> None:
+    """The command's grammar."""
+    diagnose = commands.add_parser(
+        "diagnose", help="links, redundant constraints, singular positions of a scene", formatter_class=TEXT,
+        description="Lengths of links and joints; counts, rank, redundant rows by joint and unique\n"
+        "reactions at t = 0; redundancy along the motion, which exchange of joints\n"
+        "removes it, and the nearest singular position.",
+        epilog="examples:\n  mbref diagnose five_bar\n  mbref diagnose mechanism.toml --json\n"
+        "  mbref diagnose mechanism.toml --start",
+    )  # fmt: skip
+    add_scene(diagnose)
+    diagnose.add_argument("--start", action="store_true", help="at t = 0 only, without simulating")
+    diagnose.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    diagnose.set_defaults(action=_diagnose)
+
+
+def _diagnose(options: argparse.Namespace) -> int:
+    from mbref.design.exchange import exchanges
+    from mbref.equations.diagnosis import diagnose
+
+    scene = find_scene(options.scene)
+    warn(scene)
+    found = diagnose(scene)
+    along = None if options.start else _along(scene)
+    redundant = bool(found.counts.redundant) or along_redundant(along)
+    swaps = exchanges(scene) if redundant else []
+    if options.json:
+        print(strict_json(_record(scene, found, along, swaps)))
+    else:
+        console().print(
+            "\n".join(
+                [
+                    *_scene_lines(scene),
+                    *_start_lines(found),
+                    *_motion_lines(along),
+                    *_swap_lines(swaps, redundant),
+                ]
+            )
+        )
+    return 0
+
+
+def _along(scene: Scene) -> AlongMotion | str:
+    """The diagnosis along the motion, or why there is none."""
+    from mbref.design.along_motion import along_motion
+
+    try:
+        return along_motion(scene)
+    except SceneError as error:
+        return error.faults[0]
+
+
+def along_redundant(along: AlongMotion | str | None) -> bool:
+    """Whether rows are redundant along the motion."""
+    return along is not None and not isinstance(along, str) and along.redundant > 0
+
+
+def _record(
+    scene: Scene, found: Diagnosis, along: AlongMotion | str | None, swaps: list[dict[str, str]]
+) -> dict[str, Any]:
+    beyond = {key: value for key, value in asdict(found).items() if key != "counts"}
+    motion = {"why_not": along} if isinstance(along, str) else along and asdict(along)
+    return {
+        "scene": scene.name, "ground": scene.ground, "links": link_lengths(scene), **asdict(found.counts),
+        **beyond, "along_motion": motion, "exchanges": swaps,
+    }  # fmt: skip
+
+
+def _scene_lines(scene: Scene) -> list[str]:
+    lines = [f"{scene.name} (ground as a {scene.ground})", "  links"]
+    for body, lengths in link_lengths(scene).items():
+        lines.append(
+            f"    {body:12} {', '.join(f'{pair} {length:.6g} m' for pair, length in lengths.items())}"
+        )
+    lines.append("  joints")
+    lines += [f"    {joint.name:12} {joint.type}, {' and '.join(joint.bodies)}" for joint in scene.joint]
+    return lines
+
+
+def _start_lines(found: Diagnosis) -> list[str]:
+    counts = found.counts
+    return [
+        "  at t = 0",
+        f"    coordinates         {counts.coordinates}",
+        f"    constraint rows     {counts.rows}   ({_listed(counts.rows_by_joint)})",
+        f"    rank                {counts.rank}",
+        f"    redundant rows      {counts.redundant}",
+        f"    degrees of freedom  {counts.degrees_of_freedom}",
+        f"    rows in redundancy  {_listed(found.redundant_by_joint)}",
+        f"    unique reactions    {', '.join(found.unique_reactions) or 'of no joint'}",
+        f"    singular values     {found.smallest_singular_value:.3g} to {found.largest_singular_value:.3g}"
+        " (rows of unit length; the",
+        "                        smallest is the distance to a singular position)",
+    ]
+
+
+def _motion_lines(along: AlongMotion | str | None) -> list[str]:
+    if isinstance(along, str):
+        return [f"  along the motion      not known: {along}"]
+    if along is None:
+        return []
+    lines = [
+        f"  along the motion of {along.end:g} s" + ("" if along.moves else ", in which nothing moves"),
+        f"    rank                {along.rank}",
+        f"    redundant rows      {along.redundant}",
+        f"    nearest singular    at t = {along.nearest_time:.3g} s, {along.nearest:.3g} away"
+        + (" (passed, or nearly)" if along.nearest < 1e-3 else ""),
+    ]
+    if along.by_rounding:
+        sizes = ", ".join(f"{s:.1g}" for s in along.by_rounding)
+        lines.append(
+            f"    but for rounding    singular values {sizes} at most: redundant by the numbers' last digits"
+        )
+    return lines
+
+
+def _swap_lines(swaps: list[dict[str, str]], redundant: bool) -> list[str]:
+    if not swaps:
+        return ["  no exchange of up to four joints removes the redundancy"] * redundant
+    shown = [" and ".join(f"{name} {kind}" for name, kind in swap.items()) for swap in swaps]
+    return ["  without redundancy, as mobile, with", *(f"    {words}" for words in shown)]
+
+
+def _listed(numbers: dict[str, int]) -> str:
+    return ", ".join(f"{name} {number}" for name, number in numbers.items()) or "none"

@@ -1,0 +1,104 @@
+"""mbref ensemble: variants of a scene on every core."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from mbref.cli.options import TEXT, add_method_options, add_scene, limits_of, sample_times
+from mbref.cli.output import console, progress_bar, rounded, warn
+from mbref.records import strict_json
+from mbref.scene import Scene
+from mbref.scenes import find_scene
+from mbref.trajectory import Trajectory
+
+QUANTITIES = {
+    "position, m": "position",
+    "velocity, m/s": "velocity",
+    "angular velocity, rad/s": "angular_velocity",
+}
+
+
+def add(commands: Any) -> None:
+    """The command's grammar."""
+    many = commands.add_parser(
+        "ensemble", help="simulate variants of a scene on every core", formatter_class=TEXT,
+        description="Simulate copies of a scene with numbers drawn at random; mean and standard deviation\n"
+        "of every body at the last time. Interrupted, --out keeps the runs that ended;\n"
+        "the same command goes on.",
+        epilog="example:\n"
+        "  mbref ensemble planar_slider_crank --vary 'joint[B].anchor[0]=0.304+-1e-4' \\\n"
+        "      --vary 'body[slider].mass=0.9:1.1' --count 500 --duration 0.1 --out runs.jsonl",
+    )  # fmt: skip
+    add_scene(many)
+    many.add_argument(
+        "--vary", action="append", required=True, metavar="PATH=LOW:HIGH",
+        help="a number that varies, uniform; PATH=MEAN+-DEVIATION: normal; may repeat",
+    )  # fmt: skip
+    many.add_argument("--count", type=int, default=100, help="variants (default 100)")
+    many.add_argument("--seed", type=int, default=0, help="of the random numbers (default 0)")
+    many.add_argument("--workers", type=int, help="processes (default: one a core)")
+    many.add_argument("--out", metavar="FILE", help="append every trajectory, one JSON line each")
+    add_method_options(many)
+    many.set_defaults(action=_ensemble)
+
+
+def _ensemble(options: argparse.Namespace) -> int:
+    from mbref.simulation.ensemble import ensemble, processes
+    from mbref.variation import Variation, variants
+
+    scene = find_scene(options.scene)
+    times, limits = sample_times(options, scene), limits_of(options)
+    warn(scene)
+    if options.count < 1 or not (options.workers is None or options.workers > 0):
+        raise ValueError("--count and --workers: must be at least 1")
+    scenes = variants(scene, [Variation.parse(text) for text in options.vary], options.count, options.seed)
+    runs = {}
+    with processes(options.workers) as pool, progress_bar("simulating", options.count) as progress:
+        for place, run in ensemble(scenes, times, options.method, limits, pool, options.out):
+            runs[place] = run
+            progress(len(runs))
+    completed = [run for _, run in sorted(runs.items()) if run.outcome.name == "COMPLETED"]
+    _show_spread(scene, float(times[-1]), completed, options)
+    return 0 if len(completed) == options.count else 1
+
+
+def _show_spread(
+    scene: Scene, end: float, completed: Sequence[Trajectory], options: argparse.Namespace
+) -> None:
+    """Mean and standard deviation of every body over the completed runs, at the last time."""
+    last = {key: np.array([getattr(run, key)[-1] for run in completed]) for key in QUANTITIES.values()}
+    if options.json:
+        spread = {
+            f"{what}_{key}": {body.name: a[b].tolist() for b, body in enumerate(scene.body)}
+            for key, values in last.items() if completed
+            for what, a in (("mean", values.mean(axis=0)), ("deviation", values.std(axis=0)))
+        }  # fmt: skip
+        print(strict_json({"scene": scene.name, "time": end, "completed": len(completed), **spread}))
+        return
+    seconds = sum(run.cost.seconds for run in completed)
+    console().print(
+        f"{scene.name}: {len(completed)} of {options.count} variants completed, "
+        f"{seconds:.3g} s of stepping in all"
+    )
+    if completed:
+        console().print(_table(scene, end, last))
+
+
+def _table(scene: Scene, end: float, last: dict[str, np.ndarray]) -> Any:
+    from rich.table import Table
+
+    table = Table(title=f"mean ± standard deviation at t = {end:g} s")
+    table.add_column("body", overflow="fold")
+    table.add_column("")
+    for axis in "xyz":
+        table.add_column(axis, no_wrap=True)
+    for b, body in enumerate(scene.body):
+        for k, (quantity, key) in enumerate(QUANTITIES.items()):
+            mean, deviation = (rounded(f(last[key][:, b], axis=0)) for f in (np.mean, np.std))
+            cells = (f"{m:.5g} ± {d:.2g}" for m, d in zip(mean, deviation, strict=True))
+            table.add_row("" if k else body.name, quantity, *cells, end_section=k == 2)
+    return table

@@ -1,0 +1,90 @@
+"""mbref draw and mbref animate: a scene as a picture, still or moving."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from mbref.cli.options import TEXT, add_method_options, add_scene, limits_of, sample_times
+from mbref.cli.output import progress_bar, warn
+from mbref.drawing.picture import moving, still
+from mbref.drawing.png import png
+from mbref.drawing.view import View
+from mbref.scene import Scene
+from mbref.scenes import find_scene
+
+VIEW = """\
+xy, xz, yz, oblique, or AZIMUTH,ELEVATION in degrees (write --view=-60,20);
+without: across the plane of a plane mechanism, else oblique"""
+
+
+def add(commands: Any) -> None:
+    """The commands' grammar."""
+    draw = commands.add_parser(
+        "draw", help="a picture of a scene at t = 0", formatter_class=TEXT,
+        description="A picture of a scene at t = 0: bodies, joints by type, ground, loads and drivers.",
+        epilog="examples:\n  mbref draw mechanism.toml\n  mbref draw bricard --view xz --out bricard.png",
+    )  # fmt: skip
+    add_scene(draw)
+    draw.add_argument("--view", metavar="VIEW", help=VIEW)
+    draw.add_argument("--out", metavar="FILE", help=".svg or .png (default: the scene's name with .svg)")
+    draw.set_defaults(action=_draw)
+
+    animate = commands.add_parser(
+        "animate", help="the moving mechanism as SVG", formatter_class=TEXT,
+        description="Simulate a scene and write its motion as an SVG that every browser plays.",
+        epilog="examples:\n  mbref animate mechanism.toml\n"
+        "  mbref animate flyball_governor --duration 2 --view oblique --out governor.svg",
+    )  # fmt: skip
+    add_scene(animate)
+    animate.add_argument("--view", metavar="VIEW", help=VIEW)
+    animate.add_argument("--out", metavar="FILE", help=".svg (default: the scene's name with .svg)")
+    add_method_options(animate, json=False)
+    animate.set_defaults(action=_animate)
+
+
+def _draw(options: argparse.Namespace) -> int:
+    scene, view = find_scene(options.scene), _view(options)
+    path = _path(options.out, scene, (".svg", ".png"))
+    warn(scene)
+    picture = still(scene, view)
+    if path.suffix == ".png":
+        path.write_bytes(png(picture))
+    else:
+        path.write_text(picture, encoding="utf-8")
+    print(path)
+    return 0
+
+
+def _animate(options: argparse.Namespace) -> int:
+    from mbref.simulation.simulate import simulate
+
+    scene, view = find_scene(options.scene), _view(options)
+    path, times, limits = (
+        _path(options.out, scene, (".svg",)),
+        sample_times(options, scene),
+        limits_of(options),
+    )
+    warn(scene)
+    with progress_bar("simulating", float(times[-1])) as progress:
+        motion = simulate(scene, options.method, times, limits, progress)
+    path.write_text(moving(scene, motion, view), encoding="utf-8")
+    print(path)
+    if motion.outcome.name != "COMPLETED":
+        print(f"{motion.outcome.name}: {motion.message}")
+        return 1
+    return 0
+
+
+def _view(options: argparse.Namespace) -> View | None:
+    return View.parse(options.view) if options.view else None
+
+
+def _path(out: str | None, scene: Scene, endings: tuple[str, ...]) -> Path:
+    """The file asked for, or one here named as the scene; ValueError for another kind of file."""
+    safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in scene.name)[:100]
+    path = Path(out or f"{safe}.svg")
+    if path.suffix not in endings:
+        raise ValueError(f"--out: must end in {' or '.join(endings)}, got {str(path)!r}")
+    return path

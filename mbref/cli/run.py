@@ -1,0 +1,94 @@
+"""mbref run: a scene by one method."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from mbref.cli.options import TEXT, add_method_options, add_scene, limits_of, sample_times
+from mbref.cli.output import console, progress_bar, rounded, warn
+from mbref.records import strict_json
+from mbref.scene import Scene
+from mbref.scenes import find_scene
+from mbref.trajectory import Trajectory
+
+QUANTITIES = {
+    "position, m": "position",
+    "velocity, m/s": "velocity",
+    "angular velocity, rad/s": "angular_velocity",
+}
+
+
+def add(commands: Any) -> None:
+    """The command's grammar."""
+    run = commands.add_parser(
+        "run", help="simulate a scene by one method", formatter_class=TEXT,
+        description="Simulate a scene by one method: formulation+stabilisation/integrator.",
+        epilog="examples:\n"
+        "  mbref run planar_slider_crank --method mpi-svd+projection --times 0.1,0.2,0.4 --rtol 1e-11\n"
+        "  mbref run four_bar --method mpi-svd+partitioning --duration 0.02 --json\n"
+        "  mbref run mechanism.toml --method lm1+baumgarte[alpha=10,beta=10]/rk4[step=1e-4]\n"
+        "  mbref run mechanism.toml --out run.csv",
+    )  # fmt: skip
+    add_scene(run)
+    add_method_options(run)
+    run.add_argument(
+        "--out", metavar="FILE", help="write the whole motion: .csv is a table of columns, .json what\n"
+        "mbref.Motion.load reads",
+    )  # fmt: skip
+    run.set_defaults(action=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    scene = find_scene(options.scene)
+    times, limits, write = sample_times(options, scene), limits_of(options), _writer(options.out)
+    from mbref.simulation.simulate import simulate
+
+    warn(scene)
+    with progress_bar("simulating", float(times[-1])) as progress:
+        motion = simulate(scene, options.method, times, limits, progress)
+    if options.out:
+        write(motion, options.out)
+    if options.json:
+        print(strict_json({"scene": scene.name, "records": [motion.to_record()]}))
+    else:
+        show(scene, motion)
+    return 0 if motion.outcome.name == "COMPLETED" else 1
+
+
+def _writer(out: str | None) -> Any:
+    """How a motion is written to a file of that name; ValueError where its ending says nothing."""
+    from mbref.motion import Motion
+
+    writers = {".csv": Motion.to_csv, ".json": Motion.save}
+    if out is not None and Path(out).suffix not in writers:
+        raise ValueError(f"--out: must end in {' or '.join(writers)}, got {out!r}")
+    return writers[Path(out).suffix] if out else None
+
+
+def show(scene: Scene, trajectory: Trajectory) -> None:
+    """Print how a run ended, what it cost, and its last state."""
+    from rich.table import Table
+
+    out, cost = console(), trajectory.cost
+    out.print(f"{scene.name} by {trajectory.method}: {trajectory.outcome.name} at t = {trajectory.t_end:g} s")
+    if trajectory.message:
+        out.print(trajectory.message)
+    out.print(
+        f"{cost.steps} steps, {cost.rejected} rejected, {cost.rhs} evaluations, "
+        f"{cost.factorisations} factorisations, {cost.newton} Newton iterations\n"
+        f"{cost.seconds:.3g} s of stepping, {cost.build_seconds:.2g} s of building"
+    )
+    if not trajectory.times.size:
+        return
+    table = Table(title=f"state at t = {trajectory.times[-1]:g} s")
+    table.add_column("body", overflow="fold")
+    table.add_column("")
+    for axis in "xyz":
+        table.add_column(axis, justify="right", no_wrap=True)
+    for b, name in enumerate(trajectory.bodies):
+        for k, (quantity, key) in enumerate(QUANTITIES.items()):
+            numbers = (f"{x:.5g}" for x in rounded(getattr(trajectory, key)[-1, b]))
+            table.add_row("" if k else name, quantity, *numbers, end_section=k == len(QUANTITIES) - 1)
+    out.print(table)

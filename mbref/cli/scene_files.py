@@ -1,0 +1,115 @@
+"""mbref new, assemble and schema: scene files to start from, to close, and to check in an editor."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from mbref.cli.options import TEXT, add_scene
+from mbref.scene import Scene
+from mbref.scenes import find_scene
+
+STILL = 1e-12  # m or rad, of what is not told as moved
+
+
+def add(commands: Any) -> None:
+    """The commands' grammar."""
+    new = commands.add_parser(
+        "new", help="a commented scene file to start from", formatter_class=TEXT,
+        description="Write a scene file to start from: a commented slider-crank, or a copy of a scene.",
+        epilog="examples:\n  mbref new my.toml\n  mbref new my.toml --like four_bar_gravity",
+    )  # fmt: skip
+    new.add_argument("out", metavar="FILE", help="the .toml file; an existing one is left alone")
+    new.add_argument("--like", metavar="SCENE", help="a built-in name, or another .toml file")
+    new.set_defaults(action=_new)
+
+    assemble = commands.add_parser(
+        "assemble", help="close the loops of a scene with given lengths of its links", formatter_class=TEXT,
+        description="Move the joints and bodies of a scene, as little as possible, so that its links have\n"
+        "the given lengths and every joint holds; says what moved.",
+        epilog="example:\n  mbref assemble my.toml --length A-B=0.35 --length B-C=0.9 --out closed.toml",
+    )  # fmt: skip
+    add_scene(assemble)
+    assemble.add_argument(
+        "--length", action="append", default=[], metavar="A-B=LENGTH",
+        help="distance of the joints A and B of a link, m; may repeat",
+    )  # fmt: skip
+    assemble.add_argument("--out", metavar="FILE", help="write the closed scene")
+    assemble.set_defaults(action=_assemble)
+
+    schema = commands.add_parser(
+        "schema", help="the JSON schema of scene files", formatter_class=TEXT,
+        description="The JSON schema of scene files, by which editors complete and check them. Editors with\n"
+        "taplo (VS Code: Even Better TOML) take it from the file's first line:\n"
+        "  #:schema ./scene.schema.json",
+        epilog="example:\n  mbref schema > scene.schema.json",
+    )  # fmt: skip
+    schema.set_defaults(action=_schema)
+
+
+def _new(options: argparse.Namespace) -> int:
+    path = Path(options.out)
+    if path.suffix != ".toml":
+        raise ValueError(f"FILE: must end in .toml, got {options.out!r}")
+    if path.exists():
+        raise ValueError(f"{path}: is there already, and is left as it is")
+    if options.like:
+        find_scene(options.like).save(path)
+    else:
+        path.write_text(template(), encoding="utf-8")
+    print(f"{path}: next, mbref draw {path}")
+    return 0
+
+
+def template() -> str:
+    """The commented scene."""
+    return (files("mbref") / "templates" / "scene.toml").read_text(encoding="utf-8")
+
+
+def _assemble(options: argparse.Namespace) -> int:
+    from mbref.design.assemble import assemble
+
+    scene = find_scene(options.scene)
+    found = assemble(scene, dict(_length(scene, text) for text in options.length))
+    for pair, (before, after) in found.lengths.items():
+        print(f"length {pair}: {before:.6g} m, now {after:.6g} m")
+    for name, distance in found.joints.items():
+        if distance > STILL:
+            print(f"joint {name}: moved by {distance:.3g} m")
+    for name, (distance, angle) in found.bodies.items():
+        if max(distance, angle) > STILL:
+            print(f"body {name}: moved by {distance:.3g} m, turned by {angle:.3g} rad")
+    if options.out:
+        found.scene.save(options.out)
+        print(options.out)
+    return 0
+
+
+def _length(scene: Scene, text: str) -> tuple[tuple[str, str], float]:
+    """``A-B=0.35``; names of joints may themselves hold a hyphen."""
+    pair, equals, number = text.rpartition("=")
+    names = {joint.name for joint in scene.joint}
+    parts = pair.split("-")
+    splits = [("-".join(parts[:k]), "-".join(parts[k:])) for k in range(1, len(parts))]
+    known = [split for split in splits if set(split) <= names] or splits
+    try:
+        length = float(number)
+    except ValueError:
+        length = -1.0
+    if not (equals and known and 0 < length < float("inf")):
+        raise ValueError(f"--length: must be A-B=LENGTH with a positive length in m, got {text!r}")
+    return known[0], length
+
+
+def _schema(options: argparse.Namespace) -> int:
+    print(json.dumps(schema(), indent=2))
+    return 0
+
+
+def schema() -> dict[str, Any]:
+    """The JSON schema of scene files, as shipped in mbref/templates/scene.schema.json."""
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "mbref scene"}
+    return {**Scene.model_json_schema(), **head}

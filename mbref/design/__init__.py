@@ -1,0 +1,1 @@
+"""Questions of design about a scene: closing its loops, redundancy along its motion, exchanges of joints."""

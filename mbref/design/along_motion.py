@@ -1,0 +1,107 @@
+"""Redundancy and singular positions along a motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbref import rotations
+from mbref.equations.diagnosis import RANK_TOLERANCE, scaled_jacobian
+from mbref.equations.initial_state import consistent_start, solve_positions
+from mbref.equations.model import Model, displaced
+from mbref.method import DEFAULT
+from mbref.scene import Scene, SceneError
+from mbref.simulation.simulate import simulate
+
+SAMPLES = 61
+ROUNDING = (
+    1e-5  # singular values below it (relative) at every pose are taken for rounding of the file's numbers
+)
+MOST_ROWS = 300  # beyond it dense singular values at every pose take too long
+
+
+@dataclass(frozen=True)
+class AlongMotion:
+    """Ranks and singular values of Φ_q, rows of unit length, at the poses of a motion from t = 0.
+
+    ``rank`` is that of most poses, ``redundant`` the rows beyond it.  ``by_rounding`` singular values are
+    small at every pose but not zero: rows that would be redundant but for rounding in the scene's numbers.
+    ``nearest`` is the least distance to a singular position, at time ``nearest_time`` (s).
+    """
+
+    end: float
+    moves: bool
+    rank: int
+    redundant: int
+    by_rounding: tuple[float, ...]
+    nearest: float
+    nearest_time: float
+
+
+def along_motion(scene: Scene) -> AlongMotion:
+    """Over the scene's duration by the default method, or by ``kinematic`` without masses.
+
+    Raises SceneError where the scene cannot be moved, or has more than 300 rows.
+    """
+    model = Model(scene)
+    if model.m > MOST_ROWS:
+        raise SceneError([f"scene: {model.m} constraint rows are too many for singular values at every pose"])
+    times = np.linspace(0.0, scene.duration, SAMPLES)
+    motion = simulate(scene, DEFAULT if scene.has_mass() else "kinematic", times)
+    if not motion.times.size:
+        raise SceneError([f"scene: the motion could not begin: {motion.message}"])
+    values = _singular_values(model, motion.times, motion.position, motion.orientation)
+    return _summary(model, motion.times, values, bool(np.ptp(motion.position, axis=0).any()))
+
+
+def _singular_values(
+    model: Model, times: np.ndarray, position: np.ndarray, orientation: np.ndarray
+) -> np.ndarray:
+    """Relative singular values (k, min(m, n)), largest first, at poses of the scene's bodies."""
+    found = []
+    for t, q in zip(times, coordinates(model, position, orientation), strict=True):
+        s = np.linalg.svd(scaled_jacobian(model, float(t), q), compute_uv=False)
+        found.append(s / s[0] if s.size else s)
+    return np.array(found)
+
+
+def coordinates(model: Model, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+    """Coordinates (k, 7 nb) of poses (k, …) of the scene's bodies."""
+    own = position.shape[1]
+    q = np.tile(model.start().reshape(model.nb, 7), (len(position), 1, 1))
+    q[:, :own, :3] = position
+    q[:, :own, 3:] = rotations.multiply(orientation, model.principal[:own])
+    return q.reshape(len(position), -1)
+
+
+def _summary(model: Model, times: np.ndarray, values: np.ndarray, moves: bool) -> AlongMotion:
+    ranks = np.sum(values > ROUNDING, axis=1)
+    rank = int(ranks.max(initial=0))
+    small = values[:, rank:].max(axis=0, initial=0.0)
+    nearest = values[:, rank - 1] if rank else np.zeros(len(times))
+    at = int(np.argmin(nearest))
+    return AlongMotion(
+        end=float(times[-1]), moves=moves, rank=rank, redundant=model.m - rank,
+        by_rounding=tuple(small[small > RANK_TOLERANCE].tolist()),
+        nearest=float(nearest[at]), nearest_time=float(times[at]),
+    )  # fmt: skip
+
+
+def general_pose(model: Model, seed: int = 1) -> np.ndarray:
+    """Coordinates (7 nb,) of a pose of no special kind: the start, moved along its freedoms at random."""
+    q, random = consistent_start(model).q, np.random.default_rng(seed)
+    if model.m > MOST_ROWS:
+        return q
+    for _ in range(5):
+        jacobian = scaled_jacobian(model, 0.0, q)
+        _, values, vt = np.linalg.svd(jacobian)
+        free = vt[int(np.sum(values > ROUNDING * values.max(initial=0.0))) :]
+        if not len(free):
+            return q
+        step = free.T @ random.normal(size=len(free))
+        moved, phi = solve_positions(model, 0.0, displaced(q, 0.1 * step / np.abs(step).max()))
+        if np.abs(phi).max(initial=0.0) > 1e-9:
+            return q
+        q = moved
+    return q

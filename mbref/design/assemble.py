@@ -1,0 +1,147 @@
+"""Assembly: a mechanism closed from approximate places and given lengths of its links."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbref import rotations
+from mbref.design.placed import placed
+from mbref.equations.initial_state import scene_length, solve_positions
+from mbref.equations.model import Model
+from mbref.scene import GROUND, Scene, SceneError
+
+Point = tuple[float, float, float]
+SHARES = 20  # parts in which large changes are made, so that the loops stay on their branch
+CLOSED = 1e-10  # of the mechanism's length
+MOST_ITERATIONS = 50
+
+
+@dataclass(frozen=True)
+class Assembled:
+    """The closed scene; how far every joint (m) and body (m, rad) has moved; lengths before and after."""
+
+    scene: Scene
+    joints: dict[str, float]
+    bodies: dict[str, tuple[float, float]]
+    lengths: dict[str, tuple[float, float]]
+
+
+class _Reshaped(Model):
+    """A model whose bodies have some of their points (world, t = 0) elsewhere, by body and point."""
+
+    def __init__(self, scene: Scene, elsewhere: Mapping[tuple[str, Point], np.ndarray]):
+        self._elsewhere = elsewhere
+        super().__init__(scene)
+
+    def point(self, name: str, point: Sequence[float]) -> np.ndarray:
+        x, y, z = point
+        return super().point(name, tuple(self._elsewhere.get((name, (x, y, z)), point)))
+
+
+def assemble(scene: Scene, lengths: Mapping[tuple[str, str], float]) -> Assembled:
+    """The scene with the given distances (m) between pairs of joints on a link, its loops closed again.
+
+    The points of a link move as little as gives it its lengths; then the bodies move, in the metric of
+    their masses, until every joint holds.  Masses, inertias and velocities stay.  Raises SceneError for
+    joints that share no link, or where the loops cannot be closed with these lengths.
+    """
+    pairs = {pair: _shared(scene, *pair) for pair in lengths}
+    shifts = _shifts(scene, lengths, pairs)
+    q = Model(scene).start()
+    for share in np.linspace(0.0, 1.0, SHARES + 1)[1:]:
+        model = _Reshaped(scene, {key: np.array(key[1]) + share * shift for key, shift in shifts.items()})
+        q, phi = solve_positions(model, 0.0, q)
+        if np.abs(phi).max(initial=0.0) > CLOSED * max(1.0, scene_length(model)):
+            raise SceneError([_open(model, phi, share)])
+    return _compared(scene, placed(model, q), pairs)
+
+
+def _shared(scene: Scene, first: str, second: str) -> str:
+    """The link that two joints share."""
+    known = {joint.name for joint in scene.joint}
+    for name in (first, second):
+        if name not in known:
+            raise SceneError(
+                [f"length {first}-{second}: no joint {name!r}; joints: {', '.join(sorted(known))}"]
+            )
+    both = [b for b in scene.joint_named(first).bodies if b in scene.joint_named(second).bodies]
+    if not both:
+        raise SceneError([f"length {first}-{second}: the joints {first!r} and {second!r} share no link"])
+    return next((b for b in both if b != GROUND), GROUND)
+
+
+def _anchor(scene: Scene, joint: str, body: str) -> Point:
+    found = scene.joint_named(joint)
+    return found.anchor_pair[found.bodies.index(body)]
+
+
+def _shifts(
+    scene: Scene, lengths: Mapping[tuple[str, str], float], pairs: Mapping[tuple[str, str], str]
+) -> dict[tuple[str, Point], np.ndarray]:
+    """Changes (3,) of the points of each link, least in sum of squares, that give it its lengths."""
+    found: dict[tuple[str, Point], np.ndarray] = {}
+    for body in set(pairs.values()):
+        own = {pair: lengths[pair] for pair, b in pairs.items() if b == body}
+        points = list(dict.fromkeys(_anchor(scene, joint, body) for pair in own for joint in pair))
+        ends = [tuple(points.index(_anchor(scene, joint, body)) for joint in pair) for pair in own]
+        moved = _with_distances(body, np.array(points), ends, list(own.values()))
+        found |= {(body, point): new - np.array(point) for point, new in zip(points, moved, strict=True)}
+    return found
+
+
+def _with_distances(
+    body: str, points: np.ndarray, ends: list[tuple[int, ...]], lengths: list[float]
+) -> np.ndarray:
+    """Points (n, 3) near the given ones with distances between ends: Gauss–Newton of least norm."""
+    x, wanted = points.copy(), np.array(lengths)
+    for _ in range(MOST_ITERATIONS):
+        apart = np.array([x[b] - x[a] for a, b in ends])
+        now = np.linalg.norm(apart, axis=1)
+        if np.abs(now - wanted).max() <= 1e-14 * wanted.max():
+            return x
+        if now.min() == 0:
+            break
+        rows = np.zeros((len(ends), *x.shape))
+        for row, (a, b), d in zip(rows, ends, apart / now[:, None], strict=True):
+            row[b] += d
+            row[a] -= d
+        x += (np.linalg.pinv(rows.reshape(len(ends), -1)) @ (wanted - now)).reshape(x.shape)
+    if np.abs(now - wanted).max() > 1e-12 * wanted.max():
+        raise SceneError([f"body[{body}]: no link has these lengths between its joints"])
+    return x
+
+
+def _open(model: Model, phi: np.ndarray, share: float) -> str:
+    worst = int(np.argmax(np.abs(phi)))
+    return (
+        f"joint[{model.row_joint[worst]}]: the loops cannot be closed with these lengths; at "
+        f"{100 * share:.0f} % of the changes {abs(phi[worst]):.3g} is left open"
+    )
+
+
+def _apart(scene: Scene, first: str, second: str, body: str) -> float:
+    return math.dist(_anchor(scene, first, body), _anchor(scene, second, body))
+
+
+def _compared(old: Scene, new: Scene, pairs: Mapping[tuple[str, str], str]) -> Assembled:
+    """How the new scene differs from the old."""
+    joints = {
+        a.name: max(map(math.dist, a.anchor_pair, b.anchor_pair))
+        for a, b in zip(old.joint, new.joint, strict=True)
+    }
+    bodies = {
+        a.name: (
+            math.dist(a.position, b.position),
+            float(rotations.angle_between(np.array(a.orientation), np.array(b.orientation))),
+        )
+        for a, b in zip(old.body, new.body, strict=True)
+    }
+    lengths = {
+        f"{first}–{second}": (_apart(old, first, second, body), _apart(new, first, second, body))
+        for (first, second), body in pairs.items()
+    }
+    return Assembled(new, joints, bodies, lengths)

@@ -1,0 +1,63 @@
+"""A scene written anew at other poses of its bodies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mbref import rotations
+from mbref.equations.model import Model
+from mbref.scene import Joint, Scene
+
+
+def placed(model: Model, q: np.ndarray) -> Scene:
+    """The model's scene with its bodies at coordinates q (7 nb,), joints and points of loads carried along.
+
+    A joint's anchor is the one on its second body, its axis the one on its first.
+    """
+    scene, zeros = model.scene, np.zeros((1, model.nb, 6))
+    motion = model.motion(q.reshape(1, model.nb, 7), zeros, zeros)
+    bodies = [
+        body.model_copy(update={"position": _three(r), "orientation": tuple(p.tolist())})
+        for body, r, p in zip(scene.body, motion["position"][0], motion["orientation"][0], strict=True)
+    ]
+    joints = [joint.model_copy(update=_carried(model, joint, q)) for joint in scene.joint]
+    loads = [load.model_copy(update=_points(model, load, q)) for load in scene.load]
+    return scene.with_(body=bodies, joint=joints, load=loads)
+
+
+def _carried(model: Model, joint: Joint, q: np.ndarray) -> dict[str, Any]:
+    """The places of a joint that its type has."""
+    ends = tuple(place(model, *end, q) for end in zip(joint.bodies, joint.anchor_pair, strict=True))
+    axes = tuple(_direction(model, *end, q) for end in zip(joint.bodies, joint.directions * 2, strict=False))
+    every: dict[str, Any] = {"anchor": ends[1], "anchors": ends, "axis": axes[:1] and axes[0], "axes": axes}
+    return {key: value for key, value in every.items() if key in type(joint).model_fields}
+
+
+def _points(model: Model, load: Any, q: np.ndarray) -> dict[str, Any]:
+    if load.type == "force":
+        return {"point": place(model, load.body, load.point, q)}
+    if load.type == "spring":
+        ends = zip(load.bodies, load.points, strict=True)
+        return {"points": tuple(place(model, *end, q) for end in ends)}
+    return {}
+
+
+def place(model: Model, body: str, point: tuple[float, float, float], q: np.ndarray) -> tuple[float, ...]:
+    """World place at coordinates q of a point (world, t = 0) that a body carries."""
+    b, local = model.index(body), model.point(body, point)
+    if b == model.nb:
+        return _three(local)
+    r, p = np.split(q.reshape(model.nb, 7)[b], [3])
+    return _three(r + rotations.rotate(p, local))
+
+
+def _direction(model: Model, body: str, axis: tuple[float, float, float], q: np.ndarray) -> tuple[float, ...]:
+    b, local = model.index(body), model.direction(body, axis)
+    return _three(local if b == model.nb else rotations.rotate(q.reshape(model.nb, 7)[b, 3:], local))
+
+
+def _three(vector: np.ndarray) -> tuple[float, ...]:
+    """Without the rounding errors of zeros."""
+    return tuple((np.round(vector, 15) + 0.0).tolist())

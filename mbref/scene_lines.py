@@ -1,0 +1,59 @@
+"""Lines of a scene file: where a faulty field stands."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+TABLE = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]\]?")
+KEY = re.compile(r"\s*([\w-]+|\"[^\"]*\")\s*=")
+NAME = re.compile(r"\s*(?:name|joint)\s*=\s*[\"']([^\"']*)[\"']")
+PATH = re.compile(r"(\w+)(?:\[([^\]]*)\])?(?:\.(\w+))?")
+
+Line = tuple[int, str, int, str]  # number from 1, table, its place among its kind, key ("" of a header)
+
+
+def with_lines(text: str, faults: Sequence[str]) -> list[str]:
+    """The faults, each with the line of the file that its path leads to, where there is one."""
+    lines = list(_lines(text))
+    names = _names(text, lines)
+    return [f"{fault}{_told(_line_of(lines, names, fault))}" for fault in faults]
+
+
+def _told(line: int | None) -> str:
+    return "" if line is None else f" (line {line})"
+
+
+def _lines(text: str) -> Iterator[Line]:
+    """Headers and keys."""
+    table, counts = "", {"": 0}
+    for number, line in enumerate(text.splitlines(), 1):
+        if header := TABLE.match(line):
+            table = header[1]
+            counts[table] = counts.get(table, -1) + 1
+            yield number, table, counts[table], ""
+        elif key := KEY.match(line):
+            yield number, table, counts[table], key[1].strip('"')
+
+
+def _names(text: str, lines: Sequence[Line]) -> dict[tuple[str, str], int]:
+    """Place of the first entry of each name (of a driver: its joint's), by table and name."""
+    rows, found = text.splitlines(), dict[tuple[str, str], int]()
+    for number, table, place, key in lines:
+        if key == ("joint" if table == "driver" else "name") and (name := NAME.match(rows[number - 1])):
+            found.setdefault((table, name[1]), place)
+    return found
+
+
+def _line_of(lines: Sequence[Line], names: dict[tuple[str, str], int], fault: str) -> int | None:
+    """The line of the field, or of its entry's header where it is missing; None for other files' layouts."""
+    match = PATH.match(fault)
+    if not match:
+        return None
+    table, entry, key = match.groups()
+    if entry is None or not any(line[1] == table for line in lines):
+        table, place, key = "", 0, match[1]
+    else:
+        place = names.get((table, entry), int(entry) if entry.isdigit() else -1)
+    at = {(t, p, k): number for number, t, p, k in reversed(lines)}
+    return at.get((table, place, key or ""), at.get((table, place, "")))

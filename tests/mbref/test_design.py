@@ -1,0 +1,155 @@
+"""Design: closed loops / given lengths; redundancy along the motion / counts; exchanges / counts again."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from mbref.cli.scene_files import template
+from mbref.design.along_motion import along_motion, general_pose
+from mbref.design.assemble import assemble
+from mbref.design.exchange import _as, exchanges
+from mbref.design.placed import placed
+from mbref.equations.diagnosis import counts
+from mbref.equations.initial_state import solve_positions
+from mbref.equations.model import Model
+from mbref.scene import Scene, SceneError
+from mbref.scenes import find_scene
+
+SPATIAL = ("bennett", "spatial_slider_crank", "sarrus", "andrews_squeezer")
+
+
+def violation(scene: Scene) -> float:
+    model = Model(scene.with_(driver=()))
+    return float(np.abs(model.blocks(0.0, model.start(), np.zeros(model.n)).phi).max())
+
+
+def length(scene: Scene, first: str, second: str) -> float:
+    return math.dist(scene.joint_named(first).anchor, scene.joint_named(second).anchor)
+
+
+def test_a_four_bar_gets_its_lengths_and_closes():
+    wanted = {("A", "B"): 0.3, ("B", "C"): 0.55, ("C", "D"): 0.45, ("A", "D"): 0.52}
+    found = assemble(find_scene("four_bar_gravity"), wanted)
+    assert violation(found.scene) < 1e-12
+    for pair, d in wanted.items():
+        assert length(found.scene, *pair) == pytest.approx(d, abs=1e-12)
+        assert found.lengths[f"{pair[0]}–{pair[1]}"] == pytest.approx((0.5, d), abs=1e-12)
+    assert found.joints["C"] == pytest.approx(
+        math.dist(found.scene.joint[2].anchor, find_scene("four_bar_gravity").joint[2].anchor)
+    )
+    crank = found.scene.body[0]
+    middle = np.mean([found.scene.joint_named(j).anchor for j in "AB"], axis=0)
+    assert np.allclose(crank.position, middle, atol=1e-12), "the centre of mass is no longer in the middle"
+
+
+def test_a_spatial_slider_crank_closes_with_a_longer_rod():
+    scene = find_scene("spatial_slider_crank_gravity")
+    before = length(scene, "B", "C") if "C" in {j.name for j in scene.joint} else length(scene, "B", "D")
+    names = [j.name for j in scene.joint if "rod" in j.bodies]
+    found = assemble(scene, {tuple(names[:2]): before * 1.1})
+    assert violation(found.scene) < 1e-12
+    assert length(found.scene, *names[:2]) == pytest.approx(before * 1.1, abs=1e-12)
+
+
+def test_a_plate_gets_three_lengths():
+    scene = find_scene("andrews_squeezer")
+    plate = [j.name for j in scene.joint if "K3" in j.bodies]
+    assert len(plate) >= 2
+    found = assemble(scene.with_(driver=()), {(plate[0], plate[1]): 1.01 * length(scene, *plate[:2])})
+    assert violation(found.scene) < 1e-12
+
+
+def test_nothing_moves_where_nothing_is_asked():
+    scene = find_scene("bennett")
+    found = assemble(scene, {})
+    assert max(found.joints.values()) < 1e-12 and max(max(m) for m in found.bodies.values()) < 1e-7
+
+
+@pytest.mark.parametrize(
+    ("pair", "size", "says"),
+    [
+        (("A", "B"), 5.0, r"joint\[.\]: the loops cannot be closed with these lengths"),
+        (("A", "X"), 1.0, "no joint 'X'; joints: A, B, C, D"),
+        (("A", "C"), 1.0, "'A' and 'C' share no link"),
+    ],
+)
+def test_lengths_that_cannot_be(pair, size, says):
+    with pytest.raises(SceneError, match=says):
+        assemble(find_scene("four_bar_gravity"), {pair: size})
+
+
+def test_no_plate_has_a_side_longer_than_the_others_together():
+    scene = find_scene("four_bar_gravity")
+    third = scene.joint[1].model_copy(
+        update={"name": "P", "bodies": ("crank", "flag"), "anchor": (0.1, 0.3, 0.0)}
+    )
+    flag = scene.body[0].model_copy(update={"name": "flag", "position": (0.1, 0.4, 0.0)})
+    scene = scene.with_(body=(*scene.body, flag), joint=(*scene.joint, third))
+    with pytest.raises(SceneError, match=r"body\[crank\]: no link has these lengths"):
+        assemble(scene, {("A", "B"): 0.5, ("A", "P"): 0.1, ("B", "P"): 0.2})
+
+
+@pytest.mark.parametrize("name", SPATIAL)
+def test_a_scene_written_at_another_pose_is_the_same_mechanism(name):
+    scene = find_scene(name).with_(driver=())
+    model = Model(scene)
+    elsewhere = placed(model, general_pose(model))
+    assert violation(elsewhere) < 1e-9
+    assert np.ptp([a.position for a in (scene.body[0], elsewhere.body[0])], axis=0).max() > 1e-5
+    back, _ = solve_positions(Model(elsewhere), 0.0, Model(elsewhere).start())
+    assert np.allclose(back, Model(elsewhere).start(), atol=1e-9)
+    assert counts(elsewhere).rank == counts(placed(Model(elsewhere), back)).rank
+
+
+@pytest.mark.parametrize("name", ["planar_slider_crank", "four_bar", "spatial_slider_crank"])
+def test_an_exchange_leaves_the_freedoms_and_no_redundancy(name):
+    scene = find_scene(name).with_(driver=())
+    before = counts(placed(Model(scene), general_pose(Model(scene))))
+    found = exchanges(scene)
+    assert bool(found) == (before.redundant > 0), (found, before)
+    for swap in found:
+        model = Model(scene)
+        at = placed(model, general_pose(model))
+        after = counts(at.with_(joint=tuple(_as(j, swap[j.name]) if j.name in swap else j for j in at.joint)))
+        assert after.redundant == 0, swap
+        assert after.degrees_of_freedom == before.degrees_of_freedom, swap
+
+
+def test_redundancy_within_the_plane_is_not_removed_by_exchanges():
+    """Two rockers of equal length beside the crank: their lengths, not their joints, are redundant."""
+    assert exchanges(find_scene("five_bar")) == [] and counts(find_scene("five_bar")).redundant > 0
+
+
+def test_singular_positions_along_the_motion_are_found():
+    """Crank and rod of equal length pass one where both stand across the guide; unequal ones never do."""
+    equal, unequal = find_scene("planar_slider_crank_equal"), find_scene("planar_slider_crank")
+    passed = along_motion(equal.with_(duration=0.25))
+    assert passed.nearest < 0.01 and passed.redundant == counts(equal).redundant
+    far = along_motion(unequal.with_(duration=0.25))
+    assert far.nearest > 0.05 and far.redundant == counts(unequal).redundant
+
+
+def test_rounded_axes_are_told_as_rounding():
+    """The axis of one joint off by 2e-7: rank 17 at every pose but for that."""
+    scene = find_scene("planar_slider_crank_gravity").with_(duration=0.2)
+    tilted = scene.with_("joint[B].axis", [2e-7, 0.0, 1.0])
+    assert along_motion(scene).by_rounding == ()
+    found = along_motion(tilted)
+    assert found.redundant == along_motion(scene).redundant
+    assert found.by_rounding and 1e-9 < max(found.by_rounding) < 1e-6
+
+
+def test_template_is_a_scene_and_so_are_its_comments(tmp_path):
+    (tmp_path / "plain.toml").write_text(template())
+    plain = Scene.from_file(tmp_path / "plain.toml")
+    assert counts(plain).degrees_of_freedom == 1
+    words = "[[ type body bodies point force stiffness damping natural joint polynomial sine orientation"
+    entries = tuple(f"# {word}" for word in f"{words} velocity angular".split())
+    lines = [line[2:] if line.startswith(entries) else line for line in template().splitlines()]
+    (tmp_path / "whole.toml").write_text("\n".join(lines))
+    whole = Scene.from_file(tmp_path / "whole.toml")
+    assert {load.type for load in whole.load} == {"moment", "force", "spring", "torsion_spring"}
+    assert whole.driver and whole.body[0].angular_velocity == (0.0, 0.0, 5.0)

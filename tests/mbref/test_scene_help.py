@@ -1,0 +1,163 @@
+"""Help with scene files: lines and suggestions in faults, probable slips, the schema, the commands."""
+
+from __future__ import annotations
+
+import json
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+
+from mbref.cli import main
+from mbref.cli.output import Lines
+from mbref.cli.scene_files import schema, template
+from mbref.motion import Motion
+from mbref.scene import Scene, SceneError
+from mbref.scene_slips import link_lengths, probable_slips
+from mbref.scenes import SCENES, find_scene
+
+
+def faults(tmp_path: Path, *changes: tuple[str, str]) -> list[str]:
+    text = template()
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    (tmp_path / "my.toml").write_text(text)
+    with pytest.raises(SceneError) as caught:
+        Scene.from_file(tmp_path / "my.toml")
+    return caught.value.faults
+
+
+def line_of(text: str) -> int:
+    return next(n for n, line in enumerate(template().splitlines(), 1) if line.startswith(text))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "path", "says", "line"),
+    [
+        ("mass = 2.0", "mass = -2.0", "body[rod].mass", "must be positive", "mass = 2.0"),
+        ("gravity =", "gravty =", "gravty", "did you mean 'gravity'?", "gravity"),
+        ("anchor = [0.2", "ancor = [0.2", "joint[B].ancor", "did you mean 'anchor'?", "anchor = [0.2"),
+        ('"rod", "slider"', '"rood", "slider"', "joint[C].bodies[0]", "did you mean 'rod'?",
+         'bodies = ["rod", "s'),
+        ('type = "translational"', 'type = "translatonal"', "joint[D].type", "did you mean 'translational'?",
+         'type = "translational"'),
+        ("duration = 2.0", "duration = 0.0", "duration", "must be positive", "duration"),
+        ('body = "crank"', 'body = "crnk"', "load[0].body", "did you mean 'crank'?", 'body = "crank"'),
+    ],
+)  # fmt: skip
+def test_a_fault_has_its_line_and_a_suggestion(tmp_path, old, new, path, says, line):
+    told = [fault for fault in faults(tmp_path, (old, new)) if fault.startswith(f"{path}: ")]
+    assert len(told) == 1 and says in told[0] and told[0].endswith(f"(line {line_of(line)})"), told
+
+
+def test_a_missing_field_has_the_line_of_its_entry(tmp_path):
+    found = faults(tmp_path, ("mass = 1.5\n", ""))
+    entry = line_of('name = "slider"') - 1
+    assert found == [
+        f"body[slider].mass: is missing; give mass and inertia, or neither (kinematics) (line {entry})"
+    ]
+
+
+def test_two_bodies_of_a_name_are_told_by_place(tmp_path):
+    (found,) = [f for f in faults(tmp_path, ('name = "rod"', 'name = "crank"')) if "already" in f]
+    assert found.startswith("body[1].name: 'crank' is already the name of body[0] (line ")
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_no_built_in_scene_has_a_probable_slip(name):
+    assert probable_slips(SCENES[name]()) == []
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "says"),
+    [
+        ("gravity", [0.0, -9810.0, 0.0], "gravity: 9810 m/s² is 1e+03 times the earth's"),
+        ("body[rod].inertia", [1e3, 1e4, 1e4], "body[rod].inertia: suits a body"),
+        ("joint[D].anchor", [700.0, 0.0, 0.0], "body[slider]: C–D is 699"),
+    ],
+)
+def test_probable_slips(path, value, says):
+    (slip,) = probable_slips(find_scene("planar_slider_crank").with_(path, value))
+    assert slip.startswith(says), slip
+
+
+def test_angles_beyond_a_turn_are_probably_degrees():
+    scene = Scene.from_file(Path(__file__).parents[2] / "examples" / "door_closer.toml")
+    assert probable_slips(scene) == []
+    assert probable_slips(scene.with_("load[0].natural_angle", -69.0)) == [
+        "load[0].natural_angle: -69 rad is more than a turn; is it in degrees?"
+    ]
+
+
+def test_lengths_of_links():
+    assert link_lengths(find_scene("four_bar"))["coupler"] == {"B–C": pytest.approx(0.5)}
+    assert set(link_lengths(find_scene("four_bar"))) == {"crank", "coupler", "rocker", "ground"}
+
+
+def test_the_shipped_schema_is_the_models_and_knows_every_field():
+    shipped = json.loads((files("mbref") / "templates" / "scene.schema.json").read_text())
+    assert shipped == schema(), "mbref schema > mbref/templates/scene.schema.json renews it"
+    assert set(shipped["properties"]) == set(Scene.model_fields)
+    body = shipped["$defs"]["Body"]["properties"]
+    assert "array" in json.dumps(body["inertia"]) and shipped["$defs"]["Revolute"]["required"] == [
+        "name", "bodies", "anchor", "axis",
+    ]  # fmt: skip
+
+
+def test_new_draw_assemble_and_diagnose(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "my.toml"]) == 0
+    assert main(["new", "my.toml"]) == 2
+    assert "is there already" in capsys.readouterr().err
+    assert main(["draw", "my.toml"]) == 0 and (tmp_path / "my_mechanism.svg").read_text().startswith("<svg")
+    assert main(["draw", "my.toml", "--view=-60,20", "--out", "my.png"]) == 0
+    assert (tmp_path / "my.png").read_bytes().startswith(b"\x89PNG")
+    assert main(["draw", "my.toml", "--out", "my.jpg"]) == 2
+    assert main(["assemble", "my.toml", "--length", "A-B=0.25", "--out", "closed.toml"]) == 0
+    out = capsys.readouterr().out
+    assert "length A–B: 0.2 m, now 0.25 m" in out and "joint B: moved by 0.05 m" in out, out
+    assert Scene.from_file("closed.toml").joint_named("B").anchor == pytest.approx((0.25, 0, 0))
+    assert main(["assemble", "my.toml", "--length", "A-B=-1"]) == 2
+    assert main(["diagnose", "closed.toml", "--start", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert found["redundant"] == 3 and found["links"]["crank"] == {"A–B": pytest.approx(0.25)}
+    assert {"A": "cylindrical", "B": "spherical"} in found["exchanges"] and found["along_motion"] is None
+
+
+def test_run_writes_csv_and_json_and_animate_a_moving_picture(tmp_path, capsys):
+    run = ["run", "planar_slider_crank", "--duration", "0.01", "--samples", "3"]
+    assert main([*run, "--out", str(tmp_path / "run.json")]) == 0
+    assert Motion.load(tmp_path / "run.json").times[-1] == 0.01
+    assert main([*run, "--out", str(tmp_path / "run.csv")]) == 0
+    assert (tmp_path / "run.csv").read_text().startswith("time,crank.orientation.w")
+    assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
+    assert main([*run, "--out", str(tmp_path / "run.txt")]) == 2
+    moving = tmp_path / "run.svg"
+    assert main(["animate", *run[1:], "--out", str(moving)]) == 0
+    assert "<animate " in moving.read_text()
+
+
+def test_lists_fit_eighty_columns_and_have_every_name(capsys):
+    assert main(["list"]) == 0
+    out = capsys.readouterr().out
+    assert max(map(len, out.splitlines())) <= 80 and all(name in out for name in SCENES)
+    assert all(f"{name} " in out for name in ("mpi-gs-literal", "baumgarte", "dop853"))
+
+
+def test_version_and_completion(capsys):
+    with pytest.raises(SystemExit, match="0"):
+        main(["--version"])
+    assert capsys.readouterr().out.startswith("mbref 0.1.0 (Python 3.")
+    assert main(["completion", "bash"]) == 0
+    assert "animate" in capsys.readouterr().out
+
+
+def test_progress_in_a_pipe_is_a_line_every_ten_seconds(capsys):
+    now = iter([0.0, 1.0, 12.0, 13.0, 30.0])
+    lines = Lines("simulating", 2.0, lambda: next(now))
+    for done in (0.1, 0.5, 0.6, 1.5):
+        lines(done)
+    assert capsys.readouterr().err.splitlines() == [
+        "simulating: 25 %, about 36 s left", "simulating: 75 %, about 10 s left",
+    ]  # fmt: skip
