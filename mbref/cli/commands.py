@@ -7,8 +7,13 @@ import sys
 from collections.abc import Sequence
 
 from mbref import __version__
-from mbref.cli import diagnose, ensemble, pictures, run, scene_files, tables
+from mbref.cli.diagnose import add as add_diagnose
+from mbref.cli.ensemble import add as add_ensemble
 from mbref.cli.options import TEXT
+from mbref.cli.pictures import add as add_pictures
+from mbref.cli.run import add as add_run
+from mbref.cli.scene_files import add as add_scene_files
+from mbref.cli.tables import add as add_tables
 from mbref.method import MethodError
 from mbref.scene import SceneError
 
@@ -57,8 +62,8 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     whole.add_argument("--version", action="version", version=_versions())
     commands = whole.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for module in (scene_files, pictures, diagnose, run, ensemble, tables):
-        module.add(commands)
+    for add in (add_scene_files, add_pictures, add_diagnose, add_run, add_ensemble, add_tables):
+        add(commands)
     return whole
 
 
