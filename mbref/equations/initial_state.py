@@ -17,6 +17,7 @@ LARGE = 40  # rows; above, dense singular values take longer than sparse factors
 GROSS = 0.05  # of the scene's length, or of its speed: a larger inconsistency is a fault
 MOST_ITERATIONS = 30
 OPEN_WEIGHT, REPEATS = 1e-4, 5  # weight of open velocities beside given ones, and how often it is compensated
+LEAST_WEIGHT = 1e-6  # of a turn that no inertia resists, relative to the largest mass or inertia
 
 
 @dataclass(frozen=True)
@@ -170,7 +171,8 @@ def _sparse_velocities(
         aim = aim + np.where(given, v - x, 0.0)
     chosen = np.flatnonzero(given)
     selection = csr_array((np.ones(chosen.size), (np.arange(chosen.size), chosen)), (chosen.size, model.n))
-    x = MinimumNorm(csr_array(vstack([jacobian, selection])), model.mass)(np.append(nu, x[given]))
+    weight = np.where(model.mass > 0, model.mass, LEAST_WEIGHT * np.max(model.mass))
+    x = MinimumNorm(csr_array(vstack([jacobian, selection])), weight)(np.append(nu, x[given]))
     residual = np.abs(jacobian @ np.where(given, v, x) - nu)
     miss, wanted = np.abs((x - v) / scale)[given], np.abs(v / scale)[given]
     if np.max(miss, initial=0.0) > GROSS * np.max(wanted, initial=0.0):

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting
+from crosscheck.study import grid, timings
 from crosscheck.study.grid import Case, default_cases, key, run_case, run_here, study
+from mbref.records import append
 from mbref.scene import Body, Force, Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Trajectory
@@ -150,16 +152,44 @@ def untimed(records: list[dict]) -> list[dict]:
         case("a", "RECORDER"),
         case("a", scene=still(gravity=(0.0, 0.0, -9.81))),
         case("a")._replace(times=TIMES[:2]),
+        case("a")._replace(times=TIMES + [0.0, 0.0, 0.1]),
         case("a")._replace(setting=Setting("a", {"seconds": 0.6})),
         case("a", "THREADS"),
     ],
-    ids=["family", "engine", "scene", "times", "options", "version"],
+    ids=["family", "engine", "scene", "fewer times", "times", "options", "engine with threads"],
 )
 def test_keys_of_different_cases_differ(other: Case, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     assert key(other) != key(case("a"))
     assert key(other) == key(other._replace(time_limit=1.0)), "the time limit is no part of a result"
+
+
+def test_key_of_another_version_differs(monkeypatch: pytest.MonkeyPatch):
+    first = key(case("a"))
+    monkeypatch.setattr(grid, "_version", lambda engine: "another")
+    assert key(case("a")) != first
+
+
+def test_timing_goes_on_where_one_of_a_scene_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    cases = [case("a"), case("b")]
+    records = study(cases, ThreadPoolExecutor(1))
+    path = tmp_path / "timings.jsonl"
+    timing = {"median": 0.2, "repeats": 5}
+    append(path, {"key": key(cases[0]), "seconds": 0.1, "timing": timing})
+    asked = []
+
+    def timed(cases, records, repeats, notice):
+        asked.extend(case.setting.family for case in cases)
+        return [{**r, "cost": {**r["cost"], "seconds": 0.3}, "timing": timing} for r in records]
+
+    monkeypatch.setattr(timings, "timed", timed)
+    done = timings.with_timings(cases, records, path, lambda _: None)
+    assert asked == ["a", "b"], "runs of a scene take turns: all are timed where one is missing"
+    assert [r["timing"] for r in done] == [timing, timing]
+    asked.clear()
+    timings.with_timings(cases, records, path, lambda _: None)
+    assert asked == [], "a stored timing was repeated"
 
 
 def test_default_cases_are_the_settings_of_the_engines_that_can():

@@ -163,6 +163,35 @@ def test_reactions_do_no_work_and_balance_the_accelerations(name: str) -> None:
         )
 
 
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("setting", ["mujoco", "pinocchio"])
+def test_reported_reactions_obey_newton_and_euler(name: str, setting: str) -> None:
+    """Each body's inertial wrench is that of its loads, its weight and the reactions reported at its joints."""
+    scene, run = ALL[name], trajectory(name, setting)
+    for k, t in enumerate(run.times):
+        left = inertial_wrenches(scene, run, k) - applied_wrenches(scene, run, k)
+        scale = 1 + abs(inertial_wrenches(scene, run, k)).max() + abs(left).max()
+        gap = abs(left - reaction_wrenches(scene, run, k)).max()
+        assert gap < 1e-7 * scale, f"{name}, {setting}: {gap:.2e} of {scale:.3g} left at {t}"
+
+
+def reaction_wrenches(scene: Scene, run: Trajectory, k: int) -> np.ndarray:
+    """(nb, 6): the reported reactions about the centres of mass, opposite on a joint's first body."""
+    wrenches = np.zeros((len(scene.body) + 1, 6))
+    for joint in scene.joint:
+        force, moment = run.reactions[joint.name][k, :3], run.reactions[joint.name][k, 3:]
+        first, second = map(scene.body_index, joint.bodies)
+        anchor = np.array(joint.anchor_pair[1])
+        if second >= 0:
+            body = scene.body[second]
+            back = rotations.rotate(rotations.conjugate(body.orientation), anchor - body.position)
+            anchor = run.position[k, second] + rotations.rotate(run.orientation[k, second], back)
+        for b, sign in ((first, -1.0), (second, 1.0)):
+            arm = anchor - (run.position[k, b] if b >= 0 else 0.0)
+            wrenches[b] += sign * np.concatenate([force, moment + np.cross(arm, force)])
+    return wrenches[:-1]
+
+
 def null_space(rows: np.ndarray, n: int) -> np.ndarray:
     if not len(rows):
         return np.eye(n)

@@ -137,6 +137,16 @@ def test_sparse_start_and_dense_start(monkeypatch):
     assert sparse.report() == dense.report()
 
 
+def test_sparse_start_of_slender_rods(monkeypatch):
+    """Rods without inertia about their length, whose velocities are left open."""
+    scene = find_scene("four_bar_chain[3]")
+    slender = {"inertia": (0.0, 1.0, 1.0), "angular_velocity": None, "velocity": None}
+    model = Model(scene.with_(body=tuple(body.model_copy(update=slender) for body in scene.body)))
+    monkeypatch.setattr(initial_state, "LARGE", 0)
+    start = initial_state.consistent_start(model)
+    assert np.abs(start.v).max() < 1e-12, "nothing moves the rods"
+
+
 @pytest.mark.parametrize(
     "name", ["five_bar", "spatial_slider_crank", "four_bar_chain[5]", "slider_crank_chain[3]"]
 )

@@ -18,11 +18,13 @@ ANSWERS, METRICS = "tests/crosscheck/test_answers.py", "tests/crosscheck/test_me
 KINEMATICS, FORMULAS = "tests/crosscheck/test_kinematics.py", "tests/mbref/test_formulations.py"
 RICHARDSON, GAUSS = "tests/crosscheck/test_limits.py", "tests/crosscheck/test_gauss.py"
 PRIMITIVES = "tests/properties/test_primitives.py"
+TREE, STUDY = "tests/crosscheck/test_tree_engines.py", "tests/crosscheck/test_study.py"
 
 P, L = "mbref/equations/primitives.py", "mbref/equations/loads.py"
 D, T = "crosscheck/engines/driver_motion.py", "crosscheck/judge/joint_residuals.py"
 M, E = "crosscheck/judge/metrics.py", "crosscheck/judge/energy.py"
 A, R = "crosscheck/processes/answer.py", "mbref/records.py"
+G, RE = "crosscheck/study/grid.py", "crosscheck/engines/tree_reactions.py"
 V, F = "mbref/scene_validation.py", "mbref/scene_fields.py"
 
 
@@ -188,6 +190,16 @@ DEFECTS = (
     Defect(A, "reached.size < times.size:", "reached.size < 0:", ANSWERS),
     Defect(A, "array.shape != shape", "array.ndim != len(shape)", ANSWERS),
     Defect(A, 'x if n.endswith("seconds") else int(x)', "x", ANSWERS),
+    # reactions of the tree engines
+    Defect(RE, "+ load.damping * rate)\n    axis", ")\n    axis", TREE),
+    Defect(RE, "link, joint.anchor_pair[1])", "link, joint.anchor_pair[0])", TREE),
+    Defect(RE, "if child_is_second else -carried[k]", "if child_is_second else carried[k]", TREE),
+    Defect(RE, "np.cross(omega, inertia @ omega)", "np.cross(inertia @ omega, omega)", TREE),
+    Defect(RE, "force = force + rod.mass / 2 *", "force = force + rod.mass *", TREE),
+    Defect("crosscheck/study/timings.py", "if any(records[i]", "if all(records[i]", STUDY),
+    Defect(G, "list(map(float, case.times)), case.engine", "len(case.times), case.engine", STUDY),
+    Defect(G, "_version(case.engine),\n", '"",\n', STUDY),
+    Defect(G, "dict(case.setting.options),\n    ]", "\n    ]", STUDY),
     # judge
     Defect(T, "driver.sine.phase + derivative", "derivative", JUDGE),
     Defect(T, "driver.sine.amplitude * w**derivative", "driver.sine.amplitude * w", JUDGE),
@@ -214,7 +226,7 @@ DEFECTS = (
     Defect(M, "np.where(are_lengths[name], length, 1.0)", "length", METRICS),
     Defect(M, 'Metric(_violation(1), "rad/s"', 'Metric(_violation(1), "rad/s²"', JUDGE),
     Defect(M, '"scd": Metric(_correct_digits, "digits"', '"scd": Metric(_correct_digits, ""', JUDGE),
-    Defect(M, "else math.inf\n\n\n_error", "else 0.0\n\n\n_error", METRICS),
+    Defect(M, "np.isfinite(series).all() else math.inf", "np.isfinite(series).all() else 0.0", METRICS),
     Defect(M, "(length * trajectory.angular_velocity,", "(trajectory.angular_velocity,", METRICS),
     Defect(E, "np.abs(gains.sum(axis=0)) / scale", "np.abs(gains.max(axis=0)) / scale", METRICS),
     Defect(E, "turning) / 2", "turning)", METRICS),
