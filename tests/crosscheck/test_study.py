@@ -152,7 +152,7 @@ def untimed(records: list[dict]) -> list[dict]:
         case("a", "RECORDER"),
         case("a", scene=still(gravity=(0.0, 0.0, -9.81))),
         case("a")._replace(times=TIMES[:2]),
-        case("a")._replace(times=TIMES + [0.0, 0.0, 0.1]),
+        case("a")._replace(times=np.add(TIMES, (0.0, 0.0, 0.1))),
         case("a")._replace(setting=Setting("a", {"seconds": 0.6})),
         case("a", "THREADS"),
     ],

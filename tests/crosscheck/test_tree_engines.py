@@ -166,7 +166,7 @@ def test_reactions_do_no_work_and_balance_the_accelerations(name: str) -> None:
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("setting", ["mujoco", "pinocchio"])
 def test_reported_reactions_obey_newton_and_euler(name: str, setting: str) -> None:
-    """Each body's inertial wrench is that of its loads, its weight and the reactions reported at its joints."""
+    """A body's inertial wrench is that of its loads, its weight and the reactions at its joints."""
     scene, run = ALL[name], trajectory(name, setting)
     for k, t in enumerate(run.times):
         left = inertial_wrenches(scene, run, k) - applied_wrenches(scene, run, k)

@@ -53,9 +53,7 @@ def test_numpy_s_numbers_become_python_s():
     assert limits == Limits(rtol=0.5, atol=1.0, most_steps=7)
 
 
-@pytest.mark.parametrize(
-    "times", [[10**400], ["x"], [[0.0], [1.0, 2.0]], [math.nan], [1.0, 1.0]], ids=repr
-)
+@pytest.mark.parametrize("times", [[10**400], ["x"], [[0.0], [1.0, 2.0]], [math.nan], [1.0, 1.0]], ids=repr)
 def test_times_are_refused_by_name(times):
     with pytest.raises(ValueError, match=r"^times: "):
         simulate(SCENES["four_bar"](), "alf-dual+projection", times)
