@@ -10,7 +10,6 @@ does not matter to the motion.  All joints are revolute, so that three loops hav
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from mbref.scene import Body, Moment, Revolute, Scene, Spring
 from mbref.scenes.links import about_z
@@ -39,7 +38,7 @@ def andrews_squeezer() -> Scene:
         _on((0.0, 0.0), k1, RA), _on(f, k2, -DA), _on(B, k3, SB, -SA), _on(g, k4, 0.0, EA - E),
         _on(A, k5, TA, TB), _on(h, k6, ZF - FA), _on(A, k7, UB, -UA),
     )  # fmt: skip
-    bodies: Any = [
+    bodies = [
         Body(name=f"K{n}", mass=m, inertia=(i / 2, i / 2, i), position=(*centre, 0.0), orientation=about_z(k))
         for n, m, i, centre, k in zip(range(1, 8), MASS, MOMENT, centres, ANGLES, strict=True)
     ]
@@ -48,7 +47,7 @@ def andrews_squeezer() -> Scene:
         ("A5", "ground", "K5", A), ("A7", "ground", "K7", A), ("G", "K5", "K4", g), ("H", "K7", "K6", h),
         ("E3", "K2", "K3", e), ("E4", "K2", "K4", e), ("E6", "K2", "K6", e),
     )  # fmt: skip
-    joints: Any = [
+    joints = [
         Revolute(name=name, bodies=(first, second), anchor=(*place, 0.0), axis=Z)
         for name, first, second, place in hinges
     ]
@@ -58,7 +57,9 @@ def andrews_squeezer() -> Scene:
         natural_length=NATURAL_LENGTH,
     )  # fmt: skip
     motor = Moment(body="K1", moment=(0.0, 0.0, MOTOR))
-    return Scene(name="andrews_squeezer", duration=0.03, body=bodies, joint=joints, load=(motor, spring))
+    return Scene(
+        name="andrews_squeezer", duration=0.03, body=tuple(bodies), joint=tuple(joints), load=(motor, spring)
+    )
 
 
 def _on(start: tuple[float, float], angle: float, along: float, across: float = 0.0) -> tuple[float, float]:

@@ -8,13 +8,12 @@ Sizes and inertias are ours: links of 1 kg per metre, 0.3 m and 0.5 m, gravity a
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from mbref import rotations
 from mbref.scene import Body, Revolute, Scene
-from mbref.scenes.links import DENSITY, rod_inertia
+from mbref.scenes.links import DENSITY, rod_inertia, triple
 
 SHORT, LONG, TWIST = 0.3, 0.5, math.radians(30)  # m, m, rad of the short links
 OPENING = 1.0  # rad, the first hinge's angle
@@ -28,27 +27,28 @@ def bennett() -> Scene:
     angles = (OPENING, second, -OPENING, -second)
     sizes = ((SHORT, TWIST), (LONG, twist)) * 2
     place, frame = np.zeros(3), np.eye(3)
-    hinges: list[Any] = []
-    links: list[Any] = []
+    hinges, links = [], []
     for angle, (length, turn) in zip(angles, sizes, strict=True):
         hinges.append((place, frame[:, 2]))
         frame = frame @ _about(2, angle)
         links.append((place + length / 2 * frame[:, 0], frame, length))
         place, frame = place + length * frame[:, 0], frame @ _about(0, turn)
-    bodies: Any = [_link(f"link{n}", *link) for n, link in enumerate(links[1:], start=1)]
+    bodies = [_link(f"link{n}", *link) for n, link in enumerate(links[1:], start=1)]
     chain = ["ground", *(body.name for body in bodies), "ground"]
     order = (*hinges[1:], hinges[0])
-    joints: Any = [
-        Revolute(name=f"R{n + 1}", bodies=(chain[n], chain[n + 1]), anchor=point, axis=axis)
+    joints = [
+        Revolute(name=f"R{n + 1}", bodies=(chain[n], chain[n + 1]), anchor=triple(point), axis=triple(axis))
         for n, (point, axis) in enumerate(order)
     ]
-    return Scene(name="bennett", gravity=(0.0, 0.0, -9.81), duration=1.0, body=bodies, joint=joints)
+    return Scene(
+        name="bennett", gravity=(0.0, 0.0, -9.81), duration=1.0, body=tuple(bodies), joint=tuple(joints)
+    )
 
 
-def _link(name: str, middle: Any, frame: np.ndarray, length: float) -> Body:
+def _link(name: str, middle: np.ndarray, frame: np.ndarray, length: float) -> Body:
     mass = DENSITY * length
     return Body(
-        name=name, mass=mass, inertia=rod_inertia(mass, length), position=middle,
+        name=name, mass=mass, inertia=rod_inertia(mass, length), position=triple(middle),
         orientation=tuple(rotations.from_matrix(frame).tolist()),
     )  # fmt: skip
 

@@ -8,9 +8,9 @@ rods' inertia: a cuboid of 1 m x 0.1 m x 0.1 m, or thin, m/12 across and 0 about
 from __future__ import annotations
 
 import itertools
-from typing import Any
 
 from mbref.scene import Body, Revolute, Scene
+from mbref.scenes.links import midpoint, triple
 
 POINTS = (
     (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, -1.0, 0.0), (1.0, -1.0, 1.0), (0.0, -1.0, 1.0), (0.0, 0.0, 1.0),
@@ -22,14 +22,13 @@ SIDE = 0.1  # m, of the square section
 def bricard(thin: bool = False, name: str = "bricard") -> Scene:
     """Rods of square section, or thin ones."""
     across, about = (1 / 12, 0.0) if thin else ((1 + SIDE**2) / 12, SIDE**2 / 6)
-    bodies: Any = []
+    bodies = []
     for n, (start, end) in enumerate(itertools.pairwise(POINTS), start=1):
-        inertia: Any = tuple(about if p != q else across for p, q in zip(start, end, strict=True))
-        middle: Any = tuple((p + q) / 2 for p, q in zip(start, end, strict=True))
-        bodies.append(Body(name=f"rod{n}", mass=1.0, inertia=inertia, position=middle))
+        inertia = triple(about if p != q else across for p, q in zip(start, end, strict=True))
+        bodies.append(Body(name=f"rod{n}", mass=1.0, inertia=inertia, position=midpoint(start, end)))
     chain = ["ground", *(body.name for body in bodies), "ground"]
-    joints: Any = [
+    joints = [
         Revolute(name=f"P{n}", bodies=(chain[n], chain[n + 1]), anchor=point, axis=AXES[n % 3])
         for n, point in enumerate(POINTS)
     ]
-    return Scene(name=name, gravity=(0.0, -9.81, 0.0), duration=10.0, body=bodies, joint=joints)
+    return Scene(name=name, gravity=(0.0, -9.81, 0.0), duration=10.0, body=tuple(bodies), joint=tuple(joints))

@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from mbref.scene import Body
+
+Point = tuple[float, float, float]
 
 ROD_RADIUS = 0.01  # m
 DENSITY = 1.0  # kg per metre of link
 CRANK_RATE = 124.8  # rad/s, of every driven crank in the paper
+
+
+def triple(values: Iterable[float]) -> Point:
+    """Three numbers, of an array or an expression, as a scene takes them."""
+    x, y, z = map(float, values)
+    return x, y, z
+
+
+def midpoint(start: Point, end: Point) -> Point:
+    """The point half way between two."""
+    return triple((p + q) / 2 for p, q in zip(start, end, strict=True))
 
 
 def about_z(angle: float) -> tuple[float, float, float, float]:
