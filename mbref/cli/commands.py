@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from mbref import __version__
 from mbref.cli.diagnose import add as add_diagnose
 from mbref.cli.ensemble import add as add_ensemble
+from mbref.cli.exchange import add as add_exchange
 from mbref.cli.options import TEXT
 from mbref.cli.pictures import add as add_pictures
 from mbref.cli.run import add as add_run
@@ -62,7 +63,7 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     whole.add_argument("--version", action="version", version=_versions())
     commands = whole.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for add in (add_scene_files, add_pictures, add_diagnose, add_run, add_ensemble, add_tables):
+    for add in (add_scene_files, add_pictures, add_diagnose, add_run, add_ensemble, add_exchange, add_tables):
         add(commands)
     return whole
 

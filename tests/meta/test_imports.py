@@ -8,7 +8,7 @@ import pytest
 from imports import circles, graph, imported, sources, upward
 
 DOORS = (
-    r"scene|scene_fields|scene_joints|scene_loads|scenes(\.\w+)?|scene_validation|trajectory|rotations|records"
+    r"formats|scene|scene_fields|scene_joints|scene_loads|scenes(\.\w+)?|scene_validation|trajectory|rotations|records"
     r"|__version__"
 )
 ALLOWED = {  # package → the names of mbref that it may import
@@ -22,9 +22,9 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["rotations", "records", "trajectory"],
         ["scene", "scene_fields", "scene_joints", "scene_lines", "scene_loads", "scene_paths",
          "scene_validation"],
-        ["scenes", "scene_slips", "variation"], ["drawing"], ["joint_motion", "energy"], ["motion"],
-        ["kernels"], ["linear_algebra"], ["equations"], ["formulations"], ["stabilisation"], ["integrators"],
-        ["method"], ["specialised"], ["simulation"], ["design"], ["cli"], ["__main__"],
+        ["formats", "scenes", "scene_slips", "variation"], ["drawing"], ["joint_motion", "energy"],
+        ["motion"], ["kernels"], ["linear_algebra"], ["equations"], ["formulations"], ["stabilisation"],
+        ["integrators"], ["method"], ["specialised"], ["simulation"], ["design"], ["cli"], ["__main__"],
     ),
     "crosscheck": (
         ["judge"], ["engine"], ["engines"], ["processes"], ["study"], ["conformance"], ["paper"], ["cli"],

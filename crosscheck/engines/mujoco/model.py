@@ -63,6 +63,28 @@ def compiled(scene: Scene) -> Compiled:
     import mujoco
 
     tree = spanning_tree(scene)
+    built = _built(mujoco, scene, tree)
+    model = built.spec.compile()
+    _write_masses(mujoco, model, tree)
+    applied = np.zeros((model.nbody, 6))
+    for name, wrench in built.applied:
+        applied[model.body(name).id] += wrench
+    return Compiled(
+        model=model, tree=tree, applied=applied, rates=initial_rates(scene, tree),
+        links=np.array([model.body(_name(k)).id for k in range(len(tree.links))]),
+        single=(mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE),
+        drivers=[(model.equality(f"driver {d.joint}").id, d) for d in scene.driver],
+    )  # fmt: skip
+
+
+def description(scene: Scene, tree: Tree) -> Any:
+    """The scene's tree as a MjSpec of bodies ``link k``, joints ``joint k.i``, stand-ins for masses."""
+    import mujoco
+
+    return _built(mujoco, scene, tree).spec
+
+
+def _built(mujoco: Any, scene: Scene, tree: Tree) -> _Builder:
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.option.gravity = scene.gravity
@@ -75,17 +97,7 @@ def compiled(scene: Scene) -> Compiled:
         built.add_driver(driver)
     for k, load in enumerate(scene.load):
         built.add_load(k, load)
-    model = spec.compile()
-    _write_masses(mujoco, model, tree)
-    applied = np.zeros((model.nbody, 6))
-    for name, wrench in built.applied:
-        applied[model.body(name).id] += wrench
-    return Compiled(
-        model=model, tree=tree, applied=applied, rates=initial_rates(scene, tree),
-        links=np.array([model.body(_name(k)).id for k in range(len(tree.links))]),
-        single=(mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE),
-        drivers=[(model.equality(f"driver {d.joint}").id, d) for d in scene.driver],
-    )  # fmt: skip
+    return built
 
 
 def _name(link: int) -> str:

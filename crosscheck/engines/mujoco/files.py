@@ -1,0 +1,37 @@
+"""The format that ``mbref import`` and ``mbref export`` find under mbref.formats: MJCF, and URDF to read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from crosscheck.engines.mujoco.reading import read
+from crosscheck.engines.mujoco.writing import write
+from mbref.formats import Exported, Imported
+from mbref.scene import Scene, SceneError
+
+
+class MujocoFiles:
+    """Files that MuJoCo reads and writes."""
+
+    reads = (".xml", ".urdf")
+    writes = (".xml",)
+
+    def read(self, path: Path) -> Imported:
+        """The scene of a .xml or .urdf file; raises SceneError, OSError."""
+        _need_mujoco()
+        return read(path)
+
+    def write(self, scene: Scene) -> Exported:
+        """The scene as MJCF; raises SceneError where a body has no mass."""
+        _need_mujoco()
+        return write(scene)
+
+
+def _need_mujoco() -> None:
+    try:
+        import mujoco  # noqa: F401
+    except ImportError:
+        raise SceneError(["MJCF and URDF need MuJoCo: pip install 'mbref[engines]'"]) from None
+
+
+FORMAT = MujocoFiles()

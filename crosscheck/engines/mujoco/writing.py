@@ -1,0 +1,130 @@
+"""A scene as MJCF: the tree, closures as equalities, true masses and inertias, springs and gravity.
+
+Bodies have the names of the scene's, their frames the world's axes at t = 0 with the origin at the centre
+of mass.  A cut joint hangs a share of its body's mass on its other side, named ``rod (share 1)``.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.mujoco.model import description
+from crosscheck.engines.spanning_tree import Link, Tree, spanning_tree
+from mbref import rotations
+from mbref.formats import Exported
+from mbref.scene import Force, Moment, Scene, SceneError
+
+CONSTANT = (Moment, Force)  # loads that MJCF does not know
+
+
+def write(scene: Scene) -> Exported:
+    """The MJCF text; drivers and constant loads are told as left out.  SceneError without masses."""
+    if not scene.has_mass():
+        raise SceneError([f"{scene.name}: MJCF needs the mass and inertia of every body"])
+    bare = scene.with_(driver=(), load=[load for load in scene.load if not isinstance(load, CONSTANT)])
+    tree = spanning_tree(bare)
+    spec = description(bare, tree)
+    spec.modelname = scene.name
+    names = _names(scene, tree)
+    for k, link in enumerate(tree.links):
+        body = spec.body(f"link {k}")
+        _true_inertia(body, link)
+        body.name = names[k]
+    _name_joints(spec, scene, tree)
+    return Exported(_text(spec), tuple(_left_out(scene)))
+
+
+def _text(spec: Any) -> str:
+    """The MJCF text with every digit: MuJoCo's own writer keeps six."""
+    root = ET.Element("mujoco", model=spec.modelname)
+    ET.SubElement(root, "compiler", angle="radian")
+    ET.SubElement(root, "option", gravity=_digits(spec.option.gravity))
+    _add_body(ET.SubElement(root, "worldbody"), spec.worldbody)
+    equalities = ET.SubElement(root, "equality")
+    for closure in spec.equalities:
+        kind = closure.type.name.removeprefix("mjEQ_").lower()
+        ET.SubElement(equalities, kind, name=closure.name, site1=closure.name1, site2=closure.name2)
+    tendons = ET.SubElement(root, "tendon")
+    for spring in spec.tendons:
+        element = ET.SubElement(
+            tendons, "spatial", name=spring.name, springlength=_digits(spring.springlength),
+            stiffness=_digits(spring.stiffness[:1]), damping=_digits(spring.damping[:1]),
+        )  # fmt: skip
+        for i in range(2):
+            ET.SubElement(element, "site", site=f"{spring.name}.{i}")
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _add_body(element: ET.Element, body: Any) -> None:
+    """The inertia, joints, sites and children of a body."""
+    if element.tag == "body":
+        ET.SubElement(
+            element, "inertial", mass=_digits([body.mass]), pos=_digits(body.ipos), quat=_digits(body.iquat),
+            diaginertia=_digits(body.inertia),
+        )  # fmt: skip
+    for joint in body.joints:
+        kind = joint.type.name.removeprefix("mjJNT_").lower()
+        turning = {} if kind in ("free", "ball") else {"axis": _digits(joint.axis)}
+        numbers = {
+            "stiffness": joint.stiffness[:1],
+            "damping": joint.damping[:1],
+            "springref": [joint.springref],
+        }
+        spring = {key: _digits(value) for key, value in numbers.items() if np.any(value)}
+        place = {} if kind == "free" else {"pos": _digits(joint.pos)}
+        ET.SubElement(element, "joint", {"name": joint.name, "type": kind, **place, **turning, **spring})
+    for site in body.sites:
+        ET.SubElement(element, "site", name=site.name, pos=_digits(site.pos))
+    for child in body.bodies:
+        _add_body(ET.SubElement(element, "body", name=child.name, pos=_digits(child.pos)), child)
+
+
+def _digits(numbers: Any) -> str:
+    return " ".join(repr(float(x)) for x in np.atleast_1d(numbers))
+
+
+def _names(scene: Scene, tree: Tree) -> list[str]:
+    """The scene's name of every link; shares of a body and rods of distance joints by number."""
+    names: list[str] = []
+    for k, link in enumerate(tree.links):
+        name = scene.body[link.body].name if link.body >= 0 else "rod of a distance joint"
+        own = link.body >= 0 and tree.own[link.body] == k
+        names.append(name if own else f"{name} (share {k})")
+    return names
+
+
+def _name_joints(spec: Any, scene: Scene, tree: Tree) -> None:
+    """Joints by the scene's names, with a number where the scene's has several elementary motions."""
+    for k, link in enumerate(tree.links):
+        if link.joint >= 0:
+            count = len(link.mobilities)
+            for i in range(count):
+                name = scene.joint[link.joint].name
+                spec.joint(f"joint {k}.{i}").name = name if count == 1 else f"{name} {i + 1}"
+
+
+def _true_inertia(body: Any, link: Link) -> None:
+    """Mass, centre and principal moments; the largest is at most the others' sum, as the compiler demands."""
+    moments, axes = np.linalg.eigh(link.inertia)
+    axes[:, 2] *= np.sign(np.linalg.det(axes))
+    moments = np.maximum(moments, 0.0)
+    moments[2] = min(moments[2], (moments[0] + moments[1]) * (1 - 1e-15))
+    body.mass, body.inertia = link.mass, moments
+    body.ipos, body.iquat = link.offset, rotations.from_matrix(axes)
+
+
+def _left_out(scene: Scene) -> Iterator[str]:
+    for driver in scene.driver:
+        yield f"driver of {driver.joint}: MJCF prescribes no motion over time"
+    for i, load in enumerate(scene.load):
+        if isinstance(load, CONSTANT):
+            yield f"load[{i}] ({load.type} on {load.body}): apply it by mjData.xfrc_applied"
+    for body in scene.body:
+        if body.velocity is not None or body.angular_velocity is not None:
+            yield f"initial velocity of {body.name}: set mjData.qvel"
+    yield "exactness of joints: MuJoCo's equalities are soft (solref, solimp)"

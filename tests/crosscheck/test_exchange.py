@@ -1,0 +1,202 @@
+"""MJCF and URDF: the scene's accelerations / those of MuJoCo's own matrices; round trips by the gate."""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from crosscheck.engines.mujoco.files import FORMAT
+from crosscheck.judge.model_identity import gate, gate_times
+from mbref import formats, rotations, simulate
+from mbref.cli import main
+from mbref.scene import Scene, SceneError
+from mbref.scenes import find_scene
+from mbref.trajectory import Trajectory
+
+MODELS = Path(__file__).parent / "models"
+NAMES = ("four_bar", "five_bar", "delta_leg", "stewart_legs", "slider_crank", "scissor")
+EXPORTED = ("four_bar_gravity", "bennett", "andrews_squeezer", "flyball_governor", "sarrus")
+
+
+@pytest.fixture(autouse=True)
+def installed(monkeypatch):
+    """The plug-in, whether or not the installed metadata has it yet."""
+    point = EntryPoint("mujoco", "crosscheck.engines.mujoco.files:FORMAT", formats.GROUP)
+    monkeypatch.setattr(formats, "entry_points", lambda group: [point])
+
+
+def accelerations(model) -> dict[str, np.ndarray]:
+    """Of each centre of mass (world, m/s²) at rest at qpos0: M q̈ + c = τ + Jᵀλ with J q̈ = 0, by M and J."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    mass = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    rows = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
+    jacobian = data.efc_J.reshape(data.nefc, model.nv)[rows]
+    free = np.linalg.solve(mass, data.qfrc_passive + data.qfrc_applied - data.qfrc_bias)
+    inverse = np.linalg.solve(mass, jacobian.T)
+    held = free - inverse @ np.linalg.pinv(jacobian @ inverse, rcond=1e-9) @ (jacobian @ free)
+    found = {}
+    for b in range(1, model.nbody):
+        to_centre = np.zeros((3, model.nv))
+        mujoco.mj_jacBodyCom(model, data, to_centre, None, b)
+        found[model.body(b).name] = to_centre @ held
+    return found
+
+
+def same_accelerations(scene: Scene, model) -> None:
+    start = simulate(scene, "mpi-svd+projection", [0.0])
+    theirs = accelerations(model)
+    size = max(np.linalg.norm(a) for a in theirs.values())
+    assert size > 0.1, theirs
+    for name in start.bodies:
+        assert np.abs(start[name].acceleration[0] - theirs[name]).max() < 1e-7 * size, name
+
+
+def in_frames_of(scene: Scene, trajectory: Trajectory, own: Scene) -> Trajectory:
+    """A trajectory of ``own`` with the bodies, their order and frames of ``scene``."""
+    places = [trajectory.bodies.index(body.name) for body in scene.body]
+    theirs = np.array([own.body[p].orientation for p in places])
+    ours = np.array([body.orientation for body in scene.body])
+    turn = rotations.multiply(rotations.conjugate(theirs), ours)
+    keys = ("position", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
+    return Trajectory.from_record(
+        scene.name,
+        dataclasses.replace(
+            trajectory, bodies=tuple(body.name for body in scene.body), engine="again", reactions=None,
+            orientation=rotations.multiply(trajectory.orientation[:, places], turn),
+            **{key: getattr(trajectory, key)[:, places] for key in keys},
+        ).to_record(),
+    )  # fmt: skip
+
+
+def passes_the_gate(scene: Scene, again: Scene) -> None:
+    runs = [simulate(s, "mpi-svd+projection", gate_times(scene)) for s in (scene, again)]
+    assert gate(scene, [runs[0], in_frames_of(scene, runs[1], again)]) is None
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_model_s_scene_accelerates_as_its_own_matrices_say(name):
+    scene = formats.read(MODELS / f"{name}.xml").scene
+    same_accelerations(scene, mujoco.MjModel.from_xml_path(str(MODELS / f"{name}.xml")))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_round_trip_of_a_model_passes_the_gate(name, tmp_path):
+    scene = formats.read(MODELS / f"{name}.xml").scene
+    formats.write(scene.with_(driver=()), tmp_path / "again.xml")
+    again = formats.read(tmp_path / "again.xml").scene
+    passes_the_gate(scene.with_(driver=()), again)
+
+
+@pytest.mark.parametrize("name", EXPORTED)
+def test_an_exported_scene_is_the_same_mechanism(name, tmp_path):
+    scene = find_scene(name)
+    loads = [load for load in scene.load if load.type in ("spring", "torsion_spring")]
+    bodies = [b.model_copy(update={"velocity": None, "angular_velocity": None}) for b in scene.body]
+    scene = scene.with_(driver=(), load=loads, body=bodies, gravity=(0.5, -9.0, 3.0))
+    formats.write(scene, tmp_path / "scene.xml")
+    same_accelerations(scene, mujoco.MjModel.from_xml_path(str(tmp_path / "scene.xml")))
+    passes_the_gate(scene, formats.read(tmp_path / "scene.xml").scene)
+
+
+def test_joints_of_every_kind_are_named():
+    scene = formats.read(MODELS / "delta_leg.xml").scene
+    assert {joint.name: joint.type for joint in scene.joint} == {
+        "motor": "revolute", "ball_a": "spherical", "u1": "universal", "px": "planar",
+        "end_a": "spherical", "end_b": "spherical",
+    }  # fmt: skip
+    scissor = formats.read(MODELS / "scissor.xml").scene
+    kinds = {joint.name: joint.type for joint in scissor.joint}
+    assert kinds["rail"] == "cylindrical" and kinds["label fixed"] == "fixed"
+
+
+def test_a_joint_held_by_an_equality_is_a_driver_that_stands():
+    scene = formats.read(MODELS / "stewart_legs.xml").scene
+    assert [driver.joint for driver in scene.driver] == ["s2"] and scene.driver[0].polynomial == (0.0,)
+
+
+def test_parts_without_a_counterpart_are_told():
+    told = formats.read(MODELS / "five_bar.xml").left_out
+    assert "2 actuators" in told and any("softness of equalities" in sentence for sentence in told)
+    assert any(s.startswith("limits of 1 ") for s in formats.read(MODELS / "slider_crank.xml").left_out)
+    exported = FORMAT.write(find_scene("planar_slider_crank")).left_out
+    assert exported[0] == "load[0] (moment on crank): apply it by mjData.xfrc_applied"
+    assert FORMAT.write(find_scene("four_bar")).left_out[0].startswith("driver of A: ")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('anchor="0.7 0 0"/>', 'anchor="0.7 0 0" active="false"/>', "'C' is not active"),
+        ("</equality>", '<joint name="gear" joint1="A" joint2="D"/></equality>', "'gear' couples"),
+        ('<joint name="A"/>', '<joint name="A" armature="0.1" frictionloss="1"/>', "armature of 1"),
+    ],
+)  # fmt: skip
+def test_changed_models_tell_what_is_left_out(old, new, says, tmp_path):
+    text = (MODELS / "four_bar.xml").read_text()
+    assert old in text
+    (tmp_path / "changed.xml").write_text(text.replace(old, new))
+    told = formats.read(tmp_path / "changed.xml").left_out
+    assert any(says in sentence for sentence in told), told
+
+
+def test_what_no_scene_can_hold_is_refused_by_name(tmp_path):
+    text = (MODELS / "four_bar.xml").read_text()
+    bent = text.replace('<joint name="B"/>', '<joint name="B"/><joint name="B2" axis="1 1 0"/>')
+    (tmp_path / "bent.xml").write_text(bent)
+    with pytest.raises(SceneError, match="body 'coupler': joints hinge and hinge together"):
+        formats.read(tmp_path / "bent.xml")
+    (tmp_path / "broken.xml").write_text("<mujoco><worldbody>")
+    with pytest.raises(SceneError, match=r"broken\.xml: MuJoCo cannot read it"):
+        formats.read(tmp_path / "broken.xml")
+
+
+def test_a_urdf_with_a_loop_is_the_mechanism_of_its_numbers():
+    scene = formats.read(MODELS / "four_bar.urdf").scene
+    assert [joint.type for joint in scene.joint] == ["revolute"] * 4
+    assert scene.joint_named("C").anchor == pytest.approx((0.4, 0.0, 0.2))
+    assert scene.joint_named("C").axis == pytest.approx((0.0, 1.0, 0.0))
+    assert scene.joint_named("D").axis == pytest.approx((0.0, 1.0, 0.0))
+    crank = scene.body[0]
+    assert crank.position == pytest.approx((0.0, 0.0, 0.1)) and crank.mass == 0.5
+    assert np.trace(np.array(crank.inertia)) == pytest.approx(0.0043)
+    assert scene.with_(gravity=(0, 0, -9.81)).counts().degrees_of_freedom == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('type="revolute"><pre', 'type="gear"><pre', "loop 'C': type 'gear' is none of"),
+        ('<origin xyz="0.4 0 0"/></pre', '<origin xyz="0.5 0 0"/></pre', "loop 'C': is open by 0.1 m"),
+        ('<successor link="rocker">', '<successor>', "loop 'C': names no successor"),
+        ("</robot>", "", "URDF: is no XML"),
+    ],
+)  # fmt: skip
+def test_faulty_urdf_is_refused(old, new, says, tmp_path):
+    text = (MODELS / "four_bar.urdf").read_text()
+    assert old in text
+    (tmp_path / "faulty.urdf").write_text(text.replace(old, new))
+    with pytest.raises(SceneError, match=says):
+        formats.read(tmp_path / "faulty.urdf")
+
+
+def test_commands_import_and_export(tmp_path, capsys):
+    assert main(["import", str(MODELS / "five_bar.xml"), "--out", str(tmp_path / "five.toml")]) == 0
+    assert "left out: 2 actuators" in capsys.readouterr().out
+    assert Scene.from_file(tmp_path / "five.toml").load[0].stiffness == 40
+    assert main(["export", str(tmp_path / "five.toml"), "--out", str(tmp_path / "five.xml")]) == 0
+    assert main(["export", "bricard", "--out", str(tmp_path / "five.obj")]) == 2
+    assert "no format writes .obj; known: .xml" in capsys.readouterr().err
+    assert main(["import", str(tmp_path / "none.xml")]) == 2
+
+
+def test_the_project_declares_the_plug_in():
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    assert project["entry-points"][formats.GROUP] == {"mujoco": "crosscheck.engines.mujoco.files:FORMAT"}
