@@ -30,6 +30,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = _parser((*NAMES, PAPER)).parse_args(argv)
     if arguments.picture:
         return _picture(Path(arguments.picture))
+    if arguments.render:
+        return _render(Path(arguments.render), arguments.section or NAMES)
     is_quick, out = arguments.depth == "quick", Path(arguments.out)
     names = arguments.section or (NAMES if is_quick or arguments.scene else (*NAMES, PAPER))
     try:
@@ -54,6 +56,19 @@ def _picture(path: Path) -> int:
     panels = [animation.panel(Run(record)) for record in found.records]
     path.write_text(animation.animated(found.scene, found.exact, panels, found.singular))
     _notice(f"written: {path}")
+    return 0
+
+
+def _render(folder: Path, names: Sequence[str]) -> int:
+    """Render a folder of records again; nothing is run."""
+    from reports import sections, stored
+
+    try:
+        groups = stored.groups(folder)
+    except (FileNotFoundError, SceneError) as error:
+        _notice(str(error))
+        return 2
+    _write(sections.blocks(groups, names), folder)
     return 0
 
 
@@ -96,6 +111,7 @@ def _parser(sections: Sequence[str]) -> argparse.ArgumentParser:
     add_reference_time(parser)
     parser.add_argument("--section", action="append", choices=sections, help="only this one; may repeat")
     parser.add_argument("--out", default="report", metavar="DIR", help="folder to write (default: report)")
+    parser.add_argument("--render", metavar="DIR", help="render the records of a report again, run nothing")
     parser.add_argument("--picture", metavar="FILE", help="write only the moving picture of the README")
     return parser
 

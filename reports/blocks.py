@@ -5,7 +5,7 @@ A section makes blocks once; ``render`` writes them as HTML and as Markdown.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -51,6 +51,90 @@ class Figure:
     draw: Callable[[], Drawing]
 
 
+class Linked(str):
+    """A cell that leads to a place of the page; in Markdown its text alone."""
+
+    href: str
+
+    def __new__(cls, text: str, href: str) -> Linked:
+        """The text, with the id of the place, ``#`` included."""
+        made = super().__new__(cls, text)
+        made.href = href
+        return made
+
+
+@dataclass(frozen=True)
+class Opening:
+    """The first screen: a headline, sentences by what they answer, and a mechanism that moves (SVG and style
+    sheet, empty without one)."""
+
+    headline: str
+    sentences: Mapping[str, str]
+    svg: str
+    css: str
+    caption: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One family in a cell of the matrix: its grade and sign, what is said below, and the record's place."""
+
+    family: str
+    grade: str
+    sign: str
+    lines: Sequence[str]
+    href: str
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """Scenes × engines: ``engines`` are (name, title, tone, mark), ``cells[scene][engine]`` the verdicts on
+    an engine's families; empty where it has no run."""
+
+    caption: str
+    engines: Sequence[tuple[str, str, int, str]]
+    scenes: Sequence[tuple[str, str]]
+    cells: Mapping[str, Mapping[str, Sequence[Verdict]]]
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure that can be asked: its caption, SVG, the legend (engine, tone, mark, families), and the same
+    numbers as a Figure for Markdown."""
+
+    caption: str
+    svg: str
+    legend: Sequence[tuple[str, int, str, Sequence[str]]]
+    figure: Figure
+
+
+@dataclass(frozen=True)
+class Card:
+    """A run in the page: its place, settings, grade, numbers by name, message, command, and what made it."""
+
+    place: str
+    settings: str
+    grade: str
+    sign: str
+    numbers: Mapping[str, str]
+    message: str
+    command: str
+    made: str
+
+
+@dataclass(frozen=True)
+class Record:
+    """The runs of an engine's family on a scene, shown when one is asked for; ``back`` is the place in the
+    matrix that leads here."""
+
+    place: str
+    scene: str
+    title: str
+    tone: int
+    cards: Sequence[Card]
+    back: str
+
+
 @dataclass(frozen=True)
 class Listing:
     """Lines printed as they are, in a fixed-width face."""
@@ -58,4 +142,4 @@ class Listing:
     text: str
 
 
-Block = Heading | Text | Table | Figure | Listing
+Block = Heading | Text | Table | Figure | Listing | Opening | Matrix | Plot | Record

@@ -8,11 +8,24 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from reports import figures
-from reports.blocks import Block, Figure, Heading, Listing, Table, Text
+from reports.blocks import (
+    Block,
+    Figure,
+    Heading,
+    Listing,
+    Matrix,
+    Opening,
+    Plot,
+    Record,
+    Table,
+    Text,
+    Verdict,
+)
 
+NUMBER = re.compile(r"(?:&lt; )?\d[\d.]*e[-+]?\d+|t = [\d.e-]*\d s|\d[\d.]* (?:ms|µs|s)\b")
 TITLE = "Closed-loop mechanisms: engines against truth"
 
 
@@ -22,11 +35,12 @@ def write(blocks: Sequence[Block], out: Path) -> None:
     pictures.mkdir(parents=True, exist_ok=True)
     drawn: dict[str, str] = {}
     for block in blocks:
-        if isinstance(block, Figure):
-            drawing = block.draw()
-            drawn[block.name] = figures.svg(drawing, block.name)
-            name = file_name(block.name)
-            (pictures / f"{name}.svg").write_text(drawn[block.name], encoding="utf-8")
+        figure = block.figure if isinstance(block, Plot) else block
+        if isinstance(figure, Figure):
+            drawing = figure.draw()
+            drawn[figure.name] = figures.svg(drawing, figure.name)
+            name = file_name(figure.name)
+            (pictures / f"{name}.svg").write_text(drawn[figure.name], encoding="utf-8")
             (pictures / f"{name}.png").write_bytes(figures.png(drawing))
     (out / "index.html").write_text(html(blocks, drawn), encoding="utf-8")
     (out / "report.md").write_text(markdown(blocks), encoding="utf-8")
@@ -38,11 +52,13 @@ def html(blocks: Sequence[Block], drawn: dict[str, str]) -> str:
         loader=PackageLoader("reports"), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    environment.filters["slug"] = slug
+    environment.filters |= {"slug": slug, "numbers": numbers, "breakable": breakable}
     return environment.get_template("page.html").render(
         title=TITLE,
         chapters=[b.text for b in blocks if isinstance(b, Heading) and b.level == 2],
         blocks=[(type(b).__name__.lower(), b) for b in blocks],
+        has_opening=any(isinstance(b, Opening) for b in blocks),
+        motions=Markup("".join(b.css for b in blocks if isinstance(b, Opening))),
         drawn={name: Markup(text) for name, text in drawn.items()},
     )
 
@@ -62,8 +78,37 @@ def _markdown(block: Block) -> str:
             return f"{block.caption}\n\n{_rows(block)}"
         case Figure():
             return f"{block.caption}\n\n![{_words(block.name)}](figures/{file_name(block.name)}.png)"
+        case Plot():
+            return _markdown(block.figure)
+        case Opening():
+            answers = (f"{label}: {sentence}" for label, sentence in block.sentences.items())
+            return "\n\n".join(map(_words, (block.headline, *answers)))
+        case Matrix():
+            return f"{block.caption}\n\n{_matrix(block)}"
+        case Record():
+            told = [f"{card.settings}: {card.grade}\n    {card.command}" for card in block.cards]
+            return "\n\n".join([f"### {_words(f'{block.scene}: {block.title}')}", *(f"- {t}" for t in told)])
         case Listing():
             return f"```\n{block.text}\n```"
+
+
+def _matrix(matrix: Matrix) -> str:
+    """The matrix as a table: the engine's best family, then its library's defaults."""
+    rows = [
+        [
+            scene,
+            *(
+                "; ".join(_verdict(v) for v in matrix.cells[scene].get(name, ()))
+                for name, *_ in matrix.engines
+            ),
+        ]
+        for scene, _ in matrix.scenes
+    ]
+    return _rows(Table("", ["Scene", *(title for _, title, *_ in matrix.engines)], rows))
+
+
+def _verdict(verdict: Verdict) -> str:
+    return f"{verdict.family} {verdict.sign} {verdict.grade}, {', '.join(verdict.lines)}"
 
 
 def _rows(table: Table) -> str:
@@ -79,6 +124,16 @@ def _line(cells: Sequence[str]) -> str:
 def _words(text: str) -> str:
     """The text on one line, without tags of HTML."""
     return " ".join(text.replace("&", "&amp;").replace("<", "&lt;").split())
+
+
+def numbers(text: str) -> Markup:
+    """The text for the page, its numbers with powers of ten unbroken."""
+    return Markup(NUMBER.sub(r'<span class="nb">\g<0></span>', str(escape(text))))
+
+
+def breakable(name: str) -> Markup:
+    """A name for the page that may be broken behind its underscores."""
+    return escape(name).replace("_", Markup("_<wbr>"))
 
 
 def file_name(name: str) -> str:

@@ -8,10 +8,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
+from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.tolerances import ERROR_LEVELS, EXCESS, FALSE_SUCCESS
+from crosscheck.judge.truth import NoSolution, truth_for
 from crosscheck.study.fair_timing import model_difference
 from crosscheck.study.grid import Record
-from crosscheck.study.record_view import varied_settings
+from crosscheck.study.record_view import error_text, varied_settings
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
@@ -63,6 +67,11 @@ class Run:
         return self.metric("error")
 
     @property
+    def said(self) -> str:
+        """The error for a table cell: ``< 3e-12`` below the bound on the truth's own error."""
+        return error_text(self.record)
+
+    @property
     def is_false_success(self) -> bool:
         """Whether the run says it completed and yet is WRONG."""
         return self.completed and self.error > WRONG
@@ -100,6 +109,14 @@ class SceneRuns:
     def difference(self) -> str | None:
         """The first field in which an engine's mechanism is another one; None when all agree."""
         return model_difference(self.scene, self.gate) if self.gate else None
+
+    def exact(self, times: np.ndarray) -> Trajectory | None:
+        """The true motion at times (k,), in the time that its record was given; None where unknown."""
+        truth = truth_for(self.scene, SECONDS if self.truth is None else self.truth["given"])
+        try:
+            return None if truth is None else truth.poses(times)
+        except NoSolution:
+            return None
 
     def curves(self) -> dict[Curve, list[Run]]:
         """Runs by engine and family, in the order of the records."""

@@ -119,6 +119,7 @@ def _add_report(commands: Commands) -> None:
         "--section", action="append", metavar="S", help="render only this section, such as speed; may repeat"
     )
     parser.add_argument("--out", default="report", metavar="DIR", help="folder to write (default: report)")
+    parser.add_argument("--render", metavar="DIR", help="render a report's records again, run nothing")
     add_reference_time(parser)
 
 

@@ -54,13 +54,13 @@ def headline(groups: Sequence[Judged]) -> str:
         return "There is no reference for this motion: the engines are compared with each other."
     good = [name for name, found in at_best.items() if found is Grade.RIGHT]
     first = (
-        f"All {len(good)} engines are right at their best settings"
+        f"{'Both' if len(good) == 2 else f'All {len(good)}'} engines are right at their best settings"
         if len(good) == len(at_best) > 1
         else f"{listed(map(title, good))} {_is(good)} right at {_its(good)} best settings"
         if good
-        else "No engine is right at any setting that was run"
+        else f"No engine is right{_everywhere(groups)} at any setting that was run"
     )
-    return f"{first}{_on(groups)}; {_defaults_in_short(groups)}."
+    return f"{first}{_on(groups) if good else ''}; {_defaults_in_short(groups)}."
 
 
 def right(groups: Sequence[Judged]) -> str:
@@ -168,9 +168,8 @@ def _fast_on_several(costs: Mapping[str, Mapping[str, float]]) -> str:
     first = max(count, key=lambda n: count[n])
     ratios = [min(c for n, c in cost.items() if n != first) / cost[first]
               for cost in costs.values() if first in cost and len(cost) > 1]  # fmt: skip
-    text = (
-        f"{title(first)} is the fastest to an error of {LEVEL:.0e} on {count[first]} of {len(costs)} scenes"
-    )
+    share = f"{count[first]} of {len(costs)}" if count[first] < len(costs) else f"all {len(costs)}"
+    text = f"{title(first)} is the fastest to an error of {LEVEL:.0e} on {share} scenes"
     if ratios:
         text += f"; the best other engine takes {span(min(ratios), max(ratios))} as long"
     others = [f"{title(n)} on {listed(s for s, w in winners.items() if w == n)}" for n in count if n != first]
@@ -205,14 +204,14 @@ def _failed(groups: Sequence[Judged], names: Sequence[str], scenes: Sequence[Jud
             if len(rows) > 1 or rows[0] > 1
             else ", where a constraint is redundant"
         )
-    where = "" if len(groups) == 1 else f" on {_names(scenes)}"
+    where = _place(scenes, groups)
     return f"The defaults of {listed(map(title, names))} {when}{where}{cause}."
 
 
 def _wrong(name: str, scenes: Sequence[Judged], groups: Sequence[Judged]) -> str:
     errors = [error(group.defaults()[name]) for group in scenes]
     off = f"{errors[0]:.2g}" if len(errors) == 1 else f"{min(errors):.2g} to {max(errors):.2g}"
-    where = "" if len(groups) == 1 else f" on {_names(scenes)}"
+    where = _place(scenes, groups)
     return f"{title(name)}'s defaults complete{where}, but with an error of {off} at best."
 
 
@@ -266,8 +265,20 @@ def _names(groups: Sequence[Judged]) -> str:
     return listed(group.scene.name for group in groups)
 
 
+def _place(scenes: Sequence[Judged], groups: Sequence[Judged]) -> str:
+    """`` on`` the scenes; nothing where there is but one."""
+    if len(groups) == 1:
+        return ""
+    return f" on {_names(scenes)}" if len(scenes) < len(groups) else _on(groups)
+
+
 def _on(groups: Sequence[Judged]) -> str:
-    return "" if len(groups) == 1 else f" on all {len(groups)} scenes"
+    count = len(groups)
+    return "" if count == 1 else " on both scenes" if count == 2 else f" on all {count} scenes"
+
+
+def _everywhere(groups: Sequence[Judged]) -> str:
+    return "" if len(groups) == 1 else " on every scene"
 
 
 def _most(value: float, bound: float) -> str:

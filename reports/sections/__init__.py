@@ -15,16 +15,22 @@ from reports.sections import (
     outcomes,
     provenance,
     reactions,
+    records,
     speed,
     summary,
     support,
+    verdict,
     violation,
 )
 
 Chapter = Callable[[Sequence[SceneRuns]], list[Block]]
 Part = Callable[[SceneRuns], list[Block]]
 
-OPENING: Mapping[str, Chapter] = {"least_errors": least_errors.render, "summary": summary.render}
+OPENING: Mapping[str, Chapter] = {
+    "verdict": verdict.render,
+    "least_errors": least_errors.render,
+    "summary": summary.render,
+}
 OF_A_SCENE: Mapping[str, Part] = {
     "mechanism": mechanism.render,
     "speed": speed.render,
@@ -38,6 +44,7 @@ CLOSING: Mapping[str, Chapter] = {
     "convergence": convergence.render,
     "support": support.render,
     "provenance": provenance.render,
+    "records": records.render,
 }
 NAMES = (*OPENING, *OF_A_SCENE, *CLOSING)
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 from crosscheck.judge.metrics import error_series, order_of_convergence
 from crosscheck.judge.richardson import limit
-from crosscheck.judge.truth import truth_for
 from reports.blocks import Block, Heading, Table, Text
 from reports.runs import Curve, Run, SceneRuns, number, power
 
@@ -52,15 +51,16 @@ def _limits(groups: Sequence[SceneRuns]) -> list[Block]:
 
 
 def _limit_rows(group: SceneRuns) -> list[tuple[str, ...]]:
-    truth = truth_for(group.scene)
     rows: list[tuple[str, ...]] = []
     for curve, runs in group.curves().items():
         told = [run for run in runs if run.completed and math.isfinite(run.error)]
-        if truth is None or swept_option(told) != STEP:
+        if swept_option(told) != STEP:
             continue
         steps = [run.record["settings"][STEP] for run in told]
-        if found := limit(group.scene, steps, [run.trajectory for run in told]):
-            bias = float(error_series(group.scene, found.motion, truth.poses(found.motion.times)).max())
+        found = limit(group.scene, steps, [run.trajectory for run in told])
+        exact = None if found is None else group.exact(found.motion.times)
+        if found is not None and exact is not None:
+            bias = float(error_series(group.scene, found.motion, exact).max())
             finest = min(told, key=lambda run: run.record["settings"][STEP])
             more = _heavier(bias, found.discretisation)
             rows.append((group.scene.name, *curve, f"{min(steps):.2g}", number(found.order, 2),

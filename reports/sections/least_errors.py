@@ -32,13 +32,7 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
     header = [name.capitalize() for name in HEADER]
     return [
         Heading("Least errors", 2), Text(text),
-        Table(caption, [*header[:BEST], "Families"], _once(rows), right=frozenset({4, 5, 6})),
+        Table(caption, [*header[:BEST], "Families"], rows, right=frozenset({4, 5, 6})),
         Table("The families that are within it, and the best or the end of the others.",
-              [*header[:2], *header[BEST:]], _once([(*row[:2], *row[BEST:]) for row in others]), folded=True),
+              [*header[:2], *header[BEST:]], [(*row[:2], *row[BEST:]) for row in others], folded=True),
     ]  # fmt: skip
-
-
-def _once(rows: Sequence[Sequence[str]]) -> list[Sequence[str]]:
-    """The rows with each scene named in the first of its own only."""
-    before = ["", *(row[0] for row in rows)]
-    return [("" if row[0] == last else row[0], *row[1:]) for row, last in zip(rows, before, strict=False)]

@@ -6,7 +6,7 @@ from functools import partial
 
 from reports import drawing
 from reports.blocks import Block, Figure, Heading, Table, Text
-from reports.runs import Run, SceneRuns, power
+from reports.runs import Run, SceneRuns
 
 
 def render(scene_runs: SceneRuns) -> list[Block]:
@@ -17,7 +17,7 @@ def render(scene_runs: SceneRuns) -> list[Block]:
         return [*blocks, Text("No run left a state, so there is no motion to draw.")]
     caption = (
         f"Poses of {shown.label} ({scene_runs.varied_settings(shown) or 'no settings'}; "
-        f"error {power(shown.error)}) from t = {shown.trajectory.times[0]:g} s to "
+        f"error {shown.said}) from t = {shown.trajectory.times[0]:g} s to "
         f"{shown.trajectory.times[-1]:g} s, the last darkest; "
         f"triangles are joints to the ground, dashed lines their guides, thin grey lines the paths of the "
         f"centres of mass. Seen along z if the motion is planar, else obliquely with y to the back."

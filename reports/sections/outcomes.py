@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from reports.blocks import Block, Heading, Table
-from reports.runs import Run, SceneRuns, duration, power
+from reports.blocks import Block, Heading, Linked, Table
+from reports.places import of_run
+from reports.runs import Run, SceneRuns, duration
 
 HEADER = ("Engine", "Family", "Settings", "Outcome", "End time (s)", "Error", "Time", "Steps",
           "Right-hand sides", "Message")  # fmt: skip
@@ -20,7 +21,8 @@ def render(scene_runs: SceneRuns) -> list[Block]:
 def _row(run: Run, settings: str) -> tuple[str, ...]:
     cost = run.record["cost"]
     letter = f" ({run.outcome.letter})" if run.outcome.letter else ""
+    settled = Linked(settings or "all", f"#{of_run(run)}")
     return (
-        *run.curve, settings, run.outcome.label + letter, f"{run.t_end:.4g}", power(run.error),
+        *run.curve, settled, run.outcome.label + letter, f"{run.t_end:.4g}", run.said,
         duration(run.seconds), str(cost["steps"]), str(cost["rhs"]), run.record["message"],
     )  # fmt: skip

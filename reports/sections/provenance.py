@@ -17,7 +17,7 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
         _versions(runs),
         _machines(runs),
         _settings(runs),
-        Text("These commands make the report again; stored records are not run again:"),
+        Text("These commands, in the folder of this page, make the missing records and render it again:"),
         Listing(_commands(groups)),
     ]
 
@@ -55,17 +55,8 @@ def _settings(runs: Sequence[Run]) -> Table:
 
 
 def _commands(groups: Sequence[SceneRuns]) -> str:
-    lines = [
-        "pip install 'mbref[engines,report]'",
-        "crosscheck report [--quick] --out DIR",
-        "",
-        "# one run alone",
-    ]
-    for group in groups[:1]:
-        first = group.runs[0]
-        engine, family = first.curve
-        lines.append(f"crosscheck run {group.scene.name} --engine {engine} --setting {family} --json")
-    return "\n".join(lines)
+    scenes = " ".join(f"scenes/{group.scene.name}.toml" for group in groups)
+    return f"pip install 'mbref[engines,report]'\ncrosscheck report {scenes} --out ."
 
 
 def _all(values: set[str]) -> str:

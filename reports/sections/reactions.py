@@ -1,20 +1,21 @@
-"""Joint reactions of the engines compared where unique; the shares of redundant joints side by side."""
+"""Joint reactions of the engines against the exact ones where unique; shares of redundant joints."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 from crosscheck.judge.joint_reactions import Comparison, compare, side_by_side
+from crosscheck.judge.reaction_balance import absurd, with_exact_reactions
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
-from reports.blocks import Block, Heading, Table
+from reports.blocks import Block, Heading, Table, Text
 from reports.runs import Run, SceneRuns, number, power
 
 CAPTION = (
-    "Largest difference from the reactions of {first}, relative to the largest reaction, over samples of the "
-    "run of least error of every engine; moments count divided by the scene's length. Compared are the "
-    "components that redundancy leaves unique ('open' counts the dimensions it leaves open), and, in the "
-    "last row, the resultant of all joints on a body, which is always unique."
+    "Largest difference from the reactions of the exact motion, relative to the largest of them, over "
+    "samples of the run of least error of every engine; moments count divided by the scene's length. "
+    "Compared are the components that redundancy leaves unique ('open' counts the dimensions it leaves open),"
+    " and, in the last row, the resultant of all joints on a body, which is always unique."
 )
 SHARES = (
     "The engine's choice: size (N) at t = {t:.3g} s of the components that redundancy leaves open. They need "
@@ -23,17 +24,22 @@ SHARES = (
 
 
 def render(scene_runs: SceneRuns) -> list[Block]:
-    """Tables of differences and of choices; nothing where fewer than two engines report reactions."""
-    runs = {engine: run.trajectory for engine, run in _best(scene_runs).items()}
-    if len(runs) < 2:
-        return []
-    first, *others = runs
+    """Tables of differences and of choices, and sentences on absurd reactions; nothing without reactions or
+    without a known motion."""
     scene = scene_runs.scene
-    found = {engine: compare(scene, runs[first], runs[engine]) for engine in others}
-    table = Table(
-        CAPTION.format(first=first), ("Joint", "Open", *others), _rows(scene, found), right=_after(0)
-    )
-    return [Heading("Joint reactions"), table, *_choices(scene, runs)]
+    runs = {engine: run.trajectory for engine, run in _best(scene_runs).items()}
+    found: dict[str, Comparison] = {}
+    sentences: list[Block] = []
+    for engine, run in runs.items():
+        exact = scene_runs.exact(run.times)
+        if exact is not None and exact.acceleration is not None and scene.has_mass():
+            true = with_exact_reactions(scene, exact)
+            found[engine] = compare(scene, true, run)
+            sentences += [Text(f"{sentence}.") for sentence in absurd(scene, run, true)]
+    if not found:
+        return []
+    table = Table(CAPTION, ("Joint", "Open", *found), _rows(scene, found), right=_after(0))
+    return [Heading("Joint reactions"), table, *sentences, *_choices(scene, runs)]
 
 
 def _best(scene_runs: SceneRuns) -> dict[str, Run]:

@@ -13,8 +13,9 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.gridspec import GridSpec
 
 from reports import figures
-from reports.blocks import Block, Figure, Heading, Table, Text
-from reports.runs import WRONG, Curve, Run, SceneRuns, duration, power, short
+from reports.blocks import Block, Figure, Heading, Plot, Table, Text
+from reports.runs import WRONG, Curve, Run, SceneRuns, duration, short
+from reports.speed_figure import speed_svg, toggles
 
 SMALLEST = 1e-16  # an error of exactly zero is drawn here
 UNTIMED = 1e-6  # s; a run that reports no time is drawn no lower
@@ -30,8 +31,10 @@ def render(scene_runs: SceneRuns) -> list[Block]:
     if not drawable and not failures:
         return [heading, Text("No run has an error to plot: this scene has no truth to compare with.")]
     draw = partial(plot, scene_runs, failures)
-    picture = Figure(f"{scene_runs.scene.name}-speed", _caption(scene_runs, drawable), draw)
-    return [heading, picture, *([_key(failures)] if failures else [])]
+    caption = _caption(scene_runs, drawable)
+    picture = Figure(f"{scene_runs.scene.name}-speed", caption + _strip(scene_runs), draw)
+    asked = Plot(caption, speed_svg(scene_runs, caption), toggles(scene_runs), picture)
+    return [heading, asked if asked.svg else picture, *([_key(failures)] if failures else [])]
 
 
 def failed(runs: Sequence[Run]) -> Failures:
@@ -52,20 +55,24 @@ def _caption(scene_runs: SceneRuns, drawable: Sequence[Run]) -> str:
         best = min(drawable, key=lambda run: run.error)
         quick = min(drawable, key=lambda run: run.seconds)
         text += (
-            f" The least error is {power(best.error)} ({best.label}, {duration(best.seconds)}); "
-            f"the least time {duration(quick.seconds)} ({quick.label}, error {power(quick.error)})."
+            f" The least error is {best.said} ({best.label}, {duration(best.seconds)}); "
+            f"the least time {duration(quick.seconds)} ({quick.label}, error {quick.said})."
         )
     if wrong := sum(run.is_false_success for run in drawable):
         text += (
             f" {wrong} completed with an error above {short(WRONG)}: wrong, although reported as a success."
         )
-    if len(scene_runs.completed()) < len(scene_runs.runs):
-        text += (
-            " The failed runs stand in the strip on the right at the time they took, or at its foot if "
-            "that is "
-            "less than the time of any completed run; the key gives their reasons."
-        )
     return text
+
+
+def _strip(scene_runs: SceneRuns) -> str:
+    """How failed runs are drawn where the picture cannot be asked."""
+    if len(scene_runs.completed()) == len(scene_runs.runs):
+        return ""
+    return (
+        " The failed runs stand in the strip on the right at the time they took, or at its foot if that is "
+        "less than the time of any completed run; the key gives their reasons."
+    )
 
 
 def _key(failures: Failures) -> Table:

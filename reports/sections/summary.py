@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from crosscheck.judge.metrics import cost_at_error
 from crosscheck.judge.tolerances import EXCESS
 from reports.blocks import Block, Heading, Table, Text
-from reports.runs import LEVELS, WRONG, Curve, Run, SceneRuns, duration, power, ratio, short
+from reports.runs import LEVELS, WRONG, Curve, Run, SceneRuns, duration, ratio, short
 
 HEADER = ("Engine", "Family", "Completed", "Least error", "Its settings", "Its time",
           *(f"At {short(level)}" for level in LEVELS), "Wrong or failed")  # fmt: skip
@@ -80,7 +80,7 @@ def _row(group: SceneRuns, best: Run, costs: Sequence[float], fastest: Sequence[
     ratios = [ratio(cost / least) for cost, least in zip(costs, fastest, strict=True)]
     least: tuple[str, str, str] = ("–", "–", "–")
     if best.completed:
-        least = power(best.error), group.varied_settings(best), duration(best.seconds)
+        least = best.said, group.varied_settings(best), duration(best.seconds)
     done = f"{sum(run.completed for run in runs)} of {len(runs)}"
     return (*best.curve, done, *least, *ratios, _otherwise(runs))
 

@@ -79,7 +79,7 @@ def test_sentences_of_one_scene():
 def test_other_results_and_other_sentences():
     good = [record(name, family, 1e-10) for name in ("mujoco", "exudyn") for family in ("defaults", "tuned")]
     assert headline([group(good)]) == (
-        "All 2 engines are right at their best settings; so are their libraries' defaults."
+        "Both engines are right at their best settings; so are their libraries' defaults."
     )
     assert breaks([group(good)]) == "No engine's defaults fail or are wrong."
     assert "No engine reaches an error of 1e-06" in fast([group([record("mujoco", "tuned", 1e-3)])])
@@ -100,7 +100,7 @@ def test_sentences_of_several_scenes():
     assert "fastest to an error of 1e-06 on 1 of 2 scenes" in fast(groups), fast(groups)
     assert "Elsewhere the fastest is Pinocchio on spatial_slider_crank" in fast(groups), fast(groups)
     assert "Pinocchio and Exudyn end at t = 0 s on planar_slider_crank, where a" in breaks(groups)
-    assert "MuJoCo and Pinocchio are right at their best settings on all 2 scenes" in headline(groups)
+    assert "MuJoCo and Pinocchio are right at their best settings on both scenes" in headline(groups)
 
 
 def test_no_truth_and_no_claim_of_right():

@@ -31,8 +31,9 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["__main__"],
     ),
     "reports": (
-        ["blocks"], ["runs"], ["figures"], ["drawing", "animation", "time_series", "benchmark_plot"],
-        ["sections"], ["render"], ["__main__"],
+        ["blocks"], ["runs"], ["places", "engine_looks"], ["figures"], ["drawing"],
+        ["animation", "motion_picture", "speed_figure", "time_series", "benchmark_plot"],
+        ["sections"], ["render", "stored"], ["__main__"],
     ),
 }  # fmt: skip
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import hashlib
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
+from crosscheck.study.truths import truth_record
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Cost, Outcome, Trajectory
@@ -48,15 +50,20 @@ def record(
         cost=Cost(seconds=seconds, steps=steps, rhs=4 * steps), scene=a_scene.name,
     )  # fmt: skip
     metrics = measure(a_scene, shifted, truth_for(a_scene))
-    key = f"{a_scene.name} {engine} {family} {settings} {error}"
+    key = hashlib.sha256(f"{a_scene.name} {engine} {family} {settings} {error}".encode()).hexdigest()
     return {
         **MADE_OF,
         **shifted.to_record(),
         "scene": a_scene.name,
         "family": family,
+        "asked": asked(a_scene, engine, settings),
         "key": key,
         "metrics": metrics,
     }
+
+
+def asked(a_scene: Scene, engine: str, options: dict[str, Any]) -> dict[str, Any]:
+    return {"engine": engine, "options": options, "samples": 13, "end": a_scene.duration}
 
 
 def nothing(engine: str, family: str, a_scene: Scene | None = None) -> dict[str, Any]:
@@ -67,7 +74,8 @@ def nothing(engine: str, family: str, a_scene: Scene | None = None) -> dict[str,
         bodies=tuple(b.name for b in a_scene.body), message="the process was ended by SIGSEGV",
     )  # fmt: skip
     metrics = measure(a_scene, lost, truth_for(a_scene))
-    more = {"scene": a_scene.name, "family": family, "key": f"{engine} {family}", "metrics": metrics}
+    more = {"scene": a_scene.name, "family": family, "key": f"{engine} {family}", "metrics": metrics,
+            "asked": asked(a_scene, engine, {})}  # fmt: skip
     return {**MADE_OF, **lost.to_record(), **more}
 
 
@@ -93,5 +101,20 @@ def records() -> tuple[dict[str, Any], ...]:
     return (*orders, *failures, *others)
 
 
+@functools.cache
+def truths() -> tuple[dict[str, Any], ...]:
+    return tuple(truth_record(s, exact(s).times, 20.0) for s in (scene(), scene("planar_slider_crank")))
+
+
+def motion() -> dict[str, Any]:
+    """The true motion of the first scene at the instants shown, moved, as the wrong run's."""
+    shown = truths()[0]["motion"]
+    bodies = {
+        n: {**b, "position": (np.array(b["position"]) + 0.1).tolist()} for n, b in shown["bodies"].items()
+    }
+    return {**shown, "scene": scene().name, "engine": "mujoco", "family": "defaults", "bodies": bodies}
+
+
 def groups() -> list[SceneRuns]:
-    return by_scene(records(), {s.name: s for s in (scene(), scene("planar_slider_crank"))})
+    scenes = {s.name: s for s in (scene(), scene("planar_slider_crank"))}
+    return by_scene(records(), scenes, (), truths(), [motion()])

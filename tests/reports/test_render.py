@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import html
+import json
 import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +13,15 @@ import pytest
 from synthetic import groups
 
 from crosscheck.cli import collection
+from crosscheck.cli import main as command_line
 from crosscheck.engine import Setting
 from crosscheck.study import sweep as sweeps
 from crosscheck.study.grid import Case, default_cases, study
 from crosscheck.study.timings import LONG, with_timings
 from mbref.scene import Body, Scene
 from reports import __main__ as program
-from reports import render
-from reports.blocks import Heading, Table
+from reports import render, stored
+from reports.blocks import Heading, Matrix, Table
 from reports.sections import blocks
 
 FAKE = "fake_engines:FAKE"
@@ -35,15 +39,17 @@ def test_page_and_every_block(written):
     for block in blocks(groups()):
         if isinstance(block, Heading):
             assert f">{block.text}</h{block.level}>" in page, block
-    assert page.count("<svg") == len(list((written / "figures").glob("*.svg"))) == 8, page.count("<svg")
-    assert page.count("<table>") == sum(isinstance(b, Table) for b in blocks(groups()))
+    assert page.count('class="wide"') == len(list((written / "figures").glob("*.svg"))) - 2 == 6
+    assert page.count('class="plot"') == 3 and page.count('class="moving"') == 1
+    assert page.count('<table class="cards">') == sum(isinstance(b, Table) for b in blocks(groups()))
     assert "SIGSEGV" in page and "NOT_CONVERGED" in page, "a failed run is missing"
 
 
 def test_page_opens_offline(written):
     page = (written / "index.html").read_text()
     loaded = re.findall(
-        r'<(?:script|link|img|iframe)\b[^>]*|(?:url|src|@import)\s*[(=]\s*["\']?http[^)"\']*', page
+        r'<(?:script|link|img|iframe)\b[^>]*(?:src|href)=(?!"data:,")[^>]*|(?:url|src|@import)\s*[(=]\s*["\']?http[^)"\']*',
+        page,
     )
     assert not loaded, loaded
 
@@ -59,13 +65,13 @@ def test_page_and_its_places(written):
 
 def test_words_of_a_message_are_no_markup(tmp_path):
     render.write([Table("a < b", ("x",), [("<script>alert(1)</script>",)])], tmp_path)
-    assert "<script>" not in (tmp_path / "index.html").read_text()
+    assert "<script>alert" not in (tmp_path / "index.html").read_text()
 
 
 def test_markdown_and_the_pictures_beside_it(written):
     text = (written / "report.md").read_text()
     shown = re.findall(r"!\[[\w-]+\]\(([^)]+)\)", text)
-    assert len(shown) == 8, shown
+    assert len(set(shown)) == 8, shown
     for name in shown:
         assert (written / name).stat().st_size > 5_000, f"{name} is nearly empty"
         assert (written / name).with_suffix(".svg").exists(), name
@@ -73,8 +79,12 @@ def test_markdown_and_the_pictures_beside_it(written):
 
 def test_markdown_tables_and_one_line_a_row(written):
     lines = (written / "report.md").read_text().split("\n")
-    rows = [b for b in blocks(groups()) if isinstance(b, Table)]
-    assert sum(line.startswith("| ") for line in lines) == sum(len(b.rows) + 2 for b in rows)
+    rows = [
+        b.rows if isinstance(b, Table) else b.scenes
+        for b in blocks(groups())
+        if isinstance(b, Table | Matrix)
+    ]
+    assert sum(line.startswith("| ") for line in lines) == sum(len(of_table) + 2 for of_table in rows)
     for line in lines:
         assert not line.startswith("|") or line.endswith("|"), f"a row is broken: {line}"
 
@@ -110,6 +120,33 @@ def test_program_and_a_report_that_is_not_run_twice(tmp_path, of_fakes, capsys):
     page = (out / "index.html").read_text()
     assert "Provenance" in page and "Speed against error" not in page
     assert "written" in capsys.readouterr().err
+
+
+def test_pasted_commands_of_a_page_and_the_same_errors(tmp_path, of_fakes, capsys, monkeypatch):
+    assert program.main(["--quick", "--out", str(tmp_path)]) == 0
+    page = (tmp_path / "index.html").read_text()
+    commands = [html.unescape(c) for c in re.findall(r'<pre class="command">([^<]*)</pre>', page)]
+    [group] = stored.groups(tmp_path)
+    assert len(commands) == len(group.runs) == 3, commands
+    monkeypatch.chdir(tmp_path)
+    errors = {str(run.record["settings"]): run.error for run in group.runs}
+    for line in commands:
+        capsys.readouterr()
+        assert command_line([*shlex.split(line)[1:], "--json"]) == 0, line
+        [again] = json.loads(capsys.readouterr().out)["records"]
+        assert again["metrics"]["error"] == errors.pop(str(again["settings"])), (line, again["metrics"])
+    assert not errors, f"no command for {errors}"
+
+
+def test_rendering_again_and_nothing_is_run(tmp_path, of_fakes, capsys, monkeypatch):
+    assert program.main(["--quick", "--out", str(tmp_path)]) == 0
+    first = (tmp_path / "index.html").read_text()
+    monkeypatch.setattr(collection, "comparison", None)
+    assert program.main(["--render", str(tmp_path)]) == 0
+    again = (tmp_path / "index.html").read_text()
+    assert again.count('class="command"') == first.count('class="command"') == 3
+    assert program.main(["--render", str(tmp_path / "none")]) == 2
+    assert "has no records.jsonl and scenes/" in capsys.readouterr().err
 
 
 def test_program_interrupted_and_what_to_do(tmp_path, of_fakes, capsys, monkeypatch):

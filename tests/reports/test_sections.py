@@ -14,7 +14,7 @@ import mbref.simulation.simulate
 from crosscheck.judge.model_identity import gate_times
 from crosscheck.judge.truth import truth_for
 from mbref.trajectory import Outcome
-from reports.blocks import Figure, Heading, Table, Text
+from reports.blocks import Figure, Heading, Plot, Table, Text
 from reports.runs import Run, SceneRuns, by_scene, duration, ratio
 from reports.sections import (
     NAMES,
@@ -51,8 +51,9 @@ def test_every_section_and_a_heading(monkeypatch):
         monkeypatch.setattr(module, name, simulated)
     parts = blocks(groups())
     for part in parts:
-        if isinstance(part, Figure):
-            part.draw()
+        figure = part.figure if isinstance(part, Plot) else part
+        if isinstance(figure, Figure):
+            figure.draw()
     headings = [part.text for part in parts if isinstance(part, Heading)]
     for heading in ("Summary", "spatial_slider_crank", "The mechanism", "Speed against error",
                     "Constraint violation over time", "Energy balance over time", "Outcomes",
@@ -83,7 +84,7 @@ def test_summary_and_costs_worked_out_by_hand():
     assert column(found, "Completed")["exudyn", "tuned"] == "0 of 2", found.rows
     assert column(found, "Wrong or failed")["exudyn", "tuned"] == "NOT_CONVERGED from 0.01 s", found.rows
     assert column(found, "Wrong or failed")["mujoco", "defaults"] == "1 with error above 1e-2", found.rows
-    assert column(found, "Least error")["mujoco", "tuned"] == "2.0e-03", found.rows
+    assert column(found, "Least error")["mujoco", "tuned"] == "2.00e-03", found.rows
     assert column(found, "Its settings")["mujoco", "tuned"] == "step=0.025", found.rows
     assert "at 1e-3 mbref mpi-svd+projection (10 ms), at 1e-6 none" in found.caption, found.caption
 
@@ -136,14 +137,14 @@ def test_limits_and_the_bias_put_in():
 def test_least_errors_of_the_records():
     found, others = (table(least_errors.render(groups()), name) for name in ("Families", "Within 1e-08"))
     rows = {row[1]: dict(zip(found.header, row, strict=True)) for row in found.rows[:3]}
-    assert [row[0] for row in found.rows[:3]] == ["spatial_slider_crank", "", ""], "a scene is named once"
+    assert {row[0] for row in found.rows[:3]} == {"spatial_slider_crank"}, "each row names its scene"
     best = rows["mbref"]
-    assert best["Least error"] == "1.6e-05" and best["Settings"] == "step=0.025", best
+    assert best["Least error"] == "1.56e-05" and best["Settings"] == "step=0.025", best
     assert best["Families"].startswith("0 of "), best
     assert rows["exudyn"]["Least error"] == "not converged at 0.012 s", rows
     assert found.caption.startswith("0 of 6 pairs"), found.caption
     within = {row[1]: dict(zip(others.header, row, strict=True)) for row in others.rows[:3]}
-    assert within["mbref"]["Within 1e-08"] == "" and "1.6e-05" in within["mbref"]["Others"], within
+    assert within["mbref"]["Within 1e-08"] == "" and "1.56e-05" in within["mbref"]["Others"], within
 
 
 @pytest.mark.parametrize(
@@ -182,8 +183,12 @@ def test_key_of_failures_and_their_reasons():
 
 
 def test_caption_of_the_speed_plot_and_the_counts():
-    [caption] = [b.caption for b in speed.render(groups()[0]) if isinstance(b, Figure)]
-    for words in ("7 of 10 runs completed", "1 completed with an error above 1e-2", "least error is 1.6e-05"):
+    [caption] = [b.caption for b in speed.render(groups()[0]) if isinstance(b, Plot)]
+    for words in (
+        "7 of 10 runs completed",
+        "1 completed with an error above 1e-2",
+        "least error is 1.56e-05",
+    ):
         assert words in caption, caption
 
 

@@ -1,0 +1,56 @@
+"""The records behind the page: every run with its numbers, its makings, and the command that repeats it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from crosscheck.study.command import command
+from crosscheck.study.verdict import grade
+from reports import places
+from reports.blocks import Block, Card, Heading, Record, Text
+from reports.engine_looks import SIGNS, named, tone
+from reports.runs import Run, SceneRuns, duration, power
+
+NUMBERS = {"Joints open by": "violation_position", "Energy is off by": "energy_error",
+           "Reactions are off by": "reaction_error"}  # fmt: skip
+
+
+def render(groups: Sequence[SceneRuns]) -> list[Block]:
+    """One block for every family on every scene."""
+    text = (
+        "Every mark and every cell leads to the records of its runs. The commands are for the folder of this "
+        "page; each makes its run again and prints the same error."
+    )
+    found = [_record(group, curve, runs) for group in groups for curve, runs in group.curves().items()]
+    return [Heading("Records", 2), Text(text), *found]
+
+
+def path(group: SceneRuns) -> str:
+    """The scene's file, seen from the page."""
+    return f"scenes/{group.scene.name}.toml"
+
+
+def _record(group: SceneRuns, curve: tuple[str, str], runs: Sequence[Run]) -> Record:
+    name = group.scene.name
+    cards = [_card(group, run) for run in runs]
+    return Record(
+        places.of_family(name, curve), name, named(*curve), tone(curve[0]), cards, places.of_cell(name, curve)
+    )
+
+
+def _card(group: SceneRuns, run: Run) -> Card:
+    found, record = grade(run.record), run.record
+    numbers = {"Error": run.said, "Time of stepping": duration(run.seconds) if run.seconds else "–"}
+    numbers |= {"Outcome": f"{run.outcome.label.lower().replace('_', ' ')}, t = {run.t_end:.4g} s"}
+    numbers |= {label: power(run.metric(name)) for label, name in NUMBERS.items()}
+    settings = group.varied_settings(run) or "no options"
+    return Card(places.of_run(run), settings, str(found), SIGNS[found], numbers, record["message"],
+                command(record, path(group)), _made(run))  # fmt: skip
+
+
+def _made(run: Run) -> str:
+    """The record's id, the version, commit, date and machine."""
+    record = run.record
+    told = {"record": record["key"][:12], record["engine"]: record["version"], "commit": record.get("commit"),
+            "made": record.get("date"), "on": record["machine"].get("cpu")}  # fmt: skip
+    return ", ".join(f"{name} {value}" for name, value in told.items() if value)

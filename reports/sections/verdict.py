@@ -1,0 +1,114 @@
+"""The first screen: the verdict in words, the mechanism in motion, and the matrix of scenes and engines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from crosscheck.judge.tolerances import FALSE_SUCCESS, FLOOR
+from crosscheck.study.sentences import title, verdict
+from crosscheck.study.verdict import DEFAULTS, Judged, grade
+from reports import places
+from reports.blocks import Block, Heading, Matrix, Opening, Verdict
+from reports.engine_looks import SIGNS, mark, named, tone
+from reports.motion_picture import Picture, picture, poses
+from reports.runs import Run, SceneRuns, duration, power, short
+from reports.sections import speed
+
+KEY = (
+    f"= right: error up to {short(FLOOR)}; ≈ inaccurate: up to {short(FALSE_SUCCESS)}; ≠ wrong: above, "
+    "although the run completes; × failed: no run completes. A cell has the engine's run of least error and "
+    "the time of its steps; where the library's defaults are another family, they stand below it. A cell "
+    "leads to its runs, their versions and commands; an empty one: the engine cannot run the scene (Support)."
+)
+
+
+def render(groups: Sequence[SceneRuns]) -> list[Block]:
+    """The opening and the matrix; the matrix alone where no truth was recorded."""
+    known = [judged(group) for group in groups if group.truth]
+    matrix = Matrix(KEY, _engines(groups), [_scene(group) for group in groups],
+                    {group.scene.name: _row(group) for group in groups})  # fmt: skip
+    chapter: list[Block] = [Heading("Every scene in every engine", 2), matrix]
+    if not known:
+        return [*chapter]
+    said, group = verdict(known), _shown(groups)
+    shown, caption = motion(group)
+    opening = Opening(said.headline, said.labelled(), shown.svg, shown.css, caption)
+    return [opening, *chapter, *([] if group is None else _figure(group))]
+
+
+def _figure(group: SceneRuns) -> list[Block]:
+    """Time against error on the scene that is shown moving."""
+    _, figure, *_ = speed.render(group)
+    return [Heading(f"Time against error: {group.scene.name}", 2), figure]
+
+
+def judged(group: SceneRuns) -> Judged:
+    """A scene's runs as the sentences take them."""
+    assert group.truth is not None
+    return Judged(group.scene, group.truth, [run.record for run in group.runs])
+
+
+def motion(group: SceneRuns | None) -> tuple[Picture, str]:
+    """The picture of a scene's true motion with its worst run, and its caption; empty without a truth."""
+    if group is None or not (group.truth and group.truth["motion"]):
+        return Picture("", ""), ""
+    exact = poses(group.scene, group.truth["motion"])
+    worst = group.motion if group.motion and len(group.motion["times"]) == len(exact.times) else None
+    name = places.of_family(group.scene.name, ("", "")).replace("r-", "m-")
+    shown = picture(name, group.scene, exact, poses(group.scene, worst) if worst else None,
+                    tone(worst["engine"]) if worst else 0)  # fmt: skip
+    end = exact.times[-1]
+    part = f"the first {end:.3g} s" if end < 0.999 * group.scene.duration else f"{end:.3g} s"
+    caption = f"{group.scene.name}, {part} of its true motion as thick lines."
+    if worst:
+        name = named(worst["engine"], worst["family"])
+        caption += f" Coloured: the completed run of largest error, {name}, off by {power(_largest(group))}."
+    return shown, caption
+
+
+def _shown(groups: Sequence[SceneRuns]) -> SceneRuns | None:
+    """The scene whose worst completed run is the furthest off, of those that can be shown."""
+    able = [group for group in groups if group.motion and group.truth and group.truth["motion"]]
+    return max(able, key=_largest, default=None)
+
+
+def _largest(group: SceneRuns) -> float:
+    """The largest error of a completed run."""
+    return max((run.error for run in group.completed() if run.error == run.error), default=0.0)
+
+
+def _engines(groups: Sequence[SceneRuns]) -> list[tuple[str, str, int, str]]:
+    names = dict.fromkeys(engine for group in groups for engine, _ in group.curves())
+    return [(name, title(name), tone(name), mark(name)) for name in names]
+
+
+def _scene(group: SceneRuns) -> tuple[str, str]:
+    counts = group.scene.counts()
+    redundant = f"{counts.redundant} redundant" if counts.redundant else "none redundant"
+    return group.scene.name, f"{group.scene.duration:g} s, {counts.rows} rows, {redundant}"
+
+
+def _row(group: SceneRuns) -> dict[str, list[Verdict]]:
+    """Of every engine the best family, and the library's defaults where that is another one."""
+    best = group.best()
+    found: dict[str, list[Verdict]] = {}
+    for engine in dict.fromkeys(engine for engine, _ in best):
+        own = [run for (name, _), run in best.items() if name == engine]
+        first = min(own, key=lambda run: (not run.completed, run.error != run.error, run.error))
+        others = [run for run in own if run.curve[1] == DEFAULTS and run is not first]
+        found[engine] = [_verdict(group, run) for run in (first, *others)]
+    return found
+
+
+def _verdict(group: SceneRuns, run: Run) -> Verdict:
+    found, runs = grade(run.record), group.curves()[run.curve]
+    lines = [run.said, duration(run.seconds)] if run.completed else [_end(run)]
+    if failed := sum(not other.completed for other in runs) * run.completed:
+        lines.append(f"{failed} of {len(runs)} failed")
+    href = f"#{places.of_family(group.scene.name, run.curve)}"
+    return Verdict(run.curve[1], str(found), SIGNS[found], lines, href)
+
+
+def _end(run: Run) -> str:
+    said = run.outcome.label.lower().replace("_", " ")
+    return f"{said} at {run.t_end:.3g} s" if run.t_end or run.record["times"] else said

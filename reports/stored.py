@@ -1,0 +1,52 @@
+"""A report's folder read back: its scenes, records, times, truths and motions, without any run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crosscheck.judge.model_identity import gate_times
+from crosscheck.study.grid import Record
+from mbref.records import stored
+from mbref.scene import Scene
+from reports.runs import SceneRuns, by_scene
+
+
+def groups(folder: Path) -> list[SceneRuns]:
+    """The runs of a folder by scene; FileNotFoundError where it has no scenes or records."""
+    if not (folder / "records.jsonl").exists() or not (folder / "scenes").is_dir():
+        raise FileNotFoundError(f"{folder}: has no records.jsonl and scenes/ of a report")
+    scenes = [Scene.from_file(path) for path in sorted((folder / "scenes").glob("*.toml"))]
+    named = {scene.name: scene for scene in scenes}
+    times = stored(folder / "timings.jsonl")
+    records = [r for r in stored(folder / "records.jsonl").values() if r["scene"] in named]
+    gates = [r for r in records if _is_gate(named[r["scene"]], r)]
+    runs = [_timed(r, times) for r in records if not any(r is gate for gate in gates)]
+    more = (list(stored(folder / name).values()) for name in ("truths.jsonl", "motions.jsonl"))
+    return by_scene(_ordered(runs), named, gates, *more)
+
+
+def _is_gate(scene: Scene, record: Record) -> bool:
+    return np.array_equal(record["asked"].get("times", ()), gate_times(scene))
+
+
+def _timed(record: Record, times: dict[str, dict[str, Any]]) -> Record:
+    if record["key"] not in times:
+        return record
+    entry = times[record["key"]]
+    return {**record, "cost": {**record["cost"], "seconds": entry["seconds"]}, "timing": entry["timing"]}
+
+
+def _ordered(records: Sequence[Record]) -> list[Record]:
+    """By engine in the order of the file, and from coarse to fine in each family."""
+    engines = list(dict.fromkeys(r["engine"] for r in records))
+
+    def place(record: Record) -> tuple[int, str, list[float]]:
+        options = record["asked"]["options"].values()
+        coarseness = [-float(value) for value in options if isinstance(value, int | float)]
+        return engines.index(record["engine"]), record["family"], coarseness
+
+    return sorted(records, key=place)

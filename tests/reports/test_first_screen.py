@@ -1,0 +1,122 @@
+"""The first screen: records / the matrix, the moving mechanism, the figure that can be asked, the records."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic import groups, motion, scene, truths
+
+from crosscheck.study.truths import FRAMES, TURN
+from mbref.scenes import SCENES
+from reports import render
+from reports.blocks import Matrix, Opening, Plot, Record
+from reports.motion_picture import picture, poses
+from reports.places import of_family, of_run
+from reports.sections import blocks
+from reports.sections.verdict import render as first_screen
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> str:
+    out = tmp_path_factory.mktemp("page")
+    render.write(blocks(groups(), ["verdict", "outcomes", "records"]), out)
+    return (out / "index.html").read_text()
+
+
+def one(kind: type):
+    [found] = [block for block in first_screen(groups()) if isinstance(block, kind)]
+    return found
+
+
+def test_matrix_and_the_grades():
+    cells = one(Matrix).cells["spatial_slider_crank"]
+    assert [(v.family, v.grade) for v in cells["mujoco"]] == [("tuned", "inaccurate"), ("defaults", "wrong")]
+    assert [(v.grade, v.lines) for v in cells["exudyn"]] == [("failed", ["not converged at 0.012 s"])]
+    assert cells["mbref"][0].lines == ["1.56e-05", "40 ms"], cells["mbref"]
+
+
+def test_opening_and_its_sentences():
+    opening = one(Opening)
+    assert opening.headline.startswith("No engine is right on every scene"), opening.headline
+    assert "MuJoCo, defaults, off by 5.0e-01" in opening.caption, opening.caption
+    assert opening.sentences["Who is right"].startswith("mbref is inaccurate at best on spatial_slider_crank")
+
+
+def test_motion_moves_and_stands_still_where_it_differs_most():
+    exact = poses(scene(), truths()[0]["motion"])
+    moved = poses(scene(), motion())
+    found = picture("m", scene(), exact, moved, 1)
+    assert found.css.count("@keyframes") == found.svg.count("style=") == 6, "three bodies, twice"
+    assert "100%{transform:translate(" in found.css and "nan" not in found.css
+    assert len(found.css) < 6 * 6000, f"{len(found.css)} bytes"
+
+
+def test_planar_bodies_keep_their_length_and_turn_without_a_leap():
+    planar = SCENES["planar_slider_crank"]().with_(duration=0.05)
+    from crosscheck.study.truths import truth_record
+
+    record = truth_record(planar, np.linspace(0, 0.05, 3), 20.0)
+    css = picture("m", planar, poses(planar, record["motion"]), None, 0).css
+    angles = [float(a) for a in re.findall(r"rotate\(([-\d.]+)rad", css.split("@keyframes")[1])]
+    assert "scale(" not in css and len(angles) <= FRAMES + 1
+    assert max(abs(np.diff(angles))) < 2 * TURN, angles
+
+
+def test_marks_lead_to_their_records(page):
+    ids = set(re.findall(r' id="([^"]+)"', page))
+    links = set(re.findall(r'href="#([^"]+)"', page))
+    assert links <= ids, links - ids
+    assert {of_run(run) for group in groups() for run in group.runs} <= ids
+    assert of_family(scene().name, ("mujoco", "tuned")) in ids
+    assert len(re.findall(r' id="([^"]+)"', page)) == len(ids), "an id is given twice"
+
+
+def test_figure_and_the_data_of_its_marks():
+    plot = one(Plot)
+    marks = re.findall(r'data-error="([^"]+)" data-seconds="([^"]+)"', plot.svg)
+    shown = [(f"{r.error:.4g}", f"{r.seconds:.4g}") for r in groups()[0].completed()]
+    assert sorted(marks) == sorted(shown), (marks, shown)
+    assert plot.svg.count("<title>") == len(shown) + 1
+
+
+def test_records_and_their_commands():
+    records = [block for block in blocks(groups(), ["records"]) if isinstance(block, Record)]
+    assert sum(len(record.cards) for record in records) == sum(len(group.runs) for group in groups())
+    [card, *_] = records[0].cards
+    assert card.command.startswith("crosscheck run scenes/spatial_slider_crank.toml --engine mbref --setting")
+    assert card.command.endswith("--samples 13 --duration 0.02"), card.command
+
+
+class Checked(HTMLParser):
+    """Notes elements that are closed in another order than opened, and pictures and fields without a name."""
+
+    VOID = ("meta", "link", "input", "br", "wbr", "img", "hr")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.faults: list[str] = []
+
+    def handle_starttag(self, tag, attrs):
+        named = dict(attrs)
+        if tag not in self.VOID:
+            self.open.append(tag)
+        if tag == "svg" and {"class": "moving"}.items() <= named.items() and "aria-label" not in named:
+            self.faults.append("a picture without a name")
+
+    def handle_endtag(self, tag):
+        if not self.open or self.open.pop() != tag:
+            self.faults.append(f"</{tag}> at {self.getpos()}")
+
+
+def test_page_is_well_formed_and_its_script_is_small(page):
+    checked = Checked()
+    checked.feed(page)
+    assert not checked.faults and not checked.open, (checked.faults, checked.open)
+    script = (Path(render.__file__).parent / "templates" / "script.js").read_text()
+    assert len(script) < 10_000 and "http" not in script
+    assert page.count("<script>") == 1
