@@ -1,8 +1,9 @@
 """The reference motion of any scene: two formulations, their agreement, and the bound that follows from it.
 
-Formulation A moves the scene twice, by series of different orders, with other rows where some are redundant
-and with joints displaced by the rounding of the scene's numbers; formulation B moves it once.  Where B ends
-before A, as in a singular position, the two runs of A bound each other.
+Formulation A moves the scene twice, by series of different orders and with other rows where some are
+redundant; formulation B moves it once.  Where redundant rows contradict each other, because the scene's
+numbers are rounded, joints are displaced by as much as rounding in the second run.  Where B ends before A, as
+in a singular position, the two runs of A bound each other.
 """
 
 from __future__ import annotations
@@ -15,12 +16,13 @@ from crosscheck.judge.reference import cache
 from crosscheck.judge.reference.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference.bound import USEFUL, bounds, differences
 from crosscheck.judge.reference.motion import Motion, Times
-from crosscheck.judge.reference.taylor import natural_motion
+from crosscheck.judge.reference.taylor import DATA, natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from mbref.scene import Scene
 
 SECONDS = 20.0
 TWIN_ORDER, TWIN_SEED = 24, 1  # of A's second run
+CONSISTENT = 32 * EXTENDED.eps  # residual that is of the motion's own rounding, not of the scene's
 SHARE = 0.4  # of the time that is left for each run of A
 FIELDS = (
     "position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration"
@@ -83,8 +85,11 @@ def runs(scene: Scene, times: np.ndarray, seconds: float) -> tuple[Motion, Motio
     if not len(a.times):
         return a, a, a
     left = seconds - a.seconds
-    way = {"order": TWIN_ORDER, "seed": TWIN_SEED}
-    twin = natural_motion(scene, a.times, EXTENDED, seconds=SHARE * left, **way)
+    displaced = DATA if a.contradiction > CONSISTENT else 0.0
+    twin = natural_motion(
+        scene, a.times, EXTENDED, seconds=SHARE * left,
+        order=TWIN_ORDER, seed=TWIN_SEED, displaced=displaced,
+    )  # fmt: skip
     return a, twin, tree_motion(scene, a.times, EXTENDED, seconds=left - twin.seconds)
 
 

@@ -28,6 +28,7 @@ NEW_ROW = 1e-4  # pivot from which a row that was dependent at the start has bec
 BLUNT = 1e-2  # part of the best sharpness below which the choice of rows is looked at again
 BETTER = 1e3  # times sharper that other rows have to be
 NEAR = 0.4  # part of the usual sharpness below which a position counts as near a singular one
+PREFERENCE = 0.2  # by how much a row's weight may be larger
 USUAL = 50  # steps over which sharpness is usual
 DATA = float(np.finfo(float).eps)  # rounding of a scene's numbers
 ENOUGH = 100.0  # multiples of the tolerance that a leap may lose without trying from nearer
@@ -48,16 +49,16 @@ class Ended(ArithmeticError):
 
 def natural_motion(
     scene: Scene, times: Times, arithmetic: Arithmetic, *, seconds: float = np.inf,
-    order: int = ORDER, tolerance: float | None = None, seed: int = 0,
+    order: int = ORDER, tolerance: float | None = None, seed: int = 0, displaced: float = 0.0,
 ) -> Motion:  # fmt: skip
     """The motion at ascending times (k,) ≥ 0 in natural coordinates (see Motion), by series of an order.
 
     ``tolerance`` is of a step, relative (default: the arithmetic's rounding unit).  Another ``seed`` prefers
-    other rows where some are redundant, and displaces joints by the rounding of double precision.
+    other rows where some are redundant, and displaces joints by up to ``displaced`` of their size.
     ``seconds`` limits the CPU time of the calling thread.
     """
     began, reason, samples = time.thread_time(), "", []
-    stepper = Stepper(scene, arithmetic, order, tolerance or arithmetic.eps, seed)
+    stepper = Stepper(scene, arithmetic, order, tolerance or arithmetic.eps, (seed, displaced))
     try:
         for sample in stepper.samples(times, began + seconds):
             samples.append(sample)
@@ -69,35 +70,38 @@ def natural_motion(
         np.asarray(times[: len(samples)], dtype=float), *stepper.of.bodies(x, v, a),
         reached=float(stepper.t if reason else max(times, default=0.0)), reason=reason,
         steps=stepper.steps, crossings=tuple(stepper.crossings), seconds=time.thread_time() - began,
+        contradiction=stepper.contradiction,
     )  # fmt: skip
 
 
 class Stepper:
     """The coordinates of a scene at a time ``t``, and the steps that take them on."""
 
-    def __init__(self, scene: Scene, arithmetic: Arithmetic, order: int, tolerance: float, seed: int):
+    def __init__(
+        self, scene: Scene, arithmetic: Arithmetic, order: int, tolerance: float, way: tuple[int, float]
+    ):
         self.of = NaturalCoordinates(scene, arithmetic)
         self.t: Any = arithmetic.number(0.0)
         self.steps = 0
         self.crossings: list[float] = []
+        self.contradiction = 0.0
         self._loads = Loads(self.of)
         self._order, self._tolerance = order, tolerance
         self._x, self._v = self.of.start()
         self._angles = [arithmetic.number(0.0) for _ in self._loads.torsions]
-        spread = (
-            0.2 * np.random.default_rng(seed).random(len(self.of.c)) if seed else np.zeros(len(self.of.c))
-        )
-        self._weights = 1 + spread
-        self._lost = np.inf
+        self._weights = self._varied(*way)
+        self._every, self._lost = HeldRows(self.of, range(len(self.of.c))), np.inf
         self._held = self._choice(self._x, self.t)[0]
         self._sharpness = [self._sharp(self._x, self.t)]
 
-    def _vary(self, rng: np.random.Generator) -> None:
-        """Prefer other rows, and displace the joints by what rounding leaves open of them."""
-        self._weights += 0.2 * rng.random(len(self._weights))
-        joints = slice(6 * self.of.nb, None)
-        displaced = DATA * rng.uniform(-1, 1, len(self.of.c[joints]))
-        self.of.c[joints] = self.of.c[joints] + self.of.arithmetic.array(displaced)
+    def _varied(self, seed: int, displaced: float) -> np.ndarray:
+        """Weights (m,) of the rows, near one, that prefer other rows by the seed; joints are displaced."""
+        if not seed:
+            return np.ones(len(self.of.c))
+        rng, joints = np.random.default_rng(seed), slice(6 * self.of.nb, None)
+        moved = displaced * rng.uniform(-1, 1, len(self.of.c[joints]))
+        self.of.c[joints] = self.of.c[joints] + self.of.arithmetic.array(moved)
+        return 1 + PREFERENCE * rng.random(len(self.of.c))
 
     def samples(self, times: Times, deadline: float) -> Iterator[Sample]:
         """X, X', X'' (3, n) at ascending times; raises Ended where the motion cannot be followed."""
@@ -130,12 +134,12 @@ class Stepper:
         self._sharpness.append(self._sharp(self._x, self.t))
         self._choose_again()
         self._project()
+        self.contradiction = max(self.contradiction, _largest(self._gaps(self._every)[0]))
 
     # --- rows ---------------------------------------------------------------------------------------------
     def _choice(self, x: np.ndarray, t: Any) -> tuple[HeldRows, int]:
         """Rows that are independent at the coordinates x, and how many are well so."""
-        every = HeldRows(self.of, range(len(self.of.c)))
-        rows, pivots = independent(every.unit_gradient(x, t), self._weights)
+        rows, pivots = independent(self._every.unit_gradient(x, t), self._weights)
         return HeldRows(self.of, rows), int((pivots > NEW_ROW).sum())
 
     def _sharp(self, x: np.ndarray, t: Any) -> float:
@@ -174,9 +178,9 @@ class Stepper:
             raise Ended(f"body {self.of.scene.body[way.argmax() // 4].name!r} can turn without inertia")
 
     # --- consistency --------------------------------------------------------------------------------------
-    def _gaps(self) -> tuple[np.ndarray, np.ndarray]:
-        """Residuals (m,) of the rows and of their time derivatives."""
-        held, drives = self._held, self._held.drives(self.t, 2)
+    def _gaps(self, held: HeldRows) -> tuple[np.ndarray, np.ndarray]:
+        """Residuals (m,) of rows and of their time derivatives."""
+        drives = held.drives(self.t, 2)
         u, w = (np.stack([form(self._x), form(self._v)]) for form in (held.u, held.w))
         products = np.stack([(u[0] * w[0]).sum(axis=0), (u[0] * w[1] + u[1] * w[0]).sum(axis=0)])
         return drives.combined(products, 0) - drives.c[0], drives.combined(products, 1) - drives.c[1]
@@ -190,7 +194,7 @@ class Stepper:
         system, still = SaddlePoint(self.of.mass, rows, arithmetic), 0 * self._x[:, :-4]
         for level, rounds in ((0, 4), (1, 2)):
             for _ in range(rounds):
-                gap, state = self._gaps()[level], (self._x, self._v)[level]
+                gap, state = self._gaps(held)[level], (self._x, self._v)[level]
                 if _largest(gap) <= 4 * arithmetic.eps * max(_largest(state), 1.0):
                     break
                 state[:, :-4] = arithmetic.settled(state[:, :-4] + system.solve(still, -gap)[0])

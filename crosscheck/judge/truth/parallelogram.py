@@ -14,6 +14,7 @@ import numpy as np
 from crosscheck.judge.loads import initial_rotations
 from crosscheck.judge.tolerances import PARALLEL
 from crosscheck.judge.truth.one_dof import DrivenSign, Path, Pose, circle, turned
+from crosscheck.judge.truth.picard import REAL
 from mbref.scene import GROUND, Cylindrical, Distance, Driver, Revolute, Scene
 
 
@@ -68,8 +69,9 @@ def turning_driver(scene: Scene, axis: np.ndarray, turns: np.ndarray) -> DrivenS
 
 
 def unit(vector: Sequence[float] | np.ndarray) -> np.ndarray:
-    """The vector (3,) at length one."""
-    return np.array(vector, dtype=float) / np.linalg.norm(vector)
+    """The vector (3,) at length one, in extended precision."""
+    given = np.array(vector, dtype=REAL)
+    return given / np.sqrt(np.sum(given * given))
 
 
 def _arm(scene: Scene, pivots: dict[str, Revolute], name: str) -> np.ndarray | None:

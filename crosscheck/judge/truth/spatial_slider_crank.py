@@ -12,6 +12,7 @@ import numpy as np
 from crosscheck.judge.loads import cross, initial_rotations
 from crosscheck.judge.truth.one_dof import Path, Pose, circle, turned
 from crosscheck.judge.truth.parallelogram import turning_driver, unit
+from crosscheck.judge.truth.picard import REAL
 from crosscheck.judge.truth.planar_slider_crank import parts_of
 from mbref.scene import Scene, Universal
 
@@ -25,11 +26,11 @@ def spatial_slider_crank(scene: Scene) -> Path | None:
     axis, line = unit(pivot.axis), unit(guide.axis)
     first = pin.bodies.index(scene.body[crank].name)
     e0, z0 = unit(pin.axes[first]), unit(pin.axes[1 - first])
-    centre, b0, c0 = (np.array(joint.anchor) for joint in (pivot, pin, end))
+    centre, b0, c0 = (np.array(joint.anchor, dtype=REAL) for joint in (pivot, pin, end))
     x0 = unit(c0 - b0)
     if abs(z0 @ x0) > 1 - 1e-6 or abs(e0 @ x0) > 1 - 1e-6:
         return None
-    arm, length, lean = b0 - centre, float(np.linalg.norm(c0 - b0)), float(z0 @ x0)
+    arm, length, lean = b0 - centre, np.sqrt(np.sum((c0 - b0) ** 2)), z0 @ x0
     side = float(np.sign((c0 - b0) @ line))
     hand = np.sign(np.cross(e0, x0) @ z0)
     rotation0 = initial_rotations(scene)
