@@ -60,6 +60,9 @@ def moving_probes() -> dict[str, Scene]:
         "spinning loop": spinning_loop(),
         "door": door(),
         "wound spring": wound_spring(),
+        "floating pair": floating_pair(),
+        "two drivers": two_drivers(),
+        "several springs": several_springs(),
     }
     return {name: scene.with_(name=name) for name, scene in found.items()}
 
@@ -116,7 +119,49 @@ def wound_spring() -> Scene:
     swing = np.cross(40.0 * axis, np.array(BODY.position) - np.array(hinge.anchor_pair[0]))
     body = replaced(BODY, angular_velocity=40.0 * axis, velocity=swing)
     spring = TorsionSpring(joint="J", stiffness=0.4, damping=0.01, natural_angle=0.4)
-    return Scene(name="wound spring", duration=0.25, body=(body,), joint=(hinge,), load=(spring,))
+    return Scene(name="wound spring", duration=0.45, body=(body,), joint=(hinge,), load=(spring,))
+
+
+def floating_pair() -> Scene:
+    """Two bodies on a hinge in flight, with a damped spring and a damped torsion spring between them."""
+    springs = (_load("spring"), TorsionSpring(joint="J", stiffness=4.0, damping=0.1, natural_angle=-0.6))
+    scene = Scene(name="floating", gravity=GRAVITY, duration=0.3, body=(HUB, BODY), load=springs,
+                  joint=(replaced(JOINTS["revolute"], bodies=("hub", "body")),))  # fmt: skip
+    twists = ((0.4, 1.0, -0.5, 1.0, -3.0, 2.0), (0.4, 1.0, -0.5, -2.0, 4.0, 3.0))
+    return consistent(scene, np.array(twists))
+
+
+def two_drivers() -> Scene:
+    """Two hinges one after the other, driven by a quartic and a wave, and by a wave of negative amplitude."""
+    hub = Revolute(name="H", bodies=("ground", "hub"), anchor=(-0.4, 0.3, 0.1), axis=(0.3, -0.4, 1.0))
+    drivers = (
+        Driver(joint="H", polynomial=(0.0, 0.8, -0.5, 0.9, -0.3), sine=Sine(amplitude=0.2, frequency=4.0)),
+        Driver(joint="J", polynomial=(0.0, -0.6), sine=Sine(amplitude=-0.3, frequency=6.0)),
+    )
+    joints = (hub, replaced(JOINTS["revolute"], bodies=("hub", "body")))
+    return Scene(name="drivers", gravity=GRAVITY, duration=1.5, body=(HUB, BODY), joint=joints,
+                 driver=drivers)  # fmt: skip
+
+
+def several_springs() -> Scene:
+    """Hub and body on ball joints, two springs that pull and push, two forces and two moments on one body."""
+    joints = (BEARING, Spherical(name="J", bodies=("hub", "body"), anchor=(0.0, 0.0, 0.0)))
+    points = ((-0.3, 0.6, 0.0), (0.4, -0.1, 0.1))
+    springs = (
+        Spring(bodies=("hub", "body"), points=points, stiffness=30.0, damping=0.5, natural_length=0.5),
+        Spring(bodies=("body", "ground"), points=(points[1], (0.9, -0.6, 0.4)), stiffness=60.0, damping=0.2,
+               natural_length=1.1),
+    )  # fmt: skip
+    pushes = (
+        Force(body="body", point=(0.5, -0.1, 0.2), force=(1.0, -2.0, 3.0)),
+        Force(body="body", point=(0.4, 0.1, 0.2), force=(-0.4, -2.0, 3.0)),
+        Moment(body="hub", moment=(0.3, 0.2, -0.4)),
+        Moment(body="hub", moment=(0.1, -0.2, 0.5)),
+    )
+    return _launched(
+        Scene(name="springs", gravity=GRAVITY, duration=DURATION, body=(HUB, BODY), joint=joints,
+              load=springs + pushes)
+    )  # fmt: skip
 
 
 def consistent(scene: Scene, twists: np.ndarray) -> Scene:

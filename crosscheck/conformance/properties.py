@@ -16,6 +16,7 @@ from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.energy import energy_series
 from crosscheck.judge.gauss_principle import stacked
 from crosscheck.judge.metrics import in_scene_order, violation_series
+from crosscheck.judge.momentum import momentum_series
 from crosscheck.judge.reaction_balance import balance, idle
 from crosscheck.judge.tolerances import (
     LIKE_TRUTH,
@@ -150,6 +151,14 @@ def energy(bench: Bench) -> Finding | Outside:
     return Finding(float(drift.max()), LIKE_TRUTH)
 
 
+def momentum(bench: Bench) -> Finding | Outside:
+    """Momentum, and its moment about the common centre of mass, grow by gravity and outer loads alone."""
+    drift = momentum_series(bench.scene, bench.motion)
+    if drift is None:
+        return Outside("a joint or spring is fixed to the ground, or nothing moves or has mass")
+    return Finding(float(drift.max()), LIKE_TRUTH)
+
+
 def balanced(bench: Bench) -> Finding | Outside:
     """Reactions and loads on every body are what moves it: the judge's own loads, the exact accelerations."""
     return _of_reactions(bench, balance)
@@ -246,6 +255,7 @@ PROPERTIES: Mapping[str, Property] = {
     "speeds": _property(true_velocities),
     "accelerations": _property(true_accelerations),
     "energy": _property(energy, version=2),
+    "momentum": _property(momentum),
     "balance": _property(balanced),
     "workless": _property(workless),
     "silence": _property(silence),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -11,6 +13,7 @@ from crosscheck.conformance.moving import heavy_top, moving_probes
 from crosscheck.conformance.trial import difference
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.metrics import violation_series
+from crosscheck.judge.momentum import momentum_series
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import Body, Scene
@@ -27,6 +30,22 @@ def test_gauss_motion_and_truth(name):
     times = np.linspace(0.0, scene.duration, 4)
     apart = difference(scene, gauss_motion(scene, tuple(times.tolist())), truth_for(scene).poses(times))
     assert apart < 1e-8, f"{name}: Gauss's principle and the truth differ by {apart:.1e}, allowed 1e-8"
+
+
+@pytest.mark.parametrize("name", ["floating pair", "tumbling body", "pushed body"])
+def test_momentum_and_what_pushes(name):
+    """The exact motion keeps it; with one body a thousandth faster it does not."""
+    scene = PROBES[name]
+    exact = truth_for(scene).poses(np.linspace(0.0, scene.duration, 4))
+    assert momentum_series(scene, exact).max() < 1e-13
+    faster = replace(exact, velocity=exact.velocity * 1.001)
+    assert momentum_series(scene, faster).max() > 1e-5
+
+
+def test_momentum_and_the_ground():
+    scene = PROBES["spring load"]
+    exact = gauss_motion(scene, (0.0, 0.01))
+    assert momentum_series(scene, exact) is None, "the bearing on the ground pushes"
 
 
 def test_tumbling_body_and_elliptic_functions():

@@ -12,6 +12,7 @@ import mbref.equations.model
 from crosscheck.conformance.closed_forms import CLOSED_FORMS, free_fall, pendulum
 from crosscheck.conformance.features import BODY, JOINTS, feature_scenes, massless, undetermined
 from crosscheck.conformance.random_mechanisms import random_mechanism
+from crosscheck.conformance.relations import ASKEW, Isometry
 from crosscheck.conformance.trial import best_family
 from crosscheck.engine import engine
 from crosscheck.judge import constraints, metrics
@@ -19,7 +20,7 @@ from crosscheck.judge.energy import energy_series
 from crosscheck.judge.gauss_principle import gauss, stacked
 from crosscheck.judge.reference import cache, tree_loads
 from crosscheck.judge.reference import reference as module
-from crosscheck.judge.reference.arithmetic import DOUBLE, EXTENDED
+from crosscheck.judge.reference.arithmetic import DOUBLE, EXTENDED, doubles
 from crosscheck.judge.reference.bound import differences
 from crosscheck.judge.reference.certify import certified, digest
 from crosscheck.judge.reference.natural import NaturalCoordinates
@@ -95,6 +96,19 @@ def test_known_motion_is_within_the_bound(name):
 @pytest.mark.parametrize("name", sorted(set(ALL) - {*QUICK, "four_bar_straight"}))
 def test_every_known_motion_is_within_the_bound(name):
     assert_family(name)
+
+
+def test_redundant_joints_with_rounded_anchors_are_within_the_bound():
+    """A mechanism turned askew, whose joints contradict each other, and the turned motion of the exact one."""
+    scene = SCENES["bricard"]()
+    times, turned = np.linspace(0.0, 0.3, 4), Isometry(ASKEW, np.array([0.3, -0.5, 0.2]))
+    exact = natural_motion(scene, times, EXTENDED, seconds=SECONDS)
+    askew = natural_motion(turned.change(scene), times, EXTENDED, seconds=SECONDS)
+    assert exact.contradiction < module.CONSISTENT < askew.contradiction
+    found, reason = judged(turned.change(scene), times, *runs(turned.change(scene), times, SECONDS))
+    assert not reason
+    off = np.abs(found.position - turned.place(doubles(exact.position))).max()
+    assert off <= found.bound.max(), f"{off:.1e} from the turned motion, bound {found.bound.max():.1e}"
 
 
 # --- two formulations -------------------------------------------------------------------------------------

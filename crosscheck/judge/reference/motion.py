@@ -22,8 +22,8 @@ class Motion:
     (w, x, y, z) body to world of either sign, with ``velocity``, ``angular_velocity``, ``acceleration`` and
     ``angular_acceleration`` (k, nb, 3); elements are the arithmetic's.  ``reached`` (s) is the last time
     asked for, or where the motion ended before, with the ``reason`` as a clause ("" when complete).
-    ``crossings`` (s) are the singular positions passed, ``seconds`` CPU time, ``contradiction`` by how much at
-    most redundant rows were off, relative to the scene's length, where that was looked at.
+    ``crossings`` (s) are the singular positions passed, ``seconds`` CPU time; ``contradiction`` is the
+    largest residual of redundant rows, relative to the largest coordinate, where that was looked at.
     """
 
     times: np.ndarray

@@ -2,7 +2,7 @@
 
 Formulation A moves the scene twice, by series of different orders and with other rows where some are
 redundant; formulation B moves it once.  Where redundant rows contradict each other, because the scene's
-numbers are rounded, joints are displaced by as much as rounding in the second run.  Where B ends before A, as
+numbers are rounded, joints are displaced by as much in the second run.  Where B ends before A, as
 in a singular position, the two runs of A bound each other.
 """
 
@@ -85,7 +85,7 @@ def runs(scene: Scene, times: np.ndarray, seconds: float) -> tuple[Motion, Motio
     if not len(a.times):
         return a, a, a
     left = seconds - a.seconds
-    displaced = DATA if a.contradiction > CONSISTENT else 0.0
+    displaced = max(DATA, a.contradiction) if a.contradiction > CONSISTENT else 0.0
     twin = natural_motion(
         scene, a.times, EXTENDED, seconds=SHARE * left,
         order=TWIN_ORDER, seed=TWIN_SEED, displaced=displaced,

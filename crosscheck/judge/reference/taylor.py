@@ -54,8 +54,8 @@ def natural_motion(
     """The motion at ascending times (k,) ≥ 0 in natural coordinates (see Motion), by series of an order.
 
     ``tolerance`` is of a step, relative (default: the arithmetic's rounding unit).  Another ``seed`` prefers
-    other rows where some are redundant, and displaces joints by up to ``displaced`` of their size.
-    ``seconds`` limits the CPU time of the calling thread.
+    other rows where some are redundant, and displaces joints by up to ``displaced``, relative to the largest
+    coordinate.  ``seconds`` limits the CPU time of the calling thread.
     """
     began, reason, samples = time.thread_time(), "", []
     stepper = Stepper(scene, arithmetic, order, tolerance or arithmetic.eps, (seed, displaced))
@@ -99,7 +99,7 @@ class Stepper:
         if not seed:
             return np.ones(len(self.of.c))
         rng, joints = np.random.default_rng(seed), slice(6 * self.of.nb, None)
-        moved = displaced * rng.uniform(-1, 1, len(self.of.c[joints]))
+        moved = displaced * self._size() * rng.uniform(-1, 1, len(self.of.c[joints]))
         self.of.c[joints] = self.of.c[joints] + self.of.arithmetic.array(moved)
         return 1 + PREFERENCE * rng.random(len(self.of.c))
 
@@ -118,8 +118,7 @@ class Stepper:
             while pending and pending[0] <= float(self.t) + h:
                 d = self.of.arithmetic.number(pending.pop(0)) - self.t
                 yield tuple(self.of.arithmetic.settled(value(series, d, n)) for n in range(3))
-            if pending:
-                self._advance(expansion, series, h)
+            self._advance(expansion, series, h)
 
     def _expansion(self, order: int) -> Expansion:
         state = self._x, self._v
@@ -134,7 +133,12 @@ class Stepper:
         self._sharpness.append(self._sharp(self._x, self.t))
         self._choose_again()
         self._project()
-        self.contradiction = max(self.contradiction, _largest(self._gaps(self._every)[0]))
+        gap = _largest(self._gaps(self._every)[0]) / self._size()
+        self.contradiction = max(self.contradiction, gap)
+
+    def _size(self) -> float:
+        """The largest coordinate, and no less than one."""
+        return max(1.0, _largest(self._x))
 
     # --- rows ---------------------------------------------------------------------------------------------
     def _choice(self, x: np.ndarray, t: Any) -> tuple[HeldRows, int]:

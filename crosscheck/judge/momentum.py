@@ -1,0 +1,90 @@
+"""Momentum balance of a trajectory: what joints and loads between bodies leave unchanged.
+
+Without a joint or spring to the ground, P(t) = P(0) + (Σ m g + Σ F) t, and about the centre of mass of all
+bodies, where gravity has no moment, L(t) = L(0) + Σ M t with constant moments M and no forces at points.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crosscheck.judge import constraints
+from crosscheck.judge.loads import world_inertia
+from mbref import rotations
+from mbref.scene import GROUND, Force, Moment, Scene
+from mbref.trajectory import Trajectory
+
+
+def momentum_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
+    """Drift (k,) since t = 0 of the momentum less the impulse of gravity and loads, over Σ m |v|; or of the
+    moment of momentum, over that times the scene's length plus Σ |J ω|, where that is larger.
+
+    None where a joint or a spring is fixed to the ground, without masses, or where nothing moves.
+    """
+    if not scene.has_mass() or any(GROUND in item.bodies for item in _links(scene)):
+        return None
+    start = np.concatenate(_momenta(scene, *(a[None] for a in _initial(scene))), axis=-1)
+    state = (trajectory.position, trajectory.orientation, trajectory.velocity, trajectory.angular_velocity)
+    linear, angular = _momenta(scene, *state)
+    time = trajectory.times[:, None]
+    linear = linear - start[:, :3] - time * _push(scene)
+    angular = angular - start[:, 3:] - time * _turning_push(scene)
+    along, turning = _sizes(scene, *state)
+    if not along + turning:
+        return None
+    if any(isinstance(load, Force) for load in scene.load):
+        angular = 0 * angular  # the moment of a force follows the point it acts at
+    by_length = turning + along * constraints.scene_length(scene)
+    drifts = np.linalg.norm(linear, axis=1) / (along or np.inf), np.linalg.norm(angular, axis=1) / by_length
+    return np.maximum(*drifts)
+
+
+def _links(scene: Scene) -> list[Any]:
+    return [*scene.joint, *(load for load in scene.load if hasattr(load, "bodies"))]
+
+
+def _initial(scene: Scene) -> tuple[np.ndarray, ...]:
+    return (*constraints.initial_poses(scene), *constraints.initial_twists(scene))
+
+
+def _masses(scene: Scene) -> np.ndarray:
+    return np.array([body.mass for body in scene.body])
+
+
+def _own(scene: Scene, orientation: np.ndarray, spin: np.ndarray) -> np.ndarray:
+    """J ω (k, nb, 3) of each body about its own centre of mass, world."""
+    return np.einsum("kbij,kbj->kbi", world_inertia(scene, rotations.to_matrix(orientation)), spin)
+
+
+def _momenta(
+    scene: Scene, position: np.ndarray, orientation: np.ndarray, velocity: np.ndarray, spin: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Momentum and moment of momentum (k, 3) about the centre of mass of all bodies."""
+    share = _masses(scene) / _masses(scene).sum()
+    momentum = _masses(scene)[:, None] * velocity
+    arms = position - np.einsum("b,kbi->ki", share, position)[:, None]
+    orbital = np.cross(arms, momentum).sum(axis=1)
+    return momentum.sum(axis=1), orbital + _own(scene, orientation, spin).sum(axis=1)
+
+
+def _sizes(
+    scene: Scene, position: np.ndarray, orientation: np.ndarray, velocity: np.ndarray, spin: np.ndarray
+) -> tuple[float, float]:
+    """The largest Σ m |v| and Σ |J ω| of the samples."""
+    along = np.linalg.norm(velocity, axis=-1) @ _masses(scene)
+    turning = np.linalg.norm(_own(scene, orientation, spin), axis=-1).sum(axis=1)
+    return float(along.max(initial=0.0)), float(turning.max(initial=0.0))
+
+
+def _push(scene: Scene) -> np.ndarray:
+    """Gravity and forces (3,), N."""
+    forces = [np.array(load.force) for load in scene.load if isinstance(load, Force)]
+    return _masses(scene).sum() * np.array(scene.gravity) + sum(forces, np.zeros(3))
+
+
+def _turning_push(scene: Scene) -> np.ndarray:
+    """Constant moments (3,), N m."""
+    moments = [np.array(load.moment) for load in scene.load if isinstance(load, Moment)]
+    return sum(moments, np.zeros(3))
