@@ -99,7 +99,7 @@ def test_every_known_motion_is_within_the_bound(name):
 
 
 def test_redundant_joints_with_rounded_anchors_are_within_the_bound():
-    """A mechanism turned askew, whose joints contradict each other, and the turned motion of the exact one."""
+    """A mechanism turned askew, whose joints contradict each other, moves as the exact one turned."""
     scene = SCENES["bricard"]()
     times, turned = np.linspace(0.0, 0.3, 4), Isometry(ASKEW, np.array([0.3, -0.5, 0.2]))
     exact = natural_motion(scene, times, EXTENDED, seconds=SECONDS)
