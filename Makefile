@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help check test lint deep fuzz mutants coverage report quick picture docs bench clean
+.PHONY: help check test lint deep fuzz mutants coverage report quick picture docs site bench clean
 
 help: ## show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -50,6 +50,10 @@ picture: $(VENV)/ready ## the README's moving picture, into reports/rendered/
 
 docs: $(VENV)/ready ## the support matrix, into docs/engines.md
 	$(BIN)/python -m crosscheck.cli.support docs/engines.md
+
+site: $(VENV)/ready ## the documentation as a site, into build/site/, its commands run, its links checked
+	$(BIN)/pip install -q -c constraints.txt -e '.[docs]'
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
 bench: $(VENV)/ready ## the benchmarks, printed
 	for script in $$(grep -l __main__ benchmarks/*.py); do $(BIN)/python $$script; done

@@ -76,7 +76,7 @@ def show(scene: Scene, trajectory: Trajectory) -> None:
     if trajectory.message:
         out.print(trajectory.message)
     out.print(
-        f"{cost.steps} steps, {cost.rejected} rejected, {cost.rhs} evaluations, "
+        f"{cost.steps} steps, {cost.rejected} rejected, {cost.rhs} evaluations\n"
         f"{cost.factorisations} factorisations, {cost.newton} Newton iterations\n"
         f"{cost.seconds:.3g} s of stepping, {cost.build_seconds:.2g} s of building"
     )

@@ -81,7 +81,8 @@ def _assemble(options: argparse.Namespace) -> int:
             print(f"joint {name}: moved by {distance:.3g} m")
     for name, (distance, angle) in found.bodies.items():
         if max(distance, angle) > STILL:
-            print(f"body {name}: moved by {distance:.3g} m, turned by {angle:.3g} rad")
+            turned = f", turned by {angle:.3g} rad" if angle > STILL else ""
+            print(f"body {name}: moved by {distance:.3g} m{turned}")
     if options.out:
         found.scene.save(options.out)
         print(options.out)

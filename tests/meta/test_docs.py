@@ -1,0 +1,62 @@
+"""The documentation: a page for every method, in the site's contents; commands that the parsers know."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+import yaml
+
+from mbref.cli.commands import parser
+from mbref.formulations import FORMULATIONS
+from mbref.integrators import INTEGRATORS
+from mbref.method import Method
+from mbref.scene import JOINT_TYPES, LOAD_TYPES
+from mbref.stabilisation import STABILISATIONS
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PAGES = sorted(DOCS.rglob("*.md"))
+METHODS = [*FORMULATIONS, *STABILISATIONS, *INTEGRATORS]
+
+
+def paths(entry: object) -> list[str]:
+    """Pages of a part of the contents."""
+    if isinstance(entry, str):
+        return [entry]
+    inside = entry.values() if isinstance(entry, dict) else entry
+    return [path for part in inside for path in paths(part)]
+
+
+def test_the_contents_name_every_page_once():
+    contents = yaml.safe_load((ROOT / "mkdocs.yml").read_text())["nav"]
+    assert sorted(paths(contents)) == sorted(str(page.relative_to(DOCS)) for page in PAGES)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_a_method_s_page_has_equations_use_limits_and_measurements(name):
+    text = (DOCS / "methods" / f"{name}.md").read_text()
+    assert text.startswith(f"# `{name}`: ") and "$$" in text
+    assert "**Use it for**: " in text and "**It fails on**: " in text and "## Measured" in text
+
+
+def test_measured_methods_are_methods():
+    found = [m for page in PAGES for m in re.findall(r"<!-- measured: (.+?) -->", page.read_text())]
+    names = [name for row in found for name in row.split()]
+    assert len(names) > len(METHODS) and all(str(Method.parse(name)) for name in names)
+
+
+def test_every_joint_and_load_has_its_figure():
+    text = (DOCS / "scene-format.md").read_text()
+    shown = set(re.findall(r"\]\(figures/((?:joint|load)_\w+)\.svg\)", text))
+    assert shown == {f"joint_{name}" for name in JOINT_TYPES} | {f"load_{name}" for name in LOAD_TYPES}
+
+
+def test_commands_that_pages_run_are_commands():
+    blocks = [b for page in PAGES for b in re.findall(r"^```run\n(.*?)^```$", page.read_text(), re.S | re.M)]
+    commands = [shlex.split(line) for block in blocks for line in block.splitlines()]
+    assert len(commands) > 5
+    for program, *arguments in commands:
+        assert program == "mbref" and callable(parser().parse_args(arguments).action)
