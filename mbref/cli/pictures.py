@@ -11,7 +11,6 @@ from mbref.cli.output import progress_bar, warn
 from mbref.drawing.picture import moving, still
 from mbref.drawing.png import png
 from mbref.drawing.view import View
-from mbref.scene import Scene
 from mbref.scenes import find_scene
 
 VIEW = """\
@@ -28,7 +27,7 @@ def add(commands: Any) -> None:
     )  # fmt: skip
     add_scene(draw)
     draw.add_argument("--view", metavar="VIEW", help=VIEW)
-    draw.add_argument("--out", metavar="FILE", help=".svg or .png (default: the scene's name with .svg)")
+    draw.add_argument("--out", metavar="FILE", help=".svg or .png (default: as the scene, with .svg)")
     draw.set_defaults(action=_draw)
 
     animate = commands.add_parser(
@@ -39,14 +38,14 @@ def add(commands: Any) -> None:
     )  # fmt: skip
     add_scene(animate)
     animate.add_argument("--view", metavar="VIEW", help=VIEW)
-    animate.add_argument("--out", metavar="FILE", help=".svg (default: the scene's name with .svg)")
+    animate.add_argument("--out", metavar="FILE", help=".svg (default: as the scene, with -moving.svg)")
     add_method_options(animate, json=False)
     animate.set_defaults(action=_animate)
 
 
 def _draw(options: argparse.Namespace) -> int:
     scene, view = find_scene(options.scene), _view(options)
-    path = _path(options.out, scene, (".svg", ".png"))
+    path = _path(options, "", (".svg", ".png"))
     warn(scene)
     picture = still(scene, view)
     if path.suffix == ".png":
@@ -62,7 +61,7 @@ def _animate(options: argparse.Namespace) -> int:
 
     scene, view = find_scene(options.scene), _view(options)
     path, times, limits = (
-        _path(options.out, scene, (".svg",)),
+        _path(options, "-moving", (".svg",)),
         sample_times(options, scene),
         limits_of(options),
     )
@@ -81,10 +80,9 @@ def _view(options: argparse.Namespace) -> View | None:
     return View.parse(options.view) if options.view else None
 
 
-def _path(out: str | None, scene: Scene, endings: tuple[str, ...]) -> Path:
-    """The file asked for, or one here named as the scene; ValueError for another kind of file."""
-    safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in scene.name)[:100]
-    path = Path(out or f"{safe}.svg")
-    if path.suffix not in endings:
-        raise ValueError(f"--out: must end in {' or '.join(endings)}, got {str(path)!r}")
+def _path(options: argparse.Namespace, ending: str, suffixes: tuple[str, ...]) -> Path:
+    """The file asked for, or one here named as the scene or its file; ValueError for another kind of file."""
+    path = Path(options.out or f"{Path(options.scene).name.removesuffix('.toml')}{ending}.svg")
+    if path.suffix not in suffixes:
+        raise ValueError(f"--out: must end in {' or '.join(suffixes)}, got {str(path)!r}")
     return path

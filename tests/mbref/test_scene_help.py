@@ -110,7 +110,7 @@ def test_new_draw_assemble_and_diagnose(tmp_path, monkeypatch, capsys):
     assert main(["new", "my.toml"]) == 0
     assert main(["new", "my.toml"]) == 2
     assert "is there already" in capsys.readouterr().err
-    assert main(["draw", "my.toml"]) == 0 and (tmp_path / "my_mechanism.svg").read_text().startswith("<svg")
+    assert main(["draw", "my.toml"]) == 0 and (tmp_path / "my.svg").read_text().startswith("<svg")
     assert main(["draw", "my.toml", "--view=-60,20", "--out", "my.png"]) == 0
     assert (tmp_path / "my.png").read_bytes().startswith(b"\x89PNG")
     assert main(["draw", "my.toml", "--out", "my.jpg"]) == 2
@@ -125,7 +125,7 @@ def test_new_draw_assemble_and_diagnose(tmp_path, monkeypatch, capsys):
     assert {"A": "cylindrical", "B": "spherical"} in found["exchanges"] and found["along_motion"] is None
 
 
-def test_run_writes_csv_and_json_and_animate_a_moving_picture(tmp_path, capsys):
+def test_run_writes_csv_and_json_and_animate_a_moving_picture(tmp_path, capsys, monkeypatch):
     run = ["run", "planar_slider_crank", "--duration", "0.01", "--samples", "3"]
     assert main([*run, "--out", str(tmp_path / "run.json")]) == 0
     assert Motion.load(tmp_path / "run.json").times[-1] == 0.01
@@ -133,9 +133,9 @@ def test_run_writes_csv_and_json_and_animate_a_moving_picture(tmp_path, capsys):
     assert (tmp_path / "run.csv").read_text().startswith("time,crank.orientation.w")
     assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
     assert main([*run, "--out", str(tmp_path / "run.txt")]) == 2
-    moving = tmp_path / "run.svg"
-    assert main(["animate", *run[1:], "--out", str(moving)]) == 0
-    assert "<animate " in moving.read_text()
+    monkeypatch.chdir(tmp_path)
+    assert main(["animate", *run[1:]]) == 0
+    assert "<animate " in (tmp_path / "planar_slider_crank-moving.svg").read_text()
 
 
 def test_lists_fit_eighty_columns_and_have_every_name(capsys):
