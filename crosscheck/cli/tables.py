@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import string
 from collections.abc import Mapping, Sequence
+from typing import Literal
 
-from rich import box
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -20,34 +20,27 @@ from crosscheck.study.record_view import (
     error,
     error_text,
     is_completed,
+    never_moved,
     varied_settings,
 )
 from crosscheck.study.sentences import LEVEL, verdict
 from crosscheck.study.verdict import Grade, Judged, grade
 
 MEASURED = ("violation_position", "energy_error")  # metrics that the table of runs shows beside the error
-BEST = {"violation_position": "violation", "energy_error": "energy", "reaction_error": "reactions"}
-TEXT_COLUMNS = 4  # the columns from the left that hold words and may be folded
+SETTINGS_WIDTH, NUMBER_WIDTH = 15, 8  # least widths of columns, so that numbers stay whole
+OUTCOME_WIDTH = 12  # at most, for 80 columns in all
+BEST = {"violation_position": "closure", "energy_error": "energy", "reaction_error": "reactions"}
+TEXT_COLUMNS = 3  # the columns from the left that hold words and may be folded
 
 
 def print_runs(console: Console, records: Sequence[Record]) -> None:
     """One table a scene: settings, outcome, end time, error, violation, energy and time of every run."""
-    header = (
-        "engine",
-        "family",
-        "settings",
-        "outcome",
-        "end (s)",
-        "error",
-        "violation",
-        "energy",
-        "time (s)",
-    )
+    header = ("engine, family", "settings", "outcome", "error", "closure", "energy", "time (s)")
     for name, group in by_scene(records).items():
         table = _table(name, header)
         for r in group:
-            numbers = [error_text(r), *(_number(r["metrics"].get(m)) for m in MEASURED)]
-            table.add_row(*_identity(r, group), _outcome(r), f"{r['t_end']:.4g}", *numbers, _seconds(r))
+            numbers = [error_text(r), *(_measured(r, m) for m in MEASURED)]
+            table.add_row(*_identity(r, group), f"{_outcome(r)}{_at(r)}", *numbers, _seconds(r))
         console.print(table)
         _print_messages(console, group)
 
@@ -69,8 +62,8 @@ def print_comparison(console: Console, group: Judged, path: str, difference: str
 def _ranked(records: Sequence[Record], letters: Mapping[tuple[str, str], str], with_ratio: bool) -> Table:
     """The runs with the least error first, and times as multiples of the fastest if asked for."""
     fastest = min((_cost(r) for r in records if is_completed(r)), default=math.nan)
-    header = ("", "engine", "family", "settings", "verdict", "error", "time (s)", *["ratio"] * with_ratio)
-    table = _table("runs", header, 5)
+    header = ("", "engine, family", "settings", "verdict", "error", "time (s)", *["ratio"] * with_ratio)
+    table = _table("runs", header, 4)
     for r in sorted(records, key=lambda r: (not is_completed(r), error(r))):
         row = letters[engine_and_family(r)], *_identity(r, records), _graded(r), error_text(r), _seconds(r)
         ratio = f"{_cost(r) / fastest:.1f}" if is_completed(r) and fastest > 0 else "–"
@@ -85,9 +78,9 @@ def print_tuning(
     if not reached:
         nearest = min(records, key=lambda r: (not is_completed(r), error(r)))
         console.print(f"No setting reaches an error of {level:g}; the nearest run has {error_text(nearest)}:")
-    table = _table("settings", ("engine", "family", "settings", "error", "time (s)"), 3)
+    table = _table("settings", ("engine, family", "settings", "error", "time (s)"), 2)
     for r in reached or [nearest]:
-        table.add_row(*engine_and_family(r), _options(r), error_text(r), _seconds(r))
+        table.add_row(" ".join(engine_and_family(r)), _options(r), error_text(r), _seconds(r))
     console.print(table)
     for r in reached[:1]:
         console.print(f"The cheapest: {command(r, path)}", soft_wrap=True)
@@ -111,12 +104,11 @@ def _counts(group: Judged) -> str:
 
 def _print_best(console: Console, group: Judged) -> None:
     """What else is off in every engine's run of least error."""
-    table = _table(
-        "every engine's run of least error", ("engine", "family", "settings", "error", *BEST.values()), 3
-    )
-    for name, r in group.best().items():
-        measured = [_number(r["metrics"].get(metric)) for metric in BEST]
-        table.add_row(name, r["family"], varied_settings(r, group.records), error_text(r), *measured)
+    header = ("engine, family", "settings", "error", *BEST.values())
+    table = _table("every engine's run of least error", header, 2)
+    for r in group.best().values():
+        measured = [_measured(r, metric) for metric in BEST]
+        table.add_row(*_identity(r, group.records), error_text(r), *measured)
     console.print(table)
 
 
@@ -141,17 +133,23 @@ def _graded(record: Record) -> str:
 
 
 def _at(record: Record) -> str:
-    """`` at 0.1 s``; nothing for a run that was ended from outside."""
-    return f" at {record['t_end']:.4g} s" if record["outcome"] not in ("TIMED_OUT", "CRASHED") else ""
+    """`` at 0.1 s``; nothing for a run that completed or was ended from outside."""
+    silent = is_completed(record) or record["outcome"] in ("TIMED_OUT", "CRASHED")
+    return "" if silent else f" at {record['t_end']:.4g} s"
 
 
 def _cost(record: Record) -> float:
     return record["cost"]["seconds"]
 
 
+def _measured(record: Record, metric: str) -> str:
+    """A metric; – where there is none and for a run that never moved."""
+    return "–" if never_moved(record) else _number(record["metrics"].get(metric))
+
+
 def _seconds(record: Record) -> str:
-    """The time of stepping; – where nothing was stepped."""
-    return _number(_cost(record)) if record["times"] or record["t_end"] else "–"
+    """The time of stepping; – for a run that never moved."""
+    return "–" if never_moved(record) else _number(_cost(record))
 
 
 def _print_messages(console: Console, records: Sequence[Record]) -> None:
@@ -166,8 +164,8 @@ def _letters(records: Sequence[Record]) -> dict[tuple[str, str], str]:
     return {name: marks[i % len(marks)] for i, name in enumerate(curves)}
 
 
-def _identity(record: Record, records: Sequence[Record]) -> tuple[str, str, str]:
-    return (*engine_and_family(record), varied_settings(record, records))
+def _identity(record: Record, records: Sequence[Record]) -> tuple[str, str]:
+    return " ".join(engine_and_family(record)), varied_settings(record, records)
 
 
 def _outcome(record: Record) -> str:
@@ -185,7 +183,10 @@ def listing_table(title: str, header: Sequence[str]) -> Table:
 
 def _table(title: str, header: Sequence[str], words: int = TEXT_COLUMNS) -> Table:
     """A table whose first columns hold words and may be folded; its numbers are never broken."""
-    table = Table(title=title, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), title_justify="left")
+    table = Table(title=f"\n{title}", box=None, padding=(0, 1, 0, 0), title_justify="left", pad_edge=False)
     for i, name in enumerate(header):
-        table.add_column(name, justify="left" if i < words else "right", overflow="fold", no_wrap=i >= words)
+        width = SETTINGS_WIDTH if name == "settings" else 0 if i < words else NUMBER_WIDTH
+        side: Literal["left", "right"] = "left" if i < words else "right"
+        table.add_column(name, justify=side, overflow="fold", no_wrap=i >= words, min_width=width,
+                         max_width=OUTCOME_WIDTH if name in ("outcome", "verdict") else None)  # fmt: skip
     return table

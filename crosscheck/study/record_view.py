@@ -47,11 +47,17 @@ def error(record: Record) -> float:
 
 
 def error_text(record: Record) -> str:
-    """The error of a record as shown: ``< 3e-12`` below what the truth may be off itself, – without one."""
+    """The error of a record as shown: ``< 3e-12`` below what the truth may be off itself, – without one and
+    for a run that never moved."""
     value, bound = error(record), record["metrics"].get("error_bound") or 0.0
-    if not math.isfinite(value):
+    if not math.isfinite(value) or never_moved(record):
         return "–"
     return f"< {bound:.0e}" if value < bound else f"{value:.2e}"
+
+
+def never_moved(record: Record) -> bool:
+    """Whether a run ended at its start, so that its numbers say nothing about the motion."""
+    return not is_completed(record) and record["t_end"] == 0
 
 
 def engine_and_family(record: Record) -> tuple[str, str]:

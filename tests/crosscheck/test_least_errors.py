@@ -28,10 +28,10 @@ RECORDS = [
 
 def test_rows_and_records():
     good, bad = least_errors(RECORDS)
-    assert good.row() == ("bar", "good", "fine", "step=2e-10", "2.0e-10", "2", "fine",
-                          "coarse 1.0e-03, early not converged at 0.4 s")  # fmt: skip
+    assert good.row() == ("bar", "good", "fine", "step=2e-10", "2.00e-10", "2", "fine",
+                          "coarse 1.00e-03, early not converged at 0.4 s")  # fmt: skip
     assert (good.is_reached, bad.is_reached) == (True, False)
-    assert bad.row()[4:] == ("2.0e-08", "2", "", "only 2.0e-08"), bad.row()
+    assert bad.row()[4:] == ("2.00e-08", "2", "", "only 2.00e-08"), bad.row()
 
 
 def test_engine_without_a_completed_run():

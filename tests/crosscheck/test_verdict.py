@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import io
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 
+from crosscheck.cli import tables
 from crosscheck.study.difference import changes, circumstances, load
 from crosscheck.study.sentences import breaks, fast, headline, multiple, right, span, truth
 from crosscheck.study.tuning import tuned
@@ -28,7 +32,7 @@ def record(
         "metrics": {"error": error, "error_bound": 3e-14}, "key": f"{engine} {family} {seconds}",
         "version": "1", "machine": {"cpu": "a"}, "asked": asked,
     }  # fmt: skip
-    return {**found, **more}
+    return {**found, "time_limit": 60.0, **more}
 
 
 def failed(engine: str, family: str, t_end: float = 0.0) -> dict[str, Any]:
@@ -157,3 +161,26 @@ def test_times_of_other_machines_are_not_compared():
     slow = record("a", "x", 1e-5, 0.1, machine={"cpu": "b"}, cost={"seconds": 9.0})
     named = [{"run": {**r, "repeated": False}} for r in (record("a", "x", 1e-5, 0.1), slow)]
     assert not changes(*named)[0].sentences
+
+
+def test_tables_of_eighty_columns_and_whole_numbers():
+    measured = {
+        "error": 2.71e-5,
+        "error_bound": 1e-14,
+        "violation_position": 1.13e-13,
+        "energy_error": 2.5e-12,
+    }
+    long = [
+        record(
+            "pinocchio", "defaults", None, 7.8125e-06, settings={"accuracy": s}, metrics=measured, outcome=end
+        )
+        for s, end in ((0.0001, "COMPLETED"), (7.8125e-06, "NOT_CONVERGED"))
+    ]
+    long.append(failed("exudyn", "alf-dual+projection, specialised"))
+    console = Console(width=80, record=True, file=io.StringIO())
+    tables.print_comparison(console, group(long), "my.toml", None)
+    tables.print_runs(console, long)
+    text = console.export_text()
+    for number in ("2.71e-05", "1.13e-13", "2.50e-12", "7.81e-06", "accuracy=0.0001", "7.8125e-06"):
+        assert len(re.findall(rf"{re.escape(number)}(?!\d)", text)) >= 2, (number, text)
+    assert "0.00e+00" not in text, "a run that never moved has no numbers"
