@@ -12,7 +12,8 @@ from crosscheck.engine import BUILT_IN, OPTIONAL, Cannot, Engine, Owner, Setting
 from crosscheck.engines.constraint_equations import Constraints
 from crosscheck.engines.spanning_tree import spanning_tree
 from crosscheck.judge.constraints import initial_poses, jacobian
-from mbref import cli
+from mbref.cli import run
+from mbref.cli.commands import BAD_INPUT, main
 from mbref.equations.joints import JOINTS as PRIMITIVES
 from mbref.equations.joints import primitives_of
 from mbref.equations.joints.base import ROWS_OF
@@ -86,8 +87,8 @@ def test_an_undeclared_load_type_is_refused_by_name(name: str) -> None:
     ({"joint": screwed().joint}, ("'thread'", "'screw'")), ({"load": (Magnet(),)}, ("load[0]", "'magnet'")),
 ])  # fmt: skip
 def test_mbref_run_refuses_them_too(parts: dict, named: tuple, monkeypatch, capsys) -> None:
-    monkeypatch.setattr(cli, "find_scene", lambda name: with_unknown(**parts))
-    assert cli.main(["run", "unknown"]) == cli.BAD_INPUT
+    monkeypatch.setattr(run, "find_scene", lambda name: with_unknown(**parts))
+    assert main(["run", "unknown"]) == BAD_INPUT
     said = capsys.readouterr().err
     assert all(word in said for word in named) and "Traceback" not in said, said
 
