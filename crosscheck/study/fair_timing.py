@@ -26,13 +26,14 @@ def identity_cases(scene: Scene, engines: Sequence[str], time_limit: float) -> l
 
 def model_difference(scene: Scene, records: Sequence[Record], reference_time: float = SECONDS) -> str | None:
     """The first field in which the records of `identity_cases` differ from the truth where there is one, else
-    from the first of them, as a sentence; None when all agree."""
+    from the first of them, as a sentence; None when all agree. Runs that did not complete say nothing."""
     truth = truth_for(scene, reference_time)
     try:
         exact = [] if truth is None else [truth.poses(gate_times(scene))]
     except NoSolution:
         exact = []
-    found = gate(scene, [*exact, *(Trajectory.from_record(scene.name, record) for record in records)])
+    runs = [Trajectory.from_record(scene.name, record) for record in records if is_completed(record)]
+    found = gate(scene, [*exact, *runs]) if exact or runs else None
     return None if found is None else str(found)
 
 

@@ -157,6 +157,12 @@ def test_gate_and_what_the_summary_says(shifts, words):
     assert words in said, (words, said)
 
 
+def test_gate_run_that_timed_out_is_no_other_mechanism():
+    late = {**nothing("c", "x"), "outcome": "TIMED_OUT"}
+    [group] = by_scene(records()[:3], {scene().name: scene()}, [at_gate(0.0), late])
+    assert group.difference() is None
+
+
 def at_gate(shift: float) -> dict:
     """A record of the gate: the truth, moved."""
     true = truth_for(scene()).poses(gate_times(scene()))
