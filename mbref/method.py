@@ -22,7 +22,10 @@ from mbref.stabilisation import STABILISATIONS
 from mbref.stabilisation.base import Stabilisation
 
 DEFAULT = "alf-dual+projection/dop853"
-KINEMATIC = "alf-dual+projection/predictor"  # Newton–Raphson on Eqs. 1 to 3, see integrators/predictor.py
+SHORT = {
+    "kinematic": "alf-dual+projection/predictor",  # Newton–Raphson on Eqs. 1 to 3: integrators/predictor.py
+    "taylor": "alf-dual+projection/taylor",  # see mbref/taylor
+}
 
 
 Part = TypeVar("Part", Formulation, Stabilisation, Integrator)
@@ -69,8 +72,9 @@ class Method:
 
     @staticmethod
     def parse(name: str) -> Method:
-        """The method of a name, "kinematic" among them; raises MethodError with the known names."""
-        name = KINEMATIC if name == "kinematic" else name
+        """The method of a name, or of one of SHORT with options; raises MethodError with the known names."""
+        short, bracket, rest = name.strip().partition("[")
+        name = SHORT[short] + bracket + rest if short in SHORT else name
         head, _, integrator = name.partition("/")
         formulation, plus, stabilisation = _split_outside_brackets(head)
         if not plus:
@@ -83,6 +87,8 @@ class Method:
         )
         if not parts[2].integrates and not parts[1].projects:
             raise MethodError(f"integrator {parts[2].name} only extrapolates: it goes with projection")
+        if parts[2].step is None and not parts[1].projects:
+            raise MethodError(f"integrator {parts[2].name} projects every step: it goes with projection")
         return Method(*parts, options)
 
 

@@ -1,5 +1,5 @@
-"""mbref as an engine: a family is a method, by the general kernels or by specialised code; it is swept over
-the relative tolerance."""
+"""mbref as an engine: a family is a method, by the general kernels or by specialised code, or the Taylor
+method; it is swept over the relative tolerance."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from mbref.method import Method
 
 METHODS = (
+    "taylor",
     "alf-dual+projection, specialised",
     "alf-dual+projection",
     "lm2+projection, specialised",

@@ -28,7 +28,7 @@ def add_method_options(parser: argparse.ArgumentParser, json: bool = True) -> No
     """Method, times and limits of a run; --json where the command prints its result."""
     parser.add_argument(
         "--method", default=DEFAULT,
-        help="formulation+stabilisation/integrator, or kinematic for a driven mechanism;\n"
+        help="formulation+stabilisation/integrator, taylor, or kinematic for a driven mechanism;\n"
         f"formulations: {', '.join(FORMULATIONS)};\nstabilisations: {', '.join(STABILISATIONS)};\n"
         f"integrators: {', '.join(INTEGRATORS)} (default: {DEFAULT})",
     )  # fmt: skip

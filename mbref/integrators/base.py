@@ -23,12 +23,14 @@ class Integrator:
     ``schema`` declares the integrator's own memory, in ``Memory.integrator``.  The states since step
     ``clock.restart`` are one smooth piece: y changed its meaning or jumped there.  An option ``max_order``
     bounds the order, which reaches the kernels as ``control.order``.
+
+    A method without ``step`` has steps of its own (``mbref.taylor``) in place of the compiled loop's.
     """
 
     name: str
     order: int
-    step: Exchangeable
-    propose: Exchangeable
+    step: Exchangeable | None
+    propose: Exchangeable | None
     schema: type
     adaptive: bool
     options: Mapping[str, float] = field(default_factory=dict)

@@ -241,7 +241,7 @@ def _words(leaf: Leaf) -> tuple[int, int, int]:
     if isinstance(kind, types.Record):
         return _record_address(value), 0, 0
     if isinstance(kind, types.FunctionType):
-        return (0 if PLAIN else value.address), 0, 0
+        return (0 if PLAIN or value is None else value.address), 0, 0
     return (0 if value is None else value.address), 0, 0
 
 

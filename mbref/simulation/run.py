@@ -154,7 +154,7 @@ class Run:
             accept=chart.accept,
             accelerate=self.method.formulation.accelerate,
         )
-        pointers = Kernels(*(kernel.pointer for kernel in kernels))
+        pointers = Kernels(*(kernel.pointer if kernel else None for kernel in kernels))
         self.memory = self.memory._replace(kernels=pointers)
         self.packed = packed(self.memory)
 
@@ -216,4 +216,5 @@ def prepare(method: Method) -> None:
         integrator.step, integrator.propose, chart.rates, chart.accept, method.formulation.accelerate,
         advance_to_end, evaluate_all, chart.enter.callable,
     ):  # fmt: skip
-        kernel.prepare()
+        if kernel is not None:
+            kernel.prepare()

@@ -12,10 +12,12 @@ from mbref.method import DEFAULT, Method, MethodError
 from mbref.motion import Motion
 from mbref.scene import Scene
 from mbref.scenes import find_scene
+from mbref.simulation import run as general
 from mbref.simulation.limits import SPECIALISED, Limits
 from mbref.simulation.outcome import trajectory_of
-from mbref.simulation.run import Run, prepare
+from mbref.simulation.run import Run
 from mbref.specialised import Untraceable
+from mbref.taylor.run import NO_CODE, TaylorRun, prepare_series
 
 __all__ = ["Limits", "checked_times", "prepare", "simulate", "why_no_code"]
 
@@ -45,7 +47,7 @@ def simulate(
     limits = limits or Limits()
     began = time.process_time()
     try:
-        run = Run(scene, method, times, limits)
+        run = (Run if method.integrator.step else TaylorRun)(scene, method, times, limits)
     except Untraceable as reason:
         raise MethodError(f"no machine code for {scene.name!r} by {method}: {reason}") from None
     built = time.process_time() - began - run.making
@@ -53,8 +55,17 @@ def simulate(
     return trajectory_of(run, status, seconds, built + run.making)
 
 
+def prepare(method: Method) -> None:
+    """Compile the kernels of the method, or load them from the cache of this machine."""
+    general.prepare(method)
+    if not method.integrator.step:
+        prepare_series()
+
+
 def why_no_code(scene: Scene, method: Method) -> str:
     """Why a scene cannot have machine code of its own by this method; empty where it can, and now has it."""
+    if not method.integrator.step:
+        return NO_CODE
     try:
         Run(scene, method, np.array([scene.duration]), Limits(code=SPECIALISED))
     except Untraceable as reason:

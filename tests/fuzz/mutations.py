@@ -152,7 +152,7 @@ def _smudged(draw: random.Random, text: bytes) -> bytes:
 
 METHODS = (
     "alf-dual+projection", "alf-dual+projection", "alf+projection/adams", "lm1+baumgarte", "lm1+none/rk4",
-    "mpi-svd+partitioning", "kinematic",
+    "mpi-svd+partitioning", "kinematic", "taylor",
 )  # fmt: skip
 OPTIONS = ("alpha", "beta", "step", "max_order", "omega", "mu", "kept", "iterations", "", "nothing")
 LIMITS = (

@@ -1,0 +1,1 @@
+"""Taylor series of a motion in natural coordinates, one compiled code for every scene."""

@@ -1,0 +1,140 @@
+"""Affine expressions in the variables of a mechanism, products of two of them, and their elimination.
+
+An expression is a dictionary from variables to coefficients, the key ONE standing for the constant; a
+polynomial is one from pairs of keys, in ascending order, to coefficients.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+Expression = dict[int, float]
+Polynomial = dict[tuple[int, int], float]
+
+ONE = -1
+ROUNDING = 1e-12  # relative; coefficients below it are roundings of zero
+VANISHING = 1e-9  # coefficients of an equation that follows from others, but for the rounding of the scene
+DEPENDENT = 1e-9  # of a polynomial, left by the elimination of others
+
+
+def combination(*terms: tuple[float, Expression]) -> Expression:
+    """The sum of expressions times factors."""
+    total: Expression = {}
+    for factor, expression in terms:
+        for variable, coefficient in expression.items():
+            total[variable] = total.get(variable, 0.0) + factor * coefficient
+    return cleaned(total)
+
+
+def cleaned(expression: dict) -> dict:
+    """Without coefficients that are the rounding of zero."""
+    small = ROUNDING * max(map(abs, expression.values()), default=0.0)
+    return {key: value for key, value in expression.items() if abs(value) > small}
+
+
+def product_sum(pairs: Iterable[tuple[Expression, Expression]], factor: float = 1.0) -> Polynomial:
+    """Σ a b over pairs of expressions, times a factor."""
+    total: Polynomial = {}
+    for first, second in pairs:
+        for i, a in first.items():
+            for j, b in second.items():
+                key = (i, j) if i <= j else (j, i)
+                total[key] = total.get(key, 0.0) + factor * a * b
+    return total
+
+
+def plus(polynomial: Polynomial, factor: float, expression: Expression) -> Polynomial:
+    """A polynomial and an expression times a factor."""
+    total = dict(polynomial)
+    for variable, coefficient in expression.items():
+        key = (ONE, variable)
+        total[key] = total.get(key, 0.0) + factor * coefficient
+    return total
+
+
+def degree(polynomial: Polynomial) -> int:
+    """0 of a constant, 1 of an expression, 2 else."""
+    return max(((i != ONE) + (j != ONE) for i, j in polynomial), default=0)
+
+
+def as_expression(polynomial: Polynomial) -> Expression:
+    """A polynomial of degree 1 or 0 as an expression."""
+    return {j: coefficient for (_, j), coefficient in polynomial.items()}
+
+
+class Elimination:
+    """Variables expressed by others, by Gauss–Jordan elimination of linear equations.
+
+    ``may_go(variable, others)`` says whether an equation with so many other variables may eliminate a
+    variable: the fewer equations eliminate, the fewer products of variables are left.
+    """
+
+    def __init__(self, may_go: Callable[[int, int], bool]):
+        self._may_go = may_go
+        self.expressed: dict[int, Expression] = {}
+        self._users: dict[int, set[int]] = {}  # variable → the eliminated ones that it expresses
+        self.left: list[Expression] = []  # equations that eliminate nothing
+
+    def __call__(self, expression: Expression) -> Expression:
+        """The expression in variables that are not eliminated."""
+        known = self.expressed
+        if not any(variable in known for variable in expression):
+            return expression
+        parts = ((value, known.get(variable, {variable: 1.0})) for variable, value in expression.items())
+        return combination(*parts)
+
+    def add(self, equation: Expression) -> None:
+        """Take in an equation, expression = 0, with coefficients of about one."""
+        reduced = {k: v for k, v in self(equation).items() if abs(v) > VANISHING}
+        variables = [k for k in reduced if k != ONE]
+        able = [k for k in variables if self._may_go(k, len(variables) - 1)]
+        if able:
+            self._eliminate(max(able, key=lambda k: (round(abs(reduced[k]), 9), k)), reduced)
+        elif variables:
+            self.left.append(reduced)
+
+    def settle(self) -> None:
+        """Try the equations left again, until none of them eliminates a variable."""
+        before = -1
+        while before != len(self.expressed):
+            before, equations, self.left = len(self.expressed), self.left, []
+            for equation in equations:
+                self.add(equation)
+
+    def _eliminate(self, gone: int, equation: Expression) -> None:
+        pivot = -equation.pop(gone)
+        self.expressed[gone] = {k: v / pivot for k, v in equation.items()}
+        users = self._users.pop(gone, set())
+        for user in users:
+            self.expressed[user] = self(self.expressed[user])
+        for user in (gone, *users):
+            for variable in self.expressed[user]:
+                self._users.setdefault(variable, set()).add(user)
+
+
+def independent(polynomials: Sequence[Polynomial]) -> list[Polynomial]:
+    """Those that are no linear combination of others, the ones with fewer terms before the others."""
+    reduced: dict[tuple[int, int], Polynomial] = {}  # by the monomial that none of the others has
+    kept = []
+    for polynomial in sorted(polynomials, key=len):
+        size = max(map(abs, polynomial.values()), default=0.0)
+        rest = dict(polynomial)
+        for monomial, other in reduced.items():
+            if monomial in rest:
+                _subtract(rest, rest[monomial], other)
+        rest = {k: v for k, v in rest.items() if abs(v) > DEPENDENT * size}
+        lead = max((k for k in rest if k != (ONE, ONE)), key=lambda k: abs(rest[k]), default=None)
+        if lead is None:
+            continue
+        rest = {k: v / rest[lead] for k, v in rest.items()}
+        for other in reduced.values():
+            if lead in other:
+                _subtract(other, other[lead], rest)
+        reduced[lead] = rest
+        kept.append(polynomial)
+    return kept
+
+
+def _subtract(target: Polynomial, factor: float, other: Polynomial) -> None:
+    for key, value in other.items():
+        target[key] = target.get(key, 0.0) - factor * value

@@ -1,0 +1,185 @@
+"""Springs, torsion springs and drivers as Taylor series, by the recurrences of quotients and square roots."""
+
+from __future__ import annotations
+
+from math import pi
+
+from numpy import arctan2, cos, floor, sin, sqrt
+
+from mbref.kernels.compilation import inlined, kernel
+
+VALUE, COSINE, SINE = range(3)  # functions of a driver's value
+VECTOR_OF, LENGTH, INVERSE, RATE, PULL, SPRING_SERIES = 0, 3, 4, 5, 6, 7
+E1, E2, F, COS, SIN, ANGLE, MOMENT, MOMENT_COS, MOMENT_SIN, TORSION_SERIES = (
+    0,
+    3,
+    6,
+    9,
+    10,
+    11,
+    12,
+    13,
+    14,
+    15,
+)
+
+
+@inlined
+def product(a, b, k):
+    """Order k of the product of two series."""
+    value = 0.0
+    for i in range(k + 1):
+        value += a[i] * b[k - i]
+    return value
+
+
+@inlined
+def grow_form(constant, form, k, variables, target):
+    """Order k of an affine form of the variables."""
+    value = constant if k == 0 else 0.0
+    for i in range(form.shape[0]):
+        value += form[i] * variables[k, i]
+    target[k] = value
+
+
+@inlined
+def start_loads(memory):
+    """The orders 0 of all loads."""
+    grow_springs(0, memory)
+    grow_torsions(0, memory)
+
+
+@inlined
+def add_loads(k, memory):
+    """Add order k of the forces of springs and torsion springs, the variables being known to order k + 1."""
+    grow_springs(k + 1, memory)
+    grow_torsions(k + 1, memory)
+    add_springs(k, memory)
+    add_torsions(k, memory)
+
+
+@kernel
+def grow_springs(k, memory):
+    """Order k of the springs' vectors, lengths and inverses; order k - 1 of their rates."""
+    springs, variables = memory.polynomials.springs, memory.series.terms
+    for s in range(springs.stiffness.shape[0]):
+        of = springs.series[SPRING_SERIES * s : SPRING_SERIES * (s + 1)]
+        square = 0.0
+        for c in range(3):
+            grow_form(springs.constant[s, c], springs.form[3 * s + c], k, variables, of[c])
+            square += product(of[c], of[c], k)
+        length, inverse = of[LENGTH], of[INVERSE]
+        if k == 0:
+            length[0] = sqrt(square)
+            inverse[0] = 1.0 / length[0]
+        else:
+            for i in range(1, k):
+                square -= length[i] * length[k - i]
+            length[k] = 0.5 * square * inverse[0]
+            value = 0.0
+            for i in range(1, k + 1):
+                value -= length[i] * inverse[k - i]
+            inverse[k] = value * inverse[0]
+            of[RATE, k - 1] = k * length[k]
+
+
+@kernel
+def add_springs(k, memory):
+    """Order k of their forces: -(stiffness (1 - natural / l) + damping l' / l) times the vector."""
+    springs, force = memory.polynomials.springs, memory.series.force
+    for s in range(springs.stiffness.shape[0]):
+        of = springs.series[SPRING_SERIES * s : SPRING_SERIES * (s + 1)]
+        pull = springs.damping[s] * product(of[RATE], of[INVERSE], k)
+        pull -= springs.stiffness[s] * springs.natural[s] * of[INVERSE, k]
+        of[PULL, k] = pull + springs.stiffness[s] if k == 0 else pull
+        for c in range(3):
+            value, form = product(of[PULL], of[c], k), springs.form[3 * s + c]
+            for i in range(force.shape[0]):
+                force[i] -= value * form[i]
+
+
+@kernel
+def grow_torsions(k, memory):
+    """Order k of directions, cosine and sine; of the angle, whose rate is C S' - S C'."""
+    torsions, variables = memory.polynomials.torsions, memory.series.terms
+    for s in range(torsions.stiffness.shape[0]):
+        of = torsions.series[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
+        for c in range(9):
+            grow_form(torsions.constant[s, c], torsions.form[9 * s + c], k, variables, of[c])
+        cosine, sine = 0.0, 0.0
+        for c in range(3):
+            cosine += product(of[E1 + c], of[F + c], k)
+            sine += product(of[E2 + c], of[F + c], k)
+        of[COS, k], of[SIN, k] = cosine, sine
+        if k == 0:
+            angle, near = arctan2(sine, cosine), memory.angles[s]
+            of[ANGLE, 0] = angle + 2.0 * pi * floor((near - angle) / (2.0 * pi) + 0.5)
+        else:
+            value = 0.0
+            for i in range(1, k + 1):
+                value += i * (of[COS, k - i] * of[SIN, i] - of[SIN, k - i] * of[COS, i])
+            of[ANGLE, k] = value / k
+
+
+@kernel
+def add_torsions(k, memory):
+    """Order k of their forces: -(stiffness (θ - natural) + damping θ') times C δS - S δC."""
+    torsions, force = memory.polynomials.torsions, memory.series.force
+    for s in range(torsions.stiffness.shape[0]):
+        of = torsions.series[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
+        angle = of[ANGLE, k] - torsions.natural[s] if k == 0 else of[ANGLE, k]
+        of[MOMENT, k] = torsions.stiffness[s] * angle + torsions.damping[s] * (k + 1) * of[ANGLE, k + 1]
+        of[MOMENT_COS, k] = product(of[MOMENT], of[COS], k)
+        of[MOMENT_SIN, k] = product(of[MOMENT], of[SIN], k)
+        for c in range(3):
+            on_e2, on_e1 = product(of[MOMENT_COS], of[F + c], k), product(of[MOMENT_SIN], of[F + c], k)
+            on_f = product(of[MOMENT_COS], of[E2 + c], k) - product(of[MOMENT_SIN], of[E1 + c], k)
+            e1, e2 = torsions.form[9 * s + E1 + c], torsions.form[9 * s + E2 + c]
+            f = torsions.form[9 * s + F + c]
+            for i in range(force.shape[0]):
+                force[i] -= on_e2 * e2[i] - on_e1 * e1[i] + on_f * f[i]
+
+
+@kernel
+def expand_drivers(t, memory):
+    """The functions that drivers prescribe, as series about time t."""
+    given, functions, n = memory.polynomials.given, memory.series.terms, memory.solver.partner.shape[0]
+    driven, drivers = memory.series.driven, memory.run.equations.scene.drivers
+    for g in range(given.driver.shape[0]):
+        expand_driver(t, given.driver[g], drivers, driven)
+        if given.function[g] == VALUE:
+            for k in range(driven.shape[0]):
+                functions[k, n + g] = driven[k] / given.unit[g]
+        elif given.function[g] == COSINE:
+            expand_angle(driven, functions, n + g)
+
+
+@kernel
+def expand_angle(driven, functions, g):
+    """The cosine and the sine of a series, into lanes g and g + 1."""
+    functions[0, g], functions[0, g + 1] = cos(driven[0]), sin(driven[0])
+    for k in range(1, driven.shape[0]):
+        cosine, sine = 0.0, 0.0
+        for i in range(1, k + 1):
+            cosine -= i * driven[i] * functions[k - i, g + 1]
+            sine += i * driven[i] * functions[k - i, g]
+        functions[k, g], functions[k, g + 1] = cosine / k, sine / k
+
+
+@kernel
+def expand_driver(t, d, drivers, series):
+    """A driver's value as a series about time t: its polynomial shifted, and its sine."""
+    terms, size = drivers.polynomial.shape[1], series.shape[0]
+    for k in range(size):
+        value, binomial = 0.0, 1.0
+        power = 1.0
+        for i in range(k, terms):  # Σ c_i binom(i, k) t^(i - k)
+            value += drivers.polynomial[d, i] * binomial * power
+            power *= t
+            binomial *= (i + 1.0) / (i + 1.0 - k)
+        series[k] = value
+    frequency, argument = drivers.frequency[d], drivers.frequency[d] * t + drivers.phase[d]
+    sine, cosine = drivers.amplitude[d] * sin(argument), drivers.amplitude[d] * cos(argument)
+    for k in range(size):
+        series[k] += sine
+        sine, cosine = cosine * frequency / (k + 1), -sine * frequency / (k + 1)

@@ -1,0 +1,199 @@
+"""A scene in natural coordinates: joints as products of linear forms, with as few variables as rows allow.
+
+The variables of a body are its centre of mass and its rotation from the start, R (J. García de Jalón and
+E. Bayo, Kinematic and Dynamic Simulation of Multibody Systems, 1994): points and directions fixed in it are
+linear in them, joints are rows of second degree, and the mass matrix is constant.  Bodies that keep their
+relative orientation share R.  Where an axis of R is known to rest, R has two variables, the components of
+one image; else it has the images of three directions, axes of joints first, so that joints share variables.
+Linear equations eliminate variables (see ``expressions``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from mbref import rotations
+from mbref.equations.initial_state import Start, scene_length
+from mbref.equations.model import Model
+from mbref.kernels.scene_layout import DISTANCE, DOT1, DOT2, POINT, Drivers
+from mbref.taylor.expressions import (
+    ONE,
+    VANISHING,
+    Elimination,
+    Expression,
+    Polynomial,
+    as_expression,
+    combination,
+    degree,
+    independent,
+    plus,
+    product_sum,
+)
+from mbref.taylor.loads import COSINE, SINE, VALUE
+from mbref.taylor.orientations import Orientations, Triple
+
+MOST_TERMS = 40  # of an equation that eliminates a position
+MOST_FACTORS = 1  # further variables of an equation that eliminates a direction
+
+
+class NaturalCoordinates:
+    """The variables of a model from a start, lengths in the unit ``length`` (m), and the rows between them.
+
+    ``moving`` (n,) says which velocities can be other than zero.  ``kept`` are the variables left, ``given``
+    those that drivers prescribe: (driver, VALUE, COSINE or SINE) each.
+    """
+
+    def __init__(self, model: Model, start: Start, moving: np.ndarray):
+        self.model, self.nb = model, model.nb
+        self.length = 2.0 ** round(np.log2(scene_length(model)))
+        poses = start.q.reshape(-1, 7)
+        self.place = poses[:, :3] / self.length
+        axes = rotations.to_matrix(poses[:, 3:])
+        twists = start.v.reshape(-1, 6)
+        self._spin = np.einsum("bij,bj->bi", axes, twists[:, 3:])
+        self._moving = moving.reshape(-1, 6)
+        self.start: list[float] = []
+        self.rate: list[float] = []
+        self.given: dict[int, tuple[int, int]] = {}
+        self.centres = [self._new(3, self.place[b], twists[b, :3] / self.length) for b in range(self.nb)]
+        self._positions = range(3 * self.nb)
+        self.eliminate = Elimination(self._may_go)
+        self.orientations = Orientations(model, axes, self._spin, self._moving[:, 3:], self._new)
+        self.rows = self._rows()
+        gone = self.eliminate.expressed
+        self.kept = [v for v in range(len(self.start)) if v not in gone and v not in self.given]
+
+    # --- variables ----------------------------------------------------------------------------------------
+    def _new(self, count: int, start: Sequence[float], rate: Sequence[float]) -> tuple[int, ...]:
+        first = len(self.start)
+        self.start += map(float, start)
+        self.rate += map(float, rate)
+        return tuple(range(first, first + count))
+
+    def _may_go(self, variable: int, others: int) -> bool:
+        most = MOST_TERMS if variable in self._positions else MOST_FACTORS
+        return others <= most and variable not in self.given
+
+    def direction(self, body: int, local: np.ndarray) -> Triple:
+        """A direction fixed in a body, given in its principal frame."""
+        return tuple(map(self.eliminate, self.orientations[body].image(self.orientations.world(body, local))))
+
+    def point(self, body: int, local: np.ndarray) -> Triple:
+        """A point fixed in a body, given in its principal frame from its centre of mass (m)."""
+        arm = self.orientations[body].image(self.orientations.world(body, local) / self.length)
+        if body == self.nb:
+            return arm
+        centre = ({v: 1.0} for v in self.centres[body])
+        moved = (combination((1.0, c), (1.0, a)) for c, a in zip(centre, arm, strict=True))
+        return tuple(map(self.eliminate, moved))
+
+    # --- rows ---------------------------------------------------------------------------------------------
+    def _rows(self) -> list[Polynomial]:
+        """Independent rows of second degree, and of first degree those that eliminate nothing."""
+        for equation in self._linear_equations():
+            self.eliminate.add(equation)
+        self.eliminate.settle()
+        rows = [row for orientation in self.orientations.numbered.values() for row in orientation.rows()]
+        primitives = self.model.data.primitives
+        for p in np.flatnonzero(primitives.kind != POINT):
+            rows += self._driven(p) if primitives.driver[p] >= 0 else [self._undriven(p)]
+        before = -1
+        while before != len(self.eliminate.expressed):
+            before, rows = len(self.eliminate.expressed), [self._reduced(row) for row in rows]
+            for row in rows:
+                if degree(row) == 1:
+                    self.eliminate.add(as_expression(row))
+            self.eliminate.settle()
+        linear = ({(ONE, v): c for v, c in equation.items()} for equation in self.eliminate.left)
+        return independent([row for row in (*rows, *linear) if degree(row) > 0])
+
+    def _linear_equations(self) -> Iterator[Expression]:
+        """Positions at rest, axes that joints share, coincident points; an expression that is zero each."""
+        for b, c in zip(*np.nonzero(~self._moving[:, :3]), strict=True):
+            yield {self.centres[b][c]: 1.0, ONE: -float(self.place[b, c])}
+        numbered = self.orientations.numbered
+        pairs = [(numbered[one].image(a), numbered[other].image(b))
+                 for (one, a), (other, b) in self.orientations.shared_axes()]  # fmt: skip
+        primitives = self.model.data.primitives
+        pairs += [self._ends(p) for p in np.flatnonzero(primitives.kind == POINT)]
+        for first, second in pairs:
+            yield from _difference(first, second)
+
+    def _ends(self, p: int) -> tuple[Triple, Triple]:
+        """The points of a primitive constraint on both bodies."""
+        table = self.model.data.primitives
+        first, second = int(table.first[p]), int(table.second[p])
+        return self.point(first, table.point_first[p]), self.point(second, table.point_second[p])
+
+    def _undriven(self, p: int) -> Polynomial:
+        table = self.model.data.primitives
+        if table.kind[p] == DISTANCE:
+            apart, length = _difference(*self._ends(p)), float(table.length[p]) / self.length
+            pairs = [*zip(apart, apart, strict=True), ({ONE: length}, {ONE: -length})]
+            return product_sum(pairs, 0.5 / length)
+        first = self.direction(int(table.first[p]), table.direction_first[p])
+        return product_sum(zip(first, self._other_side(p), strict=True))
+
+    def _other_side(self, p: int) -> Triple:
+        """The vector that stays perpendicular to a primitive's first direction."""
+        table = self.model.data.primitives
+        if table.kind[p] == DOT1:
+            return self.direction(int(table.second[p]), table.direction_second[p])
+        return _difference(*self._ends(p)[::-1])
+
+    def _driven(self, p: int) -> list[Polynomial]:
+        """A displacement along an axis, or an angle: the second body's direction stays perpendicular to
+        the first's, turned by the driver: e = cos ψ y - sin ψ x."""
+        table = self.model.data.primitives
+        driver, body = int(table.driver[p]), int(table.first[p])
+        if table.kind[p] == DOT2:
+            (value,) = self._prescribed(driver, (VALUE,), 1 / self.length)
+            return [plus(self._undriven(p), -1 / self.length, {value: 1.0})]
+        cosine, sine = self._prescribed(driver, (COSINE, SINE), 1.0)
+        x, y = (self.direction(body, w) for w in (table.direction_first[p], table.turning_first[p]))
+        turned = [product_sum([({cosine: 1.0}, b), ({sine: -1.0}, a)]) for a, b in zip(x, y, strict=True)]
+        rows = []
+        if max(map(degree, turned)) == 2 or not all(ONE in (i, j) for row in turned for i, j in row):
+            turned, rows = self._own_variables(p, turned)
+        e = tuple(map(as_expression, turned))
+        return [*rows, product_sum(zip(e, self._other_side(p), strict=True))]
+
+    def _own_variables(self, p: int, turned: list[Polynomial]) -> tuple[list[Polynomial], list[Polynomial]]:
+        """A direction that is of second degree as variables, and the rows that define them."""
+        table = self.model.data.primitives
+        body = int(table.first[p])
+        y, x = (self.orientations.world(body, w[p]) for w in (table.turning_first, table.direction_first))
+        rate = driver_rate(self.model.data.drivers, int(table.driver[p]))
+        spin = self._spin[body] if body < self.nb else np.zeros(3)
+        own = self._new(3, y, np.cross(spin, y) - rate * x)
+        rows = [plus(row, -1.0, {v: 1.0}) for row, v in zip(turned, own, strict=True)]
+        return [{(ONE, v): 1.0} for v in own], rows
+
+    def _prescribed(self, driver: int, functions: Sequence[int], scale: float) -> tuple[int, ...]:
+        variables = self._new(len(functions), np.zeros(len(functions)), np.zeros(len(functions)))
+        self.given |= {v: (driver, function) for v, function in zip(variables, functions, strict=True)}
+        return variables
+
+    def _reduced(self, row: Polynomial) -> Polynomial:
+        """A row without the variables eliminated."""
+        gone, total = self.eliminate.expressed, {}
+        for (i, j), coefficient in row.items():
+            if i in gone or j in gone:
+                pair = (self.eliminate({i: 1.0}), self.eliminate({j: 1.0}))
+                for key, value in product_sum([pair], coefficient).items():
+                    total[key] = total.get(key, 0.0) + value
+            else:
+                total[i, j] = total.get((i, j), 0.0) + coefficient
+        return {key: c for key, c in total.items() if abs(c) > VANISHING or key == (ONE, ONE)}
+
+
+def driver_rate(drivers: Drivers, d: int) -> float:
+    """The rate of driver d at t = 0, in rad/s or m/s."""
+    linear = drivers.polynomial[d, 1] if drivers.polynomial.shape[1] > 1 else 0.0
+    return float(linear + drivers.amplitude[d] * drivers.frequency[d] * np.cos(drivers.phase[d]))
+
+
+def _difference(first: Triple, second: Triple) -> Triple:
+    return tuple(combination((1.0, a), (-1.0, b)) for a, b in zip(first, second, strict=True))

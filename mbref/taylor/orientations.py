@@ -1,0 +1,212 @@
+"""How the bodies of a scene can be oriented: with the fixed frame, about an axis at rest, or freely."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbref.equations.model import Model
+from mbref.taylor.expressions import ONE, ROUNDING, Expression, Polynomial, combination, product_sum
+
+PARALLEL = 1e-9  # sine of an angle between the images of one axis
+APART = 0.2  # sine of the least angle between two directions of a basis
+
+Triple = tuple[Expression, ...]
+Frame = tuple[int, np.ndarray]  # the number of an orientation, and an axis fixed in it (world, at the start)
+
+
+@dataclass(frozen=True)
+class Orientation:
+    """R of some bodies: fixed (no variables), turning about an axis, or free.
+
+    The variables of a free one are the images of its ``basis``, three directions (3, 3) in rows.  One that
+    turns has a right-handed basis (arm, across, axis) and, as variables, the components of the arm's image
+    along the first two of the fixed ``frame`` (3, 3), whose third is the axis.
+    """
+
+    variables: tuple[int, ...] = ()
+    basis: np.ndarray | None = None
+    frame: np.ndarray | None = None
+
+    def image(self, w: np.ndarray) -> Triple:
+        """R w of a direction w (3,) that is fixed in the bodies."""
+        if self.basis is None:
+            return tuple(_of({ONE: w[c]}) for c in range(3))
+        parts = np.linalg.solve(self.basis.T, w)
+        if self.frame is None:
+            return tuple(_of({self.variables[3 * k + c]: parts[k] for k in range(3)}) for c in range(3))
+        (x, y, z), (cosine, sine) = self.frame, self.variables
+        columns = (parts[2] * z, parts[0] * x + parts[1] * y, parts[0] * y - parts[1] * x)
+        return tuple(
+            _of(dict(zip((ONE, cosine, sine), entries, strict=True)))
+            for entries in zip(*columns, strict=True)
+        )
+
+    def rows(self) -> Iterator[Polynomial]:
+        """R is a rotation."""
+        if self.frame is not None:
+            cosine, sine = ({v: 1.0} for v in self.variables)
+            yield product_sum([(cosine, cosine), (sine, sine), ({ONE: 1.0}, {ONE: -1.0})], 0.5)
+        elif self.basis is not None:
+            images = [self.image(b) for b in self.basis]
+            for i, j in itertools.combinations_with_replacement(range(3), 2):
+                square = {ONE: -float(self.basis[i] @ self.basis[j])}
+                pairs = [*zip(images[i], images[j], strict=True), (square, {ONE: 1.0})]
+                yield product_sum(pairs, 0.5 if i == j else 1.0)
+
+
+def _of(coefficients: dict[int, float]) -> Expression:
+    return combination((1.0, coefficients))
+
+
+FIXED = Orientation()
+
+
+class Orientations:
+    """The orientations of a model's bodies, by number: -1 is the fixed frame's.
+
+    ``axes`` (nb, 3, 3) are the principal frames and ``spin`` (nb, 3) the angular velocities at the start
+    (world), ``moving`` (nb, 3) says about which principal axes a body can turn, ``new(count, start, rate)``
+    makes variables.
+    """
+
+    def __init__(
+        self, model: Model, axes: np.ndarray, spin: np.ndarray, moving: np.ndarray,
+        new: Callable[[int, Sequence[float], Sequence[float]], tuple[int, ...]],
+    ):  # fmt: skip
+        self.model, self.nb = model, model.nb
+        self._axes, self._spin, self._moving, self._new = axes, spin, moving, new
+        self.group = self._groups()
+        self.numbered = self._orientations()
+
+    def __getitem__(self, body: int) -> Orientation:
+        """Of a body, or of the fixed frame (index nb)."""
+        return self.numbered[self.group[body]] if body < self.nb else FIXED
+
+    def world(self, body: int, local: np.ndarray) -> np.ndarray:
+        """A direction (3,) in the principal frame of a body in world axes at the start."""
+        return self._axes[body] @ local if body < self.nb else np.asarray(local)
+
+    def _groups(self) -> list[int]:
+        """The number of the orientation of each body; -1 for those oriented with the fixed frame."""
+        group = [*range(self.nb), -1]
+        for joint in self.model.joints:
+            if len(joint.facts.forbidden_rotations) == 3:
+                first, second = (group[self.model.index(name)] for name in joint.bodies)
+                keep, go = min(first, second), max(first, second)
+                group = [keep if g == go else g for g in group]
+        return group[:-1]
+
+    def _orientations(self) -> dict[int, Orientation]:
+        at_rest = self._axes_at_rest()
+        found = {-1: FIXED}
+        for group in sorted(set(self.group) - {-1}):
+            axes = at_rest.get(group, [])
+            if len(axes) > 1:
+                found[group] = FIXED
+            elif axes:
+                found[group] = self._turning(group, axes[0])
+            else:
+                found[group] = self._free(group)
+        return found
+
+    def _axes_at_rest(self) -> dict[int, list[np.ndarray]]:
+        """Up to two axes of each orientation that rest, in world axes."""
+        known: dict[int, list[np.ndarray]] = {-1: [np.eye(3)[0], np.eye(3)[1]]}
+        for b, (group, turns) in enumerate(zip(self.group, self._moving, strict=True)):
+            for k in (0, 1, 2) if not turns.any() else np.flatnonzero(turns) if turns.sum() == 1 else ():
+                _keep(known, group, self._axes[b][:, k])
+        shared, grown = list(self.shared_axes()), True
+        while grown:
+            grown = False
+            for (one, a), (other, b) in itertools.chain(shared, (pair[::-1] for pair in shared)):
+                if any(np.linalg.norm(np.cross(a, axis)) < PARALLEL for axis in known.get(one, ())) or (
+                    len(known.get(one, ())) > 1
+                ):
+                    grown |= _keep(known, other, b)
+        return known
+
+    def shared_axes(self) -> Iterator[tuple[Frame, Frame]]:
+        """The orientations that joints let turn about a common axis only, each with the axis (world)."""
+        for joint in self.model.joints:
+            if len(joint.facts.forbidden_rotations) == 2:
+                yield tuple(  # type: ignore[misc]
+                    (self._group_of(name), self._axis(name, joint.directions[0])) for name in joint.bodies
+                )
+
+    def _group_of(self, name: str) -> int:
+        body = self.model.index(name)
+        return self.group[body] if body < self.nb else -1
+
+    def _axis(self, name: str, axis: Sequence[float]) -> np.ndarray:
+        world = self.world(self.model.index(name), self.model.direction(name, axis))
+        return np.asarray(world / np.linalg.norm(world))
+
+    def _turning(self, group: int, axis: np.ndarray) -> Orientation:
+        frame = self._frame(axis)
+        across = (d - axis * (axis @ d) for d in self._directions(group))
+        arm = next(d for d in across if np.linalg.norm(d) > APART)
+        arm = arm / np.linalg.norm(arm)
+        c, s = frame[:2] @ arm
+        spin = float(self._spin[self.group.index(group)] @ axis)
+        variables = self._new(2, (c, s), (-spin * s, spin * c))
+        return Orientation(variables, np.array([arm, np.cross(axis, arm), axis]), frame)
+
+    def _frame(self, axis: np.ndarray) -> np.ndarray:
+        """Right-handed unit vectors in rows, the third an axis, the first one that a body slides along."""
+        slides = [j for j in self.model.joints if len(j.facts.forbidden_translations) == 2]
+        along = [self._axis(j.bodies[0], j.directions[0]) for j in slides]
+        first = next((x for x in along if abs(x @ axis) < PARALLEL), np.eye(3)[np.argmin(np.abs(axis))])
+        first = first - axis * (axis @ first)
+        first = first / np.linalg.norm(first)
+        return np.array([first, np.cross(axis, first), axis])
+
+    def _free(self, group: int) -> Orientation:
+        basis = _basis(self._directions(group))
+        rates = np.cross(self._spin[self.group.index(group)], basis)
+        return Orientation(self._new(9, basis.ravel(), rates.ravel()), basis=basis)
+
+    def _directions(self, group: int) -> Iterator[np.ndarray]:
+        """Directions for the basis of an orientation, the best first: axes of joints, arms, own axes."""
+        joints = [joint for joint in self.model.joints if group in map(self._group_of, joint.bodies)]
+        for joint in joints:
+            for name, axis in zip(joint.bodies, joint.directions * (3 - len(joint.directions)), strict=False):
+                if self._group_of(name) == group:
+                    yield self._axis(name, axis)
+        for b in (b for b in range(self.nb) if self.group[b] == group):
+            name = self.model.bodies[b].name
+            anchors = [
+                p
+                for joint in joints
+                for n, p in zip(joint.bodies, joint.anchor_pair, strict=True)
+                if n == name
+            ]
+            for one, other in itertools.combinations(anchors, 2):
+                arm = self.world(b, self.model.direction(name, np.subtract(other, one)))
+                if (length := np.linalg.norm(arm)) > ROUNDING:
+                    yield arm / length
+            yield from self._axes[b].T
+
+
+def _keep(known: dict[int, list[np.ndarray]], group: int, axis: np.ndarray) -> bool:
+    """Whether an axis is new to an orientation, which then has it."""
+    axes = known.setdefault(group, [])
+    if len(axes) > 1 or any(np.linalg.norm(np.cross(axis, other)) < PARALLEL for other in axes):
+        return False
+    axes.append(axis)
+    return True
+
+
+def _basis(directions: Iterable[np.ndarray]) -> np.ndarray:
+    """The first two directions that are well apart and the one across both, unit vectors, in rows."""
+    chosen: list[np.ndarray] = []
+    for unit in directions:
+        if not chosen or np.linalg.norm(np.cross(chosen[0], unit)) > APART:
+            chosen.append(unit)
+        if len(chosen) == 2:
+            break
+    across = np.cross(*chosen)
+    return np.array([*chosen, across / np.linalg.norm(across)])

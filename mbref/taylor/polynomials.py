@@ -1,0 +1,198 @@
+"""The equations of a scene in natural coordinates as the arrays that the kernels of the series read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from mbref.kernels.scene_layout import FORCE, MOMENT, SPRING, TORSION_SPRING
+from mbref.taylor.expressions import ONE, Expression, cleaned
+from mbref.taylor.lanes import filled
+from mbref.taylor.layout import Given, Inertia, Polynomials, Poses, Products, Rows, Springs, Torsions
+from mbref.taylor.loads import SPRING_SERIES, TORSION_SERIES, VALUE
+from mbref.taylor.natural import NaturalCoordinates
+
+
+def polynomials_of(of: NaturalCoordinates, orders: int) -> Polynomials:
+    """The polynomials of a scene, for series of so many orders."""
+    multipliers = len(of.kept)
+    lane = {v: i for i, v in enumerate(of.kept)}
+    lane |= {v: multipliers + len(of.rows) + g for g, v in enumerate(of.given)}
+    forms = Forms(of)
+    return Polynomials(
+        rows=_rows(of, lane),
+        products=_products(of, lane),
+        inertia=_inertia(of, forms),
+        poses=_poses(of, forms),
+        given=_given(of),
+        springs=_springs(of, forms, orders),
+        torsions=_torsions(of, forms, orders),
+    )
+
+
+class Forms:
+    """Expressions as constants and rows of coefficients of the d variables kept."""
+
+    def __init__(self, of: NaturalCoordinates):
+        self.of, self.d = of, len(of.kept)
+        self._place = {v: i for i, v in enumerate(of.kept)}
+
+    def __call__(self, expressions: Sequence[Expression]) -> tuple[np.ndarray, np.ndarray]:
+        """Constants (k,) and coefficients (k, d)."""
+        constant, matrix = np.zeros(len(expressions)), np.zeros((len(expressions), self.d))
+        for row, expression in enumerate(expressions):
+            for variable, coefficient in self.of.eliminate(expression).items():
+                if variable == ONE:
+                    constant[row] = coefficient
+                else:
+                    matrix[row, self._place[variable]] = coefficient
+        return constant, matrix
+
+    def variables(self, variables: Iterable[int]) -> tuple[np.ndarray, np.ndarray]:
+        """The same of variables, whether kept or eliminated."""
+        return self([{v: 1.0} for v in variables])
+
+    def mass(self) -> np.ndarray:
+        """M (d, d) with ½ ż M ż the kinetic energy in the unit of length squared."""
+        of, bodies = self.of, self.of.model.data.bodies
+        total = np.zeros((self.d, self.d))
+        for b in range(of.nb):
+            _, centre = self.variables(of.centres[b])
+            _, axes = self([e for axis in np.eye(3) for e in of.direction(b, axis)])
+            principal = bodies.inertia[b] / of.length**2
+            total += bodies.mass[b] * centre.T @ centre
+            total += axes.T @ (np.repeat(principal.sum() / 2 - principal, 3)[:, None] * axes)
+        return total
+
+
+def _rows(of: NaturalCoordinates, lane: dict[int, int]) -> Rows:
+    constant, linear, twofold = np.zeros(len(of.rows)), [], []
+    for r, row in enumerate(of.rows):
+        for (i, j), coefficient in row.items():
+            if j == ONE:
+                constant[r] = coefficient
+            elif i == ONE:
+                linear.append((r, lane[j], coefficient))
+            else:
+                twofold += [(r, lane[i], lane[j], coefficient), (r, lane[j], lane[i], coefficient)]
+    return Rows(*_columns(twofold, 3), *_columns(linear, 2), constant)
+
+
+def _columns(entries: Sequence[tuple[float, ...]], indices: int) -> list[np.ndarray]:
+    """Columns of a table, the first ones of indices and the last of numbers."""
+    table = np.array(entries, dtype=float).reshape(len(entries), indices + 1)
+    columns = [np.ascontiguousarray(column) for column in table.T]
+    return [column.astype(np.int64) for column in columns[:-1]] + columns[-1:]
+
+
+def _products(of: NaturalCoordinates, lane: dict[int, int]) -> Products:
+    """Of rows: two variables or functions; of forces: a row's multiplier and one of these."""
+    nz, nr = len(of.kept), len(of.rows)
+    terms: list[list[tuple[float, ...]]] = [[] for _ in range(nz + nr)]
+    for r, row in enumerate(of.rows):
+        for (i, j), coefficient in row.items():
+            if i != ONE:
+                one, other, twice = lane[i], lane[j], 2.0 if i == j else 1.0
+                terms[nz + r].append((one, other, coefficient))
+                for target, factor in dict.fromkeys([(one, other), (other, one)]):
+                    if target < nz:
+                        terms[target].append((nz + r, factor, twice * coefficient))
+    equation = sorted(range(nz + nr), key=lambda e: -len(terms[e]))
+    slots, start = [], [0]
+    for level in range(max(map(len, terms), default=0)):
+        chosen = [terms[e][level] for e in equation if len(terms[e]) > level]
+        slots += [*chosen, *[(0, 0, 0.0)] * (filled(len(chosen)) - len(chosen))]
+        start.append(len(slots))
+    return Products(*_columns(slots, 2), np.array(start), np.array(equation, dtype=np.int64))
+
+
+def _inertia(of: NaturalCoordinates, forms: Forms) -> Inertia:
+    """The mass matrix; gravity, forces and moments that are constant."""
+    model, loads = of.model, of.model.data.loads
+    force, linear = np.zeros(forms.d), np.zeros((forms.d, forms.d))
+    for b in range(of.nb):
+        _, centre = forms.variables(of.centres[b])
+        force += model.data.bodies.mass[b] * (model.data.gravity / of.length) @ centre
+    for k in np.flatnonzero((loads.kind == FORCE) & (loads.first < of.nb)):
+        _, point = forms(of.point(int(loads.first[k]), loads.point_first[k]))
+        force += (loads.force[k] / of.length) @ point
+    for k in np.flatnonzero(loads.kind == MOMENT):
+        constant, matrix = _moment(of, forms, int(loads.first[k]), loads.force[k] / of.length**2)
+        force, linear = force + constant, linear + matrix
+    target, source = map(np.ascontiguousarray, np.nonzero(linear))
+    return Inertia(forms.mass(), force, target, source, linear[target, source])
+
+
+def _moment(
+    of: NaturalCoordinates, forms: Forms, body: int, moment: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Constant (d,) and linear (d, d) force of a moment: ½ Σ (moment × R e) · δ(R e) over three axes."""
+    constant, matrix = np.zeros(forms.d), np.zeros((forms.d, forms.d))
+    for axis in np.eye(3):
+        at_rest, moving = forms(of.direction(body, axis))
+        constant += 0.5 * np.cross(moment, at_rest) @ moving
+        matrix += 0.5 * moving.T @ np.cross(moment, moving.T).T
+    return constant, matrix
+
+
+def _poses(of: NaturalCoordinates, forms: Forms) -> Poses:
+    places = []
+    for b in range(of.nb):
+        columns = [of.direction(b, axis) for axis in np.eye(3)]
+        centre = [{k: of.length * v for k, v in of.eliminate({c: 1.0}).items()} for c in of.centres[b]]
+        places += [*centre, *(columns[j][i] for i in range(3) for j in range(3))]
+    constant, matrix = forms([cleaned(expression) for expression in places])
+    row, variable = map(np.ascontiguousarray, np.nonzero(matrix))
+    start = np.searchsorted(row, np.arange(len(places) + 1))
+    return Poses(constant, start, variable, matrix[row, variable])
+
+
+def _given(of: NaturalCoordinates) -> Given:
+    rows = [(d, f, of.length if f == VALUE else 1.0) for d, f in of.given.values()]
+    return Given(*_columns(rows, 2))
+
+
+def _springs(of: NaturalCoordinates, forms: Forms, orders: int) -> Springs:
+    loads, rows = of.model.data.loads, []
+    for k in np.flatnonzero(loads.kind == SPRING):
+        one, other = (
+            forms(of.point(int(body[k]), point[k]))
+            for body, point in ((loads.first, loads.point_first), (loads.second, loads.point_second))
+        )
+        rows.append(
+            (
+                other[0] - one[0],
+                other[1] - one[1],
+                loads.stiffness[k],
+                loads.damping[k],
+                loads.natural[k] / of.length,
+            )
+        )
+    constant, form, *numbers = _stacked(rows, 3, forms.d)
+    return Springs(constant, form, *numbers, np.zeros((SPRING_SERIES * len(rows), orders)))
+
+
+def _torsions(of: NaturalCoordinates, forms: Forms, orders: int) -> Torsions:
+    loads, rows = of.model.data.loads, []
+    for k in np.flatnonzero(loads.kind == TORSION_SPRING):
+        first, second = int(loads.first[k]), int(loads.second[k])
+        images = (of.direction(first, loads.x_first[k]), of.direction(first, loads.y_first[k]),
+                  of.direction(second, loads.x_second[k]))  # fmt: skip
+        constant, form = forms([e for image in images for e in image])
+        stiffness, damping = (c[k] / of.length**2 for c in (loads.stiffness, loads.damping))
+        rows.append((constant, form, stiffness, damping, loads.natural[k], loads.angle[k]))
+    constant, form, stiffness, damping, natural, slot = _stacked([*rows], 9, forms.d, 4)
+    series = np.zeros((TORSION_SERIES * len(rows), orders))
+    return Torsions(constant, form, stiffness, damping, natural, slot.astype(np.int64), series)
+
+
+def _stacked(rows: Sequence[tuple], width: int, d: int, numbers: int = 3) -> list[np.ndarray]:
+    """Constants (k, width), forms (k width, d) and columns of numbers (k,)."""
+    columns = [[row[i] for row in rows] for i in range(2 + numbers)]
+    constant, form = np.array(columns[0], dtype=float), np.array(columns[1], dtype=float)
+    return [
+        constant.reshape(-1, width),
+        form.reshape(-1, d),
+        *(np.array(c, dtype=float) for c in columns[2:]),
+    ]

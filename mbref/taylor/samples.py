@@ -1,0 +1,179 @@
+"""Samples between the ends of a step: states from the series, multipliers by the formulation."""
+
+from __future__ import annotations
+
+from numpy import sqrt
+
+from mbref.equations.coordinates import contract, copy_state
+from mbref.equations.evaluation import assemble_system
+from mbref.kernels.compilation import inlined, kernel
+from mbref.kernels.layout import NOT_CONVERGED, OK
+from mbref.linear_algebra.vectors import copy, larger
+from mbref.taylor.lanes import LANES, sum_multiples
+
+BESIDE = 1e-3  # part of the largest least pivot below which a position is beside a singular one
+LOST_MOTION = 30.0  # tolerances, times orders², by which accelerations times the step's square may be off
+NOISE = 1e-9  # the same, by rounding
+CLEAR = 1e-6  # relative difference of accelerations that contradict each other
+
+
+@inlined
+def evaluate_series(h, memory):
+    """All lanes and their first two derivatives at a distance h (s) from the step's beginning."""
+    powers, past, state = memory.series.powers, memory.series.past, memory.state
+    orders, lanes = past.shape
+    power = 1.0
+    powers[0, 0], powers[1, 0], powers[2, 0], powers[2, 1] = 1.0, 0.0, 0.0, 0.0
+    for k in range(1, orders):
+        powers[1, k] = k * power
+        if k + 1 < orders:
+            powers[2, k + 1] = (k + 1) * k * power
+        power *= h
+        powers[0, k] = power
+    for derivative in range(3):
+        for j in range(0, lanes, LANES):
+            sum_multiples(past, j, lanes, powers, derivative * orders, orders, state, derivative * lanes + j)
+
+
+@kernel
+def find_poses(memory):
+    """Positions and rotation matrices of all bodies, and their derivatives, from ``state``."""
+    poses, state, pose = memory.polynomials.poses, memory.state, memory.pose
+    for p in range(poses.constant.shape[0]):
+        value, rate, second = poses.constant[p], 0.0, 0.0
+        for e in range(poses.start[p], poses.start[p + 1]):
+            weight, i = poses.weight[e], poses.variable[e]
+            value += weight * state[0, i]
+            rate += weight * state[1, i]
+            second += weight * state[2, i]
+        pose[0, p], pose[1, p], pose[2, p] = value, rate, second
+
+
+@inlined
+def turning(a, a_rate, out):
+    """The axial vector (3,) of the skew part of Aᵀ A', from rotation matrices by rows (9,)."""
+    for k in range(3):
+        i, j = (k + 2) % 3, (k + 1) % 3
+        value = 0.0
+        for r in range(3):
+            value += a[3 * r + i] * a_rate[3 * r + j] - a[3 * r + j] * a_rate[3 * r + i]
+        out[k] = 0.5 * value
+
+
+@inlined
+def put_quaternion(a, p):
+    """The unit quaternion of a rotation matrix by rows (9,), on the side of the one that p (4,) was."""
+    squares = (
+        1.0 + a[0] + a[4] + a[8], 1.0 + a[0] - a[4] - a[8],
+        1.0 - a[0] + a[4] - a[8], 1.0 - a[0] - a[4] + a[8],
+    )  # fmt: skip
+    x, y, z = a[7] - a[5], a[2] - a[6], a[3] - a[1]
+    xy, yz, zx = a[1] + a[3], a[5] + a[7], a[2] + a[6]
+    most = max(squares[0], squares[1], squares[2], squares[3])
+    if squares[0] == most:
+        found = (squares[0], x, y, z)
+    elif squares[1] == most:
+        found = (x, squares[1], xy, zx)
+    elif squares[2] == most:
+        found = (y, xy, squares[2], yz)
+    else:
+        found = (z, zx, yz, squares[3])
+    square, side = 0.0, 0.0
+    for value, before in zip(found, (p[0], p[1], p[2], p[3])):  # noqa: B905 - numba has no strict zip
+        square += value * value
+        side += value * before
+    factor = (1.0 if side >= 0.0 else -1.0) / sqrt(square)
+    p[0], p[1], p[2], p[3] = factor * found[0], factor * found[1], factor * found[2], factor * found[3]
+
+
+@kernel
+def put_state(memory):
+    """Coordinates, velocities and accelerations of all bodies from their poses."""
+    q, v, pose = memory.run.state.coordinates, memory.run.state.velocities, memory.pose
+    acceleration = memory.run.equations.system.acceleration
+    for b in range(v.shape[0] // 6):
+        place, axes = 12 * b, slice(12 * b + 3, 12 * b + 12)
+        for k in range(3):
+            q[7 * b + k] = pose[0, place + k]
+            v[6 * b + k] = pose[1, place + k]
+            acceleration[6 * b + k] = pose[2, place + k]
+        put_quaternion(pose[0, axes], q[7 * b + 3 : 7 * b + 7])
+        turning(pose[0, axes], pose[1, axes], v[6 * b + 3 : 6 * b + 6])
+        turning(pose[0, axes], pose[2, axes], acceleration[6 * b + 3 : 6 * b + 6])
+
+
+@kernel
+def rows_times(vector, equations, out):
+    """Φ_q times a vector (n,)."""
+    bodies, blocks = equations.scene.row_bodies, equations.system.blocks
+    for row in range(out.shape[0]):
+        value = 0.0
+        for side in range(2):
+            start = 6 * bodies[row, side]
+            if start < vector.shape[0]:
+                for k in range(6):
+                    value += blocks[row, 6 * side + k] * vector[start + k]
+        out[row] = value
+
+
+@kernel
+def explained(a, b, length, progress):
+    """Whether two accelerations differ by no more than the tolerance of a step of that length explains."""
+    size, difference, orders = 0.0, 0.0, progress.order * progress.order
+    for k in range(a.shape[0]):
+        size = larger(size, b[k])
+        difference = larger(difference, a[k] - b[k])
+    lost = LOST_MOTION * orders * progress.tolerance + NOISE
+    return difference * length * length <= LOST_MOTION * lost + CLEAR * size * length * length
+
+
+@kernel
+def project_state(t, run):
+    """The state brought onto the constraints; as it is where that does not converge."""
+    state, y = run.state, run.loop.y[: run.loop.clock.y_size]
+    copy_state(state, run.previous)
+    contract(state.coordinates, state.velocities, run.active, y)
+    if run.kernels.accept(t, y, run) != OK:
+        copy_state(run.previous, state)
+
+
+@kernel
+def take_sample(h, length, memory):
+    """Record state, accelerations and multipliers at a distance h (s) into a step: OK or why there are none.
+
+    Accelerations are the formulation's, but beside a singular position, where the state determines them ill,
+    the series'; multipliers balance the forces of either.  NOT_CONVERGED where the series' accelerations
+    contradict the formulation's.
+    """
+    run, samples, k = memory.run, memory.run.loop.samples, memory.run.loop.clock.sample
+    system, watch = run.equations.system, run.watch
+    evaluate_series(h, memory)
+    find_poses(memory)
+    put_state(memory)
+    copy(system.acceleration, samples.accelerations[k])
+    project_state(run.loop.times[k], run)
+    put_angles(h, memory)
+    assemble_system(run.loop.times[k], run.state.coordinates, run.state.velocities, run.equations)
+    if watch.smallest_pivot < BESIDE * watch.reference_pivot:
+        rows_times(samples.accelerations[k], run.equations, system.rhs)
+    status = run.kernels.accelerate(system)
+    if status == OK and not explained(system.acceleration, samples.accelerations[k], length, memory.progress):
+        status = NOT_CONVERGED
+    copy(run.state.coordinates, samples.coordinates[k])
+    copy(run.state.velocities, samples.velocities[k])
+    copy(system.acceleration, samples.accelerations[k])
+    copy(system.multipliers, samples.multipliers[k])
+    run.loop.clock.sample = k + (1 if status == OK else 0)
+    return status
+
+
+@kernel
+def put_angles(h, memory):
+    """The torsion springs' angles at a distance h (s) from the step's beginning, for the formulation."""
+    torsions, past = memory.polynomials.torsions, memory.series.past_angles
+    for s in range(past.shape[0]):
+        value = 0.0
+        for k in range(memory.progress.order, -1, -1):
+            value = value * h + past[s, k]
+        memory.run.equations.angles[torsions.slot[s]] = value
+        memory.angles[s] = value

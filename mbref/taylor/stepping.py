@@ -1,0 +1,214 @@
+"""The steps of a Taylor method: as long as the last terms allow, each judged where it ends.
+
+Steps follow À. Jorba and M. Zou (Experimental Mathematics 14, 2005).  Where a step ends, the constraint rows
+are violated by what the series has lost, which is corrected, and the accelerations of the equations differ
+from the series'.  Where either is more than the tolerance explains, or rows have become dependent, the step
+ends earlier: so a series that continues beyond a singular position passes it, and no other does.
+"""
+
+from __future__ import annotations
+
+from numpy import isfinite
+
+from mbref.kernels.compilation import INT, entry, inlined, kernel
+from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, OK
+from mbref.kernels.named_memory import Named
+from mbref.linear_algebra.vectors import copy, larger
+from mbref.simulation.stepping import DONE, PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS
+from mbref.taylor.layout import TaylorMemory
+from mbref.taylor.loads import ANGLE, TORSION_SERIES, expand_drivers
+from mbref.taylor.samples import LOST_MOTION, NOISE, evaluate_series, put_angles, take_sample
+from mbref.taylor.series import expand
+from mbref.taylor.solver import add_functions, choose, factorise, set_rows, solve
+
+SMALL = 1e-6  # a violation up to which the factor before its correction serves after it
+CORRECTIONS = 8
+ROUNDING = 1e-12  # of rows
+LOST_ROWS = 100.0  # tolerances by which rows may be off
+SHORTER = 0.7
+
+
+@kernel
+def violation(memory):
+    """Φ of every row at the first coefficients; the largest."""
+    rows, y, phi, largest = memory.polynomials.rows, memory.series.terms, memory.solver.phi, 0.0
+    for r in range(phi.shape[0]):
+        phi[r] = rows.constant[r]
+    for e in range(rows.linear_row.shape[0]):
+        phi[rows.linear_row[e]] += rows.linear_weight[e] * y[0, rows.linear_lane[e]]
+    for e in range(rows.row.shape[0]):
+        phi[rows.row[e]] += 0.5 * rows.weight[e] * y[0, rows.lane[e]] * y[0, rows.other[e]]
+    for r in range(phi.shape[0]):
+        largest = larger(largest, phi[r])
+    return largest
+
+
+@inlined
+def violation_rate(memory):
+    """Φ' of every row at the first two coefficients."""
+    rows, y, phi = memory.polynomials.rows, memory.series.terms, memory.solver.phi
+    phi[:] = 0.0
+    for e in range(rows.linear_row.shape[0]):
+        phi[rows.linear_row[e]] += rows.linear_weight[e] * y[1, rows.linear_lane[e]]
+    for e in range(rows.row.shape[0]):
+        phi[rows.row[e]] += rows.weight[e] * y[1, rows.lane[e]] * y[0, rows.other[e]]
+
+
+@inlined
+def subtract_violation(order, memory):
+    """Change the variables of order 0 or 1 by the least, in the metric of M, that takes Φ or Φ' away."""
+    solver, terms = memory.solver, memory.series.terms
+    set_rows(solver.phi, solver)
+    solve(solver, solver.partner.shape[0], solver.solution, 0)
+    for i in range(solver.order.shape[0]):
+        terms[order, i] += solver.solution[i]
+
+
+@kernel
+def correct(memory):
+    """Correct positions and velocities, the first coefficients: OK, SINGULAR or NOT_CONVERGED."""
+    progress, left = memory.progress, 1.0
+    for attempt in range(CORRECTIONS):
+        left = violation(memory)
+        if attempt == 0:
+            progress.violation = left
+        status = factorise(memory)
+        if status != OK:
+            return status
+        subtract_violation(0, memory)
+        if left <= SMALL:
+            break
+    if not left <= SMALL:
+        return NOT_CONVERGED
+    violation_rate(memory)
+    subtract_violation(1, memory)
+    add_functions(memory)
+    return OK
+
+
+@kernel
+def expand_from(t, memory):
+    """Correct the state at time t and expand it: OK or why it cannot be."""
+    expand_drivers(t, memory)
+    status = correct(memory)
+    if status == OK:
+        expand(memory)
+    return status
+
+
+@kernel
+def size_of(series, k, variables):
+    """The largest coefficient of order k."""
+    size = 0.0
+    for i in range(variables):
+        size = larger(size, series[k, i])
+    return size
+
+
+@kernel
+def longest_step(memory):
+    """The step at which the last two terms are as large as the tolerance."""
+    progress, control, past = memory.progress, memory.run.control, memory.series.past
+    counts, h = memory.run.equations.system.counts, control.largest_step
+    for k in range(progress.order - 1, progress.order + 1):
+        size = size_of(past, k, memory.solver.order.shape[0])
+        if size > 0.0:
+            h = min(h, (progress.tolerance / size) ** (1.0 / k))
+    if counts.steps == 0 and control.first_step > 0.0:
+        h = min(h, control.first_step)
+    return h
+
+
+@kernel
+def remember_series(memory):
+    """Keep the series of the step's beginning."""
+    series, torsions = memory.series, memory.polynomials.torsions
+    copy(series.terms.reshape(-1), series.past.reshape(-1))
+    for s in range(series.past_angles.shape[0]):
+        for k in range(memory.progress.order + 1):
+            series.past_angles[s, k] = torsions.series[TORSION_SERIES * s + ANGLE, k]
+
+
+@kernel
+def judge(h, memory):
+    """OK where rows and accelerations at the end of a step are off by no more than the tolerance explains."""
+    progress, state, terms = memory.progress, memory.state, memory.series.terms
+    if not progress.violation <= LOST_ROWS * progress.tolerance + ROUNDING:
+        return STEP_TOO_SMALL
+    off, size = 0.0, 1.0
+    for i in range(memory.solver.order.shape[0]):
+        off = larger(off, (2.0 * terms[2, i] - state[2, i]) * h * h)
+        size = larger(size, state[2, i] * h * h)
+    if not isfinite(off):
+        return NOT_FINITE
+    lost = LOST_MOTION * progress.order * progress.order * progress.tolerance
+    return OK if off <= lost + NOISE * size else STEP_TOO_SMALL
+
+
+@kernel
+def attempt(h, last, memory):
+    """Step to a distance h (s) and expand there, to the second order if it is the last step."""
+    progress, terms, state = memory.progress, memory.series.terms, memory.state
+    evaluate_series(h, memory)
+    for i in range(terms.shape[1]):
+        terms[0, i], terms[1, i] = state[0, i], state[1, i]
+    for i in range(memory.solver.order.shape[0], memory.solver.partner.shape[0]):
+        terms[0, i], terms[1, i] = 0.0, 0.0
+    put_angles(h, memory)
+    order = progress.order
+    progress.order = 2 if last else order
+    status = expand_from(memory.run.loop.clock.time + h, memory)
+    progress.order = order
+    return judge(h, memory) if status == OK else status
+
+
+@kernel
+def step(memory):
+    """One step, as many attempts as it takes, and the samples on its way."""
+    loop, control, counts = memory.run.loop, memory.run.control, memory.run.equations.system.counts
+    clock, times = loop.clock, loop.times
+    remember_series(memory)
+    left = times[times.shape[0] - 1] - clock.time
+    h = min(longest_step(memory), left)
+    while True:
+        status = attempt(h, h >= left, memory)
+        if status == OK:
+            break
+        counts.rejected += 1
+        h *= SHORTER
+        if not h >= control.smallest_step:
+            return status
+    while clock.sample < times.shape[0] and (h >= left or times[clock.sample] <= clock.time + h):
+        status = take_sample(times[clock.sample] - clock.time, h, memory)
+        if status != OK:
+            return status
+    put_angles(h, memory)
+    counts.steps += 1
+    clock.time = times[times.shape[0] - 1] if h >= left else clock.time + h
+    return OK
+
+
+@entry(INT(Named(TaylorMemory)))
+def enter(memory):
+    """Choose the partition at the start and expand there: OK or why that cannot be."""
+    expand_drivers(0.0, memory)
+    memory.progress.rank = choose(memory)
+    memory.solver.first[:] = 1e300
+    return expand_from(0.0, memory)
+
+
+@entry(INT(Named(TaylorMemory)))
+def advance_series(memory):
+    """Advance until the last sample time, a failure, or the number of steps per call; says which."""
+    clock, times, counts = memory.run.loop.clock, memory.run.loop.times, memory.run.equations.system.counts
+    taken = 0
+    while clock.sample < times.shape[0]:
+        if counts.steps >= memory.run.control.most_steps:
+            return TOO_MANY_STEPS
+        if taken >= memory.run.control.steps_per_call:
+            return PAUSED
+        status = step(memory)
+        if status != OK:
+            return status
+        taken += 1
+    return DONE

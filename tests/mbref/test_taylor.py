@@ -1,0 +1,185 @@
+"""The Taylor method against truths, against the general kernels, and where there is no motion to follow."""
+
+import numpy as np
+import pytest
+
+from crosscheck.conformance.random_mechanisms import random_mechanism
+from crosscheck.judge.metrics import measure
+from crosscheck.judge.truth import truth_for
+from mbref.method import Method, MethodError
+from mbref.scene import Body, Cylindrical, Driver, Revolute, Scene, SceneError, Spring, TorsionSpring
+from mbref.scenes import SCENES
+from mbref.simulation.simulate import Limits, simulate
+from mbref.taylor.expressions import ONE, Elimination, independent
+from mbref.taylor.lanes import LANES, add_multiple, add_product, filled, sum_multiples, sum_products
+
+FIELDS = ("position", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
+ROD = {"mass": 2.0, "inertia": (0.1, 0.7, 0.8)}
+SCREW = Scene(
+    name="two_rods",
+    gravity=(0.3, -9.81, 1.0),
+    duration=1.5,
+    body=(
+        Body(name="a", position=(0.5, 0.0, 0.0), angular_velocity=(0.0, 0.0, 9.0), **ROD),
+        Body(name="b", position=(1.5, 0.0, 0.2), **ROD),
+    ),
+    joint=(
+        Revolute(name="A", bodies=("ground", "a"), anchor=(0, 0, 0), axis=(0, 0, 1)),
+        Cylindrical(name="B", bodies=("a", "b"), anchor=(1, 0, 0), axis=(0, 1, 2)),
+    ),
+    load=(
+        Spring(
+            bodies=("ground", "b"), points=((0, 2, 1), (2, 0, 0)), stiffness=40, damping=2, natural_length=1
+        ),
+        TorsionSpring(joint="A", stiffness=5.0, damping=0.1, natural_angle=7.0),
+        TorsionSpring(joint="B", stiffness=3.0, natural_angle=-1.0),
+    ),
+)  # three degrees of freedom; the first joint turns more than once
+
+
+def largest(arrays):
+    return max(float(np.abs(array).max(initial=0.0)) for array in arrays)
+
+
+def assert_alike(a, b, tolerance):
+    """Equal motions and reactions, relative to the largest of each."""
+    assert (a.outcome.name, b.outcome.name) == ("COMPLETED", "COMPLETED"), f"{a.message} {b.message}"
+    for field in FIELDS:
+        one, other = getattr(a, field), getattr(b, field)
+        allowed = 10.0 * tolerance if "acceleration" in field else tolerance  # stiff springs multiply errors
+        assert np.abs(one - other).max() <= allowed * max(1.0, np.abs(one).max()), field
+    if a.reactions:
+        size = largest(a.reactions.values())
+        apart = largest(a.reactions[name] - b.reactions[name] for name in a.reactions)
+        assert apart <= max(tolerance, 1e-5) * size  # of redundant rows α decides the last digits
+
+
+@pytest.mark.parametrize(
+    ("name", "end"),
+    [
+        ("four_bar_gravity", 1.0), ("five_bar_gravity", 1.0), ("four_bar", 0.05), ("five_bar", 0.05),
+        ("spatial_slider_crank", 0.02), ("spatial_slider_crank_driven", 0.1), ("planar_slider_crank", 0.1),
+        ("planar_slider_crank_equal", 0.2), ("planar_slider_crank_heavy", 4.0), ("andrews_squeezer", 0.03),
+        ("bricard", 1.0), ("bennett", 0.5), ("sarrus", 0.3), ("heavy_top", 0.2), ("flyball_governor", 0.2),
+        ("h_frame", 0.5),
+    ],
+)  # fmt: skip
+def test_a_scene_as_by_the_general_kernels(name, end):
+    scene, times = SCENES[name](), np.linspace(0.0, end, 7)
+    general = simulate(scene, "alf-dual+projection", times, Limits(rtol=1e-11))
+    assert_alike(general, simulate(scene, "taylor", times, Limits(rtol=1e-12)), 2e-7)
+
+
+@pytest.mark.parametrize("seed", [*range(8), 21, 23, 24, 29])
+def test_a_random_mechanism_as_by_the_general_kernels(seed):
+    scene, times = random_mechanism(seed), np.linspace(0.0, 0.1, 4)
+    general = simulate(scene, "alf-dual+projection", times, Limits(rtol=1e-11))
+    assert_alike(general, simulate(scene, "taylor", times, Limits(rtol=1e-11)), 1e-7)
+
+
+def test_springs_dampers_and_torsion_springs_in_three_dimensions():
+    times = np.linspace(0.0, SCREW.duration, 6)
+    general = simulate(SCREW, "alf-dual+projection", times, Limits(rtol=1e-11))
+    turned = general.orientation[:, 0, 3]
+    assert (np.diff(np.sign(turned)) != 0).any(), "the first joint is to turn beyond π"
+    assert_alike(general, simulate(SCREW, "taylor", times, Limits(rtol=1e-12)), 1e-7)
+
+
+@pytest.mark.parametrize("name", ["planar_slider_crank", "spatial_slider_crank_gravity"])
+def test_errors_fall_with_the_tolerance(name):
+    scene = SCENES[name]()
+    times = np.linspace(0.0, 0.1, 5)
+    runs = [simulate(scene, "taylor", times, Limits(rtol=rtol)) for rtol in (1e-6, 1e-9, 1e-12)]
+    errors = [measure(scene, run, truth_for(scene))["error"] for run in runs]
+    assert errors[0] < 1e-2 and errors[1] < 1e-2 * errors[0] and errors[2] < 1e-9
+
+
+def test_samples_end_no_step():
+    scene = SCENES["planar_slider_crank"]()
+    few, many = (simulate(scene, "taylor", np.linspace(0, 0.05, k), Limits(rtol=1e-9)) for k in (2, 41))
+    assert few.cost.steps == many.cost.steps
+    assert np.array_equal(few.position[-1], many.position[-1])
+
+
+def test_a_start_in_a_singular_position_is_not_followed():
+    run = simulate(SCENES["four_bar_straight"](), "taylor", [0.05], Limits(rtol=1e-9))
+    assert run.outcome.name != "COMPLETED"
+
+
+def test_bodies_without_mass_move_as_drivers_prescribe():
+    bar = Body(name="bar", position=(1.0, 0.0, 0.0))
+    hinge = Revolute(name="H", bodies=("ground", "bar"), anchor=(0, 0, 0), axis=(0, 1, 0))
+    scene = Scene(
+        name="driven", body=(bar,), joint=(hinge,), driver=(Driver(joint="H", polynomial=(0, 2.0, 3.0)),)
+    )
+    times = np.linspace(0.0, 1.0, 5)
+    run = simulate(scene, "taylor", times)
+    angle = 2.0 * times + 3.0 * times**2
+    assert np.abs(run.position[:, 0, 0] - np.cos(angle)).max() < 1e-12
+    assert np.abs(run.angular_acceleration[:, 0, 1] - 6.0).max() < 1e-9
+    with pytest.raises(SceneError, match="bar"):
+        simulate(scene.with_(driver=()), "taylor", times)
+
+
+def test_names_and_what_does_not_go_together():
+    assert str(Method.parse("taylor[order=14]")) == "alf-dual+projection/taylor[order=14]"
+    assert Method.parse(str(Method.parse("taylor"))) == Method.parse("taylor")
+    with pytest.raises(MethodError, match="projects every step"):
+        Method.parse("lm1+none/taylor")
+    with pytest.raises(ValueError, match="order must be 4 to 30, got 31"):
+        simulate(SCREW, "taylor[order=31]", [0.1])
+    with pytest.raises(MethodError, match="one code for every scene"):
+        simulate(SCREW, "taylor", [0.1], Limits(code="specialised"))
+
+
+def test_most_steps_end_a_run():
+    run = simulate(SCENES["planar_slider_crank"](), "taylor", [0.1], Limits(most_steps=3))
+    assert (run.outcome.name, run.cost.steps) == ("STEP_FAILED", 3)
+
+
+def test_elimination_keeps_equations_that_would_multiply_products():
+    solve = Elimination(lambda variable, others: others <= 1)
+    solve.add({0: 2.0, 1: -1.0, ONE: 3.0})
+    solve.add({1: 1.0, 2: 1.0, 3: 1.0})
+    assert solve({0: 1.0}) == {1: 0.5, ONE: -1.5} or solve({1: 1.0}) == {0: 2.0, ONE: 3.0}
+    assert len(solve.left) == 1
+    solve.add({3: 1.0, ONE: -4.0})
+    solve.settle()
+    assert not solve.left and solve({3: 2.0}) == {ONE: 8.0}
+
+
+def test_polynomials_that_follow_from_others_are_left_out():
+    first, second = {(0, 0): 1.0, (ONE, ONE): -1.0}, {(0, 1): 1.0, (ONE, 2): 2.0}
+    mixed = {(0, 0): 2.0, (ONE, ONE): -2.0, (0, 1): -3.0, (ONE, 2): -6.0}
+    assert independent([mixed, second, first]) == [second, first]
+
+
+def test_sums_over_lanes():
+    rng = np.random.default_rng(5)
+    a, b = rng.random((5, 2 * LANES)), rng.random((5, 2 * LANES))
+    out, width = np.zeros(2 * LANES), a.shape[1]
+    calls = (
+        (
+            sum_products,
+            (a, LANES, width, b, 4 * width, -width, 4, out, 8),
+            (a[:4, 8:] * b[4:0:-1, :8]).sum(axis=0),
+        ),
+        (sum_multiples, (a, 0, width, b, width, 5, out, 8), (a[:, :8] * b[1, :5, None]).sum(axis=0)),
+        (add_multiple, (3.0, a, width, out, 8), 3.0 * a[1, :8]),
+        (add_product, (a.reshape(-1), 8, b.reshape(-1), width, out, 8), a[0, 8:] * b[1, :8]),
+    )
+    for function, arguments, expected in calls:
+        out[:] = 0.0
+        compiled(function, len(arguments))(*arguments)
+        assert np.allclose(out[8:], expected, rtol=1e-15) and not out[:8].any()
+    assert [filled(size) for size in (0, 1, 8, 9)] == [0, 8, 8, 16]
+
+
+def compiled(function, count):
+    """A kernel that calls an intrinsic."""
+    from numba import njit
+
+    names = ", ".join(f"a{k}" for k in range(count))
+    scope = {"function": function}
+    exec(f"def call({names}):\n    function({names})", scope)
+    return njit(scope["call"])
