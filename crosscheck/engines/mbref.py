@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from mbref.method import Method
 
 METHODS = (
-    "taylor",
     "alf-dual+projection, specialised",
     "alf-dual+projection",
+    "taylor",
     "lm2+projection, specialised",
     "kinematic, specialised",
     "kinematic",

@@ -24,7 +24,8 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
          "scene_validation"],
         ["formats", "scenes", "scene_slips", "variation"], ["drawing"], ["joint_motion", "energy"],
         ["motion"], ["kernels"], ["linear_algebra"], ["equations"], ["formulations"], ["stabilisation"],
-        ["integrators"], ["method"], ["specialised"], ["simulation", "taylor"], ["design"], ["cli"], ["__main__"],
+        ["integrators"], ["method"], ["specialised"], ["simulation", "taylor"], ["design"], ["cli"],
+        ["__main__"],
     ),
     "crosscheck": (
         ["judge"], ["engine"], ["engines"], ["processes"], ["study"], ["conformance"], ["paper"], ["cli"],
