@@ -20,7 +20,7 @@ from crosscheck.judge.energy import energy_series
 from crosscheck.judge.gauss_principle import gauss, stacked
 from crosscheck.judge.reference import cache, tree_loads
 from crosscheck.judge.reference import reference as module
-from crosscheck.judge.reference.arithmetic import DOUBLE, EXTENDED, doubles
+from crosscheck.judge.reference.arithmetic import DOUBLE, EXTENDED, doubles, many_digits
 from crosscheck.judge.reference.bound import differences
 from crosscheck.judge.reference.certify import certified, digest
 from crosscheck.judge.reference.natural import NaturalCoordinates
@@ -259,6 +259,19 @@ def test_twenty_digits_are_certified_by_both_formulations():
     place = np.array(table["position"][1][0], dtype=float)
     assert np.abs(place - exact(np.array([0.3]))[0][0, 0]).max() < 1e-15
     assert len(table["position"][1][0][0].strip("-")) >= 22
+
+
+@pytest.mark.parametrize(
+    ("make", "times"), [(SCENES["heavy_top"], [0.05, 0.06]), (SCENES["andrews_squeezer"], [1e-3])]
+)
+def test_many_digits_and_extended_precision(make, times):
+    """Rounding does not grow from step to step; every load has its digits."""
+    pytest.importorskip("flint", reason="python-flint is the extra `certify`")
+    scene = make()
+    motion = natural_motion(scene, times, many_digits(30), order=30, tolerance=1e-20, seconds=SECONDS)
+    assert not motion.reason
+    other = natural_motion(scene, times, EXTENDED, seconds=SECONDS)
+    assert np.abs(doubles(motion.position) - doubles(other.position)).max() < 1e-15
 
 
 TABLES = sorted((Path(cache.__file__).parent / "certified").glob("*.json"))

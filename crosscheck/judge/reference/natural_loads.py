@@ -88,7 +88,7 @@ class SpringForm:
         start, stop = ends
         self.vector, self.zeros = stop - start, of.arithmetic.zeros
         self.stiffness, self.damping = of.arithmetic.array([load.stiffness, load.damping])
-        self.rest = of.lengths(load.natural_length)[()]
+        self.rest = of.arithmetic.number(load.natural_length) / of.length
 
 
 class SpringSeries:

@@ -126,7 +126,7 @@ class Stepper:
 
     def _advance(self, expansion: Expansion, series: np.ndarray, h: float) -> None:
         d, settled = self.of.arithmetic.number(h), self.of.arithmetic.settled
-        self._x, self._v = value(series, d), value(series, d, 1)
+        self._x, self._v = settled(value(series, d)), settled(value(series, d, 1))
         self._angles = [settled(value(angle[: len(series)], d))[()] for angle in expansion.angles]
         self.t = settled(self.t + d)[()]
         self.steps += 1
