@@ -34,6 +34,7 @@ SPECIALISED = ", specialised"  # machine code of the scene, made before the cloc
 FAMILIES = {
     "alf-dual+projection": "augmented Lagrangian in dual form, projection, DOP853; the default method",
     "lm2+projection": "Lagrange multipliers eliminated by blocks, projection, DOP853",
+    "taylor": "Taylor series in natural coordinates, projection",
     "kinematic": "Newton-Raphson on the constraints of a fully driven mechanism",
     "mpi-svd+partitioning": "Moore-Penrose inverse by SVD, coordinate partitioning, DOP853",
     "mpi-svd+projection": "Moore-Penrose inverse by SVD, projection, DOP853",

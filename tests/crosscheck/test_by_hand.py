@@ -40,7 +40,7 @@ def test_units_and_labels_of_the_metrics():
     assert units == {
         "error": "", "position_error": "", "rotation_error": "rad", "scd": "digits", "velocity_error": "",
         "violation_position": "rad", "violation_velocity": "rad/s", "violation_acceleration": "rad/s²",
-        "energy_error": "",
+        "energy_error": "", "reaction_error": "",
     }  # fmt: skip
     for level in ("position", "velocity", "acceleration"):
         assert METRICS[f"violation_{level}"].label == f"violation of {level} constraints"

@@ -117,7 +117,7 @@ def test_runs_of_an_engine_share_a_process_until_one_does_not_complete(tmp_path:
 
 def test_run_after_a_time_out_has_its_whole_time(tmp_path: Path):
     """Getting ready takes this engine longer than its runs may."""
-    log, limit = tmp_path / "log", 1.5
+    log, limit = tmp_path / "log", 3.0
     ways = [{}, {"sleep": 60.0}, {}]
     runs = [
         run_isolated("fake_engines:SLOW", still(str(log)), TIMES, Setting("a", way), limit) for way in ways

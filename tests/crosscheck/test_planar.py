@@ -166,7 +166,9 @@ def test_a_swash_plate_lifts_a_pin(name: str, bodies: tuple[str, str]) -> None:
 
 def test_a_planar_joint_takes_neither_driver_nor_torsion_spring() -> None:
     scene = incline(ORDERS[0])
-    with pytest.raises(SceneError, match=r"driver\[0\].joint: 'plane0' is planar; only .* can be driven"):
+    with pytest.raises(
+        SceneError, match=r"driver\[plane0\].joint: 'plane0' is planar; only .* can be driven"
+    ):
         scene.with_(driver=(Driver(joint="plane0"),))
     with pytest.raises(SceneError, match=r"load\[0\].joint: 'plane0' is planar; only .* torsion spring"):
         scene.with_(load=(TorsionSpring(joint="plane0", stiffness=1.0),))

@@ -253,7 +253,10 @@ DEFECTS = (
         REPORTS,
     ),
     Defect(
-        "reports/sections/outcomes.py", "power(run.error)", 'power(run.metric("position_error"))', REPORTS
+        "reports/runs.py",
+        "return error_text(self.record)",
+        'return power(self.metric("position_error"))',
+        REPORTS,
     ),
     Defect("reports/sections/outcomes.py", "duration(run.seconds)", "duration(run.t_end)", REPORTS),
     Defect(

@@ -13,12 +13,14 @@ from synthetic import exact, groups, scene
 from crosscheck.engine import BUILT_IN
 from mbref.scenes import SCENES
 from reports import drawing, figures, time_series
-from reports.blocks import Figure
+from reports.blocks import Figure, Plot
 from reports.sections import blocks, speed
 
 
 def pictures() -> dict[str, Figure]:
-    return {block.name: block for block in blocks(groups()) if isinstance(block, Figure)}
+    """The figures of all sections; those that can be asked are drawn for Markdown too."""
+    shown = [block.figure if isinstance(block, Plot) else block for block in blocks(groups())]
+    return {block.name: block for block in shown if isinstance(block, Figure)}
 
 
 def pixels(png: bytes) -> int:

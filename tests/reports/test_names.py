@@ -23,4 +23,5 @@ def test_tags_and_line_ends_in_names_are_words():
     table = Table("caption", ("Engine",), [("<script>|a\nb",)], right=frozenset())
     blocks = [Heading("<b>\nname"), table]
     assert "&lt;script>\\|a b" in markdown(blocks) and "&lt;b> name" in markdown(blocks)
-    assert "<script>|" not in html(blocks, {}) and "<b>" not in html(blocks, {})
+    page = html(blocks, {})
+    assert "<script>|" not in page and "&lt;b&gt;" in page and "<b> name" not in page
