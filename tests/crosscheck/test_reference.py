@@ -22,7 +22,7 @@ from crosscheck.judge.reference import cache, tree_loads
 from crosscheck.judge.reference import reference as module
 from crosscheck.judge.reference.arithmetic import DOUBLE, EXTENDED, doubles, many_digits
 from crosscheck.judge.reference.bound import differences
-from crosscheck.judge.reference.certify import certified, digest
+from crosscheck.judge.reference.certify import NotCertified, certified, digest
 from crosscheck.judge.reference.natural import NaturalCoordinates
 from crosscheck.judge.reference.reference import NoReference, Reference, judged, reference, runs
 from crosscheck.judge.reference.saddle_point import SaddlePoint
@@ -272,6 +272,13 @@ def test_many_digits_and_extended_precision(make, times):
     assert not motion.reason
     other = natural_motion(scene, times, EXTENDED, seconds=SECONDS)
     assert np.abs(doubles(motion.position) - doubles(other.position)).max() < 1e-15
+
+
+def test_dependent_rows_in_many_digits_have_a_reason():
+    """Redundant rows that rounded anchors contradict leave no pivot of so many digits."""
+    pytest.importorskip("flint", reason="python-flint is the extra `certify`")
+    with pytest.raises(NotCertified, match="a pivot of its equations cannot be told from zero"):
+        certified(SCENES["sarrus"](), np.array([0.0, 0.1]), 20)
 
 
 TABLES = sorted((Path(cache.__file__).parent / "certified").glob("*.json"))

@@ -190,7 +190,10 @@ class Stepper:
         return drives.combined(products, 0) - drives.c[0], drives.combined(products, 1) - drives.c[1]
 
     def _project(self) -> None:
-        """Put coordinates and velocities onto the rows, with the least change in the sense of the masses."""
+        """Put coordinates and velocities onto the rows, with the least change in the sense of the masses.
+
+        Raises Ended where the rows are dependent in the digits of the arithmetic.
+        """
         arithmetic, held = self.of.arithmetic, self._held
         if not held.numbers:
             return
@@ -202,6 +205,8 @@ class Stepper:
                 if _largest(gap) <= 4 * arithmetic.eps * max(_largest(state), 1.0):
                     break
                 state[:, :-4] = arithmetic.settled(state[:, :-4] + system.solve(still, -gap)[0])
+        if not np.isfinite(doubles(np.stack([self._x, self._v]))).all():
+            raise Ended("a pivot of its equations cannot be told from zero in so many digits")
 
     # --- steps --------------------------------------------------------------------------------------------
     def _step(self, most: float) -> tuple[Expansion, float]:
