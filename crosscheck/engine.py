@@ -102,8 +102,8 @@ class Engine(ABC):
     name: str
     package: str  # to install when it is missing
     supports: Supports = Supports()  # everything else is refused
-    families: Mapping[str, str] = {}  # family of settings → what it is, for `crosscheck list settings`
-    options: Mapping[str, str] = {}  # option of a setting → what it is, with its unit
+    families: Mapping[str, str] = {}  # family of settings → its description, for `crosscheck list settings`
+    options: Mapping[str, str] = {}  # option of a setting → its description, with the unit
 
     @abstractmethod
     def version(self) -> str:

@@ -19,7 +19,7 @@ EXIT = (
 
 
 def parser() -> argparse.ArgumentParser:
-    """The parser; ``command`` of what it parses is the name of the command."""
+    """The parser; its result has the name of the command as ``command``."""
     found = argparse.ArgumentParser(
         prog="crosscheck", description="The same mechanism in several engines, against truth.", epilog=EXIT
     )

@@ -1,4 +1,4 @@
-"""What the commands that run engines share: the runs asked for, their progress, and the output."""
+"""Shared by the commands that run engines: the runs asked for, their progress, and the output."""
 
 from __future__ import annotations
 

@@ -103,7 +103,7 @@ def _counts(group: Judged) -> str:
 
 
 def _print_best(console: Console, group: Judged) -> None:
-    """What else is off in every engine's run of least error."""
+    """Violation, energy and reactions of every engine's run of least error."""
     header = ("engine, family", "settings", "error", *BEST.values())
     table = _table("every engine's run of least error", header, 2)
     for r in group.best().values():

@@ -38,14 +38,16 @@ def load(path: str | Path) -> dict[Identity, Record]:
     found = {}
     for record in stored(file).values():
         if "asked" not in record:
-            raise ValueError(f"{file}: its records do not say what was asked for; make them again")
+            raise ValueError(
+                f"{file}: its records lack the field asked, the request of the run; make them again"
+            )
         cost = {**record["cost"], "seconds": times.get(record["key"], record["cost"])["seconds"]}
         found[identity(record)] = {**record, "cost": cost, "repeated": record["key"] in times}
     return found
 
 
 def identity(record: Record) -> Identity:
-    """What makes runs of two sets the same one: everything asked for, not the version that answered."""
+    """The request by which runs of two sets are matched; the version of the engine is no part of it."""
     asked = record["asked"]
     when = {name: asked[name] for name in ("samples", "times", "end") if name in asked}
     return (

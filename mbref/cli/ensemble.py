@@ -9,17 +9,11 @@ from typing import Any
 import numpy as np
 
 from mbref.cli.options import TEXT, add_method_options, add_scene, limits_of, sample_times
-from mbref.cli.output import console, progress_bar, rounded, warn
+from mbref.cli.output import QUANTITIES, body_table, console, progress_bar, rounded, warn
 from mbref.records import strict_json
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 from mbref.trajectory import Trajectory
-
-QUANTITIES = {
-    "position, m": "position",
-    "velocity, m/s": "velocity",
-    "angular velocity, rad/s": "angular_velocity",
-}
 
 
 def add(commands: Any) -> None:
@@ -89,16 +83,9 @@ def _show_spread(
 
 
 def _table(scene: Scene, end: float, last: dict[str, np.ndarray]) -> Any:
-    from rich.table import Table
+    def cells(b: int, field: str) -> list[str]:
+        mean, deviation = (rounded(f(last[field][:, b], axis=0)) for f in (np.mean, np.std))
+        return [f"{m:.5g} ± {d:.2g}" for m, d in zip(mean, deviation, strict=True)]
 
-    table = Table(title=f"mean ± standard deviation at t = {end:g} s")
-    table.add_column("body", overflow="fold")
-    table.add_column("")
-    for axis in "xyz":
-        table.add_column(axis, no_wrap=True)
-    for b, body in enumerate(scene.body):
-        for k, (quantity, key) in enumerate(QUANTITIES.items()):
-            mean, deviation = (rounded(f(last[key][:, b], axis=0)) for f in (np.mean, np.std))
-            cells = (f"{m:.5g} ± {d:.2g}" for m, d in zip(mean, deviation, strict=True))
-            table.add_row("" if k else body.name, quantity, *cells, end_section=k == 2)
-    return table
+    names = [body.name for body in scene.body]
+    return body_table(f"mean ± standard deviation at t = {end:g} s", names, "left", cells)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from rich.console import Console
@@ -13,8 +14,16 @@ from rich.console import Console
 from mbref.scene import Scene
 from mbref.scene_slips import probable_slips
 
+if TYPE_CHECKING:
+    from rich.table import Table
+
 PIPED_WIDTH = 80  # characters of a line where no terminal says otherwise
 PAUSE = 10.0  # s between two lines of progress where stderr is no terminal
+QUANTITIES = {  # of a body in a table → field of a trajectory
+    "position, m": "position",
+    "velocity, m/s": "velocity",
+    "angular velocity, rad/s": "angular_velocity",
+}
 
 
 def console() -> Console:
@@ -31,6 +40,25 @@ def warn(scene: Scene) -> None:
 def rounded(vector: np.ndarray) -> np.ndarray:
     """Without the rounding errors of zeros, for reading."""
     return np.round(vector, 12) + 0.0
+
+
+def body_table(
+    title: str, bodies: Sequence[str], justify: Literal["left", "right"],
+    cells: Callable[[int, str], Iterable[str]],
+) -> Table:  # fmt: skip
+    """A table with a row x, y, z of ``cells(body, field of QUANTITIES)`` for every body and quantity."""
+    from rich.table import Table
+
+    table = Table(title=title)
+    table.add_column("body", overflow="fold")
+    table.add_column("")
+    for axis in "xyz":
+        table.add_column(axis, justify=justify, no_wrap=True)
+    for b, name in enumerate(bodies):
+        for k, (quantity, field) in enumerate(QUANTITIES.items()):
+            last = k == len(QUANTITIES) - 1
+            table.add_row("" if k else name, quantity, *cells(b, field), end_section=last)
+    return table
 
 
 @contextmanager

@@ -7,17 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from mbref.cli.options import TEXT, add_method_options, add_scene, limits_of, sample_times
-from mbref.cli.output import console, progress_bar, rounded, warn
+from mbref.cli.output import body_table, console, progress_bar, rounded, warn
 from mbref.records import strict_json
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 from mbref.trajectory import Trajectory
-
-QUANTITIES = {
-    "position, m": "position",
-    "velocity, m/s": "velocity",
-    "angular velocity, rad/s": "angular_velocity",
-}
 
 
 def add(commands: Any) -> None:
@@ -69,8 +63,6 @@ def _writer(out: str | None) -> Any:
 
 def show(scene: Scene, trajectory: Trajectory) -> None:
     """Print how a run ended, what it cost, and its last state."""
-    from rich.table import Table
-
     out, cost = console(), trajectory.cost
     out.print(f"{scene.name} by {trajectory.method}: {trajectory.outcome.name} at t = {trajectory.t_end:g} s")
     if trajectory.message:
@@ -82,13 +74,8 @@ def show(scene: Scene, trajectory: Trajectory) -> None:
     )
     if not trajectory.times.size:
         return
-    table = Table(title=f"state at t = {trajectory.times[-1]:g} s")
-    table.add_column("body", overflow="fold")
-    table.add_column("")
-    for axis in "xyz":
-        table.add_column(axis, justify="right", no_wrap=True)
-    for b, name in enumerate(trajectory.bodies):
-        for k, (quantity, key) in enumerate(QUANTITIES.items()):
-            numbers = (f"{x:.5g}" for x in rounded(getattr(trajectory, key)[-1, b]))
-            table.add_row("" if k else name, quantity, *numbers, end_section=k == len(QUANTITIES) - 1)
-    out.print(table)
+
+    def numbers(b: int, field: str) -> list[str]:
+        return [f"{x:.5g}" for x in rounded(getattr(trajectory, field)[-1, b])]
+
+    out.print(body_table(f"state at t = {trajectory.times[-1]:g} s", trajectory.bodies, "right", numbers))

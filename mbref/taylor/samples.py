@@ -9,6 +9,7 @@ from mbref.equations.evaluation import assemble_system
 from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.layout import NOT_CONVERGED, OK
 from mbref.linear_algebra.vectors import copy, larger
+from mbref.simulation.stepping import take_sample as record_sample
 from mbref.taylor.lanes import LANES, sum_multiples
 
 BESIDE = 1e-3  # part of the largest least pivot below which a position is beside a singular one
@@ -159,11 +160,8 @@ def take_sample(h, length, memory):
     status = run.kernels.accelerate(system)
     if status == OK and not explained(system.acceleration, samples.accelerations[k], length, memory.progress):
         status = NOT_CONVERGED
-    copy(run.state.coordinates, samples.coordinates[k])
-    copy(run.state.velocities, samples.velocities[k])
-    copy(system.acceleration, samples.accelerations[k])
-    copy(system.multipliers, samples.multipliers[k])
-    run.loop.clock.sample = k + (1 if status == OK else 0)
+    if status == OK:
+        record_sample(run)
     return status
 
 

@@ -72,7 +72,7 @@ def _renamed(joints: list[Joint]) -> Iterator[Joint]:
 
 
 class _Reader:
-    """A compiled model at qpos0, and what was noted while it was read."""
+    """A compiled model at qpos0, and the parts left out while it was read."""
 
     def __init__(self, mujoco: Any, model: Any):
         self.mujoco, self.model, self.data = mujoco, model, mujoco.MjData(model)
