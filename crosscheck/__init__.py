@@ -11,6 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from crosscheck.cli.comparison import Comparison, compare
     from crosscheck.engine import Cannot, Engine, Owner, Setting, Supports, default_engines, engine_names
     from crosscheck.engine import engine as find_engine
     from crosscheck.judge.metrics import METRICS, measure
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 _PLACE_OF = {
     "Cannot": ("crosscheck.engine", "Cannot"),
+    "Comparison": ("crosscheck.cli.comparison", "Comparison"),
     "Case": ("crosscheck.study", "Case"),
     "Engine": ("crosscheck.engine", "Engine"),
     "METRICS": ("crosscheck.judge.metrics", "METRICS"),
@@ -27,6 +29,7 @@ _PLACE_OF = {
     "Setting": ("crosscheck.engine", "Setting"),
     "Supports": ("crosscheck.engine", "Supports"),
     "Truth": ("crosscheck.judge.truth", "Truth"),
+    "compare": ("crosscheck.cli.comparison", "compare"),
     "default_cases": ("crosscheck.study", "default_cases"),
     "default_engines": ("crosscheck.engine", "default_engines"),
     "engine_names": ("crosscheck.engine", "engine_names"),
@@ -37,7 +40,8 @@ _PLACE_OF = {
 }
 
 __all__ = [
-    "METRICS", "Cannot", "Case", "Engine", "Owner", "Setting", "Supports", "Truth", "default_cases",
+    "METRICS", "Cannot", "Case", "Comparison", "Engine", "Owner", "Setting", "Supports", "Truth", "compare",
+    "default_cases",
     "default_engines", "engine_names", "find_engine", "measure", "run_study", "truth_for",
 ]  # fmt: skip
 

@@ -4,32 +4,26 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from typing import Any
 
 from crosscheck.cli import request, tables
-from crosscheck.cli.collection import Collection, measured, scouted
+from crosscheck.cli.comparison import WIDTH, comparisons
 from crosscheck.cli.request import Choice, RequestError
 from crosscheck.cli.running import (
     COMPLETED,
     OTHERWISE,
-    by_scene,
-    cases_of,
+    asked_of,
     console,
     notice,
     print_json,
 )  # fmt: skip
 from crosscheck.study import sweep
 from crosscheck.study.command import command
-from crosscheck.study.fair_timing import model_difference
+from crosscheck.study.comparison import Wanted, collected, scouted
 from crosscheck.study.grid import TIME_LIMIT, Case, Record, key, study
 from crosscheck.study.progress import shown
 from crosscheck.study.record_view import public
-from crosscheck.study.sentences import verdict
 from crosscheck.study.timings import REPEATS, with_timings
 from crosscheck.study.tuning import tuned
-from crosscheck.study.verdict import Judged, judged
-
-TRUTH = ("kind", "bound", "until", "seconds", "reason", "both")  # fields of a truth's record that are printed
 
 
 def compare(arguments: argparse.Namespace) -> int:
@@ -37,20 +31,24 @@ def compare(arguments: argparse.Namespace) -> int:
     where engines simulate different mechanisms."""
     if arguments.repeats < REPEATS:
         raise RequestError(f"--repeats: must be at least {REPEATS}, got {arguments.repeats}")
-    cases = cases_of(arguments, sweep.QUICK_SAMPLES)
-    scenes = list({case.scene.name: case.scene for case in cases}.values())
-    long = sweep.QUICK_LONG if arguments.depth == "quick" else sweep.LONG
-    found = measured(scenes, cases, None, long, notice, arguments.repeats)
-    reasons = _differences(found, arguments.reference_time)
-    groups = judged(found.scenes, found.truths, found.records)
+    asked = asked_of(arguments, sweep.QUICK_SAMPLES)
+    wanted = Wanted(asked.times, arguments.reference_time, asked.chosen.is_quick, None, arguments.repeats)
+    found = collected(
+        asked.scenes, asked.engines, wanted, lambda: request.plan(*asked, notice), notice
+    )  # fmt: skip
     paths = {request.find_scenes([path])[0].name: path for path in arguments.scene}
+    compared = comparisons(found, paths, arguments.reference_time)
+    for comparison in compared:
+        if comparison.difference:
+            name = comparison.judged.scene.name
+            reason = f"the engines simulate different mechanisms: {comparison.difference}"
+            notice(f"{name}: times are not compared, {reason}")
     if arguments.json:
-        print_json([_document(group, reasons, cases) for group in groups])
+        print_json([comparison.document() for comparison in compared])
     else:
-        for group in groups:
-            name = group.scene.name
-            tables.print_comparison(console(), group, paths[name], reasons.get(name))
-    return OTHERWISE if reasons else COMPLETED
+        for comparison in compared:
+            comparison.print(console(WIDTH))
+    return OTHERWISE if any(comparison.difference for comparison in compared) else COMPLETED
 
 
 def tune(arguments: argparse.Namespace) -> int:
@@ -78,24 +76,3 @@ def tune(arguments: argparse.Namespace) -> int:
 def _studied(cases: Sequence[Case]) -> list[Record]:
     with shown("trying settings", len(cases)) as progress:
         return study(cases, progress=progress)
-
-
-def _differences(found: Collection, reference_time: float) -> dict[str, str]:
-    """By scene, why the engines' mechanisms are not the same; each is printed."""
-    reasons = {}
-    for scene in found.scenes:
-        own = [record for record in found.identities if record["scene"] == scene.name]
-        if reason := model_difference(scene, own, reference_time):
-            reasons[scene.name] = reason
-            notice(
-                f"{scene.name}: times are not compared, the engines simulate different mechanisms: {reason}"
-            )
-    return reasons
-
-
-def _document(group: Judged, reasons: dict[str, str], cases: Sequence[Case]) -> dict[str, Any]:
-    """The scene's document: verdict, truth and records."""
-    (document,) = [d for d in by_scene(cases, group.records) if d["scene"] == group.scene.name]
-    truth = {name: group.truth[name] for name in TRUTH}
-    return {**document, "verdict": verdict([group])._asdict(), "truth": truth,
-            "difference": reasons.get(group.scene.name)}  # fmt: skip

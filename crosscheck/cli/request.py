@@ -12,7 +12,7 @@ import numpy as np
 from crosscheck.conformance.trial import Specimen, specimens
 from crosscheck.engine import BUILT_IN, Setting, default_engines, engine
 from crosscheck.study.grid import Case, default_cases
-from crosscheck.study.sweep import thinned
+from crosscheck.study.sweep import of_few_families
 from mbref.scene import Scene, SceneError
 from mbref.scenes import find_scene
 
@@ -145,7 +145,7 @@ def _check_times(times: Sequence[float]) -> None:
 
 class Choice(NamedTuple):
     """Which settings of the engines are run: of these ``families`` (None: all) or the one setting given, at
-    this tolerance (None: the sweep's), at quick depth only a few."""
+    this tolerance (None: the sweep's), at quick depth of few families."""
 
     families: Sequence[str] | None = None
     setting: Setting | None = None
@@ -183,7 +183,7 @@ def plan(
         cases = _named(cases, chosen.families, notice)
     if chosen.rtol is not None:
         return _at_tolerance(cases, chosen.rtol)
-    return thinned(cases, chosen.families or ()) if chosen.is_quick else cases
+    return of_few_families(cases, chosen.families or ()) if chosen.is_quick else cases
 
 
 def _single(

@@ -6,26 +6,39 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
 from rich.console import Console
 
 from crosscheck.cli import request
-from crosscheck.cli.collection import scouted
+from crosscheck.cli.request import Choice
+from crosscheck.study.comparison import scouted
 from crosscheck.study.grid import TIME_LIMIT, Case, Record, study
 from crosscheck.study.hurried import Hurried
 from crosscheck.study.progress import shown
 from crosscheck.study.record_view import public
-from crosscheck.study.sweep import QUICK_LIMIT
+from crosscheck.study.sweep import QUICK_LIMIT, thinned
+from mbref.scene import Scene
 
 Document = dict[str, Any]
 COMPLETED, OTHERWISE = 0, 1
 SAMPLES = 101
-PIPED_WIDTH = 180  # characters of a line
+PIPED_WIDTH = 180  # characters of a line, so that no cell of a table is folded
 
 
-def cases_of(arguments: argparse.Namespace, samples: int = SAMPLES) -> list[Case]:
-    """The runs asked for; a scene that an engine cannot run is reported on standard error."""
+class Asked(NamedTuple):
+    """Scenes, engines, their settings, sample times (k,) of every scene, and the wall time (s) of a run."""
+
+    scenes: Sequence[Scene]
+    engines: Sequence[str]
+    chosen: Choice
+    times: Sequence[np.ndarray]
+    time_limit: float
+
+
+def asked_of(arguments: argparse.Namespace, samples: int = SAMPLES) -> Asked:
+    """The request of a command line; RequestError where it cannot be carried out."""
     scenes = request.find_scenes(arguments.scene)
     engines = request.find_engines(arguments.engine, notice)
     named = [*(arguments.method or ()), *(arguments.setting or ())]
@@ -37,9 +50,17 @@ def cases_of(arguments: argparse.Namespace, samples: int = SAMPLES) -> list[Case
     limit = arguments.time_limit
     if limit is None:
         limit = QUICK_LIMIT if is_quick and chosen.setting is None else TIME_LIMIT
-    if chosen.setting is None:
-        scouted(scenes, engines)
-    cases = request.plan(scenes, engines, chosen, times, limit, notice)
+    return Asked(scenes, engines, chosen, times, limit)
+
+
+def cases_of(arguments: argparse.Namespace) -> list[Case]:
+    """The runs asked for; a scene that an engine cannot run is reported on standard error."""
+    asked = asked_of(arguments)
+    if asked.chosen.setting is None:
+        scouted(asked.scenes, asked.engines)
+    cases = request.plan(*asked, notice)
+    if asked.chosen.is_quick and asked.chosen.rtol is None:
+        cases = thinned(cases)
     return [case._replace(reference_time=arguments.reference_time) for case in cases]
 
 
@@ -65,9 +86,9 @@ def print_json(documents: Sequence[Document]) -> None:
     print(json.dumps(documents[0] if len(documents) == 1 else documents, allow_nan=False))
 
 
-def console() -> Console:
-    """Standard output; wide when it is no terminal, so that no cell of a table is folded."""
-    return Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, markup=False, highlight=False)
+def console(width: int = PIPED_WIDTH) -> Console:
+    """Standard output; of so many columns when it is no terminal."""
+    return Console(width=None if sys.stdout.isatty() else width, markup=False, highlight=False)
 
 
 def notice(sentence: str) -> None:

@@ -23,7 +23,7 @@ from crosscheck.study.record_view import (
     never_moved,
     varied_settings,
 )
-from crosscheck.study.sentences import LEVEL, verdict
+from crosscheck.study.sentences import LEVEL, Verdict
 from crosscheck.study.verdict import Grade, Judged, grade
 
 MEASURED = ("violation_position", "energy_error")  # metrics that the table of runs shows beside the error
@@ -45,14 +45,14 @@ def print_runs(console: Console, records: Sequence[Record]) -> None:
         _print_messages(console, group)
 
 
-def print_comparison(console: Console, group: Judged, path: str, difference: str | None) -> None:
+def print_comparison(console: Console, group: Judged, said: Verdict, path: str, with_ratio: bool) -> None:
     """The verdict on a scene, its runs with the least error first, the plot, the engines' best runs and the
     settings to use; no ratios of times where the engines simulate different mechanisms."""
     records = group.records
     console.print(f"\n{group.scene.name}, {group.scene.duration:g} s: {_counts(group)}\n")
-    _print_verdict(console, group, difference)
+    _print_verdict(console, said)
     letters = _letters(records)
-    console.print(_ranked(records, letters, with_ratio=not difference))
+    console.print(_ranked(records, letters, with_ratio=with_ratio))
     console.print(scatter(records, letters))
     _print_best(console, group)
     _print_advice(console, group, path)
@@ -86,12 +86,8 @@ def print_tuning(
         console.print(f"The cheapest: {command(r, path)}", soft_wrap=True)
 
 
-def _print_verdict(console: Console, group: Judged, difference: str | None) -> None:
-    said = verdict([group])
+def _print_verdict(console: Console, said: Verdict) -> None:
     console.print(said.headline)
-    if difference:
-        fast = f"Times are not compared, the engines simulate different mechanisms: {difference}."
-        said = said._replace(fast=fast)
     for label, sentence in said.labelled().items():
         console.print(f"\n{label}: {sentence}")
 
@@ -135,7 +131,7 @@ def _graded(record: Record) -> str:
 def _at(record: Record) -> str:
     """`` at 0.1 s``; nothing for a run that completed or was ended from outside."""
     silent = is_completed(record) or record["outcome"] in ("TIMED_OUT", "CRASHED")
-    return "" if silent else f" at {record['t_end']:.4g} s"
+    return "" if silent else f" at {max(record['t_end'], 0):.4g} s"
 
 
 def _cost(record: Record) -> float:

@@ -1,6 +1,7 @@
 """Metrics: one number of a run each, from its scene, its trajectory and the exact motion alone.
 
-Errors are taken at the samples the run reached, so that a failed run is judged up to where it got.
+Errors are taken at the samples that the run reached and at which the truth is known, so that a failed run is
+judged up to where it got.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ MANY = 50  # bodies; reactions of more are left to `crosscheck.judge.joint_react
 class Metric:
     """``function(scene, trajectory, exact)`` gives a number, or None where the metric says nothing.
 
-    ``exact`` is the truth's trajectory at the same times, or None.  Numbers are never NaN; a trajectory
-    that is not finite has infinite errors.
+    ``exact`` is the truth's trajectory at the same times or at the first of them, or None.  Numbers are never
+    NaN; a trajectory that is not finite has infinite errors.
     """
 
     function: Callable[[Scene, Trajectory, Trajectory | None], float | None]
@@ -39,9 +40,10 @@ class Metric:
 
 
 def measure(scene: Scene, trajectory: Trajectory, truth: Truth | None = None) -> dict[str, float | None]:
-    """Every metric of a trajectory by name, and ``error_bound``, the bound on the truth's own error.
+    """Every metric of a trajectory by name, ``error_bound``, the bound on the truth's own error, and
+    ``error_until``, the time (s) of the last sample that has an error.
 
-    The bound is None without a truth or without a sample.  Raises ValueError when the bodies are not the
+    Both are None without a truth or without a sample.  Raises ValueError when the bodies are not the
     scene's.
     """
     trajectory = in_scene_order(scene, trajectory)
@@ -49,16 +51,19 @@ def measure(scene: Scene, trajectory: Trajectory, truth: Truth | None = None) ->
     with np.errstate(all="ignore"):  # states that are not finite are told by the metrics, not by warnings
         found = {name: metric.function(scene, trajectory, exact) for name, metric in METRICS.items()}
     if truth is None or exact is None or not trajectory.times.size:
-        return found | {"error_bound": None}
-    return found | {"error_bound": exact.settings.get("bound", truth.accuracy)}
+        return found | {"error_bound": None, "error_until": None}
+    bound = exact.settings.get("bound", truth.accuracy)
+    return found | {"error_bound": bound, "error_until": float(exact.times[-1])}
 
 
 def exact_motion(trajectory: Trajectory, truth: Truth | None) -> Trajectory | None:
-    """The truth at a trajectory's times; None without truth, and where the true motion ends before."""
+    """The truth at a trajectory's times, or at the first of them where it is known no further; None without
+    truth, and where it is known at the start alone."""
     try:
         return None if truth is None else truth.poses(trajectory.times)
-    except NoSolution:
-        return None
+    except NoSolution as end:
+        known = trajectory.times[trajectory.times <= end.until]
+        return truth.poses(known) if truth is not None and known.max(initial=0.0) > 0 else None
 
 
 def in_scene_order(scene: Scene, trajectory: Trajectory) -> Trajectory:
@@ -124,7 +129,7 @@ def violation_series(scene: Scene, trajectory: Trajectory, level: int = 0) -> np
 
 def _against_exact(series: Callable[..., np.ndarray]) -> Callable[..., float | None]:
     def largest(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
-        return None if exact is None else _largest(series(scene, trajectory, exact))
+        return None if exact is None else _largest(series(scene, _known(trajectory, exact), exact))
 
     return largest
 
@@ -151,7 +156,7 @@ def _velocity_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | No
     largest true one."""
     if exact is None or not len(trajectory.times):
         return None
-    length = constraints.scene_length(scene)
+    trajectory, length = _known(trajectory, exact), constraints.scene_length(scene)
     pairs = [
         (trajectory.velocity, exact.velocity),
         (length * trajectory.angular_velocity, length * exact.angular_velocity),
@@ -179,6 +184,12 @@ def reaction_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | Non
     found = compare(scene, true, _at(trajectory, chosen))
     worst = max([found.resultant, *(joint.unique for joint in found.joints.values())])
     return worst if math.isfinite(worst) else math.inf
+
+
+def _known(trajectory: Trajectory, exact: Trajectory) -> Trajectory:
+    """The trajectory at the samples of the truth."""
+    count = len(exact.times)
+    return trajectory if count == len(trajectory.times) else _at(trajectory, np.arange(count))
 
 
 def _at(trajectory: Trajectory, chosen: np.ndarray) -> Trajectory:

@@ -20,10 +20,12 @@ from crosscheck.processes.child import Child, ChildFailed, Observation
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
+MOST_IDLE = 8  # children that wait for a run: one of every engine, so that scouting has started them
 READY_SECONDS = 600.0  # for imports and compiling, before the time of a run begins
 
 _idle: list[tuple[str, Child]] = []  # with their engines, the one used last at the end
-_lending, _preparing = Lock(), Lock()
+_lending = Lock()
+_preparing: dict[str, Lock] = {}  # by engine
 _prepared: set[tuple[str, str]] = set()  # engines and families that a child has made ready
 
 
@@ -117,7 +119,7 @@ def _made_ready(child: Child, engine_name: str, family: str) -> Observation:
     arguments = serve.get_ready, (engine_name, [family]), READY_SECONDS
     if (engine_name, family) in _prepared:
         return child.call(*arguments)
-    with _preparing:
+    with _preparing.setdefault(engine_name, Lock()):
         ready = child.call(*arguments)
         _prepared.add((engine_name, family))
     return ready
@@ -138,10 +140,10 @@ def _lent(engine_name: str) -> Iterator[Child]:
 
 
 def _put_back(engine_name: str, child: Child) -> None:
-    """Let the child wait for another run, if it lives, and at most one child a core do so."""
+    """Let the child wait for another run, if it lives, and at most MOST_IDLE children do so."""
     with _lending:
         _idle.append((engine_name, child))
-        waiting = [entry for entry in _idle if entry[1].is_alive][-(os.cpu_count() or 1) :]
+        waiting = [entry for entry in _idle if entry[1].is_alive][-MOST_IDLE:]
         ended = [entry for entry in _idle if entry not in waiting]
         _idle[:] = waiting
     for _, spent in ended:

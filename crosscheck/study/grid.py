@@ -88,7 +88,7 @@ def study(
     executor: Executor | None = None,
     records_path: str | Path | None = None,
     progress: Progress | None = None,
-    run: Callable[[Case], Record] | None = None,
+    run: Callable[[Case], Any] | None = None,
 ) -> list[Record]:
     """The record of every case, in the order of the cases.
 
@@ -200,7 +200,7 @@ def machine() -> dict[str, str | int | None]:
 
 
 def _run_all(
-    cases: Sequence[Case], executor: Executor | None, run: Callable[[Case], Record]
+    cases: Sequence[Case], executor: Executor | None, run: Callable[[Case], Any]
 ) -> Generator[Record, None, None]:
     """Records as their runs end; when the caller stops early, so do the runs."""
     if executor is None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from crosscheck.processes.pool import run_isolated
 from crosscheck.processes.serve import failed
-from crosscheck.study.grid import Case, Record, record_of, run_case
-from mbref.trajectory import Outcome
+from crosscheck.study.grid import Case, Record, record_of
+from mbref.trajectory import Outcome, Trajectory
 
 NOT_STARTED = "not started: a coarser setting of the family reached the time limit"
 
@@ -17,12 +18,14 @@ class Hurried:
 
     def __call__(self, case: Case) -> Record:
         """The record of a case; TIMED_OUT without a run where a coarser one was."""
+        return record_of(case, self.trajectory(case))
+
+    def trajectory(self, case: Case) -> Trajectory:
+        """The trajectory of that record."""
         family = case.scene.name, case.engine, case.setting.family
         if family in self._slow:
-            return record_of(
-                case, failed(case.engine, "", case.scene, case.setting, Outcome.TIMED_OUT, NOT_STARTED)
-            )
-        record = run_case(case)
-        if record["outcome"] == Outcome.TIMED_OUT.label:
+            return failed(case.engine, "", case.scene, case.setting, Outcome.TIMED_OUT, NOT_STARTED)
+        run = run_isolated(case.engine, case.scene, case.times, case.setting, case.time_limit)
+        if run.outcome is Outcome.TIMED_OUT:
             self._slow.add(family)
-        return record
+        return run

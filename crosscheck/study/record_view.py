@@ -57,7 +57,7 @@ def error_text(record: Record) -> str:
 
 def never_moved(record: Record) -> bool:
     """Whether a run ended at its start, so that its numbers say nothing about the motion."""
-    return not is_completed(record) and record["t_end"] == 0
+    return not is_completed(record) and record["t_end"] <= 0
 
 
 def engine_and_family(record: Record) -> tuple[str, str]:

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from crosscheck.judge.tolerances import ERROR_LEVELS
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error, error_text
 from crosscheck.study.verdict import Grade, Judged, grade
+from crosscheck.study.wording import agree, at_most, is_or_are, its_or_their, listed, multiple, seconds, span
 
 TITLES = {"mujoco": "MuJoCo", "pinocchio": "Pinocchio", "exudyn": "Exudyn", "simbody": "Simbody",
           "sundials": "SUNDIALS IDA", "ondsel": "OndselSolver"}  # fmt: skip
 LEVEL = ERROR_LEVELS[1]  # the error at which speeds are compared in words
+
+ADAPTERS = " Times are CPU seconds of stepping, each engine as crosscheck's Python adapter calls it."
 
 
 class Verdict(NamedTuple):
@@ -31,20 +34,18 @@ class Verdict(NamedTuple):
         return {**answers, "How the truth is known": self.truth}
 
 
-def verdict(groups: Sequence[Judged]) -> Verdict:
-    """The verdict on one scene or several, of the same engines where they can run them."""
-    return Verdict(headline(groups), right(groups), fast(groups), breaks(groups), truth(groups))
+def verdict(groups: Sequence[Judged], difference: str | None = None) -> Verdict:
+    """The verdict on one scene or several, of the same engines where they can run them; where their
+    mechanisms have a ``difference``, times are not compared."""
+    times = f"Times are not compared, the engines simulate different mechanisms: {difference}."
+    return Verdict(
+        headline(groups), right(groups), times if difference else fast(groups), breaks(groups), truth(groups)
+    )
 
 
 def title(engine: str) -> str:
     """An engine's name as its makers write it."""
     return TITLES.get(engine, engine)
-
-
-def listed(names: Iterable[str]) -> str:
-    """``a, b and c``."""
-    *most, last = [*names] or [""]
-    return f"{', '.join(most)} and {last}" if most else last
 
 
 def headline(groups: Sequence[Judged]) -> str:
@@ -56,7 +57,7 @@ def headline(groups: Sequence[Judged]) -> str:
     first = (
         f"{'Both' if len(good) == 2 else f'All {len(good)}'} engines are right at their best settings"
         if len(good) == len(at_best) > 1
-        else f"{listed(map(title, good))} {_is(good)} right at {_its(good)} best settings"
+        else f"{listed(map(title, good))} {is_or_are(good)} right at {its_or_their(good)} best settings"
         if good
         else f"No engine is right{_everywhere(groups)} at any setting that was run"
     )
@@ -65,7 +66,7 @@ def headline(groups: Sequence[Judged]) -> str:
 
 def right(groups: Sequence[Judged]) -> str:
     """Errors of the engines at their best settings; without a truth, how far they agree."""
-    told = [group for group in groups if group.truth["kind"]]
+    told = [group for group in groups if _is_judged(group)]
     if not told:
         return " ".join(map(_agreement, groups))
     errors: dict[str, list[float]] = {}
@@ -77,8 +78,8 @@ def right(groups: Sequence[Judged]) -> str:
     worst = {name: max(found) for name, found in errors.items()}
     sure = max(group.truth["bound"] or 0.0 for group in told)
     good = [name for name, e in worst.items() if math.isfinite(e) and _of(told, name) is Grade.RIGHT]
-    sentences = [f"{listed(map(title, good))} {_agree(good)} with the truth to "
-                 f"{_most(max(worst[n] for n in good), sure)}{_on(told)}."] if good else []  # fmt: skip
+    sentences = [f"{listed(map(title, good))} {agree(good)} with the truth to "
+                 f"{at_most(max(worst[n] for n in good), sure)}{_on(told)}."] if good else []  # fmt: skip
     return " ".join([*sentences, *(_less_than_right(told, name) for name in worst if name not in good)])
 
 
@@ -90,7 +91,7 @@ def fast(groups: Sequence[Judged]) -> str:
         return f"No engine reaches an error of {LEVEL:.0e}, so speeds are not compared."
     never = [n for n in _engines(groups) if not any(n in cost for cost in costs.values())]
     end = f" {listed(map(title, never))} {'does' if len(never) == 1 else 'do'} not reach it." if never else ""
-    return (_fast_on_one(*costs.values()) if len(groups) == 1 else _fast_on_several(costs)) + end
+    return (_fast_on_one(*costs.values()) if len(groups) == 1 else _fast_on_several(costs)) + end + ADAPTERS
 
 
 def breaks(groups: Sequence[Judged]) -> str:
@@ -111,6 +112,7 @@ def truth(groups: Sequence[Judged]) -> str:
         bound = max(g.truth["bound"] for g in closed)
         parts.append(f"The exact motion of {_names(closed)} is known in closed form or by a reduced "
                      f"equation, to {bound:.0e}.")  # fmt: skip
+        parts += [f"That of {g.scene.name} is known{_until(g)}." for g in closed if g.truth["reason"]]
     parts += [_reference(group) for group in groups if group not in closed]
     return " ".join(parts)
 
@@ -122,9 +124,22 @@ def _reference(group: Judged) -> str:
     ways = (
         "two formulations that share no code agree" if known["both"] else "two runs of one formulation agree"
     )
-    until = f" up to t = {known['until']:.4g} s ({known['reason']})" if known["reason"] else ""
-    return (f"The reference of {name} is known to {known['bound']:.0e}{until}: {ways}; "
+    return (f"The reference of {name} is known to {known['bound']:.0e}{_until(group)}: {ways}; "
             f"it took {known['seconds']:.1f} s of CPU time.")  # fmt: skip
+
+
+def _until(group: Judged) -> str:
+    """How far a truth is known, and why no further; nothing where it is known to the end."""
+    known = group.truth
+    if not known["reason"]:
+        return ""
+    end = f"{known['until']:.4g} s of {group.scene.duration:.4g} s"
+    return f" up to t = {end} ({known['reason']}), and errors are of this part"
+
+
+def _is_judged(group: Judged) -> bool:
+    """Whether a run of the scene has an error."""
+    return any(record["metrics"].get("error") is not None for record in group.records)
 
 
 def _agreement(group: Judged) -> str:
@@ -194,7 +209,7 @@ def _merged(found: Mapping[str, list[Judged]]) -> dict[tuple[str, ...], list[Jud
 
 
 def _failed(groups: Sequence[Judged], names: Sequence[str], scenes: Sequence[Judged]) -> str:
-    ends = {f"{g.defaults()[n]['t_end']:.3g}" for g in scenes for n in names}
+    ends = {f"{max(g.defaults()[n]['t_end'], 0):.3g}" for g in scenes for n in names}
     when = f"end at t = {next(iter(ends))} s" if len(ends) == 1 else "do not complete"
     rows = [g.redundant for g in scenes]
     cause = ""
@@ -236,7 +251,7 @@ def _defaults_in_short(groups: Sequence[Judged]) -> str:
         )
     if len(good) == len(at_defaults):
         return "so are their libraries' defaults"
-    return f"with their libraries' defaults only {listed(map(title, good))} {_is(good)}"
+    return f"with their libraries' defaults only {listed(map(title, good))} {is_or_are(good)}"
 
 
 def _worst(groups: Sequence[Judged], records: Callable[[Judged], Mapping[str, Record]]) -> dict[str, Grade]:
@@ -258,7 +273,7 @@ def _engines(groups: Sequence[Judged]) -> list[str]:
 
 
 def _end(record: Record) -> str:
-    return f"{record['outcome'].lower().replace('_', ' ')} at t = {record['t_end']:.3g} s"
+    return f"{record['outcome'].lower().replace('_', ' ')} at t = {max(record['t_end'], 0):.3g} s"
 
 
 def _names(groups: Sequence[Judged]) -> str:
@@ -279,42 +294,3 @@ def _on(groups: Sequence[Judged]) -> str:
 
 def _everywhere(groups: Sequence[Judged]) -> str:
     return "" if len(groups) == 1 else " on every scene"
-
-
-def _most(value: float, bound: float) -> str:
-    """An error rounded up to two digits, or the truth's own bound where that is larger."""
-    if value < bound:
-        return f"less than the truth's own bound, {bound:.0e}"
-    exponent = math.floor(math.log10(value))
-    return f"{math.ceil(value / 10.0 ** (exponent - 1)) / 10:.1f}e{exponent}"
-
-
-def _is(names: Sequence[str]) -> str:
-    return "is" if len(names) == 1 else "are"
-
-
-def _its(names: Sequence[str]) -> str:
-    return "its" if len(names) == 1 else "their"
-
-
-def _agree(names: Sequence[str]) -> str:
-    return "agrees" if len(names) == 1 else "agree"
-
-
-def seconds(value: float) -> str:
-    """A time with the unit that suits it."""
-    for unit, scale in (("s", 1.0), ("ms", 1e-3)):
-        if value >= scale:
-            return f"{value / scale:.3g} {unit}"
-    return f"{value * 1e6:.3g} µs"
-
-
-def multiple(ratio: float) -> str:
-    """``3.2 times`` or ``140 times``."""
-    return f"{ratio:.1f} times" if ratio < 9.95 else f"{ratio:.0f} times"
-
-
-def span(least: float, most: float) -> str:
-    """``3.2 to 140 times``, or one multiple where both are the same."""
-    low, high = multiple(least), multiple(most)
-    return low if low == high else f"{low.removesuffix(' times')} to {high}"

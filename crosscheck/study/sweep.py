@@ -7,6 +7,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from crosscheck.study.grid import Case, Unable, default_cases
+from crosscheck.study.ladder import families
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 
@@ -42,9 +43,9 @@ def whole(scenes: Sequence[Scene], engines: Sequence[str]) -> Sweep:
 
 
 def quick(scenes: Sequence[Scene], engines: Sequence[str]) -> Sweep:
-    """The scenes at a few settings of a few families of every engine."""
+    """The scenes at every setting of a few families of every engine, of which `study.ladder` takes a few."""
     cases, unable = _sweep(scenes, engines, QUICK_SAMPLES, QUICK_LIMIT)
-    return thinned(cases), unable
+    return of_few_families(cases), unable
 
 
 def _sweep(scenes: Sequence[Scene], engines: Sequence[str], samples: int, limit: float) -> Sweep:
@@ -56,21 +57,25 @@ def _sweep(scenes: Sequence[Scene], engines: Sequence[str], samples: int, limit:
     return cases, unable
 
 
-def thinned(cases: Sequence[Case], named: Collection[str] = ()) -> list[Case]:
-    """Of every scene and engine the ``named`` families, else MOST_FAMILIES, of each MOST_SETTINGS settings,
-    ends included."""
+def of_few_families(cases: Sequence[Case], named: Collection[str] = ()) -> list[Case]:
+    """Of every scene and engine the ``named`` families, else the QUICK_FAMILIES, else the first
+    MOST_FAMILIES."""
     groups: dict[tuple[str, str], list[Case]] = {}
     for case in cases:
         groups.setdefault((case.scene.name, case.engine), []).append(case)
-    return [case for group in groups.values() for case in _thinned_engine(group, named or QUICK_FAMILIES)]
+    return [case for group in groups.values() for case in _of_few(group, named or QUICK_FAMILIES)]
 
 
-def _thinned_engine(cases: Sequence[Case], named: Collection[str]) -> list[Case]:
-    families: dict[str, list[Case]] = {}
-    for case in cases:
-        families.setdefault(case.setting.family, []).append(case)
-    wanted = [f for f in families if f in named] or list(families)[:MOST_FAMILIES]
-    return [case for family in wanted for case in spread(families[family], MOST_SETTINGS)]
+def thinned(cases: Sequence[Case]) -> list[Case]:
+    """Of every family at most MOST_SETTINGS settings, ends included."""
+    return [case for family in families(cases) for case in spread(family, MOST_SETTINGS)]
+
+
+def _of_few(cases: Sequence[Case], named: Collection[str]) -> list[Case]:
+    """The cases, of one scene and engine, of few families."""
+    having = list(dict.fromkeys(case.setting.family for case in cases))
+    wanted = [f for f in having if f in named] or having[:MOST_FAMILIES]
+    return [case for family in wanted for case in cases if case.setting.family == family]
 
 
 def spread(items: Sequence[Case], most: int) -> list[Case]:

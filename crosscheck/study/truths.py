@@ -53,21 +53,25 @@ def shown(exact: Trajectory) -> np.ndarray:
 
 
 def _of_family(scene: Scene, family: Truth, times: np.ndarray) -> dict[str, Any]:
+    reason = ""
     try:
         exact = family.poses(times)
-    except NoSolution as reason:
-        return _nothing(str(reason), 0.0)
-    return {"kind": family.name, "bound": family.accuracy, "reason": "", "until": float(times[-1]),
+    except NoSolution as end:
+        times, reason = times[times <= end.until], str(end)
+        if not times.max(initial=0.0) > 0:
+            return _nothing(reason)
+        exact = family.poses(times)
+    return {"kind": family.name, "bound": family.accuracy, "reason": reason, "until": float(times[-1]),
             "both": True, "motion": _motion(exact)}  # fmt: skip
 
 
 def _of_reference(scene: Scene, times: np.ndarray, reference_time: float) -> dict[str, Any]:
     if not reference_time:
-        return _nothing("none was asked for", 0.0)
+        return _nothing("none was asked for")
     found = reference(scene, times.tolist(), reference_time)
     part = found.part if isinstance(found, NoReference) else found
-    if not len(part.times):
-        return _nothing(getattr(found, "reason", ""), 0.0)
+    if not part.times.max(initial=0.0) > 0:
+        return _nothing(getattr(found, "reason", ""))
     return {
         "kind": "reference", "bound": float(part.bound.max()), "both": bool(part.both.all()),
         "reason": getattr(found, "reason", ""), "until": float(part.times.max()), "seconds": part.seconds,
@@ -75,8 +79,8 @@ def _of_reference(scene: Scene, times: np.ndarray, reference_time: float) -> dic
     }  # fmt: skip
 
 
-def _nothing(reason: str, until: float) -> dict[str, Any]:
-    return {"kind": "", "bound": None, "reason": reason, "until": until, "both": False, "motion": None}
+def _nothing(reason: str) -> dict[str, Any]:
+    return {"kind": "", "bound": None, "reason": reason, "until": 0.0, "both": False, "motion": None}
 
 
 def _motion(exact: Trajectory) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 
 import numpy as np
 
@@ -30,15 +30,16 @@ def exchanges(scene: Scene, most: int = 6) -> list[Exchange]:
     """The smallest sets of joints whose exchange removes every redundant row, with the same freedoms.
 
     At most ``most`` of them, of up to four joints; empty where nothing is redundant or nothing is found.
-    Asked at a general pose, without drivers.
+    Asked at a general pose, without drivers.  A joint on which a driver or a torsion spring acts becomes only
+    a type that can bear it.
     """
-    model = Model(scene.with_(driver=()))
+    model = Model(scene.with_(driver=(), load=()))
     if not model.m:
         return []
     at_pose = Model(placed(model, general_pose(model)))
     rows = _rows(at_pose)
     rank, involved = _rank(rows.values()), _involved(at_pose, rows)
-    choices = {name: _weaker(at_pose.scene, name) for name in involved}
+    choices = {name: _weaker(at_pose.scene, name, _bearing(scene, name)) for name in involved}
     for size in range(1, MOST_EXCHANGES + 1):
         found = _sets(rows, choices, rank, size)
         if chosen := list(itertools.islice(found, most)):
@@ -83,11 +84,19 @@ def _involved(model: Model, rows: Mapping[str, np.ndarray]) -> list[str]:
     return [joint.name for joint in model.scene.joint if joint.name in shared]
 
 
-def _weaker(scene: Scene, name: str) -> dict[str, np.ndarray]:
-    """Rows of the joint of that name as each weaker type."""
+def _bearing(scene: Scene, name: str) -> list[str]:
+    """The types that can bear the driver and the torsion springs of the joint of that name."""
+    driven = scene.joint_named(name).facts.driven if name in {d.joint for d in scene.driver} else None
+    is_sprung = any(load.type == "torsion_spring" and load.joint == name for load in scene.load)
+    facts = {kind: joint.facts for kind, joint in JOINT_TYPES.items()}
+    return [k for k, f in facts.items() if driven in (None, f.driven) and f.takes_torsion_spring >= is_sprung]
+
+
+def _weaker(scene: Scene, name: str, kinds: Collection[str]) -> dict[str, np.ndarray]:
+    """Rows of the joint of that name as each weaker type, of these ``kinds``."""
     joint = scene.joint_named(name)
     found = {}
-    for kind in WEAKER.get(joint.type, ()):
+    for kind in (k for k in WEAKER.get(joint.type, ()) if k in kinds):
         others = tuple(_as(j, kind) if j.name == name else j for j in scene.joint)
         found[kind] = _rows(Model(scene.with_(joint=others)))[name]
     return found

@@ -14,7 +14,7 @@ from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.energy import energy_series, kinetic_energy
 from crosscheck.judge.metrics import METRICS, cost_at_error, measure, order_of_convergence
 from crosscheck.judge.reaction_balance import with_exact_reactions
-from crosscheck.judge.truth import truth_for
+from crosscheck.judge.truth import NoSolution, truth_for
 from mbref import rotations
 from mbref.scene import Moment
 from mbref.scenes import SCENES
@@ -37,7 +37,7 @@ def test_exact_motion_has_no_error():
     found = measure(SCENE, EXACT, TRUTH)
     assert found["error"] < 1e-15 and found["velocity_error"] == 0 and found["scd"] > 15, found
     assert found["energy_error"] < 1e-14 and found["violation_position"] < 1e-15, found
-    assert found.keys() == {*METRICS, "error_bound"}
+    assert found.keys() == {*METRICS, "error_bound", "error_until"}
 
 
 @pytest.mark.parametrize("body", [0, 1, 2])
@@ -162,7 +162,7 @@ def test_without_truth_only_errors_are_missing():
     found = measure(SCENE, EXACT)
     missing = {name for name, value in found.items() if value is None}
     of_truth = {"error", "error_bound", "position_error", "rotation_error", "scd", "velocity_error",
-                "reaction_error"}  # fmt: skip
+                "reaction_error", "error_until"}  # fmt: skip
     assert missing == of_truth, missing
 
 
@@ -224,3 +224,22 @@ def test_reaction_error_and_one_percent_put_in():
     assert measure(scene, exact, truth)["reaction_error"] is None, (
         "a run without reactions has no error of them"
     )
+
+
+def test_a_run_beyond_the_truth_is_judged_on_the_part_that_is_known():
+    class Ending:
+        """TRUTH, known up to 0.1 s."""
+
+        name, accuracy = "ending", TRUTH.accuracy
+
+        def poses(self, times):
+            if times.max() > 0.1:
+                raise NoSolution("it ends", 0.1)
+            return TRUTH.poses(times)
+
+    shift = np.array([0.003, -0.004, 0.012])
+    late = measure(SCENE, replace(EXACT, position=bumped(EXACT.position, 15, 0, shift)), Ending())
+    early = measure(SCENE, replace(EXACT, position=bumped(EXACT.position, 7, 0, shift)), Ending())
+    assert late["error"] < 1e-15 and late["velocity_error"] == 0 and late["error_until"] == EXACT.times[10]
+    assert early["error"] == pytest.approx(0.013 / scene_length(SCENE), rel=1e-12)
+    assert late["violation_position"] > 1e-3, "violations need no truth and are of the whole run"

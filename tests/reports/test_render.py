@@ -15,8 +15,10 @@ from synthetic import groups
 from crosscheck.cli import collection
 from crosscheck.cli import main as command_line
 from crosscheck.engine import Setting
+from crosscheck.study import comparison as comparisons
+from crosscheck.study import ladder
 from crosscheck.study import sweep as sweeps
-from crosscheck.study.grid import Case, default_cases, study
+from crosscheck.study.grid import Case, Record, default_cases, key, study
 from crosscheck.study.timings import LONG, with_timings
 from mbref.scene import Body, Scene
 from reports import __main__ as program
@@ -153,7 +155,7 @@ def test_program_interrupted_and_what_to_do(tmp_path, of_fakes, capsys, monkeypa
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(collection, "study", interrupted)
+    monkeypatch.setattr(comparisons, "study", interrupted)
     assert program.main(["--quick", "--out", str(tmp_path)]) == 130
     assert "the same command goes on from there" in capsys.readouterr().err
 
@@ -180,7 +182,33 @@ def case(family: str, k: int) -> Case:
 def test_thinned_sweep_and_the_ends_of_every_family():
     named = [case(family, k) for family in ("other", "defaults", "tuned") for k in range(7)]
     kept = [(c.setting.family, c.setting.options["k"]) for c in sweeps.thinned(named)]
-    assert kept == [(f, k) for f in ("defaults", "tuned") for k in (0, 3, 6)], kept
+    assert kept == [(f, k) for f in ("other", "defaults", "tuned") for k in (0, 3, 6)], kept
+    few = {c.setting.family for c in sweeps.of_few_families(named)}
+    assert few == {"defaults", "tuned"}, few
     unnamed = [case(family, k) for family in ("a", "b", "c", "d") for k in range(2)]
-    kept = [(c.setting.family, c.setting.options["k"]) for c in sweeps.thinned(unnamed)]
-    assert kept == [(f, k) for f in ("a", "b") for k in (0, 1)], kept
+    assert {c.setting.family for c in sweeps.of_few_families(unnamed)} == {"a", "b"}
+    assert {c.setting.family for c in sweeps.of_few_families(unnamed, ["c"])} == {"c"}
+
+
+def cost(asked: Case, seconds: float, outcome: str = "COMPLETED") -> dict[str, Record]:
+    return {key(asked): {"outcome": outcome, "cost": {"seconds": seconds}}}
+
+
+@pytest.mark.parametrize(
+    ("seconds", "middle", "outcome", "chosen"),
+    [(0.01, 0.02, "COMPLETED", 6), (0.1, 0.8, "COMPLETED", 4), (0.5, 4.0, "COMPLETED", None),
+     (0.5, 10.0, "TIMED_OUT", None), (0.1, 0.1, "STEP_FAILED", 6)],
+)  # fmt: skip
+def test_the_finest_setting_that_is_affordable_by_the_growth_so_far(seconds, middle, outcome, chosen):
+    family = [case("a", k) for k in range(7)]
+    begun = ladder.first(family)
+    assert [c.setting.options["k"] for c in begun] == [0, 3]
+    records = cost(begun[0], seconds) | cost(begun[1], middle, outcome)
+    assert [c.setting.options["k"] for c in ladder.finest(family, records)] == [chosen] * (chosen is not None)
+
+
+def test_the_cost_of_a_step_is_inverse_to_its_length():
+    family = [case("a", k)._replace(setting=Setting("a", {"step": 10.0**-k})) for k in range(5)]
+    records = cost(family[0], 0.4, "STEP_FAILED") | cost(family[2], 0.2)
+    assert ladder.finest(family, records) == [family[3]], "2 s are affordable, 20 s are not"
+    assert ladder.first(family[:1]) == family[:1] and not ladder.finest(family[:1], cost(family[0], 0.1))

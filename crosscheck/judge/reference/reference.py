@@ -9,6 +9,7 @@ in a singular position, the two runs of A bound each other.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from threading import Lock
 
 import numpy as np
 
@@ -27,6 +28,8 @@ SHARE = 0.4  # of the time that is left for each run of A
 FIELDS = (
     "position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration"
 )  # fmt: skip
+
+_computing: dict[str, Lock] = {}  # by what determines the motion
 
 
 @dataclass(frozen=True)
@@ -65,18 +68,25 @@ class NoReference:
 def reference(scene: Scene, times: Times, seconds: float = SECONDS) -> Reference | NoReference:
     """The reference motion at times (k,) ≥ 0, from the cache where it has them.
 
-    Takes about so many CPU seconds of the calling thread at most.  Raises SceneError where the scene's
-    velocities contradict its joints.
+    Takes about so many CPU seconds of the calling thread at most; of several threads that ask for a scene,
+    the first computes.  Raises SceneError where the scene's velocities contradict its joints.
     """
     wanted = np.unique(np.asarray(times, dtype=float))
+    with _computing.setdefault(cache.canonical(scene), Lock()):
+        kept = _known(scene, wanted, seconds)
+    there = np.isin(wanted, kept.samples.times)
+    part = kept.samples.at(wanted[there])
+    return part if there.all() else NoReference(kept.reason, kept.until(), part)
+
+
+def _known(scene: Scene, wanted: np.ndarray, seconds: float) -> _Kept:
+    """From the cache, or computed and put there, with the times that it had."""
     kept = _load(scene)
     if kept is None or not kept.answers(wanted, seconds):
         known = wanted if kept is None else np.union1d(wanted, kept.samples.times)
         kept = _Kept(*judged(scene, known, *runs(scene, known, seconds)), seconds)
         cache.save(scene, kept.arrays())
-    there = np.isin(wanted, kept.samples.times)
-    part = kept.samples.at(wanted[there])
-    return part if there.all() else NoReference(kept.reason, kept.until(), part)
+    return kept
 
 
 def runs(scene: Scene, times: np.ndarray, seconds: float) -> tuple[Motion, Motion, Motion]:

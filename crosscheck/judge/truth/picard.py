@@ -26,7 +26,12 @@ Derivative = Callable[[np.ndarray], np.ndarray]
 
 
 class NoSolution(ArithmeticError):
-    """The solution ends: its derivative becomes singular before the time asked for."""
+    """The solution ends: its derivative becomes singular before the time asked for; it is known up to
+    ``until`` (s)."""
+
+    def __init__(self, reason: str, until: float = 0.0):
+        super().__init__(reason)
+        self.until = until
 
 
 class Solution:
@@ -81,7 +86,8 @@ class Solution:
                 break
             self._next = self._next * DOWN
             if self._next < SMALLEST * max(float(self._edges[-1]), 1e-3):
-                raise NoSolution(f"the solution ends at t = {float(self._edges[-1]):.9g}")
+                end = float(self._edges[-1])
+                raise NoSolution(f"the solution ends at t = {end:.9g}", float(np.nextafter(end, 0.0)))
         self._values.append(values)
         self._edges.append(self._edges[-1] + self._next)
         self._state = values[-1]

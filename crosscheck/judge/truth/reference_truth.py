@@ -38,7 +38,8 @@ class ReferenceTruth:
         with self._asked:
             found = reference(self._scene, times.tolist(), self._seconds)
         if isinstance(found, NoReference):
-            raise NoSolution(f"no reference after t = {found.until:.6g} s: {found.reason}")
+            reason = f"no reference after t = {found.until:.6g} s: {found.reason}"
+            raise NoSolution(reason, found.until)
         self._accuracy = max(self._accuracy or 0.0, float(found.bound.max(initial=0.0)))
         return trajectory(self._scene, found.at(times))
 

@@ -1,0 +1,146 @@
+"""`crosscheck.compare`: engines compared on a mechanism, as an object with a verdict, rows and records."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+
+from crosscheck.cli import request, tables
+from crosscheck.cli.request import Choice
+from crosscheck.judge.reference.reference import SECONDS
+from crosscheck.study import sweep
+from crosscheck.study.comparison import Collection, Notice, Wanted, collected
+from crosscheck.study.fair_timing import model_difference
+from crosscheck.study.grid import TIME_LIMIT, Record
+from crosscheck.study.record_view import error, is_completed, public
+from crosscheck.study.sentences import Verdict, verdict
+from crosscheck.study.verdict import Judged, grade, judged
+from mbref.scene import Scene
+
+if TYPE_CHECKING:
+    import pandas
+
+TRUTH = ("kind", "bound", "until", "seconds", "reason", "both")  # fields of a truth's record that are shown
+WIDTH = 80
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One mechanism in several engines: printed, it is the output of `crosscheck compare`.
+
+    ``judged`` has the scene, the record of its truth and the records of all runs, ``path`` the scene's
+    name in commands, and ``difference`` the sentence on how the engines' mechanisms differ, None where they
+    agree.
+    """
+
+    judged: Judged
+    path: str
+    difference: str | None
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Its sentences: headline, right, fast, breaks and truth."""
+        return verdict([self.judged], self.difference)
+
+    @property
+    def records(self) -> Sequence[Record]:
+        """The records of all runs."""
+        return self.judged.records
+
+    @property
+    def rows(self) -> list[Row]:
+        """One dictionary a run, the completed runs of least error first: engine, family, settings, verdict,
+        outcome, end time (s), error and the other metrics, CPU seconds of stepping and steps."""
+        return [_row(r) for r in sorted(self.records, key=lambda r: (not is_completed(r), error(r)))]
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """``rows`` as a pandas DataFrame."""
+        import pandas
+
+        return pandas.DataFrame(self.rows)
+
+    def document(self) -> dict[str, Any]:
+        """What `crosscheck compare --json` prints: scene, verdict, truth, difference and records."""
+        truth = {name: self.judged.truth[name] for name in TRUTH}
+        return {"scene": self.judged.scene.name, "records": [public(r) for r in self.records],
+                "verdict": self.verdict._asdict(), "truth": truth, "difference": self.difference}  # fmt: skip
+
+    def save(self, path: str | Path) -> None:
+        """Write ``document`` as JSON."""
+        Path(path).write_text(json.dumps(self.document(), allow_nan=False) + "\n")
+
+    def print(self, console: Console) -> None:
+        """Print the verdict, tables and a plot."""
+        tables.print_comparison(console, self.judged, self.verdict, self.path, with_ratio=not self.difference)
+
+    def __str__(self) -> str:
+        text = io.StringIO()
+        self.print(Console(file=text, width=WIDTH, markup=False, highlight=False))
+        return text.getvalue()
+
+    def __repr__(self) -> str:
+        return f"<Comparison of {', '.join(self.judged.engines())}: {self.verdict.headline}>"
+
+
+def compare(
+    scene: Scene | str | Path, engines: Sequence[str] | None = None, *, families: Sequence[str] | None = None,
+    depth: str = "quick", duration: float | None = None, samples: int = sweep.QUICK_SAMPLES,
+    time_limit: float | None = None, reference_time: float = SECONDS, out: str | Path | None = None,
+    notice: Notice | None = None,
+) -> Comparison:  # fmt: skip
+    """Engines compared on a mechanism, as `crosscheck compare` does.
+
+    ``scene`` is a Scene, a built-in name or a .toml file; ``engines`` default to all that are installed,
+    ``families`` of settings to a few, at ``depth`` "whole" to all.  ``duration`` is the end time (s), by
+    default the scene's, ``time_limit`` the wall time (s) a run may take, ``reference_time`` the CPU time (s)
+    of the reference.  Records are kept in the folder ``out`` and not made again.  ``notice`` takes sentences
+    about what is left out.  Raises RequestError and SceneError with what cannot be done.
+    """
+    if depth not in ("quick", "whole"):
+        raise request.RequestError(f"depth: must be quick or whole, got {depth!r}")
+    tell, is_quick = notice or _silent, depth == "quick"
+    given = scene if isinstance(scene, Scene) else request.find_scenes([str(scene)])[0]
+    lasting = request.lasting(given, None, duration)
+    names = request.find_engines(engines, tell)
+    times = [request.sample_times(lasting, None, samples)]
+    limit = time_limit or (sweep.QUICK_LIMIT if is_quick else TIME_LIMIT)
+    chosen = Choice(families, is_quick=is_quick)
+    found = collected(
+        [lasting], names, Wanted(times, reference_time, is_quick, None if out is None else Path(out)),
+        lambda: request.plan([lasting], names, chosen, times, limit, tell), tell,
+    )  # fmt: skip
+    path = f"{given.name}.toml" if isinstance(scene, Scene) else str(scene)
+    return comparisons(found, {lasting.name: path}, reference_time)[0]
+
+
+def comparisons(found: Collection, paths: dict[str, str], reference_time: float) -> list[Comparison]:
+    """One comparison a scene of a collection; ``paths`` are the scenes' names in commands."""
+    of_scene = {
+        scene.name: [record for record in found.identities if record["scene"] == scene.name]
+        for scene in found.scenes
+    }
+    return [
+        Comparison(group, paths[group.scene.name],
+                   model_difference(group.scene, of_scene[group.scene.name], reference_time))
+        for group in judged(found.scenes, found.truths, found.records)
+    ]  # fmt: skip
+
+
+def _row(record: Record) -> Row:
+    return {
+        "engine": record["engine"], "family": record["family"], "settings": record["asked"]["options"],
+        "verdict": str(grade(record)), "outcome": record["outcome"], "t_end": record["t_end"],
+        **record["metrics"], "seconds": record["cost"]["seconds"], "steps": record["cost"]["steps"],
+    }  # fmt: skip
+
+
+def _silent(sentence: str) -> None:
+    """Tell nobody."""

@@ -1,0 +1,168 @@
+"""The records of a comparison: runs are made where they are missing, beside the truths, and stored as they
+end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from crosscheck.processes.pool import end_idle
+from crosscheck.study import sweep
+from crosscheck.study.chains import Chains
+from crosscheck.study.fair_timing import identity_cases
+from crosscheck.study.grid import Case, Record, key, known, record_of, study
+from crosscheck.study.hurried import Hurried
+from crosscheck.study.ladder import families, finest, first
+from crosscheck.study.progress import counted, shown
+from crosscheck.study.record_view import error, is_completed
+from crosscheck.study.scouting import scout, unasked
+from crosscheck.study.timings import REPEATS, with_timings
+from crosscheck.study.truths import key as truth_key
+from crosscheck.study.truths import truth_record
+from mbref.records import append, stored
+from mbref.scene import Scene
+
+Notice = Callable[[str], None]  # takes one sentence for the user
+Truths = Future[list[Record]]
+
+
+class Collection(NamedTuple):
+    """Records of a comparison: its scenes, its timed runs, the short runs that compare mechanisms, the truths
+    (`study.truths`), and of each scene one run at the instants of its truth's motion that are shown."""
+
+    scenes: Sequence[Scene]
+    records: Sequence[Record]
+    identities: Sequence[Record]
+    truths: Sequence[Record]
+    motions: Sequence[Record]
+
+
+class Wanted(NamedTuple):
+    """The sample times (k,) of every scene, the CPU seconds a reference may take, the folder that keeps the
+    records, and whether only a few settings are run (`study.ladder`) and only short runs timed again."""
+
+    times: Sequence[np.ndarray]
+    reference_time: float
+    is_quick: bool
+    out: Path | None = None
+    repeats: int = REPEATS
+
+
+def collected(
+    scenes: Sequence[Scene], engines: Sequence[str], wanted: Wanted,
+    plan: Callable[[], Sequence[Case]], notice: Notice,
+) -> Collection:  # fmt: skip
+    """The records of the cases that ``plan`` chooses, once the engines' settings are known, and what belongs
+    to them.
+
+    The truths are computed beside the search for settings and the runs.
+    """
+    if wanted.out is not None:
+        _save(scenes, wanted.out / "scenes")
+    with ExitStack() as stack:
+        stack.callback(end_idle)
+        truths = stack.enter_context(ThreadPoolExecutor(1)).submit(_truths, scenes, wanted)
+        scouted(scenes, engines)
+        return _measured(scenes, plan(), wanted, truths, notice)
+
+
+def scouted(scenes: Sequence[Scene], engines: Sequence[str]) -> None:
+    """Find out the engines' settings for the scenes, with progress."""
+    if total := unasked(engines, scenes):
+        with counted("looking for settings", total) as advance:
+            scout(engines, scenes, advance)
+
+
+def _measured(
+    scenes: Sequence[Scene], cases: Sequence[Case], wanted: Wanted, truths: Truths, notice: Notice
+) -> Collection:
+    cases = [case._replace(reference_time=wanted.reference_time) for case in cases]
+    limit = max(case.time_limit for case in cases)
+    gates = [case for scene in scenes for case in identity_cases(scene, _engines(cases), limit)]
+    path = _file(wanted, "records.jsonl")
+    if path is not None and (there := len(known(cases, path))):
+        notice(f"{path} has {there} of the runs")
+    by_key = (_few if wanted.is_quick else _all)(cases, gates, path)
+    run = [case for case in cases if key(case) in by_key]
+    told, found = [by_key[key(case)] for case in run], truths.result()
+    motions = _motions(scenes, run, told, found, wanted)
+    long = sweep.QUICK_LONG if wanted.is_quick else sweep.LONG
+    timed = with_timings(run, told, _file(wanted, "timings.jsonl"), notice, long, wanted.repeats)
+    return Collection(scenes, timed, [by_key[key(gate)] for gate in gates], found, motions)
+
+
+def _few(cases: Sequence[Case], gates: Sequence[Case], path: Path | None) -> dict[str, Record]:
+    """Records by key: of every family the coarsest and the middle setting, then the finest affordable."""
+    groups = families(cases)
+    records = _made("running", [*(case for group in groups for case in first(group)), *gates], path)
+    fine = [case for group in groups for case in finest(group, records)]
+    return records | _made("running at finer settings", fine, path)
+
+
+def _all(cases: Sequence[Case], gates: Sequence[Case], path: Path | None) -> dict[str, Record]:
+    return _made("running", [*cases, *gates], path)
+
+
+def _made(what: str, cases: Sequence[Case], path: Path | None) -> dict[str, Record]:
+    """Records by key; the first engine, which compiles when it is new, and the last ones, which take the
+    longest, begin."""
+    if not cases:
+        return {}
+    first_engine = cases[0].engine
+    order = [c for c in cases if c.engine == first_engine] + [
+        case
+        for engine in reversed(_engines(cases))
+        for case in cases
+        if case.engine == engine != first_engine
+    ]
+    with shown(what, len(order)) as progress, Chains(record_of) as threads:
+        found = study(order, threads, path, progress, Hurried().trajectory)
+    return {record["key"]: record for record in found}
+
+
+def _engines(cases: Sequence[Case]) -> list[str]:
+    return list(dict.fromkeys(case.engine for case in cases))
+
+
+def _truths(scenes: Sequence[Scene], wanted: Wanted) -> list[Record]:
+    """The record of every scene's truth at the times of its runs."""
+    path = _file(wanted, "truths.jsonl")
+    done, found = stored(path), []
+    for scene, times in zip(scenes, wanted.times, strict=True):
+        record = done.get(truth_key(scene, times))
+        if record is None or record["given"] < wanted.reference_time:
+            record = truth_record(scene, times, wanted.reference_time)
+            append(path, record)
+        found.append(record)
+    return found
+
+
+def _motions(
+    scenes: Sequence[Scene], cases: Sequence[Case], records: Sequence[Record], truths: Sequence[Record],
+    wanted: Wanted,
+) -> list[Record]:  # fmt: skip
+    """Of each scene with a truth the completed run of largest error, again at the instants shown."""
+    if wanted.out is None:
+        return []
+    chosen = []
+    for scene, truth in zip(scenes, truths, strict=True):
+        own = [i for i, r in enumerate(records) if r["scene"] == scene.name and is_completed(r)]
+        if truth["motion"] and own:
+            worst = cases[max(own, key=lambda i: error(records[i]))]
+            chosen.append(worst._replace(times=np.array(truth["motion"]["times"])))
+    return study(chosen, None, _file(wanted, "motions.jsonl"))
+
+
+def _file(wanted: Wanted, name: str) -> Path | None:
+    return None if wanted.out is None else wanted.out / name
+
+
+def _save(scenes: Sequence[Scene], folder: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for scene in scenes:
+        scene.save(folder / f"{scene.name}.toml")

@@ -1,0 +1,62 @@
+"""Which settings of a family are run at quick depth: the coarsest, the middle one and the finest that is
+affordable by what those two cost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from crosscheck.study.grid import Case, Record, key
+from crosscheck.study.record_view import is_completed
+
+AFFORDABLE = 3.0  # CPU seconds of stepping that the finest run is expected to take at most
+SCALING = "step"  # the option of fixed steps, to which the cost is inversely proportional
+
+Family = Sequence[Case]  # the settings of one engine and family on one scene, coarse to fine
+
+
+def families(cases: Sequence[Case]) -> list[Family]:
+    """The cases by scene, engine and family."""
+    found: dict[tuple[str, str, str], list[Case]] = {}
+    for case in cases:
+        found.setdefault((case.scene.name, case.engine, case.setting.family), []).append(case)
+    return list(found.values())
+
+
+def first(family: Family) -> list[Case]:
+    """The coarsest setting and the middle one."""
+    return [family[i] for i in dict.fromkeys((0, _middle(family)))]
+
+
+def finest(family: Family, records: Mapping[str, Record]) -> list[Case]:
+    """The finest setting beyond the middle one that is affordable by the records of ``first``, in a list;
+    empty where there is none."""
+    costs = [_cost(records[key(case)]) for case in (family[0], family[_middle(family)])]
+    beyond = range(len(family) - 1, _middle(family), -1)
+    return [family[i] for i in beyond if _expected(family, costs, i) <= AFFORDABLE][:1]
+
+
+def _middle(family: Family) -> int:
+    return (len(family) - 1) // 2
+
+
+def _cost(record: Record) -> float | None:
+    """CPU seconds of stepping of a completed run; infinite where the time was up."""
+    if record["outcome"] == "TIMED_OUT":
+        return float("inf")
+    return float(record["cost"]["seconds"]) if is_completed(record) else None
+
+
+def _expected(family: Family, costs: Sequence[float | None], i: int) -> float:
+    """CPU seconds expected of setting i: by the step from the middle run, else by the growth so far for each
+    setting; 0 where neither run has a cost, so that the run itself tells."""
+    coarse, middle = costs
+    known = middle if middle is not None else coarse
+    if known is None:
+        return 0.0
+    start = _middle(family) if middle is not None else 0
+    if SCALING in family[i].setting.options:
+        was, will_be = (float(family[j].setting.options[SCALING]) for j in (start, i))
+        return known * was / will_be
+    if coarse is None or middle is None or not coarse or start == 0:
+        return known
+    return float(middle * max(middle / coarse, 1.0) ** ((i - start) / start))

@@ -1,0 +1,54 @@
+"""Words for numbers and lists in the sentences of a verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+
+def listed(names: Iterable[str]) -> str:
+    """``a, b and c``."""
+    *most, last = [*names] or [""]
+    return f"{', '.join(most)} and {last}" if most else last
+
+
+def at_most(value: float, bound: float) -> str:
+    """An error rounded up to two digits, or the truth's own bound where that is larger."""
+    if value < bound:
+        return f"less than the truth's own bound, {bound:.0e}"
+    exponent = math.floor(math.log10(value))
+    return f"{math.ceil(value / 10.0 ** (exponent - 1)) / 10:.1f}e{exponent}"
+
+
+def is_or_are(names: Sequence[str]) -> str:
+    """``is`` of one, ``are`` of several."""
+    return "is" if len(names) == 1 else "are"
+
+
+def its_or_their(names: Sequence[str]) -> str:
+    """``its`` of one, ``their`` of several."""
+    return "its" if len(names) == 1 else "their"
+
+
+def agree(names: Sequence[str]) -> str:
+    """``agrees`` of one, ``agree`` of several."""
+    return "agrees" if len(names) == 1 else "agree"
+
+
+def seconds(value: float) -> str:
+    """A time with the unit that suits it."""
+    for unit, scale in (("s", 1.0), ("ms", 1e-3)):
+        if value >= scale:
+            return f"{value / scale:.3g} {unit}"
+    return f"{value * 1e6:.3g} µs"
+
+
+def multiple(ratio: float) -> str:
+    """``3.2 times`` or ``140 times``."""
+    return f"{ratio:.1f} times" if ratio < 9.95 else f"{ratio:.0f} times"
+
+
+def span(least: float, most: float) -> str:
+    """``3.2 to 140 times``, or one multiple where both are the same."""
+    low, high = multiple(least), multiple(most)
+    return low if low == high else f"{low.removesuffix(' times')} to {high}"

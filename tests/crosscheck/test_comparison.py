@@ -1,0 +1,97 @@
+"""`crosscheck.compare` and its runs: the object / the command's output; runs in chains / their order."""
+
+import json
+import threading
+
+import numpy as np
+import pytest
+
+import crosscheck
+from crosscheck.cli import main
+from crosscheck.cli.comparison import Comparison
+from crosscheck.cli.request import RequestError
+from crosscheck.engine import Setting
+from crosscheck.study.chains import Chains
+from crosscheck.study.grid import Case, key, study
+from mbref.scene import Body, Scene
+
+FAKE = "tests.crosscheck.fake_engines:FAKE"
+BLOCK = Scene(
+    name="block",
+    body=(Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0)),),
+    duration=0.5,
+)
+
+
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory: pytest.TempPathFactory) -> Comparison:
+    return crosscheck.compare(BLOCK, [FAKE], samples=3, out=tmp_path_factory.mktemp("records"))
+
+
+def test_a_comparison_says_what_the_command_prints(compared, tmp_path, capsys):
+    BLOCK.save(tmp_path / "block.toml")
+    asked = ("compare", str(tmp_path / "block.toml"), "--engine", FAKE, "--samples", "3", "--json")
+    assert main(asked) == 0
+    printed = json.loads(capsys.readouterr().out)
+    compared.save(tmp_path / "saved.json")
+    saved = json.loads((tmp_path / "saved.json").read_text())
+    assert saved.keys() == printed.keys() and saved["verdict"]["headline"] == printed["verdict"]["headline"]
+    for ours, theirs in zip(saved["records"], printed["records"], strict=True):
+        assert (ours["settings"], ours["metrics"]) == (theirs["settings"], theirs["metrics"])
+    assert str(compared).startswith("\nblock, 0.5 s: bodies: 1")
+    assert compared.verdict.headline in " ".join(str(compared).split())
+    assert all(len(line) <= 80 for line in str(compared).splitlines() if "crosscheck run" not in line)
+    assert repr(compared) == f"<Comparison of fake: {compared.verdict.headline}>"
+
+
+def test_rows_of_a_comparison_are_its_records(compared):
+    rows, frame = compared.rows, compared.to_dataframe()
+    assert [row["verdict"] for row in rows] == ["right"] * 3 and frame.shape[0] == 3
+    assert {(row["family"], row["settings"]["seconds"]) for row in rows} == {
+        ("plain", 0.1), ("plain", 0.2), ("noisy", 0.5),
+    }  # fmt: skip
+    assert list(frame["error"]) == [row["error"] for row in rows] == [0.0] * 3
+    assert compared.difference is None
+
+
+def test_a_comparison_that_cannot_be_made():
+    with pytest.raises(RequestError, match="depth: must be quick or whole, got 'deep'"):
+        crosscheck.compare(BLOCK, [FAKE], depth="deep")
+    with pytest.raises(RequestError, match="unknown engine 'none'"):
+        crosscheck.compare(BLOCK, ["none"])
+
+
+def test_runs_of_an_engine_follow_each_other_and_are_measured_aside():
+    """Two engines of three runs each; measuring waits until all six are run."""
+    cases = [
+        Case(BLOCK, np.array([0.0, 1.0]), engine, Setting("f", {"k": k}))
+        for k in range(3) for engine in ("first", "second")
+    ]  # fmt: skip
+    going, order, all_run = set(), [], threading.Event()
+
+    def run(asked):
+        assert asked.engine not in going, "two runs of one engine at a time"
+        going.add(asked.engine)
+        order.append((asked.engine, asked.setting.options["k"]))
+        if len(order) == len(cases):
+            all_run.set()
+        going.discard(asked.engine)
+        return asked
+
+    def measure(asked, got):
+        assert all_run.wait(60) and got is asked
+        return {"key": key(asked)}
+
+    with Chains(measure) as threads:
+        found = study(cases, threads, run=run)
+    assert [r["key"] for r in found] == [key(c) for c in cases]
+    for engine in ("first", "second"):
+        assert [k for name, k in order if name == engine] == [0, 1, 2]
+
+
+def test_a_run_that_raises_is_told_to_the_owner_of_its_future():
+    def run(asked):
+        raise OSError("no disk")
+
+    with Chains(lambda asked, got: {}) as threads, pytest.raises(OSError, match="no disk"):
+        study([Case(BLOCK, np.array([0.0, 1.0]), "e", Setting("f", {}))], threads, run=run)
