@@ -1,23 +1,26 @@
-"""Sums of products over blocks of eight numbers, each a vector of the processor.
+"""Blocks: eight numbers as one value, a vector of the processor, for the inner loops of the series.
 
-Compiled loops over as few numbers would cost several times as much.  Offsets and strides count numbers of the
-arrays' memory; every array's rows are filled up to a multiple of LANES.  Without the JIT the functions are
-written in NumPy.
+Compiled loops over as few numbers would cost several times as much.  Offsets count numbers of an array's
+memory; the rows of every array are filled up to a multiple of LANES.  Blocks are added, subtracted and
+multiplied with each other, and multiplied by a number from the left; a sum may take a product in before it is
+rounded.  Without the JIT a block is a NumPy array.
 """
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable
 
+import numpy as np
 from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
+from numba import f8, i8, types
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, models, register_model
 
 from mbref.kernels.compilation import PLAIN
 
 LANES = 8
 WORD, BLOCK = ir.IntType(64), ir.VectorType(ir.DoubleType(), LANES)
-ZERO = ir.Constant(BLOCK, [0.0] * LANES)
 
 
 def filled(size: int) -> int:
@@ -25,131 +28,126 @@ def filled(size: int) -> int:
     return -(-size // LANES) * LANES
 
 
-class _Blocks:
-    """Vectors in the arrays that an intrinsic is given."""
+class Block(types.Type):
+    """The numba type of a block."""
 
-    def __init__(self, context, builder, signature, arguments):
-        self._context, self.builder = context, builder
-        self._arguments = list(zip(signature.args, arguments, strict=True))
-
-    def __getitem__(self, argument):
-        return self._arguments[argument][1]
-
-    def place(self, argument, offset):
-        kind, value = self._arguments[argument]
-        return self.builder.gep(
-            self._context.make_array(kind)(self._context, self.builder, value).data, [offset]
-        )
-
-    def load(self, place):
-        block = self.builder.load(self.builder.bitcast(place, BLOCK.as_pointer()))
-        block.align = LANES
-        return block
-
-    def store(self, block, place):
-        self.builder.store(block, self.builder.bitcast(place, BLOCK.as_pointer())).align = LANES
-
-    def repeated(self, number):
-        first = self.builder.insert_element(ZERO, number, ir.IntType(32)(0))
-        return self.builder.shuffle_vector(
-            first, ZERO, ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
-        )
-
-    def total(self, count, term: Callable):
-        """Σ term(i), i = 0 … count - 1, with count ≥ 1."""
-        b, before = self.builder, self.builder.block
-        loop, after = b.append_basic_block("terms"), b.append_basic_block("sum")
-        b.branch(loop)
-        b.position_at_end(loop)
-        i, value = b.phi(WORD), b.phi(BLOCK)
-        larger, following = b.fadd(value, term(i)), b.add(i, WORD(1))
-        for phi, first, later in ((i, WORD(0), following), (value, ZERO, larger)):
-            phi.add_incoming(first, before)
-            phi.add_incoming(later, b.block)
-        b.cbranch(b.icmp_signed("<", following, count), loop, after)
-        b.position_at_end(after)
-        return larger
-
-    def at(self, offset, stride, i):
-        return self.builder.add(offset, self.builder.mul(stride, i))
+    def __init__(self):
+        super().__init__(name="Block")
 
 
-@intrinsic
-def _sum_products(typing, left, p, dp, right, q, dq, count, out, r):
-    def generate(context, builder, signature, arguments):
-        x = _Blocks(context, builder, signature, arguments)
-        block = x.total(x[6], lambda i: builder.fmul(
-            x.load(x.place(0, x.at(x[1], x[2], i))), x.load(x.place(3, x.at(x[4], x[5], i)))
-        ))  # fmt: skip
-        x.store(block, x.place(7, x[8]))
-        return context.get_dummy_value()
+block = Block()
 
-    return types.void(left, p, dp, right, q, dq, count, out, r), generate
+
+@register_model(Block)
+class _BlockModel(models.PrimitiveModel):
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, BLOCK)
+
+
+def _repeated(builder, number):
+    """A vector of one number."""
+    none, first = ir.Constant(ir.VectorType(number.type, LANES), ir.Undefined), ir.IntType(32)(0)
+    of_first = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+    return builder.shuffle_vector(builder.insert_element(none, number, first), none, of_first)
+
+
+def _operation(function: Callable, name: str) -> None:
+    """Let numba compile an operation of two blocks, or of a number and a block."""
+
+    @infer_global(function)
+    class Operation(AbstractTemplate):
+        def generic(self, arguments, keywords):
+            left, right = arguments
+            if isinstance(right, Block) and isinstance(left, Block | types.Float):
+                return signature(block, block if isinstance(left, Block) else f8, block)
+            return None
+
+    @lower_builtin(function, block, block)
+    def of_blocks(context, builder, _, arguments):
+        return getattr(builder, name)(*arguments, flags=("contract",))
+
+    @lower_builtin(function, f8, block)
+    def of_number(context, builder, _, arguments):
+        number, other = arguments
+        return getattr(builder, name)(_repeated(builder, number), other, flags=("contract",))
+
+
+for _function, _name in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul")):
+    _operation(_function, _name)
+
+
+def _place(context, builder, kind, array, offset):
+    return builder.gep(context.make_array(kind)(context, builder, array).data, [offset])
 
 
 @intrinsic
-def _sum_multiples(typing, rows, p, dp, factors, q, count, out, r):
+def _load(typing, array, offset):
     def generate(context, builder, signature, arguments):
-        x = _Blocks(context, builder, signature, arguments)
-        block = x.total(x[5], lambda i: builder.fmul(
-            x.load(x.place(0, x.at(x[1], x[2], i))),
-            x.repeated(builder.load(x.place(3, builder.add(x[4], i)))),
-        ))  # fmt: skip
-        x.store(block, x.place(6, x[7]))
-        return context.get_dummy_value()
+        place = _place(context, builder, signature.args[0], *arguments)
+        loaded = builder.load(builder.bitcast(place, BLOCK.as_pointer()))
+        loaded.align = LANES
+        return loaded
 
-    return types.void(rows, p, dp, factors, q, count, out, r), generate
+    return block(array, i8), generate
 
 
 @intrinsic
-def _add_product(typing, left, p, right, q, out, r):
+def _store(typing, value, array, offset):
     def generate(context, builder, signature, arguments):
-        x = _Blocks(context, builder, signature, arguments)
-        place = x.place(4, x[5])
-        product = builder.fmul(x.load(x.place(0, x[1])), x.load(x.place(2, x[3])))
-        x.store(builder.fadd(x.load(place), product), place)
+        place = _place(context, builder, signature.args[1], *arguments[1:])
+        builder.store(arguments[0], builder.bitcast(place, BLOCK.as_pointer())).align = LANES
         return context.get_dummy_value()
 
-    return types.void(left, p, right, q, out, r), generate
+    return types.void(block, array, i8), generate
 
 
 @intrinsic
-def _add_multiple(typing, factor, rows, p, out, r):
+def _gathered(typing, array, offset, lanes, first):
     def generate(context, builder, signature, arguments):
-        x = _Blocks(context, builder, signature, arguments)
-        place = x.place(3, x[4])
-        multiple = builder.fmul(x.load(x.place(1, x[2])), x.repeated(x[0]))
-        x.store(builder.fadd(x.load(place), multiple), place)
-        return context.get_dummy_value()
+        value, (kind, _, index_kind, _) = ir.Constant(BLOCK, ir.Undefined), signature.args
+        array, offset, lanes, first = arguments
+        row = _place(context, builder, kind, array, offset)
+        for k in range(LANES):
+            place = _place(context, builder, index_kind, lanes, builder.add(first, WORD(k)))
+            number = builder.load(builder.gep(row, [builder.load(place)]))
+            value = builder.insert_element(value, number, ir.IntType(32)(k))
+        return value
 
-    return types.void(factor, rows, p, out, r), generate
-
-
-def _plain_products(left, p, dp, right, q, dq, count, out, r):
-    left, right, out = left.reshape(-1), right.reshape(-1), out.reshape(-1)
-    out[r : r + LANES] = sum(
-        left[p + i * dp : p + i * dp + LANES] * right[q + i * dq : q + i * dq + LANES] for i in range(count)
-    )
+    return block(array, i8, lanes, i8), generate
 
 
-def _plain_multiples(rows, p, dp, factors, q, count, out, r):
-    rows, factors, out = rows.reshape(-1), factors.reshape(-1), out.reshape(-1)
-    out[r : r + LANES] = sum(rows[p + i * dp : p + i * dp + LANES] * factors[q + i] for i in range(count))
+@intrinsic
+def _placed(typing, number, lane, value):
+    def generate(context, builder, signature, arguments):
+        number, lane, value = arguments
+        lanes = ir.Constant(ir.VectorType(WORD, LANES), list(range(LANES)))
+        found = builder.icmp_signed("==", _repeated(builder, lane), lanes)
+        return builder.select(found, _repeated(builder, number), value)
+
+    return block(f8, i8, value), generate
 
 
-def _plain_add_product(left, p, right, q, out, r):
-    out[r : r + LANES] += left[p : p + LANES] * right[q : q + LANES]
+def _plain_load(array, offset):
+    return array.reshape(-1)[offset : offset + LANES].copy()
 
 
-def _plain_add(factor, rows, p, out, r):
-    out.reshape(-1)[r : r + LANES] += factor * rows.reshape(-1)[p : p + LANES]
+def _plain_store(value, array, offset):
+    array.reshape(-1)[offset : offset + LANES] = value
 
 
-sum_products = _plain_products if PLAIN else _sum_products
-"""(left, p, dp, right, q, dq, count, out, r): out[r …] := Σ left[p + i dp …] right[q + i dq …]."""
-sum_multiples = _plain_multiples if PLAIN else _sum_multiples
-"""(rows, p, dp, factors, q, count, out, r): out[r …] := Σ rows[p + i dp …] factors[q + i]."""
-add_product = _plain_add_product if PLAIN else _add_product
-"""(left, p, right, q, out, r): out[r …] += left[p …] right[q …]."""
-add_multiple = _plain_add if PLAIN else _add_multiple
-"""(factor, rows, p, out, r): out[r …] += factor rows[p …]."""
+def _plain_gathered(array, offset, lanes, first):
+    return array.reshape(-1)[offset + lanes[first : first + LANES]]
+
+
+def _plain_placed(number, lane, value):
+    return np.where(np.arange(LANES) == lane, number, value)
+
+
+load = _plain_load if PLAIN else _load
+"""(array, offset): the block at array[offset …]."""
+store = _plain_store if PLAIN else _store
+"""(value, array, offset): put a block at array[offset …]."""
+gathered = _plain_gathered if PLAIN else _gathered
+"""(array, offset, lanes, first): the block of array[offset + lanes[first + k]], k = 0 … LANES - 1."""
+placed = _plain_placed if PLAIN else _placed
+"""(number, lane, value): the block with the number in a lane; as it is for a lane outside it."""

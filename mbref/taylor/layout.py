@@ -23,30 +23,29 @@ class Rows(NamedTuple):
     linear_row: Annotated[Indices, "onefold"]
     linear_lane: Annotated[Indices, "onefold"]
     linear_weight: Annotated[Vector, "onefold"]
-    constant: Annotated[Vector, "nr"]
+    constant: Annotated[Vector, "lanes"]  # in the lanes of the multipliers
 
 
 class Products(NamedTuple):
-    """Products of two series in the equations, in levels: each holds one product of a number of equations.
+    """Products of two series in the equations: of the force on a lane's variable, or of a lane's row.
 
-    Equations, forces and rows, stand in the order of how many products they have.
+    Each block of lanes has as many blocks of slots as its lane with the most products needs.
     """
 
     left: Annotated[Indices, "slots"]  # lanes
     right: Annotated[Indices, "slots"]
     weight: Annotated[Vector, "slots"]
-    start: Annotated[Indices, "levels + 1"]  # slots where each level begins
-    equation: Annotated[Indices, "nz + nr"]  # of each place in a level: a variable's force, or nz + row
+    start: Annotated[Indices, "blocks + 1"]  # slots where each block of lanes begins
 
 
 class Inertia(NamedTuple):
     """Mass matrix, constant force, and the force of constant moments, linear in the variables."""
 
     mass: Annotated[Matrix, "nz", "nz"]
-    force: Annotated[Vector, "nz"]
-    target: Annotated[Indices, "moments"]
-    source: Annotated[Indices, "moments"]
+    force: Annotated[Vector, "lanes"]
+    source: Annotated[Indices, "moments"]  # lanes, of which each block of lanes has its blocks
     weight: Annotated[Vector, "moments"]
+    start: Annotated[Indices, "blocks + 1"]
 
 
 class Poses(NamedTuple):
@@ -110,33 +109,32 @@ class Series(NamedTuple):
     driven: Annotated[Vector, "orders"]  # of one driver
     left: Annotated[Matrix, "orders", "slots"]  # factors of the products, one order later
     right: Annotated[Matrix, "orders", "slots"]
-    sums: Annotated[Vector, "slots"]
-    totals: Annotated[Vector, "lanes"]  # of each equation's place in a level
-    force: Annotated[Vector, "nz"]
-    powers: Annotated[Matrix, 3, "orders"]  # of a time, and their derivatives
+    sums: Annotated[Matrix, "orders", "lanes"]  # of products of known orders, and minus the forces
+    scale: Annotated[Matrix, "orders", "lanes"]  # of the sums on the right-hand side
+    growth: Annotated[Matrix, "orders", "lanes"]  # of the solution
+    variable: Annotated[Vector, "lanes"]  # 1 for a variable, else 0
 
 
 class Solver(NamedTuple):
-    """K = [M Gᵀ; G 0], its columns in the order of the pivots' rows, and its inverse.
+    """K = [M Gᵀ; G 0], its columns in the order of the pivots' rows, its inverse and the response.
 
-    ``inverse`` has the lanes that follow from one number on the right-hand side in each row: of the partner
-    of the equation, then of the functions prescribed.
+    A row of ``response`` has the lanes that follow from one number on the right-hand side: of an equation
+    (none from a row that depends on others) or of a function prescribed.
     """
 
     row: Annotated[Indices, "nr"]  # the independent rows first
     order: Annotated[Indices, "nz"]  # their dependent variables first
     work: Annotated[Matrix, "nr", "nz"]
-    partner: Annotated[Indices, "nz + nr"]  # of equations: where in the right-hand side they stand
-    place: Annotated[Indices, "nz + nr"]  # the same of the equations' places in a level
-    of_force: Annotated[Vector, "nz + nr"]  # 1 for a place's force, else 0
-    of_row: Annotated[Vector, "nz + nr"]  # 1 for an independent row, else 0
+    partner: Annotated[Indices, "nz + nr"]  # of equations: their columns of K
     pivot: Annotated[Indices, "nz + nr"]  # the order of elimination
     first: Annotated[Vector, "nz + nr"]  # pivots when they were chosen
-    base: Annotated[Matrix, "nz + nr", "lanes"]  # K without what depends on the variables
-    inverse: Annotated[Matrix, "nz + nr + ng", "lanes"]
-    rhs: Annotated[Vector, "nz + nr + ng"]
-    solution: Annotated[Vector, "lanes"]
-    phi: Annotated[Vector, "nr"]
+    place: Annotated[Indices, "2*twofold"]  # of the entries of G in K, and of those of Gᵀ
+    base: Annotated[Matrix, "nz + nr + 1", "lanes"]  # K without what depends on the variables
+    inverse: Annotated[Matrix, "nz + nr + 1", "lanes"]  # the last row takes entries that K has not
+    column: Annotated[Vector, "nz + nr"]
+    response: Annotated[Matrix, "lanes", "lanes"]
+    rhs: Annotated[Vector, "lanes"]
+    phi: Annotated[Vector, "lanes"]  # in the lanes of the multipliers
 
 
 class Progress(NamedTuple):

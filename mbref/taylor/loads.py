@@ -86,7 +86,7 @@ def grow_springs(k, memory):
 @kernel
 def add_springs(k, memory):
     """Order k of their forces: -(stiffness (1 - natural / l) + damping l' / l) times the vector."""
-    springs, force = memory.polynomials.springs, memory.series.force
+    springs, sums, nz = memory.polynomials.springs, memory.series.sums, memory.solver.order.shape[0]
     for s in range(springs.stiffness.shape[0]):
         of = springs.series[SPRING_SERIES * s : SPRING_SERIES * (s + 1)]
         pull = springs.damping[s] * product(of[RATE], of[INVERSE], k)
@@ -94,8 +94,8 @@ def add_springs(k, memory):
         of[PULL, k] = pull + springs.stiffness[s] if k == 0 else pull
         for c in range(3):
             value, form = product(of[PULL], of[c], k), springs.form[3 * s + c]
-            for i in range(force.shape[0]):
-                force[i] -= value * form[i]
+            for i in range(nz):
+                sums[k, i] += value * form[i]
 
 
 @kernel
@@ -124,7 +124,7 @@ def grow_torsions(k, memory):
 @kernel
 def add_torsions(k, memory):
     """Order k of their forces: -(stiffness (θ - natural) + damping θ') times C δS - S δC."""
-    torsions, force = memory.polynomials.torsions, memory.series.force
+    torsions, sums, nz = memory.polynomials.torsions, memory.series.sums, memory.solver.order.shape[0]
     for s in range(torsions.stiffness.shape[0]):
         of = torsions.series[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
         angle = of[ANGLE, k] - torsions.natural[s] if k == 0 else of[ANGLE, k]
@@ -136,8 +136,8 @@ def add_torsions(k, memory):
             on_f = product(of[MOMENT_COS], of[E2 + c], k) - product(of[MOMENT_SIN], of[E1 + c], k)
             e1, e2 = torsions.form[9 * s + E1 + c], torsions.form[9 * s + E2 + c]
             f = torsions.form[9 * s + F + c]
-            for i in range(force.shape[0]):
-                force[i] -= on_e2 * e2[i] - on_e1 * e1[i] + on_f * f[i]
+            for i in range(nz):
+                sums[k, i] += on_e2 * e2[i] - on_e1 * e1[i] + on_f * f[i]
 
 
 @kernel

@@ -63,7 +63,8 @@ class NaturalCoordinates:
         self.orientations = Orientations(model, axes, self._spin, self._moving[:, 3:], self._new)
         self.rows = self._rows()
         gone = self.eliminate.expressed
-        self.kept = [v for v in range(len(self.start)) if v not in gone and v not in self.given]
+        kept = (v for v in range(len(self.start)) if v not in gone and v not in self.given)
+        self.kept = sorted(kept, key=lambda v: -self._products_of(v))
 
     # --- variables ----------------------------------------------------------------------------------------
     def _new(self, count: int, start: Sequence[float], rate: Sequence[float]) -> tuple[int, ...]:
@@ -75,6 +76,9 @@ class NaturalCoordinates:
     def _may_go(self, variable: int, others: int) -> bool:
         most = MOST_TERMS if variable in self._positions else MOST_FACTORS
         return others <= most and variable not in self.given
+
+    def _products_of(self, variable: int) -> int:
+        return sum(variable in pair and ONE not in pair for row in self.rows for pair in row)
 
     def direction(self, body: int, local: np.ndarray) -> Triple:
         """A direction fixed in a body, given in its principal frame."""

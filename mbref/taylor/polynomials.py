@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from mbref.kernels.scene_layout import FORCE, MOMENT, SPRING, TORSION_SPRING
 from mbref.taylor.expressions import ONE, Expression, cleaned
-from mbref.taylor.lanes import filled
+from mbref.taylor.lanes import LANES, filled
 from mbref.taylor.layout import Given, Inertia, Polynomials, Poses, Products, Rows, Springs, Torsions
 from mbref.taylor.loads import SPRING_SERIES, TORSION_SERIES, VALUE
 from mbref.taylor.natural import NaturalCoordinates
@@ -19,11 +20,12 @@ def polynomials_of(of: NaturalCoordinates, orders: int) -> Polynomials:
     multipliers = len(of.kept)
     lane = {v: i for i, v in enumerate(of.kept)}
     lane |= {v: multipliers + len(of.rows) + g for g, v in enumerate(of.given)}
+    lanes = filled(max(1, len(lane) + len(of.rows)))
     forms = Forms(of)
     return Polynomials(
-        rows=_rows(of, lane),
-        products=_products(of, lane),
-        inertia=_inertia(of, forms),
+        rows=_rows(of, lane, lanes),
+        products=_products(of, lane, lanes),
+        inertia=_inertia(of, forms, lanes),
         poses=_poses(of, forms),
         given=_given(of),
         springs=_springs(of, forms, orders),
@@ -66,12 +68,12 @@ class Forms:
         return total
 
 
-def _rows(of: NaturalCoordinates, lane: dict[int, int]) -> Rows:
-    constant, linear, twofold = np.zeros(len(of.rows)), [], []
+def _rows(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Rows:
+    constant, linear, twofold = np.zeros(lanes), [], []
     for r, row in enumerate(of.rows):
         for (i, j), coefficient in row.items():
             if j == ONE:
-                constant[r] = coefficient
+                constant[len(of.kept) + r] = coefficient
             elif i == ONE:
                 linear.append((r, lane[j], coefficient))
             else:
@@ -86,10 +88,10 @@ def _columns(entries: Sequence[tuple[float, ...]], indices: int) -> list[np.ndar
     return [column.astype(np.int64) for column in columns[:-1]] + columns[-1:]
 
 
-def _products(of: NaturalCoordinates, lane: dict[int, int]) -> Products:
+def _products(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Products:
     """Of rows: two variables or functions; of forces: a row's multiplier and one of these."""
-    nz, nr = len(of.kept), len(of.rows)
-    terms: list[list[tuple[float, ...]]] = [[] for _ in range(nz + nr)]
+    nz = len(of.kept)
+    terms: list[list[tuple[float, ...]]] = [[] for _ in range(lanes)]
     for r, row in enumerate(of.rows):
         for (i, j), coefficient in row.items():
             if i != ONE:
@@ -98,16 +100,21 @@ def _products(of: NaturalCoordinates, lane: dict[int, int]) -> Products:
                 for target, factor in dict.fromkeys([(one, other), (other, one)]):
                     if target < nz:
                         terms[target].append((nz + r, factor, twice * coefficient))
-    equation = sorted(range(nz + nr), key=lambda e: -len(terms[e]))
+    slots, start = _slots(terms, (0, 0, 0.0))
+    return Products(*_columns(slots, 2), start)
+
+
+def _slots(terms: Sequence[Sequence[tuple]], nothing: tuple) -> tuple[list[tuple], np.ndarray]:
+    """The terms of each lane in blocks, filled up with nothing; where each block of lanes begins."""
     slots, start = [], [0]
-    for level in range(max(map(len, terms), default=0)):
-        chosen = [terms[e][level] for e in equation if len(terms[e]) > level]
-        slots += [*chosen, *[(0, 0, 0.0)] * (filled(len(chosen)) - len(chosen))]
+    for block in range(0, len(terms), LANES):
+        levels = itertools.zip_longest(*terms[block : block + LANES], fillvalue=nothing)
+        slots += [slot for level in levels for slot in level]
         start.append(len(slots))
-    return Products(*_columns(slots, 2), np.array(start), np.array(equation, dtype=np.int64))
+    return slots, np.array(start)
 
 
-def _inertia(of: NaturalCoordinates, forms: Forms) -> Inertia:
+def _inertia(of: NaturalCoordinates, forms: Forms, lanes: int) -> Inertia:
     """The mass matrix; gravity, forces and moments that are constant."""
     model, loads = of.model, of.model.data.loads
     force, linear = np.zeros(forms.d), np.zeros((forms.d, forms.d))
@@ -120,8 +127,10 @@ def _inertia(of: NaturalCoordinates, forms: Forms) -> Inertia:
     for k in np.flatnonzero(loads.kind == MOMENT):
         constant, matrix = _moment(of, forms, int(loads.first[k]), loads.force[k] / of.length**2)
         force, linear = force + constant, linear + matrix
-    target, source = map(np.ascontiguousarray, np.nonzero(linear))
-    return Inertia(forms.mass(), force, target, source, linear[target, source])
+    terms: list[list[tuple]] = [[(j, row[j]) for j in np.flatnonzero(row)] for row in linear]
+    slots, start = _slots([*terms, *[[]] * (lanes - forms.d)], (0, 0.0))
+    force = np.concatenate([force, np.zeros(lanes - forms.d)])
+    return Inertia(forms.mass(), force, *_columns(slots, 1), start)
 
 
 def _moment(

@@ -59,10 +59,15 @@ class TaylorRun(Run):
         polynomials = polynomials_of(natural, orders)
         sizes = {
             "orders": orders, "nz": nz, "ng": ng, "nr": nr, "nb": self.model.nb,
-            "lanes": filled(nz + nr + ng), "slots": polynomials.products.left.size,
+            "lanes": filled(max(1, nz + nr + ng)), "slots": polynomials.products.left.size,
+            "twofold": polynomials.rows.row.size,
             "torsions": polynomials.torsions.slot.size,
         }  # fmt: skip
         series = allocate(Series, sizes)
+        grown = np.arange(1.0, orders + 1) * np.arange(2.0, orders + 2)
+        series.scale[:, :nz], series.scale[:, nz : nz + nr] = -1.0 / grown[:, None], -1.0
+        series.growth[:], series.growth[:, nz : nz + nr] = 1.0, grown[:, None]
+        series.variable[:nz] = 1.0
         series.terms[0, :nz] = [natural.start[v] for v in natural.kept]
         series.terms[1, :nz] = [natural.rate[v] for v in natural.kept]
         return TaylorMemory(

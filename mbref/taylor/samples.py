@@ -10,7 +10,7 @@ from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.layout import NOT_CONVERGED, OK
 from mbref.linear_algebra.vectors import copy, larger
 from mbref.simulation.stepping import take_sample as record_sample
-from mbref.taylor.lanes import LANES, sum_multiples
+from mbref.taylor.lanes import LANES, load, store
 
 BESIDE = 1e-3  # part of the largest least pivot below which a position is beside a singular one
 LOST_MOTION = 30.0  # tolerances, times orders², by which accelerations times the step's square may be off
@@ -20,20 +20,20 @@ CLEAR = 1e-6  # relative difference of accelerations that contradict each other
 
 @inlined
 def evaluate_series(h, memory):
-    """All lanes and their first two derivatives at a distance h (s) from the step's beginning."""
-    powers, past, state = memory.series.powers, memory.series.past, memory.state
+    """All lanes and their first two derivatives at a distance h (s) from the step's beginning (Horner)."""
+    past, state = memory.series.past, memory.state
     orders, lanes = past.shape
-    power = 1.0
-    powers[0, 0], powers[1, 0], powers[2, 0], powers[2, 1] = 1.0, 0.0, 0.0, 0.0
-    for k in range(1, orders):
-        powers[1, k] = k * power
-        if k + 1 < orders:
-            powers[2, k + 1] = (k + 1) * k * power
-        power *= h
-        powers[0, k] = power
-    for derivative in range(3):
-        for j in range(0, lanes, LANES):
-            sum_multiples(past, j, lanes, powers, derivative * orders, orders, state, derivative * lanes + j)
+    for j in range(0, lanes, LANES):
+        value = load(past, (orders - 1) * lanes + j)
+        rate = 0.0 * value
+        half = rate
+        for k in range(orders - 2, -1, -1):
+            half = rate + h * half
+            rate = value + h * rate
+            value = load(past, k * lanes + j) + h * value
+        store(value, state, j)
+        store(rate, state, lanes + j)
+        store(2.0 * half, state, 2 * lanes + j)
 
 
 @kernel

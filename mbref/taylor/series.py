@@ -2,71 +2,110 @@
 
 Of order k the unknowns z_{k+2} and λ_k enter linearly, with the matrix at the time of expansion (J. D.
 Pryce, BIT 41, 2001); all else is sums of products of lower orders, Σ a_i b_{k-i}.  Products of rows and of
-forces run over the same orders because multipliers stand two orders later than variables.
+forces run over the same orders because multipliers stand two orders later than variables.  A new coefficient
+is added to the sums of all later orders at once, so that little is left between one order and the next.
 """
 
 from __future__ import annotations
 
 from mbref.kernels.compilation import inlined, kernel
-from mbref.taylor.lanes import LANES, add_product, sum_products
+from mbref.taylor.lanes import LANES, gathered, load, store
 from mbref.taylor.loads import add_loads, start_loads
-from mbref.taylor.solver import solve
+from mbref.taylor.solver import solution
 
 
 @inlined
-def gather(k, memory):
-    """The factors of all products from the coefficients of order k + 1."""
-    series, products = memory.series, memory.polynomials.products
-    left, right = products.left, products.right
-    for c in range(left.shape[0]):
-        series.left[k, c] = series.terms[k + 1, left[c]]
-        series.right[k, c] = series.terms[k + 1, right[c]]
+def start_sums(memory):
+    """No products, and minus the constant forces in the first order."""
+    sums, force = memory.series.sums, memory.polynomials.inertia.force
+    size = sums.shape[0] * sums.shape[1]
+    zero = 0.0 * load(force, 0)
+    for j in range(0, size, LANES):
+        store(zero, sums, j)
+    for j in range(0, sums.shape[1], LANES):
+        store(-1.0 * load(force, j), sums, j)
 
 
 @inlined
-def convolve(k, memory):
-    """Σ left_i right_{k-i} of all products, and their sums over the levels."""
-    series, start, weight = (
-        memory.series,
-        memory.polynomials.products.start,
-        memory.polynomials.products.weight,
-    )
-    sums, slots, totals = series.sums, series.sums.shape[0], series.totals
-    totals[:] = 0.0
-    for c in range(0, slots, LANES):
-        sum_products(series.left, c, slots, series.right, k * slots + c, -slots, k + 1, sums, c)
-    for level in range(start.shape[0] - 1):
-        for c in range(0, start[level + 1] - start[level], LANES):
-            add_product(sums, start[level] + c, weight, start[level] + c, totals, c)
+def put_sums(k, memory):
+    """The right-hand side of order k, from the factors of order k + 1 and those known before."""
+    series, products, terms = memory.series, memory.polynomials.products, memory.series.terms
+    left, right, lanes, slots = series.left, series.right, terms.shape[1], series.left.shape[1]
+    inertia = memory.polynomials.inertia
+    share = 0.5 if k == 0 else 1.0  # the product of the first factors is counted twice
+    for block in range(products.start.shape[0] - 1):
+        place = k * lanes + block * LANES
+        one = 0.0 * load(series.sums, place)
+        other = one
+        for c in range(products.start[block], products.start[block + 1], LANES):
+            a = load(products.weight, c) * gathered(terms, (k + 1) * lanes, products.left, c)
+            b = gathered(terms, (k + 1) * lanes, products.right, c)
+            store(a, left, k * slots + c)
+            store(b, right, k * slots + c)
+            one = one + a * load(right, c)
+            other = other + load(left, c) * b
+        total = load(series.sums, place) + share * (one + other)
+        for c in range(inertia.start[block], inertia.start[block + 1], LANES):
+            total = total - load(inertia.weight, c) * gathered(terms, k * lanes, inertia.source, c)
+        store(load(series.scale, place) * total, memory.solver.rhs, block * LANES)
+
+
+@inlined
+def add_to_later_sums(k, last, memory):
+    """Add the products of the factors of order k + 1 and of earlier ones to the sums up to the last order."""
+    series, start = memory.series, memory.polynomials.products.start
+    left, right, sums, slots = series.left, series.right, series.sums, series.left.shape[1]
+    lanes = sums.shape[1]
+    for block in range(start.shape[0] - 1):
+        for c in range(start[block], start[block + 1], LANES):
+            a, b = load(left, k * slots + c), load(right, k * slots + c)
+            place, source = (k + 1) * lanes + block * LANES, slots + c
+            for _ in range(min(k - 1, last - k)):
+                more = a * load(right, source) + load(left, source) * b
+                store(load(sums, place) + more, sums, place)
+                place, source = place + lanes, source + slots
+            if 2 * k <= last:
+                place = 2 * k * lanes + block * LANES
+                store(load(sums, place) + a * b, sums, place)
+
+
+@inlined
+def solve_order(k, last, memory):
+    """Order k + 2 of the variables and order k of the multipliers; loads are in the sums."""
+    series, terms, rhs = memory.series, memory.series.terms, memory.solver.rhs
+    n, lanes = memory.solver.partner.shape[0], terms.shape[1]
+    put_sums(k, memory)
+    for g in range(n, n + memory.polynomials.given.driver.shape[0]):
+        rhs[g] = terms[k + 2, g]
+    for j in range(0, lanes, LANES):
+        grown = load(series.growth, k * lanes + j) * solution(memory.solver, j)
+        store(grown, terms, (k + 2) * lanes + j)
+    if k > 0:
+        add_to_later_sums(k, last, memory)
+
+
+@kernel
+def expand_without_springs(last, memory):
+    """The orders k = 0 … last without springs, by code short enough for the registers."""
+    for k in range(last + 1):
+        solve_order(k, last, memory)
+
+
+@kernel
+def expand_with_springs(last, memory):
+    """The orders k = 0 … last."""
+    start_loads(memory)
+    for k in range(last + 1):
+        add_loads(k, memory)
+        solve_order(k, last, memory)
 
 
 @kernel
 def expand(memory):
     """All orders of the variables from the first two, which are consistent."""
-    series, solver, inertia = memory.series, memory.solver, memory.polynomials.inertia
-    force, totals, rhs, terms = series.force, series.totals, solver.rhs, series.terms
-    loads = memory.polynomials.springs.damping.shape[0] + memory.polynomials.torsions.damping.shape[0]
-    nz, n = force.shape[0], solver.partner.shape[0]
-    start_loads(memory)
-    for k in range(memory.progress.order - 1):
-        gather(k, memory)
-        convolve(k, memory)
-        factor = 1.0 / ((k + 1) * (k + 2))
-        for c in range(n):
-            rhs[solver.place[c]] = -(factor * solver.of_force[c] + solver.of_row[c]) * totals[c]
-        for g in range(n, rhs.shape[0]):
-            rhs[g] = terms[k + 2, g]
-        if k == 0:
-            for i in range(nz):
-                rhs[solver.partner[i]] += factor * inertia.force[i]
-        for e in range(inertia.target.shape[0]):
-            moment = inertia.weight[e] * terms[k, inertia.source[e]]
-            rhs[solver.partner[inertia.target[e]]] += factor * moment
-        if loads > 0:
-            force[:] = 0.0
-            add_loads(k, memory)
-            for i in range(nz):
-                rhs[solver.partner[i]] += factor * force[i]
-        solve(solver, rhs.shape[0], terms, (k + 2) * terms.shape[1])
-        for r in range(nz, n):
-            terms[k + 2, r] *= (k + 1) * (k + 2)
+    springs, torsions = memory.polynomials.springs, memory.polynomials.torsions
+    start_sums(memory)
+    if springs.damping.shape[0] + torsions.damping.shape[0] == 0:
+        expand_without_springs(memory.progress.order - 2, memory)
+    else:
+        expand_with_springs(memory.progress.order - 2, memory)

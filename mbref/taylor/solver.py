@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.layout import OK, SINGULAR
-from mbref.taylor.lanes import LANES, add_multiple, sum_multiples
+from mbref.taylor.lanes import LANES, load, placed, store
 
 KEPT = 0.05  # a pivot over its first below which rows and variables are chosen again
 WITHOUT_INERTIA = 1e-13  # of the largest inertia of a variable
@@ -90,77 +90,83 @@ def pair(rank, memory):
         solver.pivot[rank + k] = solver.order[k]
     for k in range(rank, nr):
         solver.pivot[nz + k] = nz + solver.row[k]
-    for c in range(nz + nr):
-        e = memory.polynomials.products.equation[c]
-        solver.place[c], solver.of_force[c] = solver.partner[e], 1.0 if e < nz else 0.0
-        solver.of_row[c] = 1.0 if e >= nz and solver.partner[e] != e else 0.0
     solver.base[:] = 0.0
     for i in range(nz):
         for j in range(nz):
             solver.base[i, solver.partner[j]] = mass[i, j]
-    for e in range(rows.linear_row.shape[0]):
-        put_row(solver.base, rows.linear_row[e], rows.linear_lane[e], rows.linear_weight[e], rank, solver)
     for k in range(rank, nr):
         solver.base[nz + solver.row[k], nz + solver.row[k]] = 1.0
+    base = solver.base.reshape(-1)
+    for e in range(rows.linear_row.shape[0]):
+        for place in places_in_matrix(rows.linear_row[e], rows.linear_lane[e], solver):
+            base[place] += rows.linear_weight[e]
+    for e in range(rows.row.shape[0]):
+        solver.place[2 * e], solver.place[2 * e + 1] = places_in_matrix(rows.row[e], rows.lane[e], solver)
 
 
 @inlined
-def put_row(matrix, row, lane, value, rank, solver):
-    """Add to an entry of G, in both places of K, where the row is an independent one."""
-    nz = solver.order.shape[0]
+def places_in_matrix(row, lane, solver):
+    """Where an entry of G stands in K, and where one of Gᵀ does; in the last row for those left out."""
+    nz, lanes = solver.order.shape[0], solver.base.shape[1]
     equation = nz + row
     if lane < nz and solver.partner[equation] != equation:
-        matrix[equation, solver.partner[lane]] += value
-        matrix[lane, solver.partner[equation]] += value
-
-
-@inlined
-def invert(solver, n, first):
-    """The inverse of K in place of it (Gauss–Jordan); the least pivot of G over the first."""
-    a, lanes, sharpness = solver.inverse, solver.inverse.shape[1], 1e300
-    for step in range(n):
-        k = solver.pivot[step]
-        pivot = a[k, k]
-        if first:
-            solver.first[step] = abs(pivot)
-        sharpness = min(sharpness, abs(pivot) / solver.first[step])
-        factor = 1.0 / pivot
-        a[k, k] = 1.0
-        for j in range(lanes):
-            a[k, j] *= factor
-        for i in range(n):
-            value = a[i, k]
-            if i != k and value != 0.0:
-                a[i, k] = 0.0
-                for j in range(0, lanes, LANES):
-                    add_multiple(-value, a, k * lanes + j, a, i * lanes + j)
-    return sharpness
+        return equation * lanes + solver.partner[lane], lane * lanes + solver.partner[equation]
+    outside = solver.partner.shape[0] * lanes
+    return outside, outside
 
 
 @inlined
 def assemble(memory):
     """K at the first coefficients."""
-    solver, rows, y = memory.solver, memory.polynomials.rows, memory.series.terms
-    a, base, rank = solver.inverse, solver.base, memory.progress.rank
-    for i in range(base.shape[0]):
-        for j in range(base.shape[1]):
-            a[i, j] = base[i, j]
+    solver, rows, terms = memory.solver, memory.polynomials.rows, memory.series.terms
+    a, place = solver.inverse.reshape(-1), solver.place
+    for j in range(0, a.shape[0], LANES):
+        store(load(solver.base, j), a, j)
     for e in range(rows.row.shape[0]):
-        put_row(a, rows.row[e], rows.lane[e], rows.weight[e] * y[0, rows.other[e]], rank, solver)
+        value = rows.weight[e] * terms[0, rows.other[e]]
+        a[place[2 * e]] += value
+        a[place[2 * e + 1]] += value
+
+
+@inlined
+def invert(solver, first):
+    """The inverse of K in place of it (Gauss–Jordan); whether all pivots are as large as the first."""
+    sharp = True
+    for step in range(solver.pivot.shape[0]):
+        k = solver.pivot[step]
+        pivot = solver.inverse[k, k]
+        if first:
+            solver.first[step] = abs(pivot)
+        sharp = sharp and abs(pivot) > KEPT * solver.first[step]
+        eliminate_column(k, 1.0 / pivot, solver)
+    return sharp
+
+
+@inlined
+def eliminate_column(k, factor, solver):
+    """Column k of a becomes the k-th unit vector's, which then gives way to the inverse's."""
+    a, column, lanes = solver.inverse, solver.column, solver.inverse.shape[1]
+    for i in range(column.shape[0]):
+        column[i] = a[i, k]
+    for j in range(0, lanes, LANES):
+        row = factor * placed(1.0, k - j, load(a, k * lanes + j))
+        for i in range(column.shape[0]):
+            store(placed(0.0, k - j, load(a, i * lanes + j)) - column[i] * row, a, i * lanes + j)
+        store(row, a, k * lanes + j)
 
 
 @kernel
 def factorise(memory):
-    """The inverse of K at the first coefficients; SINGULAR where rows or inertia have another rank."""
+    """The response at the first coefficients; SINGULAR where rows or inertia have another rank."""
     solver, progress = memory.solver, memory.progress
-    n = solver.partner.shape[0]
     memory.run.equations.system.counts.factorisations += 1
     assemble(memory)
-    if not invert(solver, n, False) > KEPT:
+    if not invert(solver, False):
         if choose(memory) != progress.rank:
             return SINGULAR
         assemble(memory)
-        invert(solver, n, True)
+        invert(solver, True)
+    put_response(memory)
     return inertia_left(memory)
 
 
@@ -178,45 +184,56 @@ def inertia_left(memory):
 
 
 @inlined
-def add_functions(memory):
-    """Rows of the inverse for the functions prescribed: what they take from rows, and themselves."""
-    solver, rows, y = memory.solver, memory.polynomials.rows, memory.series.terms
-    n, a = solver.partner.shape[0], solver.inverse
-    nz, lanes = solver.order.shape[0], a.shape[1]
-    for g in range(a.shape[0] - n):
-        for j in range(lanes):
-            a[n + g, j] = 0.0
-    for e in range(rows.linear_row.shape[0]):
-        subtract_row(rows.linear_row[e], rows.linear_lane[e], rows.linear_weight[e], nz, n, solver)
-    for e in range(rows.row.shape[0]):
-        subtract_row(rows.row[e], rows.lane[e], rows.weight[e] * y[0, rows.other[e]], nz, n, solver)
-    for g in range(a.shape[0] - n):
-        a[n + g, n + g] = 1.0
-
-
-@inlined
-def subtract_row(row, lane, value, nz, n, solver):
-    """Of a row's dependence on a function: what it takes away from the right-hand side."""
-    a, place = solver.inverse, solver.partner[nz + row]
-    lanes = a.shape[1]
-    if lane >= n and place != nz + row:
+def put_response(memory):
+    """The rows of the inverse in the order of the equations, and those of the functions prescribed."""
+    solver, functions = memory.solver, memory.polynomials.given.driver.shape[0]
+    a, response, nz = solver.inverse, solver.response, solver.order.shape[0]
+    n, lanes = solver.partner.shape[0], response.shape[1]
+    for e in range(n):
+        source = solver.partner[e]
+        kept = 0.0 if e >= nz and source == e else 1.0
         for j in range(0, lanes, LANES):
-            add_multiple(-value, a, place * lanes + j, a, lane * lanes + j)
+            store(kept * load(a, source * lanes + j), response, e * lanes + j)
+    if functions > 0:
+        add_functions(functions, memory)
+
+
+@kernel
+def add_functions(functions, memory):
+    """The response to functions prescribed: what rows that depend on them take, and themselves."""
+    solver, rows, terms = memory.solver, memory.polynomials.rows, memory.series.terms
+    response, n = solver.response, solver.partner.shape[0]
+    for g in range(n, n + functions):
+        for j in range(response.shape[1]):
+            response[g, j] = 0.0
+    for e in range(rows.linear_row.shape[0]):
+        subtract_row(rows.linear_row[e], rows.linear_lane[e], rows.linear_weight[e], solver)
+    for e in range(rows.row.shape[0]):
+        value = rows.weight[e] * terms[0, rows.other[e]]
+        subtract_row(rows.row[e], rows.lane[e], value, solver)
+    for g in range(n, n + functions):
+        response[g, g] = 1.0
 
 
 @inlined
-def solve(solver, count, out, start):
-    """out[start …] (lanes) := the solution of the right-hand side's first ``count`` numbers."""
-    a = solver.inverse
-    for j in range(0, a.shape[1], LANES):
-        sum_multiples(a, j, a.shape[1], solver.rhs, 0, count, out, start + j)
+def subtract_row(row, lane, value, solver):
+    """Of a row's dependence on a function: what it takes away from the right-hand side."""
+    response, lanes, nz = solver.response, solver.response.shape[1], solver.order.shape[0]
+    if lane >= solver.partner.shape[0]:
+        for j in range(0, lanes, LANES):
+            more = value * load(response, (nz + row) * lanes + j)
+            store(load(response, lane * lanes + j) - more, response, lane * lanes + j)
 
 
 @inlined
-def set_rows(values, solver):
-    """The right-hand side: no forces, and minus the values (nr,) of rows that are independent."""
-    solver.rhs[:] = 0.0
-    nz = solver.order.shape[0]
-    for r in range(values.shape[0]):
-        if solver.partner[nz + r] != nz + r:
-            solver.rhs[solver.partner[nz + r]] = -values[r]
+def solution(solver, j):
+    """The block from lane j on of the solution of the right-hand side."""
+    response, rhs, lanes = solver.response, solver.rhs, solver.response.shape[1]
+    a, b = rhs[0] * load(response, j), rhs[1] * load(response, lanes + j)
+    c, d = rhs[2] * load(response, 2 * lanes + j), rhs[3] * load(response, 3 * lanes + j)
+    for e in range(4, lanes, 4):
+        a = a + rhs[e] * load(response, e * lanes + j)
+        b = b + rhs[e + 1] * load(response, (e + 1) * lanes + j)
+        c = c + rhs[e + 2] * load(response, (e + 2) * lanes + j)
+        d = d + rhs[e + 3] * load(response, (e + 3) * lanes + j)
+    return (a + b) + (c + d)

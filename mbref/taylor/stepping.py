@@ -8,18 +8,19 @@ ends earlier: so a series that continues beyond a singular position passes it, a
 
 from __future__ import annotations
 
-from numpy import isfinite
+from numpy import exp, isfinite, log
 
 from mbref.kernels.compilation import INT, entry, inlined, kernel
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, OK
 from mbref.kernels.named_memory import Named
-from mbref.linear_algebra.vectors import copy, larger
+from mbref.linear_algebra.vectors import larger
 from mbref.simulation.stepping import DONE, PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS
+from mbref.taylor.lanes import LANES, gathered, load, store
 from mbref.taylor.layout import TaylorMemory
 from mbref.taylor.loads import ANGLE, TORSION_SERIES, expand_drivers
 from mbref.taylor.samples import LOST_MOTION, NOISE, evaluate_series, put_angles, take_sample
 from mbref.taylor.series import expand
-from mbref.taylor.solver import add_functions, choose, factorise, set_rows, solve
+from mbref.taylor.solver import choose, factorise, solution
 
 SMALL = 1e-6  # a violation up to which the factor before its correction serves after it
 CORRECTIONS = 8
@@ -31,14 +32,17 @@ SHORTER = 0.7
 @kernel
 def violation(memory):
     """Φ of every row at the first coefficients; the largest."""
-    rows, y, phi, largest = memory.polynomials.rows, memory.series.terms, memory.solver.phi, 0.0
-    for r in range(phi.shape[0]):
-        phi[r] = rows.constant[r]
+    rows, products, terms = memory.polynomials.rows, memory.polynomials.products, memory.series.terms
+    phi, nz, largest = memory.solver.phi, memory.solver.order.shape[0], 0.0
+    for block in range(products.start.shape[0] - 1):
+        total = load(rows.constant, block * LANES)
+        for c in range(products.start[block], products.start[block + 1], LANES):
+            one = load(products.weight, c) * gathered(terms, 0, products.left, c)
+            total = total + one * gathered(terms, 0, products.right, c)
+        store(total, phi, block * LANES)
     for e in range(rows.linear_row.shape[0]):
-        phi[rows.linear_row[e]] += rows.linear_weight[e] * y[0, rows.linear_lane[e]]
-    for e in range(rows.row.shape[0]):
-        phi[rows.row[e]] += 0.5 * rows.weight[e] * y[0, rows.lane[e]] * y[0, rows.other[e]]
-    for r in range(phi.shape[0]):
+        phi[nz + rows.linear_row[e]] += rows.linear_weight[e] * terms[0, rows.linear_lane[e]]
+    for r in range(nz, memory.solver.partner.shape[0]):
         largest = larger(largest, phi[r])
     return largest
 
@@ -46,22 +50,32 @@ def violation(memory):
 @inlined
 def violation_rate(memory):
     """Φ' of every row at the first two coefficients."""
-    rows, y, phi = memory.polynomials.rows, memory.series.terms, memory.solver.phi
-    phi[:] = 0.0
+    rows, products, terms = memory.polynomials.rows, memory.polynomials.products, memory.series.terms
+    phi, nz, lanes = memory.solver.phi, memory.solver.order.shape[0], memory.series.terms.shape[1]
+    for block in range(products.start.shape[0] - 1):
+        total = 0.0 * load(rows.constant, block * LANES)
+        for c in range(products.start[block], products.start[block + 1], LANES):
+            left, left_rate = gathered(terms, 0, products.left, c), gathered(terms, lanes, products.left, c)
+            right, right_rate = (
+                gathered(terms, 0, products.right, c),
+                gathered(terms, lanes, products.right, c),
+            )
+            total = total + load(products.weight, c) * (left * right_rate + left_rate * right)
+        store(total, phi, block * LANES)
     for e in range(rows.linear_row.shape[0]):
-        phi[rows.linear_row[e]] += rows.linear_weight[e] * y[1, rows.linear_lane[e]]
-    for e in range(rows.row.shape[0]):
-        phi[rows.row[e]] += rows.weight[e] * y[1, rows.lane[e]] * y[0, rows.other[e]]
+        phi[nz + rows.linear_row[e]] += rows.linear_weight[e] * terms[1, rows.linear_lane[e]]
 
 
 @inlined
 def subtract_violation(order, memory):
     """Change the variables of order 0 or 1 by the least, in the metric of M, that takes Φ or Φ' away."""
-    solver, terms = memory.solver, memory.series.terms
-    set_rows(solver.phi, solver)
-    solve(solver, solver.partner.shape[0], solver.solution, 0)
-    for i in range(solver.order.shape[0]):
-        terms[order, i] += solver.solution[i]
+    solver, terms, variable = memory.solver, memory.series.terms, memory.series.variable
+    lanes = terms.shape[1]
+    for j in range(0, lanes, LANES):
+        store(-1.0 * load(solver.phi, j), solver.rhs, j)
+    for j in range(0, lanes, LANES):
+        change = load(variable, j) * solution(solver, j)
+        store(load(terms, order * lanes + j) + change, terms, order * lanes + j)
 
 
 @kernel
@@ -82,7 +96,6 @@ def correct(memory):
         return NOT_CONVERGED
     violation_rate(memory)
     subtract_violation(1, memory)
-    add_functions(memory)
     return OK
 
 
@@ -110,10 +123,12 @@ def longest_step(memory):
     """The step at which the last two terms are as large as the tolerance."""
     progress, control, past = memory.progress, memory.run.control, memory.series.past
     counts, h = memory.run.equations.system.counts, control.largest_step
+    shortest = log(h)
     for k in range(progress.order - 1, progress.order + 1):
         size = size_of(past, k, memory.solver.order.shape[0])
         if size > 0.0:
-            h = min(h, (progress.tolerance / size) ** (1.0 / k))
+            shortest = min(shortest, log(progress.tolerance / size) / k)
+    h = exp(shortest)
     if counts.steps == 0 and control.first_step > 0.0:
         h = min(h, control.first_step)
     return h
@@ -123,7 +138,8 @@ def longest_step(memory):
 def remember_series(memory):
     """Keep the series of the step's beginning."""
     series, torsions = memory.series, memory.polynomials.torsions
-    copy(series.terms.reshape(-1), series.past.reshape(-1))
+    for j in range(0, series.terms.shape[0] * series.terms.shape[1], LANES):
+        store(load(series.terms, j), series.past, j)
     for s in range(series.past_angles.shape[0]):
         for k in range(memory.progress.order + 1):
             series.past_angles[s, k] = torsions.series[TORSION_SERIES * s + ANGLE, k]
@@ -150,10 +166,10 @@ def attempt(h, last, memory):
     """Step to a distance h (s) and expand there, to the second order if it is the last step."""
     progress, terms, state = memory.progress, memory.series.terms, memory.state
     evaluate_series(h, memory)
-    for i in range(terms.shape[1]):
-        terms[0, i], terms[1, i] = state[0, i], state[1, i]
-    for i in range(memory.solver.order.shape[0], memory.solver.partner.shape[0]):
-        terms[0, i], terms[1, i] = 0.0, 0.0
+    lanes, variable = terms.shape[1], memory.series.variable
+    for j in range(0, lanes, LANES):
+        store(load(variable, j) * load(state, j), terms, j)
+        store(load(variable, j) * load(state, lanes + j), terms, lanes + j)
     put_angles(h, memory)
     order = progress.order
     progress.order = 2 if last else order

@@ -2,16 +2,18 @@
 
 import numpy as np
 import pytest
+from numba import njit
 
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
+from mbref.kernels.compilation import PLAIN
 from mbref.method import Method, MethodError
 from mbref.scene import Body, Cylindrical, Driver, Revolute, Scene, SceneError, Spring, TorsionSpring
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
 from mbref.taylor.expressions import ONE, Elimination, independent
-from mbref.taylor.lanes import LANES, add_multiple, add_product, filled, sum_multiples, sum_products
+from mbref.taylor.lanes import filled, gathered, load, placed, store
 
 FIELDS = ("position", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
 ROD = {"mass": 2.0, "inertia": (0.1, 0.7, 0.8)}
@@ -154,32 +156,17 @@ def test_polynomials_that_follow_from_others_are_left_out():
     assert independent([mixed, second, first]) == [second, first]
 
 
-def test_sums_over_lanes():
+def block_sum(factor, a, b, lanes, out):
+    """out[8 …] := factor a[8 …] + b's numbers in lanes, times a's first block; 3 put into lane 2."""
+    total = factor * load(a, 8) + gathered(b, 16, lanes, 0) * load(a, 0)
+    store(placed(3.0, 2, total) - load(b, 8), out, 8)
+
+
+def test_blocks_are_added_multiplied_and_gathered():
     rng = np.random.default_rng(5)
-    a, b = rng.random((5, 2 * LANES)), rng.random((5, 2 * LANES))
-    out, width = np.zeros(2 * LANES), a.shape[1]
-    calls = (
-        (
-            sum_products,
-            (a, LANES, width, b, 4 * width, -width, 4, out, 8),
-            (a[:4, 8:] * b[4:0:-1, :8]).sum(axis=0),
-        ),
-        (sum_multiples, (a, 0, width, b, width, 5, out, 8), (a[:, :8] * b[1, :5, None]).sum(axis=0)),
-        (add_multiple, (3.0, a, width, out, 8), 3.0 * a[1, :8]),
-        (add_product, (a.reshape(-1), 8, b.reshape(-1), width, out, 8), a[0, 8:] * b[1, :8]),
-    )
-    for function, arguments, expected in calls:
-        out[:] = 0.0
-        compiled(function, len(arguments))(*arguments)
-        assert np.allclose(out[8:], expected, rtol=1e-15) and not out[:8].any()
+    a, b, lanes, out = rng.random((2, 8)), rng.random((3, 8)), rng.permutation(8), np.zeros(16)
+    expected = 0.7 * a[1] + b[2, lanes] * a[0]
+    expected[2] = 3.0
+    (block_sum if PLAIN else njit(block_sum))(0.7, a, b, lanes, out)
+    assert np.allclose(out[8:], expected - b[1], rtol=1e-14, atol=1e-15) and not out[:8].any()
     assert [filled(size) for size in (0, 1, 8, 9)] == [0, 8, 8, 16]
-
-
-def compiled(function, count):
-    """A kernel that calls an intrinsic."""
-    from numba import njit
-
-    names = ", ".join(f"a{k}" for k in range(count))
-    scope = {"function": function}
-    exec(f"def call({names}):\n    function({names})", scope)
-    return njit(scope["call"])
