@@ -40,7 +40,7 @@ DENSE_LOOPS = {"four_bar_chain": 20, "slider_crank_chain": 5}  # most that dense
 SPATIAL_LOOPS = 20  # most for the engines' own mapping of the scene
 RTOLS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10)
 RK4_STEPS = (2, 4, 8, 16)
-MUJOCO_STEPS = (2, 5, 10, 20, 40, 80, 160, 320, 640)
+MUJOCO_STEPS = (2, 3, 4, 5, 10, 20, 40, 80, 160, 320, 640)
 
 Attempt = Callable[[], tuple[float, int, float]]  # seconds, steps, error
 

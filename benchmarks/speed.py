@@ -4,23 +4,29 @@
 
 Every setting of every family is run once in a child process, coarse to fine, until it takes too long; then
 all that count take turns in REPEATS rounds of this process, brief ones several times a round, so that their
-code is warm.  Times are process CPU seconds of the stepping, medians; errors are against the scene's truth;
-the cost at an error is read off the family's curve.
+code is warm.  Times are process CPU seconds of the stepping, medians, by one BLAS thread; errors are against
+the scene's truth; the cost at an error is read off the family's curve (settings: ``grids``).  Engines are
+called through crosscheck's adapters in Python; where an engine has no integrator, or a weaker one, a family's
+integrator is crosscheck's, which the table says.
 """
 
 from __future__ import annotations
 
+import one_thread  # noqa: F401 - before NumPy
+
+# isort: split
 import argparse
 import json
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 import numpy as np
+from grids import cost_at_one_error, misses, passes_singular_position, refined
 from limit import LIMIT
 from rich.console import Console
 from rich.table import Table
@@ -89,7 +95,8 @@ def measured(scene: Scene, names: Sequence[str]) -> list[Run]:
     """Every run of the scene, those worth it timed in turns."""
     times = np.linspace(0.0, scene.duration, SAMPLES)
     able = [name for name in names if engine(name).cannot(scene) is None]
-    jobs = [(engine(name), run) for name in able for run in _sweep(name, scene, times)]
+    singular = passes_singular_position(scene)
+    jobs = [(engine(name), run) for name in able for run in _sweep(name, scene, times, singular)]
     curves: dict[Curve, list[Run]] = {}
     for _, run in jobs:
         curves.setdefault((run.engine, run.family), []).append(run)
@@ -103,23 +110,31 @@ def measured(scene: Scene, names: Sequence[str]) -> list[Run]:
     return [run for _, run in jobs]
 
 
-def _sweep(name: str, scene: Scene, times: np.ndarray) -> Iterator[Run]:
+def _sweep(name: str, scene: Scene, times: np.ndarray, singular: bool) -> Iterator[Run]:
     """One run of each setting, coarse to fine, of each family."""
-    simulator, truth, finished = engine(name), truth_for(scene), set()
-    for setting in simulator.settings(scene):
+    finished = set()
+
+    def score(setting: Setting) -> float:
+        run = _once(name, scene, times, setting)
+        return cost_at_one_error(run.cost["seconds"], run.error) if _is_usable(run) else math.inf
+
+    for setting in refined(engine(name).settings(scene), scene, singular, score):
         if setting.family in finished:
             continue
-        trajectory = run_isolated(name, scene, times, setting, TIME_LIMIT)
-        error = measure(scene, trajectory, truth)["error"]
-        error = math.inf if error is None else error
-        cost = asdict(trajectory.cost)
-        yield Run(
-            simulator.name, setting.family, dict(setting.options), trajectory.outcome.label, error, cost
-        )
-        completed = trajectory.outcome is Outcome.COMPLETED
-        is_dear = trajectory.outcome is Outcome.TIMED_OUT or trajectory.cost.seconds > TOO_LONG
-        if is_dear or (completed and error < ENOUGH):
+        run = _once(name, scene, times, setting)
+        yield run
+        is_dear = run.outcome == Outcome.TIMED_OUT.label or run.cost["seconds"] > TOO_LONG
+        if is_dear or (_is_usable(run) and run.error < ENOUGH):
             finished.add(setting.family)
+
+
+def _once(name: str, scene: Scene, times: np.ndarray, setting: Setting) -> Run:
+    """One run in a process of its own."""
+    trajectory = run_isolated(name, scene, times, setting, TIME_LIMIT)
+    error = measure(scene, trajectory, truth_for(scene))["error"]
+    error, cost = math.inf if error is None else error, asdict(trajectory.cost)
+    label = trajectory.outcome.label
+    return Run(engine(name).name, setting.family, dict(setting.options), label, error, cost)
 
 
 def _times(run: Run) -> int:
@@ -166,10 +181,16 @@ def rows(scene: Scene, runs: Sequence[Run]) -> list[dict[str, Any]]:
     return [
         {
             "engine": name, "family": family, "cost": [c / scene.duration for c in _costs(group)],
-            "runs": [_cheapest(group, level) for level in ERROR_LEVELS],
+            "runs": [_cheapest(group, level) for level in ERROR_LEVELS], "least": _least(group, scene),
         }
         for (name, family), group in curves.items()
     ]  # fmt: skip
+
+
+def _least(runs: Sequence[Run], scene: Scene) -> tuple[float, float]:
+    """The least error of completed runs, and its seconds per simulated second."""
+    done = [(run.error, run.median / scene.duration) for run in runs if _is_usable(run)]
+    return min(done, default=(math.inf, math.inf))
 
 
 def _cheapest(runs: Sequence[Run], level: float) -> Run | None:
@@ -195,7 +216,7 @@ def show(console: Console, scene: Scene, table: Sequence[dict[str, Any]]) -> Non
         (row["cost"] for row in table if row["engine"] == LIMIT_NAME), [math.nan] * len(ERROR_LEVELS)
     )
     shown = Table(title=f"{scene.name}, {scene.duration:g} s: milliseconds per simulated second")
-    for heading in ("engine", "family"):
+    for heading in ("engine", "family", "integrator"):
         shown.add_column(heading, no_wrap=True)
     for level in ERROR_LEVELS:
         shown.add_column(f"at {level:.0e}", justify="right")
@@ -203,13 +224,23 @@ def show(console: Console, scene: Scene, table: Sequence[dict[str, Any]]) -> Non
     shown.add_column(f"run nearest {ERROR_LEVELS[1]:.0e}: error, evaluations, factorisations, Newton")
     for row in sorted(chosen(table), key=lambda row: row["cost"][1]):
         cells = [text for c, l in zip(row["cost"], limit, strict=True) for text in (_ms(c), _multiple(c / l))]
-        shown.add_row(row["engine"], row["family"], *cells, _counts(row["runs"][1]))
+        whose = "crosscheck's" if row["family"] in _integrated_here(row["engine"]) else "its own"
+        shown.add_row(row["engine"], row["family"], whose, *cells, _counts(row["runs"][1]))
     console.print(shown)
+    for sentence in misses(table, ERROR_LEVELS):
+        console.print(sentence)
+
+
+def _integrated_here(name: str) -> Collection[str]:
+    """The families of an engine whose integrator is crosscheck's."""
+    return engine(name).integrated_here if name in ENGINES else ()
 
 
 def summary(console: Console, tables: dict[str, Sequence[dict[str, Any]]]) -> None:
     """mbref's best by specialised code and by general kernels, against the best of the others."""
-    shown = Table(title="The best of others as a multiple of mbref's best, at errors of …")
+    shown = Table(
+        title="The best of others, by adapters in Python, as a multiple of mbref's best, at errors of …"
+    )
     shown.add_column("scene", no_wrap=True)
     shown.add_column("mbref by", no_wrap=True)
     groups = {"engines": ENGINES[1:4], "general": ("sundials", "scipy"), "limit": (LIMIT_NAME,)}

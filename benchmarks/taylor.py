@@ -9,10 +9,9 @@ making of specialised code do not.  Above 1 the Taylor method is the cheaper.
 
 from __future__ import annotations
 
-import os
+import one_thread  # noqa: F401 - before NumPy
 
-os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-
+# isort: split
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -103,6 +103,7 @@ class Engine(ABC):
     package: str  # to install when it is missing
     supports: Supports = Supports()  # everything else is refused
     families: Mapping[str, str] = {}  # family of settings → its description, for `crosscheck list settings`
+    integrated_here: Collection[str] = ()  # families whose integrator, or extrapolation, is crosscheck's
     options: Mapping[str, str] = {}  # option of a setting → its description, with the unit
 
     @abstractmethod

@@ -69,8 +69,9 @@ def _settings() -> Table:
     table = Table("engine", "name", "meaning", title=title)
     for name in engine_names():
         found = engine(name)
+        whose = {f: "; integrated by crosscheck" for f in found.integrated_here}
         for entry, meaning in [
-            *found.families.items(),
+            *((f, text + whose.get(f, "")) for f, text in found.families.items()),
             *((f"option {o}", m) for o, m in found.options.items()),
         ]:
             table.add_row(name, entry, meaning)

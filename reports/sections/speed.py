@@ -49,7 +49,8 @@ def failed(runs: Sequence[Run]) -> Failures:
 def _caption(scene_runs: SceneRuns, drawable: Sequence[Run]) -> str:
     text = (
         "Seconds of stepping against the largest error of any body at any sample; further left is more "
-        f"accurate, lower is faster. {len(scene_runs.completed())} of {len(scene_runs.runs)} runs completed."
+        "accurate, lower is faster; engines run through adapters in Python. "
+        f"{len(scene_runs.completed())} of {len(scene_runs.runs)} runs completed."
     )
     if drawable:
         best = min(drawable, key=lambda run: run.error)

@@ -50,7 +50,7 @@ class Exudyn(Engine):
     name = "exudyn"
     package = "exudyn"
     supports = SUPPORTS
-    families, options = FAMILIES, OPTIONS
+    families, options, integrated_here = FAMILIES, OPTIONS, ("tuned",)
 
     def version(self) -> str:
         return metadata.version(self.package)

@@ -71,7 +71,7 @@ class MuJoCo(Engine):
     name = "mujoco"
     package = "mujoco"
     supports = SUPPORTS
-    families, options = FAMILIES, OPTIONS
+    families, options, integrated_here = FAMILIES, OPTIONS, tuple(ADAPTIVE)
 
     def version(self) -> str:
         """Version of MuJoCo; raises ImportError when it is not installed."""

@@ -72,7 +72,7 @@ class Pinocchio(Engine):
     name = "pinocchio"
     package = "pin"
     supports = SUPPORTS
-    families, options = FAMILIES, OPTIONS
+    families, options, integrated_here = FAMILIES, OPTIONS, tuple(FAMILIES)
 
     def version(self) -> str:
         """Version of Pinocchio; raises ImportError when it is not installed."""

@@ -1,0 +1,87 @@
+"""The settings of a family in a comparison of speeds, and which families miss a level of error.
+
+A grid of half decades, so that no family drops out because it ends just short of a level; MuJoCo's closures
+at several rates, because stiff ones make integration dear; no shortest step but near singular positions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+from crosscheck.engine import Setting
+from mbref.scene import Scene
+from mbref.simulation.simulate import simulate
+
+COARSEST, FINEST = -3.0, -12.0  # decades of a relative tolerance
+BETAS = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  # 1/s, beside the engine's own
+SCAN = 1e-6  # relative tolerance at which rates of closures are compared
+ORDER = 8  # of the integrator at which errors are reduced to costs there
+SHORTEST = 1e-9  # step over the duration, where no position is singular
+NEAR = 30.0  # an error so many times a level misses it by little
+
+
+def half_decades() -> list[float]:
+    """Relative tolerances, coarse to fine."""
+    count = round(2 * (COARSEST - FINEST)) + 1
+    return [float(f"{10.0 ** (COARSEST - 0.5 * k):.2g}") for k in range(count)]
+
+
+def passes_singular_position(scene: Scene) -> bool:
+    """Whether the motion goes through a singular position, as mbref's projection counts them."""
+    return "singular positions passed" in simulate(scene, times=[scene.duration]).message
+
+
+def refined(
+    settings: Sequence[Setting], scene: Scene, singular: bool, score: Callable[[Setting], float]
+) -> Iterator[Setting]:
+    """Settings by tolerance in half decades, others as they are; coarse to fine in each family.
+
+    ``score`` is the cost of a run at one error, by which the rate of closures is chosen.
+    """
+    done = set()
+    for setting in settings:
+        if "rtol" not in setting.options:
+            yield setting
+        elif setting.family not in done:
+            done.add(setting.family)
+            first = setting if singular else _without_shortest_step(setting, scene.duration)
+            if "beta" in first.options:
+                first = min(_with_rates(first), key=score)
+            yield from (_with(first, rtol=rtol) for rtol in half_decades())
+
+
+def cost_at_one_error(seconds: float, error: float) -> float:
+    """Seconds that an integrator of order ORDER would need for an error of one."""
+    return seconds * error ** (1 / ORDER) if math.isfinite(error) else math.inf
+
+
+def misses(rows: Sequence[dict[str, Any]], levels: Sequence[float]) -> Iterator[str]:
+    """Of each engine's best family at a level, a sentence where it misses the next one, and by how much.
+
+    ``rows`` have an engine, a family, the costs at the levels and the least error with its seconds.
+    """
+    for name in dict.fromkeys(row["engine"] for row in rows):
+        own = [row for row in rows if row["engine"] == name]
+        for k, level in enumerate(levels[1:], 1):
+            before = min(own, key=lambda row: row["cost"][k - 1])
+            if math.isfinite(before["cost"][k - 1]) and math.isinf(before["cost"][k]):
+                error, seconds = before["least"]
+                little = ", by little" if error <= NEAR * level else ""
+                best = f"{before['family']}, the best at {levels[k - 1]:.0e}, misses {level:.0e}{little}"
+                yield f"{name}: {best}; least error {error:.1e} at {seconds * 1e3:.3g} ms/s"
+
+
+def _without_shortest_step(setting: Setting, duration: float) -> Setting:
+    return _with(setting, min_step=SHORTEST * duration) if "min_step" in setting.options else setting
+
+
+def _with_rates(setting: Setting) -> Iterator[Setting]:
+    for beta in (setting.options["beta"], *BETAS):
+        yield _with(setting, rtol=SCAN, beta=beta)
+
+
+def _with(setting: Setting, **options: float) -> Setting:
+    return replace(setting, options={**setting.options, **options})
