@@ -68,7 +68,7 @@ def _render(folder: Path, names: Sequence[str]) -> int:
     except (FileNotFoundError, SceneError) as error:
         _notice(str(error))
         return 2
-    _write(sections.blocks(groups, names), folder)
+    _write(sections.blocks(groups, names, stored.verified(folder)), folder)
     return 0
 
 
@@ -76,7 +76,7 @@ def _blocks(
     out: Path, scenes: Sequence[Scene] | None, is_quick: bool, names: Sequence[str], reference_time: float
 ) -> list[Block]:
     """The blocks of the named sections; only the records they need are made."""
-    from reports import sections
+    from reports import sections, stored
     from reports.sections import paper
 
     blocks: list[Block] = []
@@ -84,7 +84,7 @@ def _blocks(
         found = collection.comparison(out, scenes, is_quick, reference_time, _notice)
         named = {scene.name: scene for scene in found.scenes}
         groups = by_scene(found.records, named, found.identities, found.truths, found.motions)
-        blocks += sections.blocks(groups, names)
+        blocks += sections.blocks(groups, names, stored.verified(out))
     if PAPER in names:
         records_of_paper, illustration = collection.paper(out, _notice)
         print(paper.score(records_of_paper))

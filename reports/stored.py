@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from crosscheck.engine import engine_names
 from crosscheck.judge.model_identity import gate_times
 from crosscheck.study.grid import Record
 from mbref.records import stored
@@ -29,6 +31,14 @@ def groups(folder: Path) -> list[SceneRuns]:
     return by_scene(_ordered(runs), named, gates, *more)
 
 
+def verified(folder: Path) -> list[Record]:
+    """What `crosscheck verify ENGINE --json` printed into ``folder``/conformance/*.json, in the order of the
+    engines that are known here."""
+    order = list(engine_names())
+    found = [json.loads(path.read_text()) for path in sorted((folder / "conformance").glob("*.json"))]
+    return sorted(found, key=lambda f: order.index(f["engine"]) if f["engine"] in order else len(order))
+
+
 def _is_gate(scene: Scene, record: Record) -> bool:
     return np.array_equal(record["asked"].get("times", ()), gate_times(scene))
 
@@ -41,8 +51,8 @@ def _timed(record: Record, times: dict[str, dict[str, Any]]) -> Record:
 
 
 def _ordered(records: Sequence[Record]) -> list[Record]:
-    """By engine in the order of the file, and from coarse to fine in each family."""
-    engines = list(dict.fromkeys(r["engine"] for r in records))
+    """By engine, those known here first, and from coarse to fine in each family."""
+    engines = list(dict.fromkeys([*engine_names(), *(r["engine"] for r in records)]))
 
     def place(record: Record) -> tuple[int, str, list[float]]:
         options = record["asked"]["options"].values()

@@ -24,7 +24,7 @@ from crosscheck.cli.running import (
     print_json,
     studied,
 )  # fmt: skip
-from crosscheck.study.grid import Record, key
+from crosscheck.study.grid import Record, key, made_by
 from crosscheck.study.progress import counted
 from mbref.scene import SceneError
 from mbref.trajectory import Outcome
@@ -88,7 +88,7 @@ def _verify(arguments: argparse.Namespace) -> int:
     with counted("verifying", len(chosen) + 1) as advance:
         found = suite.verify(engine, chosen, arguments.time_limit, advance)
     if arguments.json:
-        print(json.dumps(found.to_record(), allow_nan=False))
+        print(json.dumps({**found.to_record(), **made_by()}, allow_nan=False))
     else:
         for block in suite.tables(found):
             console().print(block)

@@ -116,7 +116,10 @@ def _add_report(commands: Commands) -> None:
         "--quick", dest="depth", action="store_const", const="quick", help="the same as --depth quick"
     )
     parser.add_argument(
-        "--section", action="append", metavar="S", help="render only this section, such as speed; may repeat"
+        "--section",
+        action="append",
+        metavar="S",
+        help="render only this section, such as speed (docs/compare.md lists them); may repeat",
     )
     parser.add_argument("--out", default="report", metavar="DIR", help="folder to write (default: report)")
     parser.add_argument("--render", metavar="DIR", help="render a report's records again, run nothing")

@@ -150,11 +150,14 @@ def record_of(case: Case, trajectory: Trajectory) -> Record:
         "time_limit": case.time_limit,
         "metrics": metrics.measure(case.scene, trajectory, _truth(case.scene, case.reference_time)),
         "seed": 0,
-        "versions": versions(),
-        "commit": commit(),
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "machine": machine(),
+        **made_by(),
     }
+
+
+def made_by() -> dict[str, Any]:
+    """What makes a record: versions, commit, date (UTC) and machine."""
+    date = datetime.now(UTC).isoformat(timespec="seconds")
+    return {"versions": versions(), "commit": commit(), "date": date, "machine": machine()}
 
 
 def _asked(case: Case) -> dict[str, Any]:

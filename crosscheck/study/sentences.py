@@ -61,7 +61,7 @@ def headline(groups: Sequence[Judged]) -> str:
         if good
         else f"No engine is right{_everywhere(groups)} at any setting that was run"
     )
-    return f"{first}{_on(groups) if good else ''}; {_defaults_in_short(groups)}."
+    return f"{first}{_on(groups, good) if good else ''}; {_defaults_in_short(groups)}."
 
 
 def right(groups: Sequence[Judged]) -> str:
@@ -78,8 +78,10 @@ def right(groups: Sequence[Judged]) -> str:
     worst = {name: max(found) for name, found in errors.items()}
     sure = max(group.truth["bound"] or 0.0 for group in told)
     good = [name for name, e in worst.items() if math.isfinite(e) and _of(told, name) is Grade.RIGHT]
-    sentences = [f"{listed(map(title, good))} {agree(good)} with the truth to "
-                 f"{at_most(max(worst[n] for n in good), sure)}{_on(told)}."] if good else []  # fmt: skip
+    sentences = []
+    if good:
+        most = at_most(max(worst[name] for name in good), sure)
+        sentences = [f"{listed(map(title, good))} {agree(good)} with the truth to {most}{_on(told, good)}."]
     return " ".join([*sentences, *(_less_than_right(told, name) for name in worst if name not in good)])
 
 
@@ -287,8 +289,11 @@ def _place(scenes: Sequence[Judged], groups: Sequence[Judged]) -> str:
     return f" on {_names(scenes)}" if len(scenes) < len(groups) else _on(groups)
 
 
-def _on(groups: Sequence[Judged]) -> str:
+def _on(groups: Sequence[Judged], names: Sequence[str] = ()) -> str:
+    """`` on all 5 scenes``, or of the engines named that not all can run; nothing of a single scene."""
     count = len(groups)
+    if any(name not in group.engines() for name in names for group in groups):
+        return " on the scenes they can run" if len(names) > 1 else " on the scenes it can run"
     return "" if count == 1 else " on both scenes" if count == 2 else f" on all {count} scenes"
 
 

@@ -8,6 +8,7 @@ from reports.blocks import Block, Heading
 from reports.runs import SceneRuns
 from reports.sections import (
     accelerations,
+    conformance,
     convergence,
     energy,
     least_errors,
@@ -46,13 +47,18 @@ CLOSING: Mapping[str, Chapter] = {
     "provenance": provenance.render,
     "records": records.render,
 }
-NAMES = (*OPENING, *OF_A_SCENE, *CLOSING)
+CONFORMANCE = "conformance"  # the section that is rendered from verified engines
+NAMES = (*OPENING, *OF_A_SCENE, CONFORMANCE, *CLOSING)
 
 
-def blocks(groups: Sequence[SceneRuns], names: Collection[str] = NAMES) -> list[Block]:
+def blocks(
+    groups: Sequence[SceneRuns], names: Collection[str] = NAMES, verified: Sequence[conformance.Verified] = ()
+) -> list[Block]:
     """The blocks of the named sections, scene by scene between opening and closing chapters."""
     out = [block for name, render in OPENING.items() if name in names for block in render(groups)]
     parts = [render for name, render in OF_A_SCENE.items() if name in names]
     for group in groups if parts else ():
         out += [Heading(group.scene.name, 2), *(block for part in parts for block in part(group))]
+    if CONFORMANCE in names:
+        out += conformance.render(verified)
     return out + [block for name, render in CLOSING.items() if name in names for block in render(groups)]

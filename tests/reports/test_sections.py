@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
+from pathlib import Path
 
 import pytest
 from synthetic import groups, nothing, record, records, scene
@@ -11,6 +13,7 @@ from synthetic import groups, nothing, record, records, scene
 import crosscheck.processes.pool
 import crosscheck.study.grid
 import mbref.simulation.simulate
+from crosscheck.conformance.suite import Conformance, Verdict
 from crosscheck.judge.model_identity import gate_times
 from crosscheck.judge.truth import truth_for
 from mbref.trajectory import Outcome
@@ -28,6 +31,8 @@ from reports.sections import (
     speed,
     summary,
 )
+
+VERIFIED = [Conformance("mujoco", "1.0", [Verdict("truth", "door", "pass")]).to_record()]
 
 
 def table(parts, word: str) -> Table:
@@ -61,9 +66,15 @@ def test_every_section_and_a_heading(monkeypatch):
         assert heading in headings, (heading, headings)
 
 
+def test_sections_are_documented():
+    page = (Path(__file__).parents[2] / "docs" / "compare.md").read_text()
+    told = page.split("## Sections of a report")[1].split("The section `conformance`")[0]
+    assert re.findall(r"`(\w+)`", told) == [*NAMES, "paper"]
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_section_alone_and_its_blocks(name):
-    alone, everything = blocks(groups(), [name]), blocks(groups())
+    alone, everything = blocks(groups(), [name], VERIFIED), blocks(groups(), verified=VERIFIED)
     assert alone and len(alone) < len(everything), (len(alone), len(everything))
 
 

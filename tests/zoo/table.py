@@ -1,4 +1,5 @@
-"""The table of cards and the defects that prove them: ``python -m tests.zoo.table docs/conformance.md``."""
+"""The table of cards and the defects that prove them, written by ``python -m tests.zoo.table
+docs/conformance.md``, and the same as data for reports."""
 
 from __future__ import annotations
 
@@ -6,9 +7,11 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from crosscheck.conformance import suite
 from crosscheck.conformance.suite import Verdict, abouts
 from tests.zoo.defects import DEFECTS
 
+FOR_REPORTS = Path(suite.__file__).with_name("proved_by.toml")
 HEAD = f"""# What the conformance suite checks, and what proves that it does
 
 `crosscheck verify ENGINE` holds an engine against the cards below; `docs/verify-your-engine.md` tells how.
@@ -45,5 +48,14 @@ def _defects() -> Iterator[str]:
         yield f"| {defect.about} | {defect.scene} | {defect.card} |"
 
 
+def data() -> str:
+    """The defects, each with the scene and the card that tells it, as TOML."""
+    lines = ("[[defect]]", "about = {about!r}", "scene = {scene!r}", "card = {card!r}", "")
+    head = "# Written by `python -m tests.zoo.table docs/conformance.md`.\n\n"
+    told = (line.format(**defect._asdict()) for defect in DEFECTS.values() for line in lines)
+    return head + "\n".join(told)
+
+
 if __name__ == "__main__":
     Path(sys.argv[1]).write_text(page())
+    FOR_REPORTS.write_text(data())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from crosscheck.conformance.features import undetermined
 from crosscheck.conformance.properties import PROPERTIES
 from crosscheck.conformance.runners import InProcess
 from tests.zoo.defects import DEFECTS, engine
-from tests.zoo.table import page
+from tests.zoo.table import FOR_REPORTS, data, page
 
 SPECIMENS = {s.scene.name: s for s in [trial.Specimen(undetermined()), *trial.specimens()]}
 
@@ -53,3 +54,5 @@ def test_page_of_cards_and_the_table():
     """docs/conformance.md is what its command writes."""
     path = Path(__file__).parents[2] / "docs" / "conformance.md"
     assert path.read_text() == page(), "python -m tests.zoo.table docs/conformance.md renews it"
+    assert FOR_REPORTS.read_text() == data(), "the same command renews it"
+    assert set(tomllib.loads(data())["defect"][0]) == {"about", "scene", "card"}

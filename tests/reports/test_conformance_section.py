@@ -1,0 +1,73 @@
+"""The section on conformance: what `crosscheck verify --json` prints / counts, violations, causes."""
+
+import json
+
+import pytest
+
+from crosscheck.conformance import explained
+from crosscheck.conformance.properties import PROPERTIES
+from crosscheck.conformance.suite import FIRST, Conformance, Verdict
+from crosscheck.engine import BUILT_IN
+from reports import stored
+from reports.blocks import Table, Text
+from reports.sections import conformance
+
+VERDICTS = (
+    Verdict("truth", "door", "pass", 1e-12, 1e-6),
+    Verdict("truth", "pendulum", "fail", 2e-3, 1e-6),
+    Verdict("closure", "door", "cannot", reason="no such joint"),
+    Verdict("energy", "door", "outside", reason="a driver moves it"),
+)
+
+
+@pytest.fixture
+def verified(tmp_path):
+    folder = tmp_path / "conformance"
+    folder.mkdir()
+    for name, verdicts in (("exudyn", VERDICTS[:1]), ("mujoco", VERDICTS)):
+        record = Conformance(name, "1.0", verdicts).to_record()
+        (folder / f"{name}.json").write_text(json.dumps(record))
+    return stored.verified(tmp_path)
+
+
+def test_cards_of_every_engine_and_their_counts(verified):
+    assert [found["engine"] for found in verified] == ["mujoco", "exudyn"], "in the order of the engines"
+    _, text, cards, *_ = conformance.render(verified)
+    assert (
+        isinstance(text, Text) and "MuJoCo 1.0: 1 verdicts hold, 1 violated, 1 cannot be asked" in text.text
+    )
+    rows = {row[0]: tuple(row[2:]) for row in cards.rows}
+    proofs = sum(proof.card == "truth" for proof in explained.proofs())
+    assert rows[f"truth/{PROPERTIES['truth'].version}"] == (str(proofs), "✓ 1, ✗ 1", "✓ 1")
+    assert rows["closure/1"][1:] == ("–", "○") and rows[VERDICTS[3].card()][1:] == ("○", "○")
+
+
+def test_a_violation_has_numbers_cause_and_remedy(verified, monkeypatch):
+    [row] = violations(verified).rows
+    assert row == (
+        "MuJoCo",
+        "pendulum",
+        VERDICTS[1].card(),
+        "2.0e-03",
+        "1.0e-06",
+        conformance.UNEXPLAINED,
+        "–",
+    )
+    known = {("mujoco", "truth", "pendulum"): explained.Explanation("It slips.", "Hold it.")}
+    monkeypatch.setattr(conformance, "explanations", lambda: known)
+    assert violations(verified).rows[0][-2:] == ("It slips.", "Hold it.")
+
+
+def violations(verified) -> Table:
+    [found] = [b for b in conformance.render(verified) if isinstance(b, Table) and "Remedy" in b.header]
+    return found
+
+
+def test_without_records_there_is_no_section(tmp_path):
+    assert conformance.render(stored.verified(tmp_path)) == []
+
+
+def test_explanations_are_of_engines_and_cards_that_exist():
+    for engine, card, _ in explained.explanations():
+        assert engine in BUILT_IN and card in {*FIRST, *PROPERTIES}, (engine, card)
+    assert {proof.card for proof in explained.proofs()} == {*FIRST, *PROPERTIES}
