@@ -9,7 +9,7 @@ from crosscheck.judge.truth import truth_for
 from crosscheck.processes.pool import run_isolated
 from mbref.scenes import find_scene
 
-scene = find_scene("spatial_slider_crank").with_(duration=0.02)
+scene = find_scene("spatial_slider_crank").with_(duration=0.01)
 times = np.linspace(0.0, scene.duration, 11)
 truth = truth_for(scene)
 

@@ -16,7 +16,7 @@ from mbref.scenes import SCENES
 from mbref.trajectory import Trajectory
 
 SCENE, SAMPLES = "planar_slider_crank_equal", 161
-FINE = 4001  # instants at which the Jacobian is looked at
+FINE = 1001  # instants at which the Jacobian is looked at
 NEAR = 0.05  # a smallest singular value below this, and least among its neighbours, is a passage
 
 

@@ -12,6 +12,7 @@ from crosscheck.cli.commands import main
 from crosscheck.conformance import suite, trial
 from crosscheck.conformance.features import undetermined
 from crosscheck.conformance.relations import shaken
+from crosscheck.conformance.runners import Isolated
 from crosscheck.conformance.trial import specimens
 from crosscheck.judge.truth import truth_for
 
@@ -47,10 +48,10 @@ def test_verify_command_and_an_engine_that_breaks_the_contract(capsys, monkeypat
 def test_what_a_run_leaves_to_the_next_and_the_property_that_tells(fake, status, monkeypatch):
     """Of two engines that repeat themselves in processes of their own one does not within a process."""
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
-    found = suite.verify(f"fake_engines:{fake}", [SPECIMENS["pendulum"]], 60.0)
-    verdicts = {v.property: v for v in found.verdicts if v.scene == "pendulum"}
-    assert verdicts["repeated"].status == status, verdicts["repeated"]
-    assert verdicts["reordered"].status == "pass", verdicts["reordered"]
+    bench = trial.set_up(Isolated(f"fake_engines:{fake}", 60.0), SPECIMENS["pendulum"])
+    repeated, reordered = (suite.verdict_on(card, bench) for card in ("repeated", "reordered"))
+    assert repeated.status == status, repeated
+    assert reordered.status == "pass", reordered
 
 
 def test_shaken_scene_and_truth():

@@ -57,8 +57,9 @@ def test_plug_in_and_truth_and_gate(installed):
     assert error is not None and error < 1e-8, f"tiny at {setting}: error {error}, allowed 1e-8"
 
 
-def test_plug_in_and_conformance(installed, capsys):
-    assert main(["verify", "tiny", "--scene", "pendulum", "--scene", "spatial_slider_crank"]) == 0
+@pytest.mark.parametrize("scene", ["free_fall", pytest.param("pendulum", marks=pytest.mark.slow)])
+def test_plug_in_and_conformance(installed, capsys, scene):
+    assert main(["verify", "tiny", "--scene", scene, "--scene", "spatial_slider_crank"]) == 0
     out = capsys.readouterr().out
     assert "0 fail" in out and "cannot: spatial_slider_crank" in out, out
 

@@ -202,7 +202,8 @@ def test_unknown_engine_is_refused_before_anything_starts():
 def test_interrupting_the_parent_ends_the_child(tmp_path: Path):
     pid = tmp_path / "pid"
     script = (
-        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "import signal, sys; sys.path.insert(0, sys.argv[1])\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a shell's background job ignores it
         "from test_isolate import run, still\n"
         "run('HANG', still(sys.argv[2]), 60.0)\n"
     )

@@ -17,9 +17,9 @@ from tests.crosscheck.tree_scenes import driven, every_joint
 pinocchio = pytest.importorskip("pinocchio")
 
 PAPER = {  # scene: duration, s
-    "planar_slider_crank": 0.2,
-    "planar_slider_crank_equal": 0.2,
-    "planar_slider_crank_gravity": 1.0,
+    "planar_slider_crank": 0.08,
+    "planar_slider_crank_equal": 0.1,
+    "planar_slider_crank_gravity": 0.4,
     "spatial_slider_crank": 0.02,
     "spatial_slider_crank_driven": 0.2,
     "four_bar": 0.1,

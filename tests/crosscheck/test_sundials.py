@@ -19,11 +19,11 @@ from tests.crosscheck.tree_scenes import driven, every_joint, ring
 pytest.importorskip("sksundae", reason="the optional engine SUNDIALS needs scikit-sundae")
 
 REGULAR = {  # scene: duration (s) without a singular position
-    "planar_slider_crank": 0.1,
-    "planar_slider_crank_gravity": 0.3,
+    "planar_slider_crank": 0.05,
+    "planar_slider_crank_gravity": 0.15,
     "spatial_slider_crank": 0.01,
     "spatial_slider_crank_driven": 0.05,
-    "spatial_slider_crank_gravity": 0.3,
+    "spatial_slider_crank_gravity": 0.15,
     "four_bar": 0.012,
     "five_bar": 0.012,
     "four_bar_gravity": 0.15,

@@ -1,0 +1,221 @@
+"""One-line defects in mbref, and the tests that have to see each; why these: ``defects.py``."""
+
+from __future__ import annotations
+
+from tests.mutants.defect import Defect
+
+BY_HAND, SCENE, RECORDS = (f"tests/mbref/test_{name}.py" for name in ("by_hand", "scene", "records"))
+LIMITS, CACHES, FORMULAS = (f"tests/mbref/test_{name}.py" for name in ("limits", "caches", "formulations"))
+TAYLOR, ENSEMBLE, NAMES = (f"tests/mbref/test_{name}.py" for name in ("taylor", "ensemble", "names"))
+SCREW = f"{TAYLOR}::test_springs_dampers_and_torsion_springs_in_three_dimensions"
+TRUTHS = "tests/crosscheck/test_mbref_and_truth.py"
+PRIMITIVES = "tests/properties/test_primitives.py"
+P, L = "mbref/equations/primitives.py", "mbref/equations/loads.py"
+V, F, R = "mbref/scene_validation.py", "mbref/scene_fields.py", "mbref/records.py"
+TL, TS = "mbref/taylor/loads.py", "mbref/taylor/samples.py"
+
+DEFECTS = (
+    # equations of mbref
+    Defect(P, "argument = frequency * t + drivers.phase[d]", "argument = frequency * t", BY_HAND),
+    Defect(
+        P, "acceleration = acceleration * t + 2.0 * rate", "acceleration = acceleration * t + rate", BY_HAND
+    ),
+    Defect(P, "rate += amplitude * frequency * cos(argument)", "rate += amplitude * cos(argument)", BY_HAND),
+    Defect(
+        P,
+        "acceleration -= amplitude * frequency * frequency * sin(argument)",
+        "acceleration += amplitude * frequency * frequency * sin(argument)",
+        BY_HAND,
+    ),
+    Defect(
+        P,
+        "return direction, scale(-rate, along), second",
+        "return direction, scale(rate, along), second",
+        BY_HAND,
+    ),
+    Defect(
+        P,
+        "second = subtract(scale(-acceleration, along), scale(rate * rate, direction))",
+        "second = add(scale(-acceleration, along), scale(rate * rate, direction))",
+        f"{PRIMITIVES}::test_gamma_and_rate_of_velocity_equations",
+    ),
+    Defect(
+        P,
+        "+ 2.0 * dot(to_world(rotation, i, turn_i), to_world(rotation, j, turn_j))",
+        "+ dot(to_world(rotation, i, turn_i), to_world(rotation, j, turn_j))",
+        f"{PRIMITIVES}::test_gamma_and_rate_of_velocity_equations",
+    ),
+    Defect(
+        P,
+        "put(blocks, row + k, 3, cross(s_i, to_body(a, i, world)))",
+        "put(blocks, row + k, 3, cross(s_j, to_body(a, i, world)))",
+        f"{PRIMITIVES}::test_jacobian_and_difference_of_phi",
+    ),
+    Defect(
+        L,
+        "accumulate(g, 6 * b + 3, cross(point, to_body(frames.rotation, b, force)))",
+        "accumulate(g, 6 * b + 3, cross(point, force))",
+        "tests/crosscheck/test_constraints.py",
+    ),
+    Defect(
+        L,
+        "gyroscopic = cross((inertia[b, 0] * w[0], inertia[b, 1] * w[1], inertia[b, 2] * w[2]), w)",
+        "gyroscopic = cross(w, (inertia[b, 0] * w[0], inertia[b, 1] * w[1], inertia[b, 2] * w[2]))",
+        BY_HAND,
+    ),
+    Defect(
+        L, "+ loads.damping[k] * rate\n        force", "- loads.damping[k] * rate\n        force", BY_HAND
+    ),
+    Defect(L, "push(j, s_j, scale(-1.0, force), frames, g)", "push(j, s_j, force, frames, g)", BY_HAND),
+    Defect(
+        L,
+        "loads.stiffness[k] * (angle - loads.natural[k])",
+        "loads.stiffness[k] * (angle + loads.natural[k])",
+        BY_HAND,
+    ),
+    Defect(L, "rate = dot(subtract(w_j, w_i), axis)", "rate = dot(subtract(w_i, w_j), axis)", BY_HAND),
+    Defect(
+        L,
+        "accumulate(g, 6 * i + 3, to_body(rotation, i, scale(-1.0, moment)))",
+        "accumulate(g, 6 * i + 3, to_body(rotation, i, moment))",
+        BY_HAND,
+    ),
+    Defect(
+        L,
+        "accumulate(g, 6 * body + 3, to_body(frames.rotation, body, vector(loads.force, k)))",
+        "accumulate(g, 6 * body + 3, vector(loads.force, k))",
+        BY_HAND,
+    ),
+    Defect(
+        "mbref/stabilisation/baumgarte.py",
+        'return 2 * options["alpha"], options["beta"] ** 2',
+        'return 2 * options["beta"], options["alpha"] ** 2',
+        BY_HAND,
+    ),
+    Defect(
+        "mbref/equations/joint_reactions.py",
+        "sign = np.where(side == 1, 1.0, -1.0)",
+        "sign = np.where(side == 1, 1.0, 1.0)",
+        BY_HAND,
+    ),
+    Defect("mbref/equations/joint_reactions.py", "- np.cross(arm, force)", "+ np.cross(arm, force)", BY_HAND),
+    Defect(
+        "mbref/formulations/lm1.py",
+        "system.acceleration[j] = b[j] * root[j]",
+        "system.acceleration[j] = b[j]",
+        FORMULAS,
+    ),
+    Defect("mbref/formulations/lm1.py", "multipliers[i] *= b[n + i]", "multipliers[i] = b[n + i]", FORMULAS),
+    # doors of mbref
+    Defect(V, "tolerance = INERTIA_TOLERANCE", "tolerance = 1e9 * INERTIA_TOLERANCE", SCENE),
+    Defect(
+        V,
+        "if moments[2] > moments[0] + moments[1] + tolerance:",
+        "if moments[2] > moments[0] + moments[1] + 9:",
+        SCENE,
+    ),
+    Defect(V, "amplitude * math.sin(phase)\n    return", "amplitude * math.cos(phase)\n    return", BY_HAND),
+    Defect(V, 'RESERVED = (GROUND, "the fixed frame")', "RESERVED = (GROUND,)", SCENE),
+    Defect(F, "if value < SMALLEST:", "if value < 0:", SCENE),
+    Defect(F, "if abs(value) > LARGEST:", "if value > 1e300:", SCENE),
+    Defect("mbref/scene.py", 'encoding="utf-8-sig"', 'encoding="utf-8"', SCENE),
+    Defect(
+        "mbref/simulation/limits.py", '"rtol": (FINEST, 0.99, False)', '"rtol": (FINEST, 0.99, True)', LIMITS
+    ),
+    Defect(
+        "mbref/simulation/limits.py",
+        "object.__setattr__(self, field.name, _checked",
+        "(lambda *_: None)(self, field.name, _checked",
+        LIMITS,
+    ),
+    Defect("mbref/simulation/limits.py", "isinstance(value, str | bool)", "isinstance(value, str)", LIMITS),
+    Defect("mbref/cli/options.py", '.replace("largest_step", "max-step")', "", LIMITS),
+    # records and caches
+    Defect(
+        R,
+        'record["key"]: record for record in lines',
+        'record["key"]: record for record in lines[::-1]',
+        RECORDS,
+    ),
+    Defect(R, "os.truncate(path, end)", "os.truncate(path, 0)", RECORDS),
+    Defect(R, "if text and len(foreign) == len(lines):", "if False:", RECORDS),
+    Defect(R, "file.truncate(before)", "pass", RECORDS),
+    Defect(R, "enumerate(lines, 1)", "enumerate(lines)", RECORDS),
+    Defect(R, "parse_constant=_refused", "parse_constant=float", RECORDS),
+    Defect(
+        "mbref/kernels/checked_file.py", "if hashlib.sha256(data).digest() == digest:", "if data:", CACHES
+    ),
+    Defect("mbref/kernels/checked_file.py", "os.replace(temporary, path)", "path.write_bytes(data)", CACHES),
+    # the Taylor method
+    Defect(
+        TL,
+        "springs.damping[s] * product(of[RATE], of[INVERSE], k)",
+        "springs.damping[s] * product(of[RATE], of[LENGTH], k)",
+        SCREW,
+    ),
+    Defect(
+        TL,
+        "i * (of[COS, k - i] * of[SIN, i] - of[SIN, k - i] * of[COS, i])",
+        "i * (of[COS, k - i] * of[SIN, i] + of[SIN, k - i] * of[COS, i])",
+        SCREW,
+    ),
+    Defect(
+        TS, "factor = (1.0 if side >= 0.0 else -1.0) / sqrt(square)", "factor = 1.0 / sqrt(square)", SCREW
+    ),
+    Defect(TS, "x, y, z = a[7] - a[5],", "x, y, z = a[5] - a[7],", SCREW),
+    Defect(
+        TS,
+        "if watch.smallest_pivot < BESIDE * watch.reference_pivot:",
+        "if False:",
+        f"{TAYLOR}::test_a_scene_as_by_the_general_kernels[planar_slider_crank_equal-0.2]",
+    ),
+    Defect(
+        "mbref/taylor/series.py",
+        "terms[k + 2, r] *= (k + 1) * (k + 2)",
+        "terms[k + 2, r] *= (k + 1) * (k + 1)",
+        SCREW,
+    ),
+    Defect(
+        "mbref/taylor/stepping.py",
+        "** (1.0 / k))",
+        "** (1.0 / (k + 1)))",
+        f"{TAYLOR}::test_errors_fall_with_the_tolerance[spatial_slider_crank_gravity]",
+    ),
+    Defect(
+        "mbref/taylor/natural.py",
+        "np.cos(drivers.phase[d])",
+        "np.cos(0.0 * drivers.phase[d])",
+        f"{TAYLOR}::test_bodies_without_mass_move_as_drivers_prescribe",
+    ),
+    # ensembles and the command line
+    Defect(
+        "mbref/simulation/ensemble.py",
+        "identity = [scene.to_dict(), times.tolist(), str(method)",
+        "identity = [scene.to_dict(), str(method)",
+        f"{ENSEMBLE}::test_other_limits_and_stored_results_are_not_confused",
+    ),
+    Defect(
+        "mbref/simulation/ensemble.py",
+        "            if key in known:",
+        "            if False:",
+        f"{ENSEMBLE}::test_interrupted_and_uninterrupted_ensembles_agree",
+    ),
+    Defect(
+        "mbref/cli/ensemble.py",
+        "values.std(axis=0)",
+        "values.std(axis=0, ddof=1)",
+        f"{ENSEMBLE}::test_command_and_single_runs_agree",
+    ),
+    Defect(
+        "mbref/cli/run.py",
+        "{cost.steps} steps, {cost.rejected} rejected, {cost.rhs} evaluations",
+        "{cost.steps} steps, {cost.rhs} rejected, {cost.rejected} evaluations",
+        NAMES,
+    ),
+    Defect(
+        "mbref/simulation/singular_crossing.py",
+        "return 2.0 * (pivot + WINDOW) / slope",
+        "return 4.0 * (pivot + WINDOW) / slope",
+        f"{TRUTHS}::test_singular_positions_and_truth[1e-07-four_bar_straight-0.1-4]",
+    ),
+)
