@@ -18,7 +18,9 @@ from mbref.scene import (
     Sine,
 )
 from mbref.trajectory import Outcome, Trajectory
+from tests.crosscheck.measured import MARGIN
 
+MEASURED = 1.6e-10  # part of the largest force
 SIDEWAYS = (0.6, 0.0, 0.8)  # an axis along no coordinate axis
 INERTIA = ((0.02, 0.002, -0.001), (0.002, 0.03, 0.003), (-0.001, 0.003, 0.025))
 BODY = Body(
@@ -72,7 +74,9 @@ def test_reaction_and_newton_euler_agree(kind: str, driven: bool, bodies: tuple[
     assert trajectory.outcome is Outcome.COMPLETED, trajectory.message
     needed = needed_wrench(scene, trajectory)
     off = np.abs(trajectory.reactions["J"] - needed).max()
-    assert off < 1e-6 * np.abs(needed).max(), f"off by {off:.2e}:\n{trajectory.reactions['J']}\n{needed}"
+    assert off < MARGIN * MEASURED * np.abs(needed).max(), (
+        f"off by {off:.2e}:\n{trajectory.reactions['J']}\n{needed}"
+    )
 
 
 def test_reactions_without_reliable_accelerations_are_not_given():

@@ -1,0 +1,69 @@
+"""The Taylor method / motions that are formulas: springs, drivers, full turns, and a driver's phase."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from crosscheck.conformance.closed_forms import CLOSED_FORMS
+from mbref import rotations
+from mbref.scene import Body, Driver, Revolute, Scene, Sine
+from mbref.simulation.simulate import Limits, simulate
+
+FINE = Limits(rtol=1e-12)
+
+
+@pytest.mark.parametrize("form", CLOSED_FORMS, ids=lambda form: form.__name__)
+def test_a_closed_form(form):
+    scene, exact = form()
+    times = np.linspace(0.0, scene.duration, 9)
+    run = simulate(scene, "taylor", times, FINE)
+    position, orientation = exact(times)
+    assert run.outcome.name == "COMPLETED", run.message
+    off = np.abs(run.position - position).max()
+    turned = rotations.angle_between(run.orientation, orientation).max()
+    assert max(off, turned) < 1e-10, f"{scene.name}: off by {off:.1e} m, {turned:.1e} rad"
+
+
+@pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
+def test_quaternions_go_on_over_a_full_turn(axis):
+    """A body that spins about a principal axis by 4 π: its quaternion is that of the angle, sign and all."""
+    spin, times = 10.0, np.linspace(0.0, 0.4 * np.pi, 41)
+    body = Body(name="b", mass=2.0, inertia=(0.1, 0.2, 0.25), position=(0.0, 0.0, 0.0),
+                angular_velocity=tuple(spin * a for a in axis))  # fmt: skip
+    run = simulate(Scene(name="spinning", body=(body,)), "taylor", times, FINE)
+    half = 0.5 * spin * times
+    exact = np.column_stack([np.cos(half), np.outer(np.sin(half), axis)])
+    off = np.abs(run.orientation[:, 0] - exact).max()
+    assert off < 1e-10, f"off by {off:.1e}"
+
+
+def test_drivers_of_a_chain_and_their_phases():
+    """The second arm's driver is relative to the first's; both begin in the middle of their sines."""
+    z, rod = (0.0, 0.0, 1.0), {"mass": 1.0, "inertia": (0.1, 0.2, 0.2)}
+    sines = [Sine(amplitude=a, frequency=f, phase=p) for a, f, p in ((0.4, 3.0, 0.7), (0.5, 2.0, -0.9))]
+    scene = Scene(
+        name="driven arms",
+        body=(
+            Body(name="a", position=(0.5, 0.0, 0.0), **rod),
+            Body(name="b", position=(1.5, 0.0, 0.0), **rod),
+        ),
+        joint=(
+            Revolute(name="A", bodies=("ground", "a"), anchor=(0.0, 0.0, 0.0), axis=z),
+            Revolute(name="B", bodies=("a", "b"), anchor=(1.0, 0.0, 0.0), axis=z),
+        ),
+        driver=tuple(
+            Driver(joint=j, polynomial=(-s.amplitude * np.sin(s.phase),), sine=s)
+            for j, s in zip("AB", sines, strict=True)
+        ),
+    )
+    times = np.linspace(0.0, 1.0, 9)
+    run = simulate(scene, "taylor", times, FINE)
+    first, second = (s.amplitude * (np.sin(s.frequency * times + s.phase) - np.sin(s.phase)) for s in sines)
+    rate = sum(s.amplitude * s.frequency * np.cos(s.frequency * times + s.phase) for s in sines)
+    at = np.column_stack([np.cos(first), np.sin(first)]) + 0.5 * np.column_stack(
+        [np.cos(first + second), np.sin(first + second)]
+    )
+    assert run.outcome.name == "COMPLETED", run.message
+    assert np.abs(run.position[:, 1, :2] - at).max() < 1e-10
+    assert np.abs(run.angular_velocity[:, 1, 2] - rate).max() < 1e-9
