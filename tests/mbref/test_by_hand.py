@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from mbref.cli.run import show
 from mbref.equations.joint_reactions import reactions
 from mbref.equations.model import Model
 from mbref.formulations import FORMULATIONS
+from mbref.kernels.layout import History
+from mbref.kernels.named_memory import allocate
 from mbref.scene import (
     Body,
     Driver,
@@ -22,7 +26,9 @@ from mbref.scene import (
     TorsionSpring,
     Translational,
 )
+from mbref.simulation.singular_crossing import WINDOW, leap_length
 from mbref.stabilisation import STABILISATIONS
+from mbref.trajectory import Cost, Outcome, Trajectory
 
 SINE = Sine(amplitude=0.3, frequency=2.0, phase=0.4)
 POLYNOMIAL = (-0.3 * math.sin(0.4), 0.7, -0.2, 0.05)
@@ -65,6 +71,28 @@ def test_body_on_a_driven_slide(t: float):
     assert np.abs(terms.phi).max() < 1e-14
     assert np.abs(terms.jacobian @ (rate * along) - terms.nu).max() < 1e-14
     assert np.abs(terms.jacobian @ (acceleration * along) - terms.gamma).max() < 1e-14
+
+
+def test_leap_over_the_window_of_a_singular_position():
+    """Half a window from zero, one window in 2 ms: 1 ms to zero, 2 ms more to the far edge, and twice that."""
+    history = allocate(History, {"nb": 1})
+    history.time[:2], history.pivot[:2] = (0.0, 2e-3), (1.5 * WINDOW, 0.5 * WINDOW)
+    assert leap_length(history, 1) == pytest.approx(2 * 3e-3)
+    assert leap_length(history, 0) == 0.0, "a single state has no slope"
+    history.pivot[:2] = (2.5 * WINDOW, 1.5 * WINDOW)
+    assert leap_length(history, 1) == 0.0, "the window is still ahead"
+
+
+def test_cost_that_a_run_prints(capsys):
+    cost = Cost(1.25, 2.5, steps=11, rejected=22, rhs=33, factorisations=44, newton=55)
+    none = Trajectory.failed(scene="s", engine="e", version="1", method="m", settings={}, bodies=("ball",),
+                             outcome=Outcome.TIMED_OUT, message="")  # fmt: skip
+    show(Scene(name="s", body=(BALL,)), replace(none, cost=cost))
+    assert capsys.readouterr().out.splitlines()[1:] == [
+        "11 steps, 22 rejected, 33 evaluations",
+        "44 factorisations, 55 Newton iterations",
+        "1.25 s of stepping, 2.5 s of building",
+    ]
 
 
 def test_gains_of_baumgarte():

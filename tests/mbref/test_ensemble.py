@@ -87,8 +87,10 @@ def test_other_limits_and_stored_results_are_not_confused(tmp_path: Path):
     with ThreadPoolExecutor(1) as one:
         [(_, rough)] = ensemble([DRIVEN], TIMES, METHOD, Limits(rtol=1e-4), one, path)
         [(_, fine)] = ensemble([DRIVEN], TIMES, METHOD, Limits(rtol=1e-10), one, path)
+        [(_, short)] = ensemble([DRIVEN], TIMES[:2], METHOD, Limits(rtol=1e-4), one, path)
     assert fine.cost.rhs > rough.cost.rhs, (fine.cost, rough.cost)
-    assert len(path.read_text().splitlines()) == 2
+    assert len(short.times) == 2, "other sample times are another run"
+    assert len(path.read_text().splitlines()) == 3
 
 
 def test_faulty_scene_is_refused_whole_out_of_another_process():

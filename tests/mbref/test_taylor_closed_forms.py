@@ -1,13 +1,15 @@
-"""The Taylor method / motions that are formulas: springs, drivers, full turns, and a driver's phase."""
+"""The Taylor method / motions that are formulas: springs, drivers, full turns, phases, errors asked for."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from crosscheck.conformance.closed_forms import CLOSED_FORMS
+from crosscheck.conformance.closed_forms import CLOSED_FORMS, pendulum, torsion
+from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import Body, Driver, Revolute, Scene, Sine
+from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
 
 FINE = Limits(rtol=1e-12)
@@ -23,6 +25,29 @@ def test_a_closed_form(form):
     off = np.abs(run.position - position).max()
     turned = rotations.angle_between(run.orientation, orientation).max()
     assert max(off, turned) < 1e-10, f"{scene.name}: off by {off:.1e} m, {turned:.1e} rad"
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8])
+@pytest.mark.parametrize("form", [pendulum, torsion], ids=lambda form: form.__name__)
+def test_the_error_is_about_the_tolerance(form, rtol):
+    """Steps are as long as the last terms allow: errors are 0.5 to 1.6 tolerances."""
+    scene, exact = form()
+    times = np.linspace(0.0, scene.duration, 3)
+    turned = simulate(scene, "taylor", times, Limits(rtol=rtol)).orientation
+    error = rotations.angle_between(turned, exact(times)[1]).max()
+    assert 0.1 * rtol < error < 4.0 * rtol, f"{scene.name}: {error:.1e} rad for {rtol:g}"
+
+
+def test_a_sample_beside_a_singular_position():
+    """A microsecond before and after it the formulation alone would find no acceleration."""
+    scene = SCENES["planar_slider_crank_equal"]()
+    truth, upright = truth_for(scene), 0.06119206833987707  # s, when the crank stands upright
+    times = upright + np.array([-1e-6, 1e-6])
+    exact, run = truth.poses(times), simulate(scene, "taylor", times, Limits(rtol=1e-10))
+    assert run.outcome.name == "COMPLETED", run.message
+    assert np.abs(exact.position[:, 0, 0]).max() < 1e-5, "the crank is elsewhere"
+    off = np.abs(run.acceleration - exact.acceleration).max() / np.abs(exact.acceleration).max()
+    assert off < 1e-5, f"accelerations are off by {off:.1e} of the largest"
 
 
 @pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
