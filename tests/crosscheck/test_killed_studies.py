@@ -11,8 +11,9 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
 HERE = Path(__file__).parent
-RUNS, KILLS = 80, 6
 PROGRAM = """
 import sys
 sys.path[:0] = [{root!r}, {here!r}]
@@ -31,8 +32,9 @@ study(cases, ThreadPoolExecutor(2), {path!r}, run=run_here)
 """
 
 
-def test_kills_of_a_study_lose_nothing(tmp_path: Path):
-    runs, times, path, log = RUNS, KILLS, tmp_path / "records.jsonl", tmp_path / "log"
+@pytest.mark.parametrize(("runs", "times"), [(60, 4), pytest.param(200, 20, marks=pytest.mark.slow)])
+def test_kills_of_a_study_lose_nothing(runs: int, times: int, tmp_path: Path):
+    path, log = tmp_path / "records.jsonl", tmp_path / "log"
     program = PROGRAM.format(
         root=str(HERE.parents[1]), here=str(HERE), runs=runs, path=str(path), log=str(log)
     )

@@ -74,7 +74,7 @@ def test_body_on_a_driven_slide(t: float):
 
 
 def test_leap_over_the_window_of_a_singular_position():
-    """Half a window from zero, one window in 2 ms: 1 ms to zero, 2 ms more to the far edge, and twice that."""
+    """Half a window from zero, one window in 2 ms: 1 ms to zero, 2 ms more to the far edge, twice that."""
     history = allocate(History, {"nb": 1})
     history.time[:2], history.pivot[:2] = (0.0, 2e-3), (1.5 * WINDOW, 0.5 * WINDOW)
     assert leap_length(history, 1) == pytest.approx(2 * 3e-3)
