@@ -14,7 +14,7 @@ from crosscheck.judge.constraints import closure, closure_rates, initial_poses, 
 from tests.crosscheck.measured import MARGIN
 
 ENGINES = ("mujoco", "pinocchio", "exudyn")
-MEASURED = {  # the largest error of 124 mechanisms, times the distance to a singular position, which magnifies
+MEASURED = {  # largest error of 124 mechanisms, times the distance to a singular position, which magnifies
     "mujoco": 4.8e-10, "pinocchio": 1.7e-13, "exudyn": 2.1e-8, PRINCIPLE: 9.3e-14,
 }  # fmt: skip
 MANY, SOME = range(200), (1, 3, 5, 9, 10, 11, 12, 14, 15, 16)
