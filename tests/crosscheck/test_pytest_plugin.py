@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 from crosscheck.cli.commands import main
+from crosscheck.conformance import suite
 from crosscheck.conformance.findings import shrunk, violates
 from crosscheck.conformance.moving import moving_probes
 from crosscheck.conformance.runners import InProcess
+from crosscheck.engine import engine as find_engine
 from mbref.scene import Scene
 from tests.zoo.defects import DEFECTS, SOURCE, engine
 
@@ -61,7 +63,7 @@ def test_faulty_engine_and_its_finding(tmp_path, capsys, monkeypatch):
     command = path.read_text().splitlines()[1].removeprefix("# crosscheck ").split()
     assert command == ["verify", "spatial_engine:ENGINE", "--scene", str(path)], command
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(suite, "Isolated", lambda name, _: InProcess(find_engine(name), name))
     assert main(command) == 1
     assert "closure" in capsys.readouterr().out
 

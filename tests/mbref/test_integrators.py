@@ -104,9 +104,9 @@ def test_adams_error_and_its_order_when_bounded(error, order):
 
 
 SCENES_AND_TRUTHS = [
-    ("planar_slider_crank_gravity", 0.5, "mpi-svd+projection"),
-    ("spatial_slider_crank", 0.05, "lm1+projection"),
-    ("spatial_slider_crank", 0.05, "lm1+none"),
+    ("planar_slider_crank_gravity", 0.25, "mpi-svd+projection"),
+    ("spatial_slider_crank", 0.025, "lm1+projection"),
+    ("spatial_slider_crank", 0.025, "lm1+none"),
 ]
 
 

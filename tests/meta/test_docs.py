@@ -60,3 +60,10 @@ def test_commands_that_pages_run_are_commands():
     assert len(commands) > 5
     for program, *arguments in commands:
         assert program == "mbref" and callable(parser().parse_args(arguments).action)
+
+
+def test_tests_that_the_page_on_robustness_names_are_tests():
+    sources = "".join(path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))
+    named = set(re.findall(r"`(test_\w+)`", (DOCS / "robustness.md").read_text()))
+    assert len(named) > 30
+    assert not (missing := [name for name in named if f"def {name}(" not in sources]), missing

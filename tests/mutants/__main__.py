@@ -26,7 +26,7 @@ from tests.mutants.defects import DEFECTS, Defect
 ROOT = Path(__file__).parents[2]
 COPIED = ("mbref", "crosscheck", "reports", "tests", "examples", "benchmarks", "pyproject.toml", "README.md")
 KEPT = ROOT / "build" / "mutants.jsonl"
-MINUTES = 10  # after which the tests of a defect count as failed: it hangs
+MINUTES = 4  # after which the tests of a defect count as failed: it hangs
 JITTED = ("mbref/kernels/",)  # what plain Python does not run
 
 
