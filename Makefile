@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help check test lint deep shuffle fuzz mutants coverage report quick picture docs site bench clean
+.PHONY: help check test lint deep shuffle fuzz mutants coverage report quick reference picture docs site bench clean
 
 help: ## show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -47,6 +47,16 @@ report: $(VENV)/ready ## the whole comparison report, into report/
 
 quick: $(VENV)/ready ## a comparison report in about three minutes, into report/
 	$(BIN)/crosscheck report --quick
+
+PROBES := --scene "heavy top" --scene "universal joint" --scene "cylindrical driver" --scene door \
+    --scene "floating pair" --scene "two drivers"
+
+reference: $(VENV)/ready ## the committed report with its records, anew, into reports/reference/
+	rm -rf reports/reference && $(BIN)/crosscheck report --quick --out reports/reference
+	mkdir reports/reference/conformance
+	for engine in mbref mujoco pinocchio exudyn; do $(BIN)/crosscheck verify $$engine --json \
+	    $(PROBES) > reports/reference/conformance/$$engine.json; done
+	$(BIN)/crosscheck report --render reports/reference
 
 picture: $(VENV)/ready ## the README's moving picture, into reports/rendered/
 	$(BIN)/python -m reports --picture reports/rendered/passage.svg
