@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import time
 from collections.abc import Sequence
 from typing import Any
 
@@ -50,20 +51,24 @@ def _ensemble(options: argparse.Namespace) -> int:
     if options.count < 1 or not (options.workers is None or options.workers > 0):
         raise ValueError("--count and --workers: must be at least 1")
     scenes = variants(scene, [Variation.parse(text) for text in options.vary], options.count, options.seed)
-    runs = {}
+    runs, began = {}, time.perf_counter()
     with processes(options.workers) as pool, progress_bar("simulating", options.count) as progress:
         for place, run in ensemble(scenes, times, options.method, limits, pool, options.out):
             runs[place] = run
             progress(len(runs))
     completed = [run for _, run in sorted(runs.items()) if run.outcome.name == "COMPLETED"]
-    _show_spread(scene, float(times[-1]), completed, options)
+    rate = len(runs) / (time.perf_counter() - began)
+    _show_spread(scene, float(times[-1]), completed, rate, options)
     return 0 if len(completed) == options.count else 1
 
 
 def _show_spread(
-    scene: Scene, end: float, completed: Sequence[Trajectory], options: argparse.Namespace
+    scene: Scene, end: float, completed: Sequence[Trajectory], rate: float, options: argparse.Namespace
 ) -> None:
-    """Mean and standard deviation of every body over the completed runs, at the last time."""
+    """Mean and standard deviation of every body over the completed runs, at the last time.
+
+    ``rate`` is of runs per second of wall time, with the start of the processes.
+    """
     last = {key: np.array([getattr(run, key)[-1] for run in completed]) for key in QUANTITIES.values()}
     if options.json:
         spread = {
@@ -76,7 +81,7 @@ def _show_spread(
     seconds = sum(run.cost.seconds for run in completed)
     console().print(
         f"{scene.name}: {len(completed)} of {options.count} variants completed, "
-        f"{seconds:.3g} s of stepping in all"
+        f"{seconds:.3g} s of stepping in all, {rate:.3g} runs a second"
     )
     if completed:
         console().print(_table(scene, end, last))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array, vstack
 
 from mbref import rotations
 from mbref.equations.model import Model, displaced
@@ -158,6 +157,8 @@ def _sparse_velocities(
     model: Model, q: np.ndarray, v: np.ndarray, given: np.ndarray
 ) -> tuple[np.ndarray, float]:
     """The same by sparse solutions: nearest to the given velocities first, then least where open."""
+    from scipy.sparse import csr_array, vstack
+
     scale = np.tile(np.repeat([1.0, 1 / scene_length(model)], 3), model.nb)
     terms = model.blocks(0.0, q, v)
     jacobian, nu = model.sparse(terms.jacobian), terms.nu

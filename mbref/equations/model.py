@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from mbref import rotations
 from mbref.equations.coordinates import displace
@@ -34,6 +33,9 @@ from mbref.scene import (
     Joint,
     Scene,
 )
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 
 @dataclass(frozen=True)
@@ -122,6 +124,8 @@ class Model:
 
     def sparse(self, blocks: np.ndarray) -> csr_array:
         """Φ_q (m, n) from its blocks (m, 12), without zeros."""
+        from scipy.sparse import csr_array
+
         columns = self.entry_columns()
         row, entry = np.nonzero((blocks != 0) & (columns < self.n))
         return csr_array((blocks[row, entry], (row, columns[row, entry])), shape=(self.m, self.n))

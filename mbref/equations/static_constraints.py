@@ -19,12 +19,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mbref.equations.initial_state import Start
+from mbref.equations.initial_state import LARGE, Start
 from mbref.equations.model import Model, displaced
 from mbref.kernels.compilation import inlined
 from mbref.kernels.layout import SparseFactor, StaticRows
 from mbref.linear_algebra.minimum_norm import MinimumNorm
-from mbref.linear_algebra.redundancy import null_shares
+from mbref.linear_algebra.redundancy import dense_null_shares, null_shares
 from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation, unsigned
 
 STATES = 3  # random states at which rows are examined
@@ -147,10 +147,16 @@ def _shared(model: Model, start: Start, entries: np.ndarray, held: Sequence[Held
     rows = np.flatnonzero(_bears_on(model, entries, of_held))
     if rows.size:
         blocks = model.blocks(0.0, start.q, start.v).jacobian
-        solution = MinimumNorm(model.sparse(blocks), np.ones(model.n))
-        redundant = rows[null_shares(solution, rows) > REDUNDANT]
+        redundant = rows[_null_shares(model, blocks, rows) > REDUNDANT]
         columns[model.entry_columns()[redundant][entries[redundant]]] = True
     return columns[: model.n] & of_held
+
+
+def _null_shares(model: Model, blocks: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Share of each row in the left null space of the Jacobian whose blocks (m, 12) are given."""
+    if model.m <= LARGE:
+        return dense_null_shares(model.dense(blocks), rows)
+    return null_shares(MinimumNorm(model.sparse(blocks), np.ones(model.n)), rows)
 
 
 def _holding(

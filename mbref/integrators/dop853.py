@@ -1,8 +1,8 @@
 """DOP853: explicit Runge–Kutta of order 8 with error estimates of orders 5 and 3, adaptive.
 
 The 8(5,3) pair of Dormand and Prince (Hairer, Nørsett & Wanner, Solving Ordinary Differential Equations I,
-2nd edition, 1993, section II.5), with SciPy's coefficients.  The error of a step is the largest over the
-components, so that components at rest do not dilute it.
+2nd edition, 1993, section II.5).  The error of a step is the largest over the components, so that components
+at rest do not dilute it.
 """
 
 from __future__ import annotations
@@ -10,19 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Annotated, NamedTuple
 
-import scipy.integrate
 from numpy import sqrt
 
 from mbref.integrators.base import Integrator
+from mbref.integrators.dop853_tableau import ERROR3, ERROR5, STAGES, A, B, C
 from mbref.integrators.one_step import propose
 from mbref.kernels.compilation import exchangeable, inlined, kernel
 from mbref.kernels.layout import OK, STEP
 from mbref.kernels.named_memory import Matrix, Vector, opener
 from mbref.linear_algebra.vectors import copy, larger
-
-STAGES = 12
-A, B, C = scipy.integrate.DOP853.A[:STAGES, :STAGES], scipy.integrate.DOP853.B, scipy.integrate.DOP853.C
-ERROR3, ERROR5 = scipy.integrate.DOP853.E3[:STAGES], scipy.integrate.DOP853.E5[:STAGES]
 
 
 class Stages(NamedTuple):
@@ -58,7 +54,7 @@ def stages_to(last: int) -> Callable:
     """
     if last == 0:
         return no_stage
-    before, weighted, node = stages_to(last - 1), sum_with(A[last, :last]), float(C[last])
+    before, weighted, node = stages_to(last - 1), sum_with(A[last]), float(C[last])
 
     @kernel
     def stages(rates, t, h, y, y_new, k, memory):

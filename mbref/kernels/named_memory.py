@@ -15,7 +15,6 @@ the NamedTuple itself.  The table and its arrays stay in place while kernels run
 from __future__ import annotations
 
 import functools
-import re
 import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Annotated, Any
@@ -30,6 +29,7 @@ from numba.extending import NativeValue, infer_getattr, intrinsic, models, regis
 from numba.np.numpy_support import from_dtype
 
 from mbref.kernels.compilation import INDEX_TABLE, INDICES, MATRIX, PLAIN, UNSIGNED, VECTOR
+from mbref.kernels.dimensions import Shapes, check_sizes, size_of
 
 Vector = Annotated[np.ndarray, VECTOR]  # float64 (k,)
 Matrix = Annotated[np.ndarray, MATRIX]  # float64 (k, l)
@@ -39,7 +39,6 @@ Unsigned = Annotated[np.ndarray, UNSIGNED]  # uint32 (k,): indices without a tes
 Kernel = Callable[..., Any]  # annotated with its signature
 Address = Annotated[Any, "address"]  # of a packed schema that the reader names with ``opener``
 
-CACHE_LINE = 64  # bytes
 WORD, WORDS = ir.IntType(64), 3  # words of a field: address, rows, columns
 
 
@@ -72,6 +71,7 @@ class Field(typing.NamedTuple):
     kind: types.Type
     shape: tuple[str, ...]
     row: int
+    is_array: bool
 
 
 def is_record(schema: type) -> bool:
@@ -94,7 +94,7 @@ def fields_of(schema: type) -> Mapping[str, Field]:
     fields, row = {}, 0
     for name, hint in typing.get_type_hints(schema, include_extras=True).items():
         kind, shape = _kind_of(hint)
-        fields[name] = Field(name, kind, shape, row)
+        fields[name] = Field(name, kind, shape, row, isinstance(kind, types.Array))
         row += rows_of(kind.schema) if isinstance(kind, Named) else 1
     return fields
 
@@ -118,7 +118,7 @@ def _kind_of(hint: Any) -> tuple[types.Type, tuple[str, ...]]:
 def allocate(schema: type, sizes: Mapping[str, int], **given: Any) -> Any:
     """The schema with the fields ``given``, and zeros of the declared shapes for the others."""
     values = {}
-    for field, hint in zip(fields_of(schema).values(), typing.get_type_hints(schema).values(), strict=True):
+    for field, hint in zip(fields_of(schema).values(), _hints(schema), strict=True):
         if field.name in given:
             values[field.name] = given[field.name]
         elif isinstance(field.kind, Named):
@@ -126,37 +126,31 @@ def allocate(schema: type, sizes: Mapping[str, int], **given: Any) -> Any:
         elif isinstance(field.kind, types.Record):
             values[field.name] = record(hint())
         else:
-            shape = tuple(_size(part, sizes) for part in field.shape)
-            values[field.name] = _zeros(shape, str(field.kind.dtype))
+            shape = tuple(size_of(part, sizes) for part in field.shape)
+            values[field.name] = np.zeros(shape, dtype=_dtype(field.kind))
     return schema(**values)
 
 
-def _zeros(shape: tuple[int, ...], dtype: str) -> np.ndarray:
-    """Zeros from the beginning of a cache line on, where the processor loads its vectors fastest."""
-    size = int(np.prod(shape)) * np.dtype(dtype).itemsize
-    line = np.zeros(size + CACHE_LINE, dtype=np.uint8)
-    start = -line.ctypes.data % CACHE_LINE
-    return line[start : start + size].view(dtype).reshape(shape)
+@functools.cache
+def _hints(schema: type) -> tuple[Any, ...]:
+    """The types of a schema's fields."""
+    return tuple(typing.get_type_hints(schema).values())
+
+
+@functools.cache
+def _dtype(kind: types.Array) -> np.dtype:
+    """NumPy's type of the entries of an array."""
+    return np.dtype(str(kind.dtype))
 
 
 def stacked(schema: type, rows: Sequence[Any], sizes: Mapping[str, int] | None = None) -> Any:
     """A schema of arrays from one instance for each of their rows; ``sizes`` are of further dimensions."""
     columns = {}
     for k, field in enumerate(fields_of(schema).values()):
-        width = [_size(part, sizes or {}) for part in field.shape[1:]]
+        width = [size_of(part, sizes or {}) for part in field.shape[1:]]
         values = [row[k] for row in rows]
-        columns[field.name] = np.array(values, dtype=str(field.kind.dtype)).reshape(len(rows), *width)
+        columns[field.name] = np.array(values, dtype=_dtype(field.kind)).reshape(len(rows), *width)
     return schema(**columns)
-
-
-def _size(expression: str, sizes: Mapping[str, int]) -> int:
-    """The length of a dimension, an expression in the sizes' names that the schema's author wrote."""
-    return sizes[expression] if expression in sizes else int(eval(expression, {"max": max}, dict(sizes)))
-
-
-def _names(expression: str) -> set[str]:
-    """The sizes that an expression names."""
-    return set(re.findall(r"[a-z_]\w*", expression)) - {"max"}
 
 
 def record(values: Any) -> np.record:
@@ -170,10 +164,10 @@ class Packed:
     def __init__(self, values: Any):
         self.values = values
         if isinstance(values, np.record):
-            self.address = _record_address(values)
+            self.address = _address(values)
         else:
             leaves = list(_leaves(values))
-            _check_sizes(leaves)
+            check_sizes(tuple(leaf.shapes for leaf in leaves if leaf.field.is_array))
             self.table = np.array([_words(leaf) for leaf in leaves], dtype=np.int64).reshape(-1, WORDS)
             self.address = self.table.ctypes.data
             self._numba_type_ = _kind(type(values))  # of this argument, read by numba's dispatcher
@@ -198,63 +192,56 @@ class Leaf(typing.NamedTuple):
     field: Field
     value: Any
 
+    @property
+    def shapes(self) -> Shapes:
+        """What the sizes of an array are checked by."""
+        return self.name, self.field.shape, self.value.shape
+
 
 def _leaves(values: Any) -> Iterator[Leaf]:
     """All fields of a schema and of the schemas in it, each checked for its type."""
     schema = type(values)
     for field, value in zip(fields_of(schema).values(), values, strict=True):
         name = f"{schema.__name__}.{field.name}"
-        if isinstance(field.kind, Named):
+        if not field.is_array and isinstance(field.kind, Named):
             if type(value) is not field.kind.schema:
                 raise TypeError(f"{name}: needs {field.kind.schema.__name__}, got {type(value).__name__}")
             yield from _leaves(value)
         else:
-            _check_type(name, field.kind, value)
+            _check_type(name, field, value)
             yield Leaf(name, field, value)
 
 
-def _check_type(name: str, kind: types.Type, value: Any) -> None:
+def _check_type(name: str, field: Field, value: Any) -> None:
     """TypeError unless an array or record has the bytes that its field declares."""
-    if isinstance(kind, types.Array):
-        fits = isinstance(value, np.ndarray) and str(value.dtype) == str(kind.dtype)
+    kind = field.kind
+    if field.is_array:
+        fits = isinstance(value, np.ndarray) and value.dtype == _dtype(kind)
         if not (fits and value.ndim == kind.ndim and value.flags.c_contiguous):
             found = f"{value.dtype} {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
             raise TypeError(f"{name}: needs a contiguous {kind}, got {found}")
-    elif isinstance(kind, types.Record) and from_dtype(getattr(value, "dtype", np.dtype("f8"))) != kind:
+    elif isinstance(kind, types.Record) and _record_kind(getattr(value, "dtype", np.dtype("f8"))) != kind:
         raise TypeError(f"{name}: needs the record that its schema declares, got {type(value).__name__}")
 
 
-def _check_sizes(leaves: Sequence[Leaf]) -> None:
-    """TypeError unless dimensions of one name have one length in all arrays."""
-    arrays = [leaf for leaf in leaves if isinstance(leaf.field.kind, types.Array)]
-    sizes: dict[str, int] = {}
-    for leaf in arrays:
-        for dimension, length in zip(leaf.field.shape, leaf.value.shape, strict=True):
-            if dimension.isidentifier():
-                sizes.setdefault(dimension, length)
-    for leaf in arrays:
-        for dimension, length in zip(leaf.field.shape, leaf.value.shape, strict=True):
-            if not _names(dimension) <= sizes.keys():
-                sizes.setdefault(dimension, length)
-        declared = tuple(_size(dimension, sizes) for dimension in leaf.field.shape)
-        if declared != leaf.value.shape:
-            shape = ", ".join(leaf.field.shape)
-            raise TypeError(f"{leaf.name}: ({shape}) is {declared} here, got {leaf.value.shape}")
+@functools.cache
+def _record_kind(dtype: np.dtype) -> types.Type:
+    return from_dtype(dtype)
 
 
 def _words(leaf: Leaf) -> tuple[int, int, int]:
     """A row of the table: address, rows and columns."""
     kind, value = leaf.field.kind, leaf.value
-    if isinstance(kind, types.Array):
-        return value.ctypes.data, value.shape[0], value.shape[-1]
+    if leaf.field.is_array:
+        return _address(value), value.shape[0], value.shape[-1]
     if isinstance(kind, types.Record):
-        return _record_address(value), 0, 0
+        return _address(value), 0, 0
     if isinstance(kind, types.FunctionType):
         return (0 if PLAIN or value is None else value.address), 0, 0
     return (0 if value is None else value.address), 0, 0
 
 
-def _record_address(values: np.record) -> int:
+def _address(values: np.ndarray | np.record) -> int:
     return int(values.__array_interface__["data"][0])
 
 

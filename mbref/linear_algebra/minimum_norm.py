@@ -10,9 +10,10 @@ the projection and the consistent start are this iteration.  b stands in ``facto
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy import sqrt
-from scipy.sparse import csr_array
 
 from mbref.kernels.compilation import FLOAT, INT, VECTOR, entry, inlined
 from mbref.kernels.layout import NOT_CONVERGED, OK, SparseFactor
@@ -20,6 +21,9 @@ from mbref.kernels.named_memory import Named, packed
 from mbref.linear_algebra.sparse_cholesky import regularised_factor, solve, subtract_product, times_transpose
 from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation
 from mbref.linear_algebra.vectors import copy
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 TINY, NEVER = 1e-300, 1e300
 LEAST = 2  # iterations of ``solve_to_tolerance``: enough but near singular positions, so that they are fixed
@@ -112,6 +116,8 @@ class MinimumNorm:
     """
 
     def __init__(self, matrix: csr_array, weight: np.ndarray):
+        from scipy.sparse import csr_array
+
         self._root = 1 / np.sqrt(weight)
         d = csr_array(matrix.multiply(self._root))
         lengths = np.sqrt(np.asarray((d * d).sum(axis=1)).ravel())

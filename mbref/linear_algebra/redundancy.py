@@ -6,11 +6,22 @@ of squares on its diagonal, but for (1/(α σ²))² of every other singular valu
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.linalg import LinearOperator, eigsh
 
 from mbref.linear_algebra.minimum_norm import ALPHA, MinimumNorm
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+
+def dense_null_shares(matrix: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """``null_shares`` of a small matrix (m, n), whose rows may be zero."""
+    lengths = np.linalg.norm(matrix, axis=1, keepdims=True)
+    d = matrix / np.where(lengths > 0, lengths, 1.0)
+    unit = np.eye(matrix.shape[0])
+    return np.sum((np.linalg.solve(ALPHA * d @ d.T + unit, unit[:, rows])) ** 2, axis=0)
 
 
 def null_shares(solution: MinimumNorm, rows: np.ndarray) -> np.ndarray:
@@ -33,6 +44,8 @@ class Redundancy:
 
     def singular_values(self) -> tuple[float, float]:
         """The smallest above rank, and the largest, of the rows at unit length."""
+        from scipy.sparse.linalg import LinearOperator, eigsh
+
         d, inverse = self._solution.d, self._solution.regularised_solution
         m = d.shape[0]
 

@@ -7,12 +7,20 @@ Indices are unsigned, because kernels would test the sign of others.
 
 from __future__ import annotations
 
-import numpy as np
-from scipy.sparse import csc_array, csr_array, eye_array
-from scipy.sparse.linalg import splu
+import functools
+import hashlib
+from typing import TYPE_CHECKING
 
+import numpy as np
+
+from mbref.kernels import checked_file
+from mbref.kernels.compilation import CACHE
 from mbref.kernels.layout import SparseFactor, StaticRows, Symbolic
 from mbref.kernels.named_memory import allocate
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+MOST_PATTERNS = 64  # kept
 
 
 def symbolic_factorisation(
@@ -21,8 +29,34 @@ def symbolic_factorisation(
     """The symbolic factorisation of a pattern: row, column and place (k,) of each number of D.
 
     Places are those of the flat constraint Jacobian that the numbers are read from; ``active`` (n,) says
-    which columns take part.  Raises OverflowError for a pattern too large for 32-bit indices.
+    which columns take part.  Scenes of one structure share the arrays of their pattern, which nobody changes.
+    Raises OverflowError for a pattern too large for 32-bit indices.
     """
+    indices = (np.asarray(array, dtype=np.int64).tobytes() for array in (row, column, entry))
+    return _of_pattern(*indices, np.asarray(active, dtype=bool).tobytes())
+
+
+@functools.lru_cache(maxsize=MOST_PATTERNS)
+def _of_pattern(*pattern: bytes) -> Symbolic:
+    """The symbolic factorisation of a pattern whose arrays are given as bytes, kept on disk."""
+    digest = hashlib.sha256(b"".join(len(part).to_bytes(8, "little") + part for part in pattern))
+    path = CACHE / "patterns" / digest.hexdigest()[:32]
+    data = checked_file.read(path)
+    if data is None:
+        symbolic = _made(*pattern)
+        sizes = np.array([array.size for array in symbolic], dtype=np.int64)
+        checked_file.write(path, sizes.tobytes() + b"".join(array.tobytes() for array in symbolic))
+        return symbolic
+    count = len(Symbolic._fields)
+    sizes, indices = np.frombuffer(data, np.int64, count), np.frombuffer(data, np.uint32, offset=8 * count)
+    return Symbolic(*np.split(indices.copy(), np.cumsum(sizes)[:-1]))
+
+
+def _made(*pattern: bytes) -> Symbolic:
+    row, column, entry = (np.frombuffer(indices, dtype=np.int64) for indices in pattern[:3])
+    active = np.frombuffer(pattern[3], dtype=bool)
+    from scipy.sparse import csr_array  # a quarter of the start, which kept patterns save
+
     kept, row = np.unique(row, return_inverse=True)
     d = csr_array((np.ones(row.size), (row, column)), shape=(kept.size, active.size))
     order, l_start, l_row = _factor_pattern(d)
@@ -83,6 +117,9 @@ def _factor_pattern(d: csr_array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
     SuperLU factors a matrix of that pattern with a dominant diagonal, so that it keeps the order.
     """
+    from scipy.sparse import csc_array, csr_array, eye_array
+    from scipy.sparse.linalg import splu
+
     size = d.shape[0]
     if not size:
         return np.zeros(0, dtype=int), np.zeros(1, dtype=int), np.zeros(0, dtype=int)

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from mbref.kernels import checked_file
+from mbref.simulation.simulate import simulate
 
 ROOT = Path(__file__).parents[2]
 SMALL_KERNEL = """
@@ -150,3 +151,11 @@ def test_help_touches_no_cache(program, tmp_path: Path):
     command = [sys.executable, "-m", program, "--help"]
     subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, check=True)
     assert not (tmp_path / "cache").exists()
+
+
+def test_a_warm_start_imports_no_large_parts_of_scipy():
+    simulate("four_bar_gravity", times=[0.01])  # which keeps what SciPy has found
+    code = "import sys, mbref; mbref.simulate('four_bar_gravity', times=[0.01])\n"
+    code += "print(*{'scipy.' + name for name in ('sparse', 'integrate')} & set(sys.modules))"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.split() == []

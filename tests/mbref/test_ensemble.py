@@ -154,6 +154,9 @@ def test_command_and_single_runs_agree(tmp_path: Path, capsys: pytest.CaptureFix
     assert np.allclose(printed["mean_position"]["slider"], places.mean(axis=0), rtol=0, atol=1e-13)
     assert np.allclose(printed["deviation_position"]["slider"], places.std(axis=0), rtol=0, atol=1e-13)
     assert len(path.read_text().splitlines()) == 4
+    main(["ensemble", "spatial_slider_crank_driven", "--vary", "joint[B].anchor[0]=0.1+-1e-3", "--count", "4",
+          "--times", "0.01", "--rtol", "1e-8", "--workers", "1", "--out", str(path)])  # fmt: skip
+    assert "4 of 4 variants completed" in (said := capsys.readouterr().out) and "runs a second" in said
 
 
 def test_a_killed_process_costs_its_own_run_alone(tmp_path: Path):

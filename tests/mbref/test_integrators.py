@@ -7,13 +7,15 @@ import sys
 
 import numpy as np
 import pytest
+import scipy.integrate
 from scipy.integrate import ode
 from scipy.special import ellipj, ellipk
 
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
-from mbref.integrators.dop853 import ERROR3, ERROR5, STAGES, A, B, sum_with
+from mbref.integrators.dop853 import sum_with
+from mbref.integrators.dop853_tableau import ERROR3, ERROR5, STAGES, A, B, C
 from mbref.method import Method
 from mbref.scene import Body, Revolute, Scene, Spring, Translational
 from mbref.scenes import SCENES
@@ -262,9 +264,16 @@ def test_an_order_that_adams_does_not_have_is_refused(order):
         simulate(OSCILLATOR, f"lm1+none/adams[max_order={order}]", [1.0])
 
 
-@pytest.mark.parametrize("weights", [*(A[s, :s] for s in range(1, STAGES)), B, ERROR3, ERROR5])
+@pytest.mark.parametrize("weights", [*A[1:], B, ERROR3, ERROR5])
 def test_sums_of_stages_have_all_coefficients(weights):
     k = np.random.default_rng(4).normal(size=(STAGES, 7))
     weighted = sum_with(weights)
     found = [weighted(k, i) for i in range(7)]
     np.testing.assert_allclose(found, weights @ k[: len(weights)], rtol=1e-13, atol=1e-13)
+
+
+def test_coefficients_are_those_of_scipy():
+    theirs = scipy.integrate.DOP853
+    assert np.array_equal([[*row, *[0.0] * (STAGES - len(row))] for row in A], theirs.A[:STAGES, :STAGES])
+    assert np.array_equal((B, C), (theirs.B, theirs.C[:STAGES]))
+    assert np.array_equal((ERROR3, ERROR5), (theirs.E3[:STAGES], theirs.E5[:STAGES]))

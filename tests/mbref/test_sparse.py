@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.sparse import csr_array
 
 from crosscheck.judge.truth import truth_for
 from mbref.equations import diagnosis, initial_state
 from mbref.equations.active_coordinates import active_entries
 from mbref.equations.model import Model
 from mbref.kernels.named_memory import packed
+from mbref.linear_algebra.minimum_norm import MinimumNorm
+from mbref.linear_algebra.redundancy import dense_null_shares, null_shares
 from mbref.linear_algebra.sparse_cholesky import (
     assemble,
     factorise,
@@ -18,7 +21,7 @@ from mbref.linear_algebra.sparse_cholesky import (
     subtract_product,
     times_transpose,
 )
-from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation
+from mbref.linear_algebra.symbolic_factorisation import _of_pattern, sparse_factor, symbolic_factorisation
 from mbref.scenes import find_scene
 from mbref.simulation.simulate import Limits, simulate
 
@@ -206,3 +209,25 @@ def test_what_decays_out_of_the_plane_is_zero_at_the_end(formulation):
     values = np.abs(np.concatenate([run.velocity, run.angular_velocity], axis=None))
     left = values[(values > 0) & (values < 1e-90)]
     assert not left.size, f"{left.size} velocities have decayed to {left.max():.0e}"
+
+
+def test_a_pattern_kept_on_disk_has_the_same_factorisation():
+    rng = np.random.default_rng(3)
+    row, column = np.nonzero(rng.random((9, 12)) < 0.3)
+    arguments = (row, column, np.arange(row.size), np.isin(np.arange(12), column))
+    made = symbolic_factorisation(*arguments)
+    _of_pattern.cache_clear()
+    kept = symbolic_factorisation(*arguments)
+    assert kept is not made
+    for one, other in zip(made, kept, strict=True):
+        assert np.array_equal(one, other) and one.dtype == other.dtype
+
+
+def test_shares_of_redundant_rows_dense_and_sparse():
+    matrix = np.random.default_rng(7).normal(size=(6, 9))
+    matrix[2], matrix[4] = 2.0 * matrix[0], matrix[1] - matrix[3]
+    rows = np.array([0, 1, 2, 3, 4, 5])
+    sparse = null_shares(MinimumNorm(csr_array(matrix), np.ones(9)), rows)
+    dense = dense_null_shares(matrix, rows)
+    assert np.allclose(dense, sparse, atol=1e-6)
+    assert dense[5] < 1e-12 and np.allclose(dense[[0, 2]], 0.5)
