@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 
 from crosscheck.engine import Cannot, Owner, Setting, engine
 from crosscheck.processes.child import ChildFailed
@@ -23,9 +23,11 @@ def scout(engines: Sequence[str], scenes: Sequence[Scene], advance: Callable[[st
     """
     pairs = [(name, scene) for scene in scenes for name in engines if (name, scene) not in _found]
     with ThreadPoolExecutor(os.cpu_count()) as threads:
-        for pair, offer in zip(pairs, threads.map(_asked, pairs), strict=True):
-            _found[pair] = offer
-            advance(f"{pair[0]} {pair[1].name}")
+        asked = {threads.submit(_asked, pair): pair for pair in pairs}
+        for future in as_completed(asked):
+            name, scene = pair = asked[future]
+            _found[pair] = future.result()
+            advance(f"{name} {scene.name}")
 
 
 def offer(engine_name: str, scene: Scene) -> Offer:
