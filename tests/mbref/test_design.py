@@ -15,7 +15,7 @@ from mbref.design.placed import placed
 from mbref.equations.diagnosis import counts
 from mbref.equations.initial_state import solve_positions
 from mbref.equations.model import Model
-from mbref.scene import Scene, SceneError
+from mbref.scene import Driver, Scene, SceneError, TorsionSpring
 from mbref.scenes import find_scene
 
 SPATIAL = ("bennett", "spatial_slider_crank", "sarrus", "andrews_squeezer")
@@ -116,6 +116,19 @@ def test_an_exchange_leaves_the_freedoms_and_no_redundancy(name):
         after = counts(at.with_(joint=tuple(_as(j, swap[j.name]) if j.name in swap else j for j in at.joint)))
         assert after.redundant == 0, swap
         assert after.degrees_of_freedom == before.degrees_of_freedom, swap
+
+
+def test_joints_under_drivers_and_torsion_springs_become_only_what_bears_them():
+    plain = find_scene("planar_slider_crank")
+    spring = TorsionSpring(joint="A", stiffness=1.0, damping=0.0, natural_angle=0.1)
+    kinds = {
+        "free": exchanges(plain),
+        "sprung": exchanges(plain.with_(load=(spring,))),
+        "driven": exchanges(plain.with_(load=(), driver=(Driver(joint="A", polynomial=(0.0, 1.0)),))),
+    }
+    of_a = {name: {swap["A"] for swap in found if "A" in swap} for name, found in kinds.items()}
+    assert of_a["free"] - {"cylindrical"} and all(kinds.values()), kinds
+    assert of_a["sprung"] <= {"cylindrical"} and of_a["driven"] <= {"cylindrical"}, of_a
 
 
 def test_redundancy_within_the_plane_is_not_removed_by_exchanges():
