@@ -8,6 +8,7 @@ from itertools import count
 import numpy as np
 import pytest
 
+from crosscheck.engine import Setting, engine
 from crosscheck.engines import sampling
 from crosscheck.engines.driver_motion import motion
 from crosscheck.judge.constraints import closure_accelerations
@@ -15,6 +16,7 @@ from crosscheck.judge.joint_residuals import driver_value
 from crosscheck.judge.metrics import METRICS
 from crosscheck.study.fair_timing import _with_cost
 from mbref.scene import Body, Distance, Driver, Scene, Sine
+from mbref.scenes import SCENES
 
 DRIVER = Driver(
     joint="J", polynomial=(-0.3 * math.sin(0.4), 0.7, -0.2, 0.05),
@@ -78,3 +80,15 @@ def test_second_rate_of_a_distance_that_is_not_kept():
     rates = (np.array([[1.0, 3.0, 0.0]]), still)
     found = closure_accelerations(scene, *pose, *rates, np.array([[4.0, 0.0, 0.0]]), still)
     assert found["J"] == pytest.approx([8.5])
+
+
+@pytest.mark.parametrize(
+    ("family", "code"), [("lm2+projection", "generic"), ("lm2+projection, specialised", "specialised")]
+)
+def test_code_of_a_family_of_mbref(family, code, monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        "mbref.simulation.simulate.simulate", lambda scene, method, times, limits: asked.append(limits.code)
+    )
+    engine("mbref").run(SCENES["four_bar"](), np.array([0.1]), Setting(family, {}))
+    assert asked == [code]

@@ -56,7 +56,7 @@ class Tree:
 
     def _check_soundness(self, tests: str, jitted: bool) -> None:
         if tests not in self.sound and not self._passes(tests, jitted):
-            raise RuntimeError(f"{tests}: fails without a defect")
+            raise RuntimeError(f"{tests}: fails without a defect, or takes longer than {MINUTES} minutes")
         self.sound.add(tests)
 
     def _passes(self, tests: str, jitted: bool) -> bool:
