@@ -241,6 +241,9 @@ def test_completed_and_failed_runs_apart():
     assert isinstance(group, SceneRuns)
     assert [r.outcome for r in group.completed()] == [Outcome.COMPLETED] * 7
     assert [r.is_false_success for r in group.runs].count(True) == 1
+    wrong = next(run for run in group.runs if run.is_false_success)
+    ended = Run({**wrong.record, "outcome": "STEP_FAILED"})
+    assert not ended.is_false_success, "a run that says it failed is no false success"
 
 
 def test_errors_and_the_tolerances_asked_for():
