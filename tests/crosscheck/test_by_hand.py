@@ -14,6 +14,7 @@ from crosscheck.engines.driver_motion import motion
 from crosscheck.judge.constraints import closure_accelerations
 from crosscheck.judge.joint_residuals import driver_value
 from crosscheck.judge.metrics import METRICS
+from crosscheck.judge.reference.bound import bounds
 from crosscheck.study.fair_timing import _with_cost
 from mbref.scene import Body, Distance, Driver, Scene, Sine
 from mbref.scenes import SCENES
@@ -92,3 +93,8 @@ def test_code_of_a_family_of_mbref(family, code, monkeypatch):
     )
     engine("mbref").run(SCENES["four_bar"](), np.array([0.1]), Setting(family, {}))
     assert asked == [code]
+
+
+def test_bound_of_a_reference_never_falls():
+    """Ten times the largest difference so far, and 1e-14 at least."""
+    assert bounds(np.array([0.0, 1e-9, 1e-12, 3e-9])) == pytest.approx([1e-14, 1e-8, 1e-8, 3e-8], abs=0.0)

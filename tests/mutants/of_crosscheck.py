@@ -185,7 +185,7 @@ DEFECTS = (  # adapters and processes
         "- frequency * wave",
         FEATURES,
     ),
-    Defect("crosscheck/judge/reference/bound.py", "np.maximum.accumulate(apart)", "apart", REFERENCE),
+    Defect("crosscheck/judge/reference/bound.py", "np.maximum.accumulate(apart)", "apart", BY_HAND),
     Defect(
         "crosscheck/judge/reaction_balance.py",
         "np.hstack([mass * exact.acceleration[k], turning]) - applied(",
