@@ -15,6 +15,7 @@ from crosscheck.judge.constraints import closure_accelerations
 from crosscheck.judge.joint_residuals import driver_value
 from crosscheck.judge.metrics import METRICS
 from crosscheck.judge.reference.bound import bounds
+from crosscheck.study.difference import _is_changed
 from crosscheck.study.fair_timing import _with_cost
 from mbref.scene import Body, Distance, Driver, Scene, Sine
 from mbref.scenes import SCENES
@@ -98,3 +99,10 @@ def test_code_of_a_family_of_mbref(family, code, monkeypatch):
 def test_bound_of_a_reference_never_falls():
     """Ten times the largest difference so far, and 1e-14 at least."""
     assert bounds(np.array([0.0, 1e-9, 1e-12, 3e-9])) == pytest.approx([1e-14, 1e-8, 1e-8, 3e-8], abs=0.0)
+
+
+@pytest.mark.parametrize(
+    ("new", "changed"), [(1.9e-6, False), (2.1e-6, True), (5.1e-7, False), (4.9e-7, True)]
+)
+def test_a_change_is_one_by_more_than_the_ratio(new, changed):
+    assert _is_changed(1e-6, new, 2.0, 1e-12) is changed

@@ -41,10 +41,13 @@ def test_reaction_table_and_differences_put_in():
 
 
 def test_choices_shown_where_joints_are_redundant():
-    blocks = reactions.render(runs_of("planar_slider_crank_gravity"))
+    group = runs_of("planar_slider_crank_gravity")
+    blocks = reactions.render(group)
     tables = [block for block in blocks if isinstance(block, Table)]
     assert len(tables) == 2 and "choice" in tables[1].caption, [t.caption for t in tables]
     assert list(tables[1].header) == ["Joint", "pinocchio", "mujoco"], tables[1].header
+    times = group.runs[0].record["times"]
+    assert f"at t = {times[len(times) // 2]:.3g} s" in tables[1].caption, tables[1].caption
 
 
 def test_acceleration_table_and_differences_put_in():
