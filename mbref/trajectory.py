@@ -19,6 +19,7 @@ class Outcome(enum.Enum):
     VIOLATION = ("VIOLATION", "c", "the constraint violation exceeds the allowed tolerance")
     STEP_FAILED = ("STEP_FAILED", "d", "the integrator could not take a step")
     NOT_FINITE = ("NOT_FINITE", "", "the state is not finite")
+    UNDECIDED = ("UNDECIDED", "", "the branch of the motion cannot be told at a singular position")
     TIMED_OUT = ("TIMED_OUT", "", "the time limit was reached")
     CRASHED = ("CRASHED", "", "the process ended without a result")
 

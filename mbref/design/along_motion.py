@@ -12,13 +12,14 @@ from mbref.equations.initial_state import consistent_start, solve_positions
 from mbref.equations.model import Model, displaced
 from mbref.method import DEFAULT
 from mbref.scene import Scene, SceneError
-from mbref.simulation.simulate import simulate
+from mbref.simulation.simulate import Limits, simulate
 
 SAMPLES = 61
 ROUNDING = (
     1e-5  # singular values below it (relative) at every pose are taken for rounding of the file's numbers
 )
 MOST_ROWS = 300  # beyond it dense singular values at every pose take too long
+MOST_STEPS = 20_000  # a motion that creeps is told as far as it gets
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,8 @@ def along_motion(scene: Scene) -> AlongMotion:
     if model.m > MOST_ROWS:
         raise SceneError([f"scene: {model.m} constraint rows are too many for singular values at every pose"])
     times = np.linspace(0.0, scene.duration, SAMPLES)
-    motion = simulate(scene, DEFAULT if scene.has_mass() else "kinematic", times)
+    method = DEFAULT if scene.has_mass() else "kinematic"
+    motion = simulate(scene, method, times, Limits(most_steps=MOST_STEPS))
     if not motion.times.size:
         raise SceneError([f"scene: the motion could not begin: {motion.message}"])
     values = _singular_values(model, motion.times, motion.position, motion.orientation)

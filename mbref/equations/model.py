@@ -19,6 +19,7 @@ from mbref.equations.joints import driver_primitive, primitives_of
 from mbref.equations.joints.base import ROWS_OF, Primitive
 from mbref.equations.loads import has_angles
 from mbref.equations.packing import packed_drivers, packed_loads
+from mbref.equations.units import body_lengths, metric_root
 from mbref.kernels.layout import Counts, Equations, Frames, Settings, System
 from mbref.kernels.named_memory import allocate, packed, record, stacked
 from mbref.kernels.scene_layout import (
@@ -66,8 +67,11 @@ class Model:
         self._index.setdefault(GROUND, self.nb)
         self._index[FRAME] = self.nb
         bodies = self._pack_bodies()
+        lengths = body_lengths(self.bodies, self.joints)
         self.data = SceneData(
             gravity=np.array(self._gravity()),
+            lengths=lengths,
+            metric_root=metric_root(self.mass, lengths),
             bodies=bodies,
             primitives=self._pack_primitives(),
             row_bodies=self._row_bodies,
@@ -143,6 +147,16 @@ class Model:
     def entry_columns(self) -> np.ndarray:
         """Column (m, 12) of every entry of the blocks; those of the fixed frame are ≥ n."""
         return (6 * self._row_bodies[:, :, None] + np.arange(6)).reshape(self.m, 12)
+
+    @property
+    def closed_loops(self) -> int:
+        """Independent loops of bodies and joints; without one, no position is singular."""
+        part, loops = list(range(self.nb + 1)), 0
+        for joint in self.joints:
+            first, second = (part[self.index(name)] for name in joint.bodies)
+            loops += first == second
+            part = [first if p == second else p for p in part]
+        return loops
 
     def index(self, name: str) -> int:
         """Index of a body, ``nb`` for the fixed frame."""

@@ -172,12 +172,14 @@ class Control(NamedTuple):
     first_step: float  # s; 0 where the integrator chooses it
     rtol: float
     atol: float
+    closed_loops: float  # of bodies and joints; without one, no position is singular
 
 
 class Watch(NamedTuple):
-    """The pivots of the constraint Jacobian that a chart watches, and when it last accepted a state."""
+    """The smallest pivot of Φ_q that a chart watches, and when it last accepted a state."""
 
     smallest_pivot: float = 0.0
+    past_pivot: float = 0.0  # smallest_pivot of the last accepted state
     reference_pivot: float = 0.0  # the largest that smallest_pivot has been; 0 where nothing is watched
     generic_rank: int = 0
     accepted_time: float = 0.0  # s
@@ -193,6 +195,7 @@ class Clock(NamedTuple):
     y_size: int = 0  # length of y
     sample: int = 0  # the next one to take
     restart: int = 0  # the step since which the states are one smooth piece
+    passage: float = 0.0  # s, the end of the step that may pass a singular position
     violated_row: int = -1
 
 
@@ -209,11 +212,11 @@ class History(NamedTuple):
     """The last accepted states, a ring: step s stands in row s mod KEPT."""
 
     time: Annotated[Vector, KEPT]
-    pivot: Annotated[Vector, KEPT]  # relative, see Watch
+    pivots: Annotated[Matrix, KEPT, "pivots"]  # of every row of Φ_q, see Watch
     y: Annotated[Matrix, KEPT, "14*nb"]
     y_rate: Annotated[Matrix, KEPT, "14*nb"]
     nodes: Annotated[Indices, KEPT]  # rows chosen for an extrapolation
-    weights: Annotated[Matrix, 4, KEPT]  # of the nodes in an extrapolation
+    weights: Annotated[Matrix, 2, KEPT]  # of the nodes in an extrapolation
 
 
 class Loop(NamedTuple):
@@ -265,6 +268,7 @@ class Memory(NamedTuple):
     factor: SparseFactor
     control: Control
     watch: Watch
+    pivots: Annotated[Vector, "pivots"]  # of every row, last watched
     loop: Loop
     kernels: Kernels
     code: SpecialisedCode

@@ -68,6 +68,8 @@ class SceneData(NamedTuple):
     """A scene as kernels read it; none changes it."""
 
     gravity: Annotated[Vector, 3]
+    lengths: Annotated[Vector, "nb"]  # of the bodies (m), see equations.units
+    metric_root: Annotated[Vector, "n"]  # inverse roots of the projection's metric
     bodies: Bodies
     primitives: Primitives
     row_bodies: Annotated[IndexTable, "m", 2]  # the two bodies of each row

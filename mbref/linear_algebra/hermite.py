@@ -12,50 +12,38 @@ from __future__ import annotations
 
 from mbref.kernels.compilation import kernel
 
-OF_STATE, OF_RATE, RATE_OF_STATE, RATE_OF_RATE = range(4)  # rows of the weights
+OF_STATE, OF_RATE = range(2)  # rows of the weights
 
 
 @kernel
 def find_weights(history, count, t):
-    """Weights of the states and rates of the first ``count`` nodes in y(t) and in y'(t)."""
+    """Weights of the states and rates of the first ``count`` nodes in y(t)."""
     time, nodes, weights = history.time, history.nodes, history.weights
     for j in range(count):
-        own, basis, slope, sum_ = time[nodes[j]], 1.0, 0.0, 0.0
+        own, basis, sum_ = time[nodes[j]], 1.0, 0.0
         for k in range(count):
             if k != j:
                 width = own - time[nodes[k]]
-                factor = (t - time[nodes[k]]) / width
-                slope = slope * factor + basis / width
-                basis *= factor
+                basis *= (t - time[nodes[k]]) / width
                 sum_ += 1.0 / width
-        square, growth = basis * basis, 2.0 * basis * slope
-        off = t - own
+        square, off = basis * basis, t - own
         weights[OF_STATE, j] = (1.0 - 2.0 * off * sum_) * square
         weights[OF_RATE, j] = off * square
-        weights[RATE_OF_STATE, j] = (1.0 - 2.0 * off * sum_) * growth - 2.0 * sum_ * square
-        weights[RATE_OF_RATE, j] = off * growth + square
 
 
 @kernel
 def extrapolate(history, count, t, y):
     """y(t) of the polynomial through the first ``count`` nodes."""
     find_weights(history, count, t)
-    combine(history, count, OF_STATE, y)
+    combine(history, count, y)
 
 
 @kernel
-def extrapolate_with_rates(history, count, t, y, y_rate):
-    """y(t) and y'(t) of the polynomial through the first ``count`` nodes."""
-    extrapolate(history, count, t, y)
-    combine(history, count, RATE_OF_STATE, y_rate)
-
-
-@kernel
-def combine(history, count, row, target):
-    """``target`` := Σ_j weights[row, j] y_j + weights[row + 1, j] y'_j."""
+def combine(history, count, target):
+    """``target`` := Σ_j weights[OF_STATE, j] y_j + weights[OF_RATE, j] y'_j."""
     nodes, weights = history.nodes, history.weights
     target[:] = 0.0
     for j in range(count):
-        of_state, of_rate, node = weights[row, j], weights[row + 1, j], nodes[j]
+        of_state, of_rate, node = weights[OF_STATE, j], weights[OF_RATE, j], nodes[j]
         for i in range(target.shape[0]):
             target[i] += of_state * history.y[node, i] + of_rate * history.y_rate[node, i]

@@ -9,7 +9,7 @@ from mbref.equations.joint_reactions import reactions
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR
 from mbref.motion import Motion
 from mbref.simulation.run import Run
-from mbref.simulation.stepping import DONE, STEP_TOO_SMALL, TOO_MANY_STEPS, VIOLATED
+from mbref.simulation.stepping import DONE, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED, VIOLATED
 from mbref.trajectory import Cost, Outcome
 
 OUTCOMES = {
@@ -20,6 +20,7 @@ OUTCOMES = {
     VIOLATED: Outcome.VIOLATION,
     STEP_TOO_SMALL: Outcome.STEP_FAILED,
     TOO_MANY_STEPS: Outcome.STEP_FAILED,
+    UNDECIDED: Outcome.UNDECIDED,
 }
 
 

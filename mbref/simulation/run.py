@@ -28,6 +28,7 @@ from mbref.kernels.layout import (
     SparseFactor,
     SpecialisedCode,
     State,
+    Symbolic,
     Watch,
 )
 from mbref.kernels.named_memory import allocate, packed, record
@@ -36,11 +37,12 @@ from mbref.linear_algebra.symbolic_factorisation import empty_factor
 from mbref.method import Method
 from mbref.scene import Scene, SceneError
 from mbref.simulation.limits import AUTO, SPECIALISED, Limits
-from mbref.simulation.stepping import PAUSED, advance_to_end
+from mbref.simulation.stepping import PAUSED, SINGULAR_AHEAD, UNDECIDED, advance_to_end
 from mbref.specialised import Part, Specialised, Untraceable, specialise, with_specialised_code
 from mbref.stabilisation.base import Stabilisation
 
 STEPS_PER_CALL = 5_000  # between returns to Python, where an interrupt is heard and progress is told
+MOST_ROWS, RANK = 120, 1e-6  # rows whose rank is found at the start; a singular value that is rounding
 STEPS_WORTH_CODE = 20_000  # steps ahead from which on specialised code saves more than it takes to make
 UNWRAPPED = 1.0  # rad that a body may turn in a step where torsion springs unwrap: two turn less than π apart
 
@@ -99,7 +101,8 @@ class Run:
         model, method = self.model, self.method
         formulation, stabilisation, integrator = method.parts
         algebra = formulation.linear_algebra
-        sizes = {**model.sizes, "k": self.times.size, "dense_rows": algebra.rows(model.m)}
+        pivots = factor.symbolic.row.size
+        sizes = {**model.sizes, "k": self.times.size, "dense_rows": algebra.rows(model.m), "pivots": pivots}
         equations = model.equations(
             sizes,
             settings=record(method.settings(self.limits.rank_tolerance)),
@@ -114,6 +117,7 @@ class Run:
             factor=factor,
             control=record(self._control()),
             watch=record(Watch()),
+            pivots=np.ones(pivots),
             loop=allocate(Loop, sizes, times=self.times),
             kernels=NO_KERNELS,
             code=allocate(SpecialisedCode, sizes),
@@ -140,6 +144,7 @@ class Run:
             first_step=limits.first_step,
             rtol=limits.rtol,
             atol=limits.rtol if limits.atol is None else limits.atol,
+            closed_loops=self.model.closed_loops,
         )
 
     def _use(self, chart: Stabilisation) -> None:
@@ -162,14 +167,23 @@ class Run:
         memory = self.memory
         memory.state.coordinates[:] = self.start.q
         memory.state.velocities[:] = self.start.v
-        enter = self.method.stabilisation.enter.callable
-        memory.loop.clock.y_size = enter(0.0, memory.loop.y, self.packed.argument)
+        if self.method.stabilisation.projects:
+            memory.watch.generic_rank = independent_rows(self.model, self.start.q, self.part.factor.symbolic)
+        self.enter_state()
+
+    def enter_state(self) -> None:
+        """Start from the time of the clock and the state in memory."""
+        clock, enter = self.memory.loop.clock, self.method.stabilisation.enter.callable
+        clock.y_size = enter(clock.time, self.memory.loop.y, self.packed.argument)
+        clock.restart = self.memory.equations.system.counts.steps
 
     def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
         """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
         before, began, status = self.making, time.process_time(), PAUSED
         while status == PAUSED:
             status = advance_to_end(self.packed.argument)
+            if status == SINGULAR_AHEAD:
+                status = self.pass_singular_position()
             if self.wants_code and status == PAUSED and self._steps_ahead() >= STEPS_WORTH_CODE:
                 self.wants_code = False
                 with contextlib.suppress(Untraceable):  # then the general kernels go on
@@ -177,6 +191,10 @@ class Run:
             if progress is not None:
                 progress(float(self.memory.loop.clock.time))
         return status, time.process_time() - began - (self.making - before)
+
+    def pass_singular_position(self) -> int:
+        """Go on behind the singular position that may be ahead: PAUSED, DONE or why that cannot be."""
+        return UNDECIDED
 
     def _steps_ahead(self) -> float:
         """Steps to the end at the pace so far, or to the limit of steps."""
@@ -195,6 +213,17 @@ class Run:
         self.memory = self.memory._replace(code=code)
         self._use(with_specialised_code(stabilisation))
         self.making += time.process_time() - began
+
+
+def independent_rows(model: Model, q: np.ndarray, symbolic: Symbolic) -> int:
+    """Number of rows of Φ_q that are independent, if only just, at q (7 nb,); of those that take part."""
+    rows, columns = symbolic.row.astype(int), symbolic.column.astype(int)
+    if rows.size > MOST_ROWS or not rows.size:
+        return 0
+    jacobian = model.terms(0.0, q, np.zeros(model.n)).jacobian[np.ix_(rows, columns)]
+    jacobian *= model.data.metric_root[columns]
+    norms = np.linalg.norm(jacobian, axis=1, keepdims=True)
+    return int(np.linalg.matrix_rank(jacobian / np.where(norms > 0, norms, 1.0), tol=RANK))
 
 
 NO_KERNELS = Kernels(*[None] * len(Kernels._fields))

@@ -17,7 +17,7 @@ from mbref.simulation.limits import SPECIALISED, Limits
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.run import Run
 from mbref.specialised import Untraceable
-from mbref.taylor.run import NO_CODE, TaylorRun, prepare_series
+from mbref.taylor.run import NO_CODE, CrossingRun, TaylorRun, prepare_series
 
 __all__ = ["Limits", "checked_times", "prepare", "simulate", "why_no_code"]
 
@@ -47,7 +47,7 @@ def simulate(
     limits = limits or Limits()
     began = time.process_time()
     try:
-        run = (Run if method.integrator.step else TaylorRun)(scene, method, times, limits)
+        run = (CrossingRun if method.integrator.step else TaylorRun)(scene, method, times, limits)
     except Untraceable as reason:
         raise MethodError(f"no machine code for {scene.name!r} by {method}: {reason}") from None
     built = time.process_time() - began - run.making

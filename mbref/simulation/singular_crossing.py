@@ -1,14 +1,11 @@
-"""Passing singular positions: step over the window in which the motion is ill-determined.
+"""The watch for singular positions: which steps may pass one.
 
-Where the rank of Φ_q drops, the component of the acceleration along the vanishing singular vector is
-spoilt by rounding and by the violation of the stages, both divided by the distance to the singular
-position; an adaptive integrator then shortens its step and ends up sitting inside.  So, where the chart
-watches the smallest pivot of Φ_q relative to the largest it has had (``layout.Watch``):
-
-- a step ends at the edge of the window, where that ratio is WINDOW;
-- the window is crossed in one leap: the state is extrapolated by the Hermite polynomial through earlier
-  states and rates, and projected on the other side, where Newton's method finds the smooth branch,
-  because branches cross at an angle.
+Where the rank of Φ_q drops, a pivot of its rows falls to zero and rises again.  The pivots are those of unit
+rows in columns of unit length (``equations.units``), so that masses have no part in them; the projection has
+them at hand after every step (``layout.Watch``).  Close to a singular position the component of the
+acceleration along the vanishing singular vector is spoilt by rounding and by the violation of the stages,
+both divided by the distance, and a step over it may land on a branch that the motion does not reach.  Such a
+step is not taken; the Taylor series of ``mbref.taylor`` takes its place.
 """
 
 from __future__ import annotations
@@ -16,11 +13,10 @@ from __future__ import annotations
 from mbref.kernels.compilation import kernel
 from mbref.linear_algebra.vectors import copy
 
-WINDOW = 1e-3  # relative pivot at the edge: rounding of 1e-16 costs 1e-13 there
-NEAR = 0.05  # below it the relative pivot is taken to fall linearly
-NODES = 4  # states of a leap, at least APART times its length apart
-APART = 2.0  # the extrapolation then magnifies rounding 14-fold; at 0.5 it was a thousandfold
-FAR = 1e300
+WINDOW = 0.1  # relative pivot below which a singular position is near
+ON_IT = 1e-7  # relative pivot of a run that begins on one: its first step leaves it
+SHARP = 3.0  # times a pivot's fall in the time of a step: a larger pivot has not vanished inside
+SMALLEST = 1e-4  # pivot of a row below which it is as good as redundant, and is not compared
 
 
 @kernel
@@ -31,60 +27,51 @@ def relative_pivot(watch):
 
 
 @kernel
+def is_near(memory):
+    """Whether a singular position is near where pivots were last watched."""
+    return memory.control.closed_loops > 0.0 and relative_pivot(memory.watch) <= WINDOW
+
+
+@kernel
+def starts_near(memory):
+    """Whether a run begins beside a singular position, but not on it."""
+    begins = memory.equations.system.counts.steps == 0
+    return begins and is_near(memory) and relative_pivot(memory.watch) > ON_IT
+
+
+@kernel
+def comes_near(memory):
+    """Whether a step ends near a singular position, and nearer than it began."""
+    return is_near(memory) and memory.watch.smallest_pivot < memory.watch.past_pivot
+
+
+@kernel
 def remember_state(taken, y, y_rate, memory):
-    """Row taken mod KEPT of the history := t, relative pivot, y, y'."""
+    """Row taken mod KEPT of the history := t, pivots, y, y'."""
     history = memory.loop.history
     row, n = taken % history.time.shape[0], y.shape[0]
+    memory.watch.past_pivot = memory.watch.smallest_pivot
     history.time[row] = memory.loop.clock.time
-    history.pivot[row] = relative_pivot(memory.watch)
+    copy(memory.pivots, history.pivots[row])
     copy(y, history.y[row, :n])
     copy(y_rate, history.y_rate[row, :n])
 
 
 @kernel
-def pivot_slope(history, taken):
-    """How fast the relative pivot falls (1/s), from its last two values; 0 where no window is near."""
-    kept, time, pivot = history.time.shape[0], history.time, history.pivot
+def may_have_passed(h, memory):
+    """Whether a pivot may have vanished inside a step of h seconds that ends where pivots were last watched.
+
+    So it is where its values at both ends add up to less than what it falls, as fast as in the step before.
+    """
+    history, taken = memory.loop.history, memory.equations.system.counts.steps
+    if memory.control.closed_loops == 0.0 or taken == memory.loop.clock.restart:
+        return False
+    kept = history.time.shape[0]
     now, before = taken % kept, (taken - 1) % kept
-    if taken == 0 or pivot[now] > NEAR or time[now] == time[before]:
-        return 0.0
-    return max(0.0, (pivot[before] - pivot[now]) / (time[now] - time[before]))
-
-
-@kernel
-def step_to_edge(history, taken):
-    """The step that ends just inside the window ahead, or nine tenths of the way; FAR where it is far."""
-    slope, pivot = pivot_slope(history, taken), history.pivot[taken % history.time.shape[0]]
-    if slope == 0.0 or pivot <= WINDOW:
-        return FAR
-    return (pivot - max(0.9 * WINDOW, 0.1 * pivot)) / slope  # the slope of a long step is a rough one
-
-
-@kernel
-def has_fallen_in(history, taken, watch):
-    """Whether a step ends deep in a window that was not near before it."""
-    return history.pivot[taken % history.time.shape[0]] > NEAR and relative_pivot(watch) < 0.5 * WINDOW
-
-
-@kernel
-def leap_length(history, taken):
-    """The step across the window that the last state stands in, to its far edge; 0 for none."""
-    slope, pivot = pivot_slope(history, taken), history.pivot[taken % history.time.shape[0]]
-    if slope == 0.0 or pivot > WINDOW:
-        return 0.0
-    return 2.0 * (pivot + WINDOW) / slope  # the slope is known to a factor of two
-
-
-@kernel
-def choose_nodes(history, taken, spacing):
-    """Choose up to NODES states as nodes, the last first, at least ``spacing`` (s) apart; their number."""
-    kept, time, nodes = history.time.shape[0], history.time, history.nodes
-    nodes[0] = taken % kept
-    found, latest = 1, time[taken % kept]
-    for back in range(1, min(taken, kept - 1) + 1):
-        row = (taken - back) % kept
-        if found < NODES and latest - time[row] >= spacing:
-            nodes[found] = row
-            found += 1
-            latest = time[row]
-    return found
+    width = history.time[now] - history.time[before]
+    for k in range(memory.pivots.shape[0]):
+        start, end = history.pivots[now, k], memory.pivots[k]
+        fall = (history.pivots[before, k] - start) / width * h
+        if start > SMALLEST and start + end < SHARP * fall:
+            return True
+    return False

@@ -2,37 +2,16 @@
 
 from __future__ import annotations
 
-from mbref.equations.coordinates import copy_state, expand, fastest_turn
+from mbref.equations.coordinates import copy_state, fastest_turn
 from mbref.equations.loads import remember_angles
 from mbref.kernels.compilation import INT, entry, kernel
-from mbref.kernels.layout import CHANGED, GUARD_FAILED, MEMORY, NOT_CONVERGED, NOT_FINITE, OK
-from mbref.linear_algebra.hermite import extrapolate_with_rates
-from mbref.linear_algebra.vectors import all_finite, copy, larger
-from mbref.simulation.singular_crossing import (
-    APART,
-    choose_nodes,
-    has_fallen_in,
-    leap_length,
-    remember_state,
-    step_to_edge,
-)
-
-LARGEST_CORRECTION = 1e-2  # of a landing, relative; good extrapolations need less
+from mbref.kernels.layout import CHANGED, GUARD_FAILED, MEMORY, NOT_FINITE, OK
+from mbref.linear_algebra.vectors import all_finite, copy
+from mbref.simulation.samples import take_sample
+from mbref.simulation.singular_crossing import comes_near, may_have_passed, remember_state, starts_near
 
 # how a call ends; evaluation statuses (SINGULAR, …) end it too
-DONE, VIOLATED, STEP_TOO_SMALL, TOO_MANY_STEPS, PAUSED = range(10, 15)
-
-
-@kernel
-def take_sample(memory):
-    """Record state, accelerations and multipliers as the last evaluation left them."""
-    samples, state, system = memory.loop.samples, memory.state, memory.equations.system
-    k = memory.loop.clock.sample
-    copy(state.coordinates, samples.coordinates[k])
-    copy(state.velocities, samples.velocities[k])
-    copy(system.acceleration, samples.accelerations[k])
-    copy(system.multipliers, samples.multipliers[k])
-    memory.loop.clock.sample = k + 1
+DONE, VIOLATED, STEP_TOO_SMALL, TOO_MANY_STEPS, PAUSED, SINGULAR_AHEAD, UNDECIDED = range(10, 17)
 
 
 @kernel
@@ -95,6 +74,9 @@ def advance_to_end(memory):
     loop, clock, counts = memory.loop, memory.loop.clock, memory.equations.system.counts
     taken, times = 0, memory.loop.times
     while True:
+        if starts_near(memory):
+            clock.passage = clock.time
+            return SINGULAR_AHEAD
         y, y_rate = loop.y[: clock.y_size], loop.y_rate[: clock.y_size]
         status = evaluate_state(y, y_rate, memory)
         if status != OK:
@@ -108,8 +90,7 @@ def advance_to_end(memory):
             return TOO_MANY_STEPS
         if taken >= memory.control.steps_per_call:
             return PAUSED
-        length = 0.0 if memory.control.fixed_step > 0.0 else leap_length(loop.history, counts.steps)
-        status = leap(length, memory) if length > 0.0 else advance(times[clock.sample], y, y_rate, memory)
+        status = advance(times[clock.sample], y, y_rate, memory)
         if status != OK:
             return status
         if clock.sample == times.shape[0]:
@@ -136,56 +117,6 @@ def evaluate_state(y, y_rate, memory):
 
 
 @kernel
-def set_extrapolated_state(t, count, memory):
-    """The extrapolated state and accelerations at a sample time inside a window, for ``take_sample``."""
-    loop, active, acceleration = memory.loop, memory.active, memory.equations.system.acceleration
-    y, y_rate = loop.y_new[: loop.clock.y_size], loop.y_rate[: loop.clock.y_size]
-    extrapolate_with_rates(loop.history, count, t, y, y_rate)
-    expand(y, active, memory.state)
-    nq = active.coordinates.shape[0]
-    for k in range(active.velocities.shape[0]):
-        acceleration[active.velocities[k]] = y_rate[nq + k]
-
-
-@kernel
-def correction(y, predicted):
-    """The largest difference of an entry from its prediction, relative to the larger of 1 and the entry."""
-    size = 0.0
-    for i in range(y.shape[0]):
-        size = larger(size, (y[i] - predicted[i]) / max(1.0, abs(y[i])))
-    return size
-
-
-@kernel
-def leap(length, memory):
-    """Cross a window by extrapolation and projection; samples inside it are taken as extrapolated.
-
-    NOT_CONVERGED where the projection moves the landing further than a good extrapolation is off: the
-    window was none, or the polynomial does not reach across it.
-    """
-    loop, clock, counts = memory.loop, memory.loop.clock, memory.equations.system.counts
-    history, times, landing = loop.history, loop.times, clock.time + length
-    found = choose_nodes(history, counts.steps, APART * length)
-    while clock.sample < times.shape[0] and times[clock.sample] <= landing:
-        clock.time = times[clock.sample]
-        set_extrapolated_state(clock.time, found, memory)
-        take_sample(memory)
-    y_new, predicted = loop.y_new[: clock.y_size], loop.y_rate[: clock.y_size]
-    extrapolate_with_rates(history, found, landing, y_new, predicted)
-    copy(y_new, predicted)
-    status = memory.kernels.accept(landing, loop.y_new, memory)
-    if status == OK and correction(y_new, predicted) > max(LARGEST_CORRECTION, 300.0 * memory.control.rtol):
-        status = NOT_CONVERGED
-    clock.time = landing if clock.sample < times.shape[0] else clock.time
-    counts.steps += 1
-    counts.crossings += 1
-    clock.restart = counts.steps
-    if status == OK:
-        copy(loop.y_new, loop.y)
-    return status
-
-
-@kernel
 def attempt(t, h, y, y_rate, y_new, memory):
     """One attempt at a step: its error ratio, or minus the status of an evaluation that failed."""
     step, kernels = memory.kernels.step, memory.kernels
@@ -201,9 +132,9 @@ def accept_step(now, h, suggested, ratio, memory):
     loop, counts = memory.loop, memory.equations.system.counts
     clock = loop.clock
     status = memory.kernels.accept(now, loop.y_new, memory)
-    adaptive = memory.control.fixed_step == 0.0
-    if status == OK and adaptive and has_fallen_in(loop.history, counts.steps, memory.watch):
-        status = NOT_CONVERGED
+    if status == OK and (comes_near(memory) or may_have_passed(h, memory)):
+        clock.passage = now
+        return SINGULAR_AHEAD
     if status == OK or status == CHANGED:  # noqa: SIM109 - no containers in kernels
         counts.steps += 1
         copy(loop.y_new, loop.y)
@@ -221,8 +152,7 @@ def advance(target, y, y_rate, memory):
     t, interval, y_new = clock.time, target - clock.time, loop.y_new[: clock.y_size]
     suggested = propose(clock.length, clock.suggested, clock.ratio, y, y_rate, memory)
     suggested = proposed_or_first_step(suggested, memory)
-    limit = min(largest_step(memory), step_to_edge(loop.history, counts.steps))
-    suggested = min(max(suggested, control.forced_step), limit)
+    suggested = min(max(suggested, control.forced_step), largest_step(memory))
     while True:
         if control.fixed_step > 0.0:
             h = interval / max(1.0, -(-(interval / control.fixed_step - 1e-6) // 1.0))
@@ -236,6 +166,8 @@ def advance(target, y, y_rate, memory):
             status = accept_step(target if h == interval else t + h, h, suggested, ratio, memory)
             if status == OK or status == CHANGED:  # noqa: SIM109 - no containers in kernels
                 return OK
+            if status == SINGULAR_AHEAD:
+                return status
         counts.rejected += 1
         if control.fixed_step > 0.0:
             return status

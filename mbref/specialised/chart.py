@@ -84,7 +84,7 @@ def accept(t, y, memory):
     if project_by_code(t, y, memory) != OK:
         return project(t, y, memory)
     outputs, equations = memory.code.outputs, memory.equations
-    watch(outputs[1 : 1 + memory.factor.symbolic.row.shape[0]], memory.watch)
+    watch(outputs[1 : 1 + memory.factor.symbolic.row.shape[0]], memory.pivots, memory.watch)
     flush_denormals(y[: memory.loop.clock.y_size])
     equations.rows.phi[:] = outputs[0]
     expand(y, memory.active, memory.state)

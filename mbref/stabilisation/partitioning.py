@@ -33,9 +33,11 @@ class Options(NamedTuple):
 
 
 class Partition(NamedTuple):
-    """Number of dependent coordinates."""
+    """Number of dependent coordinates; smallest pivot of Φ_u relative to its largest, now and when chosen."""
 
     rank: int = 0
+    pivot: float = 0.0
+    chosen_pivot: float = 0.0  # 0 until it is known
 
 
 class Scratch(NamedTuple):
@@ -89,7 +91,7 @@ def choose_partition(memory):
     )
     scratch.partition.rank = rank
     memory.loop.clock.y_size = 2 * (q.shape[0] - rank)
-    memory.watch.reference_pivot = 0.0
+    scratch.partition.chosen_pivot = 0.0
 
 
 @kernel
@@ -131,7 +133,7 @@ def factorise_dependent(memory):
     smallest, greatest = abs(lu[0, 0]), abs(lu[0, 0])
     for i in range(rank):
         smallest, greatest = min(smallest, abs(lu[i, i])), max(greatest, abs(lu[i, i]))
-    memory.watch.smallest_pivot = smallest / greatest
+    scratch.partition.pivot = smallest / greatest
     return True
 
 
@@ -261,11 +263,11 @@ def accept(t, y, memory):
         return status
     solve_dependent_rates(y, memory)
     copy_state(memory.state, memory.previous)
-    watch = memory.watch
-    watch.accepted_time = t
-    if watch.reference_pivot == 0.0:
-        watch.reference_pivot = watch.smallest_pivot
-    if watch.smallest_pivot < options_of(memory.chart_options).kept * watch.reference_pivot:
+    memory.watch.accepted_time = t
+    partition = scratch_of(memory.chart).partition
+    if partition.chosen_pivot == 0.0:
+        partition.chosen_pivot = partition.pivot
+    if partition.pivot < options_of(memory.chart_options).kept * partition.chosen_pivot:
         choose_partition(memory)
         gather_independent(y, memory)
         return CHANGED

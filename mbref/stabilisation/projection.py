@@ -29,6 +29,7 @@ from mbref.stabilisation.base import Stabilisation
 ALPHA = 1e10  # of the iteration
 REPEATED, ALONE = 1, 2  # iterations of a correction that Newton's method repeats, and of one made once
 INDEPENDENT = (5.0 * ALPHA**-0.25) ** 2  # the squared pivot from which on a row counts as independent
+LEAST_REFERENCE = 0.05  # that the smallest pivot is compared with, also at a start near a singular position
 MOST_ITERATIONS = 10
 ROUNDING = 1e3  # tolerances: the violation below which iterations may fail to reduce it further
 SMALL, GOOD_REDUCTION = 1e-8, 1e-2  # a factor is kept while violations are so small and shrink so fast
@@ -60,23 +61,25 @@ def enter(t, y, memory):
 @inlined
 def factorise_constraints(memory):
     """The factor of S + I/α at the state last evaluated; False where it does not exist."""
-    system = memory.equations.system
+    equations, system = memory.equations, memory.equations.system
     system.counts.factorisations += 1
-    return regularised_factor(memory.factor, system.blocks.reshape(-1), system.inverse_root, ALPHA)
+    return regularised_factor(memory.factor, system.blocks.reshape(-1), equations.scene.metric_root, ALPHA)
 
 
 @inlined
 def watch_pivots(memory):
     """Watch the pivots of the last factor."""
     find_squared_pivots(memory.factor)
-    watch(memory.factor.squared_pivots, memory.watch)
+    watch(memory.factor.squared_pivots, memory.pivots, memory.watch)
 
 
 @inlined
-def watch(squares, record):
-    """Keep the largest rank seen, the smallest of so many pivots now, and the largest that has been."""
+def watch(squares, pivots, record):
+    """Keep the pivots, the largest rank seen, the smallest of so many pivots now, and its largest value."""
     rank, smallest = 0, 1.0
-    for square in squares:
+    for k in range(squares.shape[0]):
+        square = squares[k]
+        pivots[k] = sqrt(square)
         if square > INDEPENDENT:
             rank += 1
             smallest = min(smallest, square)
@@ -88,7 +91,7 @@ def watch(squares, record):
         sort(squares)
         smallest = squares[squares.shape[0] - generic]
     record.smallest_pivot = sqrt(smallest) if generic > 0 else 0.0
-    record.reference_pivot = max(record.reference_pivot, record.smallest_pivot)
+    record.reference_pivot = max(record.reference_pivot, record.smallest_pivot, LEAST_REFERENCE)
 
 
 @inlined

@@ -128,6 +128,9 @@ class Solver(NamedTuple):
     partner: Annotated[Indices, "nz + nr"]  # of equations: their columns of K
     pivot: Annotated[Indices, "nz + nr"]  # the order of elimination
     first: Annotated[Vector, "nz + nr"]  # pivots when they were chosen
+    last: Annotated[Vector, "nz + nr"]  # pivots of the last factorisation
+    past_gradient: Annotated[Matrix, "nr", "nz"]  # G where the step began
+    product: Annotated[Matrix, "nr", "nr"]  # of gradients at both ends of a step
     place: Annotated[Indices, "2*twofold"]  # of the entries of G in K, and of those of Gᵀ
     base: Annotated[Matrix, "nz + nr + 1", "lanes"]  # K without what depends on the variables
     inverse: Annotated[Matrix, "nz + nr + 1", "lanes"]  # the last row takes entries that K has not
@@ -144,6 +147,9 @@ class Progress(NamedTuple):
     order: int = 0  # of the series
     tolerance: float = 0.0  # of the last terms of the series
     violation: float = 0.0  # the largest before the last correction
+    crossed: int = 0  # whether the last attempt crossed a singular position
+    past_pivot: float = 1.0  # the least of G where the step began
+    largest_pivot: float = 0.0  # that the least one has been
 
 
 class TaylorMemory(NamedTuple):

@@ -17,7 +17,7 @@ import numpy as np
 from mbref import rotations
 from mbref.equations.initial_state import Start, scene_length
 from mbref.equations.model import Model
-from mbref.kernels.scene_layout import DISTANCE, DOT1, DOT2, POINT, Drivers
+from mbref.kernels.scene_layout import DISTANCE, DOT1, DOT2, POINT
 from mbref.taylor.expressions import (
     ONE,
     VANISHING,
@@ -31,6 +31,7 @@ from mbref.taylor.expressions import (
     plus,
     product_sum,
 )
+from mbref.taylor.images import Images, image_forms
 from mbref.taylor.loads import COSINE, SINE, VALUE
 from mbref.taylor.orientations import Orientations, Triple
 
@@ -51,28 +52,19 @@ class NaturalCoordinates:
         poses = start.q.reshape(-1, 7)
         self.place = poses[:, :3] / self.length
         axes = rotations.to_matrix(poses[:, 3:])
-        twists = start.v.reshape(-1, 6)
-        self._spin = np.einsum("bij,bj->bi", axes, twists[:, 3:])
         self._moving = moving.reshape(-1, 6)
-        self.start: list[float] = []
-        self.rate: list[float] = []
+        self.images = Images(model.data.drivers, self.length)
         self.given: dict[int, tuple[int, int]] = {}
-        self.centres = [self._new(3, self.place[b], twists[b, :3] / self.length) for b in range(self.nb)]
+        self.centres = [self.images.add(b, np.eye(12)[:3]) for b in range(self.nb)]
         self._positions = range(3 * self.nb)
         self.eliminate = Elimination(self._may_go)
-        self.orientations = Orientations(model, axes, self._spin, self._moving[:, 3:], self._new)
+        self.orientations = Orientations(model, axes, self._moving[:, 3:], self.images)
         self.rows = self._rows()
         gone = self.eliminate.expressed
-        kept = (v for v in range(len(self.start)) if v not in gone and v not in self.given)
+        kept = (v for v in range(len(self.images)) if v not in gone and v not in self.given)
         self.kept = sorted(kept, key=lambda v: -self._products_of(v))
 
     # --- variables ----------------------------------------------------------------------------------------
-    def _new(self, count: int, start: Sequence[float], rate: Sequence[float]) -> tuple[int, ...]:
-        first = len(self.start)
-        self.start += map(float, start)
-        self.rate += map(float, rate)
-        return tuple(range(first, first + count))
-
     def _may_go(self, variable: int, others: int) -> bool:
         most = MOST_TERMS if variable in self._positions else MOST_FACTORS
         return others <= most and variable not in self.given
@@ -168,15 +160,13 @@ class NaturalCoordinates:
         """A direction that is of second degree as variables, and the rows that define them."""
         table = self.model.data.primitives
         body = int(table.first[p])
-        y, x = (self.orientations.world(body, w[p]) for w in (table.turning_first, table.direction_first))
-        rate = driver_rate(self.model.data.drivers, int(table.driver[p]))
-        spin = self._spin[body] if body < self.nb else np.zeros(3)
-        own = self._new(3, y, np.cross(spin, y) - rate * x)
+        along, across = (image_forms(np.eye(3), w[p]) for w in (table.turning_first, table.direction_first))
+        own = self.images.add(body, along, across, int(table.driver[p]))
         rows = [plus(row, -1.0, {v: 1.0}) for row, v in zip(turned, own, strict=True)]
         return [{(ONE, v): 1.0} for v in own], rows
 
     def _prescribed(self, driver: int, functions: Sequence[int], scale: float) -> tuple[int, ...]:
-        variables = self._new(len(functions), np.zeros(len(functions)), np.zeros(len(functions)))
+        variables = self.images.add(self.nb, np.zeros((len(functions), 12)))
         self.given |= {v: (driver, function) for v, function in zip(variables, functions, strict=True)}
         return variables
 
@@ -191,12 +181,6 @@ class NaturalCoordinates:
             else:
                 total[i, j] = total.get((i, j), 0.0) + coefficient
         return {key: c for key, c in total.items() if abs(c) > VANISHING or key == (ONE, ONE)}
-
-
-def driver_rate(drivers: Drivers, d: int) -> float:
-    """The rate of driver d at t = 0, in rad/s or m/s."""
-    linear = drivers.polynomial[d, 1] if drivers.polynomial.shape[1] > 1 else 0.0
-    return float(linear + drivers.amplitude[d] * drivers.frequency[d] * np.cos(drivers.phase[d]))
 
 
 def _difference(first: Triple, second: Triple) -> Triple:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from mbref.equations.model import Model
 from mbref.taylor.expressions import ONE, ROUNDING, Expression, Polynomial, combination, product_sum
+from mbref.taylor.images import Images, image_forms
 
 PARALLEL = 1e-9  # sine of an angle between the images of one axis
 APART = 0.2  # sine of the least angle between two directions of a basis
@@ -68,17 +69,13 @@ FIXED = Orientation()
 class Orientations:
     """The orientations of a model's bodies, by number: -1 is the fixed frame's.
 
-    ``axes`` (nb, 3, 3) are the principal frames and ``spin`` (nb, 3) the angular velocities at the start
-    (world), ``moving`` (nb, 3) says about which principal axes a body can turn, ``new(count, start, rate)``
-    makes variables.
+    ``axes`` (nb, 3, 3) are the principal frames at the start, ``moving`` (nb, 3) says about which principal
+    axes a body can turn, ``images`` takes the variables.
     """
 
-    def __init__(
-        self, model: Model, axes: np.ndarray, spin: np.ndarray, moving: np.ndarray,
-        new: Callable[[int, Sequence[float], Sequence[float]], tuple[int, ...]],
-    ):  # fmt: skip
+    def __init__(self, model: Model, axes: np.ndarray, moving: np.ndarray, images: Images):
         self.model, self.nb = model, model.nb
-        self._axes, self._spin, self._moving, self._new = axes, spin, moving, new
+        self._axes, self._moving, self._images = axes, moving, images
         self.group = self._groups()
         self.numbered = self._orientations()
 
@@ -150,10 +147,9 @@ class Orientations:
         across = (d - axis * (axis @ d) for d in self._directions(group))
         arm = next(d for d in across if np.linalg.norm(d) > APART)
         arm = arm / np.linalg.norm(arm)
-        c, s = frame[:2] @ arm
-        spin = float(self._spin[self.group.index(group)] @ axis)
-        variables = self._new(2, (c, s), (-spin * s, spin * c))
-        return Orientation(variables, np.array([arm, np.cross(axis, arm), axis]), frame)
+        return Orientation(
+            self._variables(group, frame[:2], [arm]), np.array([arm, np.cross(axis, arm), axis]), frame
+        )
 
     def _frame(self, axis: np.ndarray) -> np.ndarray:
         """Right-handed unit vectors in rows, the third an axis, the first one that a body slides along."""
@@ -166,8 +162,13 @@ class Orientations:
 
     def _free(self, group: int) -> Orientation:
         basis = _basis(self._directions(group))
-        rates = np.cross(self._spin[self.group.index(group)], basis)
-        return Orientation(self._new(9, basis.ravel(), rates.ravel()), basis=basis)
+        return Orientation(self._variables(group, np.eye(3), basis), basis=basis)
+
+    def _variables(self, group: int, axes: np.ndarray, directions: Sequence[np.ndarray]) -> tuple[int, ...]:
+        """Components along axes at rest (k, 3) of the images of directions that move with an orientation."""
+        body = self.group.index(group)
+        forms = [image_forms(axes, self._axes[body].T @ w) for w in directions]
+        return self._images.add(body, np.concatenate(forms))
 
     def _directions(self, group: int) -> Iterator[np.ndarray]:
         """Directions for the basis of an orientation, the best first: axes of joints, arms, own axes."""

@@ -9,7 +9,7 @@ from mbref.equations.evaluation import assemble_system
 from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.layout import NOT_CONVERGED, OK
 from mbref.linear_algebra.vectors import copy, larger
-from mbref.simulation.stepping import take_sample as record_sample
+from mbref.simulation.samples import take_sample as record_sample
 from mbref.taylor.lanes import LANES, load, store
 
 BESIDE = 1e-3  # part of the largest least pivot below which a position is beside a singular one

@@ -17,9 +17,9 @@ WITHOUT_INERTIA = 1e-13  # of the largest inertia of a variable
 
 
 @kernel
-def put_gradient(memory):
-    """G at the first coefficients into ``work``; rows are of length one about, or zero in all positions."""
-    rows, work, y = memory.polynomials.rows, memory.solver.work, memory.series.terms
+def put_gradient(y, memory):
+    """G at variables y[0] into ``work``; rows are of length one about, or zero in all positions."""
+    rows, work = memory.polynomials.rows, memory.solver.work
     work[:] = 0.0
     for e in range(rows.linear_row.shape[0]):
         if rows.linear_lane[e] < work.shape[1]:
@@ -56,7 +56,7 @@ def choose(memory):
     """Choose independent rows and dependent variables by complete pivoting; how many there are."""
     solver, tolerance = memory.solver, memory.run.equations.system.settings.rank_tolerance
     row, order, work, rank = solver.row, solver.order, solver.work, 0
-    put_gradient(memory)
+    put_gradient(memory.series.terms, memory)
     for k in range(row.shape[0]):
         row[k] = k
     for k in range(order.shape[0]):
@@ -135,6 +135,7 @@ def invert(solver, first):
     for step in range(solver.pivot.shape[0]):
         k = solver.pivot[step]
         pivot = solver.inverse[k, k]
+        solver.last[step] = pivot
         if first:
             solver.first[step] = abs(pivot)
         sharp = sharp and abs(pivot) > KEPT * solver.first[step]

@@ -14,11 +14,31 @@ from mbref.kernels.compilation import INT, entry, inlined, kernel
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, OK
 from mbref.kernels.named_memory import Named
 from mbref.linear_algebra.vectors import larger
-from mbref.simulation.stepping import DONE, PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS
+from mbref.simulation.singular_crossing import WINDOW, relative_pivot
+from mbref.simulation.stepping import DONE, PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED
 from mbref.taylor.lanes import LANES, gathered, load, store
 from mbref.taylor.layout import TaylorMemory
 from mbref.taylor.loads import ANGLE, TORSION_SERIES, expand_drivers
-from mbref.taylor.samples import LOST_MOTION, NOISE, evaluate_series, put_angles, take_sample
+from mbref.taylor.passage import (
+    DEEPEST,
+    LEAST,
+    exactness,
+    exactness_across,
+    has_crossed,
+    least_pivot,
+    passes_gap,
+    remember_gradient,
+)
+from mbref.taylor.samples import (
+    LOST_MOTION,
+    NOISE,
+    evaluate_series,
+    find_poses,
+    project_state,
+    put_angles,
+    put_state,
+    take_sample,
+)
 from mbref.taylor.series import expand
 from mbref.taylor.solver import choose, factorise, solution
 
@@ -27,6 +47,7 @@ CORRECTIONS = 8
 ROUNDING = 1e-12  # of rows
 LOST_ROWS = 100.0  # tolerances by which rows may be off
 SHORTER = 0.7
+LEAVE = 1.5  # windows: the pivot from which on steps of the run are taken again
 
 
 @kernel
@@ -119,15 +140,15 @@ def size_of(series, k, variables):
 
 
 @kernel
-def longest_step(memory):
-    """The step at which the last two terms are as large as the tolerance."""
+def longest_step(tolerance, memory):
+    """The step at which the last two terms of the series are as large as the tolerance."""
     progress, control, past = memory.progress, memory.run.control, memory.series.past
     counts, h = memory.run.equations.system.counts, control.largest_step
     shortest = log(h)
     for k in range(progress.order - 1, progress.order + 1):
         size = size_of(past, k, memory.solver.order.shape[0])
         if size > 0.0:
-            shortest = min(shortest, log(progress.tolerance / size) / k)
+            shortest = min(shortest, log(tolerance / size) / k)
     h = exp(shortest)
     if counts.steps == 0 and control.first_step > 0.0:
         h = min(h, control.first_step)
@@ -136,7 +157,8 @@ def longest_step(memory):
 
 @kernel
 def remember_series(memory):
-    """Keep the series of the step's beginning."""
+    """Keep the series of the step's beginning, and the constraint gradient there."""
+    remember_gradient(memory)
     series, torsions = memory.series, memory.polynomials.torsions
     for j in range(0, series.terms.shape[0] * series.terms.shape[1], LANES):
         store(load(series.terms, j), series.past, j)
@@ -146,18 +168,24 @@ def remember_series(memory):
 
 
 @kernel
-def judge(h, memory):
+def judge(h, last, memory):
     """OK where rows and accelerations at the end of a step are off by no more than the tolerance explains."""
-    progress, state, terms = memory.progress, memory.state, memory.series.terms
+    progress, state, terms, pivot = memory.progress, memory.state, memory.series.terms, least_pivot(memory)
     if not progress.violation <= LOST_ROWS * progress.tolerance + ROUNDING:
         return STEP_TOO_SMALL
+    crossed = has_crossed(h, pivot, memory)
+    progress.crossed = crossed
+    if passes_gap(crossed, pivot, memory) or (not last and pivot < DEEPEST * progress.past_pivot):
+        return STEP_TOO_SMALL
+    if not crossed and not last and pivot < min(progress.past_pivot, LEAST * progress.largest_pivot):
+        return UNDECIDED
     off, size = 0.0, 1.0
     for i in range(memory.solver.order.shape[0]):
         off = larger(off, (2.0 * terms[2, i] - state[2, i]) * h * h)
         size = larger(size, state[2, i] * h * h)
     if not isfinite(off):
         return NOT_FINITE
-    lost = LOST_MOTION * progress.order * progress.order * progress.tolerance
+    lost = LOST_MOTION * progress.order * progress.order * exactness_across(progress)
     return OK if off <= lost + NOISE * size else STEP_TOO_SMALL
 
 
@@ -175,23 +203,26 @@ def attempt(h, last, memory):
     progress.order = 2 if last else order
     status = expand_from(memory.run.loop.clock.time + h, memory)
     progress.order = order
-    return judge(h, memory) if status == OK else status
+    return judge(h, last, memory) if status == OK else status
 
 
 @kernel
 def step(memory):
     """One step, as many attempts as it takes, and the samples on its way."""
     loop, control, counts = memory.run.loop, memory.run.control, memory.run.equations.system.counts
-    clock, times = loop.clock, loop.times
+    clock, times, progress = loop.clock, loop.times, memory.progress
     remember_series(memory)
     left = times[times.shape[0] - 1] - clock.time
-    h = min(longest_step(memory), left)
+    exact = min(longest_step(exactness(progress), memory), left)
+    h = min(longest_step(exactness_across(progress), memory), left)
     while True:
         status = attempt(h, h >= left, memory)
-        if status == OK:
+        if status == OK and (progress.crossed or h <= exact):
             break
+        if status == UNDECIDED and h <= exact:
+            return status
         counts.rejected += 1
-        h *= SHORTER
+        h = exact if h > exact else h * SHORTER
         if not h >= control.smallest_step:
             return status
     while clock.sample < times.shape[0] and (h >= left or times[clock.sample] <= clock.time + h):
@@ -200,17 +231,19 @@ def step(memory):
             return status
     put_angles(h, memory)
     counts.steps += 1
+    counts.crossings += progress.crossed
     clock.time = times[times.shape[0] - 1] if h >= left else clock.time + h
     return OK
 
 
 @entry(INT(Named(TaylorMemory)))
 def enter(memory):
-    """Choose the partition at the start and expand there: OK or why that cannot be."""
-    expand_drivers(0.0, memory)
+    """Choose the partition at the present state and expand there: OK or why that cannot be."""
+    t = memory.run.loop.clock.time
+    expand_drivers(t, memory)
     memory.progress.rank = choose(memory)
     memory.solver.first[:] = 1e300
-    return expand_from(0.0, memory)
+    return expand_from(t, memory)
 
 
 @entry(INT(Named(TaylorMemory)))
@@ -228,3 +261,34 @@ def advance_series(memory):
             return status
         taken += 1
     return DONE
+
+
+@entry(INT(Named(TaylorMemory)))
+def pass_singular_position(memory):
+    """Advance until a singular position is behind: PAUSED there, DONE at the end, or why that cannot be."""
+    run = memory.run
+    clock, times, counts = run.loop.clock, run.loop.times, run.equations.system.counts
+    before = 1.0
+    while clock.sample < times.shape[0]:
+        if counts.steps >= run.control.most_steps:
+            return TOO_MANY_STEPS
+        status = step(memory)
+        if status != OK:
+            return status
+        put_first_terms(memory)
+        pivot = relative_pivot(run.watch)
+        if clock.time >= clock.passage and pivot >= max(before, LEAVE * WINDOW):
+            return PAUSED
+        before = pivot
+    return DONE
+
+
+@kernel
+def put_first_terms(memory):
+    """Coordinates and velocities of all bodies where the series begins, projected, with their pivots."""
+    state, terms = memory.state, memory.series.terms
+    for i in range(memory.solver.order.shape[0]):
+        state[0, i], state[1, i] = terms[0, i], terms[1, i]
+    find_poses(memory)
+    put_state(memory)
+    project_state(memory.run.loop.clock.time, memory.run)

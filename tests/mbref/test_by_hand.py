@@ -12,8 +12,6 @@ from mbref.cli.run import show
 from mbref.equations.joint_reactions import reactions
 from mbref.equations.model import Model
 from mbref.formulations import FORMULATIONS
-from mbref.kernels.layout import History
-from mbref.kernels.named_memory import allocate
 from mbref.scene import (
     Body,
     Driver,
@@ -26,8 +24,8 @@ from mbref.scene import (
     TorsionSpring,
     Translational,
 )
-from mbref.simulation.singular_crossing import WINDOW, leap_length
 from mbref.stabilisation import STABILISATIONS
+from mbref.taylor.passage import determinant
 from mbref.trajectory import Cost, Outcome, Trajectory
 
 SINE = Sine(amplitude=0.3, frequency=2.0, phase=0.4)
@@ -73,14 +71,14 @@ def test_body_on_a_driven_slide(t: float):
     assert np.abs(terms.jacobian @ (acceleration * along) - terms.gamma).max() < 1e-14
 
 
-def test_leap_over_the_window_of_a_singular_position():
-    """Half a window from zero, one window in 2 ms: 1 ms to zero, 2 ms more to the far edge, twice that."""
-    history = allocate(History, {"nb": 1})
-    history.time[:2], history.pivot[:2] = (0.0, 2e-3), (1.5 * WINDOW, 0.5 * WINDOW)
-    assert leap_length(history, 1) == pytest.approx(2 * 3e-3)
-    assert leap_length(history, 0) == 0.0, "a single state has no slope"
-    history.pivot[:2] = (2.5 * WINDOW, 1.5 * WINDOW)
-    assert leap_length(history, 1) == 0.0, "the window is still ahead"
+@pytest.mark.parametrize(("rows", "negative"), [
+    ([[2.0, 1.0], [1.0, 3.0]], False), ([[0.0, 1.0], [1.0, 0.0]], True), ([[1.0, 2.0], [2.0, 1.0]], True),
+    ([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]], False),
+    ([[-1.0, 5.0, 2.0], [0.0, 2.0, 7.0], [0.0, 0.0, 3.0]], True),
+])  # fmt: skip
+def test_the_sign_of_a_determinant(rows, negative):
+    sign, size = determinant(np.array(rows), len(rows))
+    assert sign == negative and np.exp(size) == pytest.approx(abs(np.linalg.det(rows)))
 
 
 def test_cost_that_a_run_prints(capsys):

@@ -9,8 +9,8 @@ from mbref.equations.static_constraints import SMALL, _perpendicular, held_by_ro
 from mbref.method import Method
 from mbref.scene import Body, Driver, Fixed, Revolute, Scene, Spring, Translational
 from mbref.scenes import SCENES, find_scene
-from mbref.simulation.run import Run
 from mbref.simulation.simulate import Limits, simulate
+from mbref.taylor.run import CrossingRun as Run
 
 METHOD = "alf-dual+projection"
 ORIGIN, X, Z = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)

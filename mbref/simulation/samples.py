@@ -1,0 +1,18 @@
+"""Samples: what a run records at the sample times, at states of steps and inside a leap."""
+
+from __future__ import annotations
+
+from mbref.kernels.compilation import kernel
+from mbref.linear_algebra.vectors import copy
+
+
+@kernel
+def take_sample(memory):
+    """Record state, accelerations and multipliers as the last evaluation left them."""
+    samples, state, system = memory.loop.samples, memory.state, memory.equations.system
+    k = memory.loop.clock.sample
+    copy(state.coordinates, samples.coordinates[k])
+    copy(state.velocities, samples.velocities[k])
+    copy(system.acceleration, samples.accelerations[k])
+    copy(system.multipliers, samples.multipliers[k])
+    memory.loop.clock.sample = k + 1
