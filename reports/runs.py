@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.judge.metrics import exact_motion
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.tolerances import ERROR_LEVELS, EXCESS, FALSE_SUCCESS
-from crosscheck.judge.truth import NoSolution, truth_for
+from crosscheck.judge.truth import NoSolution, Truth, truth_for
 from crosscheck.study.fair_timing import model_difference
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error_text, varied_settings
@@ -112,11 +113,18 @@ class SceneRuns:
 
     def exact(self, times: np.ndarray) -> Trajectory | None:
         """The true motion at times (k,), in the time that its record was given; None where unknown."""
-        truth = truth_for(self.scene, SECONDS if self.truth is None else self.truth["given"])
+        truth = self._truth()
         try:
             return None if truth is None else truth.poses(times)
         except NoSolution:
             return None
+
+    def exact_part(self, motion: Trajectory) -> Trajectory | None:
+        """The true motion at a motion's times, or at the first of them where it is known no further."""
+        return exact_motion(motion, self._truth())
+
+    def _truth(self) -> Truth | None:
+        return truth_for(self.scene, SECONDS if self.truth is None else self.truth["given"])
 
     def curves(self) -> dict[Curve, list[Run]]:
         """Runs by engine and family, in the order of the records."""

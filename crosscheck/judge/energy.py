@@ -28,17 +28,32 @@ def energy_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
     apart to count a body's turns, or when nothing ever has energy beyond rounding; infinite when a state is
     not finite.
     """
+    balance = _balance(scene, trajectory)
+    if balance is None:
+        return None
+    drift, scale = balance
+    return None if scale <= AT_REST * _possible(scene, trajectory) else drift / scale
+
+
+def energy_drift(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
+    """Drift (k,) of energy minus work since t = 0 in J; None and infinite where `energy_series` is, but a
+    number at rest."""
+    balance = _balance(scene, trajectory)
+    return None if balance is None else balance[0]
+
+
+def _balance(scene: Scene, trajectory: Trajectory) -> tuple[np.ndarray, float] | None:
+    """Drift (k,) in J, and the largest energy seen (J); None where there is no balance."""
     damped = any(load.is_damped for load in scene.load)
     if scene.driver or damped or not scene.has_mass() or not len(trajectory.times):
         return None
     if not all(np.isfinite(array).all() for array in _motion(trajectory)):
-        return np.full(len(trajectory.times), np.inf)
+        return np.full(len(trajectory.times), np.inf), float(np.finfo(float).max)
     kinetic = kinetic_energy(scene, *_motion(trajectory)[1:])
     start = kinetic_energy(scene, *(a[None] for a in _initial(scene)[1:]))[0]
     gains = np.array([kinetic - start, *_potential_gains(scene, trajectory)])
     scale = max(start, kinetic.max(), np.abs(gains).max())
-    least = AT_REST * _possible(scene, trajectory)
-    return None if np.isnan(gains).any() or scale <= least else np.abs(gains.sum(axis=0)) / scale
+    return None if np.isnan(gains).any() else (np.abs(gains.sum(axis=0)), float(scale))
 
 
 def _possible(scene: Scene, trajectory: Trajectory) -> float:

@@ -1,7 +1,8 @@
 """Published hard problems: the values printed for them, how errors are measured, what is accepted, and where.
 
 The printed values are data to be checked, not truths: `benchmarks/errata.py` tells how far each is from the
-reference.  An observation is one number of a motion at one time.
+reference.  An observation is one number of a motion at one time.  Problems without published acceptance are
+accepted at OURS, a level of this project.
 """
 
 from __future__ import annotations
@@ -12,28 +13,39 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.judge import constraints
+from crosscheck.judge import published_measures as measures
+from crosscheck.judge.published_measures import Measure
 from crosscheck.judge.reference.arithmetic import doubles
+from crosscheck.judge.reference.cache import canonical
 from crosscheck.judge.reference.motion import Motion
 from mbref.scene import Scene
 from mbref.scenes import find_scene
+from mbref.trajectory import Trajectory
 
-Observe = Callable[[Scene, Motion], dict[str, float]]
+Observe = Callable[[Scene, Motion | Trajectory], dict[str, float]]
+OURS = 1e-6  # acceptance, in the unit of the measure, where none is published
 
 
 @dataclass(frozen=True)
 class Published:
     """One problem: the scene's name, printed values by name at ``time`` (s) and how they are read off a
-    motion sampled on ``times``, the ``measure`` of error with its level of ``acceptance`` (None: none is
-    published), and the ``source``."""
+    motion sampled on ``times``, the ``measure`` of error and its words with the level of ``acceptance``, and
+    the ``source``."""
 
     scene: str
     time: float
     samples: int
     values: dict[str, float]
     observe: Observe
-    measure: str
-    acceptance: float | None
+    words: str
+    measure: Measure
+    acceptance: float
     source: str
+
+    @property
+    def level(self) -> str:
+        """The acceptance in words."""
+        return f"{self.acceptance:g}" + (", ours: none is published" if self.acceptance == OURS else "")
 
     def times(self) -> np.ndarray:
         """Sample times (samples,), close enough to count the turns of joints."""
@@ -45,7 +57,7 @@ class Published:
         return {name: value - found[name] for name, value in self.values.items()}
 
 
-def _squeezer(scene: Scene, motion: Motion) -> dict[str, float]:
+def _squeezer(scene: Scene, motion: Motion | Trajectory) -> dict[str, float]:
     """The seven angles of the test set and their rates, from the hinges' angles."""
     position, orientation = doubles(motion.position), doubles(motion.orientation)
     spin = doubles(motion.angular_velocity)
@@ -73,27 +85,39 @@ STARTS = {
 }  # fmt: skip
 
 
-def _top_of_first_upright(scene: Scene, motion: Motion) -> dict[str, float]:
+def _top_of_first_upright(scene: Scene, motion: Motion | Trajectory) -> dict[str, float]:
     """The top is twice as far from the pivot as the centre of mass."""
     (x, y, _), (vx, vy, _) = 2 * doubles(motion.position[-1, 0]), 2 * doubles(motion.velocity[-1, 0])
     return {"x": x, "y": y, "x'": vx, "y'": vy}
 
 
-def _nothing(scene: Scene, motion: Motion) -> dict[str, float]:
+def _nothing(scene: Scene, motion: Motion | Trajectory) -> dict[str, float]:
     return {}
 
 
+def _first_top(motion: Trajectory) -> np.ndarray:
+    """Place and velocity (k, 4) in the plane of the top of the first upright."""
+    return np.asarray(2 * np.hstack([motion.position[:, 0, :2], motion.velocity[:, 0, :2]]))
+
+
+ANGLES = ("beta", "Theta", "gamma", "Phi", "delta", "Omega", "epsilon")
 ENERGY = "largest |E(t) - E(0)| (J)"
+PLACE = "largest error of the slider's place (m)"
 IFTOMM = (
     "M. González et al., Multibody System Dynamics 16, 2006, and the IFToMM library of benchmark problems"
 )
+CRANK = "IFToMM library, problem 54; Haug 1989, section 12.2"
 PUBLISHED: dict[str, Published] = {
-    "A01": Published("point_pendulum", 10.0, 401, {}, _nothing, ENERGY, 5e-5, IFTOMM),
+    "A01": Published(
+        "point_pendulum", 10.0, 401, {}, _nothing, ENERGY, measures.energy, 5e-5,
+        "acceptance: Exudyn, example pendulumIftommBenchmark; problem: " + IFTOMM,
+    ),
     "A02": Published(
         "four_bar_chain", 10.0, 401,
         {"x": 0.3284573768, "y": 0.9445187937, "x'": 1.423050003, "y'": -0.4948670827},
         _top_of_first_upright, "largest relative error of place and velocity of the first top",
-        1e-3, "values: Exudyn, test model fourBarMechanismIftomm, step 0.125 ms; problem: " + IFTOMM,
+        measures.relative_to_each(_first_top), 1e-3,
+        "values: Exudyn, test model fourBarMechanismIftomm, step 0.125 ms; problem: " + IFTOMM,
     ),
     "A03": Published(
         "andrews_squeezer", 0.03, 301,
@@ -104,25 +128,50 @@ PUBLISHED: dict[str, Published] = {
             "gamma'": 11.03291221937134, "Phi'": 19.29337464421385, "delta'": 0.5735699284790808,
             "Omega'": -19.29337464421385, "epsilon'": 0.3231791658026955,
         },
-        _squeezer, "largest relative error of the angles", None,
+        _squeezer, "largest relative error of the angles at the end",
+        measures.relative_at_the_end(_squeezer, ANGLES), OURS,
         "Test Set for IVP Solvers, Andrews' squeezing mechanism: PSIDE, tolerance 1e-14",
     ),
-    "A04": Published("bricard", 10.0, 401, {}, _nothing, ENERGY, None, IFTOMM),
-    "A04, thin rods": Published("bricard_thin", 10.0, 401, {}, _nothing, ENERGY, None, IFTOMM),
+    "A04": Published("bricard", 10.0, 401, {}, _nothing, ENERGY, measures.energy, OURS, IFTOMM),
+    "A04, thin rods": Published(
+        "bricard_thin", 10.0, 401, {}, _nothing, ENERGY, measures.energy, OURS, IFTOMM
+    ),
     "A05": Published(
-        "flyball_governor", 10.0, 401, {}, _nothing, "root of the mean square error of s(t) (m)", None,
-        IFTOMM,
+        "flyball_governor", 10.0, 401, {}, _nothing,
+        "root of the mean square error of the slider's place (m)",
+        measures.mean_square_distance("slider"), OURS, IFTOMM,
     ),
     "rigid slider-crank": Published(
-        "rigid_slider_crank", 5.0, 401, {}, _nothing, "largest error of the slider's place (m)", None,
-        "IFToMM library, problem 54; Haug 1989, section 12.2",
+        "rigid_slider_crank", 5.0, 401, {}, _nothing, PLACE, measures.distance("slider"), OURS, CRANK
     ),
     "rigid slider-crank, middle": Published(
-        "rigid_slider_crank_middle", 5.0, 401, {}, _nothing, "largest error of the slider's place (m)", None,
-        "IFToMM library, problem 54; Haug 1989, section 12.2",
+        "rigid_slider_crank_middle", 5.0, 401, {}, _nothing, PLACE, measures.distance("slider"), OURS, CRANK
     ),
     "heavy top": Published(
-        "heavy_top", 2.0, 401, {}, _nothing, "relative error of the centre's place", None,
+        "heavy_top", 2.0, 401, {}, _nothing, "relative error of the centre's place",
+        measures.relative_distance("top"), OURS,
         "O. Brüls, A. Cardona, M. Arnold, Mechanism and Machine Theory 48, 2012, 121-137",
     ),
+    "Bennett": Published(
+        "bennett", 1.0, 401, {}, _nothing, "largest sum of the angles of opposite hinges (rad)",
+        measures.opposite_hinges((("R1", "R3"), ("R2", "R4"))), OURS, "G. T. Bennett, Engineering 76, 1903",
+    ),
+    "Sarrus": Published(
+        "sarrus", 0.3, 401, {}, _nothing, "largest departure (m) or tilt (rad) of the platform",
+        measures.guided("platform"), OURS, "P. F. Sarrus, Comptes rendus 36, 1853",
+    ),
+    "H-frame": Published(
+        "h_frame", 1.0, 401, {}, _nothing, "largest error of the block's place (m)",
+        measures.distance("block"), OURS, "two hinges of one axis, whose reactions are not unique",
+    ),
 }  # fmt: skip
+
+
+def problem_of(scene: Scene) -> Published | None:
+    """The problem whose scene this is, for any duration; None of other scenes."""
+    _, problem = BY_SCENE.get(scene.name, ("", None))
+    same = problem is not None and canonical(scene) == canonical(find_scene(problem.scene))
+    return problem if same else None
+
+
+BY_SCENE = {problem.scene: (name, problem) for name, problem in PUBLISHED.items()}

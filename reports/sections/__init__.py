@@ -15,6 +15,7 @@ from reports.sections import (
     mechanism,
     outcomes,
     provenance,
+    published,
     reactions,
     records,
     speed,
@@ -31,6 +32,7 @@ OPENING: Mapping[str, Chapter] = {
     "verdict": verdict.render,
     "least_errors": least_errors.render,
     "summary": summary.render,
+    "published": published.render,
 }
 OF_A_SCENE: Mapping[str, Part] = {
     "mechanism": mechanism.render,

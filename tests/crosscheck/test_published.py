@@ -1,15 +1,19 @@
 """The published problems: their scenes' degrees of freedom, printed values, and mbref's motion of each."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from crosscheck.judge.published import PUBLISHED
+from crosscheck.judge.published import BY_SCENE, PUBLISHED
 from crosscheck.judge.reference.arithmetic import EXTENDED, doubles
+from crosscheck.judge.reference.motion import Motion
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.truth import closed_form
+from mbref import rotations
 from mbref.scenes import SCENES, find_scene
 from mbref.simulation.simulate import simulate
-from mbref.trajectory import Outcome
+from mbref.trajectory import Outcome, Trajectory
 
 SECONDS = 100.0
 FREEDOMS = {
@@ -40,12 +44,41 @@ def test_mbref_moves_as_the_reference(name):
     assert off < 1e-8, f"{name}: mbref is {off:.1e} m from the reference"
     moved = np.abs(run.position[-1] - run.position[0]).max()
     assert moved > 1e-3, f"{name}: moved only {moved} m"
+    assert_own_measure(name, run, exact(run, motion))
+
+
+def exact(run: Trajectory, motion: Motion) -> Trajectory:
+    """The reference's motion in place of a run's."""
+    names = ("position", "orientation", "velocity", "angular_velocity")
+    return replace(run, **{name: doubles(getattr(motion, name)) for name in names})
+
+
+def assert_own_measure(name: str, run: Trajectory, true: Trajectory) -> None:
+    """The measure of the problem accepts a run, and not the same slightly moved, turned and sped up."""
+    scene, (_, problem) = SCENES[name](), BY_SCENE[name]
+    slight = rotations.from_vector(np.outer(np.arange(1, len(scene.body) + 1), (1e-3, 2e-3, 3e-3)))
+    wrong = replace(
+        run, position=run.position + 1e-3, velocity=1.02 * run.velocity,
+        orientation=rotations.multiply(slight, run.orientation),
+    )  # fmt: skip
+    good, bad = (problem.measure(scene, motion, true) for motion in (run, wrong))
+    assert good <= problem.acceptance < bad, f"{name}: {problem.words} {good:.1e} and {bad:.1e}"
+
+
+def test_measures_that_need_a_truth_say_nothing_without_one():
+    run = simulate(SCENES["h_frame"](), "alf-dual+projection/dop853", np.array([0.0, 0.1]))
+    assert BY_SCENE["h_frame"][1].measure(SCENES["h_frame"](), run, None) is None
+
+
+def test_every_published_problem_has_another_scene():
+    assert len(BY_SCENE) == len(PUBLISHED) == 12
+    assert {"bennett", "sarrus", "h_frame"} <= set(BY_SCENE)
 
 
 def test_problems_name_their_scene_measure_and_source():
     for problem in PUBLISHED.values():
         assert find_scene(problem.scene).body
-        assert problem.measure and problem.source
+        assert problem.words and problem.source and problem.acceptance > 0
         assert len(problem.times()) == problem.samples
 
 

@@ -14,6 +14,7 @@ import crosscheck.processes.pool
 import crosscheck.study.grid
 import mbref.simulation.simulate
 from crosscheck.conformance.suite import Conformance, Verdict
+from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.model_identity import gate_times
 from crosscheck.judge.truth import truth_for
 from mbref.trajectory import Outcome
@@ -28,6 +29,7 @@ from reports.sections import (
     mechanism,
     outcomes,
     provenance,
+    published,
     speed,
     summary,
 )
@@ -107,6 +109,22 @@ def test_summary_and_the_ratio_of_two_curves():
     at = column(table(summary.render([group]), "Least error"), "At 1e-3")
     expected = math.sqrt(0.02 * 0.2) / math.sqrt(0.01 * 0.04)  # half-way in both logarithms
     assert at["b", "y"] == "1.0" and at["a", "x"] == ratio(expected) == "3.2", (at, expected)
+
+
+def test_published_problems_and_their_own_measure():
+    """The block of the H-frame is off by 1e-4 m, more than is accepted, or by 1e-8 m."""
+    frame = scene("h_frame")
+    length = scene_length(frame)
+    runs = [
+        record("a", "x", 1e-4 / length, 0.1, a_scene=frame),
+        record("b", "y", 1e-8 / length, 0.1, a_scene=frame),
+    ]
+    found = table(published.render(by_scene(runs, {frame.name: frame})), "Accepted")
+    assert column(found, "Accepted") == {("a", "x"): "no", ("b", "y"): "yes"}
+    assert column(found, "Error") == {("a", "x"): "1.0e-04", ("b", "y"): "1.0e-08"}
+    heavier = frame.with_(body=tuple(b.model_copy(update={"mass": 1.0}) for b in frame.body))
+    _, text = published.render(by_scene(runs, {frame.name: heavier}))
+    assert "No scene of this report is a published problem" in text.text
 
 
 def test_least_error_and_end_times_that_rounding_moves():

@@ -1,0 +1,118 @@
+"""How the error of a published problem is measured: energy, the place of a body, what a linkage keeps.
+
+A measure takes the scene, a trajectory and the exact motion at the same times or at the first of them; it is
+None where it says nothing, as where it needs the exact motion and there is none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from crosscheck.judge import constraints
+from crosscheck.judge.energy import energy_drift
+from mbref import rotations
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+
+Measure = Callable[[Scene, Trajectory, Trajectory | None], float | None]
+NEAR_ZERO = 1e-3  # below which relative errors of A02 are relative to this, as the problem has it
+
+
+def energy(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
+    """Largest |E(t) - E(0)|, J."""
+    drift = energy_drift(scene, motion)
+    return None if drift is None or not drift.size else float(drift.max())
+
+
+def relative_to_each(observe: Callable[[Trajectory], np.ndarray]) -> Measure:
+    """Largest relative error of observed numbers (k, n); of those near zero, relative to NEAR_ZERO."""
+
+    def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
+        if exact is None:
+            return None
+        got, true = observe(motion)[: len(exact.times)], observe(exact)
+        return float((np.abs(got - true) / np.maximum(np.abs(true), NEAR_ZERO)).max(initial=0.0))
+
+    return measure
+
+
+def relative_at_the_end(
+    observe: Callable[[Scene, Trajectory], Mapping[str, float]], names: Sequence[str]
+) -> Measure:
+    """Largest relative error of some observed numbers at the last sample; None where it is not reached."""
+
+    def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
+        if exact is None or not len(exact.times) or len(exact.times) < len(motion.times):
+            return None
+        got, true = observe(scene, motion), observe(scene, exact)
+        return max(abs(got[name] - true[name]) / abs(true[name]) for name in names)
+
+    return measure
+
+
+def distance(body: str) -> Measure:
+    """Largest distance of a body's centre from its true place, m."""
+
+    def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
+        off = _off(scene, body, motion, exact)
+        return None if off is None else float(off.max(initial=0.0))
+
+    return measure
+
+
+def relative_distance(body: str) -> Measure:
+    """Largest distance of a body's centre from its true place, relative to that place's from the origin."""
+
+    def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
+        off = _off(scene, body, motion, exact)
+        if off is None or exact is None:
+            return None
+        true = np.linalg.norm(exact.position[:, scene.body_index(body)], axis=-1)
+        return float((off / true).max(initial=0.0))
+
+    return measure
+
+
+def mean_square_distance(body: str) -> Measure:
+    """Root of the mean square distance of a body's centre from its true place, m."""
+
+    def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
+        off = _off(scene, body, motion, exact)
+        return None if off is None or not off.size else float(np.sqrt(np.mean(off**2)))
+
+    return measure
+
+
+def opposite_hinges(pairs: Sequence[tuple[str, str]]) -> Measure:
+    """Largest sum of the angles, counted from the start, of hinges that turn oppositely, rad."""
+
+    def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
+        state = motion.position, motion.orientation, motion.angular_velocity
+        turned = constraints.joint_coordinates(scene, motion.times, *state)
+        sums = [np.abs(turned[a][:, 0] + turned[b][:, 0]) for a, b in pairs]
+        return float(np.max(sums, initial=0.0))
+
+    return measure
+
+
+def guided(body: str) -> Measure:
+    """Largest distance (m) of a body's centre from the vertical through its start, or tilt (rad) of it."""
+
+    def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
+        b = scene.body_index(body)
+        place, turn = (a[b] for a in constraints.initial_poses(scene))
+        aside = np.linalg.norm((motion.position[:, b] - place)[:, :2], axis=-1)
+        tilt = rotations.angle_between(motion.orientation[:, b], np.broadcast_to(turn, (len(aside), 4)))
+        return float(max(aside.max(initial=0.0), tilt.max(initial=0.0)))
+
+    return measure
+
+
+def _off(scene: Scene, body: str, motion: Trajectory, exact: Trajectory | None) -> np.ndarray | None:
+    """Distances (k,) of a body's centre from its true place, m."""
+    if exact is None:
+        return None
+    b, k = scene.body_index(body), len(exact.times)
+    return np.asarray(np.linalg.norm(motion.position[:k, b] - exact.position[:, b], axis=-1))

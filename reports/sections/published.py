@@ -1,0 +1,49 @@
+"""Published problems: each engine's error in the measure of the problem, and whether it is accepted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from crosscheck.judge.published import BY_SCENE, problem_of
+from reports.blocks import Block, Heading, Table, Text
+from reports.runs import Run, SceneRuns, duration, power
+
+HEADER = ("Engine", "Family", "Settings", "Error", "Accepted", "Time")
+
+
+def render(groups: Sequence[SceneRuns]) -> list[Block]:
+    """One table a problem; a sentence where no scene is one."""
+    found = [group for group in groups if problem_of(group.scene)]
+    known = ", ".join(BY_SCENE)
+    text = (
+        "Problems of the literature, each with an error measure and a level of acceptance of its own; of "
+        "every family the run of least error against the truth."
+        if found
+        else f"No scene of this report is a published problem. Those are: {known}."
+    )
+    return [Heading("Published problems", 2), Text(text), *map(_table, found)]
+
+
+def _table(group: SceneRuns) -> Table:
+    name, problem = BY_SCENE[group.scene.name]
+    end, rows = group.scene.duration, [_row(group, run) for run in group.best().values()]
+    caption = (
+        f"{name}: `{group.scene.name}` to t = {end:g} s. Error: {problem.words}; accepted up to "
+        f"{problem.level}. Source: {problem.source}."
+    )
+    return Table(caption, HEADER, rows, right=frozenset({3, 5}))
+
+
+def _row(group: SceneRuns, run: Run) -> tuple[str, ...]:
+    if not run.completed:
+        ended = f"ended at {run.t_end:.3g} s"
+        return *run.curve, group.varied_settings(run), "–", ended, duration(run.seconds)
+    _, problem = BY_SCENE[group.scene.name]
+    exact = group.exact_part(run.trajectory)
+    error = problem.measure(group.scene, run.trajectory, exact)
+    said = "not known" if error is None else "yes" if error <= problem.acceptance else "no"
+    if exact is not None and len(exact.times) < len(run.trajectory.times):
+        said += f", truth to {exact.times[-1]:.3g} s"
+    shown = power(math.nan if error is None else error)
+    return *run.curve, group.varied_settings(run), shown, said, duration(run.seconds)
