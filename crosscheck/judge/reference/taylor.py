@@ -25,8 +25,9 @@ from mbref.scene import Scene
 
 ORDER = 28
 NEW_ROW = 1e-4  # pivot from which a row that was dependent at the start has become independent
-BLUNT = 1e-2  # part of the best sharpness below which the choice of rows is looked at again
-BETTER = 1e3  # times sharper that other rows have to be
+BLUNT = 0.25  # part of the best sharpness below which the choice of rows is looked at again
+KEEN = 0.5  # part of the best sharpness that other rows have to have,
+BETTER = 1e3  # or else how many times sharper they have to be
 NEAR = 0.4  # part of the usual sharpness below which a position counts as near a singular one
 PREFERENCE = 0.2  # by how much a row's weight may be larger
 USUAL = 50  # steps over which sharpness is usual
@@ -151,12 +152,15 @@ class Stepper:
         return float(np.linalg.svd(self._held.unit_gradient(x, t), compute_uv=False)[-1])
 
     def _choose_again(self) -> None:
-        """Hold other rows where these have become blunt."""
-        if self._sharpness[-1] > BLUNT * max(self._sharpness):
+        """Hold other rows where these have become blunt and the position is not singular: blunt rows magnify
+        what redundant ones contradict each other by."""
+        now, best = self._sharpness[-1], max(self._sharpness)
+        if now > BLUNT * best:
             return
         before, self._held = self._held, self._choice(self._x, self.t)[0]
         sharpness = self._sharp(self._x, self.t)
-        if len(self._held.numbers) == len(before.numbers) and sharpness > BETTER * self._sharpness[-1]:
+        enough = min(KEEN * best, BETTER * now)
+        if len(self._held.numbers) == len(before.numbers) and sharpness > enough:
             self._sharpness = [sharpness]
         else:
             self._held = before
