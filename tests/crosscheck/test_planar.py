@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting, engine
+from crosscheck.judge.reference.bound import differences
+from crosscheck.judge.reference.reference import Reference, judged, runs
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import Body, Cylindrical, Driver, Planar, Revolute, Scene, SceneError, TorsionSpring
@@ -162,6 +164,33 @@ def test_a_swash_plate_lifts_a_pin(name: str, bodies: tuple[str, str]) -> None:
     gap = np.abs(run.position[:, 1, 2] - heights).max()
     assert gap < CLOSE, f"{name}: the pin is off by {gap:.1e} m"
     assert name != "ondsel" or run.acceleration is None, "accelerations that miss the joint's equations"
+
+
+def referred(scene: Scene) -> Reference:
+    """The reference at TIMES, of two formulations that agree."""
+    a, twin, b = runs(scene, TIMES, 60.0)
+    assert differences(scene, a, b).max() < 1e-15, f"A and B differ by {differences(scene, a, b).max():.1e}"
+    found, reason = judged(scene, TIMES, a, twin, b)
+    assert not reason and found.both.all() and found.bound.max() <= 1e-12
+    return found
+
+
+@pytest.mark.parametrize("joints", [1, 2])
+@pytest.mark.parametrize("bodies", ORDERS, ids="-".join)
+def test_the_reference_of_a_block_on_an_incline(bodies: tuple[str, str], joints: int) -> None:
+    """The planar joint is in the tree of formulation B, a second one closes a loop."""
+    found, (position, orientation) = referred(incline(bodies, joints)), exact_poses()
+    allowed = found.bound.max()
+    assert np.abs(found.position[:, 0] - position).max() <= allowed
+    sign = np.sign((found.orientation[:, 0] * orientation).sum(axis=-1, keepdims=True))
+    assert np.abs(found.orientation[:, 0] - sign * orientation).max() <= allowed
+
+
+@pytest.mark.parametrize("bodies", [("plate", "pin"), ("pin", "plate")], ids="-".join)
+def test_the_reference_of_a_swash_plate(bodies: tuple[str, str]) -> None:
+    scene, heights = swash_plate(bodies)
+    found = referred(scene)
+    assert np.abs(found.position[:, 1, 2] - heights).max() <= found.bound.max()
 
 
 def test_a_planar_joint_takes_neither_driver_nor_torsion_spring() -> None:
