@@ -1,31 +1,44 @@
-"""Cost and bounds of the references of built-in scenes and of random mechanisms.
+"""Cost and bounds of references of built-in scenes and random mechanisms, and tighter runs beside them.
 
-    python benchmarks/references.py [--random 200] [--duration 0.5] [--seconds 60]
+    python benchmarks/references.py [--random 200] [--duration 0.5] [--seconds 60] [--tight 120] [--records F]
 
-Of each built-in scene and closed form of the conformance suite: steps of formulation A, CPU seconds of A, of
-its twin and of B, the difference of A and B, the bound, and the true error where a closed form is known.
-Of the random mechanisms of 3 to 8 bodies: the part with a bound of 1e-11 or less, and the median CPU seconds.
-Nothing is taken from the cache.
+Of each scene: CPU seconds of formulation A, of its twin and of B, the difference of A and B, the bound, the
+true error where a closed form is known, and elsewhere the difference of a tighter run: formulation A in
+DIGITS decimal digits, with other rows where some are redundant.  "ABOVE" marks an error or a difference above
+the bound.  Nothing is taken from the cache of references; with --records, lines that the same code made are
+taken from the file, and the command goes on where it was interrupted.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
+from collections import Counter
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from crosscheck.conformance.closed_forms import CLOSED_FORMS
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from crosscheck.judge.metrics import error_series
+from crosscheck.judge.reference import cache
+from crosscheck.judge.reference.arithmetic import EXTENDED, many_digits
 from crosscheck.judge.reference.bound import differences
+from crosscheck.judge.reference.motion import Motion
 from crosscheck.judge.reference.reference import Reference, judged, runs
+from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.truth import closed_form
 from crosscheck.judge.truth.reference_truth import trajectory
-from mbref.scene import Scene
+from mbref.records import append, opened
+from mbref.scene import Scene, TorsionSpring
 from mbref.scenes import SCENES
 
 TIGHT = 1e-11
 SAMPLES = 21
+DIGITS, TOLERANCE, ORDER, OTHER_ROWS = 26, 1e-22, 30, 2  # of the tighter run
+COLUMNS = ("scene", "s", "A", "twin", "B", "A − B", "bound", "error", "tighter", "remark")
+Line = dict[str, Any]
 
 
 def main() -> None:
@@ -34,38 +47,147 @@ def main() -> None:
     parser.add_argument("--random", type=int, default=200, help="how many random mechanisms")
     parser.add_argument("--duration", type=float, default=0.5, help="of their motion, s")
     parser.add_argument("--seconds", type=float, default=60.0, help="of CPU time for each reference")
+    parser.add_argument(
+        "--tight", type=float, default=120.0, help="of CPU time for each tighter run; 0: none"
+    )
+    parser.add_argument(
+        "--every", type=int, default=1, help="tighter runs of one random mechanism in so many"
+    )
+    parser.add_argument("--records", metavar="FILE", help="keep the lines and go on from them")
+    parser.add_argument("--only-random", action="store_true", help="leave the built-in scenes out")
     asked = parser.parse_args()
-    heads = "".join(f" {head:>7}" for head in ("A", "twin", "B", "A - B", "bound", "error"))
-    print(f"{'scene':28} {'s':>5} {'steps':>5}{heads}")
-    for scene in [*(make() for make in SCENES.values()), *(make()[0] for make in CLOSED_FORMS)]:
-        line(scene, scene.duration, asked.seconds)
-    found = [line(random_mechanism(k), asked.duration, asked.seconds) for k in range(asked.random)]
+    built_in = [*(make() for make in SCENES.values()), *(make()[0] for make in CLOSED_FORMS)]
+    print(f"| {' | '.join(COLUMNS)} |\n| --- {'| --: ' * (len(COLUMNS) - 2)}| --- |")
+    for scene in () if asked.only_random else built_in:
+        line(scene, scene.duration, asked.seconds, asked.tight, asked.records)
+    found = []
+    for seed in range(asked.random):
+        tight = 0.0 if seed % asked.every else asked.tight
+        scene = with_torsion_spring(random_mechanism(seed))
+        found.append(line(scene, asked.duration, asked.seconds, tight, asked.records))
     if found:
-        bounds, seconds = np.array(found).T
-        print(f"{len(found)} random mechanisms of {asked.duration:g} s: bound at most {TIGHT:g} in "
-              f"{np.mean(bounds <= TIGHT):.1%}, median {np.median(seconds):.2f} CPU s")  # fmt: skip
+        print("\n".join(summary(found, asked.duration)))
 
 
-def line(scene: Scene, duration: float, seconds: float) -> tuple[float, float]:
-    """Print one scene's line; its bound (infinite without a reference) and its CPU seconds."""
+def line(scene: Scene, duration: float, seconds: float, tight: float, records: str | None) -> Line:
+    """Print one scene's line, made or as it was kept in a file of records."""
+    made_of = [cache.version(), cache.canonical(scene), duration, seconds, tight, DIGITS, TOLERANCE]
+    key = hashlib.sha256(repr(made_of).encode()).hexdigest()
+    found = opened(records).get(key)
+    if found is None:
+        found = {"key": key, **examined(scene, duration, seconds, tight)}
+        append(records, found)
+    print(text(found), flush=True)
+    return found
+
+
+def examined(scene: Scene, duration: float, seconds: float, tight: float) -> Line:
+    """The numbers of one scene; None where there is none."""
     times = np.linspace(0.0, duration, SAMPLES)
-    a, twin, b = runs(scene, times, seconds)
-    found, reason = judged(scene, times, a, twin, b)
-    apart = differences(scene, a, b).max(initial=0.0)
-    cells = [f"{duration:5.3g} {a.steps:5d}", *(f"{run.seconds:7.2f}" for run in (a, twin, b))]
-    cells += [f"{apart:7.0e}", f"{found.bound.max(initial=0.0):7.0e}", _error(scene, found)]
-    early = "" if found.both.all() else f"  B to {b.reached:.4g} s: {b.reason}"
-    print(f"{scene.name:28} {' '.join(cells)}{early}{'  no reference: ' * bool(reason)}{reason}", flush=True)
-    return (np.inf if reason else float(found.bound.max())), found.seconds
+    motions = a, _, b = runs(scene, times, seconds)
+    found, reason = judged(scene, times, *motions)
+    tighter = _tighter(scene, found.times, tight)
+    apart = [] if tighter is None else differences(scene, a, tighter)[: len(found.times)]
+    return {
+        "scene": scene.name, "duration": duration,
+        "bodies": len(scene.body), "joints": dict(Counter(joint.type for joint in scene.joint)),
+        "loads": dict(Counter(load.type for load in scene.load)), "redundant": scene.counts().redundant,
+        "seconds": [motion.seconds for motion in motions], "apart": largest(differences(scene, a, b)),
+        "bound": None if reason else largest(found.bound), "reason": reason,
+        "b_to": None if found.both.all() else b.reached, "b_reason": b.reason,
+        "error": _compared(_error(scene, found), found), "tighter": _compared(apart, found),
+        "tighter_reason": "" if tighter is None else tighter.reason,
+    }  # fmt: skip
 
 
-def _error(scene: Scene, found: Reference) -> str:
-    """The true error, where a closed form is known, and whether it is above the bound."""
+def _tighter(scene: Scene, times: np.ndarray, seconds: float) -> Motion | None:
+    """Formulation A in more digits; None where it is not asked for, or a closed form tells more."""
+    if not seconds or closed_form(scene) is not None:
+        return None
+    motion = natural_motion(
+        scene, times, many_digits(DIGITS), order=ORDER, tolerance=TOLERANCE, seconds=seconds, seed=OTHER_ROWS
+    )
+    return replace(motion, position=_rounded(motion.position), orientation=_rounded(motion.orientation))
+
+
+def _rounded(values: np.ndarray) -> np.ndarray:
+    """Numbers of many digits as the nearest of extended precision."""
+    texts = [x.str(DIGITS, radius=False) for x in values.ravel()]
+    return np.array([EXTENDED.dtype(text) for text in texts], dtype=EXTENDED.dtype).reshape(values.shape)
+
+
+def _error(scene: Scene, found: Reference) -> np.ndarray:
+    """True errors (k,), where a closed form is known."""
     truth = closed_form(scene)
     if truth is None or not len(found.times):
-        return " " * 7
-    errors = error_series(scene, trajectory(scene, found), truth.poses(found.times))
-    return f"{errors.max():7.0e}{' ABOVE THE BOUND' * bool((errors > found.bound).any())}"
+        return np.zeros(0)
+    return error_series(scene, trajectory(scene, found), truth.poses(found.times))
+
+
+def _compared(errors: Any, found: Reference) -> dict[str, Any] | None:
+    """The largest of some errors, the largest part of the bound that one is, and until when (s)."""
+    if not len(errors):
+        return None
+    k = len(errors)
+    parts = np.asarray(errors) / found.bound[:k]
+    return {"largest": largest(errors), "part": largest(parts), "until": float(found.times[k - 1])}
+
+
+def largest(values: Any) -> float:
+    """The largest; 0 of none."""
+    return float(np.max(values, initial=0.0))
+
+
+def text(found: Line) -> str:
+    """One row of the table."""
+    cells = [found["scene"], f"{found['duration']:.3g}", *(f"{s:.2f}" for s in found["seconds"])]
+    bound = "none" if found["bound"] is None else f"{found['bound']:.0e}"
+    cells += [f"{found['apart']:.0e}", bound, _cell(found["error"]), _cell(found["tighter"])]
+    remarks = [f"B to {found['b_to']:.4g} s"] if found["b_to"] is not None else []
+    reasons = {"no reference": found["reason"], "tighter run": found["tighter_reason"]}
+    remarks += [f"{what}: {reason}" for what, reason in reasons.items() if reason]
+    return f"| {' | '.join(cells)} | {'; '.join(remarks)} |"
+
+
+def _cell(compared: dict[str, Any] | None) -> str:
+    return "" if compared is None else f"{compared['largest']:.0e}{' ABOVE' * (compared['part'] > 1)}"
+
+
+def with_torsion_spring(scene: Scene) -> Scene:
+    """The scene with a torsion spring on its first joint that takes one; the other loads it has."""
+    for joint in scene.joint:
+        if joint.facts.takes_torsion_spring:
+            spring = TorsionSpring(joint=joint.name, stiffness=5.0, damping=0.1, natural_angle=0.3)
+            return scene.with_(load=(*scene.load, spring))
+    return scene
+
+
+def summary(found: list[Line], duration: float) -> list[str]:
+    """What the lines of random mechanisms come to."""
+    bodies, redundant = [f["bodies"] for f in found], sum(f["redundant"] > 0 for f in found)
+    bounds = np.array([np.inf if f["bound"] is None else f["bound"] for f in found])
+    seconds = [sum(f["seconds"]) for f in found]
+    tight = [f["tighter"] for f in found if f["tighter"] is not None]
+    whole = sum(t["until"] == duration for t in tight)
+    apart, part = (largest([t[name] for t in tight]) for name in ("largest", "part"))
+    above = sum(t["part"] > 1 for t in tight)
+    return [
+        "",
+        f"{len(found)} random mechanisms of {min(bodies)} to {max(bodies)} bodies over {duration:g} s, "
+        f"{redundant} with redundant rows.",
+        f"Joints: {_counted(found, 'joints')}. Loads: {_counted(found, 'loads')}.",
+        f"With a reference: {np.isfinite(bounds).sum()}; its bound is at most {TIGHT:g} in "
+        f"{np.mean(bounds <= TIGHT):.1%}, the largest {bounds[np.isfinite(bounds)].max(initial=0.0):.0e}.",
+        f"CPU seconds of the three runs: median {np.median(seconds):.2f}, largest {max(seconds):.0f}.",
+        f"Tighter runs: {len(tight)}, {whole} of them to the end; their differences are at most {apart:.0e}, "
+        f"and at most {part:.2g} of the bound; {above} are above it.",
+    ]
+
+
+def _counted(found: list[Line], what: str) -> str:
+    """How many there are of each type, the most frequent first."""
+    total = sum((Counter(f[what]) for f in found), Counter())
+    return ", ".join(f"{count} {kind.replace('_', ' ')}" for kind, count in total.most_common())
 
 
 if __name__ == "__main__":

@@ -59,10 +59,10 @@ def canonical(scene: Scene) -> str:
 
 def _path(scene: Scene) -> Path:
     root = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "mbref" / "references"
-    return root / hashlib.sha256((_version() + canonical(scene)).encode()).hexdigest()
+    return root / hashlib.sha256((version() + canonical(scene)).encode()).hexdigest()
 
 
 @functools.cache
-def _version() -> str:
+def version() -> str:
     """Hash of the code that makes references."""
     return hashlib.sha256(b"".join(path.read_bytes() for path in SOURCES)).hexdigest()
