@@ -98,7 +98,7 @@ def _verify(arguments: argparse.Namespace) -> int:
 def _certify(arguments: argparse.Namespace) -> int:
     from crosscheck.judge.reference.certify import NotCertified, certified
 
-    (scene,) = request.find_scenes([arguments.scene])
+    scene = request.find_certifiable(arguments.scene)
     times = request.sample_times(request.lasting(scene, None, arguments.duration), None, arguments.samples)
     try:
         table = certified(scene, times, arguments.digits)

@@ -51,7 +51,7 @@ def _add_certify(commands: Commands) -> None:
     example = "crosscheck certify four_bar_gravity --digits 20 --duration 0.1 --out four_bar_gravity.json"
     about = "the motion of a scene to many digits, on which two formulations agree (needs python-flint)"
     parser = _add(commands, "certify", about, example)
-    parser.add_argument("scene", metavar="SCENE", help="a built-in name or a .toml file")
+    parser.add_argument("scene", metavar="SCENE", help="a built-in name, a .toml file, or random_N")
     parser.add_argument("--digits", type=int, default=20, metavar="N", help="default: 20")
     parser.add_argument("--samples", type=int, default=3, metavar="N", help="from 0 to the end (default: 3)")
     parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")

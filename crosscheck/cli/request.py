@@ -47,6 +47,17 @@ def find_scenes(names: Sequence[str]) -> list[Scene]:
     return scenes
 
 
+def find_certifiable(name: str) -> Scene:
+    """The scene of that name or file, or the random mechanism ``random_N`` that the tests draw from seed N;
+    raises RequestError."""
+    seed = name.removeprefix("random_")
+    if seed == name or not seed.isdecimal():
+        return find_scenes([name])[0]
+    from crosscheck.conformance.random_mechanisms import random_mechanism
+
+    return random_mechanism(int(seed))
+
+
 def find_engines(names: Sequence[str] | None, notice: Notice) -> list[str]:
     """The named engines, or the default ones; one whose package is missing is left out with a ``notice``.
 

@@ -1,7 +1,8 @@
 """Certified references: the motion of a scene to so many digits by both formulations, as a table to be kept.
 
 The scene's doubles count as exact.  The digits are those on which formulations A and B agree in arithmetics
-of more; the bound is ten times their difference.  Tables are never edited, only superseded.
+of more; the bound is ten times their difference.  Where redundant rows contradict each other, the table is of
+the mechanism without them, and tells which joints were replaced.  Tables are never edited, only superseded.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 from crosscheck.judge.reference.arithmetic import many_digits
 from crosscheck.judge.reference.bound import SAFETY, differences
 from crosscheck.judge.reference.cache import canonical
+from crosscheck.judge.reference.isostatic import isostatic, replaced
 from crosscheck.judge.reference.motion import Motion
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
@@ -33,24 +35,32 @@ class NotCertified(ArithmeticError):
 
 def certified(scene: Scene, times: np.ndarray, digits: int, seconds: float = np.inf) -> dict[str, Any]:
     """A table of positions (m) and orientations (w, x, y, z) at ascending times (k,) as decimal strings, with
-    its ``id`` (of scene and times), ``digits``, ``bound``, both ``methods`` and the ``hash`` of all this.
+    its ``id`` (of scene and times), ``digits``, ``bound``, both ``methods``, the ``replaced`` joints where
+    there are any, and the ``hash`` of all this.
 
     Raises NotCertified, and ImportError without python-flint.
     """
-    exact = many_digits(2 * digits)
-    tolerance = 10.0 ** -(digits + SPARE)
-    a = natural_motion(scene, times, exact, seconds=seconds, order=2 * digits, tolerance=tolerance)
-    b = tree_motion(scene, times, many_digits(digits + SPARE), seconds=seconds)
+    moved, a = scene, _by_a(scene, times, digits, seconds)
+    if a.contradiction > 10.0**-digits:
+        moved = isostatic(scene)
+        a = _by_a(moved, times, digits, seconds)
+    b = tree_motion(moved, times, many_digits(digits + SPARE), seconds=seconds)
     for motion, name in ((a, "A"), (b, "B")):
         if motion.reason:
             raise NotCertified(f"{scene.name}: {name} ends at t = {motion.reached:.6g} s: {motion.reason}")
     bound = SAFETY * float(differences(scene, a, b).max(initial=0.0))
     if bound > 10.0**-digits:
         raise NotCertified(f"{scene.name}: the formulations agree to {bound:.0e} only")
-    return _table(scene, a, digits, max(bound, 10.0 ** -(digits + SPARE)))
+    return _table(scene, moved, a, digits, max(bound, 10.0 ** -(digits + SPARE)))
 
 
-def _table(scene: Scene, motion: Motion, digits: int, bound: float) -> dict[str, Any]:
+def _by_a(scene: Scene, times: np.ndarray, digits: int, seconds: float) -> Motion:
+    tolerance = 10.0 ** -(digits + SPARE)
+    exact = many_digits(2 * digits)
+    return natural_motion(scene, times, exact, seconds=seconds, order=2 * digits, tolerance=tolerance)
+
+
+def _table(scene: Scene, moved: Scene, motion: Motion, digits: int, bound: float) -> dict[str, Any]:
     identity = canonical(scene) + json.dumps(motion.times.tolist())
     signs = np.where(np.asarray(motion.orientation[..., :1]).astype(float) < 0, -1, 1)
     table = {
@@ -60,6 +70,8 @@ def _table(scene: Scene, motion: Motion, digits: int, bound: float) -> dict[str,
         "position": _decimals(motion.position, digits),
         "orientation": _decimals(motion.orientation * signs, digits),
     }  # fmt: skip
+    if others := replaced(scene, moved):
+        table["replaced"] = others
     return table | {"hash": digest(table)}
 
 

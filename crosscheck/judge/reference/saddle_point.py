@@ -53,7 +53,7 @@ class SaddlePoint:
 
     def solve(self, force: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """x (3, n) and y (m,) of f (3, n) and g (m,)."""
-        wanted = np.concatenate([force.ravel(), rate])
+        wanted = self._arithmetic.settled(np.concatenate([force.ravel(), rate]))
         found, left, last = 0 * wanted, wanted, FIRST
         for _ in range(ROUNDS):
             size = np.abs(left).max()
@@ -64,5 +64,5 @@ class SaddlePoint:
             change = float(np.abs(step).max() * size / np.abs(found / self._scale).max())
             if change * change / last <= self._eps or not change <= STALLED * last:
                 break
-            last, left = max(change, TINY), wanted - self._product(found)
+            last, left = max(change, TINY), self._arithmetic.settled(wanted - self._product(found))
         return found[: self._size].reshape(force.shape), found[self._size :]
