@@ -89,7 +89,7 @@ DEFECTS = (  # adapters and processes
     Defect(M, '"scd": Metric(_correct_digits, "digits"', '"scd": Metric(_correct_digits, ""', BY_HAND),
     Defect(M, "np.isfinite(series).all() else math.inf", "np.isfinite(series).all() else 0.0", METRICS),
     Defect(M, "(length * trajectory.angular_velocity,", "(trajectory.angular_velocity,", METRICS),
-    Defect(E, "np.abs(gains.sum(axis=0)) / scale", "np.abs(gains.max(axis=0)) / scale", METRICS),
+    Defect(E, "np.abs(gains.sum(axis=0))", "np.abs(gains.max(axis=0))", METRICS),
     Defect(E, "turning) / 2", "turning)", METRICS),
     Defect(
         "crosscheck/judge/richardson.py",

@@ -44,14 +44,19 @@ def certified(scene: Scene, times: np.ndarray, digits: int, seconds: float = np.
     if a.contradiction > 10.0**-digits:
         moved = isostatic(scene)
         a = _by_a(moved, times, digits, seconds)
+    _refuse_ended(scene, a, "A")
     b = tree_motion(moved, times, many_digits(digits + SPARE), seconds=seconds)
-    for motion, name in ((a, "A"), (b, "B")):
-        if motion.reason:
-            raise NotCertified(f"{scene.name}: {name} ends at t = {motion.reached:.6g} s: {motion.reason}")
+    _refuse_ended(scene, b, "B")
     bound = SAFETY * float(differences(scene, a, b).max(initial=0.0))
     if bound > 10.0**-digits:
         raise NotCertified(f"{scene.name}: the formulations agree to {bound:.0e} only")
     return _table(scene, moved, a, digits, max(bound, 10.0 ** -(digits + SPARE)))
+
+
+def _refuse_ended(scene: Scene, motion: Motion, name: str) -> None:
+    """Raise NotCertified where a formulation's motion ended early."""
+    if motion.reason:
+        raise NotCertified(f"{scene.name}: {name} ends at t = {motion.reached:.6g} s: {motion.reason}")
 
 
 def _by_a(scene: Scene, times: np.ndarray, digits: int, seconds: float) -> Motion:
