@@ -1,12 +1,16 @@
 """Hypothesis profiles: ``check`` is reproducible, ``deep`` searches, ``first`` ends at a failure.
 
 Of two processes that run all tests, one compiles the general kernels first and the other the Taylor method's.
+Each computes with one thread: more would wait for each other.
 """
 
+import gc
 import os
 
 import pytest
 from hypothesis import Phase, settings
+
+os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 settings.register_profile("check", max_examples=25, deadline=None, derandomize=True, database=None)
 settings.register_profile("deep", max_examples=500, deadline=None, print_blob=True)
@@ -18,7 +22,9 @@ GENERAL = ("alf-dual+projection", "mpi-svd+partitioning", "lm1+none/rk4", "lm2+p
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Compile this process's share of the kernels; nothing where they are in the cache."""
+    """Compile this process's share of the kernels, which takes no time where they are in the cache; what has
+    been imported is not searched for garbage again."""
+    gc.freeze()
     if len(session.items) < MANY:
         return
     match os.environ.get("PYTEST_XDIST_WORKER"):

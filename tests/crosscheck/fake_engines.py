@@ -129,12 +129,12 @@ class Aging(Fake):
 
 
 class Slow(Recorder):
-    """Needs four seconds before the first run of a process."""
+    """Needs two seconds before the first run of a process."""
 
     is_ready = False
 
     def prepare(self, families: Sequence[str]) -> None:
-        time.sleep(0.0 if self.is_ready else 4.0)
+        time.sleep(0.0 if self.is_ready else 2.0)
         self.is_ready = True
 
 

@@ -78,8 +78,8 @@ def test_failure_of_an_engine_and_the_trajectory(fake: str, message: str, versio
 
 def test_hang_is_killed_with_all_it_started(tmp_path: Path):
     pid = tmp_path / "pid"
-    ended = run("HANG", still(str(pid)), time_limit=4.0)
-    assert (ended.outcome, ended.message) == (Outcome.TIMED_OUT, "no result after 4 s"), ended.message
+    ended = run("HANG", still(str(pid)), time_limit=2.0)
+    assert (ended.outcome, ended.message) == (Outcome.TIMED_OUT, "no result after 2 s"), ended.message
     assert gone(int(pid.read_text())), f"grandchild {pid.read_text()} is still alive"
 
 
@@ -93,7 +93,9 @@ def test_printing_and_files_of_an_engine_leave_no_trace(
     assert list(tmp_path.iterdir()) == [], "files were left in the working directory"
 
 
-def test_child_computes_with_one_thread():
+def test_child_computes_with_one_thread(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
     ended = run("THREADS")
     assert ended.version == "11", f"OPENBLAS and OMP threads, one digit each: {ended.version}"
 
@@ -117,7 +119,7 @@ def test_runs_of_an_engine_share_a_process_until_one_does_not_complete(tmp_path:
 
 def test_run_after_a_time_out_has_its_whole_time(tmp_path: Path):
     """Getting ready takes this engine longer than its runs may."""
-    log, limit = tmp_path / "log", 3.0
+    log, limit = tmp_path / "log", 1.5
     ways = [{}, {"sleep": 60.0}, {}]
     runs = [
         run_isolated("fake_engines:SLOW", still(str(log)), TIMES, Setting("a", way), limit) for way in ways
@@ -128,9 +130,9 @@ def test_run_after_a_time_out_has_its_whole_time(tmp_path: Path):
 
 
 def test_engine_that_hangs_while_it_gets_ready_times_out(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("crosscheck.processes.pool.READY_SECONDS", 3.0)
+    monkeypatch.setattr("crosscheck.processes.pool.READY_SECONDS", 1.0)
     ended = run("STUCK", time_limit=60.0)
-    assert (ended.outcome, ended.message) == (Outcome.TIMED_OUT, "no result after 3 s"), ended.message
+    assert (ended.outcome, ended.message) == (Outcome.TIMED_OUT, "no result after 1 s"), ended.message
 
 
 def test_engines_do_not_share_a_process(tmp_path: Path):

@@ -1,6 +1,7 @@
 """The house rules as tests: import arrows, file sizes, docstrings, tables told in the README."""
 
 import ast
+import functools
 import re
 import tomllib
 from pathlib import Path
@@ -20,15 +21,25 @@ ENGINE_PACKAGES = {"mujoco", "pinocchio", "exudyn", "opensim", "pyondsel", "sksu
 LONGEST = 330  # lines of a file
 
 
+@functools.cache
+def parsed(path):
+    return ast.parse(path.read_text())
+
+
+@functools.cache
 def imports(path, inside_functions=True):
     """Top-level names that a file imports; without those inside functions if asked."""
-    tree = ast.parse(path.read_text())
-    nodes = ast.walk(tree) if inside_functions else tree.body
-    for node in nodes:
+    tree, names = parsed(path), set()
+    for node in ast.walk(tree) if inside_functions else tree.body:
         if isinstance(node, ast.Import):
-            yield from (alias.name.partition(".")[0] for alias in node.names)
+            names |= {alias.name.partition(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and not node.level:
-            yield (node.module or "").partition(".")[0]
+            names.add((node.module or "").partition(".")[0])
+    return names
+
+
+def files(package):
+    return [path for path in FILES if path.is_relative_to(ROOT / package)]
 
 
 def name(path):
@@ -39,49 +50,52 @@ def test_there_are_files_to_judge():
     assert len(FILES) > 50
 
 
-@pytest.mark.parametrize("path", FILES, ids=name)
-def test_import_direction(path):
-    package = path.relative_to(ROOT).parts[0]
-    upward = (set(imports(path)) & {*PACKAGES, "tests"}) - MAY_IMPORT[package]
-    assert not upward, f"{name(path)} imports {upward}, against reports → crosscheck → mbref"
+@pytest.mark.parametrize("package", PACKAGES)
+def test_import_direction(package):
+    theirs = {*PACKAGES, "tests"} - MAY_IMPORT[package]
+    upward = {name(path): found for path in files(package) if (found := imports(path) & theirs)}
+    assert not upward, f"{upward}, against reports → crosscheck → mbref"
 
 
-@pytest.mark.parametrize("path", FILES, ids=name)
-def test_engines_only_in_their_adapters_and_inside_functions(path):
-    found = set(imports(path)) & ENGINE_PACKAGES
-    allowed = path.is_relative_to(ROOT / "crosscheck" / "engines")
-    assert allowed or not found, f"{name(path)} imports {found}"
-    at_import = set(imports(path, inside_functions=False)) & ENGINE_PACKAGES
-    assert not at_import, f"{name(path)} loads {at_import} when it is imported"
+def test_engines_only_in_their_adapters_and_inside_functions():
+    adapters = ROOT / "crosscheck" / "engines"
+    elsewhere = [path for path in FILES if not path.is_relative_to(adapters)]
+    outside = {name(path): found for path in elsewhere if (found := imports(path) & ENGINE_PACKAGES)}
+    assert not outside, outside
+    at_import = {name(path): found for path in FILES if (found := imports(path, False) & ENGINE_PACKAGES)}
+    assert not at_import, f"loaded when the file is imported: {at_import}"
 
 
-@pytest.mark.parametrize("path", [f for f in FILES if "reports" not in f.parts], ids=name)
-def test_plotting_only_in_reports_and_in_the_plot_of_a_motion(path):
-    allowed = path == ROOT / "mbref" / "drawing" / "plot.py"
-    assert allowed or "matplotlib" not in set(imports(path)), name(path)
-    assert "matplotlib" not in set(imports(path, inside_functions=False)), name(path)
+def test_plotting_only_in_reports_and_in_the_plot_of_a_motion():
+    others = [path for path in FILES if "reports" not in path.parts]
+    plotting = [path for path in others if "matplotlib" in imports(path)]
+    assert plotting == [ROOT / "mbref" / "drawing" / "plot.py"], plotting
+    assert not [name(path) for path in plotting if "matplotlib" in imports(path, False)]
 
 
-@pytest.mark.parametrize("path", FILES, ids=name)
-def test_length_and_first_line(path):
-    text = path.read_text()
-    assert len(text.splitlines()) <= LONGEST, f"{name(path)} has {len(text.splitlines())} lines"
-    first = (ast.get_docstring(ast.parse(text)) or "").partition("\n")[0]
-    assert len(first) > 10, f"{name(path)} does not begin by saying what it is"
+def test_files_are_short():
+    lengths = {name(path): len(path.read_text().splitlines()) for path in FILES}
+    assert not {path: length for path, length in lengths.items() if length > LONGEST}
 
 
-@pytest.mark.parametrize("path", FILES, ids=name)
-def test_public_functions_say_what_they_do(path):
+def test_first_lines_say_what_files_are():
+    first = {name(path): (ast.get_docstring(parsed(path)) or "").partition("\n")[0] for path in FILES}
+    assert not [path for path, line in first.items() if len(line) <= 10]
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_public_functions_say_what_they_do(package):
     kernels = {"accelerate", "enter", "rates", "accept", "step", "propose"}  # contract on the base class
     silent = [
-        node.name
-        for node in ast.parse(path.read_text()).body
+        f"{name(path)}: {node.name}"
+        for path in files(package)
+        for node in parsed(path).body
         if isinstance(node, ast.FunctionDef | ast.ClassDef)
         and not node.name.startswith("_")
         and node.name not in kernels
         and not ast.get_docstring(node)
     ]
-    assert not silent, f"{name(path)}: no docstring on {silent}"
+    assert not silent, silent
 
 
 @pytest.mark.parametrize("table", [FORMULATIONS, STABILISATIONS], ids=["formulations", "stabilisations"])

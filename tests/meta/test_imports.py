@@ -49,12 +49,16 @@ MAKERS = (
 )
 
 
-def modules(package: str) -> list[str]:
-    return list(sources(package))
-
-
 def of(package: str, module: str) -> set[str]:
     return set(imported(sources(package)[module]))
+
+
+def of_mbref(package: str, module: str) -> list[str]:
+    return sorted(name for name in of(package, module) if name.split(".")[0] == "mbref")
+
+
+def makes(name: str) -> bool:
+    return name.startswith(MAKERS) or name.rpartition(".")[2] in MAKING
 
 
 @pytest.mark.parametrize("package", FLOORS)
@@ -67,18 +71,24 @@ def test_no_arrow_from_a_lower_floor_to_a_higher_one(package):
     assert not upward(graph(package), FLOORS[package])
 
 
-@pytest.mark.parametrize(("package", "module"), [(p, m) for p in ALLOWED for m in modules(p) if m != ADAPTER])
-def test_names_of_mbref_that_a_module_may_import(package, module):
-    names = {name for name in of(package, module) if name.split(".")[0] == "mbref"}
-    wrong = sorted(name for name in names if not ALLOWED[package].fullmatch(name))
-    assert not wrong, f"{module} imports {wrong}: only engines/mbref.py knows mbref's numerics"
+@pytest.mark.parametrize("package", ALLOWED)
+def test_names_of_mbref_that_a_module_may_import(package):
+    wrong = {
+        module: names
+        for module in sources(package)
+        if module != ADAPTER
+        and (names := [n for n in of_mbref(package, module) if not ALLOWED[package].fullmatch(n)])
+    }
+    assert not wrong, f"{wrong}: only engines/mbref.py knows mbref's numerics"
 
 
-@pytest.mark.parametrize("module", [m for m in modules("reports") if m != "reports.__main__"])
-def test_no_module_that_renders_can_make_a_record(module):
-    names = of("reports", module)
-    wrong = sorted(n for n in names if n.startswith(MAKERS) or n.rpartition(".")[2] in MAKING)
-    assert not wrong, f"{module} imports {wrong}: records are made before, by crosscheck"
+def test_no_module_that_renders_can_make_a_record():
+    wrong = {
+        module: names
+        for module in sources("reports")
+        if module != "reports.__main__" and (names := sorted(filter(makes, of("reports", module))))
+    }
+    assert not wrong, f"{wrong}: records are made before, by crosscheck"
 
 
 def test_the_program_asks_crosscheck_s_command_line_for_its_records():

@@ -6,6 +6,7 @@ the reference that two formulations agree on; it shares no code with the model i
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Protocol
 
@@ -57,8 +58,9 @@ def truth_for(scene: Scene, reference_time: float = SECONDS) -> Truth | None:
     return closed_form(scene) or (ReferenceTruth(scene, reference_time) if reference_time else None)
 
 
+@functools.lru_cache(maxsize=64)
 def closed_form(scene: Scene) -> Truth | None:
-    """The truth of a scene of a known family, or None."""
+    """The truth of a scene of a known family, or None; kept, with the part of the motion that is solved."""
     for family in PATHS:
         if truth := one_dof(scene, family(scene)):
             return truth

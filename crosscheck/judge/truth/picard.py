@@ -68,7 +68,7 @@ class Solution:
             state = self(np.clip(at, 0, edges[-1]))
             step = (wanted - state[:, component]) / self._derivative(state)[:, component]
             at = at + step
-            if np.abs(step).max(initial=0) <= SETTLED * edges[-1]:
+            if np.abs(step).max(initial=0) <= SETTLED * np.abs(at).max(initial=0):
                 break
         return self(np.clip(at, 0, edges[-1]))
 
