@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import struct
 import zlib
@@ -17,6 +18,7 @@ from reports.blocks import Figure, Plot
 from reports.sections import blocks, speed
 
 
+@functools.cache
 def pictures() -> dict[str, Figure]:
     """The figures of all sections; those that can be asked are drawn for Markdown too."""
     shown = [block.figure if isinstance(block, Plot) else block for block in blocks(groups())]

@@ -23,27 +23,32 @@ from crosscheck.study.timings import LONG, with_timings
 from mbref.scene import Body, Scene
 from reports import __main__ as program
 from reports import render, stored
-from reports.blocks import Heading, Matrix, Table
+from reports.blocks import Block, Heading, Matrix, Table
 from reports.sections import blocks
 
 FAKE = "fake_engines:FAKE"
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def parts() -> list[Block]:
+    return blocks(groups())
+
+
+@pytest.fixture(scope="module")
+def written(parts: list[Block], tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("report")
-    render.write(blocks(groups()), out)
+    render.write(parts, out)
     return out
 
 
-def test_page_and_every_block(written):
+def test_page_and_every_block(written, parts):
     page = (written / "index.html").read_text()
-    for block in blocks(groups()):
+    for block in parts:
         if isinstance(block, Heading):
             assert f">{block.text}</h{block.level}>" in page, block
     assert page.count('class="wide"') == len(list((written / "figures").glob("*.svg"))) - 2 == 6
     assert page.count('class="plot"') == 3 and page.count('class="moving"') == 1
-    assert page.count('<table class="cards">') == sum(isinstance(b, Table) for b in blocks(groups()))
+    assert page.count('<table class="cards">') == sum(isinstance(b, Table) for b in parts)
     assert "SIGSEGV" in page and "NOT_CONVERGED" in page, "a failed run is missing"
 
 
@@ -79,13 +84,9 @@ def test_markdown_and_the_pictures_beside_it(written):
         assert (written / name).with_suffix(".svg").exists(), name
 
 
-def test_markdown_tables_and_one_line_a_row(written):
+def test_markdown_tables_and_one_line_a_row(written, parts):
     lines = (written / "report.md").read_text().split("\n")
-    rows = [
-        b.rows if isinstance(b, Table) else b.scenes
-        for b in blocks(groups())
-        if isinstance(b, Table | Matrix)
-    ]
+    rows = [b.rows if isinstance(b, Table) else b.scenes for b in parts if isinstance(b, Table | Matrix)]
     assert sum(line.startswith("| ") for line in lines) == sum(len(of_table) + 2 for of_table in rows)
     for line in lines:
         assert not line.startswith("|") or line.endswith("|"), f"a row is broken: {line}"

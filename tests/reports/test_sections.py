@@ -47,6 +47,11 @@ def column(found: Table, name: str) -> dict[tuple[str, str], str]:
     return {tuple(row[:2]): row[list(found.header).index(name)] for row in found.rows}
 
 
+@pytest.fixture(scope="module")
+def everything():
+    return blocks(groups(), verified=VERIFIED)
+
+
 def test_every_section_and_a_heading(monkeypatch):
     def simulated(*_, **__):
         raise AssertionError("a section simulated")
@@ -75,13 +80,13 @@ def test_sections_are_documented():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_section_alone_and_its_blocks(name):
-    alone, everything = blocks(groups(), [name], VERIFIED), blocks(groups(), verified=VERIFIED)
+def test_a_section_alone_and_its_blocks(name, everything):
+    alone = blocks(groups(), [name], VERIFIED)
     assert alone and len(alone) < len(everything), (len(alone), len(everything))
 
 
-def test_every_table_and_cells_that_are_words():
-    for part in blocks(groups()):
+def test_every_table_and_cells_that_are_words(everything):
+    for part in everything:
         if isinstance(part, Table):
             for row in part.rows:
                 assert len(row) == len(part.header), (part.header, row)
