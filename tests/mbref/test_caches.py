@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+import multiprocessing
 import os
+import signal
 import subprocess
 import sys
 import threading
+from collections.abc import Callable
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import pytest
@@ -92,6 +97,48 @@ def test_writers_at_the_same_time_leave_one_whole_file(tmp_path: Path):
         writer.join()
     assert len(checked_file.read(path)) in sizes
     assert os.listdir(tmp_path) == ["a"]
+
+
+def forked(work: Callable[[], None]) -> BaseProcess:
+    process = multiprocessing.get_context("fork").Process(target=work)
+    process.start()
+    return process
+
+
+def test_a_disk_that_fills_up_leaves_no_part_of_a_file(tmp_path: Path, capfd):
+    """The limit of a file's size stands for a full disk."""
+    resource = pytest.importorskip("resource")
+    path = tmp_path / "a"
+    checked_file.write(path, b"data")
+
+    def fill() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))
+        checked_file.write(path, b"x" * 100_000)
+
+    process = forked(fill)
+    process.join()
+    assert process.exitcode == 0
+    assert capfd.readouterr().err.count("nothing can be kept in") == 1
+    assert os.listdir(tmp_path) == ["a"] and checked_file.read(path) == b"data"
+
+
+def test_a_killed_writer_leaves_a_whole_file(tmp_path: Path, capfd):
+    path = tmp_path / "a"
+    checked_file.write(path, b"0" * 1_000_000)
+
+    def write() -> None:
+        for digit in itertools.cycle(b"123456789"):
+            checked_file.write(path, bytes([digit]) * 1_000_000)
+
+    for _ in range(5):
+        before, process = path.stat().st_ino, forked(write)
+        while path.stat().st_ino == before:  # nothing has been written yet
+            assert process.is_alive()
+        process.kill()
+        process.join()
+        assert len(set(checked_file.read(path))) == 1
+    assert capfd.readouterr().err == ""
 
 
 def ran(script: str, folder: Path, cache: Path) -> tuple[str, str]:
