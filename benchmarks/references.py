@@ -71,11 +71,11 @@ def main() -> None:
 
 def line(scene: Scene, duration: float, seconds: float, tight: float, records: str | None) -> Line:
     """Print one scene's line, made or as it was kept in a file of records."""
-    made_of = [cache.version(), cache.canonical(scene), duration, seconds, tight, DIGITS, TOLERANCE]
+    made_of = [cache.version(), cache.canonical(scene), duration, seconds, DIGITS, TOLERANCE]
     key = hashlib.sha256(repr(made_of).encode()).hexdigest()
     found = opened(records).get(key)
-    if found is None:
-        found = {"key": key, **examined(scene, duration, seconds, tight)}
+    if found is None or found["tight"] < tight:
+        found = {"key": key, "tight": tight, **examined(scene, duration, seconds, tight)}
         append(records, found)
     print(text(found), flush=True)
     return found
