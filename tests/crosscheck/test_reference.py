@@ -321,7 +321,7 @@ def test_a_start_in_a_singular_position_is_not_certified():
         certified(SCENES["four_bar_straight"](), np.array([0.0, 1e-4]), 20)
 
 
-@pytest.mark.parametrize("name", ["bennett", "four_bar_gravity", "andrews_squeezer", "h_frame", "random_12"])
+@pytest.mark.parametrize("name", ["bennett", "four_bar_gravity", "h_frame", "random_12"])
 def test_weaker_joints_leave_the_freedoms_and_no_redundant_row(name):
     scene = find_certifiable(name)
     before, after = scene.counts(), isostatic(scene).counts()
