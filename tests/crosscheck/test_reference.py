@@ -78,6 +78,15 @@ def test_closed_form_is_within_the_bound(make):
     assert angle <= 1e-7, "arccos resolves no less"
 
 
+def test_bound_of_a_mechanism_far_from_the_origin_holds_the_rounding_of_its_samples():
+    scene, _ = pendulum()
+    far = Isometry(np.eye(3), np.array([1e6, 0.0, 0.0])).change(scene)
+    motion = natural_motion(far, [0.0, 0.4, 0.8], EXTENDED, seconds=SECONDS)
+    found, _ = judged(far, motion.times, motion, motion, motion)
+    lost = np.abs(EXTENDED.array(found.position) - motion.position).max() / constraints.scene_length(far)
+    assert 1e-12 < lost < found.bound.max() < 1e-9
+
+
 def assert_family(name: str) -> None:
     scene = ALL[name]
     found, reason = samples(scene, BRIEF.get(name, scene.duration))

@@ -36,6 +36,13 @@ def bounds(apart: np.ndarray) -> np.ndarray:
     return np.maximum(SAFETY * np.maximum.accumulate(apart), LEAST)
 
 
+def rounding(scene: Scene, motion: Motion) -> np.ndarray:
+    """By how much doubles of a motion's positions may be off (k,), over the scene's length: far from the
+    origin more than LEAST."""
+    farthest = np.linalg.norm(doubles(motion.position), axis=-1).max(axis=-1, initial=0.0)
+    return np.finfo(float).eps * farthest / scene_length(scene)
+
+
 def _angles(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Angles (k, nb) between orientations (k, nb, 4), exact to the rounding of the arithmetic."""
     pw, qw, pv, qv = p[..., :1], q[..., :1], p[..., 1:], q[..., 1:]

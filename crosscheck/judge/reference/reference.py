@@ -15,7 +15,7 @@ import numpy as np
 
 from crosscheck.judge.reference import cache
 from crosscheck.judge.reference.arithmetic import EXTENDED, doubles
-from crosscheck.judge.reference.bound import USEFUL, bounds, differences
+from crosscheck.judge.reference.bound import USEFUL, bounds, differences, rounding
 from crosscheck.judge.reference.motion import Motion, Times
 from crosscheck.judge.reference.taylor import DATA, natural_motion
 from crosscheck.judge.reference.tree import tree_motion
@@ -108,7 +108,7 @@ def judged(scene: Scene, times: np.ndarray, a: Motion, twin: Motion, b: Motion) 
     apart = np.zeros(max(len(twin.times), len(b.times)))
     for other in (twin, b):
         apart[: len(other.times)] = np.maximum(apart[: len(other.times)], differences(scene, a, other))
-    bound = bounds(apart)
+    bound = np.maximum(bounds(apart), rounding(scene, a)[: len(apart)])
     good = int((bound <= USEFUL).sum())
     arrays = {name: doubles(getattr(a, name)[:good]) for name in FIELDS}
     samples = Reference(
