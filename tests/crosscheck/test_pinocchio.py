@@ -19,14 +19,14 @@ pinocchio = pytest.importorskip("pinocchio")
 PAPER = {  # scene: duration, s
     "planar_slider_crank": 0.08,
     "planar_slider_crank_equal": 0.1,
-    "planar_slider_crank_gravity": 0.4,
+    "planar_slider_crank_gravity": 0.2,
     "spatial_slider_crank": 0.02,
-    "spatial_slider_crank_driven": 0.2,
+    "spatial_slider_crank_driven": 0.1,
     "four_bar": 0.1,
     "four_bar_quarter": 0.1,
     "five_bar": 0.1,
-    "four_bar_gravity": 1.0,
-    "five_bar_gravity": 1.0,
+    "four_bar_gravity": 0.5,
+    "five_bar_gravity": 0.5,
 }
 SINGULAR = ("planar_slider_crank_equal", "four_bar_gravity", "five_bar_gravity")  # passed by their own motion
 
