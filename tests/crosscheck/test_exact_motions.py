@@ -16,8 +16,9 @@ from crosscheck.judge.metrics import violation_series
 from crosscheck.judge.momentum import momentum_series
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
-from mbref.scene import Body, Scene
+from mbref.scene import Body, Moment, Scene
 from mbref.scenes import SCENES
+from mbref.trajectory import Trajectory
 
 PROBES = moving_probes()
 
@@ -40,6 +41,18 @@ def test_momentum_and_what_pushes(name):
     assert momentum_series(scene, exact).max() < 1e-13
     faster = replace(exact, velocity=exact.velocity * 1.001)
     assert momentum_series(scene, faster).max() > 1e-5
+
+
+def test_moment_of_momentum_and_a_moment():
+    """A ball that a moment M turns ever faster: J ω = M t, by the angle M t² / (2 J); without M it drifts."""
+    moment, inertia, times = np.array([0.0, 0.3, 0.4]), 0.2, np.linspace(0.0, 1.0, 4)
+    body = Body(name="ball", mass=1.0, inertia=(inertia,) * 3, position=(0.0, 0.0, 0.0))
+    scene = Scene(name="ball", body=(body,), load=(Moment(body="ball", moment=moment),))
+    turned = rotations.from_vector(np.outer(times**2 / 2 / inertia, moment))[:, None]
+    still, spin = np.zeros((4, 1, 3)), np.outer(times / inertia, moment)[:, None]
+    exact = Trajectory("ball", "", "", "", {}, times, ("ball",), still, turned, still, spin)
+    assert momentum_series(scene, exact).max() < 1e-15
+    assert momentum_series(scene.with_(load=()), exact).max() == pytest.approx(1.0)
 
 
 def test_momentum_and_the_ground():

@@ -8,7 +8,11 @@ judge), each has its own.
 
 from __future__ import annotations
 
-from tests.mutants import of_crosscheck, of_mbref
+from tests.mutants import of_crosscheck, of_mbref, second_reading
 from tests.mutants.defect import Defect
 
-DEFECTS: tuple[Defect, ...] = (*of_mbref.DEFECTS, *of_crosscheck.DEFECTS)
+DEFECTS: tuple[Defect, ...] = (
+    *of_mbref.DEFECTS,
+    *of_crosscheck.DEFECTS,
+    *second_reading.DEFECTS,
+)

@@ -164,6 +164,7 @@ def test_limits_and_the_bias_put_in():
     cells = {row[1]: dict(zip(found.header, row, strict=True)) for row in found.rows}
     assert cells["a"]["Bias"] == "1.0e-04" and cells["a"]["Larger"] == "bias", cells
     assert cells["a"]["Discretisation"] == "1.0e-05" and cells["a"]["Order"] == "1", cells
+    assert cells["a"]["Its error"] == "1.1e-04", "that of the finest step"
     assert float(cells["b"]["Bias"]) < 1e-12 and cells["b"]["Larger"] == "discretisation", cells
     assert "1 of them bias" in found.caption, found.caption
 
