@@ -68,7 +68,7 @@ class Comparison:
         return pandas.DataFrame(self.rows)
 
     def document(self) -> dict[str, Any]:
-        """What `crosscheck compare --json` prints: scene, verdict, truth, difference and records."""
+        """The document of `crosscheck compare --json`: scene, verdict, truth, difference and records."""
         truth = {name: self.judged.truth[name] for name in TRUTH}
         return {"scene": self.judged.scene.name, "records": [public(r) for r in self.records],
                 "verdict": self.verdict._asdict(), "truth": truth, "difference": self.difference}  # fmt: skip

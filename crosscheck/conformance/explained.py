@@ -11,7 +11,7 @@ FOLDER = Path(__file__).parent
 
 
 class Explanation(NamedTuple):
-    """Why an engine violates a card, and what a user of the engine can do; a sentence each."""
+    """The cause of an engine's violation of a card and its remedy; a sentence each."""
 
     cause: str
     remedy: str

@@ -16,11 +16,12 @@ there, while the least true singular value of any linkage worth the name is abov
 
 ON_PATH = 1e-9
 """Relative gap up to which a scene is of a truth's family. Scenes written with twelve digits pass; one
-whose lengths differ by more is another mechanism, and its truth would be off by as much."""
+whose lengths differ by more is another mechanism, and its truth would be off by as much. Beyond a singular
+position the truth is that of the family without the gap."""
 
-SAME_LENGTH = 1e-12
-"""Relative difference up to which crank and rod are equal: with computed anchors rounding leaves 1e-16,
-and a difference d changes the smooth branch only within an angle of about sqrt(d) of the singularity."""
+SAME_LENGTH = 1e-13
+"""Relative difference up to which crank and rod are equal: with computed anchors rounding leaves 1e-16. A
+larger one, however small, sends the motion to the other branch."""
 
 PARALLEL = 1e-9
 """Sine of the angle up to which directions are parallel: errors of work from it are its square."""

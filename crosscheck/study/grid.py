@@ -155,7 +155,7 @@ def record_of(case: Case, trajectory: Trajectory) -> Record:
 
 
 def made_by() -> dict[str, Any]:
-    """What makes a record: versions, commit, date (UTC) and machine."""
+    """The origin of a record: versions, commit, date (UTC) and machine."""
     date = datetime.now(UTC).isoformat(timespec="seconds")
     return {"versions": versions(), "commit": commit(), "date": date, "machine": machine()}
 

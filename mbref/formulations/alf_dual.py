@@ -6,7 +6,9 @@ By the Woodbury identity its iterates are those of Eqs. 17 to 19.  But α enters
 multiplying Φ_qᵀ Φ_q beside M, so that a large α costs no digits and few iterations are needed; no rank
 is decided.  Regularised rows are those of unit length in the metric of M.  The iteration is
 ``linear_algebra.minimum_norm`` with b = γ - Φ_q q̈_0, on a sparse factor of S + I/α; it stops when the next
-change would be ≤ epsilon, relative to the larger of 1 and the acceleration.
+change would be ≤ epsilon, relative to the larger of 1 and the acceleration.  Small inertias make small
+singular values, for which it begins again with a larger α where rows are known to be independent: those of
+redundant rows, off the constraints, are no rows' own.
 """
 
 from __future__ import annotations
@@ -16,8 +18,8 @@ from typing import NamedTuple
 from mbref.equations.static_constraints import add_static_multipliers
 from mbref.formulations.alf import feedback
 from mbref.formulations.base import Formulation, Sparse
-from mbref.kernels.compilation import exchangeable
-from mbref.kernels.layout import ACCELERATE, SINGULAR, SparseFactor
+from mbref.kernels.compilation import exchangeable, kernel
+from mbref.kernels.layout import ACCELERATE, NOT_CONVERGED, SINGULAR, SparseFactor
 from mbref.kernels.named_memory import opener
 from mbref.linear_algebra.minimum_norm import solve_to_tolerance
 from mbref.linear_algebra.sparse_cholesky import regularised_factor, subtract_product
@@ -33,15 +35,28 @@ class Options(NamedTuple):
     mu: float = 1.0
 
 
+STRONGER, LARGEST_ALPHA = 1e3, 1e16  # factor of the next α; from there on 1/α is rounding beside S
 options_of, factor_of = opener(Options), opener(SparseFactor)
 
 
 @exchangeable(ACCELERATE)
 def accelerate(system):
     options, factor = options_of(system.options), factor_of(system.scratch)
+    alpha, status = options.alpha, iterate_with(options.alpha, system)
+    while status == NOT_CONVERGED and system.settings.independent and alpha < LARGEST_ALPHA:
+        alpha *= STRONGER
+        status = iterate_with(alpha, system)
+    add_static_multipliers(factor.static, system)
+    return status
+
+
+@kernel
+def iterate_with(alpha, system):
+    """The iteration from q̈_0 on with 1/α beside S: OK, SINGULAR or NOT_CONVERGED."""
+    options, factor = options_of(system.options), factor_of(system.scratch)
     row, column, root, x = factor.symbolic.row, factor.symbolic.column, factor.root, factor.change
     system.counts.factorisations += 1
-    if not regularised_factor(factor, system.blocks.reshape(-1), system.inverse_root, options.alpha):
+    if not regularised_factor(factor, system.blocks.reshape(-1), system.inverse_root, alpha):
         return SINGULAR
     for j in range(column.shape[0]):
         k = column[j]
@@ -52,11 +67,9 @@ def accelerate(system):
     for i in range(row.shape[0]):
         factor.residual[i] = system.rhs[row[i]]
     subtract_product(factor, x, factor.residual)
-    status = solve_to_tolerance(
+    return solve_to_tolerance(
         factor, options.epsilon, int(options.iterations), system.acceleration, system.multipliers
     )
-    add_static_multipliers(factor.static, system)
-    return status
 
 
 ALF_DUAL = Formulation(

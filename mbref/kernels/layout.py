@@ -53,6 +53,7 @@ class Settings(NamedTuple):
     position_gain: float = 0.0
     rank_tolerance: float = 1e-10
     newton_tolerance: float = 1e-13
+    independent: int = 0  # whether rows of small singular values are known to be independent
 
 
 class Counts(NamedTuple):
@@ -213,6 +214,7 @@ class History(NamedTuple):
 
     time: Annotated[Vector, KEPT]
     pivots: Annotated[Matrix, KEPT, "pivots"]  # of every row of Φ_q, see Watch
+    inside: Annotated[Matrix, 8, "pivots"]  # the same at places inside a long step
     y: Annotated[Matrix, KEPT, "14*nb"]
     y_rate: Annotated[Matrix, KEPT, "14*nb"]
     nodes: Annotated[Indices, KEPT]  # rows chosen for an extrapolation

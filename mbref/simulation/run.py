@@ -168,7 +168,9 @@ class Run:
         memory.state.coordinates[:] = self.start.q
         memory.state.velocities[:] = self.start.v
         if self.method.stabilisation.projects:
-            memory.watch.generic_rank = independent_rows(self.model, self.start.q, self.part.factor.symbolic)
+            rank = independent_rows(self.model, self.start.q, self.part.factor.symbolic)
+            memory.watch.generic_rank = rank
+            memory.equations.system.settings.independent = rank == memory.pivots.size
         self.enter_state()
 
     def enter_state(self) -> None:

@@ -17,7 +17,8 @@ from mbref.simulation.limits import SPECIALISED, Limits
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.run import Run
 from mbref.specialised import Untraceable
-from mbref.taylor.run import NO_CODE, CrossingRun, TaylorRun, prepare_series
+from mbref.taylor.run import CrossingRun, TaylorRun
+from mbref.taylor.series_run import NO_CODE, prepare_series
 
 __all__ = ["Limits", "checked_times", "prepare", "simulate", "why_no_code"]
 

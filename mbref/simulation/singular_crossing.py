@@ -10,12 +10,20 @@ step is not taken; the Taylor series of ``mbref.taylor`` takes its place.
 
 from __future__ import annotations
 
+from numpy import sqrt
+
+from mbref.equations.coordinates import expand, fastest_turn
+from mbref.equations.evaluation import evaluate
+from mbref.equations.loads import remember_angles
 from mbref.kernels.compilation import kernel
+from mbref.linear_algebra.sparse_cholesky import find_squared_pivots
 from mbref.linear_algebra.vectors import copy
+from mbref.stabilisation.projection import factorise_constraints
 
 WINDOW = 0.1  # relative pivot below which a singular position is near
 ON_IT = 1e-7  # relative pivot of a run that begins on one: its first step leaves it
 SHARP = 3.0  # times a pivot's fall in the time of a step: a larger pivot has not vanished inside
+LONG = 0.5  # rad that a body turns in a step inside which pivots are looked at
 SMALLEST = 1e-4  # pivot of a row below which it is as good as redundant, and is not compared
 
 
@@ -75,3 +83,76 @@ def may_have_passed(h, memory):
         if start > SMALLEST and start + end < SHARP * fall:
             return True
     return False
+
+
+@kernel
+def has_passed(y, memory):
+    """Whether a pivot has vanished inside the last step, y being the state at its end.
+
+    Inside a long step the pivots are those at places in between, by Hermite's cubic polynomial.
+    """
+    history, clock, state = memory.loop.history, memory.loop.clock, memory.state
+    taken, kept, inside = memory.equations.system.counts.steps, history.time.shape[0], history.inside
+    if memory.control.closed_loops == 0.0 or memory.watch.reference_pivot == 0.0 or taken == clock.restart:
+        return False
+    now, before = taken % kept, (taken - 1) % kept
+    turn = fastest_turn(state.velocities) * (history.time[now] - history.time[before])
+    pieces = min(int(turn / LONG) + 1, inside.shape[0] - 1)
+    if pieces == 1:
+        return False
+    copy(history.pivots[before], inside[0])
+    copy(history.pivots[now], inside[pieces])
+    for i in range(1, pieces):
+        put_pivots_inside(i, i / pieces, before, now, memory)
+    expand(y, memory.active, state)
+    evaluate(clock.time, state.coordinates, state.velocities, memory.equations)
+    return falls_and_rises(pieces, inside)
+
+
+@kernel
+def put_pivots_inside(i, part, before, now, memory):
+    """The pivots at a part of a step, between two rows of the history, into row i of those inside."""
+    history, state, factor = memory.loop.history, memory.state, memory.factor
+    y, width = memory.loop.y_new[: memory.loop.clock.y_size], history.time[now] - history.time[before]
+    rest = 1.0 - part
+    for k in range(y.shape[0]):
+        start, end = history.y[before, k], history.y[now, k]
+        leaving = width * history.y_rate[before, k] - (end - start)
+        arriving = (end - start) - width * history.y_rate[now, k]
+        y[k] = rest * start + part * end + part * rest * (rest * leaving + part * arriving)
+    expand(y, memory.active, state)
+    t = history.time[before] + part * width
+    evaluate(t, state.coordinates, state.velocities, memory.equations)
+    copy(history.pivots[before], history.inside[i])
+    if factorise_constraints(memory):
+        find_squared_pivots(factor)
+        for k in range(factor.squared_pivots.shape[0]):
+            history.inside[i, k] = sqrt(factor.squared_pivots[k])
+
+
+@kernel
+def falls_and_rises(pieces, inside):
+    """Whether a pivot vanishes between two of the equidistant places, as fast as it falls or rises beside."""
+    for k in range(inside.shape[1]):
+        for i in range(pieces):
+            first, second, fall = inside[i, k], inside[i + 1, k], 0.0
+            if i > 0:
+                fall = inside[i - 1, k] - first
+            if i + 2 <= pieces:
+                fall = max(fall, inside[i + 2, k] - second)
+            if min(first, second) > SMALLEST and first + second < SHARP * fall:
+                return True
+    return False
+
+
+@kernel
+def step_back(memory):
+    """The state before the last step, with the time of that step's end as that of the passage."""
+    history, clock, state = memory.loop.history, memory.loop.clock, memory.state
+    before = (memory.equations.system.counts.steps - 1) % history.time.shape[0]
+    clock.passage, clock.time = clock.time, history.time[before]
+    y = memory.loop.y[: clock.y_size]
+    copy(history.y[before, : clock.y_size], y)
+    expand(y, memory.active, state)
+    evaluate(clock.time, state.coordinates, state.velocities, memory.equations)
+    remember_angles(memory.equations)

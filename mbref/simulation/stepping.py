@@ -8,7 +8,14 @@ from mbref.kernels.compilation import INT, entry, kernel
 from mbref.kernels.layout import CHANGED, GUARD_FAILED, MEMORY, NOT_FINITE, OK
 from mbref.linear_algebra.vectors import all_finite, copy
 from mbref.simulation.samples import take_sample
-from mbref.simulation.singular_crossing import comes_near, may_have_passed, remember_state, starts_near
+from mbref.simulation.singular_crossing import (
+    comes_near,
+    has_passed,
+    may_have_passed,
+    remember_state,
+    starts_near,
+    step_back,
+)
 
 # how a call ends; evaluation statuses (SINGULAR, …) end it too
 DONE, VIOLATED, STEP_TOO_SMALL, TOO_MANY_STEPS, PAUSED, SINGULAR_AHEAD, UNDECIDED = range(10, 17)
@@ -81,9 +88,12 @@ def advance_to_end(memory):
         status = evaluate_state(y, y_rate, memory)
         if status != OK:
             return status
+        remember_state(counts.steps, y, y_rate, memory)
+        if has_passed(y, memory):
+            step_back(memory)
+            return SINGULAR_AHEAD
         while clock.sample < times.shape[0] and clock.time >= times[clock.sample]:
             take_sample(memory)
-        remember_state(counts.steps, y, y_rate, memory)
         if clock.sample == times.shape[0]:
             return DONE
         if counts.steps >= memory.control.most_steps:

@@ -8,6 +8,7 @@ cos ψ along - sin ψ across.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,21 +42,36 @@ class Images:
         self._across += list(np.zeros((count, 12)) if across is None else across)
         return tuple(range(first, first + count))
 
-    def at(
-        self, t: float, q: np.ndarray, v: np.ndarray, wanted: Sequence[int]
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Values and rates (k,) of the variables wanted at time t (s), from q (7 nb,) and v (6 nb,)."""
-        pose, pose_rate = poses(q, v, self.length)
+    def of(self, wanted: Sequence[int]) -> Readings:
+        """The forms of the variables wanted, to read their values from states."""
         chosen = list(wanted)
         body, turned_by = np.array(self._bodies, int)[chosen], np.array(self._turned_by, int)[chosen]
         along, across = (np.array(forms).reshape(-1, 12)[chosen] for forms in (self._along, self._across))
-        angle, speed = np.zeros(len(chosen)), np.zeros(len(chosen))
-        for k in np.flatnonzero(turned_by != NO_DRIVER):
-            angle[k], speed[k] = driver_at(self.drivers, turned_by[k], t)
-        c, s = np.cos(angle), np.sin(angle)
-        x, y = np.sum(along * pose[body], axis=1), np.sum(across * pose[body], axis=1)
-        x_rate, y_rate = np.sum(along * pose_rate[body], axis=1), np.sum(across * pose_rate[body], axis=1)
-        return c * x - s * y, c * x_rate - s * y_rate - speed * (s * x + c * y)
+        turned = np.flatnonzero(turned_by != NO_DRIVER)
+        return Readings(self.drivers, self.length, body, turned_by[turned], turned, along, across[turned])
+
+
+class Readings(NamedTuple):
+    """Variables (k,): the forms (k, 12) of their bodies' poses, and of those that drivers turn the others."""
+
+    drivers: Drivers
+    length: float
+    body: np.ndarray
+    driver: np.ndarray  # of the variables ``turned``
+    turned: np.ndarray
+    along: np.ndarray
+    across: np.ndarray
+
+    def at(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Values and rates (2, k) at time t (s), from q (7 nb,) and v (6 nb,)."""
+        pose, pose_rate = poses(q, v, self.length)
+        found = np.array([np.einsum("kf,kf->k", self.along, p[self.body]) for p in (pose, pose_rate)])
+        for k, driver, across in zip(self.turned, self.driver, self.across, strict=True):
+            angle, speed = driver_at(self.drivers, driver, t)
+            c, s, (x, x_rate) = np.cos(angle), np.sin(angle), found[:, k]
+            y, y_rate = across @ pose[self.body[k]], across @ pose_rate[self.body[k]]
+            found[:, k] = c * x - s * y, c * x_rate - s * y_rate - speed * (s * x + c * y)
+        return found
 
 
 def image_forms(axes: np.ndarray, local: np.ndarray) -> np.ndarray:

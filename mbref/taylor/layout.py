@@ -129,6 +129,7 @@ class Solver(NamedTuple):
     pivot: Annotated[Indices, "nz + nr"]  # the order of elimination
     first: Annotated[Vector, "nz + nr"]  # pivots when they were chosen
     last: Annotated[Vector, "nz + nr"]  # pivots of the last factorisation
+    past: Annotated[Vector, "nz + nr"]  # pivots where the step began
     past_gradient: Annotated[Matrix, "nr", "nz"]  # G where the step began
     product: Annotated[Matrix, "nr", "nr"]  # of gradients at both ends of a step
     place: Annotated[Indices, "2*twofold"]  # of the entries of G in K, and of those of Gᵀ
@@ -148,8 +149,14 @@ class Progress(NamedTuple):
     tolerance: float = 0.0  # of the last terms of the series
     violation: float = 0.0  # the largest before the last correction
     crossed: int = 0  # whether the last attempt crossed a singular position
+    end: float = 0.0  # time of the last step's end
+    choice: int = 0  # of the partition, counted
+    past_choice: int = 0  # where the step began
     past_pivot: float = 1.0  # the least of G where the step began
-    largest_pivot: float = 0.0  # that the least one has been
+    approaching: int = 1  # whether it is less than where the step before began
+    largest_pivot: float = 0.1  # that the least one has been, of rows of length one about
+    passing: int = 0  # whether singular positions are passed, or run up to
+    nearest: float = 1.0  # least pivot over the largest, of steps that do not cross
 
 
 class TaylorMemory(NamedTuple):

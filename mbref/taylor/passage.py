@@ -7,8 +7,8 @@
   the gap its rows are violated by g at least, and by more the further it goes.  A step near a singular
   position is therefore as exact as rounding allows, and violated by rounding alone.
 - Near a singular position rounding moves the state along the vanishing direction by its ratio to the pivot,
-  and turns the velocity by as much again.  A motion that comes nearer than LEAST and does not cross
-  is lost.
+  and turns the velocity by as much again.  A motion that comes nearer than LEAST and does not cross is lost;
+  whether a nearer one is determined, its twin tells (``mbref.taylor.run``).
 """
 
 from __future__ import annotations
@@ -16,28 +16,32 @@ from __future__ import annotations
 from numpy import log
 
 from mbref.kernels.compilation import kernel
+from mbref.kernels.layout import OK
+from mbref.linear_algebra.vectors import copy
+from mbref.simulation.stepping import SINGULAR_AHEAD, STEP_TOO_SMALL, UNDECIDED
 from mbref.taylor.samples import evaluate_series
 from mbref.taylor.solver import put_gradient
 
 NEAR = 0.3  # least pivot of G, over the largest that it has been, below which a singular position is near
-EXACT = 1e-14  # the least tolerance of a series
-NOISE = 3e-14  # over the pivot: that of a step which then crosses by a third of its distance
+AHEAD = 0.03  # the same, below which a series of a loose tolerance gives way to an exact one
+NOISE = 4e-15  # over the pivot: the tolerance of a step, which then crosses by a quarter of its distance
 BEFORE = 0.6  # of the largest pivot: from there on a step may cross
-RESOLUTION = 1e-12  # violation of a step that passes no gap
-DEEPEST = 0.25  # of a step's first pivot: its last is not less, so that the next is not the worse for it
+ROUNDING = 1e-15  # the least violation that is asked for
+RESOLUTION = 1e-14  # violation of a step beside a singular position, that passes no gap
+ACROSS = 1e-13  # of a step that crosses
+DEEPEST = 0.2  # of a step's first pivot: its last is not less, so that the next is not the worse for it
 VANISHING = log(0.2)  # of a determinant over its values at both ends, that falls and rises linearly
-LEAST = 1e-4  # pivot over its largest below which the branch depends on rounding
+LEAST = 1e-9  # pivot over its largest below which the branch depends on rounding
 
 
 @kernel
-def remember_gradient(memory):
-    """Keep G at the first coefficients, where a step begins."""
+def remember_pivots(memory):
+    """Keep the pivots where a step begins."""
     solver, progress = memory.solver, memory.progress
-    put_gradient(memory.series.terms, memory)
-    for r in range(solver.work.shape[0]):
-        for c in range(solver.work.shape[1]):
-            solver.past_gradient[r, c] = solver.work[r, c]
-    progress.past_pivot = least_pivot(memory)
+    copy(solver.last, solver.past)
+    pivot = least_pivot(memory)
+    progress.approaching = pivot <= progress.past_pivot
+    progress.past_choice, progress.past_pivot = progress.choice, pivot
     progress.largest_pivot = max(progress.largest_pivot, progress.past_pivot)
 
 
@@ -48,6 +52,32 @@ def least_pivot(memory):
     for k in range(memory.progress.rank):
         least = min(least, abs(solver.last[k]))
     return least
+
+
+@kernel
+def may_cross(pivot, memory):
+    """Whether a step may cross a singular position: it ends near one, or a pivot has changed its sign."""
+    progress, solver = memory.progress, memory.solver
+    if progress.choice != progress.past_choice or is_near(pivot, progress):
+        return True
+    for k in range(progress.rank):  # noqa: SIM110 - no generators in kernels
+        if solver.last[k] * solver.past[k] <= 0.0:
+            return True
+    return False
+
+
+@kernel
+def is_near(pivot, progress):
+    """Whether a step begins or ends near a singular position."""
+    return min(pivot, progress.past_pivot) < NEAR * progress.largest_pivot
+
+
+@kernel
+def remember_gradient(memory):
+    """Keep G where the step began."""
+    solver = memory.solver
+    put_gradient(memory.series.past, memory)
+    copy(solver.work.reshape(-1), solver.past_gradient.reshape(-1))
 
 
 @kernel
@@ -105,6 +135,7 @@ def has_crossed(h, pivot, memory):
     the determinant is looked at where a least pivot vanishes that falls and rises linearly.
     """
     progress = memory.progress
+    remember_gradient(memory)
     negative, behind = overlap(memory.series.terms, memory)
     if negative or progress.past_pivot >= BEFORE * progress.largest_pivot or turns_back(memory):
         return negative
@@ -117,22 +148,42 @@ def has_crossed(h, pivot, memory):
 
 @kernel
 def exactness(progress):
-    """The tolerance of the series: the run's times the square of the relative pivot, at least EXACT."""
-    relative = progress.past_pivot / progress.largest_pivot
-    return min(progress.tolerance, max(progress.tolerance * relative * relative, EXACT))
+    """The tolerance of a step: a motion bends the more sharply the nearer it is to a singular position."""
+    return progress.tolerance * min(1.0, progress.past_pivot / progress.largest_pivot)
 
 
 @kernel
 def exactness_across(progress):
-    """The same of a step that crosses: terms that rounding makes grow with its length over the distance."""
-    exact, pivot = exactness(progress), progress.past_pivot
-    return max(exact, NOISE / pivot) if pivot < BEFORE * progress.largest_pivot else exact
+    """The tolerance of a step that crosses: its terms grow by rounding, with its length over the distance."""
+    pivot, near = progress.past_pivot, BEFORE * progress.largest_pivot
+    if progress.passing and progress.approaching and pivot < near:
+        return max(progress.tolerance, NOISE / pivot)
+    return exactness(progress)
 
 
 @kernel
-def passes_gap(crossed, pivot, memory):
-    """Whether a step's violation is more than rounding, where it crosses or ends near a singular position."""
-    progress = memory.progress
-    if not crossed and min(pivot, progress.past_pivot) >= NEAR * progress.largest_pivot:
-        return False
-    return not progress.violation <= RESOLUTION
+def resolution(progress):
+    """The violation of a step that passes no gap, whose correction costs energy."""
+    if progress.crossed:
+        return ACROSS
+    return max(RESOLUTION * progress.past_pivot / progress.largest_pivot, ROUNDING)
+
+
+@kernel
+def judge_branch(h, last, memory):
+    """Judge a step of h seconds by the least pivot: OK, or why the branch on which it ends is in doubt."""
+    progress, pivot = memory.progress, least_pivot(memory)
+    progress.crossed = may_cross(pivot, memory) and has_crossed(h, pivot, memory)
+    if not progress.passing:
+        ahead = progress.crossed or pivot < AHEAD * progress.largest_pivot
+        return SINGULAR_AHEAD if ahead else OK
+    if not (progress.crossed or is_near(pivot, progress)):
+        return OK
+    if progress.crossed and turns_back(memory):
+        return STEP_TOO_SMALL
+    if not progress.violation <= resolution(progress) or (not last and pivot < DEEPEST * progress.past_pivot):
+        return STEP_TOO_SMALL
+    if progress.crossed or last or pivot >= progress.past_pivot:
+        return OK
+    progress.nearest = min(progress.nearest, pivot / progress.largest_pivot)
+    return OK if progress.nearest >= LEAST else UNDECIDED

@@ -70,6 +70,7 @@ def choose(memory):
         eliminate(work, row, order, rank)
         rank += 1
     pair(rank, memory)
+    memory.progress.choice += 1
     return rank
 
 

@@ -15,19 +15,24 @@ from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, OK
 from mbref.kernels.named_memory import Named
 from mbref.linear_algebra.vectors import larger
 from mbref.simulation.singular_crossing import WINDOW, relative_pivot
-from mbref.simulation.stepping import DONE, PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED
+from mbref.simulation.stepping import (
+    DONE,
+    PAUSED,
+    SINGULAR_AHEAD,
+    STEP_TOO_SMALL,
+    TOO_MANY_STEPS,
+    UNDECIDED,
+)
 from mbref.taylor.lanes import LANES, gathered, load, store
 from mbref.taylor.layout import TaylorMemory
 from mbref.taylor.loads import ANGLE, TORSION_SERIES, expand_drivers
 from mbref.taylor.passage import (
-    DEEPEST,
-    LEAST,
+    AHEAD,
     exactness,
     exactness_across,
-    has_crossed,
+    judge_branch,
     least_pivot,
-    passes_gap,
-    remember_gradient,
+    remember_pivots,
 )
 from mbref.taylor.samples import (
     LOST_MOTION,
@@ -42,12 +47,13 @@ from mbref.taylor.samples import (
 from mbref.taylor.series import expand
 from mbref.taylor.solver import choose, factorise, solution
 
-SMALL = 1e-6  # a violation up to which the factor before its correction serves after it
+SMALL = 1e-6  # a violation whose correction leaves its square
 CORRECTIONS = 8
 ROUNDING = 1e-12  # of rows
 LOST_ROWS = 100.0  # tolerances by which rows may be off
 SHORTER = 0.7
 LEAVE = 1.5  # windows: the pivot from which on steps of the run are taken again
+CLEAR = 3.0  # of the pivot of ``AHEAD``: the same for a run in series
 
 
 @kernel
@@ -115,9 +121,12 @@ def correct(memory):
             break
     if not left <= SMALL:
         return NOT_CONVERGED
+    pivot = least_pivot(memory)
+    if left > progress.tolerance * pivot * pivot:  # then the correction has changed the factor
+        status = factorise(memory)
     violation_rate(memory)
     subtract_violation(1, memory)
-    return OK
+    return status
 
 
 @kernel
@@ -157,8 +166,8 @@ def longest_step(tolerance, memory):
 
 @kernel
 def remember_series(memory):
-    """Keep the series of the step's beginning, and the constraint gradient there."""
-    remember_gradient(memory)
+    """Keep the series of the step's beginning, and the pivots there."""
+    remember_pivots(memory)
     series, torsions = memory.series, memory.polynomials.torsions
     for j in range(0, series.terms.shape[0] * series.terms.shape[1], LANES):
         store(load(series.terms, j), series.past, j)
@@ -170,15 +179,12 @@ def remember_series(memory):
 @kernel
 def judge(h, last, memory):
     """OK where rows and accelerations at the end of a step are off by no more than the tolerance explains."""
-    progress, state, terms, pivot = memory.progress, memory.state, memory.series.terms, least_pivot(memory)
+    progress, state, terms = memory.progress, memory.state, memory.series.terms
     if not progress.violation <= LOST_ROWS * progress.tolerance + ROUNDING:
         return STEP_TOO_SMALL
-    crossed = has_crossed(h, pivot, memory)
-    progress.crossed = crossed
-    if passes_gap(crossed, pivot, memory) or (not last and pivot < DEEPEST * progress.past_pivot):
-        return STEP_TOO_SMALL
-    if not crossed and not last and pivot < min(progress.past_pivot, LEAST * progress.largest_pivot):
-        return UNDECIDED
+    status = judge_branch(h, last, memory)
+    if status != OK:
+        return status
     off, size = 0.0, 1.0
     for i in range(memory.solver.order.shape[0]):
         off = larger(off, (2.0 * terms[2, i] - state[2, i]) * h * h)
@@ -212,27 +218,29 @@ def step(memory):
     loop, control, counts = memory.run.loop, memory.run.control, memory.run.equations.system.counts
     clock, times, progress = loop.clock, loop.times, memory.progress
     remember_series(memory)
-    left = times[times.shape[0] - 1] - clock.time
+    left = progress.end - clock.time
     exact = min(longest_step(exactness(progress), memory), left)
     h = min(longest_step(exactness_across(progress), memory), left)
     while True:
         status = attempt(h, h >= left, memory)
         if status == OK and (progress.crossed or h <= exact):
             break
-        if status == UNDECIDED and h <= exact:
+        if status == SINGULAR_AHEAD or (status == UNDECIDED and h <= exact):
+            clock.passage = clock.time + h
             return status
         counts.rejected += 1
         h = exact if h > exact else h * SHORTER
         if not h >= control.smallest_step:
             return status
-    while clock.sample < times.shape[0] and (h >= left or times[clock.sample] <= clock.time + h):
+    now = progress.end if h >= left else clock.time + h
+    while clock.sample < times.shape[0] and times[clock.sample] <= now:
         status = take_sample(times[clock.sample] - clock.time, h, memory)
         if status != OK:
             return status
     put_angles(h, memory)
     counts.steps += 1
     counts.crossings += progress.crossed
-    clock.time = times[times.shape[0] - 1] if h >= left else clock.time + h
+    clock.time = now
     return OK
 
 
@@ -248,47 +256,47 @@ def enter(memory):
 
 @entry(INT(Named(TaylorMemory)))
 def advance_series(memory):
-    """Advance until the last sample time, a failure, or the number of steps per call; says which."""
-    clock, times, counts = memory.run.loop.clock, memory.run.loop.times, memory.run.equations.system.counts
-    taken = 0
-    while clock.sample < times.shape[0]:
+    """Advance until the end, a failure, or the number of steps per call; says which."""
+    clock, counts = memory.run.loop.clock, memory.run.equations.system.counts
+    for _ in range(int(memory.run.control.steps_per_call)):
         if counts.steps >= memory.run.control.most_steps:
             return TOO_MANY_STEPS
-        if taken >= memory.run.control.steps_per_call:
-            return PAUSED
         status = step(memory)
         if status != OK:
+            put_terms(memory.series.past, memory)
             return status
-        taken += 1
-    return DONE
+        if clock.time >= memory.progress.end:
+            return DONE
+    return PAUSED
 
 
 @entry(INT(Named(TaylorMemory)))
 def pass_singular_position(memory):
     """Advance until a singular position is behind: PAUSED there, DONE at the end, or why that cannot be."""
-    run = memory.run
-    clock, times, counts = run.loop.clock, run.loop.times, run.equations.system.counts
-    before = 1.0
-    while clock.sample < times.shape[0]:
+    run, progress = memory.run, memory.progress
+    clock, counts, before = run.loop.clock, run.equations.system.counts, 1.0
+    while True:
         if counts.steps >= run.control.most_steps:
             return TOO_MANY_STEPS
         status = step(memory)
         if status != OK:
             return status
-        put_first_terms(memory)
-        pivot = relative_pivot(run.watch)
-        if clock.time >= clock.passage and pivot >= max(before, LEAVE * WINDOW):
+        if clock.time >= progress.end:
+            return DONE
+        put_terms(memory.series.terms, memory)
+        project_state(clock.time, run)
+        pivot, clear = relative_pivot(run.watch), CLEAR * AHEAD * progress.largest_pivot
+        leaves = pivot >= max(before, LEAVE * WINDOW) and least_pivot(memory) > clear
+        if leaves and clock.time >= clock.passage:
             return PAUSED
         before = pivot
-    return DONE
 
 
 @kernel
-def put_first_terms(memory):
-    """Coordinates and velocities of all bodies where the series begins, projected, with their pivots."""
-    state, terms = memory.state, memory.series.terms
+def put_terms(series, memory):
+    """Coordinates and velocities of all bodies where a series begins."""
+    state = memory.state
     for i in range(memory.solver.order.shape[0]):
-        state[0, i], state[1, i] = terms[0, i], terms[1, i]
+        state[0, i], state[1, i] = series[0, i], series[1, i]
     find_poses(memory)
     put_state(memory)
-    project_state(memory.run.loop.clock.time, memory.run)

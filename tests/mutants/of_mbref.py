@@ -223,8 +223,8 @@ DEFECTS = (
     ),
     Defect(
         "mbref/taylor/passage.py",
-        "    if not crossed and min(pivot, progress.past_pivot) >= NEAR * progress.largest_pivot:",
-        "    if min(pivot, progress.past_pivot) >= 0.0 * progress.largest_pivot:",
+        "    if not progress.violation <= resolution(progress)",
+        "    if not progress.violation <= 1e9 * resolution(progress)",
         "tests/mbref/test_singular_crossing.py",
     ),
     Defect(

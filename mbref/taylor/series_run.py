@@ -1,0 +1,123 @@
+"""A simulation in Taylor series: memory made of the scene's natural coordinates, and its steps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbref.kernels.layout import OK
+from mbref.kernels.named_memory import allocate, packed, record
+from mbref.method import Method
+from mbref.scene import Scene
+from mbref.simulation.limits import SPECIALISED, Limits
+from mbref.simulation.run import Run
+from mbref.simulation.stepping import PAUSED
+from mbref.specialised import Untraceable
+from mbref.taylor.lanes import filled
+from mbref.taylor.layout import Progress, Series, Solver, TaylorMemory
+from mbref.taylor.natural import NaturalCoordinates
+from mbref.taylor.polynomials import polynomials_of
+from mbref.taylor.stepping import advance_series, enter, pass_singular_position
+
+SHARE = 0.05  # of rtol + atol: the tolerance of a step
+NO_CODE = "its series are made by one code for every scene"
+LEAST_ORDER, MOST_ORDER = 4, 30
+ORDERS_PER_DIGIT, FIRST_ORDER = 1.2, 6.0  # of the order that costs least
+
+
+def order_of(tolerance: float, wanted: float) -> int:
+    """The order of the series: the one wanted, or for 0 by the tolerance; ValueError outside 4 to 30."""
+    if wanted == 0:
+        best = 2 * round((FIRST_ORDER - ORDERS_PER_DIGIT * np.log10(tolerance)) / 2)
+        return int(np.clip(best, LEAST_ORDER, MOST_ORDER))
+    if wanted not in range(LEAST_ORDER, MOST_ORDER + 1):
+        raise ValueError(f"taylor: order must be {LEAST_ORDER} to {MOST_ORDER}, got {wanted:g}")
+    return int(wanted)
+
+
+class SeriesRun(Run):
+    """The steps of one simulation in Taylor series; the memory of the general kernels takes its samples."""
+
+    def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
+        if limits.code == SPECIALISED:
+            raise Untraceable(NO_CODE)
+        super().__init__(scene, method, times, limits)
+        prepare_series()
+        control = self.memory.control
+        tolerance = SHARE * (control.rtol + control.atol)
+        order = order_of(tolerance, method.options_of(method.integrator)["order"])
+        moving = np.zeros(self.model.n, dtype=bool)
+        moving[self.part.active.velocities] = True
+        self.natural = NaturalCoordinates(self.model, self.start, moving)
+        self._variables = self.natural.images.of(self.natural.kept)
+        self.taylor = self._taylor_memory(order)
+        self.taylor.progress.order, self.taylor.progress.tolerance = order, tolerance
+        self._packed_taylor = packed(self.taylor)
+
+    def _taylor_memory(self, order: int) -> TaylorMemory:
+        natural = self.natural
+        orders, nz, ng, nr = order + 1, len(natural.kept), len(natural.given), len(natural.rows)
+        polynomials = polynomials_of(natural, orders)
+        sizes = {
+            "orders": orders, "nz": nz, "ng": ng, "nr": nr, "nb": self.model.nb,
+            "lanes": filled(max(1, nz + nr + ng)), "slots": polynomials.products.left.size,
+            "twofold": polynomials.rows.row.size,
+            "torsions": polynomials.torsions.slot.size,
+        }  # fmt: skip
+        series = allocate(Series, sizes)
+        grown = np.arange(1.0, orders + 1) * np.arange(2.0, orders + 2)
+        series.scale[:, :nz], series.scale[:, nz : nz + nr] = -1.0 / grown[:, None], -1.0
+        series.growth[:], series.growth[:, nz : nz + nr] = 1.0, grown[:, None]
+        series.variable[:nz] = 1.0
+        return TaylorMemory(
+            run=self.memory,
+            polynomials=polynomials,
+            series=series,
+            solver=allocate(Solver, sizes),
+            progress=record(Progress()),
+            state=np.zeros((3, sizes["lanes"])),
+            pose=np.zeros((3, 12 * self.model.nb)),
+            angles=np.zeros(polynomials.torsions.slot.size),
+        )
+
+    def expand(self, until: float) -> int:
+        """Expand at the present time and state, for steps until a time (s): OK or why that cannot be."""
+        memory, series, nz = self.memory, self.taylor.series, len(self.natural.kept)
+        t, state = float(memory.loop.clock.time), memory.state
+        series.terms[:2] = 0.0
+        series.terms[:2, :nz] = self._variables.at(t, state.coordinates, state.velocities)
+        self.taylor.angles[:] = memory.equations.angles[self.taylor.polynomials.torsions.slot]
+        self.taylor.progress.end = until
+        return int(enter(self._packed_taylor.argument))
+
+    def step_on(self) -> int:
+        """So many steps as are taken at a time: PAUSED after them, DONE at the end, or why there are none."""
+        return int(advance_series(self._packed_taylor.argument))
+
+    def cross(self) -> int:
+        """Pass a singular position from the state and time in memory: PAUSED, DONE or why that cannot be."""
+        self.taylor.progress.nearest = self.taylor.progress.past_pivot = 1.0
+        status = self.expand(self.times[-1])
+        return int(pass_singular_position(self._packed_taylor.argument)) if status == OK else status
+
+    def follow(self, until: float) -> int:
+        """The steps from the state and time in memory to a time (s): DONE or why that cannot be."""
+        status = self.expand(until)
+        while status in (OK, PAUSED):
+            status = self.step_on()
+        return status
+
+    @property
+    def has_freedom(self) -> bool:
+        """Whether the rows leave a motion to the forces."""
+        return int(self.taylor.progress.rank) < len(self.natural.kept)
+
+    @property
+    def landing(self) -> np.ndarray:
+        """Values and rates (2, nz) of the variables where the last series begins."""
+        return self.taylor.series.terms[:2, : len(self.natural.kept)].copy()
+
+
+def prepare_series() -> None:
+    """Compile the kernels of the series, or load them from the cache of this machine."""
+    for kernel in (enter, advance_series, pass_singular_position):
+        kernel.prepare()
