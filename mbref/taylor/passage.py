@@ -29,6 +29,7 @@ BEFORE = 0.6  # of the largest pivot: from there on a step may cross
 ROUNDING = 1e-15  # the least violation that is asked for
 RESOLUTION = 1e-14  # violation of a step beside a singular position, that passes no gap
 ACROSS = 1e-13  # of a step that crosses
+CLOCK = 3e-16  # of the time: its rounding, over which drivers and variables move
 DEEPEST = 0.2  # of a step's first pivot: its last is not less, so that the next is not the worse for it
 VANISHING = log(0.2)  # of a determinant over its values at both ends, that falls and rises linearly
 LEAST = 1e-9  # pivot over its largest below which the branch depends on rounding
@@ -162,11 +163,16 @@ def exactness_across(progress):
 
 
 @kernel
-def resolution(progress):
-    """The violation of a step that passes no gap, whose correction costs energy."""
+def resolution(memory):
+    """The violation of a step that passes no gap, whose correction costs energy; drivers round with time."""
+    progress, terms, rounding, speed = memory.progress, memory.series.terms, ROUNDING, 0.0
+    if memory.polynomials.given.driver.shape[0] > 0:
+        for i in range(memory.solver.order.shape[0]):
+            speed = max(speed, abs(terms[1, i]))
+        rounding = max(rounding, CLOCK * memory.run.loop.clock.time * speed)
     if progress.crossed:
-        return ACROSS
-    return max(RESOLUTION * progress.past_pivot / progress.largest_pivot, ROUNDING)
+        return max(ACROSS, rounding)
+    return max(RESOLUTION * progress.past_pivot / progress.largest_pivot, rounding)
 
 
 @kernel
@@ -181,7 +187,7 @@ def judge_branch(h, last, memory):
         return OK
     if progress.crossed and turns_back(memory):
         return STEP_TOO_SMALL
-    if not progress.violation <= resolution(progress) or (not last and pivot < DEEPEST * progress.past_pivot):
+    if not progress.violation <= resolution(memory) or (not last and pivot < DEEPEST * progress.past_pivot):
         return STEP_TOO_SMALL
     if progress.crossed or last or pivot >= progress.past_pivot:
         return OK

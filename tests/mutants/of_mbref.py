@@ -223,8 +223,8 @@ DEFECTS = (
     ),
     Defect(
         "mbref/taylor/passage.py",
-        "    if not progress.violation <= resolution(progress)",
-        "    if not progress.violation <= 1e9 * resolution(progress)",
+        "    if not progress.violation <= resolution(memory)",
+        "    if not progress.violation <= 1e9 * resolution(memory)",
         "tests/mbref/test_singular_crossing.py",
     ),
     Defect(
