@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help check test lint deep shuffle fuzz mutants coverage report quick reference picture docs site bench clean
+.PHONY: help check test lint deep shuffle fuzz kills mutants coverage report quick reference picture docs site bench clean
 
 help: ## show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -33,6 +33,9 @@ fuzz: $(VENV)/ready ## mutated scenes, runs and command lines against both packa
 	$(BIN)/python -m tests.fuzz scene_data --count 20000
 	$(BIN)/python -m tests.fuzz simulation --count 2000
 	$(BIN)/python -m tests.fuzz command_line --count 1000
+
+kills: $(VENV)/ready ## processes of studies and ensembles killed at random moments: is a record lost?
+	$(BIN)/python -m tests.kills
 
 mutants: $(VENV)/ready ## one-line defects planted one at a time: which do the tests see?
 	$(BIN)/python -m tests.mutants

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from crosscheck.engine import Owner, Setting, engine
+from crosscheck.judge.constraints import joint_coordinates
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import (
@@ -33,7 +36,7 @@ DRIVEN = {  # scene: measured errors (m, rad), and of rates and accelerations, p
     "four_bar": (1.8e-14, 1.9e-10), "four_bar_quarter": (ROUNDING, 4.2e-13), "five_bar": (2.2e-14, 3.5e-10),
     "spatial_slider_crank_driven": (3e-11, 2.1e-11),
 }  # fmt: skip
-UNEVEN, SAME = ROUNDING, ROUNDING  # m, rad; m
+UNEVEN, SAME, PHASED = ROUNDING, ROUNDING, ROUNDING  # m, rad; m; rad
 TURNED, ALIKE, REACTION = (
     5.2e-14,
     3.9e-14,
@@ -139,6 +142,21 @@ def test_ondsel_and_pinocchio_on_every_joint(swapped: bool) -> None:
     for joint, wrench in other.reactions.items():
         gap = abs(run.reactions[joint] - wrench).max() / abs(wrench).max()
         assert gap < MARGIN * REACTION, f"reaction in {joint}: relative difference {gap:.1e}"
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_a_driver_with_a_phase_and_the_angle_it_prescribes(swapped: bool) -> None:
+    """Samples apart by two lengths: the second analysis begins in the middle of the motion."""
+    sine = Sine(amplitude=0.3, frequency=5.0, phase=0.4)
+    start = -sine.amplitude * math.sin(sine.phase)
+    base = clockwork(swapped)
+    scene = base.with_(driver=(base.driver[0], Driver(joint="cyl", polynomial=(start, -1.0), sine=sine)))
+    run = simulate(scene, np.array([0.0, 0.1, 0.2, 0.25, 0.3]), 5e-3)
+    assert run.outcome is Outcome.COMPLETED, run.message
+    found = joint_coordinates(scene, run.times, run.position, run.orientation, run.angular_velocity)["cyl"]
+    prescribed = start - run.times + sine.amplitude * np.sin(5.0 * run.times + 0.4)
+    gap = abs(found[:, 0] - prescribed).max()
+    assert gap < MARGIN * PHASED, f"{gap:.1e} rad from what the driver prescribes"
 
 
 def test_accelerations_that_the_solver_gets_wrong_are_left_out() -> None:

@@ -11,7 +11,7 @@ from crosscheck.conformance.closed_forms import free_fall
 from crosscheck.engine import Setting, engine
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
-from mbref.scene import Driver, Scene
+from mbref.scene import Body, Driver, Revolute, Scene, TorsionSpring
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN
@@ -34,7 +34,7 @@ ALIKE = {  # measured differences from Pinocchio: m, m/s, rad/s, m/s², rad/s²
     "angular_acceleration": 2.5e-3,
 }  # fmt: skip
 REACTION = 3e-5  # of the largest
-FREE_FALL, TURN, BARE = 1.9e-7, 1.5e-3, 8.8e-9  # m, rad
+FREE_FALL, TURN, BARE, SPRUNG = 1.9e-7, 1.5e-3, 8.8e-9, 2.9e-7  # m, rad
 STOP, BEFORE = 2.6e-6, 2.9e-6  # s from the singular position; m, rad before it
 
 
@@ -89,6 +89,22 @@ def test_ida_and_pinocchio_move_alike(scene: Scene) -> None:
         for joint, wrench in other.reactions.items():
             gap = abs(run.reactions[joint] - wrench).max() / abs(wrench).max()
             assert gap < MARGIN * REACTION, f"reaction in {joint}: relative difference {gap:.2e}"
+
+
+def test_torsion_spring_beyond_a_turn_and_closed_form_agree() -> None:
+    """Released at 0 with a natural angle of 8 rad: swings about it, past 14 rad."""
+    inertia, stiffness, damping, natural = 0.5, 2.0, 0.05, 8.0
+    wheel = Body(name="wheel", mass=1.0, inertia=(0.3, 0.3, inertia), position=(0.0, 0.0, 0.0))
+    axle = Revolute(name="J", bodies=("ground", "wheel"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+    spring = TorsionSpring(joint="J", stiffness=stiffness, damping=damping, natural_angle=natural)
+    run = simulate(Scene(name="wheel", body=(wheel,), joint=(axle,), load=(spring,)), 2.0, 1e-8, 41)
+    decay, rate = damping / (2 * inertia), math.sqrt(stiffness / inertia)
+    damped = math.sqrt(rate**2 - decay**2)
+    t, swing = run.times, np.exp(-decay * run.times)
+    angle = natural * (1 - swing * (np.cos(damped * t) + decay / damped * np.sin(damped * t)))
+    turned = rotations.from_vector(angle[:, None] * np.array([0.0, 0.0, 1.0]))
+    gap = rotations.angle_between(run.orientation[:, 0], turned).max()
+    assert angle.max() > 14 and gap < MARGIN * SPRUNG, f"{gap:.1e} rad off, past {angle.max():.1f} rad"
 
 
 def test_the_end_of_a_run_and_the_singular_position() -> None:

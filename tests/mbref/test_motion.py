@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import csv
+import dataclasses
 import json
 import sys
 from pathlib import Path
@@ -14,6 +15,7 @@ import pytest
 from crosscheck.judge.energy import kinetic_energy, potential_energy
 from mbref import Limits, Motion, Scene, SceneError, Trajectory, find_scene, simulate
 from mbref.drawing.plot import grouped
+from mbref.scene import Body
 
 ROOT = Path(__file__).parents[2]
 TIMES = np.linspace(0.0, 0.1, 21)
@@ -43,6 +45,15 @@ def test_angle_of_a_driven_joint_is_counted_over_full_turns(driven):
     assert np.abs(joint.angle + 124.8 * driven.times).max() < 1e-9
     assert np.abs(joint.rate + 124.8).max() < 1e-8
     assert joint.displacement is None and driven.joint("B").angle is None
+
+
+def test_angle_of_a_joint_is_the_same_where_a_quaternion_has_the_other_sign(driven):
+    """p and -p are one orientation, also at the first sample."""
+    other = Motion.of(driven.mechanism, dataclasses.replace(driven, orientation=-driven.orientation))
+    crank_alone = driven.orientation * np.array([-1.0, 1.0, 1.0])[:, None]
+    one = Motion.of(driven.mechanism, dataclasses.replace(driven, orientation=crank_alone))
+    for motion in (other, one):
+        assert np.abs(motion.joint("A").angle - driven.joint("A").angle).max() < 1e-9
 
 
 def test_displacement_of_a_guide_is_the_slider_s(crank):
@@ -86,6 +97,18 @@ def test_energy_is_kept_by_gravity_alone():
     assert np.ptp(motion.energy) < 1e-8 < np.ptp(motion.kinetic_energy)
 
 
+def test_energy_of_a_tumbling_body_is_that_of_its_principal_axes():
+    """1/2 (A p² + B q² + C r²) with the rates about its own axes, which the spin leaves as it is."""
+    moments, spin, turn = np.array([1.0, 2.0, 2.5]), np.array([3.0, 0.4, -1.0]), (0.5, -0.5, 0.5, 0.5)
+    body = Body(name="top", mass=2.0, inertia=tuple(moments), position=(0.0, 0.0, 0.0), orientation=turn,
+                angular_velocity=spin)  # fmt: skip
+    motion = simulate(Scene(name="top", body=(body,)), times=TIMES * 20, limits=Limits(rtol=1e-11))
+    own = np.array([-spin[2], -spin[0], spin[1]])  # the quaternion turns x to -z, y to -x and z to y
+    assert motion.kinetic_energy[0] == pytest.approx(moments @ own**2 / 2, rel=1e-14)
+    assert np.ptp(motion.angular_velocity[:, 0], axis=0).max() > 1.0
+    assert np.ptp(motion.kinetic_energy) < 1e-9
+
+
 def test_energy_without_masses_names_the_body():
     scene = find_scene("four_bar")
     bare = scene.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in scene.body))
@@ -115,6 +138,11 @@ def test_csv_and_frame_have_the_columns(crank, tmp_path):
     frame = crank.to_dataframe()
     assert (frame.index == TIMES).all()
     assert (frame["A.force.y"] == crank.joint("A").force[:, 1]).all()
+    for k, part in enumerate("wxyz"):
+        assert (frame[f"rod.orientation.{part}"] == crank["rod"].orientation[:, k]).all()
+    for field in ("position", "velocity", "angular_velocity", "acceleration", "angular_acceleration"):
+        for k, axis in enumerate("xyz"):
+            assert (frame[f"rod.{field}.{axis}"] == getattr(crank["rod"], field)[:, k]).all(), field
 
 
 def test_without_pandas_the_frame_says_what_to_install(crank, monkeypatch):
@@ -132,6 +160,17 @@ def test_plot_has_a_panel_for_each_quantity(crank):
     assert (axes[1].lines[0].get_ydata() == crank.joint("A").angle).all()
     with pytest.raises(ValueError, match=r"no column 'slider\.colour'"):
         crank.plot("slider.colour")
+
+
+def test_panels_of_a_plot_have_the_units_of_their_quantities(crank):
+    quantities = ("position", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
+    names = [f"rod.{quantity}.x" for quantity in quantities]
+    names += ["rod.orientation.w", "A.angle", "A.rate", "D.displacement", "A.force.x", "A.moment.z", "energy"]
+    assert [axes.get_ylabel() for axes in crank.plot(*names).axes] == [
+        "position, m", "velocity, m/s", "angular velocity, rad/s", "acceleration, m/s²",
+        "angular acceleration, rad/s²", "orientation", "angle, rad", "rate, rad/s", "displacement, m",
+        "force, N", "moment, N m", "energy, J",
+    ]  # fmt: skip
 
 
 def test_without_names_joints_and_energy_are_plotted(crank):

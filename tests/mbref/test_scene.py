@@ -49,6 +49,7 @@ FAULTS = [
     (("driver", 0, "joint"), "S", "driver[S].joint"),
     (("driver", 0, "joint"), "X", "driver[X].joint"),
     (("driver", 0, "polynomial"), [0.5, 1.0], "driver[H].polynomial"),
+    (("driver", 0, "polynomial"), [1e-11, 1.0], "driver[H].polynomial"),
     (("load", 0, "body"), "ground", "load[0].body"),
     (("load", 0, "type"), "wind", "load[0].type"),
     (("gravity",), [0, 0, float("inf")], "gravity[2]"),
@@ -99,7 +100,7 @@ def test_fault_and_its_path(path, value, reported):
 
 
 def test_ten_faults_ten_messages():
-    ten = [FAULTS[k] for k in (0, 2, 8, 9, 11, 12, 17, 19, 20, 22)]
+    ten = [FAULTS[k] for k in (0, 2, 8, 9, 11, 12, 17, 19, 21, 23)]
     faults = faults_of(changed(*((path, value) for path, value, _ in ten if path != ("driver", 0, "joint"))))
     assert len(faults) == 9, "\n".join(faults)
     faults = faults_of(changed(*((path, value) for path, value, _ in ten)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from importlib.resources import files
 from pathlib import Path
 
@@ -88,6 +89,12 @@ def test_angles_beyond_a_turn_are_probably_degrees():
     assert probable_slips(scene.with_("load[0].natural_angle", -69.0)) == [
         "load[0].natural_angle: -69 rad is more than a turn; is it in degrees?"
     ]
+    driven = find_scene("four_bar")
+    for phase, told in ((180.0, 1), (-180.0, 1), (6.2, 0), (-6.2, 0)):
+        sine = {"amplitude": 1.0, "frequency": 2.0, "phase": phase}
+        start = -math.sin(phase)
+        slips = probable_slips(driven.with_(driver=({"joint": "A", "polynomial": [start], "sine": sine},)))
+        assert len(slips) == told and all(s.startswith("driver[A].sine.phase: ") for s in slips), slips
 
 
 def test_lengths_of_links():

@@ -1,0 +1,28 @@
+"""Studies and ensembles whose processes are killed: no record is lost, none is written twice."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests import kills
+
+WHOLE = (200, 20)  # runs, kills
+FEW = {"parents": (60, 4), "children": (12, 2), "workers": (12, 2)}
+MOST_REPEATED = (
+    3  # runs under way when a parent is killed: two threads, and one whose record is being written
+)
+
+
+@pytest.mark.parametrize(
+    ("kind", "runs", "times"),
+    [*((k, *few) for k, few in FEW.items()), *(pytest.param(k, *WHOLE, marks=pytest.mark.slow) for k in FEW)],
+)
+def test_kills_lose_nothing(
+    kind: str, runs: int, times: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.syspath_prepend(str(kills.FAKES))
+    found = kills.KINDS[kind](runs, times, tmp_path)
+    assert found.is_sound and found.kills == times, f"{kind}: {found}"
+    assert found.made <= runs + MOST_REPEATED * times, f"{kind}: {found}: finished runs were repeated"
