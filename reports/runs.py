@@ -197,6 +197,14 @@ def power(value: float) -> str:
     return "–" if not math.isfinite(value) else "0" if value == 0 else f"{value:.1e}"
 
 
+ROUNDING = 1e-11  # below which a difference from the judge's own solution is rounding
+
+
+def beyond_rounding(value: float) -> str:
+    """A difference for a table cell that is the same on every machine: rounding is not printed."""
+    return f"< {ROUNDING:g}" if 0 < value < ROUNDING else power(value)
+
+
 def duration(seconds: float) -> str:
     """Seconds with the unit that suits them."""
     if not math.isfinite(seconds):

@@ -7,7 +7,7 @@ import numpy as np
 from crosscheck.judge.gauss_principle import gauss, singular_values, stacked
 from crosscheck.judge.tolerances import RANK
 from reports.blocks import Block, Heading, Table
-from reports.runs import SceneRuns, power
+from reports.runs import SceneRuns, beyond_rounding
 
 HEADER = ("Engine", "Family", "Difference")
 
@@ -24,7 +24,7 @@ def render(scene_runs: SceneRuns) -> list[Block]:
         motion = run.trajectory
         if motion.acceleration is not None and len(motion.times) and motion.times[0] == 0:
             off = np.linalg.norm(stacked(scene_runs.scene, motion, 0) - exact, axis=-1).max() / scale
-            rows.append((*curve, power(float(off))))
+            rows.append((*curve, beyond_rounding(float(off))))
     caption = (
         "Largest difference of an initial acceleration (angular ones times the scene's length) from that of "
         "Gauss's principle with the judge's own joint equations, relative to the largest. "

@@ -9,7 +9,7 @@ from crosscheck.judge.reaction_balance import absurd, with_exact_reactions
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 from reports.blocks import Block, Heading, Table, Text
-from reports.runs import Run, SceneRuns, number, power
+from reports.runs import ROUNDING, Run, SceneRuns, beyond_rounding, number
 
 CAPTION = (
     "Largest difference from the reactions of the exact motion, relative to the largest of them, over "
@@ -56,8 +56,11 @@ def _rows(scene: Scene, found: Mapping[str, Comparison]) -> list[tuple[str, ...]
     rows = []
     for joint in scene.joint:
         reactions = [comparison.joints[joint.name] for comparison in found.values()]
-        rows.append((joint.name, str(reactions[0].shared), *(power(r.unique) for r in reactions)))
-    return [*rows, ("on a body", "0", *(power(comparison.resultant) for comparison in found.values()))]
+        rows.append((joint.name, str(reactions[0].shared), *(beyond_rounding(r.unique) for r in reactions)))
+    return [
+        *rows,
+        ("on a body", "0", *(beyond_rounding(comparison.resultant) for comparison in found.values())),
+    ]
 
 
 def _choices(scene: Scene, runs: Mapping[str, Trajectory]) -> list[Block]:
@@ -66,7 +69,11 @@ def _choices(scene: Scene, runs: Mapping[str, Trajectory]) -> list[Block]:
     if not shares:
         return []
     time = next(iter(runs.values())).times[samples // 2]
-    rows = [(joint, *(number(size, 4) for size in sizes.values())) for joint, sizes in shares.items()]
+    least = ROUNDING * max(max(sizes.values()) for sizes in shares.values())
+    rows = [
+        (joint, *("0" if size < least else number(size, 4) for size in sizes.values()))
+        for joint, sizes in shares.items()
+    ]
     return [Table(SHARES.format(t=time), ("Joint", *runs), rows, right=_after(0))]
 
 
