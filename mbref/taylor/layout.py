@@ -156,7 +156,6 @@ class Progress(NamedTuple):
     approaching: int = 1  # whether it is less than where the step before began
     largest_pivot: float = 0.1  # that the least one has been, of rows of length one about
     passing: int = 0  # whether singular positions are passed, or run up to
-    nearest: float = 1.0  # least pivot over the largest, of steps that do not cross
 
 
 class TaylorMemory(NamedTuple):

@@ -191,5 +191,4 @@ def judge_branch(h, last, memory):
         return STEP_TOO_SMALL
     if progress.crossed or last or pivot >= progress.past_pivot:
         return OK
-    progress.nearest = min(progress.nearest, pivot / progress.largest_pivot)
-    return OK if progress.nearest >= LEAST else UNDECIDED
+    return OK if pivot >= LEAST * progress.largest_pivot else UNDECIDED

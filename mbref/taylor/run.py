@@ -99,6 +99,7 @@ class Passage:
             limits = replace(run.limits, rtol=TOLERANCE, atol=TOLERANCE, code=GENERIC)
             self._made = SeriesRun(run.scene, Method.parse(SERIES), run.times, limits)
             self._made.taylor.progress.passing = True
+            self._made.memory.control.steps_per_call = 1
             self._made.memory.equations.system.settings.independent = True  # states are exact
             run.making += time.process_time() - began
         return self._made
@@ -110,7 +111,8 @@ class Passage:
         change = max(self._run.memory.control.rtol, LEAST_CHANGE)
         landing = series.landing
         enter(before._replace(velocities=before.velocities * (1.0 + change)), series)
-        if series.follow(behind.time) != DONE or moment_of(series).crossings != behind.crossings:
+        counts = series.memory.equations.system.counts
+        if series.follow(behind.time) != DONE or counts.crossings != behind.crossings:
             return False
         near, speed = min(MAGNIFIED * change, APART), np.abs(landing[1]).max(initial=0.0)
         places, rates = np.abs(series.landing - landing).max(axis=1, initial=0.0)

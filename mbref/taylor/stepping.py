@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from numpy import exp, isfinite, log
 
-from mbref.kernels.compilation import INT, entry, inlined, kernel
+from mbref.kernels.compilation import FLOAT, INT, entry, inlined, kernel
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, OK
 from mbref.kernels.named_memory import Named
 from mbref.linear_algebra.vectors import larger
@@ -270,26 +270,17 @@ def advance_series(memory):
     return PAUSED
 
 
-@entry(INT(Named(TaylorMemory)))
-def pass_singular_position(memory):
-    """Advance until a singular position is behind: PAUSED there, DONE at the end, or why that cannot be."""
+@entry(FLOAT(Named(TaylorMemory)))
+def clearance(memory):
+    """Distance from a singular position, over that from which steps of the run go on: the lesser of two.
+
+    One is by the pivots that steps of the run watch, one by those of series of a loose tolerance.
+    """
     run, progress = memory.run, memory.progress
-    clock, counts, before = run.loop.clock, run.equations.system.counts, 1.0
-    while True:
-        if counts.steps >= run.control.most_steps:
-            return TOO_MANY_STEPS
-        status = step(memory)
-        if status != OK:
-            return status
-        if clock.time >= progress.end:
-            return DONE
-        put_terms(memory.series.terms, memory)
-        project_state(clock.time, run)
-        pivot, clear = relative_pivot(run.watch), CLEAR * AHEAD * progress.largest_pivot
-        leaves = pivot >= max(before, LEAVE * WINDOW) and least_pivot(memory) > clear
-        if leaves and clock.time >= clock.passage:
-            return PAUSED
-        before = pivot
+    put_terms(memory.series.terms, memory)
+    project_state(run.loop.clock.time, run)
+    ahead = CLEAR * AHEAD * progress.largest_pivot
+    return min(relative_pivot(run.watch) / (LEAVE * WINDOW), least_pivot(memory) / ahead)
 
 
 @kernel
