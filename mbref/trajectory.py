@@ -20,6 +20,7 @@ class Outcome(enum.Enum):
     STEP_FAILED = ("STEP_FAILED", "d", "the integrator could not take a step")
     NOT_FINITE = ("NOT_FINITE", "", "the state is not finite")
     UNDECIDED = ("UNDECIDED", "", "the branch of the motion cannot be told at a singular position")
+    LEFT_MOTION = ("LEFT_MOTION", "", "the run went on along another motion than the one of its start")
     TIMED_OUT = ("TIMED_OUT", "", "the time limit was reached")
     CRASHED = ("CRASHED", "", "the process ended without a result")
 

@@ -46,6 +46,7 @@ class Limits:
     largest_step: float = 0.0  # s; 0 means the duration
     largest_turn: float = 0.0  # rad that the fastest body may turn in an adaptive step; 0: a safe angle
     most_steps: int = 5_000_000
+    compared: bool = True  # whether a run without projection is compared with Taylor series at its end
     code: str = AUTO  # GENERIC kernels, SPECIALISED to the scene, or AUTO: where many steps are ahead
 
     def __post_init__(self) -> None:
@@ -57,6 +58,10 @@ def _checked(name: str, value: Any) -> Any:
     if name == "code":
         if value not in CODES:
             raise ValueError(f"code: must be one of {', '.join(CODES)}, got {shown(value)}")
+        return value
+    if name == "compared":
+        if not isinstance(value, bool):
+            raise ValueError(f"compared: must be True or False, got {shown(value)}")
         return value
     if name in COUNTS:
         return _count(name, value, *COUNTS[name])

@@ -9,7 +9,7 @@ from mbref.equations.joint_reactions import reactions
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR
 from mbref.motion import Motion
 from mbref.simulation.run import Run
-from mbref.simulation.stepping import DONE, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED, VIOLATED
+from mbref.simulation.stepping import DONE, LEFT_MOTION, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED, VIOLATED
 from mbref.trajectory import Cost, Outcome
 
 OUTCOMES = {
@@ -21,6 +21,7 @@ OUTCOMES = {
     STEP_TOO_SMALL: Outcome.STEP_FAILED,
     TOO_MANY_STEPS: Outcome.STEP_FAILED,
     UNDECIDED: Outcome.UNDECIDED,
+    LEFT_MOTION: Outcome.LEFT_MOTION,
 }
 
 
@@ -76,4 +77,6 @@ def _message(run: Run, status: int) -> str:
     if status == STEP_TOO_SMALL:
         h = memory.control.smallest_step
         return f"the error estimate asks for a step below {h:.3g} s at t = {t:.6g} s"
+    if status == LEFT_MOTION:
+        return f"{OUTCOMES[status].sentence}, as Taylor series show, by t = {memory.loop.clock.passage:.6g} s"
     return f"{OUTCOMES[status].sentence} at t = {t:.6g} s ({run.method.formulation.name})"

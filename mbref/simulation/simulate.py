@@ -17,6 +17,7 @@ from mbref.simulation.limits import SPECIALISED, Limits
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.run import Run
 from mbref.specialised import Untraceable
+from mbref.taylor.check import CheckedRun
 from mbref.taylor.run import CrossingRun, TaylorRun
 from mbref.taylor.series_run import NO_CODE, prepare_series
 
@@ -48,12 +49,19 @@ def simulate(
     limits = limits or Limits()
     began = time.process_time()
     try:
-        run = (CrossingRun if method.integrator.step else TaylorRun)(scene, method, times, limits)
+        run = kind_of(method)(scene, method, times, limits)
     except Untraceable as reason:
         raise MethodError(f"no machine code for {scene.name!r} by {method}: {reason}") from None
     built = time.process_time() - began - run.making
     status, seconds = run.advance(progress)
     return trajectory_of(run, status, seconds, built + run.making)
+
+
+def kind_of(method: Method) -> type[Run]:
+    """How a run of the method treats singular positions."""
+    if not method.integrator.step:
+        return TaylorRun
+    return CrossingRun if method.stabilisation.projects else CheckedRun
 
 
 def prepare(method: Method) -> None:

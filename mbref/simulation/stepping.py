@@ -18,7 +18,7 @@ from mbref.simulation.singular_crossing import (
 )
 
 # how a call ends; evaluation statuses (SINGULAR, …) end it too
-DONE, VIOLATED, STEP_TOO_SMALL, TOO_MANY_STEPS, PAUSED, SINGULAR_AHEAD, UNDECIDED = range(10, 17)
+DONE, VIOLATED, STEP_TOO_SMALL, TOO_MANY_STEPS, PAUSED, SINGULAR_AHEAD, UNDECIDED, LEFT_MOTION = range(10, 18)
 
 
 @kernel

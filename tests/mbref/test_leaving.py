@@ -1,0 +1,52 @@
+"""Runs without projection complete on the motion of their start, or say that they left it."""
+
+import numpy as np
+import pytest
+
+from crosscheck.judge.metrics import error_series, measure
+from crosscheck.judge.truth import closed_form
+from mbref.scenes.five_bar import five_bar_gravity
+from mbref.scenes.four_bar import four_bar_gravity
+from mbref.scenes.planar_slider_crank import slider_crank
+from mbref.simulation.simulate import Limits, simulate
+
+SCENES = {
+    "four_bar": (four_bar_gravity(0.3, "four_bar"), 1.5),
+    "five_bar": (five_bar_gravity(0.3, "five_bar"), 1.5),
+    "turning": (four_bar_gravity(-1e-5, "turning"), 1.5),
+    "gap": (slider_crank(0.308, 0.308 + 1e-6, 0.3, "gap", rate=30.0), 0.25),
+    "equal": (slider_crank(0.308, 0.308, 0.3, "equal", rate=30.0), 0.25),
+}
+METHODS = [
+    f"{formulation}+{stabilisation}"
+    for formulation in ("alf-dual", "mpi-svd", "mpi-gs", "mpi-qr")
+    for stabilisation in ("none", "baumgarte", "partitioning")
+]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", SCENES)
+def test_no_method_completes_on_another_motion(name, method):
+    scene, end = SCENES[name]
+    for rtol in (1e-5, 1e-9):
+        run = simulate(scene, method, np.linspace(0.0, end, 9), Limits(rtol=rtol, most_steps=5_000))
+        error = measure(scene, run, closed_form(scene))["error"]
+        assert run.outcome.label != "COMPLETED" or error <= 2 * max(1e3 * rtol, 1e-6), (
+            f"{rtol:g}: {error:.1e}"
+        )
+
+
+def test_a_run_that_left_its_motion_says_when():
+    scene, end = SCENES["four_bar"]
+    times = np.linspace(0.0, end, 31)
+    run = simulate(scene, "mpi-gs+none", times, Limits(rtol=1e-6))
+    off = error_series(scene, run, closed_form(scene).poses(times)) > 1e-3
+    assert run.outcome.label == "LEFT_MOTION" and run.t_end == end and len(run.times) == len(times)
+    assert run.message.endswith(f"by t = {times[np.argmax(off)]:.6g} s")
+
+
+def test_coarse_steps_of_fixed_length_are_no_other_motion():
+    scene = slider_crank(0.1, 0.3, 0.3, "crank", rate=3.0)
+    run = simulate(scene, "mpi-svd+none/rk4[step=2e-2]", [0.5, 1.0])
+    assert run.outcome.label == "COMPLETED"
+    assert 1e-6 < measure(scene, run, closed_form(scene))["error"] < 0.1
