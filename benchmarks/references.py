@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.conformance.closed_forms import CLOSED_FORMS
+from crosscheck.conformance.hard_mechanisms import HARD
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from crosscheck.judge.metrics import error_series
 from crosscheck.judge.reference import cache
@@ -55,8 +56,11 @@ def main() -> None:
     )
     parser.add_argument("--records", metavar="FILE", help="keep the lines and go on from them")
     parser.add_argument("--only-random", action="store_true", help="leave the built-in scenes out")
+    parser.add_argument("--hard", action="store_true", help="hard mechanisms instead of the built-in scenes")
     asked = parser.parse_args()
     built_in = [*(make() for make in SCENES.values()), *(make()[0] for make in CLOSED_FORMS)]
+    if asked.hard:
+        built_in = [make() for make in HARD.values()]
     print(f"| {' | '.join(COLUMNS)} |\n| --- {'| --: ' * (len(COLUMNS) - 2)}| --- |")
     for scene in () if asked.only_random else built_in:
         line(scene, scene.duration, asked.seconds, asked.tight, asked.records)

@@ -17,6 +17,7 @@ import numpy as np
 
 from crosscheck.judge import constraints
 from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
+from crosscheck.judge.reference.start_velocities import given
 from mbref.scene import Body, Driver, Scene
 
 PERPENDICULAR = {
@@ -91,17 +92,35 @@ class NaturalCoordinates:
         return [self.scene.body_index(name) for name in names]
 
     def start(self) -> tuple[np.ndarray, np.ndarray]:
-        """X, X' (3, n) at t = 0, the velocities in double precision and not yet corrected."""
-        x, v = self.arithmetic.zeros(3, 4 * self.nb + 4), self.arithmetic.zeros(3, 4 * self.nb + 4)
+        """X, X' (3, n) at t = 0, the velocities still zero; raises SceneError where the scene's contradict
+        its joints."""
+        constraints.initial_twists(self.scene)
+        x, v = self.arithmetic.zeros(2, 3, 4 * self.nb + 4)
         x[:, -3:] = self.arithmetic.array(EYE)
-        for b, (body, velocity, spin) in enumerate(
-            zip(self.scene.body, *constraints.initial_twists(self.scene), strict=True)
-        ):
-            place, axes = slice(4 * b, 4 * b + 1), slice(4 * b + 1, 4 * b + 4)
-            x[:, place], x[:, axes] = self.lengths(body.position)[:, None], self.axes[b]
-            v[:, place] = self.lengths(velocity)[:, None]
-            v[:, axes] = skew(self.arithmetic.array(spin)) @ self.axes[b]
+        for b, body in enumerate(self.scene.body):
+            x[:, 4 * b] = self.lengths(body.position)
+            x[:, 4 * b + 1 : 4 * b + 4] = self.axes[b]
         return x, v
+
+    def given_velocities(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Forms (g, 3 (n - 4)) of the given velocities at coordinates x, and their values (g,), weighted."""
+        asked = given(self.scene)
+        angular = asked.components % 6 > 2
+        values = self.lengths(asked.values) * self.arithmetic.array(asked.weights)
+        weights = self.lengths(np.where(angular, asked.weights, self.length))
+        return weights[:, None] * self._twists(x)[asked.components], values
+
+    def _twists(self, x: np.ndarray) -> np.ndarray:
+        """Forms (6 nb, 3 (n - 4)) of the bodies' velocities and angular velocities in X' of rigid bodies."""
+        forms = self.arithmetic.zeros(self.nb, 6, 3, 4 * self.nb)
+        for b, i in itertools.product(range(self.nb), range(3)):
+            axes = slice(4 * b + 1, 4 * b + 4)
+            forms[b, i, i, 4 * b] = self.arithmetic.number(1.0)
+            forms[b, 3 + i, i - 1, axes], forms[b, 3 + i, i - 2, axes] = (
+                x[i - 2, axes] / 2,
+                -x[i - 1, axes] / 2,
+            )
+        return forms.reshape(6 * self.nb, -1)
 
     def bodies(self, x: np.ndarray, v: np.ndarray, a: np.ndarray) -> Sampled:
         """Positions, orientations, velocities, angular velocities and both accelerations, as in Motion, of

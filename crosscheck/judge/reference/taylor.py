@@ -21,6 +21,7 @@ from crosscheck.judge.reference.motion import Motion, Times
 from crosscheck.judge.reference.natural import NaturalCoordinates
 from crosscheck.judge.reference.natural_loads import Loads
 from crosscheck.judge.reference.saddle_point import SaddlePoint
+from crosscheck.judge.reference.start_velocities import start_velocities
 from mbref.scene import Scene
 
 ORDER = 28
@@ -107,7 +108,7 @@ class Stepper:
     def samples(self, times: Times, deadline: float) -> Iterator[Sample]:
         """X, X', X'' (3, n) at ascending times; raises Ended where the motion cannot be followed."""
         self._refuse_undetermined()
-        self._project()
+        self._start()
         pending = list(times)
         while pending:
             if time.thread_time() > deadline:
@@ -120,6 +121,17 @@ class Stepper:
                 d = self.of.arithmetic.number(pending.pop(0)) - self.t
                 yield tuple(self.of.arithmetic.settled(value(series, d, n)) for n in range(3))
             self._advance(expansion, series, h)
+
+    def _start(self) -> None:
+        """Put the coordinates onto the rows, and take the velocities that the rule asks for."""
+        self._project()
+        still = self._held.gradient(self._x, self._held.drives(self.t, 1))[:, :, :-4]
+        rows, v = still.reshape(len(still), self._x[:, :-4].size), self._v[:, :-4].ravel()
+        rates = rows @ v - self._gaps(self._held)[1]
+        mass = np.kron(np.eye(3, dtype=int), self.of.mass)
+        v = start_velocities(self.of.arithmetic, rows, rates, *self.of.given_velocities(self._x), mass)
+        self._v[:, :-4] = v.reshape(3, -1)
+        self._project()
 
     def _expansion(self, order: int) -> Expansion:
         state = self._x, self._v

@@ -14,6 +14,7 @@ from scipy.linalg import qr
 
 from crosscheck.judge import constraints
 from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
+from crosscheck.judge.reference.start_velocities import given, start_velocities
 from crosscheck.judge.reference.tree_closures import Closures, Rows, Twists
 from crosscheck.judge.reference.tree_joints import Placed, Tree
 from crosscheck.judge.reference.tree_loads import Loads
@@ -86,14 +87,26 @@ class TreeEquations:
         return Instant(placed, coordinates, closing.joined(driven), np.concatenate(speed, axis=1), rate)
 
     def start(self) -> np.ndarray:
-        """The state (n,) at t = 0 with the velocities of `initial_twists`, made exact."""
-        y = self.arithmetic.zeros(1, int(self.ends[-1]))
-        y[0, self.tree.scalars : self.light : 4] = self.arithmetic.number(1.0)
-        at = self.at(self.arithmetic.zeros(1), y)
-        self._choose(at)
-        twists = self.arithmetic.array(np.concatenate(constraints.initial_twists(self.scene), axis=-1))
-        y[:, self.ends[2] :] = self._solve(at, self.loads.momentum(at.placed, twists[None]), -1 * at.speed)[0]
-        return self.closed(self.arithmetic.number(0.0), y[0])
+        """The state (n,) at t = 0 with the velocities of the documented rule; raises SceneError where the
+        scene's contradict its joints."""
+        constraints.initial_twists(self.scene)
+        y = self.arithmetic.zeros(int(self.ends[-1]))
+        y[self.tree.scalars : self.light : 4] = self.arithmetic.number(1.0)
+        now = self.arithmetic.number(0.0)
+        y = self.closed(now, y)
+        at = self.at(self.arithmetic.zeros(1), y[None])
+        rows = at.rows.jacobian[0, self.kept]
+        rates, mass = rows @ at.rate[0] - at.speed[0, self.kept], self.loads.mass_matrix(at.placed)[0]
+        y[self.ends[2] :] = start_velocities(self.arithmetic, rows, rates, *self._given(at.placed), mass)
+        return self.closed(now, y)
+
+    def _given(self, placed: Placed) -> tuple[np.ndarray, np.ndarray]:
+        """Twists (g, nv) per joint rate in the components that the scene gives, and their values (g,), all
+        weighted."""
+        asked, (columns,) = given(self.scene), placed.columns
+        weights = self.arithmetic.array(asked.weights)
+        twists = np.swapaxes(columns[:-1], 1, 2).reshape(6 * (len(columns) - 1), self.nv)
+        return weights[:, None] * twists[asked.components], weights * self.arithmetic.array(asked.values)
 
     def closed(self, t: Any, y: np.ndarray) -> np.ndarray:
         """The state (n,) nearest in the mass metric to one at time t whose loops are closed."""

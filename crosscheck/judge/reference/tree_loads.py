@@ -58,12 +58,6 @@ class Loads:
             total = total - apply(np.swapaxes(jacobian, 1, 2), resisting)
         return self._mass_matrix(placed, inertia), total
 
-    def momentum(self, placed: Placed, twist: np.ndarray) -> np.ndarray:
-        """(K, nv) columnᵀ · inertia · twist, of twists (K, nb, 6)."""
-        turning = apply(self._world_inertia(placed), twist[..., 3:])
-        momentum = np.concatenate([self.mass * twist[..., :3], turning], axis=-1)
-        return self._project(placed, self._with_ground(momentum))
-
     @staticmethod
     def _with_ground(wrench: np.ndarray) -> np.ndarray:
         """A row for the ground, on which wrenches do nothing."""

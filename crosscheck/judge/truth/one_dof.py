@@ -15,6 +15,7 @@ import numpy as np
 from crosscheck.judge import constraints
 from crosscheck.judge.joint_residuals import driver_value
 from crosscheck.judge.loads import Motion, world_inertia, wrenches
+from crosscheck.judge.reference.start_velocities import given
 from crosscheck.judge.tolerances import FREEDOM, ON_PATH, PARALLEL, TRUTH_DRIVEN, TRUTH_DYNAMIC
 from crosscheck.judge.truth.picard import REAL, Solution
 from mbref import rotations
@@ -156,12 +157,15 @@ def one_dof(scene: Scene, path: Path | None) -> OneDof | None:
 def initial_rate(scene: Scene, path: Path) -> float | None:
     """q' at t = 0 from the scene's velocities; None when those are not along the path."""
     velocity, spin = constraints.initial_twists(scene)
-    pose = path.poses(np.zeros(1))
+    pose = path.poses(np.zeros(1, dtype=REAL))
     length = constraints.scene_length(scene)
-    along = np.concatenate([pose.dposition[0], length * pose.spin[0]]).astype(float)
+    along = np.concatenate([pose.dposition[0], length * pose.spin[0]])
     wanted = np.concatenate([velocity, length * spin])
-    rate = float(np.sum(along * wanted) / np.sum(along**2))
-    off = np.abs(wanted - rate * along).max()
+    asked = given(scene)
+    nearest = np.hstack(np.split(along, 2)).ravel()[asked.components]
+    square = np.sum(nearest**2)
+    rate = float(np.sum(nearest * asked.values * asked.weights) / square) if square else 0.0
+    off = np.abs(wanted - rate * along.astype(float)).max()
     return rate if off <= ON_PATH * np.abs(wanted).max() else None
 
 

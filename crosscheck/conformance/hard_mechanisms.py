@@ -1,0 +1,225 @@
+"""Mechanisms that are hard for a reference: stiff, nearly singular, rounded, fast, ill-scaled.
+
+Most have no closed form.  Each starts from rest, or the velocity of one body determines the others'.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from crosscheck.conformance.relations import ASKEW, Isometry
+from mbref.scene import (
+    Body,
+    Distance,
+    Driver,
+    Force,
+    Planar,
+    Revolute,
+    Scene,
+    Sine,
+    Spherical,
+    Spring,
+    TorsionSpring,
+    Translational,
+    Universal,
+)
+
+GRAVITY, Z = (0.0, -9.81, 0.0), (0.0, 0.0, 1.0)
+TURNED = Isometry(ASKEW, np.array([0.3, -0.7, 0.45]))
+Point = Sequence[float]
+
+
+def bar(name: str, start: Point, stop: Point, mass: float = 1.0) -> Body:
+    """A bar between two points of the xy-plane, its x axis along it."""
+    way = np.subtract(stop, start)
+    half, length = math.atan2(way[1], way[0]) / 2, float(np.linalg.norm(way))
+    long = mass * length**2 / 12
+    return Body(
+        name=name, mass=mass, inertia=(0.1 * long, long, 1.1 * long), orientation=_q(half),
+        position=tuple((np.add(start, stop) / 2).tolist()),
+    )  # fmt: skip
+
+
+def _q(half: float) -> tuple[float, float, float, float]:
+    return math.cos(half), 0.0, 0.0, math.sin(half)
+
+
+def hinge(name: str, first: str, second: str, place: Point) -> Revolute:
+    """About z."""
+    x, y, z = place
+    return Revolute(name=name, bodies=(first, second), anchor=(x, y, z), axis=Z)
+
+
+def linkage(name: str, places: Sequence[Point], masses: Sequence[float] = (1.0, 1.0, 1.0)) -> Scene:
+    """Bars between successive points, hinged to each other and at both ends to the ground."""
+    names = ["ground", *(f"bar{k}" for k in range(len(places) - 1)), "ground"]
+    bars = [bar(n, p, q, m) for n, p, q, m in zip(names[1:-1], places[:-1], places[1:], masses, strict=True)]
+    pins = [
+        hinge(f"P{k}", a, b, p) for k, (a, b, p) in enumerate(zip(names[:-1], names[1:], places, strict=True))
+    ]
+    return Scene(name=name, gravity=GRAVITY, duration=0.5, body=tuple(bars), joint=tuple(pins))
+
+
+FOUR = ((0.0, 0.0, 0.0), (0.1, 0.3, 0.0), (0.6, 0.5, 0.0), (0.7, -0.1, 0.0))
+
+
+def stiff_spring() -> Scene:
+    """A four-bar with a spring of 1e6 N/m across, which vibrates at 3000 rad/s."""
+    spring = Spring(bodies=("bar0", "bar2"), points=((0.05, 0.15, 0), (0.65, 0.2, 0)), stiffness=1e6,
+                    damping=20.0, natural_length=0.6)  # fmt: skip
+    return linkage("stiff_spring", FOUR).with_(load=(spring,), duration=0.1)
+
+
+def strong_damping() -> Scene:
+    """A four-bar whose hinge is damped a thousand times more than it has inertia."""
+    spring = TorsionSpring(joint="P1", stiffness=10.0, damping=100.0, natural_angle=0.5)
+    return linkage("strong_damping", FOUR).with_(load=(spring,), duration=0.3)
+
+
+def near_singular() -> Scene:
+    """An almost-parallelogram that passes its straight position at a thousandth of its size."""
+    places = ((0.0, 0.0, 0.0), (0.3, 0.4, 0.0), (1.3, 0.4, 0.0), (1.0004, 0.0, 0.0))
+    return linkage("near_singular", places).with_(duration=1.0)
+
+
+def start_near_singular() -> Scene:
+    """Coupler and rocker start a thousandth of a radian from their dead centre, at a given rate of the crank:
+    the least difference of that rate is magnified."""
+    crank, coupler, rocker, ground = 0.3, 0.8, 0.6, 1.5
+    reach = coupler + rocker - 1e-7
+    x = (crank**2 + ground**2 - reach**2) / (2 * ground)
+    pin = np.array([x, math.sqrt(crank**2 - x**2), 0.0])
+    way = (np.array([ground, 0.0, 0.0]) - pin) / reach
+    along = (coupler**2 + reach**2 - rocker**2) / (2 * reach)
+    aside = math.sqrt(coupler**2 - along**2) * np.array([-way[1], way[0], 0.0])
+    places = ((0.0, 0.0, 0.0), pin.tolist(), (pin + along * way + aside).tolist(), (ground, 0.0, 0.0))
+    return turning(linkage("start_near_singular", places), 1e-3).with_(duration=0.3)
+
+
+def turning(scene: Scene, rate: float) -> Scene:
+    """The linkage with the first bar at a rate (rad/s)."""
+    first = scene.body[0].model_copy(update={"angular_velocity": (0.0, 0.0, rate)})
+    return scene.with_(body=(first, *scene.body[1:]))
+
+
+def two_crossings() -> Scene:
+    """A parallelogram of 5 : 3 : 4 that falls through both of its straight positions."""
+    base = linkage("two_crossings", ((0, 0, 0), (0.375, 0.5, 0), (1.375, 0.5, 0), (1, 0, 0)))
+    return turning(base, -6.0).with_(duration=0.8)
+
+
+def rounded_redundancy() -> Scene:
+    """A six-bar of eight parallel hinges, six rows redundant, turned so that anchors and axes are rounded."""
+    base = linkage("rounded_redundancy", FOUR)
+    mid, far, low = (0.35, 0.4, 0.0), (0.45, 1.0, 0.0), (1.0, 0.7, 0.0)
+    bars = (*base.body, bar("bar3", mid, far), bar("bar4", far, low))
+    pins = (*base.joint, hinge("P4", "bar1", "bar3", mid), hinge("P5", "bar3", "bar4", far),
+            hinge("P6", "bar4", "ground", low))  # fmt: skip
+    return TURNED.change(base.with_(body=bars, joint=pins, duration=0.3))
+
+
+def fast_driver() -> Scene:
+    """A crank and a slider; the crank's rate shakes at 400 rad/s, from a phase of 1.3 rad."""
+    b, c = (0.1, 0.1, 0.0), (0.5, 0.0, 0.0)
+    slider = Body(name="slider", mass=0.5, inertia=(1e-3, 1e-3, 1e-3), position=c)
+    joints = (
+        hinge("A", "ground", "crank", (0, 0, 0)), hinge("B", "crank", "rod", b),
+        Spherical(name="C", bodies=("rod", "slider"), anchor=c),
+        Translational(name="D", bodies=("slider", "ground"), anchor=c, axis=(1.0, 0.0, 0.0)),
+    )  # fmt: skip
+    wave = Sine(amplitude=0.05, frequency=400.0, phase=1.3)
+    driver = Driver(joint="A", polynomial=(-0.05 * math.sin(1.3), 20.0, 3.0), sine=wave)
+    bodies = (bar("crank", (0, 0, 0), b), bar("rod", b, c), slider)
+    return Scene(name="fast_driver", gravity=GRAVITY, duration=0.3, body=bodies, joint=joints,
+                 driver=(driver,))  # fmt: skip
+
+
+def point_masses() -> Scene:
+    """Four masses of 1e-8 kg m² at the ends of five bars of fixed length, pulled together by a spring."""
+    places = [(0.5, 0.0, 0.0), (0.5, 0.0, 0.6), (1.0, 0.3, 0.2), (0.2, 0.7, 0.4)]
+    names = ["p0", "p1", "p2", "p3"]
+    bodies = [
+        Body(name=n, mass=1.0 + k, inertia=(1e-8, 1e-8, 1e-8), position=p)
+        for k, (n, p) in enumerate(zip(names, places, strict=True))
+    ]
+    pairs = ((None, 0), (0, 1), (1, 2), (0, 2), (2, 3))
+    rods = [
+        Distance(name=f"L{k}", bodies=("ground" if i is None else names[i], names[j]),
+                 anchors=((0.0, 0.1, 0.0) if i is None else places[i], places[j]))
+        for k, (i, j) in enumerate(pairs)
+    ]  # fmt: skip
+    pull = Spring(bodies=("p0", "p3"), points=(places[0], places[3]), stiffness=50.0, damping=1.0,
+                  natural_length=0.4)  # fmt: skip
+    return Scene(name="point_masses", gravity=GRAVITY, duration=1.0, body=tuple(bodies), joint=tuple(rods),
+                 load=(pull,))  # fmt: skip
+
+
+def free_bodies() -> Scene:
+    """Two free bodies, one tumbling about its middle axis, on a damped spring whose line passes both."""
+    racket = Body(name="racket", mass=1.0, inertia=(0.01, 0.02, 0.03), position=(0.0, 0.0, 0.0),
+                  angular_velocity=(1e-3, 12.0, 0.0))  # fmt: skip
+    stone = Body(
+        name="stone",
+        mass=3.0,
+        inertia=((0.05, 0.01, 0), (0.01, 0.04, 0), (0, 0, 0.06)),
+        position=(0.6, 0.2, 0.1),
+        velocity=(0.0, -0.3, 0.1),
+        angular_velocity=(0.0, 2.0, -4.0),
+    )
+    spring = Spring(bodies=("racket", "stone"), points=((0.1, 0.05, 0.0), (0.5, 0.2, 0.0)), stiffness=300.0,
+                    damping=2.0, natural_length=0.3)  # fmt: skip
+    push = Force(body="stone", point=(0.6, 0.3, 0.1), force=(0.5, 1.0, -1.0))
+    return Scene(name="free_bodies", duration=2.0, body=(racket, stone), load=(spring, push))
+
+
+def whip() -> Scene:
+    """Eight bodies on balls and universal joints, from the ceiling to the floor."""
+    places = np.array([(0.25 * k, 0.1 * (k % 2), 0.05 * (k % 3)) for k in range(9)])
+    names, bars, pins = ["ground", *(f"b{k}" for k in range(8))], [], []
+    for k in range(8):
+        middle, pair = tuple(places[k : k + 2].mean(axis=0).tolist()), (names[k], names[k + 1])
+        bars.append(Body(name=names[k + 1], mass=0.4, inertia=(0.003, 0.002, 0.0015), position=middle))
+        anchor = tuple(places[k].tolist())
+        ball = Spherical(name=f"J{k}", bodies=pair, anchor=anchor)
+        cross = Universal(name=f"J{k}", bodies=pair, anchor=anchor, axes=(Z, (0.0, 1.0, 0.0)))
+        pins.append(cross if k % 2 else ball)
+    rod = Distance(name="rod", bodies=("b7", "ground"),
+                   anchors=(tuple(places[8].tolist()), (2.2, -1.0, 0.3)))  # fmt: skip
+    return Scene(name="whip", gravity=GRAVITY, duration=0.5, body=tuple(bars), joint=(*pins, rod))
+
+
+def mass_ratio() -> Scene:
+    """A grain of a milligram between a kilogram and half a ton."""
+    places = ((0.0, 0.0, 0.0), (0.4, 0.2, 0.0), (0.9, 0.1, 0.0), (1.2, -0.3, 0.0))
+    return linkage("mass_ratio", places, (1.0, 1e-6, 500.0)).with_(duration=1.0)
+
+
+def planes() -> Scene:
+    """A block on a slope with a pendulum on it, which a bar of fixed length ties to another block."""
+    slope = (0.0, 1.0, 0.4)
+    first, second = (0.0, 0.0, 0.0), (0.8, 0.0, 0.3)
+    inertia = ((0.02, 0.001, 0.0), (0.001, 0.03, 0.002), (0.0, 0.002, 0.025))
+    blocks = [
+        Body(name=n, mass=m, inertia=inertia, position=p)
+        for n, m, p in (("one", 1.0, first), ("two", 2.5, second))
+    ]
+    bob = Body(name="bob", mass=0.7, inertia=(0.01, 0.002, 0.01), position=(0.1, -0.4, 0.1))
+    joints = (
+        Planar(name="S1", bodies=("ground", "one"), anchor=first, axis=slope),
+        Planar(name="S2", bodies=("ground", "two"), anchor=second, axis=(0.1, 1.0, 0.2)),
+        Spherical(name="H", bodies=("one", "bob"), anchor=(0.0, 0.0, 0.05)),
+        Distance(name="L", bodies=("bob", "two"), anchors=((0.1, -0.6, 0.1), second)),
+    )
+    return Scene(name="planes", gravity=GRAVITY, duration=1.0, body=(*blocks, bob), joint=joints)
+
+
+HARD: dict[str, Callable[[], Scene]] = {
+    make.__name__: make
+    for make in (
+        stiff_spring, strong_damping, near_singular, start_near_singular, two_crossings, rounded_redundancy,
+        fast_driver, point_masses, free_bodies, whip, mass_ratio, planes,
+    )
+}  # fmt: skip

@@ -1,0 +1,84 @@
+"""The bound of a reference against tighter runs: hard mechanisms, and starts that magnify rounding."""
+
+import numpy as np
+import pytest
+
+from crosscheck.conformance.hard_mechanisms import HARD
+from crosscheck.judge.reference.arithmetic import EXTENDED, many_digits
+from crosscheck.judge.reference.reference import judged, runs
+from crosscheck.judge.reference.start_velocities import least_squares, null_space, start_velocities
+from crosscheck.judge.reference.taylor import natural_motion
+from crosscheck.judge.reference.tree import tree_motion
+from mbref.scene import Scene
+
+SECONDS = 200.0
+QUICK = ("stiff_spring", "fast_driver", "rounded_redundancy", "planes")
+SHORTER = {"near_singular": 0.5, "whip": 0.25, "point_masses": 0.5}  # s
+CROSSING = ("two_crossings",)  # where rounding decides, and more digits move another mechanism
+
+
+def in_many_digits(scene: Scene, times: np.ndarray) -> np.ndarray:
+    """Positions (k, nb, 3) of the scene by formulation A in thirty digits, with other rows."""
+    pytest.importorskip("flint", reason="python-flint is the extra `certify`")
+    motion = natural_motion(scene, times, many_digits(30), order=34, tolerance=1e-24, seed=2, seconds=SECONDS)
+    assert not motion.reason
+    texts = [x.str(30, radius=False) for x in motion.position.ravel()]
+    return np.array([EXTENDED.dtype(x) for x in texts]).reshape(motion.position.shape)
+
+
+def assert_bounded(name: str) -> None:
+    scene = HARD[name]()
+    times = np.linspace(0.0, SHORTER.get(name, scene.duration), 5)
+    a, twin, b = runs(scene, times, SECONDS)
+    found, reason = judged(scene, times, a, twin, b)
+    assert not reason
+    assert found.bound.max() <= 1e-12
+    place = in_many_digits(scene, times)
+    off = np.abs(a.position - place).max(axis=(1, 2))
+    assert (off <= found.bound).all(), f"{off.max():.1e} from thirty digits, bound {found.bound.max():.1e}"
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_hard_mechanism_is_within_its_bound(name):
+    assert_bounded(name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(set(HARD) - {*QUICK, *CROSSING}))
+def test_every_hard_mechanism_is_within_its_bound(name):
+    assert_bounded(name)
+
+
+@pytest.mark.parametrize("move", [natural_motion, tree_motion])
+def test_given_rates_near_a_singular_position_are_kept(move):
+    """Taken in double precision, the rule's velocities let the crank start off by a part of 1e-13."""
+    motion = move(HARD["start_near_singular"](), [0.0], EXTENDED, seconds=SECONDS)
+    assert np.abs(motion.angular_velocity[0, 0] - EXTENDED.array([0.0, 0.0, 1e-3])).max() < 1e-18
+
+
+def test_start_velocities_obey_the_rule():
+    """Five velocities and one row: two given ones contradict it and are fitted."""
+    rows, rates = EXTENDED.array([[1.0, 2.0, 0.0, 0.0, 0.0]]), EXTENDED.array([3.0])
+    fit, wanted = EXTENDED.array(np.eye(5)[:2]), EXTENDED.array([0.0, 1.0])
+    root = np.random.default_rng(4).normal(size=(5, 5))
+    mass = EXTENDED.array(root @ root.T)
+    z = start_velocities(EXTENDED, rows, rates, fit, wanted, mass)
+    tiny = 50 * EXTENDED.eps
+    assert np.abs(z[:2] - EXTENDED.array([1, 7]) / EXTENDED.array([5, 5])).max() < tiny
+    assert np.abs((mass @ z)[2:]).max() < tiny * np.abs(mass).max() * np.abs(z).max()
+
+
+def test_least_squares_of_nearly_dependent_columns():
+    eps = EXTENDED.number(2.0**-20)
+    matrix = EXTENDED.array([[1.0, 1.0], [1.0, 1.0], [1.0, 0.0]])
+    matrix[:, 1] = matrix[:, 0] + EXTENDED.array([1.0, -1.0, 0.5]) * eps
+    exact = EXTENDED.array([1.0, 3.0])
+    found = least_squares(EXTENDED, matrix, matrix @ exact)
+    assert np.abs(found - exact).max() < 1e-12, "a millionth of the digits of double precision is lost"
+
+
+def test_null_space_is_one_to_the_last_digit():
+    matrix = EXTENDED.array(np.random.default_rng(1).normal(size=(3, 7)))
+    basis = null_space(EXTENDED, matrix)
+    assert basis.shape == (7, 4)
+    assert np.abs(matrix @ basis).max() < 20 * EXTENDED.eps
