@@ -14,6 +14,7 @@ from crosscheck.judge.metrics import error_series
 from mbref import rotations
 from mbref.scene import Body, Revolute, Scene
 from mbref.trajectory import Outcome
+from tests.crosscheck.measured import MARGIN
 
 POINTS = np.array([(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)], dtype=float)
 AXES = "yzxyzx"
@@ -48,18 +49,22 @@ def test_counts_of_the_linkage():
 
 
 @pytest.mark.parametrize(
-    "name, setting",
+    ("name", "setting", "measured"),  # difference over the scene's length, rad
     [
-        ("mujoco", Setting("forward", {"rtol": 1e-10, "min_step": 0.01, "beta": 10.0, "hard": 1e-7})),
-        ("pinocchio", Setting("proximal", {"step": 1e-3})),
-        ("pinocchio", Setting("tuned", {"rtol": 1e-10, "min_step": 0.01})),
-        ("exudyn", Setting("alpha", {"step": 1e-4})),
+        (
+            "mujoco",
+            Setting("forward", {"rtol": 1e-10, "min_step": 0.01, "beta": 10.0, "hard": 1e-7}),
+            5.4e-10,
+        ),
+        ("pinocchio", Setting("proximal", {"step": 1e-3}), 2.7e-13),
+        ("pinocchio", Setting("tuned", {"rtol": 1e-10, "min_step": 0.01}), 4.8e-11),
+        ("exudyn", Setting("alpha", {"step": 1e-4}), 3e-9),
     ],
 )
-def test_engine_and_mbref_agree(name: str, setting: Setting):
+def test_engine_and_mbref_agree(name: str, setting: Setting, measured: float):
     scene = bricard()
     found = engine(name).run(scene, TIMES, setting)
     reference = engine("mbref").run(scene, TIMES, Setting("alf-dual+projection", {"rtol": 1e-11}))
     assert found.outcome is Outcome.COMPLETED, found.message
     apart = error_series(scene, found, reference).max()
-    assert apart < 1e-8, f"{name} {setting} and mbref differ by {apart:.1e}"
+    assert apart < MARGIN * measured, f"{name} {setting} and mbref differ by {apart:.1e}"

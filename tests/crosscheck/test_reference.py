@@ -469,6 +469,20 @@ def test_known_times_are_not_computed_again(own_cache, monkeypatch):
         reference(scene.with_(gravity=(0.0, -9.8, 0.0)), [0.5])
 
 
+def test_a_motion_that_ended_is_computed_again_only_in_more_time(own_cache, monkeypatch):
+    """Of a start in a singular position nothing becomes known in less time, or in as much."""
+    scene, given = SCENES["four_bar_straight"](), []
+
+    def counted(scene, times, seconds):
+        given.append(seconds)
+        return runs(scene, times, seconds)
+
+    monkeypatch.setattr(module, "runs", counted)
+    for seconds in (2.0, 2.0, 1.0, 4.0, 3.0):
+        assert isinstance(reference(scene, [0.1], seconds), NoReference)
+    assert given == [2.0, 4.0]
+
+
 def test_new_times_keep_the_old_ones(own_cache, monkeypatch):
     scene, _ = free_fall()
     reference(scene, [0.1])

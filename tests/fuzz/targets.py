@@ -9,12 +9,15 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import os
 import random
 import signal
+import tempfile
 import traceback
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TextIO
 
 from mbref.cli import main as mbref_main
 from mbref.equations.diagnosis import diagnose
@@ -86,18 +89,39 @@ def command_line(seed: int) -> str:
     )
     words = [scene.replace("\x00", ""), *mutations.option_words(draw)]
     program, command = draw.choice(_programs())
-    out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out), _standard_error() as err:
         try:
             status = program([command, *words])
         except SystemExit as end:
             status = end.code
+        said = _said(err)
     assert status in DOCUMENTED, f"exit status {status}"
-    assert "Traceback" not in err.getvalue(), err.getvalue()[-300:]
-    assert status != 2 or err.getvalue().strip(), f"bad input, and no message: {command} {words}"
+    assert "Traceback" not in said, said[-300:]
+    assert status != 2 or said.strip(), f"bad input, and no message: {command} {words}"
     if "--json" in words and status in (0, 1):
         json.loads(out.getvalue(), parse_constant=_refuse_constant)
     return f"exit status {status}"
+
+
+@contextlib.contextmanager
+def _standard_error() -> Iterator[TextIO]:
+    """A file of what this process, and those that it starts, write on standard error."""
+    with tempfile.TemporaryFile("w+", encoding="utf-8") as file:
+        kept = os.dup(2)
+        os.dup2(file.fileno(), 2)
+        try:
+            with contextlib.redirect_stderr(file):
+                yield file
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+
+
+def _said(file: TextIO) -> str:
+    file.flush()
+    file.seek(0)
+    return file.read()
 
 
 def _programs() -> list[tuple[Callable, str]]:
