@@ -4,13 +4,14 @@ end."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from crosscheck.judge.reference.motion import given_up
 from crosscheck.processes.pool import end_idle
 from crosscheck.study import sweep
 from crosscheck.study.chains import Chains
@@ -67,8 +68,13 @@ def collected(
     with ExitStack() as stack:
         stack.callback(end_idle)
         truths = stack.enter_context(ThreadPoolExecutor(1)).submit(_truths, scenes, wanted)
-        scouted(scenes, engines)
-        return _measured(scenes, plan(), wanted, truths, notice)
+        try:
+            scouted(scenes, engines)
+            return _measured(scenes, plan(), wanted, truths, notice)
+        except BaseException:
+            with given_up():
+                wait([truths])
+            raise
 
 
 def scouted(scenes: Sequence[Scene], engines: Sequence[str]) -> None:

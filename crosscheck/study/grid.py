@@ -21,6 +21,7 @@ import numpy as np
 import mbref
 from crosscheck.engine import Cannot, Setting, engine
 from crosscheck.judge import metrics
+from crosscheck.judge.reference.motion import given_up
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth import Truth, truth_for
 from crosscheck.processes.child import stop_all
@@ -218,8 +219,9 @@ def _run_all(
     except BaseException:
         for future in futures:
             future.cancel()
-        while isinstance(executor, ThreadPoolExecutor) and wait(futures, timeout=0.1).not_done:
-            stop_all()  # again and again: a run may have been about to start
+        with given_up():
+            while isinstance(executor, ThreadPoolExecutor) and wait(futures, timeout=0.1).not_done:
+                stop_all()  # again and again: a run may have been about to start
         raise
 
 

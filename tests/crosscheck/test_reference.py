@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +28,7 @@ from crosscheck.judge.reference.arithmetic import DOUBLE, EXTENDED, doubles, man
 from crosscheck.judge.reference.bound import differences
 from crosscheck.judge.reference.certify import NotCertified, certified, digest
 from crosscheck.judge.reference.isostatic import isostatic, replaced
+from crosscheck.judge.reference.motion import GivenUp, given_up
 from crosscheck.judge.reference.natural import NaturalCoordinates
 from crosscheck.judge.reference.reference import NoReference, Reference, judged, reference, runs
 from crosscheck.judge.reference.saddle_point import SaddlePoint
@@ -33,6 +36,7 @@ from crosscheck.judge.reference.taylor import Stepper, natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from crosscheck.judge.truth import NoSolution, closed_form, truth_for
 from crosscheck.judge.truth.reference_truth import ReferenceTruth, trajectory
+from crosscheck.study.comparison import Wanted, collected
 from mbref import rotations
 from mbref.scene import Body, Driver, Scene, Spring, TorsionSpring
 from mbref.scenes import SCENES
@@ -481,6 +485,30 @@ def test_a_motion_that_ended_is_computed_again_only_in_more_time(own_cache, monk
     for seconds in (2.0, 2.0, 1.0, 4.0, 3.0):
         assert isinstance(reference(scene, [0.1], seconds), NoReference)
     assert given == [2.0, 4.0]
+
+
+def test_a_motion_that_is_given_up_ends_and_is_not_kept(own_cache):
+    scene, times = SCENES["flyball_governor"]().with_(duration=1e4), np.linspace(0.0, 1e4, 11)
+    with ThreadPoolExecutor(1) as beside:
+        motion = beside.submit(reference, scene, times, 600.0)
+        while not motion.running():
+            time.sleep(0.01)
+        with given_up(), pytest.raises(GivenUp):
+            motion.result(timeout=60.0)
+    assert not own_cache.exists()
+
+
+def test_an_interrupt_does_not_wait_for_the_truth(own_cache):
+    """The command ends while the reference of its scene would take ten minutes."""
+    scene = SCENES["flyball_governor"]().with_(duration=1e4)
+    wanted = Wanted([np.linspace(0.0, 1e4, 11)], reference_time=600.0, is_quick=True)
+
+    def interrupt():
+        raise KeyboardInterrupt
+
+    with ThreadPoolExecutor(1) as beside:
+        command = beside.submit(collected, [scene], [], wanted, interrupt, print)
+        assert isinstance(command.exception(timeout=60.0), KeyboardInterrupt)
 
 
 def test_new_times_keep_the_old_ones(own_cache, monkeypatch):

@@ -18,6 +18,7 @@ from crosscheck.study.verdict import Grade, Judged, grade, judged
 from crosscheck.study.wording import multiple, span
 from mbref.records import append
 from mbref.scenes import SCENES
+from tests.reports import synthetic
 
 REDUNDANT, SOUND = SCENES["planar_slider_crank"](), SCENES["spatial_slider_crank"]()
 TRUTH = {"kind": "reference", "bound": 3e-14, "reason": "", "until": 1.0, "seconds": 2.4, "both": True}
@@ -114,6 +115,14 @@ def test_no_truth_and_no_claim_of_right():
     unknown = group(still, kind="", reason="two ways", bound=None)
     assert "no reference for this motion" in headline([unknown])
     assert "There is no reference for planar_slider_crank: two ways." in truth([unknown])
+
+
+def test_engines_without_a_truth_are_compared_at_the_same_times():
+    """Two motions that are 1e-3 of the scene's length apart, and one at other times."""
+    first, second = (synthetic.record(name, "x", error, 0.1) for name, error in (("a", 1e-3), ("b", 2e-3)))
+    scene, other = synthetic.scene(), {**first, "engine": "c", "times": [0.5 * t for t in first["times"]]}
+    found = Judged(scene, {}, [first, second, other]).agreement()
+    assert found == {("a", "b"): pytest.approx(1e-3, rel=1e-9)}, found
 
 
 def test_multiples():

@@ -6,12 +6,39 @@ from t ≥ 0, and after so many CPU seconds of the calling thread the motion end
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from threading import Event
 
 import numpy as np
 
 Times = Sequence[float] | np.ndarray
+
+_given_up = Event()
+
+
+class GivenUp(Exception):
+    """A motion was not followed to its end, because it is no longer wanted."""
+
+
+@contextmanager
+def given_up() -> Iterator[None]:
+    """Until the block is left, motions that other threads follow end by GivenUp: an interrupt does not wait
+    for them."""
+    _given_up.set()
+    try:
+        yield
+    finally:
+        _given_up.clear()
+
+
+def is_over(deadline: float) -> bool:
+    """Whether the calling thread's CPU time (s) is past a deadline; raises GivenUp."""
+    if _given_up.is_set():
+        raise GivenUp("the motion is no longer wanted")
+    return time.thread_time() > deadline
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.judge.reference.arithmetic import Arithmetic
-from crosscheck.judge.reference.motion import Motion
+from crosscheck.judge.reference.motion import Motion, is_over
 from crosscheck.judge.reference.panels import Panel, Panels
 from crosscheck.judge.reference.tree_equations import OPEN, TreeEquations
 from crosscheck.judge.reference.vectors import apply, product, unit
@@ -57,7 +57,7 @@ class _Run:
         end, panel = self.times.max(initial=0.0), None
         length = self.arithmetic.number(FIRST * end or 1.0)
         while self.taken < len(self.times):
-            if time.thread_time() > until:
+            if is_over(until):
                 return "the CPU time for it is over"
             tried = self._before_singular(length)
             panel = self.panels.panel(self.equations, self.t, tried, self._guess(panel, tried))
