@@ -1,8 +1,9 @@
 """The certified tables, made again: `python benchmarks/certified.py [--add NAME=SECONDS …] [NAME …]`.
 
 Without names all tables are made again and compared with those that are kept; a difference above the bound of
-a table is told.  ``--add`` makes a table of a built-in scene or of a random mechanism, random_N, that has
-none: of NAME from 0 to SECONDS.  No table is overwritten.
+a table is told.  ``--add`` makes a table of a built-in scene or of a random mechanism, random_N, from 0 to
+SECONDS.  No table is edited: with ``--supersede`` one that differs, or that is of other times, is replaced by
+the next version, which names the hash of the one before.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from crosscheck.judge.reference import certify
 FOLDER = Path(certify.__file__).with_name("certified")
 DIGITS, SAMPLES = 20, 3
 COLUMNS = ("scene", "s", "digits", "bound", "replaced joints", "CPU s")
+SAME = "as kept"
 
 
 def main() -> None:
@@ -28,30 +30,40 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("name", nargs="*", metavar="NAME")
     parser.add_argument("--add", action="append", default=[], metavar="NAME=SECONDS")
+    parser.add_argument(
+        "--supersede", action="store_true", help="replace tables that differ by the next version"
+    )
     asked = parser.parse_args()
     known = {path.stem: json.loads(path.read_text()) for path in sorted(FOLDER.glob("*.json"))}
     print(f"| {' | '.join(COLUMNS)} | |\n| --- {'| --: ' * 3}| --- | --: | --- |")
     for name, _, end in (given.partition("=") for given in asked.add):
-        row(name, np.linspace(0.0, float(end), SAMPLES), DIGITS, None)
+        row(name, np.linspace(0.0, float(end), SAMPLES), DIGITS, known.get(name), asked.supersede)
     for name in () if asked.add else asked.name or known:
-        row(name, np.array(known[name]["times"]), known[name]["digits"], known[name])
+        row(name, np.array(known[name]["times"]), known[name]["digits"], known[name], asked.supersede)
 
 
-def row(name: str, times: np.ndarray, digits: int, kept: dict[str, Any] | None) -> None:
-    """Print a table's row; write the table where there is none."""
+def row(name: str, times: np.ndarray, digits: int, kept: dict[str, Any] | None, supersede: bool) -> None:
+    """Print a table's row; write the table where there is none, or where it differs and is to be replaced."""
     began = time.process_time()
     try:
         made = certify.certified(find_certifiable(name), times, digits)
     except certify.NotCertified as reason:
         print(f"| {name} | {times[-1]:g} | | | | {time.process_time() - began:.0f} | {reason} |", flush=True)
         return
+    said = compared(made, kept)
     if kept is None:
-        text = json.dumps(made, indent=1, ensure_ascii=False)
-        with open(FOLDER / f"{name}.json", "x", encoding="utf-8") as file:
-            file.write(text + "\n")
+        write(name, made)
+    elif supersede and said != SAME:
+        write(name, made | {"version": kept["version"] + 1, "supersedes": kept["hash"]})
     others = ", ".join(f"{joint} {kind}" for joint, kind in made.get("replaced", {}).items())
     cells = [name, f"{times[-1]:g}", str(digits), made["bound"], others]
-    print(f"| {' | '.join(cells)} | {time.process_time() - began:.0f} | {compared(made, kept)} |", flush=True)
+    print(f"| {' | '.join(cells)} | {time.process_time() - began:.0f} | {said} |", flush=True)
+
+
+def write(name: str, table: dict[str, Any]) -> None:
+    """Keep a table with its hash."""
+    text = json.dumps(table | {"hash": certify.digest(table)}, indent=1, ensure_ascii=False)
+    (FOLDER / f"{name}.json").write_text(text + "\n", encoding="utf-8")
 
 
 def compared(made: dict[str, Any], kept: dict[str, Any] | None) -> str:
@@ -60,9 +72,11 @@ def compared(made: dict[str, Any], kept: dict[str, Any] | None) -> str:
 
     if kept is None:
         return "added"
+    if made["times"] != kept["times"]:
+        return f"instead of one to {kept['times'][-1]:g} s"
     pairs = zip(*(np.ravel(np.array(t["position"], dtype=object)) for t in (made, kept)), strict=True)
     apart = max(abs(float(arb(a) - arb(b))) for a, b in pairs)
-    return "as kept" if apart <= 10.0 ** -kept["digits"] else f"{apart:.0e} m from the one kept"
+    return SAME if apart <= 10.0 ** -kept["digits"] else f"{apart:.0e} m from the one kept"
 
 
 if __name__ == "__main__":

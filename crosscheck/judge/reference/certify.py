@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.judge.reference.arithmetic import many_digits
+from crosscheck.judge.reference.arithmetic import doubles, many_digits
 from crosscheck.judge.reference.bound import SAFETY, differences
 from crosscheck.judge.reference.cache import canonical
 from crosscheck.judge.reference.isostatic import isostatic, replaced
@@ -28,15 +28,18 @@ METHODS = {
     "B": "joint coordinates of a spanning tree, Chebyshev–Picard panels",
 }
 
+RATES = ("velocity", "angular_velocity")
+
 
 class NotCertified(ArithmeticError):
     """The formulations do not agree to the digits asked for, or one of them ends before."""
 
 
 def certified(scene: Scene, times: np.ndarray, digits: int, seconds: float = np.inf) -> dict[str, Any]:
-    """A table of positions (m) and orientations (w, x, y, z) at ascending times (k,) as decimal strings, with
-    its ``id`` (of scene and times), ``digits``, ``bound``, both ``methods``, the ``replaced`` joints where
-    there are any, and the ``hash`` of all this.
+    """A table of positions (m), orientations (w, x, y, z) and velocities of both kinds (m/s, rad/s; world) at
+    ascending times (k,) as decimal strings, with its ``id`` (of scene and times), ``digits``, ``bound``,
+    ``rate_bound`` (of velocities, each relative to the largest of its kind), both ``methods``, the
+    ``replaced`` joints where there are any, and the ``hash`` of all this.
 
     Raises NotCertified, and ImportError without python-flint.
     """
@@ -50,7 +53,15 @@ def certified(scene: Scene, times: np.ndarray, digits: int, seconds: float = np.
     bound = SAFETY * float(differences(scene, a, b).max(initial=0.0))
     if bound > 10.0**-digits:
         raise NotCertified(f"{scene.name}: the formulations agree to {bound:.0e} only")
-    return _table(scene, moved, a, digits, max(bound, 10.0 ** -(digits + SPARE)))
+    least = 10.0 ** -(digits + SPARE)
+    rates = SAFETY * max(_apart(getattr(a, name), getattr(b, name)) for name in RATES)
+    return _table(scene, moved, a, digits, (max(bound, least), max(rates, least)))
+
+
+def _apart(one: np.ndarray, other: np.ndarray) -> float:
+    """The largest difference of two arrays, relative to the largest of the first."""
+    largest, apart = (np.abs(doubles(values)).max(initial=0.0) for values in (one, one - other))
+    return float(apart / largest) if largest else float(apart)
 
 
 def _refuse_ended(scene: Scene, motion: Motion, name: str) -> None:
@@ -65,15 +76,19 @@ def _by_a(scene: Scene, times: np.ndarray, digits: int, seconds: float) -> Motio
     return natural_motion(scene, times, exact, seconds=seconds, order=2 * digits, tolerance=tolerance)
 
 
-def _table(scene: Scene, moved: Scene, motion: Motion, digits: int, bound: float) -> dict[str, Any]:
+def _table(
+    scene: Scene, moved: Scene, motion: Motion, digits: int, bound: tuple[float, float]
+) -> dict[str, Any]:
     identity = canonical(scene) + json.dumps(motion.times.tolist())
     signs = np.where(np.asarray(motion.orientation[..., :1]).astype(float) < 0, -1, 1)
     table = {
         "scene": scene.name, "id": hashlib.sha256(identity.encode()).hexdigest()[:16], "version": 1,
-        "digits": digits, "bound": f"{bound:.0e}", "methods": METHODS, "times": motion.times.tolist(),
+        "digits": digits, "bound": f"{bound[0]:.0e}", "rate_bound": f"{bound[1]:.0e}", "methods": METHODS,
+        "times": motion.times.tolist(),
         "bodies": [body.name for body in scene.body],
         "position": _decimals(motion.position, digits),
         "orientation": _decimals(motion.orientation * signs, digits),
+        **{name: _decimals(getattr(motion, name), digits) for name in RATES},
     }  # fmt: skip
     if others := replaced(scene, moved):
         table["replaced"] = others
