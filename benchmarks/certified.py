@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,6 @@ import numpy as np
 from crosscheck.cli.request import find_certifiable
 from crosscheck.judge.reference import certify
 
-FOLDER = Path(certify.__file__).with_name("certified")
 DIGITS, SAMPLES = 20, 3
 COLUMNS = ("scene", "s", "digits", "bound", "replaced joints", "CPU s")
 SAME = "as kept"
@@ -34,7 +32,7 @@ def main() -> None:
         "--supersede", action="store_true", help="replace tables that differ by the next version"
     )
     asked = parser.parse_args()
-    known = {path.stem: json.loads(path.read_text()) for path in sorted(FOLDER.glob("*.json"))}
+    known = {path.stem: json.loads(path.read_text()) for path in sorted(certify.FOLDER.glob("*.json"))}
     print(f"| {' | '.join(COLUMNS)} | |\n| --- {'| --: ' * 3}| --- | --: | --- |")
     for name, _, end in (given.partition("=") for given in asked.add):
         row(name, np.linspace(0.0, float(end), SAMPLES), DIGITS, known.get(name), asked.supersede)
@@ -63,7 +61,7 @@ def row(name: str, times: np.ndarray, digits: int, kept: dict[str, Any] | None, 
 def write(name: str, table: dict[str, Any]) -> None:
     """Keep a table with its hash."""
     text = json.dumps(table | {"hash": certify.digest(table)}, indent=1, ensure_ascii=False)
-    (FOLDER / f"{name}.json").write_text(text + "\n", encoding="utf-8")
+    (certify.FOLDER / f"{name}.json").write_text(text + "\n", encoding="utf-8")
 
 
 def compared(made: dict[str, Any], kept: dict[str, Any] | None) -> str:
