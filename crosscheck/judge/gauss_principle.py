@@ -22,29 +22,35 @@ NO_AXIS = np.zeros(3)  # no shared axis of turning: torsion springs are added he
 
 
 def gauss(scene: Scene) -> np.ndarray:
-    """Accelerations at t = 0 as `stacked`: of all that joints and drivers allow, the nearest in the mass
-    metric to those without joints.  The scene has masses."""
+    """Accelerations at t = 0 as `stacked`: of all that joints and drivers allow, those of least constraint,
+    ½ aᵀ M a - aᵀ f.  The scene has masses; moments of inertia may be zero where joints leave no such turn."""
+    mass, force = _unbound(scene)
+    weights = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))  # of `stacked`
+    rows = jacobian(scene, 0.0, *initial_poses(scene))[0] * weights
+    mass, force = mass * weights * weights[:, None], force * weights
+    _, s, vt = np.linalg.svd(rows, full_matrices=True)
+    free = vt[int((s > RANK * s.max(initial=0.0)).sum()) :].T
+    held = np.linalg.lstsq(rows, -bias(scene), rcond=RANK)[0]
+    step = np.linalg.lstsq(free.T @ mass @ free, free.T @ (force - mass @ held), rcond=None)[0]
+    return np.concatenate(np.hsplit((held + free @ step).reshape(-1, 6), 2))
+
+
+def _unbound(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Mass matrix M (6 nb, 6 nb) of the twists at t = 0, and the forces f (6 nb,) of loads and gyration."""
     position, orientation = initial_poses(scene)
     velocity, angular_velocity = initial_twists(scene)
     turn = rotations.to_matrix(orientation)
     no_turn = np.zeros((1, len(position)))
     motion = Motion(position[None], turn[None], velocity[None], angular_velocity[None], no_turn)
     force, moment = (w[0] for w in wrenches(scene, motion, NO_AXIS))
-    moment = moment + _torsion(scene, angular_velocity)
     inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
     momentum = np.einsum("bij,bj->bi", inertia, angular_velocity)
-    moment = moment - np.cross(angular_velocity, momentum)
-    rows, _ = jacobian(scene, 0.0, position, orientation)
-    root = np.zeros((rows.shape[1], rows.shape[1]))  # W with WᵀW the mass matrix
+    moment = moment + _torsion(scene, angular_velocity) - np.cross(angular_velocity, momentum)
+    mass = np.zeros((6 * len(position), 6 * len(position)))
     for b, body in enumerate(scene.body):
-        root[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = np.sqrt(body.mass or 0.0) * np.eye(3)
-        root[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = np.linalg.cholesky(inertia[b]).T
-    inverse = np.linalg.inv(root)
-    unbound = inverse.T @ np.hstack([force, moment]).ravel()  # W times the accelerations without joints
-    wanted = -bias(scene) - rows @ inverse @ unbound
-    found = unbound + np.linalg.lstsq(rows @ inverse, wanted, rcond=RANK)[0]
-    linear, angular = np.hsplit((inverse @ found).reshape(-1, 6), 2)
-    return np.concatenate([linear, scene_length(scene) * angular])
+        mass[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = (body.mass or 0.0) * np.eye(3)
+        mass[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = inertia[b]
+    return mass, np.hstack([force, moment]).ravel()
 
 
 def _torsion(scene: Scene, angular_velocity: np.ndarray) -> np.ndarray:

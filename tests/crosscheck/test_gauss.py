@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from crosscheck.conformance.closed_forms import free_fall, oscillator, torsion
+from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.gauss_principle import gauss, singular_values, stacked
+from crosscheck.judge.reference.arithmetic import EXTENDED, doubles
+from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.truth import truth_for
 from mbref.scene import Scene
 from mbref.scenes import SCENES
@@ -30,6 +33,16 @@ def test_gauss_and_truth(name):
     exact = stacked(scene, truth.poses(np.array([0.0, 1e-3])), 0)
     off = np.abs(gauss(scene) - exact).max() / np.abs(exact).max()
     assert off < MARGIN * MEASURED, f"{name}: relative difference {off:.2e} from {truth.name}"
+
+
+@pytest.mark.parametrize("name", ["point_pendulum", "bricard_thin"])
+def test_bodies_without_moment_of_inertia(name):
+    """The report of these published problems ended with an error of the Cholesky factorisation."""
+    scene = SCENES[name]()
+    motion = natural_motion(scene, [0.0], EXTENDED, seconds=100.0)
+    angular = scene_length(scene) * motion.angular_acceleration[0]
+    exact = doubles(np.concatenate([motion.acceleration[0], angular]))
+    assert np.abs(gauss(scene) - exact).max() < 1e-12 * np.abs(exact).max()
 
 
 def test_torsion_spring_between_two_moving_bodies_and_the_ground():

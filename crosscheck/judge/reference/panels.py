@@ -15,6 +15,7 @@ import numpy as np
 
 from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
 from crosscheck.judge.reference.crossing import bridged, singular_ahead, singular_time
+from crosscheck.judge.reference.motion import is_over
 
 SWEEPS = 60  # Picard iterations before a panel is shortened
 MANY = 35  # a panel that took more is not followed by a longer one
@@ -95,6 +96,7 @@ class Panels:
         t, places = start + half * (self.nodes + 1), doubles(self.nodes)
         y, y0, last, crossing = guess, guess[0], np.inf, None
         for sweep in range(1, SWEEPS):
+            is_over(np.inf)  # raises where the motion is no longer wanted
             with np.errstate(all="ignore"):
                 here = y if crossing is None else equations.nearer(t, y)
                 rates, distance = equations.other_rates(t, here)
