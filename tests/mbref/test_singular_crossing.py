@@ -59,6 +59,17 @@ def test_a_motion_that_turns_back_within_its_tolerance_is_right_or_undecided(rto
     assert undecided > 0
 
 
+@pytest.mark.parametrize("loop", RHOMBI)
+@pytest.mark.parametrize("distance", [1e-6, 1e-7, 1e-8])
+def test_a_motion_that_passes_beside_the_flat_position_has_right_samples(loop, distance):
+    """By the Taylor method, which ends UNDECIDED where it cannot tell the branches apart."""
+    scene = RHOMBI[loop][1](distance)
+    run = simulate(scene, "taylor", np.linspace(0.0, 1.5, 9), Limits())
+    assert run.outcome.label in ("COMPLETED", "UNDECIDED"), run.message
+    if len(run.times):
+        assert measure(scene, run, closed_form(scene))["error"] < 2.6e-6  # ten times the measured 2.6e-7
+
+
 @pytest.mark.parametrize("method", ["alf-dual+projection", "mpi-svd+projection", "taylor"])
 @pytest.mark.parametrize("gap", [1e-2, 1e-5, 1e-8, 1e-10])
 def test_branches_that_miss_each_other_are_not_crossed(gap, method):
