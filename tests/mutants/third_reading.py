@@ -1,6 +1,6 @@
 """One-line defects of a third reading, in parts that no table had: optional engines, mbref's door, exchange.
 
-Of its 36 defects the tests killed 25 when they were planted first.  These are the eleven that survived, and
+Of its 36 defects the tests killed 24 when they were planted first.  These are the twelve that survived, and
 others of engines and files that nothing else in the tables reaches.
 """
 
@@ -78,6 +78,12 @@ DEFECTS = (
         "return names.index(engine) % 3 if",
         f"{R}first_screen.py::test_every_engine_has_a_colour_and_a_mark_of_its_own",
     ),
+    Defect(
+        f"{E}/mujoco/urdf.py",
+        "[cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],",
+        "[cy * cp, cy * sp * sr + sy * cr, cy * sp * cr + sy * sr],",
+        f"{EXCHANGE}::test_roll_pitch_and_yaw_of_a_loop_turn_its_axis",
+    ),
     # engines that the other tables leave out, and files of other programs
     Defect(f"{E}/simbody/model.py", "force.setViscosity(load.damping)", "force.setViscosity(0.0)", ALIKE),
     Defect(f"{E}/simbody/adapter.py", "found.append(-wrench(force", "found.append(wrench(force", ALIKE),
@@ -115,12 +121,6 @@ DEFECTS = (
         f"{E}/mujoco/reading.py",
         "float(model.qpos_spring[q] - model.qpos0[q])",
         "float(model.qpos0[q] - model.qpos_spring[q])",
-        EXCHANGE,
-    ),
-    Defect(
-        f"{E}/mujoco/urdf.py",
-        "[cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],",
-        "[cy * cp, cy * sp * sr + sy * cr, cy * sp * cr + sy * sr],",
         EXCHANGE,
     ),
     Defect(
