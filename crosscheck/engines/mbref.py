@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, FamilyParts, Owner, Setting, Supports
+from crosscheck.judge.tolerances import ROUNDING
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
@@ -29,11 +30,14 @@ METHODS = (
     "mpi-qr+projection",
     "lm2+projection",
 )
+WITH_SINGULAR_MASS = ("lm1+projection", "alf+projection")  # of bodies without some moment of inertia
 KINEMATIC = "kinematic"  # of driven scenes; integrates nothing, so has no tolerance
 SPECIALISED = ", specialised"  # machine code of the scene, made before the clock runs
 FAMILIES = {
     "alf-dual+projection": "augmented Lagrangian in dual form, projection, DOP853; the default method",
     "lm2+projection": "Lagrange multipliers eliminated by blocks, projection, DOP853",
+    "lm1+projection": "Lagrange multipliers, projection, DOP853; where a body lacks a moment of inertia",
+    "alf+projection": "augmented Lagrangian, projection, DOP853; where a body lacks a moment of inertia",
     "taylor": "Taylor series in natural coordinates, projection",
     "kinematic": "Newton-Raphson on the constraints of a fully driven mechanism",
     "mpi-svd+partitioning": "Moore-Penrose inverse by SVD, coordinate partitioning, DOP853",
@@ -76,9 +80,10 @@ class Mbref(Engine):
         return None
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
+        methods = WITH_SINGULAR_MASS if _has_singular_mass(scene) else METHODS
         return [
             Setting(family, options)
-            for family in METHODS
+            for family in methods
             if self._serves(family, scene)
             for options in ([{}] if family.startswith(KINEMATIC) else [{"rtol": rtol} for rtol in TOLERANCES])
         ]
@@ -125,6 +130,13 @@ class Mbref(Engine):
 
         code = "specialised" if setting.family.endswith(SPECIALISED) else "generic"
         return simulate(scene, _method(setting.family), times, Limits(code=code, **setting.options))
+
+
+def _has_singular_mass(scene: Scene) -> bool:
+    """Whether a body lacks a moment of inertia: most formulations invert the mass matrix."""
+    given = [np.array(body.inertia, dtype=float) for body in scene.body if body.inertia is not None]
+    moments = [np.linalg.eigvalsh(np.diag(i) if i.ndim == 1 else i) for i in given]
+    return any(m[0] <= ROUNDING * max(m[-1], np.finfo(float).tiny) for m in moments)
 
 
 def _method(family: str) -> Method:

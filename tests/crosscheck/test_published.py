@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from crosscheck.conformance.trial import best_family
+from crosscheck.engine import engine
 from crosscheck.judge.published import BY_SCENE, PUBLISHED
 from crosscheck.judge.reference.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference.motion import Motion
@@ -110,3 +112,12 @@ def test_published_chain_is_as_near_as_its_step_allows():
     ours = 2 * exact.position[0, 0, :2]
     assert abs(problem.values["x"] - ours[0]) < 1e-6
     assert abs(problem.values["y"] - ours[1]) < 1e-6
+
+
+@pytest.mark.parametrize("name", sorted(BY_SCENE))
+def test_the_best_family_of_mbref_runs_every_problem(name):
+    """Bodies without moments of inertia had only families whose mass matrix is then singular."""
+    scene = SCENES[name]()
+    setting = best_family(engine("mbref").settings(scene))[0]
+    run = engine("mbref").run(scene, np.array([0.0, 1e-3]), setting)
+    assert run.outcome is Outcome.COMPLETED, f"{setting.family}: {run.message}"
