@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.published import BY_SCENE, problem_of
 from reports.blocks import Block, Heading, Table, Text
 from reports.runs import Run, SceneRuns, duration, power
 
+LEAST = 1e-14  # below which a measure of a run in double precision is rounding
 HEADER = ("Engine", "Family", "Settings", "Error", "Accepted", "Time")
 
 
@@ -29,7 +31,7 @@ def _table(group: SceneRuns) -> Table:
     name, problem = BY_SCENE[group.scene.name]
     end, rows = group.scene.duration, [_row(group, run) for run in group.best().values()]
     caption = (
-        f"{name}: `{group.scene.name}` to t = {end:g} s. Error: {problem.words}; accepted up to "
+        f"{name}: {group.scene.name} to t = {end:g} s. Error: {problem.words}; accepted up to "
         f"{problem.level}. Source: {problem.source}."
     )
     return Table(caption, HEADER, rows, right=frozenset({3, 5}))
@@ -45,5 +47,14 @@ def _row(group: SceneRuns, run: Run) -> tuple[str, ...]:
     said = "not known" if error is None else "yes" if error <= problem.acceptance else "no"
     if exact is not None and len(exact.times) < len(run.trajectory.times):
         said += f", truth to {exact.times[-1]:.3g} s"
-    shown = power(math.nan if error is None else error)
-    return *run.curve, group.varied_settings(run), shown, said, duration(run.seconds)
+    return *run.curve, group.varied_settings(run), _shown(group, error, run), said, duration(run.seconds)
+
+
+def _shown(group: SceneRuns, error: float | None, run: Run) -> str:
+    """The error for a table cell: ``< 3e-12`` below what the truth, its bound times the length, or
+    rounding may be off."""
+    bound = run.record["metrics"].get("error_bound") or 0.0
+    least = max(LEAST, bound * max(1.0, scene_length(group.scene)))
+    if error is None or error >= least:
+        return power(math.nan if error is None else error)
+    return f"< {least:.0e}"

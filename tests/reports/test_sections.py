@@ -123,10 +123,12 @@ def test_published_problems_and_their_own_measure():
     runs = [
         record("a", "x", 1e-4 / length, 0.1, a_scene=frame),
         record("b", "y", 1e-8 / length, 0.1, a_scene=frame),
+        record("c", "z", 0.0, 0.1, a_scene=frame),
     ]
     found = table(published.render(by_scene(runs, {frame.name: frame})), "Accepted")
-    assert column(found, "Accepted") == {("a", "x"): "no", ("b", "y"): "yes"}
-    assert column(found, "Error") == {("a", "x"): "1.0e-04", ("b", "y"): "1.0e-08"}
+    assert column(found, "Accepted") == {("a", "x"): "no", ("b", "y"): "yes", ("c", "z"): "yes"}
+    errors = {("a", "x"): "1.0e-04", ("b", "y"): "1.0e-08", ("c", "z"): "< 1e-14"}
+    assert column(found, "Error") == errors
     heavier = frame.with_(body=tuple(b.model_copy(update={"mass": 1.0}) for b in frame.body))
     _, text = published.render(by_scene(runs, {frame.name: heavier}))
     assert "No scene of this report is a published problem" in text.text
