@@ -51,7 +51,7 @@ def _row(group: SceneRuns, run: Run) -> tuple[str, ...]:
 
 
 def _shown(group: SceneRuns, error: float | None, run: Run) -> str:
-    """The error for a table cell: ``< 3e-12`` below what rounding and the truth, if it is asked, may be off."""
+    """The error for a table cell: ``< 3e-12`` below what rounding and, if asked, the truth may be off."""
     _, problem = BY_SCENE[group.scene.name]
     asks_truth = problem.measure(group.scene, run.trajectory, None) is None
     bound = run.record["metrics"].get("error_bound") or 0.0  # over the scene's length
