@@ -221,6 +221,14 @@ class History(NamedTuple):
     weights: Annotated[Matrix, 2, KEPT]  # of the nodes in an extrapolation
 
 
+class Gradients(NamedTuple):
+    """Constraint gradients at both ends of a step; without room where the scene has many rows."""
+
+    start: Annotated[Vector, "compared_entries"]  # D of ``SparseFactor`` where the step began
+    row: Annotated[Vector, "compared_columns"]
+    product: Annotated[Matrix, "compared_rows", "compared_rows"]
+
+
 class Loop(NamedTuple):
     """Memory of the stepping loop."""
 
@@ -231,6 +239,7 @@ class Loop(NamedTuple):
     y_rate: Annotated[Vector, "14*nb"]
     y_new: Annotated[Vector, "14*nb"]
     history: History
+    gradients: Gradients
 
 
 class Kernels(NamedTuple):

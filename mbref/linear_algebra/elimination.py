@@ -6,6 +6,8 @@ arrays given by the caller.
 
 from __future__ import annotations
 
+from numpy import log
+
 from mbref.kernels.compilation import kernel
 
 
@@ -49,6 +51,29 @@ def lu_solve(a, n, pivots, b):
         for j in range(n - 1, k, -1):  # the entry found last is used last
             b[k] -= a[k, j] * b[j]
         b[k] /= a[k, k]
+
+
+@kernel
+def determinant(a, n):
+    """The determinant of a[:n, :n]: whether it is negative, and the logarithm of its size; LU in place."""
+    negative, size = False, 0.0
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(a[i, k]) > abs(a[best, k]):
+                best = i
+        if best != k:
+            negative = not negative
+            for j in range(n):
+                a[k, j], a[best, j] = a[best, j], a[k, j]
+        if a[k, k] < 0.0:
+            negative = not negative
+        size += log(max(abs(a[k, k]), 1e-300))
+        for i in range(k + 1, n):
+            factor = a[i, k] / a[k, k] if a[k, k] != 0.0 else 0.0
+            for j in range(k, n):
+                a[i, j] -= factor * a[k, j]
+    return negative, size
 
 
 @kernel

@@ -43,6 +43,7 @@ from mbref.stabilisation.base import Stabilisation
 
 STEPS_PER_CALL = 5_000  # between returns to Python, where an interrupt is heard and progress is told
 MOST_ROWS, RANK = 120, 1e-6  # rows whose rank is found at the start; a singular value that is rounding
+MOST_COMPARED = 60  # rows whose gradients at both ends of a step are compared
 STEPS_WORTH_CODE = 20_000  # steps ahead from which on specialised code saves more than it takes to make
 UNWRAPPED = 1.0  # rad that a body may turn in a step where torsion springs unwrap: two turn less than π apart
 
@@ -103,6 +104,10 @@ class Run:
         algebra = formulation.linear_algebra
         pivots = factor.symbolic.row.size
         sizes = {**model.sizes, "k": self.times.size, "dense_rows": algebra.rows(model.m), "pivots": pivots}
+        compared = pivots <= MOST_COMPARED
+        sizes["compared_rows"] = pivots if compared else 0
+        sizes["compared_entries"] = factor.d.size if compared else 0
+        sizes["compared_columns"] = factor.root.size if compared else 0
         equations = model.equations(
             sizes,
             settings=record(method.settings(self.limits.rank_tolerance)),

@@ -16,14 +16,19 @@ from mbref.equations.coordinates import expand, fastest_turn
 from mbref.equations.evaluation import evaluate
 from mbref.equations.loads import remember_angles
 from mbref.kernels.compilation import kernel
-from mbref.linear_algebra.sparse_cholesky import find_squared_pivots
+from mbref.linear_algebra.elimination import determinant
+from mbref.linear_algebra.sparse_cholesky import assemble, find_squared_pivots
 from mbref.linear_algebra.vectors import copy
-from mbref.stabilisation.projection import factorise_constraints
+from mbref.stabilisation.projection import ALPHA, factorise_constraints
 
 WINDOW = 0.1  # relative pivot below which a singular position is near
 ON_IT = 1e-7  # relative pivot of a run that begins on one: its first step leaves it
 SHARP = 3.0  # times a pivot's fall in the time of a step: a larger pivot has not vanished inside
+STEEP = (
+    2.0  # a pivot's fall a rad: steps inside which one can fall to zero and rise are compared at both ends
+)
 LONG = 0.5  # rad that a body turns in a step inside which pivots are looked at
+SHARPLY, FINE = 0.5, 5  # a pivot's change in a step, as a ratio, inside which as many parts are looked at
 SMALLEST = 1e-4  # pivot of a row below which it is as good as redundant, and is not compared
 
 
@@ -89,7 +94,8 @@ def may_have_passed(h, memory):
 def has_passed(y, memory):
     """Whether a pivot has vanished inside the last step, y being the state at its end.
 
-    Inside a long step the pivots are those at places in between, by Hermite's cubic polynomial.
+    Inside a long step, and one in which a pivot changes much, the pivots are those at places in between, by
+    Hermite's cubic polynomial.
     """
     history, clock, state = memory.loop.history, memory.loop.clock, memory.state
     taken, kept, inside = memory.equations.system.counts.steps, history.time.shape[0], history.inside
@@ -97,7 +103,14 @@ def has_passed(y, memory):
         return False
     now, before = taken % kept, (taken - 1) % kept
     turn = fastest_turn(state.velocities) * (history.time[now] - history.time[before])
-    pieces = min(int(turn / LONG) + 1, inside.shape[0] - 1)
+    if least_sum(history.pivots[before], history.pivots[now]) < STEEP * turn and changes_sign(
+        before, y, memory
+    ):
+        return True
+    pieces = int(turn / LONG) + 1
+    if changes_much(history.pivots[before], history.pivots[now]):
+        pieces = max(pieces, FINE)
+    pieces = min(pieces, inside.shape[0] - 1)
     if pieces == 1:
         return False
     copy(history.pivots[before], inside[0])
@@ -107,6 +120,72 @@ def has_passed(y, memory):
     expand(y, memory.active, state)
     evaluate(clock.time, state.coordinates, state.velocities, memory.equations)
     return falls_and_rises(pieces, inside)
+
+
+@kernel
+def least_sum(before, now):
+    """The least of the sums of a pivot at both ends of a step."""
+    least = 2.0
+    for k in range(now.shape[0]):
+        if min(before[k], now[k]) > SMALLEST:
+            least = min(least, before[k] + now[k])
+    return least
+
+
+@kernel
+def changes_sign(before, y, memory):
+    """Whether det(G₁ G₀ᵀ + I/α) is negative, G₀ and G₁ being the gradients at both ends of the last step.
+
+    It is positive where the rows' span turns by less than a right angle, and changes its sign where the rank
+    drops by one in between.  y is the state at the end, where the scene is evaluated last.
+    """
+    loop, factor = memory.loop, memory.factor
+    if loop.gradients.row.shape[0] == 0:
+        return False
+    start = loop.y_new[: loop.clock.y_size]
+    copy(loop.history.y[before, : loop.clock.y_size], start)
+    put_gradient(loop.history.time[before], start, memory)
+    copy(factor.d, loop.gradients.start)
+    put_gradient(loop.clock.time, y, memory)
+    put_product(factor, loop.gradients)
+    negative, _ = determinant(loop.gradients.product, factor.diagonal.shape[0])
+    return negative
+
+
+@kernel
+def put_gradient(t, y, memory):
+    """D of the factor at time t and state y."""
+    state, equations = memory.state, memory.equations
+    expand(y, memory.active, state)
+    evaluate(t, state.coordinates, state.velocities, equations)
+    assemble(memory.factor, equations.system.blocks.reshape(-1), equations.scene.metric_root, ALPHA)
+
+
+@kernel
+def put_product(factor, gradients):
+    """D D₀ᵀ + I/α, D₀ being where the step began."""
+    start, column, row = factor.symbolic.d_start, factor.symbolic.d_column, gradients.row
+    size = factor.diagonal.shape[0]
+    for i in range(size):
+        row[:] = 0.0
+        for p in range(start[i], start[i + 1]):
+            row[column[p]] = factor.d[p]
+        for j in range(size):
+            value = 0.0
+            for p in range(start[j], start[j + 1]):
+                value += row[column[p]] * gradients.start[p]
+            gradients.product[i, j] = value
+        gradients.product[i, i] += factor.diagonal[i] / ALPHA
+
+
+@kernel
+def changes_much(before, now):
+    """Whether a pivot falls or rises by more than SHARPLY between the ends of a step."""
+    for k in range(now.shape[0]):
+        least, most = min(before[k], now[k]), max(before[k], now[k])
+        if most > SMALLEST and least < SHARPLY * most:
+            return True
+    return False
 
 
 @kernel

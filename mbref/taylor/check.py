@@ -64,7 +64,7 @@ class CheckedRun(Run):
         return max(OFF[0] * rtol, OFF[1]) if self.method.integrator.adaptive else COARSE
 
     def _distances(self, other: Run, samples: int) -> np.ndarray:
-        """The largest distance (k,) of a body at each of the first samples: over the scene's length, or rad."""
+        """The largest distance (k,) of a body at each of the first samples: over the length, or rad."""
         mine, theirs = (run.memory.loop.samples.coordinates[:samples] for run in (self, other))
         mine, theirs = mine.reshape(samples, -1, 7), theirs.reshape(samples, -1, 7)
         places = np.linalg.norm(mine[..., :3] - theirs[..., :3], axis=-1) / scene_length(self.model)

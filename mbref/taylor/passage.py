@@ -13,10 +13,11 @@
 
 from __future__ import annotations
 
-from numpy import log
+from numpy import exp, log
 
 from mbref.kernels.compilation import kernel
 from mbref.kernels.layout import OK
+from mbref.linear_algebra.elimination import determinant
 from mbref.linear_algebra.vectors import copy
 from mbref.simulation.stepping import SINGULAR_AHEAD, STEP_TOO_SMALL, UNDECIDED
 from mbref.taylor.samples import evaluate_series
@@ -32,6 +33,7 @@ ACROSS = 1e-13  # of a step that crosses
 CLOCK = 3e-16  # of the time: its rounding, over which drivers and variables move
 DEEPEST = 0.2  # of a step's first pivot: its last is not less, so that the next is not the worse for it
 VANISHING = log(0.2)  # of a determinant over its values at both ends, that falls and rises linearly
+ILLINOIS, VANISHED = 60, 1e-15  # iterations, and a determinant over that at the beginning of its step
 LEAST = 1e-9  # pivot over its largest below which the branch depends on rounding
 
 
@@ -97,29 +99,6 @@ def overlap(y, memory):
 
 
 @kernel
-def determinant(a, n):
-    """Sign (whether negative) and logarithm of the leading n x n block's, which becomes its LU factor."""
-    negative, size = False, 0.0
-    for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if abs(a[i, k]) > abs(a[best, k]):
-                best = i
-        if best != k:
-            negative = not negative
-            for j in range(n):
-                a[k, j], a[best, j] = a[best, j], a[k, j]
-        if a[k, k] < 0.0:
-            negative = not negative
-        size += log(max(abs(a[k, k]), 1e-300))
-        for i in range(k + 1, n):
-            factor = a[i, k] / a[k, k] if a[k, k] != 0.0 else 0.0
-            for j in range(k, n):
-                a[i, j] -= factor * a[k, j]
-    return negative, size
-
-
-@kernel
 def turns_back(memory):
     """Whether the rates of the variables at both ends of a step point against each other."""
     past, terms, along = memory.series.past, memory.series.terms, 0.0
@@ -145,6 +124,33 @@ def has_crossed(h, pivot, memory):
     _, between = overlap(memory.state, memory)
     evaluate_series(h, memory)
     return between < VANISHING + min(before, behind)
+
+
+@kernel
+def find_crossing(h, memory):
+    """The time (s, from its beginning) at which a step of h seconds that crossed met the singular position.
+
+    There the determinant vanishes: by the Illinois method; where it keeps its sign, as if it fell and rose
+    linearly.
+    """
+    progress = memory.progress
+    negative, size = overlap(memory.series.terms, memory)
+    _, first = overlap(memory.series.past, memory)
+    start, end, before, after = 0.0, h, 1.0, -exp(size - first)
+    if not negative:
+        return h * progress.past_pivot / (progress.past_pivot + least_pivot(memory))
+    for _ in range(ILLINOIS):
+        middle = (start * after - end * before) / (after - before)
+        evaluate_series(middle, memory)
+        negative, size = overlap(memory.state, memory)
+        value = exp(size - first)
+        if negative:
+            end, after, before = middle, -value, 0.5 * before
+        else:
+            start, before, after = middle, value, 0.5 * after
+        if value <= VANISHED:
+            break
+    return start if before < -after else end
 
 
 @kernel

@@ -30,6 +30,7 @@ from mbref.taylor.passage import (
     AHEAD,
     exactness,
     exactness_across,
+    find_crossing,
     judge_branch,
     least_pivot,
     remember_pivots,
@@ -240,7 +241,7 @@ def step(memory):
     put_angles(h, memory)
     counts.steps += 1
     counts.crossings += progress.crossed
-    clock.time = now
+    clock.time, clock.length = now, h
     return OK
 
 
@@ -281,6 +282,33 @@ def clearance(memory):
     project_state(run.loop.clock.time, run)
     ahead = CLEAR * AHEAD * progress.largest_pivot
     return min(relative_pivot(run.watch) / (LEAVE * WINDOW), least_pivot(memory) / ahead)
+
+
+@entry(FLOAT(Named(TaylorMemory)))
+def place_crossing(memory):
+    """How long (s) before the last step's end it crossed; the state there."""
+    length = memory.run.loop.clock.length
+    h = find_crossing(length, memory)
+    put_state_at(h, memory)
+    return length - h
+
+
+@entry(INT(FLOAT, Named(TaylorMemory)))
+def look_along(h, memory):
+    """The state at a distance h (s) from where the series now begins."""
+    series = memory.series
+    for j in range(0, series.terms.shape[0] * series.terms.shape[1], LANES):
+        store(load(series.terms, j), series.past, j)
+    put_state_at(h, memory)
+    return OK
+
+
+@kernel
+def put_state_at(h, memory):
+    """Coordinates and velocities of all bodies at a distance h (s) from the step's beginning."""
+    evaluate_series(h, memory)
+    find_poses(memory)
+    put_state(memory)
 
 
 @kernel

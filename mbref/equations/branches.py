@@ -1,0 +1,167 @@
+"""The branches of motion that meet at a singular position, to second order.
+
+Where the rank of Φ_q drops, velocities have a freedom more, and each left null vector w of Φ_q leaves an
+equation of second order, wᵀ γ(q, v, t) = 0: the quadratic cone of A. Müller (Mech. Mach. Theory 2016) and
+P. C. López-Custodio et al. (2020).  With time as one more coordinate, u = (v, t'), both are homogeneous:
+[Φ_q  -ν] u = 0 and wᵀ (γ₂(v, v) + t' γ₁(v) + t'² γ₀) = 0.  Two directions of one freedom each are two
+branches that cross; a double one is a common tangent, which higher orders tell apart.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mbref.equations.model import Model
+
+RANK = 1e-6  # relative singular value that is zero at a singular position
+FLAT = 1e-7  # relative size of a quadratic form that is zero
+SAME = 1e-4  # rad between directions that are one
+STARTS, ITERATIONS = 200, 40  # of Newton's method where more than two freedoms meet
+
+SMOOTH = "the smooth branch only"
+ALONE = "one branch"
+OPEN = "all directions agree with the constraints to second order"
+TANGENT = "branches with a common tangent, which second order does not tell apart"
+CONE = "a cone of directions, of which the smooth one is listed"
+
+
+class Branches(NamedTuple):
+    """Velocities (b, n) of the branches, that of the motion first, and what second order says of them."""
+
+    velocities: np.ndarray
+    sentence: str
+
+
+class SecondOrder(NamedTuple):
+    """Directions (n + 1, d) allowed by the constraints to first order, and the forms (c, d, d) of second."""
+
+    kernel: np.ndarray
+    forms: np.ndarray
+    scale: np.ndarray  # of velocities and time: columns of unit length
+
+
+def branches(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Branches:
+    """The branches at a singular position, q (7 nb,) at t (s), which a motion passes with velocities v (n,).
+
+    Drivers prescribe a branch's velocities; without any, all have the kinetic energy of v.
+    """
+    found = second_order(model, t, q, v)
+    freedoms = found.kernel.shape[1]
+    mine = _direction(found, v)
+    if freedoms < 2:
+        return Branches(v[None], SMOOTH)
+    if not len(found.forms):
+        return Branches(v[None], OPEN)
+    roots = _roots(found.forms[0]) if freedoms == 2 else _roots_of_many(found.forms)
+    if roots is None:
+        return Branches(v[None], CONE)
+    roots = [a for a in roots if np.abs(_values(found.forms, a)).max() < SAME]
+    velocities = [_velocity(model, found, a, v) for a in roots if _angle(a, mine) > SAME]
+    velocities = [w for w in velocities if w is not None]
+    if freedoms == 2 and len(found.forms) == 1 and len(roots) == 1:
+        return Branches(v[None], TANGENT)
+    return Branches(np.array([v, *velocities]), f"{1 + len(velocities)} branches" if velocities else ALONE)
+
+
+def second_order(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> SecondOrder:
+    """The constraints at q (7 nb,) to second order: rows of unit length, columns by the lengths of bodies.
+
+    Time is scaled by the velocities v (n,), and left out where nothing depends on it.
+    """
+    at_rest = model.terms(t, q, np.zeros(model.n))
+    lengths = np.column_stack([np.ones((model.nb, 3)), np.tile(1.0 / model.data.lengths[:, None], 3)]).ravel()
+    rows = np.linalg.norm(at_rest.jacobian * lengths, axis=1)
+    rows = np.where(rows > 0, rows, 1.0)
+    driven = bool(np.any(at_rest.nu) or np.any(at_rest.gamma))
+    scale = np.append(lengths, 1.0 / (np.linalg.norm(v / lengths) or 1.0) if driven else 0.0)
+    first = np.column_stack([at_rest.jacobian, -at_rest.nu]) * scale / rows[:, None]
+    left, values, right = np.linalg.svd(first if driven else first[:, :-1])
+    rank = int(np.sum(values > RANK * values[0]))
+    kernel = right[rank:].T if driven else np.vstack([right[rank:].T, np.zeros(len(right) - rank)])
+    null = left[:, rank:].T / rows
+    return SecondOrder(kernel, _independent(_forms(model, t, q, kernel * scale[:, None], null)), scale)
+
+
+def _forms(model: Model, t: float, q: np.ndarray, directions: np.ndarray, null: np.ndarray) -> np.ndarray:
+    """wᵀ γ as quadratic forms (c, d, d) of d directions (n + 1, d), for c left null vectors (c, m)."""
+    d, at_rest = directions.shape[1], model.terms(t, q, np.zeros(model.n)).gamma
+
+    def rate(u: np.ndarray) -> np.ndarray:
+        """Second order along u (n + 1,): γ₂ + t' γ₁ + t'² γ₀."""
+        there, back = (model.terms(t, q, sign * u[:-1]).gamma for sign in (1.0, -1.0))
+        even, odd = (there + back) / 2 - at_rest, (there - back) / 2
+        return even + u[-1] * odd + u[-1] ** 2 * at_rest
+
+    forms = np.zeros((len(null), d, d))
+    for i in range(d):
+        for j in range(i + 1):
+            one, other = directions[:, i], directions[:, j]
+            forms[:, i, j] = forms[:, j, i] = null @ (rate(one + other) - rate(one - other)) / 4
+    return forms
+
+
+def _independent(forms: np.ndarray) -> np.ndarray:
+    """As few forms as have the same zeros, of unit size."""
+    count, d, _ = forms.shape
+    _, sizes, right = np.linalg.svd(forms.reshape(count, d * d), full_matrices=False)
+    return right[sizes > FLAT * max(1.0, sizes.max(initial=0.0))].reshape(-1, d, d)
+
+
+def _values(forms: np.ndarray, a: np.ndarray) -> np.ndarray:
+    return np.einsum("kij,i,j->k", forms, a, a)
+
+
+def _angle(a: np.ndarray, b: np.ndarray) -> float:
+    """The angle (rad) between two lines."""
+    return float(np.arccos(min(1.0, abs(a @ b))))
+
+
+def _roots(form: np.ndarray) -> list[np.ndarray]:
+    """The lines through the origin on which a form of two variables is zero: none, a double one, or two."""
+    values, axes = np.linalg.eigh(form)
+    if values[0] * values[1] > SAME**2:
+        return []
+    tangent = np.sqrt(max(0.0, -values[0] / values[1])) if values[1] > -values[0] else None
+    weights = (1.0, tangent) if tangent is not None else (np.sqrt(max(0.0, -values[1] / values[0])), 1.0)
+    lines = [axes @ (np.array([weights[0], sign * weights[1]])) for sign in (1.0, -1.0)]
+    lines = [a / np.linalg.norm(a) for a in lines]
+    return lines[:1] if _angle(*lines) < SAME else lines
+
+
+def _roots_of_many(forms: np.ndarray) -> list[np.ndarray] | None:
+    """Lines on which all forms are zero, by Newton's method from random starts; None where they are no
+    isolated lines."""
+    d, random, found = forms.shape[1], np.random.default_rng(0), []
+    for _ in range(STARTS):
+        a = random.normal(size=d)
+        for _ in range(ITERATIONS):
+            a /= np.linalg.norm(a)
+            slopes = 2.0 * forms @ a
+            a = a - np.linalg.lstsq(slopes, _values(forms, a), rcond=None)[0]
+        a /= np.linalg.norm(a)
+        if np.abs(_values(forms, a)).max() > 1e-12 or any(_angle(a, b) < SAME for b in found):
+            continue
+        if np.linalg.matrix_rank(2.0 * forms @ a, tol=SAME) < d - 1:
+            return None
+        found.append(a)
+    return found
+
+
+def _direction(found: SecondOrder, v: np.ndarray) -> np.ndarray:
+    """The direction (d,) of unit length of a motion's velocities."""
+    scale = np.where(found.scale > 0, found.scale, 1.0)
+    u = np.append(v, float(found.scale[-1] > 0)) / scale
+    a = found.kernel.T @ u
+    return a / (np.linalg.norm(a) or 1.0)
+
+
+def _velocity(model: Model, found: SecondOrder, a: np.ndarray, v: np.ndarray) -> np.ndarray | None:
+    """The velocities (n,) of a branch; None for one on which time stands still."""
+    u = (found.kernel @ a) * found.scale
+    if found.scale[-1] > 0:
+        return u[:-1] / u[-1] if abs(u[-1]) > SAME * np.linalg.norm(u) else None
+    energy, own = v @ (model.mass * v), u[:-1] @ (model.mass * u[:-1])
+    along = v @ (model.mass * u[:-1])
+    return u[:-1] * np.sqrt(energy / own) * (1.0 if along >= 0 else -1.0)
