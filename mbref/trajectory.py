@@ -44,6 +44,38 @@ class Cost:
 
 
 @dataclass(frozen=True)
+class Crossing:
+    """A singular position that a run passed at a time (s), and the branches of motion that meet there.
+
+    ``position`` (nb, 3), m, and ``orientation`` (nb, 4) of the bodies; ``velocity`` and ``angular_velocity``
+    (b, nb, 3), world, on each of the b branches to second order, the smooth one first.  The run took
+    branch ``taken``, counted from 1; ``sentence`` says how many there are, or why they cannot be told.
+    """
+
+    time: float
+    position: np.ndarray
+    orientation: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+    taken: int
+    sentence: str
+
+    def to_record(self) -> dict[str, Any]:
+        """The crossing as numbers, lists and text."""
+        arrays = ("position", "orientation", "velocity", "angular_velocity")
+        return {
+            "time": self.time, "taken": self.taken, "sentence": self.sentence,
+            **{key: getattr(self, key).tolist() for key in arrays},
+        }  # fmt: skip
+
+    @staticmethod
+    def from_record(record: Mapping[str, Any]) -> Crossing:
+        """The crossing that a record was made of."""
+        arrays = {key: np.array(v, dtype=float) for key, v in record.items() if isinstance(v, list)}
+        return Crossing(**{**record, **arrays})
+
+
+@dataclass(frozen=True)
 class BodyMotion:
     """One body's share of a trajectory: the rows (k, …) of its arrays, in the same frames and units."""
 
@@ -71,7 +103,8 @@ class Trajectory:
     quaternions (w, x, y, z), body to world.  ``acceleration`` and ``angular_acceleration``
     (k, nb, 3, world) and ``reactions`` are None where the engine does not give them.
     ``reactions[joint]`` (k, 6) is the force and the moment (world) on the joint's second body at the
-    anchor on that body, the driver's share included.
+    anchor on that body, the driver's share included.  ``crossings`` are the singular positions passed; None
+    where the engine, or the method, does not look for them.
     """
 
     scene: str
@@ -92,6 +125,7 @@ class Trajectory:
     t_end: float = 0.0
     message: str = ""
     cost: Cost = field(default_factory=Cost)
+    crossings: tuple[Crossing, ...] | None = None
 
     def __repr__(self) -> str:
         return (
@@ -139,6 +173,7 @@ class Trajectory:
                 for b, name in enumerate(self.bodies)
             },
             "reactions": {k: np.asarray(v).tolist() for k, v in (self.reactions or {}).items()},
+            "crossings": None if self.crossings is None else [c.to_record() for c in self.crossings],
             "metrics": {},
             "cost": {f.name: getattr(self.cost, f.name) for f in fields(Cost)},
         }
@@ -147,7 +182,7 @@ class Trajectory:
     def from_record(scene: str, record: Mapping[str, Any]) -> Trajectory:
         """The trajectory a record was made of."""
         names = tuple(record["bodies"])
-        k = len(record["times"])
+        k, crossings = len(record["times"]), record.get("crossings")
 
         def stacked(key: str, width: int) -> np.ndarray:
             rows = [record["bodies"][name][key] for name in names]
@@ -172,4 +207,5 @@ class Trajectory:
             reactions=reactions or None,
             outcome=Outcome[record["outcome"]],
             cost=Cost(**record["cost"]),
+            crossings=None if crossings is None else tuple(Crossing.from_record(c) for c in crossings),
         )

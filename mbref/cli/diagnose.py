@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from mbref.design.along_motion import AlongMotion
     from mbref.equations.diagnosis import Diagnosis
 
+LISTED = 5  # singular positions of a motion
+
 
 def add(commands: Any) -> None:
     """The command's grammar."""
@@ -79,7 +81,9 @@ def _record(
     scene: Scene, found: Diagnosis, along: AlongMotion | str | None, swaps: list[dict[str, str]]
 ) -> dict[str, Any]:
     beyond = {key: value for key, value in asdict(found).items() if key != "counts"}
-    motion = {"why_not": along} if isinstance(along, str) else along and asdict(along)
+    motion: dict[str, Any] | None = {"why_not": along} if isinstance(along, str) else None
+    if along is not None and not isinstance(along, str):
+        motion = asdict(along) | {"crossings": [crossing.to_record() for crossing in along.crossings]}
     return {
         "scene": scene.name, "ground": scene.ground, "links": link_lengths(scene), **asdict(found.counts),
         **beyond, "along_motion": motion, "exchanges": swaps,
@@ -126,6 +130,15 @@ def _motion_lines(along: AlongMotion | str | None) -> list[str]:
         f"    nearest singular    at t = {along.nearest_time:.3g} s, {along.nearest:.3g} away"
         + (" (passed, or nearly)" if along.nearest < 1e-3 else ""),
     ]
+    shown = along.crossings[:LISTED]
+    lines += [f"    singular position   at t = {c.time:.6g} s: {c.sentence}" for c in shown]
+    if len(along.crossings) > LISTED:
+        lines.append(f"    singular positions  {len(along.crossings)} in all")
+    if along.shaky:
+        lines.append(
+            "    shaky               freedoms of first order that second order takes away, at every pose:\n"
+            "                        rows are dependent that are no redundancy, and an engine may let it move"
+        )
     if along.by_rounding:
         sizes = ", ".join(f"{s:.1g}" for s in along.by_rounding)
         lines.append(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -74,11 +75,15 @@ def sample_times(options: argparse.Namespace, scene: Scene) -> np.ndarray:
     return times
 
 
-def limits_of(options: argparse.Namespace) -> Limits:
-    """The limits; ValueError names their field, which is the option's but for --max-step."""
+def limits_of(options: argparse.Namespace, branches: Mapping[int, int] | None = None) -> Limits:
+    """The limits; ValueError names their field, which is the option's but for --max-step and --branch."""
     from mbref.simulation.limits import Limits
 
     try:
-        return Limits(rtol=options.rtol, largest_step=options.max_step, code=options.code)
+        return Limits(
+            rtol=options.rtol, largest_step=options.max_step, code=options.code, branches=branches or {}
+        )
     except ValueError as error:
-        raise ValueError(f"--{error}".replace("largest_step", "max-step")) from None
+        raise ValueError(
+            f"--{error}".replace("largest_step", "max-step").replace("branches", "branch")
+        ) from None

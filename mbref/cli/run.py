@@ -13,6 +13,8 @@ from mbref.scene import Scene
 from mbref.scenes import find_scene
 from mbref.trajectory import Trajectory
 
+SHOWN = 10  # singular positions in the text; --json has all
+
 
 def add(commands: Any) -> None:
     """The command's grammar."""
@@ -23,6 +25,7 @@ def add(commands: Any) -> None:
         "  mbref run planar_slider_crank --method mpi-svd+projection --times 0.1,0.2,0.4 --rtol 1e-11\n"
         "  mbref run four_bar --method mpi-svd+partitioning --duration 0.02 --json\n"
         "  mbref run mechanism.toml --method lm1+baumgarte[alpha=10,beta=10]/rk4[step=1e-4]\n"
+        "  mbref run four_bar --duration 0.1 --branch 2=2\n"
         "  mbref run mechanism.toml --out run.csv",
     )  # fmt: skip
     add_scene(run)
@@ -31,12 +34,21 @@ def add(commands: Any) -> None:
         "--out", metavar="FILE", help="write the whole motion: .csv is a table of columns, .json what\n"
         "mbref.Motion.load reads",
     )  # fmt: skip
+    run.add_argument(
+        "--branch", action="append", metavar="CROSSING=BRANCH", default=[],
+        help="at a singular position, counted from 1, take another branch than the smooth one, which is 1;\n"
+        "a run lists the branches at every crossing; e.g. --branch 2=2.  May be repeated",
+    )  # fmt: skip
     run.set_defaults(action=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
     scene = find_scene(options.scene)
-    times, limits, write = sample_times(options, scene), limits_of(options), _writer(options.out)
+    times, limits, write = (
+        sample_times(options, scene),
+        limits_of(options, _branches(options.branch)),
+        _writer(options.out),
+    )
     from mbref.simulation.simulate import simulate
 
     warn(scene)
@@ -49,6 +61,15 @@ def _run(options: argparse.Namespace) -> int:
     else:
         show(scene, motion)
     return 0 if motion.outcome.name == "COMPLETED" else 1
+
+
+def _branches(words: list[str]) -> dict[int, int]:
+    """Branch by crossing; ValueError for a word that is no such pair."""
+    try:
+        pairs = [word.split("=") for word in words]
+        return {int(crossing): int(branch) for crossing, branch in pairs}
+    except ValueError:
+        raise ValueError(f"--branch: must be CROSSING=BRANCH, such as 2=2, got {' '.join(words)!r}") from None
 
 
 def _writer(out: str | None) -> Any:
@@ -72,6 +93,11 @@ def show(scene: Scene, trajectory: Trajectory) -> None:
         f"{cost.factorisations} factorisations, {cost.newton} Newton iterations\n"
         f"{cost.seconds:.3g} s of stepping, {cost.build_seconds:.2g} s of building"
     )
+    for number, crossing in enumerate((trajectory.crossings or ())[:SHOWN], 1):
+        out.print(
+            f"singular position {number} at t = {crossing.time:.6g} s: {crossing.sentence}, "
+            f"number {crossing.taken} taken"
+        )
     if not trajectory.times.size:
         return
 

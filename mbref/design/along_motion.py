@@ -7,18 +7,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbref import rotations
+from mbref.equations.branches import MOST_ROWS as MOST_BRANCHED
+from mbref.equations.branches import second_order
 from mbref.equations.diagnosis import RANK_TOLERANCE, scaled_jacobian
 from mbref.equations.initial_state import consistent_start, solve_positions
 from mbref.equations.model import Model, displaced
 from mbref.method import DEFAULT
+from mbref.motion import Motion
 from mbref.scene import Scene, SceneError
 from mbref.simulation.simulate import Limits, simulate
+from mbref.trajectory import Crossing
 
 SAMPLES = 61
 ROUNDING = (
     1e-5  # singular values below it (relative) at every pose are taken for rounding of the file's numbers
 )
 MOST_ROWS = 300  # beyond it dense singular values at every pose take too long
+POSES = 5  # at which freedoms are looked at to second order
 MOST_STEPS = 20_000  # a motion that creeps is told as far as it gets
 
 
@@ -28,6 +33,8 @@ class AlongMotion:
 
     ``rank`` is that of most poses, ``redundant`` the rows beyond it.  ``by_rounding`` singular values are
     small at every pose but not zero: rows that would be redundant but for rounding in the scene's numbers.
+    ``crossings`` are the singular positions that the motion passes; ``shaky`` tells whether second order
+    takes away freedoms of first order at every pose: they are none (A. Müller, Mech. Mach. Theory 2016).
     ``nearest`` is the least distance to a singular position, at time ``nearest_time`` (s).
     """
 
@@ -38,6 +45,8 @@ class AlongMotion:
     by_rounding: tuple[float, ...]
     nearest: float
     nearest_time: float
+    crossings: tuple[Crossing, ...]
+    shaky: bool
 
 
 def along_motion(scene: Scene) -> AlongMotion:
@@ -54,7 +63,7 @@ def along_motion(scene: Scene) -> AlongMotion:
     if not motion.times.size:
         raise SceneError([f"scene: the motion could not begin: {motion.message}"])
     values = _singular_values(model, motion.times, motion.position, motion.orientation)
-    return _summary(model, motion.times, values, bool(np.ptp(motion.position, axis=0).any()))
+    return _summary(model, motion, values)
 
 
 def _singular_values(
@@ -77,16 +86,32 @@ def coordinates(model: Model, position: np.ndarray, orientation: np.ndarray) -> 
     return q.reshape(len(position), -1)
 
 
-def _summary(model: Model, times: np.ndarray, values: np.ndarray, moves: bool) -> AlongMotion:
+def _is_shaky(model: Model, motion: Motion) -> bool:
+    """Whether equations of second order restrict the freedoms of first order at every pose looked at."""
+    if model.m > MOST_BRANCHED:
+        return False
+    chosen = np.linspace(0, len(motion.times) - 1, POSES).round().astype(int)
+    poses = coordinates(model, motion.position[chosen], motion.orientation[chosen])
+    at_rest = np.zeros(model.n)
+    orders = (
+        second_order(model, float(t), q, at_rest) for t, q in zip(motion.times[chosen], poses, strict=True)
+    )
+    return all(len(order.forms) for order in orders)
+
+
+def _summary(model: Model, motion: Motion, values: np.ndarray) -> AlongMotion:
+    times = motion.times
     ranks = np.sum(values > ROUNDING, axis=1)
     rank = int(ranks.max(initial=0))
     small = values[:, rank:].max(axis=0, initial=0.0)
     nearest = values[:, rank - 1] if rank else np.zeros(len(times))
     at = int(np.argmin(nearest))
     return AlongMotion(
-        end=float(times[-1]), moves=moves, rank=rank, redundant=model.m - rank,
+        end=float(times[-1]), moves=bool(np.ptp(motion.position, axis=0).any()),
+        rank=rank, redundant=model.m - rank,
         by_rounding=tuple(small[small > RANK_TOLERANCE].tolist()),
-        nearest=float(nearest[at]), nearest_time=float(times[at]),
+        nearest=float(nearest[at]), nearest_time=float(times[at]), crossings=motion.crossings or (),
+        shaky=_is_shaky(model, motion),
     )  # fmt: skip
 
 

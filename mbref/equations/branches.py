@@ -15,15 +15,18 @@ import numpy as np
 
 from mbref.equations.model import Model
 
+SMOOTH = 1  # the branch that is taken unless another is asked for
+MOST_ROWS = 120  # beyond it the singular values of a crossing take longer than the run
 RANK = 1e-6  # relative singular value that is zero at a singular position
 FLAT = 1e-7  # relative size of a quadratic form that is zero
 SAME = 1e-4  # rad between directions that are one
 STARTS, ITERATIONS = 200, 40  # of Newton's method where more than two freedoms meet
 
-SMOOTH = "the smooth branch only"
+NO_OTHER = "the smooth branch only"
 ALONE = "one branch"
 OPEN = "all directions agree with the constraints to second order"
 TANGENT = "branches with a common tangent, which second order does not tell apart"
+NOT_LOOKED_FOR = f"branches of scenes with more than {MOST_ROWS} rows are not looked for"
 CONE = "a cone of directions, of which the smooth one is listed"
 
 
@@ -31,6 +34,19 @@ class Branches(NamedTuple):
     """Velocities (b, n) of the branches, that of the motion first, and what second order says of them."""
 
     velocities: np.ndarray
+    sentence: str
+
+
+class SingularPosition(NamedTuple):
+    """A crossing at a time (s): coordinates (7 nb,), velocities (b, n) of the branches, and the one taken.
+
+    The first branch is the smooth one; ``taken`` counts from 1.
+    """
+
+    time: float
+    coordinates: np.ndarray
+    velocities: np.ndarray
+    taken: int
     sentence: str
 
 
@@ -51,7 +67,7 @@ def branches(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Branches:
     freedoms = found.kernel.shape[1]
     mine = _direction(found, v)
     if freedoms < 2:
-        return Branches(v[None], SMOOTH)
+        return Branches(v[None], NO_OTHER)
     if not len(found.forms):
         return Branches(v[None], OPEN)
     roots = _roots(found.forms[0]) if freedoms == 2 else _roots_of_many(found.forms)
@@ -105,6 +121,8 @@ def _forms(model: Model, t: float, q: np.ndarray, directions: np.ndarray, null: 
 def _independent(forms: np.ndarray) -> np.ndarray:
     """As few forms as have the same zeros, of unit size."""
     count, d, _ = forms.shape
+    if not forms.size:
+        return np.zeros((0, d, d))
     _, sizes, right = np.linalg.svd(forms.reshape(count, d * d), full_matrices=False)
     return right[sizes > FLAT * max(1.0, sizes.max(initial=0.0))].reshape(-1, d, d)
 
@@ -165,3 +183,15 @@ def _velocity(model: Model, found: SecondOrder, a: np.ndarray, v: np.ndarray) ->
     energy, own = v @ (model.mass * v), u[:-1] @ (model.mass * u[:-1])
     along = v @ (model.mass * u[:-1])
     return u[:-1] * np.sqrt(energy / own) * (1.0 if along >= 0 else -1.0)
+
+
+def singular_position(model: Model, t: float, q: np.ndarray, v: np.ndarray, taken: int) -> SingularPosition:
+    """The branches at a crossing that a motion passes at time t (s) with coordinates q and velocities v.
+
+    Raises ValueError where a branch is to be taken that is not there.
+    """
+    large = model.m > MOST_ROWS
+    found = Branches(v[None], NOT_LOOKED_FOR) if large else branches(model, t, q, v)
+    if taken > len(found.velocities):
+        raise ValueError(f"branches: the crossing at t = {t:.6g} s has no branch {taken}: {found.sentence}")
+    return SingularPosition(t, q, found.velocities, taken, found.sentence)

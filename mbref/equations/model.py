@@ -250,6 +250,13 @@ def displaced(q: np.ndarray, x: np.ndarray) -> np.ndarray:
     return moved
 
 
+def displacement(q: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """The small (δr, δπ') per body (6 nb,) that displaces coordinates (7 nb,) to others, to first order."""
+    here, there = q.reshape(-1, 7), target.reshape(-1, 7)
+    turn = 2.0 * rotations.multiply(rotations.conjugate(here[:, 3:]), there[:, 3:])
+    return np.concatenate([there[:, :3] - here[:, :3], np.sign(turn[:, :1]) * turn[:, 1:]], axis=1).ravel()
+
+
 def _with_ground(scene: Scene) -> tuple[tuple[Body, ...], tuple[Joint, ...]]:
     """Bodies and joints, the ground a body held by six rows where the scene asks for it."""
     if scene.ground == "frame":

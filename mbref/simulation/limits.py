@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -29,6 +30,9 @@ INTERVALS = {
 COUNTS = {"most_steps": (1, MOST)}
 
 
+Branches = Mapping[int, int] | tuple[tuple[int, int], ...]  # by crossing, or pairs, as Limits keep them
+
+
 @dataclass(frozen=True)
 class Limits:
     """Tolerances, steps and code of a run; raises ValueError naming a field that is out of its interval.
@@ -47,6 +51,7 @@ class Limits:
     largest_turn: float = 0.0  # rad that the fastest body may turn in an adaptive step; 0: a safe angle
     most_steps: int = 5_000_000
     compared: bool = True  # whether a run without projection is compared with Taylor series at its end
+    branches: Branches = ()  # to take at crossings, both counted from 1; else the smooth one
     code: str = AUTO  # GENERIC kernels, SPECIALISED to the scene, or AUTO: where many steps are ahead
 
     def __post_init__(self) -> None:
@@ -63,9 +68,24 @@ def _checked(name: str, value: Any) -> Any:
         if not isinstance(value, bool):
             raise ValueError(f"compared: must be True or False, got {shown(value)}")
         return value
+    if name == "branches":
+        return _pairs(value)
     if name in COUNTS:
         return _count(name, value, *COUNTS[name])
     return None if name == "atol" and value is None else _number(name, value, *INTERVALS[name])
+
+
+def _pairs(value: Any) -> tuple[tuple[int, int], ...]:
+    """Pairs of whole numbers from 1, of a mapping or of pairs."""
+    try:
+        pairs = value.items() if isinstance(value, Mapping) else value
+        return tuple(
+            (operator.index(crossing), _count("branches", branch, 1, MOST)) for crossing, branch in pairs
+        )
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"branches: must be pairs of a crossing and a branch, counted from 1, got {shown(value)}"
+        ) from None
 
 
 def _number(name: str, value: Any, least: float, largest: float, zero: bool) -> float:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
+import numpy as np
+
 from mbref import __version__
 from mbref.equations.joint_reactions import reactions
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR
 from mbref.motion import Motion
 from mbref.simulation.run import Run
 from mbref.simulation.stepping import DONE, LEFT_MOTION, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED, VIOLATED
-from mbref.trajectory import Cost, Outcome
+from mbref.trajectory import Cost, Crossing, Outcome
 
 OUTCOMES = {
     DONE: Outcome.COMPLETED,
@@ -45,6 +47,7 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion
         outcome=OUTCOMES[status],
         t_end=float(loop.clock.time),
         message=_message(run, status),
+        crossings=_crossings(run),
         cost=Cost(
             seconds,
             built,
@@ -55,6 +58,29 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion
             int(counts.newton),
         ),
     )
+
+
+def _crossings(run: Run) -> tuple[Crossing, ...] | None:
+    """The singular positions passed, in the scene's frames; None for a method that does not look for them."""
+    if not run.method.stabilisation.projects:
+        return None
+    found = []
+    for crossing in run.crossings:
+        v = crossing.velocities.reshape(len(crossing.velocities), -1, 6)
+        q = np.broadcast_to(crossing.coordinates.reshape(-1, 7), (len(v), v.shape[1], 7))
+        motion = run.model.motion(q, v, np.zeros_like(v))
+        found.append(
+            Crossing(
+                crossing.time,
+                motion["position"][0],
+                motion["orientation"][0],
+                motion["velocity"],
+                motion["angular_velocity"],
+                crossing.taken,
+                crossing.sentence,
+            )
+        )
+    return tuple(found)
 
 
 def _message(run: Run, status: int) -> str:

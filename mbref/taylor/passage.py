@@ -130,27 +130,27 @@ def has_crossed(h, pivot, memory):
 def find_crossing(h, memory):
     """The time (s, from its beginning) at which a step of h seconds that crossed met the singular position.
 
-    There the determinant vanishes: by the Illinois method; where it keeps its sign, as if it fell and rose
-    linearly.
+    There the determinant vanishes, which the Illinois method finds; where it keeps its sign, it is taken to
+    fall and rise linearly.
     """
     progress = memory.progress
     negative, size = overlap(memory.series.terms, memory)
     _, first = overlap(memory.series.past, memory)
-    start, end, before, after = 0.0, h, 1.0, -exp(size - first)
     if not negative:
         return h * progress.past_pivot / (progress.past_pivot + least_pivot(memory))
+    start, end, before, after = 0.0, h, 1.0, -exp(size - first)
     for _ in range(ILLINOIS):
         middle = (start * after - end * before) / (after - before)
         evaluate_series(middle, memory)
         negative, size = overlap(memory.state, memory)
         value = exp(size - first)
+        if value <= VANISHED:
+            return middle
         if negative:
             end, after, before = middle, -value, 0.5 * before
         else:
             start, before, after = middle, value, 0.5 * after
-        if value <= VANISHED:
-            break
-    return start if before < -after else end
+    return 0.5 * (start + end)
 
 
 @kernel

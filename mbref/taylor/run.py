@@ -11,16 +11,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
-from mbref.kernels.layout import OK, Counts
+from mbref.kernels.layout import OK
 from mbref.method import Method
 from mbref.scene import Scene
 from mbref.simulation.limits import GENERIC, Limits
 from mbref.simulation.run import Run
 from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, TOO_MANY_STEPS, UNDECIDED
+from mbref.taylor.moment import Moment, enter, moment_of, put_counts
+from mbref.taylor.passing_run import PassingRun
 from mbref.taylor.series_run import SeriesRun
 
 TOLERANCE = 1e-13  # of the series that pass singular positions
@@ -73,7 +74,7 @@ class Passage:
 
     def __init__(self, run: Run):
         self._run = run
-        self._made: SeriesRun | None = None
+        self._made: PassingRun | None = None
 
     def __call__(self) -> int:
         """Take the run's state and time over one, and its samples: PAUSED, DONE or why that cannot be."""
@@ -91,20 +92,20 @@ class Passage:
         put_counts(series, run)
         if status not in (PAUSED, DONE):
             return status if status == TOO_MANY_STEPS else UNDECIDED
-        return status if self._is_determined(before, behind, series) else UNDECIDED
+        if not self._is_determined(series.began or before, behind, series):
+            return UNDECIDED
+        run.crossings += series.crossings
+        return status
 
-    def _series(self) -> SeriesRun:
+    def _series(self) -> PassingRun:
         if self._made is None:
             began, run = time.process_time(), self._run
             limits = replace(run.limits, rtol=TOLERANCE, atol=TOLERANCE, code=GENERIC)
-            self._made = SeriesRun(run.scene, Method.parse(SERIES), run.times, limits)
-            self._made.taylor.progress.passing = True
-            self._made.memory.control.steps_per_call = 1
-            self._made.memory.equations.system.settings.independent = True  # states are exact
+            self._made = PassingRun(run.scene, Method.parse(SERIES), run.times, limits)
             run.making += time.process_time() - began
         return self._made
 
-    def _is_determined(self, before: Moment, behind: Moment, series: SeriesRun) -> bool:
+    def _is_determined(self, before: Moment, behind: Moment, series: PassingRun) -> bool:
         """Whether a twin comes to the same place over as many singular positions."""
         if not series.has_freedom:
             return True
@@ -117,38 +118,3 @@ class Passage:
         near, speed = min(MAGNIFIED * change, APART), np.abs(landing[1]).max(initial=0.0)
         places, rates = np.abs(series.landing - landing).max(axis=1, initial=0.0)
         return bool(places <= near and rates <= FASTER * near * speed)
-
-
-class Moment(NamedTuple):
-    """The state of a run at a time (s), and the samples taken and the singular positions passed so far."""
-
-    time: float
-    sample: int
-    crossings: int
-    coordinates: np.ndarray
-    velocities: np.ndarray
-    angles: np.ndarray
-
-
-def moment_of(run: Run) -> Moment:
-    """A copy of the present state of a run."""
-    state, clock, equations = run.memory.state, run.memory.loop.clock, run.memory.equations
-    arrays = (state.coordinates, state.velocities, equations.angles)
-    crossings = int(equations.system.counts.crossings)
-    return Moment(float(clock.time), int(clock.sample), crossings, *(a.copy() for a in arrays))
-
-
-def enter(moment: Moment, run: Run) -> None:
-    """Bring a run of the same scene to a state."""
-    state, clock, equations = run.memory.state, run.memory.loop.clock, run.memory.equations
-    clock.time, clock.sample = moment.time, moment.sample
-    equations.system.counts.crossings = moment.crossings
-    state.coordinates[:], state.velocities[:] = moment.coordinates, moment.velocities
-    equations.angles[:] = moment.angles
-
-
-def put_counts(one: Run, other: Run) -> None:
-    """The counts of one run to another."""
-    source, target = one.memory.equations.system.counts, other.memory.equations.system.counts
-    for name in Counts._fields:
-        setattr(target, name, getattr(source, name))

@@ -16,7 +16,7 @@ from mbref.taylor.lanes import filled
 from mbref.taylor.layout import Progress, Series, Solver, TaylorMemory
 from mbref.taylor.natural import NaturalCoordinates
 from mbref.taylor.polynomials import polynomials_of
-from mbref.taylor.stepping import advance_series, clearance, enter
+from mbref.taylor.stepping import advance_series, clearance, enter, look_along, place_crossing
 
 SHARE = 0.05  # of rtol + atol: the tolerance of a step
 NO_CODE = "its series are made by one code for every scene"
@@ -93,18 +93,6 @@ class SeriesRun(Run):
         """As many steps as are taken at a time: PAUSED after them, DONE at the end, or why there are none."""
         return int(advance_series(self._packed_taylor.argument))
 
-    def cross(self) -> int:
-        """Pass a singular position from the state and time in memory: PAUSED, DONE or why that cannot be."""
-        clock, clear = self.memory.loop.clock, 0.0
-        self.taylor.progress.past_pivot = 1.0
-        if (status := self.expand(self.times[-1])) != OK:
-            return status
-        while (status := self.step_on()) == PAUSED:
-            before, clear = clear, float(clearance(self._packed_taylor.argument))
-            if clear >= max(before, 1.0) and clock.time >= clock.passage:
-                break
-        return status
-
     def follow(self, until: float) -> int:
         """The steps from the state and time in memory to a time (s): DONE or why that cannot be."""
         status = self.expand(until)
@@ -125,5 +113,5 @@ class SeriesRun(Run):
 
 def prepare_series() -> None:
     """Compile the kernels of the series, or load them from the cache of this machine."""
-    for kernel in (enter, advance_series, clearance):
+    for kernel in (enter, advance_series, clearance, place_crossing, look_along):
         kernel.prepare()

@@ -1,0 +1,105 @@
+"""Taylor series that pass singular positions: they record each one, and take the branch that is asked for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbref.equations.branches import SMOOTH, SingularPosition, singular_position
+from mbref.equations.model import displaced, displacement
+from mbref.kernels.layout import OK
+from mbref.method import Method
+from mbref.scene import Scene
+from mbref.simulation.limits import Limits
+from mbref.simulation.stepping import DONE, PAUSED
+from mbref.taylor.moment import Moment, moment_of
+from mbref.taylor.series_run import SeriesRun
+from mbref.taylor.stepping import clearance, look_along, place_crossing
+
+BEHIND = 3e-3  # lengths or rad behind a crossing where another branch is entered
+CORRECTIONS = 6  # of the state there
+
+
+class PassingRun(SeriesRun):
+    """The series of a passage; ``crossings`` are those of the last one.
+
+    ``began`` is the moment from which the last passage is smooth, where it took another branch.
+    """
+
+    def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
+        super().__init__(scene, method, times, limits)
+        self.taylor.progress.passing = True
+        self.memory.control.steps_per_call = 1
+        self.memory.equations.system.settings.independent = True  # states are exact
+        self.began: Moment | None = None
+
+    def cross(self) -> int:
+        """Pass a singular position from the state and time in memory: PAUSED, DONE or why that cannot be."""
+        clock, clear = self.memory.loop.clock, 0.0
+        self.taylor.progress.past_pivot = 1.0
+        self.crossings, self.began = [], None
+        status = self.expand(self.times[-1])
+        status = PAUSED if status == OK else status
+        while status == PAUSED:
+            status = self._step()
+            if status == PAUSED:
+                before, clear = clear, float(clearance(self._packed_taylor.argument))
+                if clear >= max(before, 1.0) and clock.time >= clock.passage:
+                    break
+        return status
+
+    def _step(self) -> int:
+        """One step of the series, whose crossing is recorded."""
+        counts = self.memory.equations.system.counts
+        passed = int(counts.crossings)
+        status = self.step_on()
+        if status not in (PAUSED, DONE) or counts.crossings == passed:
+            return status
+        taken = dict(self.limits.branches).get(passed + 1, SMOOTH)
+        crossing = self._placed(taken)
+        self.crossings.append(crossing)
+        return status if taken == SMOOTH else self._take_branch(crossing)
+
+    def _placed(self, taken: int) -> SingularPosition:
+        """The crossing of the last step; the state in memory stays behind it."""
+        state, clock = self.memory.state, self.memory.loop.clock
+        behind = state.coordinates.copy(), state.velocities.copy()
+        t = float(clock.time) - float(place_crossing(self._packed_taylor.argument))
+        q, v = state.coordinates.copy(), state.velocities.copy()
+        state.coordinates[:], state.velocities[:] = behind
+        return singular_position(self.model, t, q, v, taken)
+
+    def _take_branch(self, crossing: SingularPosition) -> int:
+        """Go on along another branch than the smooth one: PAUSED, or why that cannot be.
+
+        A state a little behind the crossing is corrected until the series about it comes from the crossing
+        with the velocities of the branch.
+        """
+        clock, velocities = self.memory.loop.clock, crossing.velocities[crossing.taken - 1]
+        clock.sample = int(np.searchsorted(self.times, crossing.time, side="right"))
+        ahead = self._time_behind(crossing.time, velocities)
+        clock.time = crossing.time + ahead
+        q, v, status = displaced(crossing.coordinates, ahead * velocities), velocities, OK
+        for _ in range(CORRECTIONS):
+            self.memory.state.coordinates[:], self.memory.state.velocities[:] = q, v
+            if (status := self.expand(self.times[-1])) != OK:
+                return status
+            there, here = self._state_at(-ahead), self._state_at(0.0)
+            q = displaced(here[0], displacement(there[0], crossing.coordinates))
+            v = here[1] + velocities - there[1]
+        self.taylor.progress.past_pivot = 0.0
+        self.began = moment_of(self)
+        return PAUSED
+
+    def _time_behind(self, t: float, velocities: np.ndarray) -> float:
+        """Time (s) after t in which the fastest body moves by BEHIND; no sample lies before."""
+        rates = velocities.reshape(-1, 6)
+        fastest = max(
+            np.abs(rates[:, :3] / self.model.data.lengths[:, None]).max(), np.abs(rates[:, 3:]).max()
+        )
+        following = self.times[self.memory.loop.clock.sample :]
+        return min(BEHIND / float(fastest), 0.5 * float(following[0] - t) if following.size else np.inf)
+
+    def _state_at(self, ahead: float) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates and velocities at a distance (s) from where the series begins."""
+        look_along(ahead, self._packed_taylor.argument)
+        return self.memory.state.coordinates.copy(), self.memory.state.velocities.copy()

@@ -1,0 +1,123 @@
+"""Crossings are placed and listed with their branches, any of which can be taken."""
+
+import math
+
+import numpy as np
+import pytest
+
+from crosscheck.judge.metrics import measure
+from mbref.design.along_motion import along_motion
+from mbref.equations.branches import ALONE, second_order
+from mbref.equations.initial_state import consistent_start
+from mbref.equations.model import Model
+from mbref.motion import Motion
+from mbref.scene import GROUND, Body, Revolute, Scene
+from mbref.scenes.five_bar import five_bar
+from mbref.scenes.four_bar import four_bar, four_bar_gravity
+from mbref.scenes.planar_slider_crank import slider_crank
+from mbref.simulation.simulate import Limits, simulate
+
+RATE = 124.8  # rad/s, of the driven crank
+METHODS = ["alf-dual+projection", "taylor"]
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-10])
+@pytest.mark.parametrize("make", [four_bar, five_bar])
+def test_every_crossing_is_seen_at_its_time(make, rtol):
+    """The crank starts at π/2 and turns backwards: the loop is flat at every multiple of π."""
+    run = simulate(make(), "alf-dual+projection", [1.0], Limits(rtol=rtol))
+    flat = (math.pi / 2 + math.pi * np.arange(40)) / RATE
+    found = np.array([crossing.time for crossing in run.crossings])
+    assert len(found) == len(flat) and np.abs(found - flat).max() < 1e-13
+
+
+def test_branches_of_a_rhombus_and_of_a_loop_that_has_none_besides():
+    """At θ = π the coupler may fold back on the crank; at θ = 0 the crank would have to stand."""
+    first, second = simulate(four_bar(), "alf-dual+projection", [0.05]).crossings
+    assert first.sentence == ALONE and second.sentence == "2 branches" and second.taken == 1
+    expected = np.array([[-RATE, 0.0, -RATE], [-RATE, -RATE, 0.0]])
+    assert np.abs(second.angular_velocity[:, :, 2] - expected).max() < 1e-9
+    assert np.abs(second.position[:, 1]).max() < 1e-12, "the loop is flat there"
+    assert {c.sentence for c in simulate(five_bar(), "alf-dual+projection", [0.05]).crossings} == {ALONE}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_fold_of_a_driven_rhombus(method):
+    """The rocker rests and the coupler lies on the crank; samples before the crossing stay as they are."""
+    times = np.linspace(0.0, 0.06, 25)
+    smooth = simulate(four_bar(), method, times)
+    fold = simulate(four_bar(), method, times, Limits(branches={2: 2}))
+    assert fold.outcome.label == "COMPLETED" and [c.taken for c in fold.crossings] == [1, 2]
+    behind = times > fold.crossings[1].time
+    assert np.array_equal(fold.position[~behind], smooth.position[~behind])
+    angle = math.pi / 2 - RATE * times[behind]
+    tip = 0.25 * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    assert np.abs(fold["crank"].position[behind] - tip).max() < 1e-12
+    assert np.abs(fold["coupler"].position[behind] - tip).max() < 1e-12
+    assert np.abs(fold["rocker"].angular_velocity[behind]).max() < 1e-8
+    assert measure(four_bar(), fold, None)["violation_position"] < 1e-12
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_another_branch_without_drivers_keeps_the_energy(method):
+    scene, times = four_bar_gravity(0.3), np.linspace(0.0, 1.0, 41)
+    run = simulate(scene, method, times, Limits(branches={1: 2}))
+    assert run.outcome.label == "COMPLETED" and run.crossings[0].taken == 2
+    assert np.ptp(run.energy) < 1e-8
+    off = np.abs(run.position - simulate(scene, method, times).position).max(axis=(1, 2))
+    behind = times > run.crossings[0].time
+    assert off[~behind].max() < 1e-9 and off[behind][1:].min() > 1e-3
+
+
+def test_a_branch_that_is_not_there():
+    with pytest.raises(ValueError, match=r"branches: the crossing at t = 0\.0125865 s has no branch 2: one"):
+        simulate(four_bar(), "alf-dual+projection", [0.05], Limits(branches={1: 2}))
+    for wrong in ({1: 0}, {1: "x"}, 3, [(1,)], {1: 1.5}):
+        with pytest.raises(ValueError, match="branches: must be"):
+            Limits(branches=wrong)
+
+
+def test_crossings_in_a_record_and_none_where_nothing_looks_for_them(tmp_path):
+    run = simulate(four_bar_gravity(0.3), "alf-dual+projection", [0.5])
+    run.save(tmp_path / "run.json")
+    (read,) = Motion.load(tmp_path / "run.json").crossings
+    (crossing,) = run.crossings
+    assert (read.time, read.taken, read.sentence) == (crossing.time, crossing.taken, crossing.sentence)
+    assert np.array_equal(read.angular_velocity, crossing.angular_velocity)
+    assert simulate(four_bar_gravity(0.3), "mpi-svd+partitioning", [0.1]).crossings is None
+    assert simulate(slider_crank(0.1, 0.3, 0.3, "crank"), "alf-dual+projection", [0.1]).crossings == ()
+
+
+def straight_arch(offset: float = 0.0) -> Scene:
+    """Two equal links between fixed hinges, in line where the offset (m) of the hinge between them is 0."""
+    hinges = (
+        ("A", GROUND, "left", -1.0, 0.0), ("B", "left", "right", 0.0, offset),
+        ("C", "right", GROUND, 1.0, 0.0),
+    )  # fmt: skip
+    body = tuple(
+        Body(name=name, mass=1.0, inertia=(0.1,) * 3, position=(x, 0.5 * offset, 0.0))
+        for name, x in (("left", -0.5), ("right", 0.5))
+    )
+    joint = tuple(
+        Revolute(name=name, bodies=(one, other), anchor=(x, y, 0.0), axis=(0.0, 0.0, 1.0))
+        for name, one, other, x, y in hinges
+    )
+    return Scene(name="arch", body=body, joint=joint)
+
+
+def test_a_freedom_that_second_order_takes_away():
+    """A straight arch can begin to move, and cannot move."""
+    for scene, freedoms, forms in ((straight_arch(), 1, 1), (straight_arch(0.3), 0, 0)):
+        model = Model(scene)
+        found = second_order(model, 0.0, consistent_start(model).q, np.ones(model.n))
+        assert found.kernel.shape[1] == freedoms and len(found.forms) == forms
+
+
+def test_diagnosis_lists_crossings_and_tells_a_shaky_linkage():
+    found = along_motion(four_bar_gravity(0.3))
+    assert [c.sentence for c in found.crossings] == ["2 branches"] * 3 and not found.shaky
+    pendulum = Body(name="pendulum", mass=1.0, inertia=(0.1,) * 3, position=(3.5, 0.0, 0.0))
+    hinge = Revolute(name="D", bodies=(GROUND, "pendulum"), anchor=(3.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+    arch = straight_arch()
+    beside = arch.with_(body=(*arch.body, pendulum), joint=(*arch.joint, hinge), gravity=(0.0, -9.81, 0.0))
+    assert along_motion(beside).shaky
