@@ -12,7 +12,7 @@ from mbref.linear_algebra.vectors import copy, larger
 from mbref.simulation.samples import take_sample as record_sample
 from mbref.taylor.lanes import LANES, load, store
 
-BESIDE = 1e-3  # part of the largest least pivot below which a position is beside a singular one
+BESIDE = 0.1  # part of the largest least pivot below which a position is beside a singular one
 LOST_MOTION = 30.0  # tolerances, times orders², by which accelerations times the step's square may be off
 NOISE = 1e-9  # the same, by rounding
 CLEAR = 1e-6  # relative difference of accelerations that contradict each other

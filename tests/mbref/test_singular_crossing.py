@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from crosscheck.judge.metrics import measure
+from crosscheck.judge.reaction_balance import with_exact_reactions
 from crosscheck.judge.truth import closed_form
 from mbref.scene import GROUND, Body, Revolute, Scene, Translational
 from mbref.scenes.five_bar import five_bar, five_bar_gravity
@@ -126,3 +127,19 @@ def test_crossings_are_counted():
     run = simulate(scene, "alf-dual+projection", np.linspace(0.0, 5.0, 6), Limits())
     assert run.outcome.label == "COMPLETED" and "singular positions passed" in run.message
     assert measure(scene, run, closed_form(scene))["error"] < 1e-9
+
+
+@pytest.mark.parametrize("method", ["alf-dual+projection", "mpi-svd+projection", "taylor"])
+@pytest.mark.parametrize("scene", [four_bar(), four_bar_gravity(0.3)], ids=["driven", "swinging"])
+def test_accelerations_and_reactions_beside_a_crossing(scene, method):
+    """The exact reactions are finite there; the exact motion with them shares no code with mbref."""
+    (crossing, *_) = simulate(scene, "taylor", [0.3]).crossings
+    rate = np.abs(crossing.angular_velocity[0]).max()
+    distances = np.array([1e-1, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6, 1e-9])
+    times = crossing.time + np.concatenate([-distances, [0.0], distances[::-1]]) / rate
+    run = simulate(scene, method, times)
+    exact = with_exact_reactions(scene, closed_form(scene).poses(times))
+    scale = np.abs(exact.acceleration).max()
+    assert np.abs(run.acceleration - exact.acceleration).max() < 1e-8 * scale
+    for name, true in exact.reactions.items():
+        assert np.abs(run.reactions[name] - true).max() < 1e-6 * np.abs(true).max(), name
