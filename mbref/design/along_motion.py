@@ -88,7 +88,7 @@ def coordinates(model: Model, position: np.ndarray, orientation: np.ndarray) -> 
 
 def _is_shaky(model: Model, motion: Motion) -> bool:
     """Whether equations of second order restrict the freedoms of first order at every pose looked at."""
-    if model.m > MOST_BRANCHED:
+    if model.m > MOST_BRANCHED or model.closed_loops == 0:
         return False
     chosen = np.linspace(0, len(motion.times) - 1, POSES).round().astype(int)
     poses = coordinates(model, motion.position[chosen], motion.orientation[chosen])

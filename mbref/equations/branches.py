@@ -94,7 +94,7 @@ def second_order(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Second
     scale = np.append(lengths, 1.0 / (np.linalg.norm(v / lengths) or 1.0) if driven else 0.0)
     first = np.column_stack([at_rest.jacobian, -at_rest.nu]) * scale / rows[:, None]
     left, values, right = np.linalg.svd(first if driven else first[:, :-1])
-    rank = int(np.sum(values > RANK * values[0]))
+    rank = int(np.sum(values > RANK * values.max(initial=0.0)))
     kernel = right[rank:].T if driven else np.vstack([right[rank:].T, np.zeros(len(right) - rank)])
     null = left[:, rank:].T / rows
     return SecondOrder(kernel, _independent(_forms(model, t, q, kernel * scale[:, None], null)), scale)

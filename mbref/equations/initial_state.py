@@ -103,7 +103,7 @@ def _least_change(model: Model, blocks: np.ndarray, rhs: np.ndarray) -> np.ndarr
     if model.m > LARGE:
         return MinimumNorm(model.sparse(blocks), mass)(rhs)
     inverse_root = 1 / np.sqrt(mass)
-    return _least_norm(model.dense(blocks) * inverse_root, rhs) * inverse_root
+    return _least_norm(*_unit_rows(model.dense(blocks) * inverse_root, rhs)) * inverse_root
 
 
 def _least_norm(matrix: np.ndarray, rhs: np.ndarray) -> np.ndarray:
@@ -134,16 +134,16 @@ def _velocities(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]:
     scale = np.tile(np.repeat([1.0, 1 / scene_length(model)], 3), model.nb)
     wanted = v[given] / scale[given]
     terms = model.terms(0.0, q, v)
-    jacobian = terms.jacobian * scale
-    x, open_ = _solutions(jacobian, terms.nu)
-    if np.max(np.abs(jacobian @ x - terms.nu), initial=0.0) > GROSS * np.max(np.abs(x), initial=0.0):
-        worst = int(np.argmax(np.abs(jacobian @ x - terms.nu)))
+    jacobian, nu = _unit_rows(terms.jacobian * scale, terms.nu)
+    x, open_ = _solutions(jacobian, nu)
+    if np.max(np.abs(jacobian @ x - nu), initial=0.0) > GROSS * np.max(np.abs(x), initial=0.0):
+        worst = int(np.argmax(np.abs(jacobian @ x - nu)))
         raise _fault(model, worst, "the driver contradicts the joints")
     step, still_open = _solutions(open_[given], wanted - x[given])
     x, open_ = x + open_ @ step, open_ @ still_open
     as_given = x.copy()
     as_given[given] = wanted
-    residual = np.abs(jacobian @ as_given - terms.nu)
+    residual = np.abs(terms.jacobian @ (as_given * scale) - terms.nu)
     if np.max(np.abs(x[given] - wanted), initial=0.0) > GROSS * np.max(np.abs(wanted), initial=0.0):
         what = f"the initial velocities violate the constraint by {residual.max():.3g}"
         raise _fault(model, int(np.argmax(residual)), what)
@@ -180,6 +180,13 @@ def _sparse_velocities(
         what = f"the initial velocities violate the constraint by {residual.max():.3g}"
         raise _fault(model, int(np.argmax(residual)), what)
     return x, float(np.max(residual, initial=0.0))
+
+
+def _unit_rows(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same equations with rows of unit length, so that their rank does not depend on units."""
+    norms = np.linalg.norm(matrix, axis=1)
+    norms = np.where(norms > 0.0, norms, 1.0)
+    return matrix / norms[:, None], rhs / norms
 
 
 def _solutions(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

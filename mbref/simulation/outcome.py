@@ -39,7 +39,10 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion
         engine="mbref",
         version=__version__,
         method=str(run.method),
-        settings={**asdict(run.limits), "branches": [list(pair) for pair in dict(run.limits.branches).items()]},
+        settings={
+            **asdict(run.limits),
+            "branches": [list(pair) for pair in dict(run.limits.branches).items()],
+        },
         times=run.times[:reached],
         bodies=tuple(body.name for body in run.scene.body),
         **model.motion(q, v, a),

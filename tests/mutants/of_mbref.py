@@ -217,7 +217,7 @@ DEFECTS = (
         BY_HAND,
     ),
     Defect(
-        "mbref/taylor/passage.py",
+        "mbref/linear_algebra/elimination.py",
         "        if a[k, k] < 0.0:",
         "        if a[k, k] > 0.0:",
         BY_HAND,
