@@ -20,6 +20,7 @@ from crosscheck.cli.running import (
     by_scene,
     cases_of,
     console,
+    missing_truths,
     notice,
     print_json,
     studied,
@@ -77,6 +78,8 @@ def _run(arguments: argparse.Namespace) -> int:
             print_json(by_scene(cases, records))
         else:
             tables.print_runs(console(), records)
+            for sentence in missing_truths(cases, records):
+                console().print(sentence, soft_wrap=True)
     return COMPLETED if all(r["outcome"] == Outcome.COMPLETED.label for r in records) else OTHERWISE
 
 

@@ -17,8 +17,10 @@ from crosscheck.study.comparison import scouted
 from crosscheck.study.grid import TIME_LIMIT, Case, Record, study
 from crosscheck.study.hurried import Hurried
 from crosscheck.study.progress import shown
-from crosscheck.study.record_view import public
+from crosscheck.study.record_view import is_judged, public
+from crosscheck.study.sentences import unknown
 from crosscheck.study.sweep import QUICK_LIMIT, thinned
+from crosscheck.study.truths import known_at
 from mbref.scene import Scene
 
 Document = dict[str, Any]
@@ -73,6 +75,13 @@ def studied(cases: Sequence[Case], finished: list[Record]) -> list[Record]:
             advance(done, total, record)
 
         return study(cases, progress=progress, run=Hurried())
+
+
+def missing_truths(cases: Sequence[Case], records: Sequence[Record]) -> list[str]:
+    """Sentences on the scenes whose true motion is not known at all times that their runs reached."""
+    unjudged = {r["scene"] for r in records if not is_judged(r)}
+    asked = {case.scene.name: case for case in cases if case.scene.name in unjudged}
+    return [unknown(c.scene, known_at(c.scene, c.times, c.reference_time)) for c in asked.values()]
 
 
 def by_scene(cases: Sequence[Case], records: Sequence[Record]) -> list[Document]:

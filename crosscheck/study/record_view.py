@@ -55,6 +55,14 @@ def error_text(record: Record) -> str:
     return f"< {bound:.0e}" if value < bound else f"{value:.2e}"
 
 
+def is_judged(record: Record) -> bool:
+    """Whether the error of a record is of all that the run reached; True where it reached nothing."""
+    metrics = record["metrics"]
+    if never_moved(record) or not record["times"]:
+        return True
+    return metrics.get("error") is not None and metrics["error_until"] >= record["times"][-1]
+
+
 def never_moved(record: Record) -> bool:
     """Whether a run ended at its start, so that its numbers say nothing about the motion."""
     return not is_completed(record) and record["t_end"] <= 0

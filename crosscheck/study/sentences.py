@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from crosscheck.judge.tolerances import ERROR_LEVELS
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error, error_text
 from crosscheck.study.verdict import Grade, Judged, grade
 from crosscheck.study.wording import agree, at_most, is_or_are, its_or_their, listed, multiple, seconds, span
+from mbref.scene import Scene
 
 TITLES = {"mujoco": "MuJoCo", "pinocchio": "Pinocchio", "exudyn": "Exudyn", "simbody": "Simbody",
           "sundials": "SUNDIALS IDA", "ondsel": "OndselSolver"}  # fmt: skip
@@ -114,28 +115,36 @@ def truth(groups: Sequence[Judged]) -> str:
         bound = max(g.truth["bound"] for g in closed)
         parts.append(f"The exact motion of {_names(closed)} is known in closed form or by a reduced "
                      f"equation, to {bound:.0e}.")  # fmt: skip
-        parts += [f"That of {g.scene.name} is known{_until(g)}." for g in closed if g.truth["reason"]]
+        parts += [
+            f"That of {g.scene.name} is known{_until(g.scene, g.truth)}." for g in closed if g.truth["reason"]
+        ]
     parts += [_reference(group) for group in groups if group not in closed]
     return " ".join(parts)
+
+
+def unknown(scene: Scene, known: Mapping[str, Any]) -> str:
+    """From when on the true motion of a scene is not known, and why; empty where it is known to the end."""
+    if not known["kind"]:
+        return f"There is no reference for {scene.name}: {known['reason']}."
+    return f"The motion of {scene.name} is known{_until(scene, known)}." if known["reason"] else ""
 
 
 def _reference(group: Judged) -> str:
     known, name = group.truth, group.scene.name
     if not known["kind"]:
-        return f"There is no reference for {name}: {known['reason']}."
+        return unknown(group.scene, known)
     ways = (
         "two formulations that share no code agree" if known["both"] else "two runs of one formulation agree"
     )
-    return (f"The reference of {name} is known to {known['bound']:.0e}{_until(group)}: {ways}; "
+    return (f"The reference of {name} is known to {known['bound']:.0e}{_until(group.scene, known)}: {ways}; "
             f"it took {known['seconds']:.1f} s of CPU time.")  # fmt: skip
 
 
-def _until(group: Judged) -> str:
+def _until(scene: Scene, known: Mapping[str, Any]) -> str:
     """How far a truth is known, and why no further; nothing where it is known to the end."""
-    known = group.truth
     if not known["reason"]:
         return ""
-    end = f"{known['until']:.4g} s of {group.scene.duration:.4g} s"
+    end = f"{known['until']:.4g} s of {scene.duration:.4g} s"
     return f" up to t = {end} ({known['reason']}), and errors are of this part"
 
 

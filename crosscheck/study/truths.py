@@ -31,10 +31,15 @@ def truth_record(scene: Scene, times: np.ndarray, reference_time: float) -> Reco
     dense = np.linspace(0.0, scene.duration, DENSE + 1)
     wanted = np.unique(np.concatenate([times, gate_times(scene), dense]))
     start = time.process_time()
-    family = closed_form(scene)
-    found = _of_family(scene, family, wanted) if family else _of_reference(scene, wanted, reference_time)
+    found = known_at(scene, wanted, reference_time)
     found.setdefault("seconds", time.process_time() - start)
     return {"key": key(scene, times), "scene": scene.name, "given": reference_time, **found}
+
+
+def known_at(scene: Scene, times: np.ndarray, reference_time: float) -> Record:
+    """What is known of the true motion at times (k,) alone, as in a truth's record."""
+    family = closed_form(scene)
+    return _of_family(scene, family, times) if family else _of_reference(scene, times, reference_time)
 
 
 def key(scene: Scene, times: np.ndarray) -> str:

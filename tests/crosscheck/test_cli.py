@@ -20,9 +20,11 @@ from crosscheck.study import grid
 from crosscheck.study.command import command
 from crosscheck.study.fair_timing import timed
 from crosscheck.study.hurried import NOT_STARTED, Hurried
-from crosscheck.study.record_view import PUBLIC
+from crosscheck.study.record_view import PUBLIC, is_judged
+from crosscheck.study.sentences import unknown
 from mbref.scene import Body, Moment, Scene
 from mbref.scenes import SCENES
+from mbref.scenes.four_bar import four_bar_gravity
 from mbref.trajectory import Cost, Outcome
 
 FAKE = "fake_engines:FAKE"
@@ -96,6 +98,27 @@ def test_a_scene_of_no_family_is_judged_by_its_reference(capsys, tmp_path, monke
     _, out, _ = run_main(capsys, *asked, "--reference-time", "0", "--json")
     assert json.loads(out)["records"][0]["metrics"]["error"] is None
     assert run_main(capsys, *asked, "--reference-time", "-1")[0] == 2
+
+
+def test_a_scene_without_a_truth_and_why(capsys, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    asked = ("--engine", FAKE, "--setting", "plain", "--samples", "3")
+    sentence = "There is no reference for two: none was asked for."
+    scene = two_blocks(tmp_path)
+    for reference_time, times in (("0", 1), ("20", 0)):
+        out = run_main(capsys, "run", scene, *asked, "--reference-time", reference_time)[1]
+        assert out.count(sentence) == times
+
+
+def test_a_truth_that_ends_before_the_runs():
+    scene = four_bar_gravity(0.3).with_(duration=0.5)
+    known = {"kind": "reference", "reason": "it stops", "until": 0.25}
+    expected = "The motion of four_bar_gravity is known up to t = 0.25 s of 0.5 s (it stops), and errors are"
+    assert unknown(scene, known) == f"{expected} of this part."
+    assert unknown(scene, {**known, "reason": ""}) == ""
+    run = {"outcome": "COMPLETED", "t_end": 0.5, "times": [0.0, 0.25, 0.5]}
+    for until, judged in ((0.25, False), (0.5, True)):
+        assert is_judged({**run, "metrics": {"error": 0.0, "error_until": until}}) is judged
 
 
 def test_json_of_several_scenes_and_a_list_in_the_order_asked(capsys, tmp_path):
