@@ -17,7 +17,7 @@ from reports.blocks import Block
 from reports.runs import Run, by_scene
 
 NEEDS = ("matplotlib", "jinja2")
-PAPER = "paper"  # the section whose runs are its own
+PAPER, STABILITY = "paper", "stability"  # the sections whose runs are their own
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -27,13 +27,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     from reports.sections import NAMES
 
-    arguments = _parser((*NAMES, PAPER)).parse_args(argv)
+    arguments = _parser((*NAMES, STABILITY, PAPER)).parse_args(argv)
     if arguments.picture:
         return _picture(Path(arguments.picture))
     if arguments.render:
         return _render(Path(arguments.render), arguments.section or NAMES)
     is_quick, out = arguments.depth == "quick", Path(arguments.out)
-    names = arguments.section or (NAMES if is_quick or arguments.scene else (*NAMES, PAPER))
+    names = arguments.section or (NAMES if is_quick or arguments.scene else (*NAMES, STABILITY, PAPER))
     try:
         scenes = find_scenes(arguments.scene) if arguments.scene else None
         blocks = _blocks(out, scenes, is_quick, names, arguments.reference_time)
@@ -77,14 +77,16 @@ def _blocks(
 ) -> list[Block]:
     """The blocks of the named sections; only the records they need are made."""
     from reports import sections, stored
-    from reports.sections import paper
+    from reports.sections import paper, stability
 
     blocks: list[Block] = []
-    if set(names) - {PAPER}:
+    if set(names) - {PAPER, STABILITY}:
         found = collection.comparison(out, scenes, is_quick, reference_time, _notice)
         named = {scene.name: scene for scene in found.scenes}
         groups = by_scene(found.records, named, found.identities, found.truths, found.motions)
         blocks += sections.blocks(groups, names, stored.verified(out))
+    if STABILITY in names:
+        blocks += stability.render(collection.stability_ladders(out, _notice))
     if PAPER in names:
         records_of_paper, illustration = collection.paper(out, _notice)
         print(paper.score(records_of_paper))

@@ -11,9 +11,9 @@ import numpy as np
 from crosscheck.cli.request import RequestError, find_engines
 from crosscheck.paper import runs
 from crosscheck.paper.illustration import Illustration, illustration
-from crosscheck.study import sweep
+from crosscheck.study import stability, sweep
 from crosscheck.study.comparison import Collection, Wanted, collected
-from crosscheck.study.grid import Case
+from crosscheck.study.grid import Case, Record
 from crosscheck.study.progress import shown
 from crosscheck.study.timings import with_timings
 from mbref.scene import Scene
@@ -51,6 +51,12 @@ def comparison(
         return cases
 
     return collected(chosen, engines, Wanted(times, reference_time, is_quick, out), plan, notice)
+
+
+def stability_ladders(out: Path, notice: Notice) -> list[Record]:
+    """The records of the stability ladders, stored in ``out``/stability.jsonl."""
+    out.mkdir(parents=True, exist_ok=True)
+    return stability.run(out / "stability.jsonl", find_engines(None, notice))
 
 
 def paper(out: Path, notice: Notice) -> Paper:

@@ -107,5 +107,6 @@ def _message(run: Run, status: int) -> str:
         h = memory.control.smallest_step
         return f"the error estimate asks for a step below {h:.3g} s at t = {t:.6g} s"
     if status == LEFT_MOTION:
-        return f"{OUTCOMES[status].sentence}, as Taylor series show, by t = {memory.loop.clock.passage:.6g} s"
+        left = memory.loop.clock.passage
+        return f"{OUTCOMES[status].sentence}, as the default method shows, by t = {left:.6g} s"
     return f"{OUTCOMES[status].sentence} at t = {t:.6g} s ({run.method.formulation.name})"

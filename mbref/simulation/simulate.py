@@ -41,12 +41,17 @@ def simulate(
     Returns the states reached, with accelerations and reactions; a failure of the method is the
     motion's outcome.  Raises SceneError for a scene that cannot be simulated, ValueError for times
     that do not increase or an order the integrator does not have, MethodError for an unknown method name
-    and where ``limits`` ask for machine code that the method or the scene cannot have.
+    and where ``limits`` ask for machine code that the method or the scene cannot have, or for a branch of a
+    method that does not look for singular positions.
     """
     scene = scene if isinstance(scene, Scene) else find_scene(str(scene))
     times = checked_times(np.linspace(0.0, scene.duration, SAMPLES) if times is None else times)
     method = Method.parse(method) if isinstance(method, str) else method
     limits = limits or Limits()
+    if limits.branches and not method.stabilisation.projects:
+        raise MethodError(
+            f"branches: {method} does not look for singular positions; +projection and taylor do"
+        )
     began = time.process_time()
     try:
         run = kind_of(method)(scene, method, times, limits)

@@ -1,4 +1,4 @@
-"""Runs without projection: completed only on the motion that Taylor series follow from the same start.
+"""Runs without projection: completed only on the motion that a projected run follows from the same start.
 
 Nothing but the accelerations holds such a run to its branch.  At a singular position they are ill-determined,
 and a pseudo-inverse whose rank drops there lets the run go on along another branch with all constraints and
@@ -14,27 +14,25 @@ import numpy as np
 
 from mbref import rotations
 from mbref.equations.initial_state import scene_length
-from mbref.method import Method
+from mbref.method import DEFAULT, Method
 from mbref.simulation.limits import GENERIC, Limits
 from mbref.simulation.run import Run
 from mbref.simulation.stepping import DONE, LEFT_MOTION, UNDECIDED
-from mbref.taylor.run import TaylorRun
+from mbref.taylor.run import CrossingRun
 
-MOST_ROWS = 300  # beyond it series take too long
 MOST_STEPS = 100_000
-TOLERANCE = 1e-10  # of the series
+TOLERANCE = 1e-10  # of the projected run
 OFF = (1e3, 1e-6)  # lengths or rad by which a run may be off: over its tolerance, and whatever that is
 COARSE = 0.1  # the same of a run in fixed steps, whose error its tolerance does not limit
 
 
 class CheckedRun(Run):
-    """One simulation without projection whose samples are compared with those of Taylor series."""
+    """One simulation without projection, whose samples are compared with those of the default method."""
 
     def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
         """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
         status, seconds = super().advance(progress)
-        loops = self.model.closed_loops > 0 and self.model.m <= MOST_ROWS
-        if status == DONE and loops and self.limits.compared:
+        if status == DONE and self.model.closed_loops > 0 and self.limits.compared:
             began = time.process_time()
             status = self._checked()
             self.making += time.process_time() - began
@@ -43,13 +41,14 @@ class CheckedRun(Run):
     def _checked(self) -> int:
         """DONE, LEFT_MOTION by the time (s) in ``clock.passage``, or UNDECIDED at the time of the clock.
 
-        Where the series end early for another reason than a branch in doubt, they are compared up to there.
+        Where the projected run ends early for another reason than a branch in doubt, samples are compared up
+        to there.
         """
         limits = Limits(rtol=TOLERANCE, code=GENERIC, most_steps=MOST_STEPS)
-        series = TaylorRun(self.scene, Method.parse("taylor"), self.times, limits)
-        status, _ = series.advance(None)
-        theirs, clock = series.memory.loop.clock, self.memory.loop.clock
-        off = self._distances(series, int(theirs.sample))
+        projected = CrossingRun(self.scene, Method.parse(DEFAULT), self.times, limits)
+        status, _ = projected.advance(None)
+        theirs, clock = projected.memory.loop.clock, self.memory.loop.clock
+        off = self._distances(projected, int(theirs.sample))
         if (off > self._allowed).any():
             clock.passage = self.times[np.argmax(off > self._allowed)]
             return LEFT_MOTION
@@ -66,7 +65,7 @@ class CheckedRun(Run):
     def _distances(self, other: Run, samples: int) -> np.ndarray:
         """The largest distance (k,) of a body at each of the first samples: over the length, or rad."""
         mine, theirs = (run.memory.loop.samples.coordinates[:samples] for run in (self, other))
-        mine, theirs = mine.reshape(samples, -1, 7), theirs.reshape(samples, -1, 7)
+        mine, theirs = (q.reshape(samples, self.model.nb, 7) for q in (mine, theirs))
         places = np.linalg.norm(mine[..., :3] - theirs[..., :3], axis=-1) / scene_length(self.model)
         turns = rotations.angle_between(mine[..., 3:], theirs[..., 3:])
         return np.maximum(places, turns).max(axis=-1, initial=0.0)

@@ -10,6 +10,7 @@ from mbref.design.along_motion import along_motion
 from mbref.equations.branches import ALONE, second_order
 from mbref.equations.initial_state import consistent_start
 from mbref.equations.model import Model
+from mbref.method import MethodError
 from mbref.motion import Motion
 from mbref.scene import GROUND, Body, Revolute, Scene
 from mbref.scenes.five_bar import five_bar
@@ -72,6 +73,8 @@ def test_another_branch_without_drivers_keeps_the_energy(method):
 def test_a_branch_that_is_not_there():
     with pytest.raises(ValueError, match=r"branches: the crossing at t = 0\.0125865 s has no branch 2: one"):
         simulate(four_bar(), "alf-dual+projection", [0.05], Limits(branches={1: 2}))
+    with pytest.raises(MethodError, match="does not look for singular positions"):
+        simulate(four_bar(), "mpi-svd+partitioning", [0.05], Limits(branches={2: 2}))
     for wrong in ({1: 0}, {1: "x"}, 3, [(1,)], {1: 1.5}):
         with pytest.raises(ValueError, match="branches: must be"):
             Limits(branches=wrong)

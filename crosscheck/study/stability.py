@@ -1,0 +1,199 @@
+"""Stability ladders: one difficulty of a mechanism grows rung by rung, and each method and engine is run.
+
+The exact motion of every rung is known in closed form.  Methods of mbref run at one tolerance, engines at a
+fine setting of the family that suits singular positions best.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from crosscheck.engine import Setting
+from crosscheck.study.grid import Case, Record, study
+from crosscheck.study.progress import counted, shown
+from crosscheck.study.scouting import scout, settings, unasked
+from mbref.scene import Driver, Scene, Spring
+from mbref.scenes.four_bar import four_bar, four_bar_gravity
+from mbref.scenes.links import CRANK_RATE
+from mbref.scenes.planar_slider_crank import slider_crank
+
+RTOL = 1e-9
+MOST_STEPS = 200_000
+SAMPLES = 21
+TIME_LIMIT = 20.0  # s of a run
+METHODS = (
+    "alf-dual+projection", "taylor", "mpi-svd+projection", "mpi-svd+partitioning", "mpi-svd+baumgarte",
+    "mpi-svd+none", "mpi-gs+none", "alf+baumgarte", "lm1+baumgarte",
+)  # fmt: skip
+FAMILIES = {"mujoco": "projected", "pinocchio": "tuned", "exudyn": "tuned"}
+MBREF = "mbref"
+
+Rung = tuple[float, Scene]  # the difficulty and the scene, whose duration is the run's
+
+
+class Ladder(NamedTuple):
+    """A difficulty that grows: its name, a sentence, the axis' label, and the rungs from easy to hard."""
+
+    name: str
+    words: str
+    label: str
+    rungs: Sequence[Rung]
+
+
+def scene_name(ladder: str, difficulty: float) -> str:
+    """The name of a rung's scene, which tells its place in the records: ``gap[1e-05]``."""
+    return f"{ladder}[{difficulty:g}]"
+
+
+def place(name: str) -> tuple[str, float]:
+    """Ladder and difficulty of a rung's scene."""
+    ladder, _, difficulty = name.removesuffix("]").partition("[")
+    return ladder, float(difficulty)
+
+
+def ladders() -> tuple[Ladder, ...]:
+    """All ladders."""
+    return (
+        Ladder(
+            "start", "A driven rhombus begins so far before its flat position.", "distance, rad",
+            [(d, four_bar(math.pi + d, "start").with_(duration=0.05)) for d in powers(-1, -14, 9)],
+        ),
+        Ladder(
+            "turning_back",
+            "A rhombus swings up to so far below its flat position, and back.",
+            "distance, rad",
+            [(d, four_bar_gravity(-d, "turning_back").with_(duration=1.5)) for d in powers(-1, -9, 9)],
+        ),
+        Ladder(
+            "gap", "The rod of a slider-crank is so much longer than its crank: branches miss each other.",
+            "gap, m", [(g, _gap(g)) for g in powers(-1, -13, 9)],
+        ),
+        Ladder(
+            "mass_ratio", "The slider of a slider-crank is so many times as heavy as its crank.",
+            "ratio", [(r, _heavy_slider(r)) for r in powers(0, 12, 9)],
+        ),
+        Ladder(
+            "length_ratio", "The rod of a slider-crank is so many times as long as its crank.",
+            "ratio", [(r, _long_rod(r)) for r in (1.5, *powers(1, 6, 6))],
+        ),
+        Ladder(
+            "units", "A slider-crank of so many units of length, the same motion by Froude's scaling.",
+            "unit", [(s, _scaled(s)) for s in powers(-6, 4, 9)],
+        ),
+        Ladder(
+            "speed", "The crank of a rhombus is driven so fast, for two turns.", "rad/s",
+            [(w, _driven_at(w)) for w in powers(-6, 7, 9)],
+        ),
+        Ladder(
+            "stiffness", "A spring of such stiffness holds the slider of a slider-crank, for two periods.",
+            "N/m", [(k, _sprung(k)) for k in powers(0, 12, 9)],
+        ),
+        Ladder(
+            "duration", "A slider-crank turns under gravity for so long.", "s",
+            [(t, _turning().with_(duration=t)) for t in (0.3, 1.0, 3.0, 10.0, 30.0)],
+        ),
+    )  # fmt: skip
+
+
+def powers(first: float, last: float, count: int) -> Iterator[float]:
+    """Powers of ten between two exponents."""
+    return (float(f"{10**e:.0e}") for e in np.linspace(first, last, count))
+
+
+def _gap(gap: float) -> Scene:
+    return slider_crank(0.308, 0.308 + gap, 0.3, "gap", rate=30.0).with_(duration=0.25)
+
+
+def _turning() -> Scene:
+    return slider_crank(0.304, 0.4048, 0.3, "duration", rate=30.0).with_(gravity=(0.0, -9.81, 0.0))
+
+
+def _heavy_slider(ratio: float) -> Scene:
+    scene = slider_crank(0.304, 0.4048, 0.3, "mass_ratio", rate=30.0)
+    crank, rod, slider = scene.body
+    mass = ratio * 0.304  # kg, of the crank
+    heavy = slider.model_copy(update={"mass": mass, "inertia": (1e-2 * mass,) * 3})
+    return scene.with_(body=(crank, rod, heavy), duration=0.5)
+
+
+def _long_rod(ratio: float) -> Scene:
+    return slider_crank(0.4 / ratio, 0.4, 0.3, "length_ratio", rate=30.0).with_(duration=0.5)
+
+
+def _scaled(unit: float) -> Scene:
+    """The turning slider-crank with lengths times s, times times √s, its masses as they are."""
+    scene, time = _turning(), math.sqrt(unit)
+    moved = slider_crank(0.304 * unit, 0.4048 * unit, 0.3, "units", rate=30.0 / time)
+    bodies = tuple(
+        placed.model_copy(update={"mass": body.mass, "inertia": _times(body.inertia, unit**2)})
+        for placed, body in zip(moved.body, scene.body, strict=True)
+    )
+    return moved.with_(body=bodies, gravity=(0.0, -9.81, 0.0), duration=0.5 * time)
+
+
+def _times(numbers: Any, factor: float) -> tuple[float, ...]:
+    return tuple(float(number) * factor for number in numbers)
+
+
+def _driven_at(rate: float) -> Scene:
+    scene = four_bar(math.pi / 2, "speed")
+    factor = rate / CRANK_RATE
+    bodies = tuple(
+        body.model_copy(update={"angular_velocity": _times(body.angular_velocity, factor)})
+        for body in scene.body
+    )
+    driver = Driver(joint="A", polynomial=(0.0, -rate))
+    return scene.with_(body=bodies, driver=(driver,), duration=4 * math.pi / rate)
+
+
+def _sprung(stiffness: float) -> Scene:
+    """From rest, the spring a tenth longer than it would be; the slider is by far the heaviest part."""
+    scene = slider_crank(0.304, 0.4048, 0.3, "stiffness")
+    at = scene.body[2].position
+    spring = Spring(
+        bodies=("ground", "slider"), points=((1.0, 0.0, 0.0), at), stiffness=stiffness,
+        natural_length=0.9 * (1.0 - at[0]),
+    )  # fmt: skip
+    return scene.with_(load=(spring,), duration=4 * math.pi / math.sqrt(stiffness))
+
+
+def scenes() -> list[Scene]:
+    """The scene of every rung, named by its place."""
+    return [
+        scene.with_(name=scene_name(ladder.name, difficulty))
+        for ladder in ladders()
+        for difficulty, scene in ladder.rungs
+    ]
+
+
+def cases(engines: Sequence[str]) -> list[Case]:
+    """Every rung by mbref's methods, and by those of the engines that can run it."""
+    return [
+        Case(scene, np.linspace(0.0, scene.duration, SAMPLES), name, setting, TIME_LIMIT)
+        for scene in scenes()
+        for name, setting in _settings(scene, engines)
+    ]
+
+
+def _settings(scene: Scene, engines: Sequence[str]) -> Iterator[tuple[str, Setting]]:
+    for method in METHODS:
+        yield MBREF, Setting(method, {"rtol": RTOL, "most_steps": MOST_STEPS})
+    for name in engines:
+        offered = [s for s in settings(name, scene) if s.family == FAMILIES[name]]
+        if offered:
+            yield name, offered[max(0, len(offered) - 2)]
+
+
+def run(path: str | Path, engines: Sequence[str]) -> list[Record]:
+    """The record of every run, stored at ``path`` as it ends and taken from there where it is known."""
+    able, rungs = [name for name in FAMILIES if name in engines], scenes()
+    with counted("finding out settings", unasked(able, rungs)) as advance:
+        scout(able, rungs, advance)
+    planned = cases(able)
+    with shown("the stability ladders", len(planned)) as progress:
+        return study(planned, None, path, progress)

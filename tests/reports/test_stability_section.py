@@ -1,0 +1,67 @@
+"""The stability section: counts, cells and colours worked out by hand from records with known errors."""
+
+import math
+
+import pytest
+
+from crosscheck.engine import engine_names
+from crosscheck.judge.truth import closed_form
+from crosscheck.study import stability
+from reports.blocks import Figure, Table
+from reports.sections import stability as section
+
+
+def record(
+    ladder: str, difficulty: float, error: float, outcome="COMPLETED", engine="mbref", family="taylor"
+):
+    return {
+        "scene": stability.scene_name(ladder, difficulty), "engine": engine, "family": family,
+        "outcome": outcome, "metrics": {"error": error},
+    }  # fmt: skip
+
+
+def test_every_rung_has_an_exact_motion_and_a_place():
+    scenes = stability.scenes()
+    assert len(scenes) == sum(len(ladder.rungs) for ladder in stability.ladders()) > 60
+    for scene in scenes:
+        ladder, difficulty = stability.place(scene.name)
+        assert stability.scene_name(ladder, difficulty) == scene.name
+        assert closed_form(scene) is not None, f"{scene.name} has no closed form"
+
+
+def test_cases_are_mbrefs_methods_and_a_fine_setting_of_the_engines():
+    cases = [c for c in stability.cases(["pinocchio"]) if c.scene.name == stability.scenes()[0].name]
+    assert [c.setting.family for c in cases] == [*stability.METHODS, stability.FAMILIES["pinocchio"]]
+    assert all(c.setting.options["rtol"] == stability.RTOL for c in cases[:-1])
+    assert set(stability.FAMILIES) <= set(engine_names())
+
+
+def test_counts_tell_right_ended_and_false():
+    records = [
+        record("gap", 1e-1, 1e-9),
+        record("gap", 3e-3, 2e-6),
+        record("gap", 1e-4, 3.0, "UNDECIDED"),
+        record("units", 1e-6, math.nan),
+        record("gap", 1e-1, 5e-3, engine="mujoco", family="projected"),
+        record("gap", 3e-3, 0.5, engine="mujoco", family="projected"),
+    ]
+    (table,) = [b for b in section.render(records) if isinstance(b, Table)]
+    assert [tuple(row) for row in table.rows] == [
+        ("mbref", "taylor", "1", "1", "2"), ("mujoco", "projected", "1", "0", "1"),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("error", "outcome", "text", "red"),
+    [
+        (1e-9, "COMPLETED", "9", False), (3e-16, "COMPLETED", "15", False), (2.0, "COMPLETED", "0", True),
+        (1.0, "LEFT_MOTION", "m", False), (1.0, "SINGULAR_MATRIX", "a", False),
+    ],
+)  # fmt: skip
+def test_a_cell_shows_digits_or_why_the_run_ended(error, outcome, text, red):
+    (figure,) = [b for b in section.render([record("gap", 1e-1, error, outcome)]) if isinstance(b, Figure)]
+    [axes] = figure.draw().axes
+    assert [t.get_text() for t in axes.texts] == [text]
+    assert bool(axes.collections) is red
+    assert axes.get_xlabel() == "gap, m" and axes.get_yticklabels()[0].get_text() == "taylor"
+    assert axes.get_xticklabels()[0].get_text() == "1e-1"
