@@ -103,23 +103,21 @@ def has_passed(y, memory):
         return False
     now, before = taken % kept, (taken - 1) % kept
     turn = fastest_turn(state.velocities) * (history.time[now] - history.time[before])
-    if least_sum(history.pivots[before], history.pivots[now]) < STEEP * turn and changes_sign(
-        before, y, memory
-    ):
-        return True
     pieces = int(turn / LONG) + 1
     if changes_much(history.pivots[before], history.pivots[now]):
         pieces = max(pieces, FINE)
     pieces = min(pieces, inside.shape[0] - 1)
-    if pieces == 1:
+    if pieces == 1 and least_sum(history.pivots[before], history.pivots[now]) >= STEEP * turn:
         return False
     copy(history.pivots[before], inside[0])
     copy(history.pivots[now], inside[pieces])
+    changes = False
+    remember_gradient(before, memory)
     for i in range(1, pieces):
         put_pivots_inside(i, i / pieces, before, now, memory)
-    expand(y, memory.active, state)
-    evaluate(clock.time, state.coordinates, state.velocities, memory.equations)
-    return falls_and_rises(pieces, inside)
+        changes = changes_sign(memory) or changes
+    put_gradient(clock.time, y, memory)
+    return changes_sign(memory) or changes or falls_and_rises(pieces, inside)
 
 
 @kernel
@@ -133,22 +131,29 @@ def least_sum(before, now):
 
 
 @kernel
-def changes_sign(before, y, memory):
-    """Whether det(G₁ G₀ᵀ + I/α) is negative, G₀ and G₁ being the gradients at both ends of the last step.
-
-    It is positive where the rows' span turns by less than a right angle, and changes its sign where the rank
-    drops by one in between.  y is the state at the end, where the scene is evaluated last.
-    """
-    loop, factor = memory.loop, memory.factor
-    if loop.gradients.row.shape[0] == 0:
-        return False
+def remember_gradient(before, memory):
+    """Keep D of a row of the history."""
+    loop = memory.loop
     start = loop.y_new[: loop.clock.y_size]
     copy(loop.history.y[before, : loop.clock.y_size], start)
     put_gradient(loop.history.time[before], start, memory)
-    copy(factor.d, loop.gradients.start)
-    put_gradient(loop.clock.time, y, memory)
-    put_product(factor, loop.gradients)
-    negative, _ = determinant(loop.gradients.product, factor.diagonal.shape[0])
+    if loop.gradients.row.shape[0] > 0:
+        copy(memory.factor.d, loop.gradients.start)
+
+
+@kernel
+def changes_sign(memory):
+    """Whether det(G₁ G₀ᵀ + I/α) is negative, of the last gradient and of the kept one, which it replaces.
+
+    It is positive where the rows' span turns by less than a right angle, and changes its sign where the rank
+    drops by one in between.
+    """
+    factor, gradients = memory.factor, memory.loop.gradients
+    if gradients.row.shape[0] == 0:
+        return False
+    put_product(factor, gradients)
+    copy(factor.d, gradients.start)
+    negative, _ = determinant(gradients.product, factor.diagonal.shape[0])
     return negative
 
 

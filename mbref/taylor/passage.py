@@ -18,7 +18,7 @@ from numpy import exp, log
 from mbref.kernels.compilation import kernel
 from mbref.kernels.layout import OK
 from mbref.linear_algebra.elimination import determinant
-from mbref.linear_algebra.vectors import copy
+from mbref.linear_algebra.vectors import copy, larger
 from mbref.simulation.stepping import SINGULAR_AHEAD, STEP_TOO_SMALL, UNDECIDED
 from mbref.taylor.samples import evaluate_series
 from mbref.taylor.solver import put_gradient
@@ -33,6 +33,7 @@ ACROSS = 1e-13  # of a step that crosses
 CLOCK = 3e-16  # of the time: its rounding, over which drivers and variables move
 DEEPEST = 0.2  # of a step's first pivot: its last is not less, so that the next is not the worse for it
 VANISHING = log(0.2)  # of a determinant over its values at both ends, that falls and rises linearly
+LONG, MOST_PARTS = 0.5, 8  # m or rad that a variable moves in a part of a step, and the most of them
 ILLINOIS, VANISHED = 60, 1e-15  # iterations, and a determinant over that at the beginning of its step
 LEAST = 1e-9  # pivot over its largest below which the branch depends on rounding
 
@@ -59,7 +60,7 @@ def least_pivot(memory):
 
 @kernel
 def may_cross(pivot, memory):
-    """Whether a step may cross a singular position: it ends near one, or a pivot has changed its sign."""
+    """Whether a step may cross two branches at once: it ends near one, or a pivot has changed its sign."""
     progress, solver = memory.progress, memory.solver
     if progress.choice != progress.past_choice or is_near(pivot, progress):
         return True
@@ -115,15 +116,49 @@ def has_crossed(h, pivot, memory):
     the determinant is looked at where a least pivot vanishes that falls and rises linearly.
     """
     progress = memory.progress
+    far = progress.past_pivot >= BEFORE * progress.largest_pivot
+    if changes_sign(h, memory):
+        return True
+    if far or not may_cross(pivot, memory) or turns_back(memory):
+        return False
     remember_gradient(memory)
-    negative, behind = overlap(memory.series.terms, memory)
-    if negative or progress.past_pivot >= BEFORE * progress.largest_pivot or turns_back(memory):
-        return negative
+    _, behind = overlap(memory.series.terms, memory)
     _, before = overlap(memory.series.past, memory)
     evaluate_series(h * progress.past_pivot / (progress.past_pivot + pivot), memory)
     _, between = overlap(memory.state, memory)
     evaluate_series(h, memory)
     return between < VANISHING + min(before, behind)
+
+
+@kernel
+def changes_sign(h, memory):
+    """Whether the determinant of the gradients at both ends of a step of h seconds is negative.
+
+    So of each of the parts of a long step: rows that turn by a right angle change the sign too.
+    """
+    series, changes = memory.series, False
+    moved = h * size_of(series.past, 1, memory.solver.order.shape[0])
+    parts = min(int(moved / LONG) + 1, MOST_PARTS)
+    remember_gradient(memory)
+    for part in range(1, parts):
+        evaluate_series(h * part / parts, memory)
+        negative, _ = overlap(memory.state, memory)
+        changes = changes or negative
+        copy(memory.solver.work.reshape(-1), memory.solver.past_gradient.reshape(-1))
+    negative, _ = overlap(series.terms, memory)
+    if parts > 1:
+        evaluate_series(h, memory)
+        remember_gradient(memory)
+    return changes or negative
+
+
+@kernel
+def size_of(series, k, variables):
+    """The largest coefficient of order k."""
+    size = 0.0
+    for i in range(variables):
+        size = larger(size, series[k, i])
+    return size
 
 
 @kernel
@@ -185,7 +220,7 @@ def resolution(memory):
 def judge_branch(h, last, memory):
     """Judge a step of h seconds by the least pivot: OK, or why the branch on which it ends is in doubt."""
     progress, pivot = memory.progress, least_pivot(memory)
-    progress.crossed = may_cross(pivot, memory) and has_crossed(h, pivot, memory)
+    progress.crossed = has_crossed(h, pivot, memory)
     if not progress.passing:
         ahead = progress.crossed or pivot < AHEAD * progress.largest_pivot
         return SINGULAR_AHEAD if ahead else OK

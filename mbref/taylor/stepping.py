@@ -34,6 +34,7 @@ from mbref.taylor.passage import (
     judge_branch,
     least_pivot,
     remember_pivots,
+    size_of,
 )
 from mbref.taylor.samples import (
     LOST_MOTION,
@@ -141,24 +142,24 @@ def expand_from(t, memory):
 
 
 @kernel
-def size_of(series, k, variables):
-    """The largest coefficient of order k."""
-    size = 0.0
-    for i in range(variables):
-        size = larger(size, series[k, i])
-    return size
-
-
-@kernel
 def longest_step(tolerance, memory):
-    """The step at which the last two terms of the series are as large as the tolerance."""
+    """The step at which the last two terms of the series are as large as the tolerance.
+
+    So are those of its rate, over the largest rate where that is above 1; a passage asks for rounding anyway.
+    """
     progress, control, past = memory.progress, memory.run.control, memory.series.past
-    counts, h = memory.run.equations.system.counts, control.largest_step
-    shortest = log(h)
+    counts, h, variables = (
+        memory.run.equations.system.counts,
+        control.largest_step,
+        memory.solver.order.shape[0],
+    )
+    shortest, of_rates = log(h), tolerance * max(1.0, size_of(past, 1, variables))
     for k in range(progress.order - 1, progress.order + 1):
-        size = size_of(past, k, memory.solver.order.shape[0])
+        size = size_of(past, k, variables)
         if size > 0.0:
             shortest = min(shortest, log(tolerance / size) / k)
+            if not progress.passing:
+                shortest = min(shortest, log(of_rates / (k * size)) / (k - 1))
     h = exp(shortest)
     if counts.steps == 0 and control.first_step > 0.0:
         h = min(h, control.first_step)
