@@ -37,6 +37,15 @@ class Branches(NamedTuple):
     sentence: str
 
 
+class Passed(NamedTuple):
+    """A crossing at a time (s): coordinates (7 nb,), velocities (n,) on the smooth branch, the one taken."""
+
+    time: float
+    coordinates: np.ndarray
+    velocities: np.ndarray
+    taken: int
+
+
 class SingularPosition(NamedTuple):
     """A crossing at a time (s): coordinates (7 nb,), velocities (b, n) of the branches, and the one taken.
 
@@ -102,11 +111,11 @@ def second_order(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Second
 
 def _forms(model: Model, t: float, q: np.ndarray, directions: np.ndarray, null: np.ndarray) -> np.ndarray:
     """wᵀ γ as quadratic forms (c, d, d) of d directions (n + 1, d), for c left null vectors (c, m)."""
-    d, at_rest = directions.shape[1], model.terms(t, q, np.zeros(model.n)).gamma
+    d, at_rest = directions.shape[1], model.blocks(t, q, np.zeros(model.n)).gamma
 
     def rate(u: np.ndarray) -> np.ndarray:
         """Second order along u (n + 1,): γ₂ + t' γ₁ + t'² γ₀."""
-        there, back = (model.terms(t, q, sign * u[:-1]).gamma for sign in (1.0, -1.0))
+        there, back = (model.blocks(t, q, sign * u[:-1]).gamma for sign in (1.0, -1.0))
         even, odd = (there + back) / 2 - at_rest, (there - back) / 2
         return even + u[-1] * odd + u[-1] ** 2 * at_rest
 
@@ -185,11 +194,12 @@ def _velocity(model: Model, found: SecondOrder, a: np.ndarray, v: np.ndarray) ->
     return u[:-1] * np.sqrt(energy / own) * (1.0 if along >= 0 else -1.0)
 
 
-def singular_position(model: Model, t: float, q: np.ndarray, v: np.ndarray, taken: int) -> SingularPosition:
-    """The branches at a crossing that a motion passes at time t (s) with coordinates q and velocities v.
+def singular_position(model: Model, passed: Passed) -> SingularPosition:
+    """The branches at a crossing that a motion passed.
 
     Raises ValueError where a branch is to be taken that is not there.
     """
+    t, q, v, taken = passed
     large = model.m > MOST_ROWS
     found = Branches(v[None], NOT_LOOKED_FOR) if large else branches(model, t, q, v)
     if taken > len(found.velocities):

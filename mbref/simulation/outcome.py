@@ -7,6 +7,7 @@ from dataclasses import asdict
 import numpy as np
 
 from mbref import __version__
+from mbref.equations.branches import singular_position
 from mbref.equations.joint_reactions import reactions
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR
 from mbref.motion import Motion
@@ -68,7 +69,8 @@ def _crossings(run: Run) -> tuple[Crossing, ...] | None:
     if not run.method.stabilisation.projects:
         return None
     found = []
-    for crossing in run.crossings:
+    for passed in run.crossings:
+        crossing = singular_position(run.model, passed)
         v = crossing.velocities.reshape(len(crossing.velocities), -1, 6)
         q = np.broadcast_to(crossing.coordinates.reshape(-1, 7), (len(v), v.shape[1], 7))
         motion = run.model.motion(q, v, np.zeros_like(v))

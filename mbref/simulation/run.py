@@ -14,7 +14,7 @@ from mbref.equations.active_coordinates import (
     active_scene,
     without_rounding,
 )
-from mbref.equations.branches import SingularPosition
+from mbref.equations.branches import Passed
 from mbref.equations.degrees_of_freedom import undriven_freedoms
 from mbref.equations.evaluation import evaluate_all
 from mbref.equations.initial_state import consistent_start, scene_length
@@ -64,7 +64,7 @@ class Run:
         self._enter()
         self.specialised: Specialised | None = None
         self.wants_code = limits.code == AUTO
-        self.crossings: list[SingularPosition] = []
+        self.crossings: list[Passed] = []
         self.making = 0.0  # s of CPU time spent on specialised code
         if limits.code == SPECIALISED:
             self._specialise()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbref.equations.branches import SMOOTH, SingularPosition, singular_position
+from mbref.equations.branches import SMOOTH, Passed, SingularPosition, singular_position
 from mbref.equations.model import displaced, displacement
 from mbref.kernels.layout import OK
 from mbref.method import Method
@@ -57,16 +57,16 @@ class PassingRun(SeriesRun):
         taken = dict(self.limits.branches).get(passed + 1, SMOOTH)
         crossing = self._placed(taken)
         self.crossings.append(crossing)
-        return status if taken == SMOOTH else self._take_branch(crossing)
+        return status if taken == SMOOTH else self._take_branch(singular_position(self.model, crossing))
 
-    def _placed(self, taken: int) -> SingularPosition:
+    def _placed(self, taken: int) -> Passed:
         """The crossing of the last step; the state in memory stays behind it."""
         state, clock = self.memory.state, self.memory.loop.clock
         behind = state.coordinates.copy(), state.velocities.copy()
         t = float(clock.time) - float(place_crossing(self._packed_taylor.argument))
         q, v = state.coordinates.copy(), state.velocities.copy()
         state.coordinates[:], state.velocities[:] = behind
-        return singular_position(self.model, t, q, v, taken)
+        return Passed(t, q, v, taken)
 
     def _take_branch(self, crossing: SingularPosition) -> int:
         """Go on along another branch than the smooth one: PAUSED, or why that cannot be.
