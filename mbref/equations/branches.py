@@ -1,10 +1,10 @@
 """The branches of motion that meet at a singular position, to second order.
 
-Where the rank of Φ_q drops, velocities have a freedom more, and each left null vector w of Φ_q leaves an
+Where the rank of Φ_q drops, the velocities have more freedoms, and each left null vector w of Φ_q leaves an
 equation of second order, wᵀ γ(q, v, t) = 0: the quadratic cone of A. Müller (Mech. Mach. Theory 2016) and
 P. C. López-Custodio et al. (2020).  With time as one more coordinate, u = (v, t'), both are homogeneous:
 [Φ_q  -ν] u = 0 and wᵀ (γ₂(v, v) + t' γ₁(v) + t'² γ₀) = 0.  Two directions of one freedom each are two
-branches that cross; a double one is a common tangent, which higher orders tell apart.
+branches that cross; a double one is a common tangent, whose branches only higher orders tell apart.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ MOST_ROWS = 120  # beyond it the singular values of a crossing take longer than 
 RANK = 1e-6  # relative singular value that is zero at a singular position
 FLAT = 1e-7  # relative size of a quadratic form that is zero
 SAME = 1e-4  # rad between directions that are one
+BROAD = 0.05  # the same of multiple roots, to which Newton's method converges slowly
+ZERO, CONVERGED = 1e-12, 1e-10  # of the forms, and of the last iteration's change, at a root
 STARTS, ITERATIONS = 200, 40  # of Newton's method where more than two freedoms meet
 
 NO_OTHER = "the smooth branch only"
@@ -27,6 +29,7 @@ ALONE = "one branch"
 OPEN = "all directions agree with the constraints to second order"
 TANGENT = "branches with a common tangent, which second order does not tell apart"
 NOT_LOOKED_FOR = f"branches of scenes with more than {MOST_ROWS} rows are not looked for"
+MULTIPLE = " and others that second order does not determine"
 CONE = "a cone of directions, of which the smooth one is listed"
 
 
@@ -79,15 +82,17 @@ def branches(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Branches:
         return Branches(v[None], NO_OTHER)
     if not len(found.forms):
         return Branches(v[None], OPEN)
-    roots = _roots(found.forms[0]) if freedoms == 2 else _roots_of_many(found.forms)
-    if roots is None:
+    lines = (_roots(found.forms[0]), False) if freedoms == 2 else _roots_of_many(found.forms)
+    if lines is None:
         return Branches(v[None], CONE)
+    roots, multiple = lines
     roots = [a for a in roots if np.abs(_values(found.forms, a)).max() < SAME]
     velocities = [_velocity(model, found, a, v) for a in roots if _angle(a, mine) > SAME]
     velocities = [w for w in velocities if w is not None]
     if freedoms == 2 and len(found.forms) == 1 and len(roots) == 1:
         return Branches(v[None], TANGENT)
-    return Branches(np.array([v, *velocities]), f"{1 + len(velocities)} branches" if velocities else ALONE)
+    sentence = f"{1 + len(velocities)} branches" if velocities else ALONE
+    return Branches(np.array([v, *velocities]), sentence + MULTIPLE * multiple)
 
 
 def second_order(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> SecondOrder:
@@ -157,23 +162,33 @@ def _roots(form: np.ndarray) -> list[np.ndarray]:
     return lines[:1] if _angle(*lines) < SAME else lines
 
 
-def _roots_of_many(forms: np.ndarray) -> list[np.ndarray] | None:
-    """Lines on which all forms are zero, by Newton's method from random starts; None where they are no
-    isolated lines."""
-    d, random, found = forms.shape[1], np.random.default_rng(0), []
-    for _ in range(STARTS):
-        a = random.normal(size=d)
-        for _ in range(ITERATIONS):
-            a /= np.linalg.norm(a)
-            slopes = 2.0 * forms @ a
-            a = a - np.linalg.lstsq(slopes, _values(forms, a), rcond=None)[0]
-        a /= np.linalg.norm(a)
-        if np.abs(_values(forms, a)).max() > 1e-12 or any(_angle(a, b) < SAME for b in found):
-            continue
-        if np.linalg.matrix_rank(2.0 * forms @ a, tol=SAME) < d - 1:
+def _roots_of_many(forms: np.ndarray) -> tuple[list[np.ndarray], bool] | None:
+    """Simple lines on which all forms are zero, by Newton's method from random starts, and whether there are
+    multiple ones; None where lines are not isolated: those are 2ᵈ⁻¹ at most (Bézout)."""
+    d, random = forms.shape[1], np.random.default_rng(0)
+    simple: list[np.ndarray] = []
+    multiple: list[np.ndarray] = []
+    for _ in range(STARTS if len(forms) >= d - 1 else 0):
+        a, left, is_simple = _root_from(forms, random.normal(size=d))
+        known, near = (simple, SAME) if is_simple else (multiple, BROAD)
+        if left <= ZERO and all(_angle(a, b) >= near for b in known):
+            known.append(a)
+        if len(simple) + len(multiple) > 2 ** (d - 1):
             return None
-        found.append(a)
-    return found
+    return (simple, bool(multiple)) if len(forms) >= d - 1 else None
+
+
+def _root_from(forms: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, float, bool]:
+    """Where Newton's method leads from a, what the forms are there, and whether it is a simple root."""
+    change = np.ones(1)
+    for _ in range(ITERATIONS):
+        a = a / np.linalg.norm(a)
+        change = np.linalg.lstsq(2.0 * forms @ a, _values(forms, a), rcond=None)[0]
+        a = a - change
+    a = a / np.linalg.norm(a)
+    full = np.linalg.matrix_rank(2.0 * forms @ a, tol=SAME) == len(a) - 1
+    left = float(np.abs(_values(forms, a)).max())
+    return a, left, bool(full and np.linalg.norm(change) < CONVERGED)
 
 
 def _direction(found: SecondOrder, v: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ from mbref.simulation import run as general
 from mbref.simulation.limits import SPECIALISED, Limits
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.run import Run
+from mbref.simulation.stepping import DONE
 from mbref.specialised import Untraceable
 from mbref.taylor.check import CheckedRun
 from mbref.taylor.run import CrossingRun, TaylorRun
@@ -59,7 +60,19 @@ def simulate(
         raise MethodError(f"no machine code for {scene.name!r} by {method}: {reason}") from None
     built = time.process_time() - began - run.making
     status, seconds = run.advance(progress)
+    if status == DONE:
+        _check_branches(run)
     return trajectory_of(run, status, seconds, built + run.making)
+
+
+def _check_branches(run: Run) -> None:
+    """Raise ValueError where a branch was asked for at a singular position that the motion does not pass."""
+    last, passed = max(dict(run.limits.branches), default=0), len(run.crossings)
+    if last > passed:
+        raise ValueError(
+            f"branches: the motion passes {passed} singular positions up to t = {run.times[-1]:g} s, "
+            f"there is no number {last}"
+        )
 
 
 def kind_of(method: Method) -> type[Run]:
@@ -70,10 +83,13 @@ def kind_of(method: Method) -> type[Run]:
 
 
 def prepare(method: Method) -> None:
-    """Compile the kernels of the method, or load them from the cache of this machine."""
-    general.prepare(method)
-    if not method.integrator.step:
-        prepare_series()
+    """Compile the kernels of the method, or load them from the cache of this machine.
+
+    Those of the default method and of Taylor series are among them: comparisons and crossings need them.
+    """
+    for needed in (method, Method.parse(DEFAULT), Method.parse("taylor")):
+        general.prepare(needed)
+    prepare_series()
 
 
 def why_no_code(scene: Scene, method: Method) -> str:

@@ -24,9 +24,7 @@ from mbref.stabilisation.projection import ALPHA, factorise_constraints
 WINDOW = 0.1  # relative pivot below which a singular position is near
 ON_IT = 1e-7  # relative pivot of a run that begins on one: its first step leaves it
 SHARP = 3.0  # times a pivot's fall in the time of a step: a larger pivot has not vanished inside
-STEEP = (
-    2.0  # a pivot's fall a rad: steps inside which one can fall to zero and rise are compared at both ends
-)
+STEEP = 2.0  # largest fall of a pivot a rad: where it could vanish inside a step, determinants are compared
 LONG = 0.5  # rad that a body turns in a step inside which pivots are looked at
 SHARPLY, FINE = 0.5, 5  # a pivot's change in a step, as a ratio, inside which as many parts are looked at
 SMALLEST = 1e-4  # pivot of a row below which it is as good as redundant, and is not compared

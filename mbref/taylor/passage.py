@@ -13,7 +13,7 @@
 
 from __future__ import annotations
 
-from numpy import exp, log
+from numpy import log
 
 from mbref.kernels.compilation import kernel
 from mbref.kernels.layout import OK
@@ -34,7 +34,7 @@ CLOCK = 3e-16  # of the time: its rounding, over which drivers and variables mov
 DEEPEST = 0.2  # of a step's first pivot: its last is not less, so that the next is not the worse for it
 VANISHING = log(0.2)  # of a determinant over its values at both ends, that falls and rises linearly
 LONG, MOST_PARTS = 0.5, 8  # m or rad that a variable moves in a part of a step, and the most of them
-ILLINOIS, VANISHED = 60, 1e-15  # iterations, and a determinant over that at the beginning of its step
+GOLDEN, SECTIONS = 0.6180339887498949, 70  # of the search for the least determinant
 LEAST = 1e-9  # pivot over its largest below which the branch depends on rounding
 
 
@@ -116,7 +116,7 @@ def has_crossed(h, pivot, memory):
     the determinant is looked at where a least pivot vanishes that falls and rises linearly.
     """
     progress = memory.progress
-    far = progress.past_pivot >= BEFORE * progress.largest_pivot
+    far = progress.passing and progress.past_pivot >= BEFORE * progress.largest_pivot
     if changes_sign(h, memory):
         return True
     if far or not may_cross(pivot, memory) or turns_back(memory):
@@ -124,8 +124,7 @@ def has_crossed(h, pivot, memory):
     remember_gradient(memory)
     _, behind = overlap(memory.series.terms, memory)
     _, before = overlap(memory.series.past, memory)
-    evaluate_series(h * progress.past_pivot / (progress.past_pivot + pivot), memory)
-    _, between = overlap(memory.state, memory)
+    between = size_at(h * progress.past_pivot / (progress.past_pivot + pivot), memory)
     evaluate_series(h, memory)
     return between < VANISHING + min(before, behind)
 
@@ -165,27 +164,29 @@ def size_of(series, k, variables):
 def find_crossing(h, memory):
     """The time (s, from its beginning) at which a step of h seconds that crossed met the singular position.
 
-    There the determinant vanishes, which the Illinois method finds; where it keeps its sign, it is taken to
-    fall and rise linearly.
+    The determinant vanishes there, as often as branches of loops cross; golden section finds its least size.
     """
-    progress = memory.progress
-    negative, size = overlap(memory.series.terms, memory)
-    _, first = overlap(memory.series.past, memory)
-    if not negative:
-        return h * progress.past_pivot / (progress.past_pivot + least_pivot(memory))
-    start, end, before, after = 0.0, h, 1.0, -exp(size - first)
-    for _ in range(ILLINOIS):
-        middle = (start * after - end * before) / (after - before)
-        evaluate_series(middle, memory)
-        negative, size = overlap(memory.state, memory)
-        value = exp(size - first)
-        if value <= VANISHED:
-            return middle
-        if negative:
-            end, after, before = middle, -value, 0.5 * before
+    start, end = 0.0, h
+    one, other = h - GOLDEN * h, GOLDEN * h
+    before, after = size_at(one, memory), size_at(other, memory)
+    for _ in range(SECTIONS):
+        if before < after:
+            end, other, after = other, one, before
+            one = end - GOLDEN * (end - start)
+            before = size_at(one, memory)
         else:
-            start, before, after = middle, value, 0.5 * after
+            start, one, before = one, other, after
+            other = start + GOLDEN * (end - start)
+            after = size_at(other, memory)
     return 0.5 * (start + end)
+
+
+@kernel
+def size_at(h, memory):
+    """The logarithm of the determinant's size at a distance h (s) from the step's beginning."""
+    evaluate_series(h, memory)
+    _, size = overlap(memory.state, memory)
+    return size
 
 
 @kernel

@@ -7,7 +7,7 @@ import pytest
 
 from crosscheck.judge.metrics import measure
 from mbref.design.along_motion import along_motion
-from mbref.equations.branches import ALONE, second_order
+from mbref.equations.branches import ALONE, MULTIPLE, second_order
 from mbref.equations.initial_state import consistent_start
 from mbref.equations.model import Model
 from mbref.method import MethodError
@@ -15,6 +15,7 @@ from mbref.motion import Motion
 from mbref.scene import GROUND, Body, Revolute, Scene
 from mbref.scenes.five_bar import five_bar
 from mbref.scenes.four_bar import four_bar, four_bar_gravity
+from mbref.scenes.four_bar_chain import four_bar_chain
 from mbref.scenes.planar_slider_crank import slider_crank
 from mbref.simulation.simulate import Limits, simulate
 
@@ -70,11 +71,35 @@ def test_another_branch_without_drivers_keeps_the_energy(method):
     assert off[~behind].max() < 1e-9 and off[behind][1:].min() > 1e-3
 
 
+@pytest.mark.parametrize("loops", [2, 3])
+@pytest.mark.parametrize("method", METHODS)
+def test_loops_that_are_flat_at_once(method, loops):
+    """All links lie on one line, which is placed; the first upright may rest, the others go on."""
+    run = simulate(four_bar_chain(loops), method, [1.0])
+    (crossing,) = run.crossings
+    assert np.abs(crossing.position[:, 1]).max() < 1e-12 and crossing.sentence == "2 branches" + MULTIPLE
+    resting = np.abs(crossing.angular_velocity[:, : loops + 1, 2]) < 1e-6
+    assert not resting[0].any() and resting[1].tolist() == [True] + [False] * loops
+
+
+@pytest.mark.parametrize("loops", [2, 3])
+def test_a_branch_of_several_loops(loops):
+    """The first loop folds, the others swing on, the energy stays."""
+    scene, times = four_bar_chain(loops), np.linspace(0.0, 1.0, 21)
+    run = simulate(scene, "alf-dual+projection", times, Limits(branches={1: 2}))
+    assert run.outcome.label == "COMPLETED" and np.ptp(run.energy) < 1e-8
+    behind = times > run.crossings[0].time
+    folded = run["bar1"].position[behind] - run["upright1"].position[behind]
+    assert np.abs(folded).max() < 1e-9, "the first bar lies on the second upright"
+
+
 def test_a_branch_that_is_not_there():
     with pytest.raises(ValueError, match=r"branches: the crossing at t = 0\.0125865 s has no branch 2: one"):
         simulate(four_bar(), "alf-dual+projection", [0.05], Limits(branches={1: 2}))
     with pytest.raises(MethodError, match="does not look for singular positions"):
         simulate(four_bar(), "mpi-svd+partitioning", [0.05], Limits(branches={2: 2}))
+    with pytest.raises(ValueError, match=r"branches: the motion passes 2 singular positions up to t"):
+        simulate(four_bar(), "alf-dual+projection", [0.05], Limits(branches={9: 2}))
     for wrong in ({1: 0}, {1: "x"}, 3, [(1,)], {1: 1.5}):
         with pytest.raises(ValueError, match="branches: must be"):
             Limits(branches=wrong)
