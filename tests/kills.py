@@ -1,4 +1,4 @@
-"""Processes killed at random moments of a study or an ensemble: what is lost, and what is written twice.
+"""Kills of processes at random moments of a study or an ensemble, and counts of lost and repeated records.
 
 ``python -m tests.kills --runs 200 --times 20`` kills (SIGKILL) the parent of a study, the child processes of
 its engine, and the worker processes of an ensemble, each so many times, and prints a line for each; exit
@@ -122,7 +122,7 @@ def children(runs: int, times: int, folder: Path) -> Counted:
 
 
 def workers(runs: int, times: int, folder: Path) -> Counted:
-    """The worker processes of an ensemble are killed; what they were running is run again afterwards."""
+    """The worker processes of an ensemble are killed; their runs are repeated afterwards."""
     path, draw = folder / "ensemble.jsonl", random.Random(5)
     every = max(1, runs // (times + 1))
 

@@ -37,7 +37,7 @@ def truth_record(scene: Scene, times: np.ndarray, reference_time: float) -> Reco
 
 
 def known_at(scene: Scene, times: np.ndarray, reference_time: float) -> Record:
-    """What is known of the true motion at times (k,) alone, as in a truth's record."""
+    """The truth's record at times (k,) alone, without key and scene."""
     family = closed_form(scene)
     return _of_family(scene, family, times) if family else _of_reference(scene, times, reference_time)
 

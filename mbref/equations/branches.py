@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mbref.equations.model import Model
+from mbref.equations.units import row_lengths
 
 SMOOTH = 1  # the branch that is taken unless another is asked for
 MOST_ROWS = 120  # beyond it the singular values of a crossing take longer than the run
@@ -102,8 +103,7 @@ def second_order(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Second
     """
     at_rest = model.terms(t, q, np.zeros(model.n))
     lengths = np.column_stack([np.ones((model.nb, 3)), np.tile(1.0 / model.data.lengths[:, None], 3)]).ravel()
-    rows = np.linalg.norm(at_rest.jacobian * lengths, axis=1)
-    rows = np.where(rows > 0, rows, 1.0)
+    rows = row_lengths(at_rest.jacobian * lengths)
     driven = bool(np.any(at_rest.nu) or np.any(at_rest.gamma))
     scale = np.append(lengths, 1.0 / (np.linalg.norm(v / lengths) or 1.0) if driven else 0.0)
     first = np.column_stack([at_rest.jacobian, -at_rest.nu]) * scale / rows[:, None]
@@ -179,7 +179,7 @@ def _roots_of_many(forms: np.ndarray) -> tuple[list[np.ndarray], bool] | None:
 
 
 def _root_from(forms: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, float, bool]:
-    """Where Newton's method leads from a, what the forms are there, and whether it is a simple root."""
+    """The end of Newton's method from a, the largest form there, and whether the end is a simple root."""
     change = np.ones(1)
     for _ in range(ITERATIONS):
         a = a / np.linalg.norm(a)

@@ -9,6 +9,7 @@ import numpy as np
 
 from mbref.equations.initial_state import LARGE, consistent_start
 from mbref.equations.model import Model
+from mbref.equations.units import row_lengths
 from mbref.linear_algebra.redundancy import Redundancy
 from mbref.scene import Scene
 
@@ -89,7 +90,7 @@ def _jacobian_at_start(model: Model) -> np.ndarray:
 def scaled_jacobian(model: Model, t: float, q: np.ndarray) -> np.ndarray:
     """Φ_q (m, n) with rows of unit length, so that its rank does not depend on units."""
     jacobian = model.terms(t, q, np.zeros(model.n)).jacobian
-    return jacobian / np.linalg.norm(jacobian, axis=1, keepdims=True)
+    return jacobian / row_lengths(jacobian)[:, None]
 
 
 def rank_of(matrix: np.ndarray) -> int:

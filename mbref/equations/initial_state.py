@@ -8,6 +8,7 @@ import numpy as np
 
 from mbref import rotations
 from mbref.equations.model import Model, displaced
+from mbref.equations.units import row_lengths
 from mbref.linear_algebra.minimum_norm import MinimumNorm
 from mbref.scene import SceneError
 
@@ -184,9 +185,8 @@ def _sparse_velocities(
 
 def _unit_rows(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The same equations with rows of unit length, so that their rank does not depend on units."""
-    norms = np.linalg.norm(matrix, axis=1)
-    norms = np.where(norms > 0.0, norms, 1.0)
-    return matrix / norms[:, None], rhs / norms
+    lengths = row_lengths(matrix)
+    return matrix / lengths[:, None], rhs / lengths
 
 
 def _solutions(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -25,6 +25,12 @@ def metric_root(mass: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     return 1.0 / np.sqrt(np.where(metric > 0.0, metric, 1.0)).ravel()
 
 
+def row_lengths(matrix: np.ndarray) -> np.ndarray:
+    """Lengths (m,) of the rows of a matrix (m, n), 1 for a row of zeros."""
+    lengths = np.linalg.norm(matrix, axis=1)
+    return np.where(lengths > 0.0, lengths, 1.0)
+
+
 def body_lengths(bodies: Sequence[Body], joints: Sequence[Joint]) -> np.ndarray:
     """Length (nb,) of every body (m); one with all anchors in its centre has the mean of the others, or 1."""
     index = {body.name: b for b, body in enumerate(bodies)}

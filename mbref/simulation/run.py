@@ -20,6 +20,7 @@ from mbref.equations.evaluation import evaluate_all
 from mbref.equations.initial_state import consistent_start, scene_length
 from mbref.equations.model import Model
 from mbref.equations.static_constraints import at_rest, held_by_rows, reduced_factor
+from mbref.equations.units import row_lengths
 from mbref.kernels.layout import (
     Active,
     Control,
@@ -231,8 +232,7 @@ def independent_rows(model: Model, q: np.ndarray, symbolic: Symbolic) -> int:
         return 0
     jacobian = model.terms(0.0, q, np.zeros(model.n)).jacobian[np.ix_(rows, columns)]
     jacobian *= model.data.metric_root[columns]
-    norms = np.linalg.norm(jacobian, axis=1, keepdims=True)
-    return int(np.linalg.matrix_rank(jacobian / np.where(norms > 0, norms, 1.0), tol=RANK))
+    return int(np.linalg.matrix_rank(jacobian / row_lengths(jacobian)[:, None], tol=RANK))
 
 
 NO_KERNELS = Kernels(*[None] * len(Kernels._fields))

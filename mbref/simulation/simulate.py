@@ -87,8 +87,8 @@ def prepare(method: Method) -> None:
 
     Those of the default method and of Taylor series are among them: comparisons and crossings need them.
     """
-    for needed in (method, Method.parse(DEFAULT), Method.parse("taylor")):
-        general.prepare(needed)
+    general.prepare(method)
+    general.prepare(Method.parse(DEFAULT))
     prepare_series()
 
 

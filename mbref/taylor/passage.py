@@ -121,7 +121,6 @@ def has_crossed(h, pivot, memory):
         return True
     if far or not may_cross(pivot, memory) or turns_back(memory):
         return False
-    remember_gradient(memory)
     _, behind = overlap(memory.series.terms, memory)
     _, before = overlap(memory.series.past, memory)
     between = size_at(h * progress.past_pivot / (progress.past_pivot + pivot), memory)
@@ -133,7 +132,8 @@ def has_crossed(h, pivot, memory):
 def changes_sign(h, memory):
     """Whether the determinant of the gradients at both ends of a step of h seconds is negative.
 
-    So of each of the parts of a long step: rows that turn by a right angle change the sign too.
+    A long step is looked at in parts, because rows that turn by a right angle change the sign too.  The
+    gradient where the step began is kept.
     """
     series, changes = memory.series, False
     moved = h * size_of(series.past, 1, memory.solver.order.shape[0])

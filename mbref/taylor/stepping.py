@@ -148,11 +148,8 @@ def longest_step(tolerance, memory):
     So are those of its rate, over the largest rate where that is above 1; a passage asks for rounding anyway.
     """
     progress, control, past = memory.progress, memory.run.control, memory.series.past
-    counts, h, variables = (
-        memory.run.equations.system.counts,
-        control.largest_step,
-        memory.solver.order.shape[0],
-    )
+    counts, variables = memory.run.equations.system.counts, memory.solver.order.shape[0]
+    h = control.largest_step
     shortest, of_rates = log(h), tolerance * max(1.0, size_of(past, 1, variables))
     for k in range(progress.order - 1, progress.order + 1):
         size = size_of(past, k, variables)
@@ -167,12 +164,18 @@ def longest_step(tolerance, memory):
 
 
 @kernel
+def keep_terms(series):
+    """The terms, which are looked along from now on."""
+    for j in range(0, series.terms.shape[0] * series.terms.shape[1], LANES):
+        store(load(series.terms, j), series.past, j)
+
+
+@kernel
 def remember_series(memory):
     """Keep the series of the step's beginning, and the pivots there."""
     remember_pivots(memory)
+    keep_terms(memory.series)
     series, torsions = memory.series, memory.polynomials.torsions
-    for j in range(0, series.terms.shape[0] * series.terms.shape[1], LANES):
-        store(load(series.terms, j), series.past, j)
     for s in range(series.past_angles.shape[0]):
         for k in range(memory.progress.order + 1):
             series.past_angles[s, k] = torsions.series[TORSION_SERIES * s + ANGLE, k]
@@ -287,7 +290,7 @@ def clearance(memory):
 
 @entry(FLOAT(Named(TaylorMemory)))
 def place_crossing(memory):
-    """How long (s) before the last step's end it crossed; the state there."""
+    """Put the state where the last step crossed into memory; how long (s) before the step's end that is."""
     length = memory.run.loop.clock.length
     h = find_crossing(length, memory)
     put_state_at(h, memory)
@@ -296,10 +299,8 @@ def place_crossing(memory):
 
 @entry(INT(FLOAT, Named(TaylorMemory)))
 def look_along(h, memory):
-    """The state at a distance h (s) from where the series now begins."""
-    series = memory.series
-    for j in range(0, series.terms.shape[0] * series.terms.shape[1], LANES):
-        store(load(series.terms, j), series.past, j)
+    """Put the state at a distance h (s) from where the series now begins into memory."""
+    keep_terms(memory.series)
     put_state_at(h, memory)
     return OK
 

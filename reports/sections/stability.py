@@ -10,22 +10,26 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
+from crosscheck.judge.tolerances import FALSE_SUCCESS
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error, is_completed
 from crosscheck.study.stability import MBREF, METHODS, RTOL, Ladder, ladders, place
+from mbref.trajectory import Outcome
 from reports import figures
 from reports.blocks import Block, Figure, Heading, Table, Text
+from reports.runs import Curve, short
 
 ALLOWED = max(1e3 * RTOL, 1e-6)  # error of a method of mbref beyond which a completed run is a false success
-WRONG = 1e-2  # the same of an engine, whose step is not chosen by a tolerance
 MOST_DIGITS = 15.0
-LETTERS = {"SINGULAR_MATRIX": "a", "NOT_CONVERGED": "b", "VIOLATION": "c", "STEP_FAILED": "d"}
-OTHERS = {"UNDECIDED": "u", "LEFT_MOTION": "m", "TIMED_OUT": "t", "CRASHED": "x", "NOT_FINITE": "n"}
+LETTERS = {  # of outcomes that the paper's tables do not have
+    "UNDECIDED": "u", "LEFT_MOTION": "m", "TIMED_OUT": "t", "CRASHED": "x", "NOT_FINITE": "n",
+}  # fmt: skip
 HOW = (
     "Numbers are digits kept: minus the logarithm of the largest error. Red cells are false successes, "
-    f"completed with an error above {ALLOWED:g} (engines: {WRONG:g}). Letters are runs that ended early and "
-    "said so: a singular matrix, b iteration not converged, c violation, d step failed, u branch undecided, "
-    "m left the motion, t out of time, x crashed, n not finite. Empty cells were not run."
+    f"completed with an error above {ALLOWED:g} (engines: {FALSE_SUCCESS:g}). A letter names the outcome of a "
+    "run that ended early: a singular matrix, b iteration not converged, c violation, d step failed, "
+    "u branch undecided, m left the motion, t out of time, x crashed, n not finite. "
+    "Empty cells were not run."
 )
 WHEN = (
     "Where a mechanism passes singular positions, or comes near them, projection (the default) and taylor "
@@ -34,30 +38,31 @@ WHEN = (
     "unstabilised pseudo-inverses suit motions without singular positions."
 )
 
-Runs = Mapping[tuple[str, str], Mapping[float, Record]]  # by engine and family, by difficulty
+Runs = Mapping[Curve, Mapping[float, Record]]  # by engine and family, by difficulty
 
 
 def render(records: Sequence[Record]) -> list[Block]:
-    """What to use when, a heat map a ladder, and the count of false successes."""
-    found = {ladder.name: _runs(records, ladder.name) for ladder in ladders()}
-    shown = [ladder for ladder in ladders() if found[ladder.name]]
+    """Advice, counts of false successes, and a heat map for each ladder."""
+    found = _runs(records)
+    shown = [ladder for ladder in ladders() if ladder.name in found]
     maps = [_figure(ladder, found[ladder.name]) for ladder in shown]
     return [Heading("Stability", 2), Text(WHEN), Text(HOW), _counts(shown, found), *maps]
 
 
-def _runs(records: Iterable[Record], ladder: str) -> dict[tuple[str, str], dict[float, Record]]:
-    runs: dict[tuple[str, str], dict[float, Record]] = {}
-    for record in records:
-        name, difficulty = place(record["scene"])
-        if name == ladder:
-            runs.setdefault((record["engine"], record["family"]), {})[difficulty] = record
+def _runs(records: Iterable[Record]) -> dict[str, Runs]:
+    """The runs of each ladder, mbref's methods first."""
     order = {method: k for k, method in enumerate(METHODS)}
-    return dict(sorted(runs.items(), key=lambda item: (item[0][0] != MBREF, order.get(item[0][1], 0))))
+    found: dict[str, dict[Curve, dict[float, Record]]] = {}
+    for record in sorted(records, key=lambda r: (r["engine"] != MBREF, order.get(r["family"], 0))):
+        ladder, difficulty = place(record["scene"])
+        curve = record["engine"], record["family"]
+        found.setdefault(ladder, {}).setdefault(curve, {})[difficulty] = record
+    return dict(found)
 
 
 def is_false(record: Record) -> bool:
-    """Whether a run completed with an error beyond what its tolerance, or reason, allows."""
-    allowed = ALLOWED if record["engine"] == MBREF else WRONG
+    """Whether a run completed with an error above ALLOWED, or an engine's above FALSE_SUCCESS."""
+    allowed = ALLOWED if record["engine"] == MBREF else FALSE_SUCCESS
     return is_completed(record) and not error(record) <= allowed
 
 
@@ -92,9 +97,7 @@ def plot(label: str, difficulties: Sequence[float], runs: Runs) -> Drawing:
     for i, row in enumerate(runs.values()):
         for j, difficulty in enumerate(difficulties):
             _write(axes, i, j, row.get(difficulty))
-    axes.set_xticks(
-        range(len(difficulties)), [f"{d:.0e}".replace("e-0", "e-").replace("e+0", "e") for d in difficulties]
-    )
+    axes.set_xticks(range(len(difficulties)), [short(d).replace("e+0", "e") for d in difficulties])
     axes.set_yticks(range(len(runs)), [_name(curve) for curve in runs])
     axes.set_xlabel(label)
     axes.grid(visible=False)
@@ -112,13 +115,13 @@ def _write(axes: figures.Axes, i: int, j: int, record: Record | None) -> None:
     axes.text(j, i, text, ha="center", va="center", color=colour, fontsize=8)
 
 
-def _name(curve: tuple[str, str]) -> str:
+def _name(curve: Curve) -> str:
     engine, family = curve
     return family if engine == MBREF else f"{engine} {family}"
 
 
 def _letter(outcome: str) -> str:
-    return {**LETTERS, **OTHERS}[outcome]
+    return Outcome[outcome].letter or LETTERS[outcome]
 
 
 def _shown(record: Record) -> float:

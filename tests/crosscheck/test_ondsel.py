@@ -156,7 +156,7 @@ def test_a_driver_with_a_phase_and_the_angle_it_prescribes(swapped: bool) -> Non
     found = joint_coordinates(scene, run.times, run.position, run.orientation, run.angular_velocity)["cyl"]
     prescribed = start - run.times + sine.amplitude * np.sin(5.0 * run.times + 0.4)
     gap = abs(found[:, 0] - prescribed).max()
-    assert gap < MARGIN * PHASED, f"{gap:.1e} rad from what the driver prescribes"
+    assert gap < MARGIN * PHASED, f"{gap:.1e} rad from the driver's angle"
 
 
 def test_accelerations_that_the_solver_gets_wrong_are_left_out() -> None:
