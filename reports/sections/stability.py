@@ -26,8 +26,8 @@ LETTERS = {  # of outcomes that the paper's tables do not have
 }  # fmt: skip
 HOW = (
     "Numbers are digits kept: minus the logarithm of the largest error. Red cells are false successes, "
-    f"completed with an error above {ALLOWED:g} (engines: {FALSE_SUCCESS:g}). A letter names the outcome of a "
-    "run that ended early: a singular matrix, b iteration not converged, c violation, d step failed, "
+    f"completed with an error above {ALLOWED:g} (engines: {FALSE_SUCCESS:g}). A letter names the outcome "
+    "of a run that ended early: a singular matrix, b iteration not converged, c violation, d step failed, "
     "u branch undecided, m left the motion, t out of time, x crashed, n not finite. "
     "Empty cells were not run."
 )
