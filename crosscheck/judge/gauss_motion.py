@@ -1,7 +1,8 @@
 """Motion of any scene by Gauss's principle with the judge's own equations, integrated at 1e-10 by SciPy.
 
 It is the exact motion of the suite's scenes that belong to no family of a truth.  Its error is what the
-integrations at two tolerances differ by, and what is left of the joint residuals.
+integrations at two tolerances differ by, and what is left of the joint residuals.  The rank of the joints'
+rows is that at the start: rows that are redundant stay so, however far the samples of a step drift apart.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from scipy.integrate import solve_ivp
 
 from crosscheck.judge.constraints import closure_accelerations, inertia_matrices, initial_twists, jacobian
 from crosscheck.judge.energy import kinetic_energy
+from crosscheck.judge.gauss_principle import singular_values
 from crosscheck.judge.loads import Motion, wrenches
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
@@ -37,20 +39,27 @@ def gauss_motion(scene: Scene, times: tuple[float, ...], rtol: float = RTOL) -> 
     orientation = np.array([body.orientation for body in scene.body])
     parts = (position, orientation, velocity, spin, np.zeros(len(_springs(scene))))
     start = np.concatenate([np.ravel(part) for part in parts])
+    rank = _rank(scene)
     if times[-1] == 0:
-        return _trajectory(scene, np.array(times), np.repeat(start[None], len(times), axis=0))
+        return _trajectory(scene, np.array(times), np.repeat(start[None], len(times), axis=0), rank)
     done = solve_ivp(
-        _rates, (0.0, times[-1]), start, "DOP853", np.array(times), rtol=rtol, atol=rtol, args=(scene,)
+        _rates, (0.0, times[-1]), start, "DOP853", np.array(times), rtol=rtol, atol=rtol, args=(scene, rank)
     )
     if not done.success:
         raise RuntimeError(f"{scene.name}: {done.message}")
-    return _trajectory(scene, done.t, done.y.T)
+    return _trajectory(scene, done.t, done.y.T, rank)
 
 
-def accelerations(scene: Scene, t: float, state: State) -> np.ndarray:
+def _rank(scene: Scene) -> int:
+    """Rank of the rows of joints and drivers at the start."""
+    values = singular_values(scene) if scene.joint else np.zeros(0)
+    return int(np.sum(values > RANK * values.max(initial=0.0)))
+
+
+def accelerations(scene: Scene, t: float, state: State, rank: int | None = None) -> np.ndarray:
     """Accelerations and angular accelerations (nb, 6), world, at a state (position (nb, 3), unit orientation
     (nb, 4), velocity, spin (nb, 3), angles of the torsion springs): of all that joints and drivers allow,
-    the nearest in the mass metric to those without joints."""
+    the nearest in the mass metric to those without joints.  ``rank`` of the rows, if it is known."""
     position, orientation, velocity, spin, _ = state
     turn = rotations.to_matrix(orientation)
     force = applied(scene, state)
@@ -66,8 +75,17 @@ def accelerations(scene: Scene, t: float, state: State) -> np.ndarray:
     still = np.zeros_like(position)
     bias = closure_accelerations(scene, t, position, orientation, velocity, spin, still, still)
     wanted = -np.concatenate([np.zeros(0), *bias.values()]) - weighted @ unbound.ravel()
-    found = unbound.ravel() + (np.linalg.lstsq(weighted, wanted, rcond=RANK)[0] if len(rows) else 0.0)
+    found = unbound.ravel() + (_least(weighted, wanted, rank) if len(rows) else 0.0)
     return np.einsum("bij,bj->bi", inverses, found.reshape(-1, 6))
+
+
+def _least(matrix: np.ndarray, wanted: np.ndarray, rank: int | None) -> np.ndarray:
+    """The least solution (n,) of a matrix (m, n) of known rank, else of singular values beyond RANK."""
+    if not (np.isfinite(matrix).all() and np.isfinite(wanted).all()):
+        return np.full(matrix.shape[1], np.nan)  # a step that went astray, which the integrator refuses
+    u, s, vt = np.linalg.svd(matrix, full_matrices=False)
+    r = int(np.sum(s > RANK * s[0])) if rank is None else rank
+    return vt[:r].T @ (u[:, :r].T @ wanted / s[:r])
 
 
 def applied(scene: Scene, state: State) -> np.ndarray:
@@ -145,10 +163,10 @@ def _state(scene: Scene, y: np.ndarray) -> State:
     return position, unit, velocity, spin, rest[10 * n :]
 
 
-def _rates(t: float, y: np.ndarray, scene: Scene) -> np.ndarray:
+def _rates(t: float, y: np.ndarray, scene: Scene, rank: int) -> np.ndarray:
     state = _state(scene, y)
     _, orientation, velocity, spin, _ = state
-    second = accelerations(scene, t, state)
+    second = accelerations(scene, t, state, rank)
     pure = np.concatenate([np.zeros((len(spin), 1)), spin], axis=1)
     n = len(spin)
     turning = rotations.multiply(pure, y[3 * n : 7 * n].reshape(n, 4)) / 2
@@ -156,9 +174,9 @@ def _rates(t: float, y: np.ndarray, scene: Scene) -> np.ndarray:
     return np.concatenate([np.ravel(part) for part in parts])
 
 
-def _trajectory(scene: Scene, times: np.ndarray, samples: np.ndarray) -> Trajectory:
+def _trajectory(scene: Scene, times: np.ndarray, samples: np.ndarray, rank: int) -> Trajectory:
     states = [_state(scene, y) for y in samples]
-    second = np.array([accelerations(scene, t, state) for t, state in zip(times, states, strict=True)])
+    second = np.array([accelerations(scene, t, state, rank) for t, state in zip(times, states, strict=True)])
     position, orientation, velocity, spin = (np.array([state[k] for state in states]) for k in range(4))
     names = tuple(body.name for body in scene.body)
     return Trajectory(
