@@ -124,6 +124,11 @@ class Engine(ABC):
         """The sweep over this engine's families and accuracies for a scene, coarse to fine in each
         family."""
 
+    def settings_of(self, scene: Scene, family: str) -> Sequence[Setting]:
+        """The sweep over the accuracies of one family, coarse to fine; none where it does not serve the
+        scene."""
+        return [setting for setting in self.settings(scene) if setting.family == family]
+
     def has_family(self, family: str) -> bool:
         """Whether `run` takes this family although the sweep of `settings` may leave it out."""
         return False

@@ -87,15 +87,33 @@ def _verify(arguments: argparse.Namespace) -> int:
     from crosscheck.conformance import suite
 
     (engine,) = request.find_engines([arguments.engine], notice)
+    if arguments.mechanisms:
+        return _verify_drawn(engine, arguments)
     chosen = request.find_specimens(arguments.scene, arguments.reference_time)
     with counted("verifying", len(chosen) + 1) as advance:
-        found = suite.verify(engine, chosen, arguments.time_limit, advance)
+        found = suite.verify(engine, chosen, arguments.time_limit, advance, arguments.family)
     if arguments.json:
         print(json.dumps({**found.to_record(), **made_by()}, allow_nan=False))
     else:
         for block in suite.tables(found):
             console().print(block)
     return COMPLETED if found.conforms else OTHERWISE
+
+
+def _verify_drawn(engine: str, arguments: argparse.Namespace) -> int:
+    from crosscheck.conformance import deep
+    from crosscheck.conformance.deep_table import tables as deep_tables
+
+    beside = request.find_engines(arguments.beside, notice) if arguments.beside else ()
+    plan = deep.Plan(engine, arguments.mechanisms, arguments.first_seed, arguments.family, beside)
+    with counted("verifying", plan.mechanisms) as advance:
+        found = deep.examined(plan, arguments.records, advance)
+    if arguments.json:
+        print(json.dumps({**found.to_record(), **made_by()}, allow_nan=False))
+    else:
+        for block in deep_tables(found):
+            console().print(block)
+    return OTHERWISE if found.violations else COMPLETED
 
 
 def _certify(arguments: argparse.Namespace) -> int:

@@ -98,6 +98,13 @@ def add_reference_time(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--reference-time", type=_not_negative, default=SECONDS, metavar="T", help=about)
 
 
+def whole(text: str) -> int:
+    """A positive whole number of a command line."""
+    if not text.isdecimal() or not int(text):
+        raise argparse.ArgumentTypeError(f"must be a positive whole number, got {text}")
+    return int(text)
+
+
 def positive(text: str) -> float:
     """A positive number of a command line."""
     number = float(text)

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from crosscheck.cli.listing import TABLES
-from crosscheck.cli.options import add_depth, add_limits, add_reference_time, add_selection, positive
+from crosscheck.cli.options import add_depth, add_limits, add_reference_time, add_selection, positive, whole
 from crosscheck.study.timings import REPEATS
 
 Commands = Any  # the object that argparse adds subcommands to; its type is private
@@ -99,6 +99,21 @@ def _add_verify(commands: Commands) -> None:
     )
     parser.add_argument(
         "--scene", action="append", metavar="S", help="a scene of the suite; may repeat; default: all"
+    )
+    parser.add_argument(
+        "--family",
+        default="",
+        metavar="F",
+        help="a family of settings, or a method of mbref; default: the best",
+    )
+    drawn = parser.add_argument_group("drawn mechanisms, in the place of scenes; runs are in this process")
+    drawn.add_argument(
+        "--mechanisms", type=whole, metavar="N", help="judge every card on N mechanisms drawn from seeds"
+    )
+    drawn.add_argument("--first-seed", type=int, default=0, metavar="S", help="default: 0")
+    drawn.add_argument("--records", metavar="FILE", help="keep verdicts there, and take those it has")
+    drawn.add_argument(
+        "--beside", action="append", metavar="E", help="an engine to agree with on each; may repeat"
     )
     add_limits(parser)
 

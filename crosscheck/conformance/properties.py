@@ -17,10 +17,10 @@ from crosscheck.judge.energy import energy_series
 from crosscheck.judge.gauss_principle import stacked
 from crosscheck.judge.metrics import in_scene_order, violation_series
 from crosscheck.judge.momentum import momentum_series
+from crosscheck.judge.push_difference import pushes_apart
 from crosscheck.judge.reaction_balance import balance, idle
 from crosscheck.judge.tolerances import (
     LIKE_TRUTH,
-    OWN_ACCURACY,
     REACTIONS,
     SAME_MOTION,
     STAYS_CLOSED,
@@ -31,7 +31,6 @@ from mbref.scene import Moment, Scene
 from mbref.trajectory import Trajectory
 
 STATE = ("position", "orientation", "velocity", "angular_velocity")
-TRUSTED = 1e-7  # the exact motions are certainly more accurate, after a motion of some turns
 DENSE = 65  # samples from which the work of a moment is summed to 1e-8
 STEP = 1e-4  # of the duration: central differences of it are off by 1e-8 of what a motion does in its time
 
@@ -99,12 +98,14 @@ def truth(bench: Bench) -> Finding:
 
 
 def convergence(bench: Bench) -> Finding | Outside:
-    """Finer settings come to the exact motion, not to another: the error is what the finest two differ by."""
+    """The motion is the exact one within what the engine's measured order and floor leave of error."""
     if len(bench.settings) < 2:
         return Outside("the engine offers one setting")
-    error = difference(bench.scene, bench.motion, bench.exact)
-    allowed = max(TRUSTED, OWN_ACCURACY * bench.steps_apart)
-    return Finding(error, allowed, f"two finest settings {bench.steps_apart:.1e} apart")
+    error, allowed = difference(bench.scene, bench.motion, bench.exact), bench.resolution
+    if error > allowed:
+        allowed += bench.exact_bound
+    remark = f"{bench.floors}, {bench.contraction:.1e} of the difference before"
+    return Finding(error, allowed, remark)
 
 
 def rates_closed(bench: Bench) -> Finding:
@@ -214,7 +215,7 @@ def other_times(bench: Bench) -> Finding:
 
 
 def related(name: str, bench: Bench) -> Finding | Cannot | Outside:
-    """The scene changed as the relation says moves as it says."""
+    """The scene changed as the relation says moves as it says, by accelerations and unique reactions too."""
     relation = RELATIONS[name]
     scene = relation.change(bench.scene, bench.motion)
     if isinstance(scene, Outside):
@@ -223,7 +224,10 @@ def related(name: str, bench: Bench) -> Finding | Cannot | Outside:
         return cannot
     expected = in_scene_order(scene, relation.expect(bench.scene, bench.motion))
     found = bench.run(scene, expected.times)
-    return Finding(difference(scene, expected, found), bench.own_accuracy, bench.floors)
+    poses = Finding(difference(scene, expected, found), bench.own_accuracy, bench.floors)
+    apart, of = pushes_apart(scene, expected, found)
+    pushes = Finding(apart, bench.own_pushes, f"of {of}")
+    return max(poses, pushes, key=lambda finding: finding.measured / finding.allowed)
 
 
 def _at(run: Trajectory, samples: slice | np.ndarray) -> Trajectory:
@@ -251,7 +255,7 @@ PROPERTIES: Mapping[str, Property] = {
     "rates": _property(rates_closed),
     "velocities": _property(velocities),
     "truth": _property(truth, version=2),
-    "convergence": _property(convergence),
+    "convergence": _property(convergence, version=2),
     "speeds": _property(true_velocities),
     "accelerations": _property(true_accelerations),
     "energy": _property(energy, version=2),
@@ -262,7 +266,7 @@ PROPERTIES: Mapping[str, Property] = {
     "repeated": _property(determinism, _related),
     "resampled": _property(other_times, _related, version=2),
     **{
-        name: Property(f"The scene {name}: {relation.about}.", partial(related, name), _related, 2)
+        name: Property(f"The scene {name}: {relation.about}.", partial(related, name), _related, 3)
         for name, relation in RELATIONS.items()
     },
 }

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.conformance.trial import best_family
+from crosscheck.conformance.families import best_family
 from crosscheck.engine import engine
 from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.judge.gauss_principle import bias, gauss, singular_values, stacked
@@ -152,8 +152,8 @@ class _Drawing:
         a, b = self.bodies[first], self.bodies[second]
         ends = (self.point(np.array(a.position)), self.point(np.array(b.position)))
         return (
-            Moment(body=a.name, moment=_triple(self.rng.normal(size=3))),
-            Force(body=b.name, point=ends[1], force=_triple(self.rng.normal(size=3))),
+            Moment(body=a.name, moment=triple(self.rng.normal(size=3))),
+            Force(body=b.name, point=ends[1], force=triple(self.rng.normal(size=3))),
             Spring(bodies=(a.name, b.name), points=ends, stiffness=20.0, damping=0.5, natural_length=0.3),
         )
 
@@ -163,7 +163,7 @@ class _Drawing:
         inertia = turn @ np.diag(moments.sum() - moments) @ turn.T
         return Body(
             name=name, mass=float(self.rng.uniform(0.5, 3.0)), inertia=((inertia + inertia.T) / 2).tolist(),
-            position=_triple(self.rng.uniform(-1, 1, 3)),
+            position=triple(self.rng.uniform(-1, 1, 3)),
             orientation=tuple(rotations.from_vector(self.rng.normal(size=3)).tolist()),
         )  # fmt: skip
 
@@ -178,28 +178,29 @@ class _Drawing:
         far = np.array(middle) + self.rng.uniform(0.3, 0.8) * across if kind == "distance" else across
         has_rotation = JOINT_TYPES[kind].facts.free_rotations > 0
         return JOINT_TYPES[kind].at(
-            f"J{len(self.joints)}", (first, second), anchor=middle, anchors=(middle, _triple(far)),
-            axis=_triple(along if has_rotation else across), axes=(_triple(along), _triple(across)),
+            f"J{len(self.joints)}", (first, second), anchor=middle, anchors=(middle, triple(far)),
+            axis=triple(along if has_rotation else across), axes=(triple(along), triple(across)),
         )  # fmt: skip
 
     def second_hinge(self, hinge: Revolute) -> Joint:
         """Another joint on the axis of a revolute one, between the same bodies: redundant."""
         axis = np.array(hinge.axis)
-        anchor = _triple(np.array(hinge.anchor) + self.rng.uniform(0.2, 0.6) * axis)
+        anchor = triple(np.array(hinge.anchor) + self.rng.uniform(0.2, 0.6) * axis)
         kind: type[Joint] = Spherical
         if self.rng.random() >= 0.3:
             kind = Revolute if self.rng.random() < 0.5 else Cylindrical
         return kind.at(f"J{len(self.joints)}", hinge.bodies, anchor=anchor, axis=hinge.axis)
 
     def point(self, near: np.ndarray) -> Triple:
-        return _triple(near + self.rng.uniform(-0.3, 0.3, 3))
+        return triple(near + self.rng.uniform(-0.3, 0.3, 3))
 
     def direction(self) -> np.ndarray:
         v = self.rng.normal(size=3)
         return v / np.linalg.norm(v)
 
 
-def _triple(v: np.ndarray) -> Triple:
+def triple(v: np.ndarray) -> Triple:
+    """An array (3,) as numbers of a scene."""
     x, y, z = map(float, v)
     return x, y, z
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.conformance.changes import mapped, replaced
-from crosscheck.conformance.replays import RESTARTED, REVERSED, replayed
+from crosscheck.conformance.replays import RESTARTED, REVERSED, joints_kept, pinned, replayed
 from crosscheck.conformance.rewritings import (
     duplicated,
     negated,
@@ -27,6 +27,8 @@ from mbref import rotations
 from mbref.scene import Driver, Scene
 from mbref.trajectory import Trajectory
 
+Mapped = Callable[[Any], Any]
+HEAVIER = 2.5
 FLIP = np.diag([1.0, -1.0, 1.0])  # of the body frames of a mirrored scene, which stay right-handed
 
 
@@ -93,21 +95,39 @@ class Isometry:
         )
 
     def expect(self, motion: Trajectory) -> Trajectory:
-        """The motion moved as a whole; accelerations and reactions are left out."""
-        return replace(
+        """The motion moved as a whole, accelerations and reactions too."""
+        moved = replace(
             motion, position=self.place(motion.position), orientation=self.turn(motion.orientation),
             velocity=self.polar(motion.velocity), angular_velocity=self.axial(motion.angular_velocity),
-            acceleration=None, angular_acceleration=None, reactions=None,
         )  # fmt: skip
+        return with_pushes(moved, motion, self.polar, self.axial, self.polar, self.axial)
+
+
+def with_pushes(
+    to: Trajectory, motion: Trajectory, linear: Mapped, angular: Mapped, force: Mapped, moment: Mapped
+) -> Trajectory:
+    """A motion with another's accelerations and reactions, mapped; None where that has none."""
+    return replace(
+        to,
+        acceleration=None if motion.acceleration is None else linear(motion.acceleration),
+        angular_acceleration=(
+            None if motion.angular_acceleration is None else angular(motion.angular_acceleration)
+        ),
+        reactions=motion.reactions and {
+            name: np.hstack([force(w[:, :3]), moment(w[:, 3:])]) for name, w in motion.reactions.items()
+        },
+    )  # fmt: skip
+
+
+def times(factor: float) -> Mapped:
+    """Multiplication."""
+    return lambda value: factor * np.asarray(value)
 
 
 def scaled(scene: Scene, factor: float) -> Scene:
     """Masses, inertias, forces, stiffnesses and dampings times a factor: the motion stays the same."""
 
-    def times(value: Any) -> np.ndarray:
-        return factor * np.asarray(value)
-
-    fields = dict.fromkeys(("mass", "inertia", "force", "moment", "stiffness", "damping"), times)
+    fields = dict.fromkeys(("mass", "inertia", "force", "moment", "stiffness", "damping"), times(factor))
     return scene.with_(
         body=tuple(mapped(body, fields) for body in scene.body),
         load=tuple(mapped(load, fields) for load in scene.load),
@@ -137,17 +157,21 @@ def in_other_units(scene: Scene, length: float, time: float) -> Scene:
     """The scene with its lengths and times multiplied, and all else as its units say; masses stay."""
     speed, push = length / time, length / time**2
 
-    def by(factor: float) -> Callable[[Any], np.ndarray]:
-        return lambda value: factor * np.asarray(value)
-
-    places = dict.fromkeys(("position", "anchor", "anchors", "point", "points", "natural_length"), by(length))
-    bodies = {**places, "velocity": by(speed), "angular_velocity": by(1 / time), "inertia": by(length**2)}
-    loads = {**places, "force": by(push), "moment": by(length * push)}
-    linear = {"stiffness": by(1 / time**2), "damping": by(1 / time)}
-    turning = {"stiffness": by(length * push), "damping": by(length * speed)}
+    places = dict.fromkeys(
+        ("position", "anchor", "anchors", "point", "points", "natural_length"), times(length)
+    )
+    bodies = {
+        **places,
+        "velocity": times(speed),
+        "angular_velocity": times(1 / time),
+        "inertia": times(length**2),
+    }
+    loads = {**places, "force": times(push), "moment": times(length * push)}
+    linear = {"stiffness": times(1 / time**2), "damping": times(1 / time)}
+    turning = {"stiffness": times(length * push), "damping": times(length * speed)}
     slides = {joint.name for joint in scene.joint if joint.facts.driven == "displacement"}
     return scene.with_(
-        gravity=by(push)(scene.gravity).tolist(), duration=scene.duration * time,
+        gravity=times(push)(scene.gravity).tolist(), duration=scene.duration * time,
         body=tuple(mapped(body, bodies) for body in scene.body),
         joint=tuple(mapped(joint, places) for joint in scene.joint),
         driver=tuple(_slower(d, length if d.joint in slides else 1.0, time) for d in scene.driver),
@@ -165,11 +189,13 @@ def _slower(driver: Driver, amount: float, time: float) -> Driver:
 
 def _other_units(about: str, length: float, time: float) -> Relation:
     def expect(scene: Scene, motion: Trajectory) -> Trajectory:
-        return replace(
+        push = length / time**2
+        moved = replace(
             motion, times=time * motion.times, position=length * motion.position,
             velocity=length / time * motion.velocity, angular_velocity=motion.angular_velocity / time,
-            acceleration=None, angular_acceleration=None, reactions=None,
         )  # fmt: skip
+        turning = times(1 / time**2), times(push), times(length * push)
+        return with_pushes(moved, motion, times(push), *turning)
 
     return Relation(about, lambda scene, motion: in_other_units(scene, length, time), expect)
 
@@ -177,6 +203,23 @@ def _other_units(about: str, length: float, time: float) -> Relation:
 def same(scene: Scene, motion: Trajectory) -> Trajectory:
     """The motion itself, of a change that leaves it what it is."""
     return motion
+
+
+def heavier(scene: Scene, motion: Trajectory) -> Trajectory:
+    """The motion with reactions times HEAVIER."""
+    return with_pushes(motion, motion, times(1), times(1), times(HEAVIER), times(HEAVIER))
+
+
+def opposite(scene: Scene, motion: Trajectory) -> Trajectory:
+    """The motion with reactions reversed, of joints whose anchors stay together."""
+    kept = joints_kept(motion, pinned(scene))
+    return with_pushes(kept, kept, times(1), times(1), times(-1), times(-1))
+
+
+def undriven(scene: Scene, motion: Trajectory) -> Trajectory:
+    """The motion without the reactions of driven joints."""
+    driven = [driver.joint for driver in scene.driver]
+    return joints_kept(motion, [joint.name for joint in scene.joint if joint.name not in driven])
 
 
 ASKEW = rotations.to_matrix(rotations.from_vector(np.array([0.7, -0.4, 1.1])))
@@ -199,10 +242,14 @@ RELATIONS = {
     "turned": _isometry("about z, its motion rotates with it", IN_PLANE),
     "translated": _isometry("its motion moves with it", np.eye(3), (0.3, -0.5, 0.0)),
     "mirrored": _isometry("its motion is the mirror image", np.eye(3) - 2 * np.outer(NORMAL, NORMAL)),
-    "scaled": unchanged("masses and loads times 2.5, the motion stays", lambda s: scaled(s, 2.5)),
+    "scaled": Relation(
+        "masses and loads times 2.5, the motion stays", lambda s, _: scaled(s, HEAVIER), heavier
+    ),
     "reordered": unchanged("bodies and joints listed in reverse, the motion stays", reordered),
     "relabelled": Relation("under other names, the motion stays", lambda s, _: relabelled(s), renamed),
-    "swapped": unchanged("with the bodies of every joint exchanged, the motion stays", swapped),
+    "swapped": Relation(
+        "with the bodies of every joint exchanged, the motion stays", lambda s, _: swapped(s), opposite
+    ),
     "stretched": unchanged("with axes 1000 times as long, the motion stays", stretched),
     "duplicated": unchanged("with a joint given twice, the motion stays", duplicated),
     "satisfied": unchanged("with a joint that the motion satisfies anyway, the motion stays", satisfied),
@@ -212,5 +259,5 @@ RELATIONS = {
     "in millimetres": _other_units("with its lengths in millimetres, the motion stays", 1000.0, 1.0),
     "restarted": Relation("from its state half way, the motion goes on", *RESTARTED),
     "reversed": Relation("from its last state with velocities reversed, the motion goes back", *REVERSED),
-    "replayed": Relation("by its driver's moment instead, the motion stays", replayed, same),
+    "replayed": Relation("by its driver's moment instead, the motion stays", replayed, undriven),
 }

@@ -102,7 +102,8 @@ def _half_way(scene: Scene, motion: Trajectory) -> Scene:
 
 def _second_half(scene: Scene, motion: Trajectory) -> Trajectory:
     half = len(motion.times) // 2
-    return _samples(motion, np.arange(half, len(motion.times)), motion.times[half:] - motion.times[half], 1.0)
+    chosen = np.arange(half, len(motion.times))
+    return _samples(scene, motion, chosen, motion.times[half:] - motion.times[half], 1.0)
 
 
 def _from_the_end(scene: Scene, motion: Trajectory) -> Scene | Outside:
@@ -112,15 +113,32 @@ def _from_the_end(scene: Scene, motion: Trajectory) -> Scene | Outside:
 
 
 def _backwards(scene: Scene, motion: Trajectory) -> Trajectory:
-    return _samples(motion, np.arange(len(motion.times))[::-1], motion.times, -1.0)
+    return _samples(scene, motion, np.arange(len(motion.times))[::-1], motion.times, -1.0)
 
 
-def _samples(motion: Trajectory, chosen: np.ndarray, times: np.ndarray, sense: float) -> Trajectory:
+def _samples(
+    scene: Scene, motion: Trajectory, chosen: np.ndarray, times: np.ndarray, sense: float
+) -> Trajectory:
+    """Samples of a motion; of the reactions those of joints whose anchors stay together."""
+    second, turning = motion.acceleration, motion.angular_acceleration
+    kept = joints_kept(motion, pinned(scene)).reactions
     return replace(
         motion, times=times, position=motion.position[chosen], orientation=motion.orientation[chosen],
         velocity=sense * motion.velocity[chosen], angular_velocity=sense * motion.angular_velocity[chosen],
-        acceleration=None, angular_acceleration=None, reactions=None,
+        acceleration=None if second is None else second[chosen],
+        angular_acceleration=None if turning is None else turning[chosen],
+        reactions=kept and {name: wrench[chosen] for name, wrench in kept.items()},
     )  # fmt: skip
+
+
+def pinned(scene: Scene) -> list[str]:
+    """Joints whose anchors stay together, so that a reaction is at the same point of both bodies."""
+    return [joint.name for joint in scene.joint if len(joint.facts.forbidden_translations) == 3]
+
+
+def joints_kept(motion: Trajectory, names: Sequence[str]) -> Trajectory:
+    """The motion with the reactions of those joints alone."""
+    return replace(motion, reactions=motion.reactions and {n: motion.reactions[n] for n in names})
 
 
 RESTARTED = _half_way, _second_half

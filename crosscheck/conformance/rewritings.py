@@ -19,7 +19,7 @@ HALF, LIMIT = " half", 0.2  # the halves' distance as a part of the largest that
 def relabelled(scene: Scene) -> Scene:
     """Other names, in the other alphabetical order."""
     names = {body.name: _name(scene, k) for k, body in enumerate(scene.body)} | {GROUND: GROUND}
-    joints = {joint.name: f"joint {chr(122 - k % 26)}{k}" for k, joint in enumerate(scene.joint)}
+    joints = _joints(scene)
 
     def pair(bodies: Any) -> tuple[str, ...]:
         return tuple(names[name] for name in bodies)
@@ -35,7 +35,13 @@ def relabelled(scene: Scene) -> Scene:
 
 def renamed(scene: Scene, motion: Trajectory) -> Trajectory:
     """The motion under the names of `relabelled`."""
-    return replace(motion, bodies=tuple(_name(scene, k) for k in range(len(scene.body))), reactions=None)
+    joints = _joints(scene)
+    found = motion.reactions and {joints[name]: wrench for name, wrench in motion.reactions.items()}
+    return replace(motion, bodies=tuple(_name(scene, k) for k in range(len(scene.body))), reactions=found)
+
+
+def _joints(scene: Scene) -> dict[str, str]:
+    return {joint.name: f"joint {chr(122 - k % 26)}{k}" for k, joint in enumerate(scene.joint)}
 
 
 def _name(scene: Scene, k: int) -> str:
@@ -117,7 +123,7 @@ def _in_halves(scene: Scene, body: Body) -> Scene:
 
 
 def of_halves(scene: Scene, motion: Trajectory) -> Trajectory:
-    """The motion with the last body's as that of its halves."""
+    """The motion with the last body's as that of its halves; without accelerations."""
     arm = rotations.rotate(motion.orientation[:, -1], _arm(scene.body[-1]))
     swing = np.cross(motion.angular_velocity[:, -1], arm)
     name = scene.body[-1].name
@@ -132,7 +138,7 @@ def of_halves(scene: Scene, motion: Trajectory) -> Trajectory:
         for key, ends in parts.items()
     }
     return replace(motion, bodies=(*motion.bodies[:-1], name, name + HALF), acceleration=None,
-                   angular_acceleration=None, reactions=None, **arrays)  # fmt: skip
+                   angular_acceleration=None, **arrays)  # fmt: skip
 
 
 def _arm(body: Body) -> np.ndarray:

@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Engine, Setting, engine
+from crosscheck.engine import Cannot, Engine, Owner, Setting, engine
 from crosscheck.processes.pool import Observation, capabilities, observe, run_isolated
 from crosscheck.processes.serve import failed
 from mbref.scene import Scene
@@ -26,8 +26,8 @@ class Runner(Protocol):
     def name(self) -> str:
         """The engine's name."""
 
-    def offers(self, scene: Scene) -> tuple[str, Cannot | None, list[Setting]]:
-        """Version, what the engine cannot do with the scene, and else its settings."""
+    def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
+        """Version, what the engine cannot do with the scene, and else its settings, or those of a family."""
 
     def cannot(self, scene: Scene) -> Cannot | None:
         """What the engine cannot do with the scene."""
@@ -39,6 +39,16 @@ class Runner(Protocol):
         """Runs at the settings, one after another in one process."""
 
 
+def offered(simulator: Engine, scene: Scene, family: str) -> tuple[str, Cannot | None, list[Setting]]:
+    """Version, refusal and settings of an engine, or of one of its families, which may not serve a scene."""
+    if cannot := simulator.cannot(scene):
+        return simulator.version(), cannot, []
+    settings = list(simulator.settings_of(scene, family) if family else simulator.settings(scene))
+    if family and not settings:
+        cannot = Cannot(Owner.ENGINE, f"{family} does not serve this scene")
+    return simulator.version(), cannot, settings
+
+
 @dataclass(frozen=True)
 class Isolated:
     """Every run in a child process with a time limit (s); ``name`` is known, or ``module:attribute``."""
@@ -46,7 +56,9 @@ class Isolated:
     name: str
     time_limit: float
 
-    def offers(self, scene: Scene) -> tuple[str, Cannot | None, list[Setting]]:
+    def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
+        if family:
+            return offered(engine(self.name), scene, family)
         return capabilities(self.name, scene, self.time_limit)
 
     def cannot(self, scene: Scene) -> Cannot | None:
@@ -73,9 +85,8 @@ class InProcess:
     def name(self) -> str:
         return self.called or self.engine.name
 
-    def offers(self, scene: Scene) -> tuple[str, Cannot | None, list[Setting]]:
-        cannot = self.engine.cannot(scene)
-        return self.engine.version(), cannot, [] if cannot else list(self.engine.settings(scene))
+    def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
+        return offered(self.engine, scene, family)
 
     def cannot(self, scene: Scene) -> Cannot | None:
         return self.engine.cannot(scene)

@@ -13,10 +13,10 @@ from rich.box import SIMPLE
 from rich.table import Column, Table
 from rich.text import Text
 
-from crosscheck.conformance.features import undetermined
+from crosscheck.conformance.features import is_undetermined, undetermined
 from crosscheck.conformance.properties import PROPERTIES, Finding
 from crosscheck.conformance.runners import InProcess, Isolated, Runner
-from crosscheck.conformance.trial import Bench, Broken, Outside, Specimen, set_up
+from crosscheck.conformance.trial import Bench, Broken, NoExact, Outside, Specimen, set_up
 from crosscheck.processes.pool import ChildFailed
 
 PASS, FAIL, CANNOT, OUTSIDE = "pass", "fail", "cannot", "outside"
@@ -62,11 +62,13 @@ class Conformance:
 
     def to_record(self) -> dict[str, Any]:
         """What ``verify --json`` prints; numbers that are not finite are null."""
-        verdicts = [
-            {"card": verdict.card(), **{k: _finite(v) for k, v in asdict(verdict).items()}}
-            for verdict in self.verdicts
-        ]
+        verdicts = [record_of(verdict) for verdict in self.verdicts]
         return {**asdict(self), "conforms": self.conforms, "verdicts": verdicts}
+
+
+def record_of(verdict: Verdict) -> dict[str, Any]:
+    """A verdict as JSON; numbers that are not finite are null."""
+    return {"card": verdict.card(), **{k: _finite(v) for k, v in asdict(verdict).items()}}
 
 
 def verify(
@@ -74,21 +76,26 @@ def verify(
     specimens: Sequence[Specimen],
     time_limit: float,
     progress: Callable[[str], None] | None = None,
+    family: str = "",
 ) -> Conformance:
-    """Hold the suite against an engine (a name or ``module:attribute``); every run is in a child
-    process with a ``time_limit`` (s).  ``progress`` is told the scene just done.  Raises LookupError."""
-    return held_against(Isolated(engine, time_limit), specimens, progress)
+    """Hold the suite against an engine (a name or ``module:attribute``), in its best family of settings or
+    the one named; every run is in a child process with a ``time_limit`` (s).  ``progress`` is told the scene
+    just done.  Raises LookupError."""
+    return held_against(Isolated(engine, time_limit), specimens, progress, family)
 
 
 def held_against(
-    runner: Runner, specimens: Sequence[Specimen], progress: Callable[[str], None] | None = None
+    runner: Runner,
+    specimens: Sequence[Specimen],
+    progress: Callable[[str], None] | None = None,
+    family: str = "",
 ) -> Conformance:
     """The verdicts on a runner's engine; runs in this process take place one after another."""
     versions: set[str] = set()
 
     def examined(specimen: Specimen) -> list[Verdict]:
         try:
-            bench = set_up(runner, specimen)
+            bench = set_up(runner, specimen, family)
         except ChildFailed as failure:
             verdicts = [Verdict(REFUSAL, specimen.scene.name, FAIL, reason=str(failure))]
         else:
@@ -114,7 +121,7 @@ def examine(bench: Bench) -> Iterator[Verdict]:
 def refusal(bench: Bench) -> Verdict:
     """Whether the engine refuses what it cannot run, and has settings for what it can."""
     name = bench.scene.name
-    impossible = bench.scene == undetermined()
+    impossible = is_undetermined(bench.scene)
     if bench.cannot:
         return Verdict(REFUSAL, name, PASS if impossible else CANNOT, reason=str(bench.cannot))
     if impossible or not bench.settings:
@@ -154,6 +161,8 @@ def judged(label: str, bench: Bench) -> Verdict:
         found = PROPERTIES[label].check(bench)
     except Broken as broken:
         return Verdict(label, bench.scene.name, FAIL, reason=str(broken))
+    except NoExact as unknown:
+        return Verdict(label, bench.scene.name, OUTSIDE, reason=f"its exact motion is not known: {unknown}")
     if isinstance(found, Finding):
         status = PASS if found.measured <= found.allowed else FAIL
         return Verdict(label, bench.scene.name, status, found.measured, found.allowed, found.remark)

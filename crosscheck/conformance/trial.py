@@ -3,28 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from crosscheck.conformance.closed_forms import CLOSED_FORMS, Exact
+from crosscheck.conformance.drawn import mechanism
+from crosscheck.conformance.families import best_family
 from crosscheck.conformance.features import feature_scenes
 from crosscheck.conformance.moving import moving_probes
 from crosscheck.conformance.runners import Runner
 from crosscheck.engine import Cannot, Setting
+from crosscheck.judge.gauss_motion import NAME as GAUSS
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.metrics import error_series, in_scene_order
+from crosscheck.judge.push_difference import pushes_apart
 from crosscheck.judge.reference.reference import SECONDS
-from crosscheck.judge.tolerances import OWN_ACCURACY, ROUNDING, SAME_MOTION, TWINS
-from crosscheck.judge.truth import NoSolution, truth_for
+from crosscheck.judge.tolerances import OWN_ACCURACY, ROUNDING, SAME_MOTION, SAME_PUSHES, TRUTH_DRIVEN, TWINS
+from crosscheck.judge.truth import NoSolution, closed_form, truth_for
 from crosscheck.processes.pool import Observation
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
 
 SAMPLES = 9
-BEST = "tuned"  # the family an engine calls its best; without it, its first family counts as that
+SWEPT = 3  # settings from which order and floor are measured
+FASTEST, SLOWEST = 0.1, 0.5  # contractions that are believed: adaptive steps and a floor make others
+COARSER = 1e-8  # tolerance of the second integration of Gauss's principle, 100 times that of the first
+SHARE = 0.1  # of what those two differ by is the most that the first is off by: 0.01 to 0.03 was measured
 SHORT = {  # built-in scenes with a truth, and end times (s) before their first singular position
     "four_bar": 0.01,
     "four_bar_gravity": 0.12,
@@ -32,14 +40,19 @@ SHORT = {  # built-in scenes with a truth, and end times (s) before their first 
     "spatial_slider_crank": 0.02,
     "spatial_slider_crank_driven": 0.02,
 }
+DRAWN = {"drawn loop": 0, "drawn driven loop": 1}  # seeds of mechanisms that are part of the suite
 RELATED = (  # the scenes that are changed as relations say at quick depth
     "pendulum", "torsion", "oscillator", "driven", "turntable", "four_bar_gravity", "spinning loop",
-    "cylindrical driver", "force load", "tumbling body",
+    "cylindrical driver", "force load", "tumbling body", *DRAWN,
 )  # fmt: skip
 
 
 class Broken(Exception):
     """A run that a property needs did not complete."""
+
+
+class NoExact(Exception):
+    """The exact motion that a property needs could not be had; the reason."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +81,8 @@ def specimens(deep: bool = False) -> list[Specimen]:
     probes = {
         name: scene.with_(name=name) for name, scene in feature_scenes().items() if scene.name not in known
     }
-    scenes += (probes | moving_probes()).values()
+    drawn = [mechanism(seed).with_(name=name) for name, seed in DRAWN.items()]
+    scenes += [*(probes | moving_probes()).values(), *drawn]
     return forms + [Specimen(scene, None, deep or scene.name in RELATED) for scene in scenes]
 
 
@@ -117,16 +131,62 @@ class Bench:
         return [completed(self.scene, run, len(self.times)) for run in (runs[0], runs[2])]
 
     @cached_property
+    def sweep(self) -> list[Trajectory]:
+        """Completed runs, finest first: at the finest setting, and at the two next that complete."""
+        runs = [self.motion]
+        for setting in self.settings[-2::-1]:
+            with suppress(Broken):
+                found = self.observed(self.scene, self.times, setting).value
+                runs.append(completed(self.scene, found, len(self.times)))
+            if len(runs) == SWEPT:
+                break
+        if len(runs) == 1 < len(self.settings):
+            raise Broken("no setting but the finest completes")
+        return runs
+
+    @cached_property
     def steps_apart(self) -> float:
-        """Difference of the runs at the two finest settings."""
-        coarser = self.observed(self.scene, self.times, self.settings[-2:][0])
-        return difference(self.scene, self.motion, completed(self.scene, coarser.value, len(self.times)))
+        """Difference of the runs at the two finest settings, 0 where there is but one."""
+        return self._apart(0) if len(self.sweep) > 1 else 0.0
+
+    @cached_property
+    def contraction(self) -> float:
+        """Factor by which the difference of successive settings shrinks, by the three finest: the order of
+        convergence in steps of the engine's own settings."""
+        before = self._apart(1) if len(self.sweep) == SWEPT else 0.0
+        return self.steps_apart / before if before > 0 else 1.0
+
+    @cached_property
+    def left(self) -> float:
+        """Error that the finest setting leaves: the sum of all differences that would follow, which shrink
+        by the measured contraction."""
+        shrink = min(max(self.contraction, FASTEST), SLOWEST)
+        return self.steps_apart * shrink / (1 - shrink)
+
+    @cached_property
+    def resolution(self) -> float:
+        """Largest error of the finest run by the engine's measured order and floor."""
+        return max(SAME_MOTION, OWN_ACCURACY * self.left, TWINS * self.twins_apart)
+
+    def _apart(self, k: int) -> float:
+        return difference(self.scene, self.sweep[k], self.sweep[k + 1])
 
     @cached_property
     def twins_apart(self) -> float:
         """Difference of two runs whose scenes differ by two units in the last place of every number."""
-        twin = self.run(nudged(self.scene), self.times)
-        return difference(self.scene, self.motion, twin)
+        return difference(self.scene, self.motion, self.twin)
+
+    @cached_property
+    def twin(self) -> Trajectory:
+        """The run of a scene that differs by two units in the last place of every number."""
+        return self.run(nudged(self.scene), self.times)
+
+    @cached_property
+    def own_pushes(self) -> float:
+        """As `own_accuracy`, of accelerations and unique reactions."""
+        twins = pushes_apart(self.scene, self.motion, self.twin)[0]
+        steps = pushes_apart(self.scene, *self.sweep[:2])[0] if len(self.sweep) > 1 else 0.0
+        return max(SAME_PUSHES, OWN_ACCURACY * steps, TWINS * twins)
 
     @cached_property
     def own_accuracy(self) -> float:
@@ -144,18 +204,17 @@ class Bench:
         """The exact motion at the sample times."""
         return exact_motion(self.specimen, self.times)
 
+    @cached_property
+    def exact_bound(self) -> float:
+        """Bound on the error of the exact motion."""
+        return exact_bound(self.specimen, self.exact)
 
-def set_up(runner: Runner, specimen: Specimen) -> Bench:
-    """A bench with what the engine says of the specimen; raises ChildFailed when it cannot even say."""
-    version, cannot, settings = runner.offers(specimen.scene)
+
+def set_up(runner: Runner, specimen: Specimen, family: str = "") -> Bench:
+    """A bench with what the engine says of the specimen, in its best family or the one named; raises
+    ChildFailed when the engine cannot even say."""
+    version, cannot, settings = runner.offers(specimen.scene, family)
     return Bench(runner, specimen, version, cannot, best_family(settings))
-
-
-def best_family(settings: Sequence[Setting]) -> list[Setting]:
-    """The settings of the family an engine calls its best, else of its first family, coarse to fine."""
-    families = [setting.family for setting in settings]
-    best = BEST if BEST in families or not families else families[0]
-    return [setting for setting in settings if setting.family == best]
 
 
 def completed(scene: Scene, run: Trajectory, samples: int) -> Trajectory:
@@ -190,7 +249,8 @@ def nudged(scene: Scene) -> Scene:
 
 
 def exact_motion(specimen: Specimen, times: np.ndarray) -> Trajectory:
-    """Exact poses at times (k,): of a formula (its velocities are NaN), a truth, or Gauss's principle."""
+    """Exact poses at times (k,): of a formula (its velocities are NaN), a truth, or Gauss's principle; raises
+    NoExact."""
     if specimen.exact is None:
         truth = truth_for(specimen.scene, specimen.reference_time)
         try:
@@ -198,9 +258,26 @@ def exact_motion(specimen: Specimen, times: np.ndarray) -> Trajectory:
                 return truth.poses(times)
         except NoSolution:
             pass  # no reference within its time: accelerations at the start are still known
-        return gauss_motion(specimen.scene, tuple(times.tolist()))
+        return _of_gauss(specimen.scene, times)
     position, orientation = specimen.exact(times)
     unknown = np.full_like(position, np.nan)
     names = tuple(body.name for body in specimen.scene.body)
     return Trajectory(specimen.scene.name, "closed form", "", "", {}, times, names, position, orientation,
                       unknown, unknown)  # fmt: skip
+
+
+def _of_gauss(scene: Scene, times: np.ndarray) -> Trajectory:
+    try:
+        return gauss_motion(scene, tuple(times.tolist()))
+    except RuntimeError as error:
+        raise NoExact(str(error)) from None
+
+
+def exact_bound(specimen: Specimen, exact: Trajectory) -> float:
+    """Bound on the error of `exact_motion`: of the formula, the truth, the reference, or what integrations of
+    Gauss's principle at two tolerances differ by."""
+    if exact.engine == GAUSS:
+        coarser = gauss_motion(specimen.scene, tuple(exact.times.tolist()), COARSER)
+        return SHARE * difference(specimen.scene, exact, coarser)
+    form = None if specimen.exact else closed_form(specimen.scene)
+    return form.accuracy if form else float(exact.settings.get("bound", TRUTH_DRIVEN))

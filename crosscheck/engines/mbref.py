@@ -81,12 +81,13 @@ class Mbref(Engine):
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
         methods = WITH_SINGULAR_MASS if _has_singular_mass(scene) else METHODS
-        return [
-            Setting(family, options)
-            for family in methods
-            if self._serves(family, scene)
-            for options in ([{}] if family.startswith(KINEMATIC) else [{"rtol": rtol} for rtol in TOLERANCES])
-        ]
+        return [setting for family in methods for setting in self.settings_of(scene, family)]
+
+    def settings_of(self, scene: Scene, family: str) -> Sequence[Setting]:
+        if not self._serves(family, scene):
+            return []
+        sweep = [{}] if family.startswith(KINEMATIC) else [{"rtol": rtol} for rtol in TOLERANCES]
+        return [Setting(family, options) for options in sweep]
 
     def _serves(self, family: str, scene: Scene) -> bool:
         from mbref.equations.degrees_of_freedom import undriven_freedoms
@@ -95,6 +96,8 @@ class Mbref(Engine):
         if family.startswith(KINEMATIC) and undriven_freedoms(scene) > 0:
             return False
         method = _method(family)
+        if _has_singular_mass(scene) and not method.formulation.handles_singular_mass:
+            return False
         if family.endswith(SPECIALISED):
             return not why_no_code(scene, method)
         return scene.counts().redundant == 0 or method.formulation.handles_redundancy

@@ -18,6 +18,7 @@ from mbref import rotations
 from mbref.scene import Scene, TorsionSpring
 from mbref.trajectory import Trajectory
 
+CONTINUES = 1e-8  # of the accelerations: what a mobility of the instant, which stops at once, leaves
 NO_AXIS = np.zeros(3)  # no shared axis of turning: torsion springs are added here
 
 
@@ -82,6 +83,14 @@ def bias(scene: Scene) -> np.ndarray:
     still = np.zeros_like(pose[0])
     rows = closure_accelerations(scene, 0.0, *pose, *rates, still, still)
     return np.concatenate([np.zeros(0), *rows.values()])
+
+
+def goes_on(scene: Scene) -> bool:
+    """Whether accelerations exist that keep the velocities on the joints: no mobility of the instant."""
+    rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
+    coasting = bias(scene)
+    left = rows @ np.linalg.lstsq(rows, coasting, rcond=RANK)[0] - coasting if len(rows) else coasting
+    return bool(np.linalg.norm(left) <= CONTINUES * max(1.0, float(np.linalg.norm(coasting))))
 
 
 def stacked(scene: Scene, run: Trajectory, sample: int) -> np.ndarray:

@@ -51,14 +51,15 @@ def shared_wrenches(
     ``position`` (nb, 3) and ``orientation`` (nb, 4) are one pose at time t (s).
     """
     rows, _ = jacobian(scene, t, position, orientation)
-    length, found, start = scene_length(scene), {}, 0
-    u, s, _ = np.linalg.svd(rows / np.linalg.norm(rows, axis=1, keepdims=True))
-    open_ = u[:, int(np.sum(s > RANK * s[0])) :] / np.linalg.norm(rows, axis=1, keepdims=True)
+    units, found, start = np.repeat([1.0, scene_length(scene)], 3), {}, 0
+    lengths = np.linalg.norm(rows, axis=1)
+    u, s, _ = np.linalg.svd(rows / lengths[:, None])
+    open_ = u[:, int(np.sum(s > RANK * s[0])) :]
     for joint in scene.joint:
         count = len(length_rows(scene)[joint.name])
         own = slice(start, start + count)
-        wrenches = on_second(scene, joint, rows[own], position, orientation) @ open_[own]
-        found[joint.name] = _span(wrenches / np.repeat([1.0, length], 3)[:, None], np.abs(rows).max())
+        wrenches = on_second(scene, joint, rows[own], position, orientation) / units[:, None] / lengths[own]
+        found[joint.name] = _span(wrenches @ open_[own], np.abs(wrenches).max(initial=0.0))
         start += count
     return found
 

@@ -92,6 +92,10 @@ SAME_MOTION = 1e-9
 """Difference of two runs of a conforming engine that should agree, where its own accuracy (the difference of
 its two finest settings) is better: rounding grows to this over some thousand steps."""
 
+SAME_PUSHES = 1e-6
+"""The same for accelerations and unique reactions, which are solved for at each sample: rounding of poses
+times the condition of the equations, of 1e6 at most away from singular positions."""
+
 OWN_ACCURACY = 4.0
 """Multiples of an engine's own accuracy by which such runs may differ: each is off by about one, and what
 the coarser setting adds is not all of it."""

@@ -146,7 +146,9 @@ class Mechanism:
             gammas.append(gamma)
         jacobian, gamma = np.concatenate(rows), np.concatenate(gammas)
         flexible = jacobian @ inverse @ jacobian.T
-        push = np.linalg.lstsq(flexible, gamma - jacobian @ free, rcond=RANK)[0] if len(gamma) else gamma
+        unit = 1 / np.sqrt(np.diag(flexible))  # rows of lengths and of angles, in any unit, count alike
+        flexible, missing = flexible * unit * unit[:, None], unit * (gamma - jacobian @ free)
+        push = unit * np.linalg.lstsq(flexible, missing, rcond=RANK)[0] if len(gamma) else gamma
         ends = np.cumsum([len(gamma) for gamma in gammas[1:]])
         return (free + inverse @ jacobian.T @ push).reshape(n, 6), np.split(push, ends[:-1])
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crosscheck.conformance.trial import best_family
+from crosscheck.conformance.families import best_family
 from crosscheck.engine import engine
 from crosscheck.judge.published import BY_SCENE, PUBLISHED
 from crosscheck.judge.reference.arithmetic import EXTENDED, doubles

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crosscheck.conformance.trial import best_family
+from crosscheck.conformance.families import best_family
 from crosscheck.engine import engine
 from crosscheck.judge.constraints import initial_poses
 from crosscheck.judge.gauss_motion import gauss_motion

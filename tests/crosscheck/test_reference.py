@@ -13,11 +13,11 @@ import pytest
 import mbref.equations.model
 from crosscheck.cli.request import find_certifiable
 from crosscheck.conformance.closed_forms import CLOSED_FORMS, free_fall, pendulum
+from crosscheck.conformance.families import best_family
 from crosscheck.conformance.features import BODY, JOINTS, feature_scenes, massless, undetermined
 from crosscheck.conformance.moving import moving_probes, several_springs
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from crosscheck.conformance.relations import ASKEW, Isometry
-from crosscheck.conformance.trial import best_family
 from crosscheck.engine import engine
 from crosscheck.judge import constraints, metrics
 from crosscheck.judge.energy import energy_series

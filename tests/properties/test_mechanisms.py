@@ -8,12 +8,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from crosscheck.conformance.replays import started
-from crosscheck.conformance.strategies import goes_on, matrices, mechanisms, paper_mechanisms
+from crosscheck.conformance.strategies import matrices, mechanisms, paper_mechanisms
 from crosscheck.conformance.trial import difference
 from crosscheck.judge.constraints import initial_poses, jacobian, scene_length
 from crosscheck.judge.energy import energy_series
 from crosscheck.judge.gauss_motion import accelerations, applied, gauss_motion
-from crosscheck.judge.gauss_principle import singular_values
+from crosscheck.judge.gauss_principle import goes_on, singular_values
 from crosscheck.judge.joint_reactions import resultants
 from crosscheck.judge.loads import world_inertia
 from crosscheck.judge.metrics import violation_series

@@ -1,0 +1,158 @@
+"""Every card on many drawn mechanisms, each until it has its number; records are kept, so that a run resumes.
+
+All cards that ask something of a mechanism share its runs: the one judged, its twin, coarser ones and the
+exact motion are made once.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from crosscheck.conformance import suite
+from crosscheck.conformance.drawn import floating, mechanism, rotor, without_masses
+from crosscheck.conformance.properties import PROPERTIES
+from crosscheck.conformance.runners import InProcess
+from crosscheck.conformance.suite import CANNOT, FAIL, PASS, REFUSAL, RUN, Verdict
+from crosscheck.conformance.trial import Bench, Broken, Specimen, difference, set_up
+from crosscheck.engine import engine
+from mbref.records import append, opened
+from mbref.scene import Scene
+
+AGREEMENT = "agreement"
+ABOUT = "Trajectories of two engines agree within what the measured order and floor of both leave of error."
+MOST = 3  # seeds for each mechanism asked for, where a card says nothing of some
+DECIDED = (PASS, FAIL)
+KINDS: tuple[tuple[Callable[[int], Scene], tuple[str, ...]], ...] = (
+    (mechanism, (RUN, AGREEMENT, *(card for card in PROPERTIES if card not in ("momentum", "replayed")))),
+    (floating, ("energy", "momentum", "reversed")),
+    (rotor, ("replayed",)),
+    (without_masses, (REFUSAL,)),
+)
+
+
+class Plan(NamedTuple):
+    """So many ``mechanisms`` for each card, from seed ``first`` on, in an engine's best family or the one
+    named; ``beside`` are engines to agree with."""
+
+    engine: str
+    mechanisms: int
+    first: int = 0
+    family: str = ""
+    beside: Sequence[str] = ()
+
+
+@dataclass
+class Tally:
+    """Counts of verdicts by card and status, the largest part of the allowance that was used and where, and
+    the violations."""
+
+    plan: Plan
+    version: str = ""
+    seeds: int = 0
+    counts: dict[str, Counter[str]] = field(default_factory=dict)
+    worst: dict[str, tuple[float, str]] = field(default_factory=dict)
+    violations: list[dict[str, Any]] = field(default_factory=list)
+
+    def open(self) -> list[str]:
+        """Cards that are not decided on as many mechanisms as planned."""
+        cards = list(dict.fromkeys(card for _, asked in KINDS for card in asked))
+        asked = [card for card in cards if card != AGREEMENT or self.plan.beside]
+        return [card for card in asked if self.decided(card) < self.plan.mechanisms]
+
+    def decided(self, card: str) -> int:
+        """Mechanisms that a card was decided on."""
+        counts = self.counts.get(card, Counter())
+        return sum(counts[status] for status in DECIDED)
+
+    def add(self, record: dict[str, Any]) -> None:
+        """Count a record's verdicts."""
+        self.version, self.seeds = record["version"], self.seeds + 1
+        for verdict in record["verdicts"]:
+            card = verdict["property"]
+            self.counts.setdefault(card, Counter())[verdict["status"]] += 1
+            if verdict["status"] == FAIL:
+                self.violations.append(verdict)
+            elif verdict["measured"] and verdict["allowed"]:
+                part = verdict["measured"] / verdict["allowed"]
+                self.worst[card] = max(self.worst.get(card, (0.0, "")), (part, verdict["scene"]))
+
+    def to_record(self) -> dict[str, Any]:
+        """The counts as JSON."""
+        cards = {
+            name: {"card": card_of(name), "about": about(name), **counts,
+                   "worst": self.worst.get(name, (0.0, ""))}
+            for name, counts in self.counts.items()
+        }  # fmt: skip
+        return {"engine": self.plan.engine, "version": self.version, "family": self.plan.family,
+                "mechanisms": self.plan.mechanisms, "first_seed": self.plan.first, "seeds": self.seeds,
+                "cards": cards, "violations": self.violations}  # fmt: skip
+
+
+def card_of(name: str) -> str:
+    """A card with its version."""
+    return Verdict(name, "", PASS).card()
+
+
+def about(name: str) -> str:
+    """What a card checks."""
+    return ABOUT if name == AGREEMENT else suite.abouts()[name]
+
+
+def examined(plan: Plan, path: str | None = None, progress: Callable[[str], None] | None = None) -> Tally:
+    """Judge drawn mechanisms in this process until each card is decided on as many as planned, or seeds are
+    MOST times as many; records at ``path`` (JSON lines) are taken instead of runs, and added to."""
+    known, tally = opened(path), Tally(plan)
+    for seed in itertools.islice(itertools.count(plan.first), MOST * plan.mechanisms):
+        wanted = tally.open()
+        if not wanted:
+            break
+        key = f"{plan.engine} {plan.family} {seed}"
+        if key not in known:
+            known[key] = {"key": key, **_record(plan, seed, wanted)}
+            append(path, known[key])
+        tally.add(known[key])
+        if progress:
+            progress(f"seed {seed}")
+    return tally
+
+
+def _record(plan: Plan, seed: int, wanted: Collection[str]) -> dict[str, Any]:
+    """The verdicts of one seed: a card is asked of the next kind of mechanism where it has none yet."""
+    runner, version = InProcess(engine(plan.engine), plan.engine), ""
+    verdicts: list[Verdict] = []
+    for draw, asked in KINDS:
+        decided = {verdict.property for verdict in verdicts if verdict.status in DECIDED}
+        cards = [card for card in asked if card in wanted and card not in decided]
+        if cards:
+            bench = set_up(runner, Specimen(draw(seed), None, True, reference_time=0.0), plan.family)
+            version = bench.version
+            verdicts += list(_verdicts(plan, bench, cards))
+    return {"version": version, "verdicts": [suite.record_of(verdict) for verdict in verdicts]}
+
+
+def _verdicts(plan: Plan, bench: Bench, cards: Sequence[str]) -> Iterator[Verdict]:
+    for card in cards:
+        if bench.cannot and card != REFUSAL:
+            yield Verdict(card, bench.scene.name, CANNOT, reason=str(bench.cannot))
+        elif card == AGREEMENT:
+            yield from (agreement(bench, other) for other in plan.beside)
+        else:
+            yield suite.verdict_on(card, bench)
+
+
+def agreement(bench: Bench, other: str) -> Verdict:
+    """Whether the motion is that of another engine, by the finest settings of both."""
+    name = bench.scene.name
+    beside = set_up(InProcess(engine(other), other), bench.specimen)
+    if beside.cannot:
+        return Verdict(AGREEMENT, name, CANNOT, reason=f"{other}: {beside.cannot}")
+    try:
+        apart = difference(bench.scene, bench.motion, beside.motion)
+        allowed = bench.resolution + beside.resolution
+    except Broken as broken:
+        return Verdict(AGREEMENT, name, FAIL, reason=f"{other}: {broken}")
+    return Verdict(AGREEMENT, name, PASS if apart <= allowed else FAIL, apart, allowed, f"with {other}")

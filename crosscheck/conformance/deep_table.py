@@ -1,0 +1,32 @@
+"""The tables of a run on drawn mechanisms, for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rich.box import SIMPLE
+from rich.table import Column, Table
+from rich.text import Text
+
+from crosscheck.conformance.deep import Tally, about, card_of
+from crosscheck.conformance.suite import CANNOT, FAIL, OUTSIDE, PASS
+
+COLUMNS = (PASS, FAIL, CANNOT, OUTSIDE)
+
+
+def tables(tally: Tally) -> Iterator[Table | Text]:
+    """Cards with their counts and the largest part of an allowance that was used; then the violations."""
+    plan = tally.plan
+    first, last = plan.first, plan.first + tally.seeds - 1
+    title = f"{plan.engine} {tally.version} {plan.family}: mechanisms drawn from seeds {first} to {last}"
+    numbers = (Column(name, justify="right") for name in COLUMNS)
+    table = Table("card", *numbers, "most used of the allowance", "it checks", title=title, box=SIMPLE)
+    for name, counts in tally.counts.items():
+        used, scene = tally.worst.get(name, (0.0, ""))
+        row = (str(counts[status]) for status in COLUMNS)
+        table.add_row(card_of(name), *row, f"{used:.0e} {scene}" if used else "", about(name))
+    yield table
+    for v in tally.violations:
+        numbers_of = "" if v["measured"] is None else f" {v['measured']:.3g}, allowed {v['allowed']:.3g}"
+        yield Text(f"fail: {v['scene']}, {v['card']}:{numbers_of} {v['reason']}".rstrip())
+    yield Text(f"{plan.engine}: {len(tally.violations)} violations in {tally.seeds} seeds")

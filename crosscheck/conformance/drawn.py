@@ -1,0 +1,123 @@
+"""Mechanisms drawn from seeds for every card: closed loops with all loads and drivers, floating ones, rotors.
+
+A card that says something of some mechanisms alone has a kind of its own: momentum of floating mechanisms,
+a driver's constant moment of rotors, refusal of mechanisms without masses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from crosscheck.conformance.changes import replaced
+from crosscheck.conformance.features import massless
+from crosscheck.conformance.moving import consistent
+from crosscheck.conformance.random_mechanisms import random_mechanism, triple
+from crosscheck.judge.constraints import closure_rates, initial_poses, initial_twists
+from crosscheck.judge.gauss_principle import goes_on, singular_values
+from crosscheck.judge.tolerances import RANK
+from mbref.scene import GROUND, Body, Driver, Fixed, Force, Joint, Load, Revolute, Scene, Sine, TorsionSpring
+
+DURATION = 0.05  # s: bodies of half a metre turn by a tenth of a radian
+REGULAR = 1e-3  # least singular value of rows with a driver, of unit length: else its joint hardly turns
+FRAME = "frame"  # the body in the ground's place
+NUDGE = 0.1  # m or rad: amplitude of a driver's wave
+
+
+def mechanism(seed: int) -> Scene:
+    """A closed-loop mechanism with a gravity of any direction and, where a joint takes them, torsion spring
+    and driver.  That of an even seed has neither driver nor damping."""
+    rng = np.random.default_rng([seed, 1])
+    scene = random_mechanism(seed)
+    gravity = rng.normal(size=3)
+    scene = scene.with_(
+        name=f"drawn_{seed}", gravity=triple(9.81 * gravity / np.linalg.norm(gravity)), duration=DURATION,
+        load=(*scene.load, *_torsion(scene, rng)),
+    )  # fmt: skip
+    return _driven(scene, rng) if seed % 2 else _undamped(scene)
+
+
+def floating(seed: int) -> Scene:
+    """The mechanism in flight: a body in the ground's place, without damping, driver and force at a point,
+    whose moment of momentum would follow the point."""
+    rng = np.random.default_rng([seed, 2])
+    scene = _undamped(random_mechanism(seed)).with_(duration=DURATION)
+    frame = Body(name=FRAME, mass=4.0, inertia=(0.3, 0.4, 0.5), position=(0.1, -0.2, 0.05))
+    joints = tuple(replaced(joint, bodies=[_freed(name) for name in joint.bodies]) for joint in scene.joint)
+    loads = tuple(load for load in scene.load if not isinstance(load, Force))
+    flying = scene.with_(name=f"floating_{seed}", body=(frame, *scene.body), joint=joints, load=loads)
+    moving = consistent(flying, rng.normal(size=(len(flying.body), 6)))
+    return moving if goes_on(moving) else consistent(flying, np.zeros((len(flying.body), 6)))
+
+
+def rotor(seed: int) -> Scene:
+    """One to four welded bodies on a hinge along gravity, sped up evenly: the driver's moment is constant."""
+    rng = np.random.default_rng([seed, 3])
+    base = random_mechanism(seed)
+    axis = rng.normal(size=3)
+    names = [GROUND, *(body.name for body in base.body[: rng.integers(1, 5)])]
+    hinge = Revolute(name="hinge", bodies=(GROUND, names[1]), anchor=triple(rng.normal(size=3)),
+                     axis=triple(axis))  # fmt: skip
+    welds = [Fixed(name=f"weld {b}", bodies=(a, b), anchor=triple(rng.normal(size=3)))
+             for a, b in pairwise(names[1:])]  # fmt: skip
+    still = [replaced(body, velocity=None, angular_velocity=None) for body in base.body[: len(names) - 1]]
+    driver = Driver(joint="hinge", polynomial=(0.0, *rng.uniform(-3, 3, 2).tolist()))
+    gravity = 9.81 * axis / np.linalg.norm(axis)
+    return Scene(name=f"rotor_{seed}", gravity=triple(gravity), duration=DURATION, body=tuple(still),
+                 joint=(hinge, *welds), driver=(driver,))  # fmt: skip
+
+
+def without_masses(seed: int) -> Scene:
+    """The mechanism without masses and drivers, whose motion nothing determines."""
+    return massless(random_mechanism(seed))
+
+
+def _freed(name: str) -> str:
+    return FRAME if name == GROUND else name
+
+
+def _undamped(scene: Scene) -> Scene:
+    return scene.with_(load=tuple(_still(load) for load in scene.load))
+
+
+def _still(load: Load) -> Load:
+    return replaced(load, damping=0.0) if hasattr(load, "damping") else load
+
+
+def _torsion(scene: Scene, rng: np.random.Generator) -> Iterator[TorsionSpring]:
+    """A torsion spring about a joint that takes one, for two of three mechanisms."""
+    joints = [joint.name for joint in scene.joint if joint.facts.takes_torsion_spring]
+    if joints and rng.random() < 2 / 3:
+        joint = str(rng.choice(joints))
+        stiffness, damping, angle = rng.uniform((1.0, 0.0, -1.0), (9.0, 0.2, 1.0)).tolist()
+        yield TorsionSpring(joint=joint, stiffness=stiffness, damping=damping,
+                            natural_angle=angle)  # fmt: skip
+
+
+def _driven(scene: Scene, rng: np.random.Generator) -> Scene:
+    """The scene with a driver that begins at the joint's own rate; without, where none leaves a motion."""
+    rank = _rank(scene)
+    joints = [joint for joint in scene.joint if joint.facts.driven]
+    for joint in rng.permutation(np.array(joints, dtype=object)):
+        driven = scene.with_(driver=(_driver(scene, joint, rng),))
+        values = singular_values(driven)
+        if _rank(driven) == rank + 1 and values[rank] > REGULAR and goes_on(driven):
+            return driven
+    return scene
+
+
+def _driver(scene: Scene, joint: Joint, rng: np.random.Generator) -> Driver:
+    still = scene.with_(driver=(Driver(joint=joint.name, polynomial=(0.0,)),))
+    rows = closure_rates(still, 0.0, *initial_poses(scene), *initial_twists(scene))
+    amplitude, frequency, phase = NUDGE * rng.uniform(-1, 1), rng.uniform(3, 20), rng.uniform(-3, 3)
+    rate = float(rows[joint.name][-1]) - amplitude * frequency * np.cos(phase)
+    wave = Sine(amplitude=amplitude, frequency=frequency, phase=phase)
+    polynomial = (-amplitude * float(np.sin(phase)), float(rate), float(rng.uniform(-1, 1)))
+    return Driver(joint=joint.name, polynomial=polynomial, sine=wave)
+
+
+def _rank(scene: Scene) -> int:
+    values = singular_values(scene)
+    return int(np.sum(values > RANK * values[0]))

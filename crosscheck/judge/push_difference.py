@@ -1,0 +1,49 @@
+"""Difference of accelerations and of unique reactions between two runs that should agree."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.joint_reactions import LEAST, shared_wrenches
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+
+Part = tuple[float, str]
+
+
+def pushes_apart(scene: Scene, expected: Trajectory, found: Trajectory) -> Part:
+    """The larger of both differences, each relative to the largest expected one, and its name; of a scene
+    and two runs of the same sample times.  What one of the runs does not give is not compared."""
+    return max(_accelerations(scene, expected, found), _reactions(scene, expected, found))
+
+
+def _accelerations(scene: Scene, expected: Trajectory, found: Trajectory) -> Part:
+    """Angular accelerations count times the scene's length, and none less than its length in its time."""
+    length, parts = scene_length(scene), []
+    for name, unit in (("acceleration", 1.0), ("angular_acceleration", length)):
+        first, second = getattr(expected, name), getattr(found, name)
+        if first is not None and second is not None:
+            parts.append(
+                (unit * np.abs(first).max(initial=0.0), unit * np.abs(first - second).max(initial=0.0))
+            )
+    scale = max([length / scene.duration**2, *(size for size, _ in parts)])
+    return float(max([0.0, *(apart for _, apart in parts)]) / scale), "accelerations"
+
+
+def _reactions(scene: Scene, expected: Trajectory, found: Trajectory) -> Part:
+    """At the last sample, of the joints that both runs have, across what redundancy leaves open; moments
+    count over the scene's length."""
+    first, second = expected.reactions or {}, found.reactions or {}
+    common = [name for name in first if name in second]
+    if not common or not scene.has_mass():
+        return 0.0, "reactions"
+    units = np.repeat([1.0, scene_length(scene)], 3)
+    weight = LEAST * sum(body.mass or 0.0 for body in scene.body)
+    scale = max([weight, *(float(np.linalg.norm(w[-1] / units)) for w in first.values())])
+    shared = shared_wrenches(scene, found.times[-1], found.position[-1], found.orientation[-1])
+    worst = 0.0
+    for name in common:
+        apart = (second[name][-1] - first[name][-1]) / units
+        worst = max(worst, float(np.linalg.norm(apart - shared[name] @ (shared[name].T @ apart))))
+    return worst / scale, "reactions"
