@@ -104,7 +104,9 @@ def _verify_drawn(engine: str, arguments: argparse.Namespace) -> int:
     from crosscheck.conformance import deep
     from crosscheck.conformance.deep_table import tables as deep_tables
 
-    beside = request.find_engines(arguments.beside, notice) if arguments.beside else ()
+    beside = arguments.beside or ()
+    for other in beside:
+        request.find_engines([other.partition("=")[0]], notice)
     plan = deep.Plan(engine, arguments.mechanisms, arguments.first_seed, arguments.family, beside)
     with counted("verifying", plan.mechanisms) as advance:
         found = deep.examined(plan, arguments.records, advance)

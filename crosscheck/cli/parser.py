@@ -113,7 +113,7 @@ def _add_verify(commands: Commands) -> None:
     drawn.add_argument("--first-seed", type=int, default=0, metavar="S", help="default: 0")
     drawn.add_argument("--records", metavar="FILE", help="keep verdicts there, and take those it has")
     drawn.add_argument(
-        "--beside", action="append", metavar="E", help="an engine to agree with on each; may repeat"
+        "--beside", action="append", metavar="E[=F]", help="an engine (and family) to agree with; may repeat"
     )
     add_limits(parser)
 

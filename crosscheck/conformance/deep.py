@@ -36,7 +36,7 @@ KINDS: tuple[tuple[Callable[[int], Scene], tuple[str, ...]], ...] = (
 
 class Plan(NamedTuple):
     """So many ``mechanisms`` for each card, from seed ``first`` on, in an engine's best family or the one
-    named; ``beside`` are engines to agree with."""
+    named; ``beside`` are engines to agree with, as NAME or NAME=FAMILY."""
 
     engine: str
     mechanisms: int
@@ -145,9 +145,9 @@ def _verdicts(plan: Plan, bench: Bench, cards: Sequence[str]) -> Iterator[Verdic
 
 
 def agreement(bench: Bench, other: str) -> Verdict:
-    """Whether the motion is that of another engine, by the finest settings of both."""
-    name = bench.scene.name
-    beside = set_up(InProcess(engine(other), other), bench.specimen)
+    """Whether the motion is that of another engine (NAME or NAME=FAMILY), by the finest settings of both."""
+    name, (called, _, family) = bench.scene.name, other.partition("=")
+    beside = set_up(InProcess(engine(called), called), bench.specimen, family)
     if beside.cannot:
         return Verdict(AGREEMENT, name, CANNOT, reason=f"{other}: {beside.cannot}")
     try:

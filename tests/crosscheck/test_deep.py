@@ -86,7 +86,14 @@ def test_command_and_its_records(known, capsys, tmp_path):
     """The command prints the counts of the cards, and is 1 where a card is violated."""
     known(example())
     arguments = ["verify", "mbref", "--mechanisms", "1", "--records", str(tmp_path / "r.jsonl")]
-    arguments += ["--family", "alf-dual+projection", "--first-seed", "2", "--beside", "mbref"]
+    arguments += [
+        "--family",
+        "alf-dual+projection",
+        "--first-seed",
+        "2",
+        "--beside",
+        "mbref=mpi-svd+projection",
+    ]
     assert main([*arguments, "--json"]) == 0
     record = json.loads(capsys.readouterr().out)
     counts = record["cards"]["agreement"]

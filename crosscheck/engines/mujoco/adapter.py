@@ -24,7 +24,7 @@ from crosscheck.engines.mujoco.projection import projected
 from crosscheck.engines.sampling import Adaptive, Counts, Failed, Sample, run_through, step_count
 from crosscheck.engines.tree_reactions import LinkMotion, joint_reactions, wrench
 from mbref import rotations
-from mbref.scene import Scene
+from mbref.scene import Driver, Scene
 from mbref.trajectory import Outcome, Trajectory
 
 HARD = 1e-8  # factor of the regulariser: its error is gone, and rounding does not yet take over
@@ -183,9 +183,7 @@ class _MujocoSimulation:
         mujoco = self.mujoco
         mujoco.set_mju_user_warning(lambda _: None)  # they would go to the terminal and MUJOCO_LOG.TXT
         try:
-            mujoco.mj_forward(self.model, self.data)
-            self.rows = [(int(self._rows(equality)[0]), d) for equality, d in self.compiled.drivers]
-            if self.rows:
+            if self.compiled.drivers:
                 mujoco.set_mjcb_control(self._drive)
             yield
         finally:
@@ -193,14 +191,18 @@ class _MujocoSimulation:
             mujoco.set_mju_user_warning(None)
 
     def _rows(self, equality: int) -> np.ndarray:
-        """The constraint rows of an equality; none between two bodies that cannot move."""
+        """The constraint rows of an equality, at this step: MuJoCo leaves out those that nothing moves."""
         data, kind = self.data, int(self.mujoco.mjtConstraint.mjCNSTR_EQUALITY)
         return np.flatnonzero((data.efc_type == kind) & (data.efc_id == equality))
+
+    def _driven(self) -> list[tuple[int, Driver]]:
+        """The rows of the drivers, at this step."""
+        return [(int(row), d) for equality, d in self.compiled.drivers for row in self._rows(equality)[:1]]
 
     def _drive(self, model: Any, data: Any) -> None:
         """Adds the prescribed motion to the reference accelerations of the drivers' rows."""
         reference, gains = data.efc_aref, data.efc_KBIP
-        for row, driver in self.rows:
+        for row, driver in self._driven():
             value, rate, acceleration = motion(driver, data.time)
             stiffness, damping, impedance, _ = gains[row]
             reference[row] += acceleration + damping * rate + stiffness * impedance * value
@@ -241,7 +243,7 @@ class _MujocoSimulation:
         return np.concatenate((self._position_rates(data.qpos, data.qvel), data.qacc))
 
     def _settle(self, t: float, y: np.ndarray) -> np.ndarray:
-        return projected(self.mujoco, self.model, self.data, self.rows, t, self._load, y)
+        return projected(self.mujoco, self.model, self.data, self._driven, t, self._load, y)
 
     def _position_rates(self, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
         model = self.model

@@ -18,7 +18,7 @@ CLOSED = 1e-13  # m and rad, where it ends
 CLOSED_ENOUGH = 1e-8  # m and rad, beyond which it has failed
 REDUNDANT = 1e-7  # of the largest singular value: redundant rows of states not quite closed are below
 
-Rows = Sequence[tuple[int, Driver]]  # the driven constraint rows
+Rows = Callable[[], Sequence[tuple[int, Driver]]]  # the driven constraint rows of the data as they are
 
 
 def projected(
@@ -35,7 +35,7 @@ def projected(
         mujoco.mj_forward(model, data)
         jacobian = data.efc_J[: data.ne * model.nv].reshape(data.ne, model.nv)
         values, rates = data.efc_pos[: data.ne].copy(), np.zeros(data.ne)
-        for row, driver in drivers:
+        for row, driver in drivers():
             value, rate, _ = motion(driver, t)
             values[row] -= value
             rates[row] = rate
