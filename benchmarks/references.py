@@ -1,12 +1,14 @@
 """Cost and bounds of references of built-in scenes and random mechanisms, and tighter runs beside them.
 
-    python benchmarks/references.py [--random 200] [--duration 0.5] [--seconds 60] [--tight 120] [--records F]
+    python benchmarks/references.py [NAME …] [--random 200] [--duration 0.5] [--seconds 60] [--tight 120]
+                                    [--records F]
 
-Of each scene: CPU seconds of formulation A, of its twin and of B, the difference of A and B, the bound, the
-true error where a closed form is known, and elsewhere the difference of a tighter run: formulation A in
-DIGITS decimal digits, with other rows where some are redundant.  "ABOVE" marks an error or a difference above
-the bound.  Nothing is taken from the cache of references; with --records, lines that the same code made are
-taken from the file, and the command goes on where it was interrupted.
+Of each scene: CPU seconds of formulation A, of the twin, which is a second run of A, or of B where A had no
+time left, and of B, the difference of A and B, the bound, the true error where a closed form is known, and
+elsewhere the difference of a tighter run: formulation A in DIGITS decimal digits, with other rows where some
+are redundant.  "ABOVE" marks an error or a difference above the bound.  Nothing is taken from the cache of
+references; with --records, lines that the same code made are taken from the file, and the command goes on
+where it was interrupted.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.conformance.awkward_mechanisms import AWKWARD, awkward
 from crosscheck.conformance.closed_forms import CLOSED_FORMS
 from crosscheck.conformance.hard_mechanisms import HARD
 from crosscheck.conformance.random_mechanisms import random_mechanism
@@ -45,6 +48,7 @@ Line = dict[str, Any]
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("name", nargs="*", metavar="NAME", help="only these built-in scenes")
     parser.add_argument("--random", type=int, default=200, help="how many random mechanisms")
     parser.add_argument("--duration", type=float, default=0.5, help="of their motion, s")
     parser.add_argument("--seconds", type=float, default=60.0, help="of CPU time for each reference")
@@ -57,10 +61,14 @@ def main() -> None:
     parser.add_argument("--records", metavar="FILE", help="keep the lines and go on from them")
     parser.add_argument("--only-random", action="store_true", help="leave the built-in scenes out")
     parser.add_argument("--hard", action="store_true", help="hard mechanisms instead of the built-in scenes")
+    parser.add_argument("--awkward", type=int, metavar="N", help="N mechanisms of each awkward kind instead")
     asked = parser.parse_args()
     built_in = [*(make() for make in SCENES.values()), *(make()[0] for make in CLOSED_FORMS)]
     if asked.hard:
         built_in = [make() for make in HARD.values()]
+    if asked.awkward:
+        built_in = [awkward(kind, seed) for kind in AWKWARD for seed in range(asked.awkward)]
+    built_in = [scene for scene in built_in if not asked.name or scene.name in asked.name]
     print(f"| {' | '.join(COLUMNS)} |\n| --- {'| --: ' * (len(COLUMNS) - 2)}| --- |")
     for scene in () if asked.only_random else built_in:
         line(scene, scene.duration, asked.seconds, asked.tight, asked.records)
@@ -88,17 +96,18 @@ def line(scene: Scene, duration: float, seconds: float, tight: float, records: s
 def examined(scene: Scene, duration: float, seconds: float, tight: float) -> Line:
     """The numbers of one scene; None where there is none."""
     times = np.linspace(0.0, duration, SAMPLES)
-    motions = a, _, b = runs(scene, times, seconds)
+    motions = one, _, other = runs(scene, times, seconds)
     found, reason = judged(scene, times, *motions)
     tighter = _tighter(scene, found.times, tight)
-    apart = [] if tighter is None else differences(scene, a, tighter)[: len(found.times)]
+    apart = [] if tighter is None else differences(scene, one, tighter)[: len(found.times)]
     return {
         "scene": scene.name, "duration": duration,
         "bodies": len(scene.body), "joints": dict(Counter(joint.type for joint in scene.joint)),
         "loads": dict(Counter(load.type for load in scene.load)), "redundant": scene.counts().redundant,
-        "seconds": [motion.seconds for motion in motions], "apart": largest(differences(scene, a, b)),
+        "by": [motion.formulation for motion in motions],
+        "seconds": [motion.seconds for motion in motions], "apart": largest(differences(scene, one, other)),
         "bound": None if reason else largest(found.bound), "reason": reason,
-        "b_to": None if found.both.all() else b.reached, "b_reason": b.reason,
+        "other_to": None if found.both.all() else other.reached, "other_reason": other.reason,
         "error": _compared(_error(scene, found), found), "tighter": _compared(apart, found),
         "tighter_reason": "" if tighter is None else tighter.reason,
     }  # fmt: skip
@@ -144,10 +153,14 @@ def largest(values: Any) -> float:
 
 def text(found: Line) -> str:
     """One row of the table."""
-    cells = [found["scene"], f"{found['duration']:.3g}", *(f"{s:.2f}" for s in found["seconds"])]
+    by, other, seconds = found["by"], found["by"][-1], [f"{s:.2f}" for s in found["seconds"]]
+    if by == ["B", "B", "A"]:
+        seconds = [seconds[2], seconds[1], seconds[0]]
+    cells = [found["scene"], f"{found['duration']:.3g}", *seconds]
     bound = "none" if found["bound"] is None else f"{found['bound']:.0e}"
     cells += [f"{found['apart']:.0e}", bound, _cell(found["error"]), _cell(found["tighter"])]
-    remarks = [f"B to {found['b_to']:.4g} s"] if found["b_to"] is not None else []
+    remarks = [f"{other} to {found['other_to']:.4g} s"] if found["other_to"] is not None else []
+    remarks += [f"twin by {by[1]}"] if other == "A" else []
     reasons = {"no reference": found["reason"], "tighter run": found["tighter_reason"]}
     remarks += [f"{what}: {reason}" for what, reason in reasons.items() if reason]
     return f"| {' | '.join(cells)} | {'; '.join(remarks)} |"

@@ -29,7 +29,7 @@ from mbref.scene import (
 
 GRAVITY, Z = (0.0, -9.81, 0.0), (0.0, 0.0, 1.0)
 TURNED = Isometry(ASKEW, np.array([0.3, -0.7, 0.45]))
-Point = Sequence[float]
+Point = Sequence[float] | np.ndarray
 
 
 def bar(name: str, start: Point, stop: Point, mass: float = 1.0) -> Body:

@@ -143,6 +143,46 @@ def test_formulations_agree_on_every_feature(feature):
         assert np.abs(one - other).max() <= 1e-13 * rate**2, name
 
 
+def test_closures_that_vanish_on_the_way_are_not_held():
+    """Where Bennett's linkage is flat, one of two rows that close it vanishes, and panels grew short."""
+    motion = tree_motion(SCENES["bennett"](), np.linspace(0.0, 1.0, 3), EXTENDED, seconds=SECONDS)
+    assert not motion.reason and motion.steps < 10
+
+
+def test_panels_of_stiff_motions_are_as_long_as_the_motion_is_smooth():
+    """Dampers of the governor act in 40 µs, and Picard's iteration takes 20 panels to 7 ms."""
+    scene, times = SCENES["flyball_governor"](), np.linspace(0.0, 0.4, 5)
+    motion = tree_motion(scene, times, EXTENDED, seconds=SECONDS)
+    assert not motion.reason and motion.steps < 40
+    assert differences(scene, natural_motion(scene, times, EXTENDED, seconds=SECONDS), motion).max() < 1e-15
+
+
+def test_where_one_formulation_is_slow_the_other_bounds_itself(monkeypatch):
+    scene, times = SCENES["flyball_governor"](), np.linspace(0.0, 0.4, 9)
+
+    def brief(*given, **options):
+        return natural_motion(*given, **options | {"seconds": 0.3})
+
+    monkeypatch.setattr(module, "natural_motion", brief)
+    one, twin, other = runs(scene, times, SECONDS)
+    found, reason = judged(scene, times, one, twin, other)
+    assert not reason and found.bound.max() <= SMOOTH
+    assert 0 < found.both.sum() == len(other.times) < len(times)
+    exact = natural_motion(scene, times, EXTENDED, seconds=SECONDS)
+    assert (np.abs(found.position - exact.position).max(axis=(1, 2)) <= found.bound).all()
+
+
+def test_other_rows_and_displaced_closures_show_contradictions():
+    """B on other rows of a linkage turned askew moves apart by the rounding of its axes, and no more."""
+    scene = Isometry(ASKEW, np.array([0.3, -0.5, 0.2])).change(SCENES["bennett"]())
+    one, same, other = (
+        tree_motion(scene, [0.5], EXTENDED, seconds=SECONDS, seed=seed, displaced=displaced)
+        for seed, displaced in ((0, 0.0), (0, 0.0), (1, 2e-16))
+    )
+    assert (one.position == same.position).all()
+    assert 1e-17 < differences(scene, one, other).max() < 1e-14
+
+
 def assert_random(seed: int) -> None:
     scene = random_mechanism(seed)
     found, reason = samples(scene, 0.3, 4)
@@ -340,6 +380,21 @@ def test_weaker_joints_leave_the_freedoms_and_no_redundant_row(name):
     assert before.redundant > after.redundant == 0
     assert before.degrees_of_freedom == after.degrees_of_freedom
     assert replaced(scene, isostatic(scene)) and not replaced(scene, scene)
+
+
+def test_weaker_joints_keep_the_rank_along_the_motion():
+    """With the joints that serve at the start, Bennett's linkage is singular where it is flat."""
+    scene = SCENES["bennett"]()
+    motion = natural_motion(scene, np.linspace(0.0, 1.0, 41), EXTENDED, seconds=SECONDS)
+    along = list(
+        zip(motion.times.tolist(), doubles(motion.position), doubles(motion.orientation), strict=True)
+    )
+    one, other = (
+        natural_motion(s, [1.0], EXTENDED, seconds=SECONDS)
+        for s in (isostatic(scene), isostatic(scene, along))
+    )
+    assert one.crossings and not other.crossings
+    assert other.contradiction < 1e-17 < motion.contradiction
 
 
 def test_driven_joints_are_kept():

@@ -14,16 +14,17 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.judge.reference.arithmetic import doubles, many_digits
+from crosscheck.judge.reference.arithmetic import EXTENDED, doubles, many_digits
 from crosscheck.judge.reference.bound import SAFETY, differences
 from crosscheck.judge.reference.cache import canonical
-from crosscheck.judge.reference.isostatic import isostatic, replaced
+from crosscheck.judge.reference.isostatic import Pose, isostatic, replaced
 from crosscheck.judge.reference.motion import Motion
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from mbref.scene import Scene
 
 SPARE = (6, 12)  # digits beyond those asked for, of a step's tolerance; more where fewer do not do
+POSES = 101  # along a motion
 METHODS = {
     "A": "natural coordinates, Taylor series",
     "B": "joint coordinates of a spanning tree, Chebyshev–Picard panels",
@@ -64,7 +65,7 @@ def _motions(
     B keeps too few digits, by A with other digits and another order."""
     moved, a = scene, _by_a(scene, times, digits, digits + spare, seconds)
     if a.contradiction > 10.0**-digits:
-        moved = isostatic(scene)
+        moved = isostatic(scene, _poses(scene, float(times[-1])))
         a = _by_a(moved, times, digits, digits + spare, seconds)
     if a.crossings:
         orders = 3 * digits // 2, 7 * digits // 4
@@ -75,6 +76,14 @@ def _motions(
     _refuse_ended(scene, a, "A")
     _refuse_ended(scene, b, "B")
     return moved, a, b
+
+
+def _poses(scene: Scene, end: float) -> list[Pose]:
+    """Poses along the motion to a time (s), in double precision."""
+    motion = natural_motion(scene, np.linspace(0.0, end, POSES), EXTENDED)
+    return list(
+        zip(motion.times.tolist(), doubles(motion.position), doubles(motion.orientation), strict=True)
+    )
 
 
 def _apart(one: np.ndarray, other: np.ndarray) -> float:

@@ -6,30 +6,49 @@ doubles have it then moves on one set of independent rows or on another, but has
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.judge.tolerances import RANK
-from mbref.scene import JOINT_TYPES, Joint, Scene
+from mbref.scene import JOINT_TYPES, Joint, Scene, Universal
 
 WEAKER = {"revolute": ("spherical", "planar", "cylindrical"), "translational": ("cylindrical",),
           "universal": ("spherical",), "fixed": ("spherical",)}  # fmt: skip
 """Types whose rows are among those of a type, with the same anchor and axis; the fewest rows first."""
 REMOVED = "removed"
+KEPT = 0.02  # part of the least singular value that rows keep without the redundant ones
+Pose = tuple[float, np.ndarray, np.ndarray]
+"""Time, positions (nb, 3) and orientations (nb, 4)."""
 
 
-def isostatic(scene: Scene) -> Scene:
+def isostatic(scene: Scene, along: Sequence[Pose] = ()) -> Scene:
     """The scene with redundant joints removed or replaced by weaker ones, the last joints first; its rank at
-    t = 0 stays the same.  Joints with a driver or a torsion spring are kept."""
+    t = 0, and at the poses along its motion, stays the same.  Joints with a driver or a torsion spring are
+    kept; where they leave redundant rows, the scene stays as it is."""
+    poses = [(0.0, *initial_poses(scene)), *along]
     rank = _rank(scene)
+    least = [_singular_value(scene, rank, pose) for pose in poses]
     needed = {d.joint for d in scene.driver} | {l.joint for l in scene.load if l.type == "torsion_spring"}
-    for joint in reversed(scene.joint):
-        if joint.name not in needed:
-            trials = (_with(scene, joint, other) for other in _weaker(joint))
-            scene = next((trial for trial in trials if _rank(trial) == rank), scene)
-    return scene
+
+    def serves(trial: Scene) -> bool:
+        if _rank(trial) != rank:
+            return False
+        return all(
+            _singular_value(trial, rank, pose) > KEPT * s for pose, s in zip(poses, least, strict=True)
+        )
+
+    def without(trial: Scene, joints: Sequence[Joint]) -> Scene | None:
+        if len(jacobian(trial, *poses[0])[0]) == rank:
+            return trial
+        if not joints:
+            return None
+        weaker = (_with(trial, joints[0], others) for others in _weaker(joints[0]))
+        found = (without(other, joints[1:]) for other in weaker if serves(other))
+        return next((other for other in found if other), None) or without(trial, joints[1:])
+
+    return without(scene, [joint for joint in reversed(scene.joint) if joint.name not in needed]) or scene
 
 
 def replaced(scene: Scene, by: Scene) -> dict[str, str]:
@@ -40,11 +59,19 @@ def replaced(scene: Scene, by: Scene) -> dict[str, str]:
 
 
 def _weaker(joint: Joint) -> Iterator[tuple[Joint, ...]]:
-    """No joint, and then the weaker ones."""
+    """No joint, and then the weaker ones; of a revolute joint last the universal ones, which also turn about
+    one of the two directions normal to its axis."""
     yield ()
+    axis = next(iter(joint.directions), None)
     for kind in WEAKER.get(joint.type, ()):
-        places = {"anchor": joint.anchor_pair[0], "axis": next(iter(joint.directions), None)}
+        places = {"anchor": joint.anchor_pair[0], "axis": axis}
         yield (JOINT_TYPES[kind].at(joint.name, joint.bodies, **places),)
+    if joint.type == "revolute" and axis is not None:
+        across = np.cross(np.eye(3)[np.argmin(np.abs(axis))], axis)
+        for normal in (across, np.cross(axis, across)):
+            x, y, z = normal.tolist()
+            there = joint.anchor_pair[0]
+            yield (Universal(name=joint.name, bodies=joint.bodies, anchor=there, axes=(axis, (x, y, z))),)
 
 
 def _with(scene: Scene, joint: Joint, others: tuple[Joint, ...]) -> Scene:
@@ -55,8 +82,15 @@ def _with(scene: Scene, joint: Joint, others: tuple[Joint, ...]) -> Scene:
 
 def _rank(scene: Scene) -> int:
     """Rank of the rows at t = 0, with drivers."""
-    rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
-    if not len(rows):
-        return 0
-    values = np.linalg.svd(rows, compute_uv=False)
-    return int((values > RANK * values[0]).sum())
+    values = _singular_values(scene, (0.0, *initial_poses(scene)))
+    return int((values > RANK * values.max(initial=0.0)).sum())
+
+
+def _singular_value(scene: Scene, number: int, pose: Pose) -> float:
+    """One of the rows' singular values, counted from 1, the largest; infinite for number 0."""
+    return float(_singular_values(scene, pose)[number - 1]) if number else np.inf
+
+
+def _singular_values(scene: Scene, pose: Pose) -> np.ndarray:
+    rows, _ = jacobian(scene, *pose)
+    return np.linalg.svd(rows, compute_uv=False) if len(rows) else np.zeros(0)

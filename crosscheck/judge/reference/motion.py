@@ -16,6 +16,8 @@ import numpy as np
 
 Times = Sequence[float] | np.ndarray
 
+OVER = "the time for it was up"
+
 _given_up = Event()
 
 
@@ -51,6 +53,7 @@ class Motion:
     asked for, or where the motion ended before, with the ``reason`` as a clause ("" when complete).
     ``crossings`` (s) are the singular positions passed, ``seconds`` CPU time; ``contradiction`` is the
     largest residual of redundant rows, relative to the largest coordinate, where that was looked at.
+    ``formulation`` is A or B.
     """
 
     times: np.ndarray
@@ -66,3 +69,4 @@ class Motion:
     crossings: tuple[float, ...]
     seconds: float
     contradiction: float = 0.0
+    formulation: str = "A"

@@ -59,6 +59,7 @@ class Panel:
     factor: float
     crossing: float | None = None
     foreseen: float | None = None
+    sweeps: int = 0
 
     def time(self, place: float | None) -> float | None:
         """The time (s) of a place."""
@@ -126,7 +127,7 @@ class Panels:
                 if settled:
                     factor = min(SPARE * fits, LONGEST if sweep < MANY else 1.0)
                     ahead = singular_ahead(places, distance)
-                    return Panel(start, length, y, rates, True, factor, crossing, ahead)
+                    return Panel(start, length, y, rates, True, factor, crossing, ahead, sweeps=sweep)
         return Panel(start, length, guess, rates, False, SHORTER, foreseen=crossing)
 
     def _fits(self, moved: np.ndarray, size: np.ndarray, change: float, tolerance: float) -> float:

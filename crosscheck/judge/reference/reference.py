@@ -3,7 +3,8 @@
 Formulation A moves the scene twice, by series of different orders and with other rows where some are
 redundant; formulation B moves it once.  Where redundant rows contradict each other, because the scene's
 numbers are rounded, joints are displaced by as much in the second run.  Where B ends before A, as
-in a singular position, the two runs of A bound each other.
+in a singular position, the two runs of A bound each other; where A has no time left before B, as with stiff
+dampers, B moves the scene twice, and two runs of B bound each other after A's end.
 """
 
 from __future__ import annotations
@@ -16,13 +17,13 @@ import numpy as np
 from crosscheck.judge.reference import cache
 from crosscheck.judge.reference.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference.bound import USEFUL, bounds, differences, rounding
-from crosscheck.judge.reference.motion import Motion, Times
+from crosscheck.judge.reference.motion import OVER, Motion, Times
 from crosscheck.judge.reference.taylor import DATA, natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from mbref.scene import Scene
 
 SECONDS = 20.0
-TWIN_ORDER, TWIN_SEED = 24, 1  # of A's second run
+TWIN_ORDER, TWIN_NODES, TWIN_SEED = 24, 1.8, 1  # of second runs: A's order, B's points a digit
 CONSISTENT = 32 * EXTENDED.eps  # residual that is of the motion's own rounding, not of the scene's
 SHARE = 0.4  # of the time that is left for each run of A
 FIELDS = (
@@ -36,7 +37,7 @@ _computing: dict[str, Lock] = {}  # by what determines the motion
 class Reference:
     """Samples of the reference motion in double precision, as in Motion, and the ``bound`` (k,) on their
     error: distance over the scene's length, or angle (rad).  ``both`` (k,) tells where A and B agree and
-    not two runs of A alone; ``seconds`` of CPU time were spent."""
+    not two runs of one of them alone; ``seconds`` of CPU time were spent."""
 
     times: np.ndarray
     position: np.ndarray
@@ -90,34 +91,57 @@ def _known(scene: Scene, wanted: np.ndarray, seconds: float) -> _Kept:
 
 
 def runs(scene: Scene, times: np.ndarray, seconds: float) -> tuple[Motion, Motion, Motion]:
-    """The motion at ascending times (k,) by A, by A in its other way, and by B."""
+    """The motion at ascending times (k,) by A, by A in its other way, and by B; where A has no time left and
+    B goes on, as with stiff dampers, by B, by B in its other way, and by A."""
     a = natural_motion(scene, times, EXTENDED, seconds=SHARE * seconds)
+    left, moved = seconds - a.seconds, max(DATA, a.contradiction) if a.contradiction > CONSISTENT else 0.0
+    if a.reason == OVER:
+        b = tree_motion(scene, times, EXTENDED, seconds=left / 2)
+        if len(b.times) > len(a.times):
+            return b, _other_b(scene, b.times, moved, left - b.seconds), a
+        return a, _other_a(scene, a.times, moved, left - b.seconds), b
     if not len(a.times):
         return a, a, a
-    left = seconds - a.seconds
-    displaced = max(DATA, a.contradiction) if a.contradiction > CONSISTENT else 0.0
-    twin = natural_motion(
-        scene, a.times, EXTENDED, seconds=SHARE * left,
-        order=TWIN_ORDER, seed=TWIN_SEED, displaced=displaced,
-    )  # fmt: skip
+    twin = _other_a(scene, a.times, moved, SHARE * left)
     return a, twin, tree_motion(scene, a.times, EXTENDED, seconds=left - twin.seconds)
 
 
-def judged(scene: Scene, times: np.ndarray, a: Motion, twin: Motion, b: Motion) -> tuple[Reference, str]:
-    """Samples of A with the bound that its twin and B leave, as far as that is small enough to be of use."""
-    apart = np.zeros(max(len(twin.times), len(b.times)))
-    for other in (twin, b):
-        apart[: len(other.times)] = np.maximum(apart[: len(other.times)], differences(scene, a, other))
-    bound = np.maximum(bounds(apart), rounding(scene, a)[: len(apart)])
+def _other_a(scene: Scene, times: np.ndarray, displaced: float, seconds: float) -> Motion:
+    """By A, of another order and with other rows, the joints displaced."""
+    return natural_motion(
+        scene, times, EXTENDED, seconds=seconds, order=TWIN_ORDER, seed=TWIN_SEED, displaced=displaced
+    )
+
+
+def _other_b(scene: Scene, times: np.ndarray, displaced: float, seconds: float) -> Motion:
+    """By B, on fewer points and with other rows, the joints displaced."""
+    return tree_motion(
+        scene, times, EXTENDED, seconds=seconds, nodes_per_digit=TWIN_NODES, seed=TWIN_SEED,
+        displaced=displaced,
+    )  # fmt: skip
+
+
+def judged(
+    scene: Scene, times: np.ndarray, one: Motion, twin: Motion, other: Motion
+) -> tuple[Reference, str]:
+    """Samples of one motion with the bound that its twin and another leave, as far as that is of use."""
+    apart = np.zeros(max(len(twin.times), len(other.times)))
+    for second in (twin, other):
+        k = len(second.times)
+        apart[:k] = np.maximum(apart[:k], differences(scene, one, second))
+    bound = np.maximum(bounds(apart), rounding(scene, one)[: len(apart)])
     good = int((bound <= USEFUL).sum())
-    arrays = {name: doubles(getattr(a, name)[:good]) for name in FIELDS}
+    arrays = {name: doubles(getattr(one, name)[:good]) for name in FIELDS}
     samples = Reference(
-        times=a.times[:good], **arrays, bound=bound[:good], both=np.arange(good) < len(b.times),
-        seconds=a.seconds + twin.seconds + b.seconds,
+        times=one.times[:good], **arrays, bound=bound[:good], both=np.arange(good) < len(other.times),
+        seconds=one.seconds + twin.seconds + other.seconds,
     )  # fmt: skip
     if good < len(apart):
-        return samples, f"independent motions of it differ by {apart[good]:.0e} at t = {a.times[good]:.6g} s"
-    ended = a if len(a.times) < len(times) else twin
+        return (
+            samples,
+            f"independent motions of it differ by {apart[good]:.0e} at t = {one.times[good]:.6g} s",
+        )
+    ended = one if len(one.times) < len(times) else twin
     return samples, f"{ended.reason}, at t = {ended.reached:.6g} s" if good < len(times) else ""
 
 

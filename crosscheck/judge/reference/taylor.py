@@ -17,7 +17,7 @@ from scipy.optimize import minimize_scalar
 from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
 from crosscheck.judge.reference.expansion import Expansion, Series, value
 from crosscheck.judge.reference.held_rows import HeldRows, independent
-from crosscheck.judge.reference.motion import Motion, Times, is_over
+from crosscheck.judge.reference.motion import OVER, Motion, Times, is_over
 from crosscheck.judge.reference.natural import NaturalCoordinates
 from crosscheck.judge.reference.natural_loads import Loads
 from crosscheck.judge.reference.saddle_point import SaddlePoint
@@ -112,7 +112,7 @@ class Stepper:
         pending = list(times)
         while pending:
             if is_over(deadline):
-                raise Ended("the time for it was up")
+                raise Ended(OVER)
             expansion, h = self._step(2 * (float(times[-1]) - float(self.t)))
             series = expansion.x[: Series(expansion.x).terms(h)]
             if not self.steps:

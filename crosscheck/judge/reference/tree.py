@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from crosscheck.judge.reference.arithmetic import Arithmetic
-from crosscheck.judge.reference.motion import Motion, is_over
+from crosscheck.judge.reference.motion import OVER, Motion, is_over
 from crosscheck.judge.reference.panels import Panel, Panels
+from crosscheck.judge.reference.stiff_panels import StiffPanels
 from crosscheck.judge.reference.tree_equations import OPEN, TreeEquations
 from crosscheck.judge.reference.vectors import apply, product, unit
 from mbref.scene import Scene
@@ -22,17 +23,24 @@ from mbref.scene import Scene
 NODES_PER_DIGIT = 2.1
 FIRST = 0.1  # of the time asked for: length of the first panel
 LEAST = 1e-10  # of the time asked for: shortest panel
+SLOW = 20  # of Picard's iterations, from which on a panel may be stiff
 NEAR_END = 0.7  # part of a panel from which on a singular position is too near its end
 
 
-def tree_motion(scene: Scene, times: np.ndarray, arithmetic: Arithmetic, *, seconds: float) -> Motion:
+def tree_motion(
+    scene: Scene, times: np.ndarray, arithmetic: Arithmetic, *, seconds: float,
+    nodes_per_digit: float = NODES_PER_DIGIT, seed: int = 0, displaced: float = 0.0,
+) -> Motion:  # fmt: skip
     """The motion of a scene at ascending times (k,) ≥ 0 in an arithmetic; see Motion.
 
-    It ends early, with the reason, after so many CPU seconds, where the loops do not stay closed, and where
-    no panel of time is short enough.  Raises SceneError when the given velocities contradict the joints.
+    Another ``seed`` prefers other rows where some are redundant, and displaces the joints that close loops by
+    up to ``displaced``, relative to the scene's length.  The motion ends early, with the reason, after so
+    many CPU seconds, where the loops do not stay closed, and where no panel of time is short enough.  Raises
+    SceneError when the given velocities contradict the joints.
     """
     clock = time.thread_time()
-    run = _Run(TreeEquations(scene, arithmetic), np.asarray(times, dtype=float))
+    equations = TreeEquations(scene, arithmetic, (seed, displaced))
+    run = _Run(equations, np.asarray(times, dtype=float), nodes_per_digit)
     reason = run.through(clock + seconds)
     return run.motion(reason, time.thread_time() - clock)
 
@@ -40,15 +48,16 @@ def tree_motion(scene: Scene, times: np.ndarray, arithmetic: Arithmetic, *, seco
 class _Run:
     """Panels from t = 0 on, and the samples that fell into them."""
 
-    def __init__(self, equations: TreeEquations, times: np.ndarray):
+    def __init__(self, equations: TreeEquations, times: np.ndarray, nodes_per_digit: float):
         self.equations, self.arithmetic, self.times = equations, equations.arithmetic, times
-        self.panels = Panels(self.arithmetic, round(-NODES_PER_DIGIT * np.log10(self.arithmetic.eps)))
+        self.panels = Panels(self.arithmetic, round(-nodes_per_digit * np.log10(self.arithmetic.eps)))
         self.t = self.arithmetic.number(0.0)
         self.state = equations.start()
         self.samples: list[tuple[np.ndarray, np.ndarray]] = []
         self.crossings: list[float] = []
         self.foreseen = 0.0  # time of the next singular position, or a past one
         self.taken = self.steps = 0
+        self.stiff, self.is_stiff = StiffPanels(self.panels), False
 
     def through(self, until: float) -> str:
         """Runs to the last time; the reason where the motion ends before."""
@@ -58,9 +67,9 @@ class _Run:
         length = self.arithmetic.number(FIRST * end or 1.0)
         while self.taken < len(self.times):
             if is_over(until):
-                return "the CPU time for it is over"
+                return OVER
             tried = self._before_singular(length)
-            panel = self.panels.panel(self.equations, self.t, tried, self._guess(panel, tried))
+            panel = self._panel(tried, self._guess(panel, tried))
             length = length if panel.settled and tried < length else tried * panel.factor
             if not panel.settled or self.foreseen <= float(self.t):
                 self.foreseen = panel.time(panel.foreseen) or self.foreseen
@@ -75,6 +84,14 @@ class _Run:
             self._sample(panel)
             self._advance(panel, after, state)
         return ""
+
+    def _panel(self, length: Any, guess: np.ndarray) -> Panel:
+        """By Picard's iteration, or by Newton's method while decays are short against the panel."""
+        solver = self.stiff if self.is_stiff else self.panels
+        panel = solver.panel(self.equations, self.t, length, guess)
+        if self.is_stiff or panel.sweeps >= SLOW:
+            self.is_stiff = self.stiff.is_for(self.equations, self.t, float(length), guess[0])
+        return panel
 
     def _before_singular(self, length: Any) -> Any:
         """A length with which no panel ends near a singular position: one ends half a length before, and the
@@ -127,4 +144,5 @@ class _Run:
             steps=self.steps,
             crossings=tuple(self.crossings),
             seconds=seconds,
+            formulation="B",
         )

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.judge.reference.arithmetic import Arithmetic
+from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
 from crosscheck.judge.reference.tree_joints import Placed, Tree, joint_frame
 from crosscheck.judge.reference.vectors import apply, cross, dot, unit
 
@@ -69,14 +69,20 @@ class Closures:
         self.half_square = dot(span, span) / 2
         self.cosine = dot(self.angles.vectors[:, 0], self.angles.vectors[:, 1])
 
-    def rows(self, placed: Placed) -> Rows:
-        """The closures of placed bodies."""
+    def sizes(self, length: float) -> np.ndarray:
+        """How far each closure (m,) changes when its joint parts by a length (m), or turns by a radian."""
+        spans = np.sqrt(2 * doubles(self.half_square))
+        counts = len(self.shifts.bodies), len(self.angles.bodies)
+        return np.concatenate([np.full(counts[0], length), length * spans, np.ones(counts[1])])
+
+    def rows(self, placed: Placed, displaced: np.ndarray) -> Rows:
+        """The closures of placed bodies, of joints displaced by so much (m,)."""
         kinds = ((self.shifts, self._shifts), (self.lengths, self._lengths), (self.angles, self._angles))
         rows = none(placed)
         for packed, equations in kinds:
             if len(packed.bodies):
                 rows = rows.joined(equations(placed))
-        return rows
+        return Rows(rows.value - displaced, rows.drift, rows.jacobian)
 
     def _shifts(self, placed: Placed) -> Rows:
         p, q, a = self.shifts.carried(placed)

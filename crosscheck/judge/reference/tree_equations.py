@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import qr
 
 from crosscheck.judge import constraints
-from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
+from crosscheck.judge.reference.arithmetic import DOUBLE, Arithmetic, doubles
 from crosscheck.judge.reference.start_velocities import given, start_velocities
 from crosscheck.judge.reference.tree_closures import Closures, Rows, Twists
 from crosscheck.judge.reference.tree_joints import Placed, Tree
@@ -22,8 +22,9 @@ from crosscheck.judge.reference.vectors import apply, product, saddle_solve, uni
 from crosscheck.judge.tolerances import RANK
 from mbref.scene import Driver, Scene
 
-WORSE = 0.03  # part of the best conditioning below which other rows are chosen
+WORSE = 0.5  # part of the best conditioning below which other rows are chosen
 CORRECTIONS = 8  # Newton iterations at most that close the loops
+PREFERENCE = 0.2  # by how much a row's weight may be larger
 OPEN = 1e-9  # residual, relative to the scene's length, of rows that were taken as redundant and are not
 
 
@@ -40,9 +41,13 @@ class Instant:
 
 
 class TreeEquations:
-    """Rates of states; ``kept`` are the independent ones of the rows of closures and drivers."""
+    """Rates of states; ``kept`` are the independent ones of the rows of closures and drivers.
 
-    def __init__(self, scene: Scene, arithmetic: Arithmetic):
+    ``way``: a seed, by which other rows are preferred where some are redundant, and how far, relative to the
+    scene's length, joints that close loops are displaced.
+    """
+
+    def __init__(self, scene: Scene, arithmetic: Arithmetic, way: tuple[int, float] = (0, 0.0)):
         self.scene, self.arithmetic, self.tree = scene, arithmetic, Tree(scene, arithmetic)
         self.closures = Closures(self.tree)
         asked = {d.joint for d in scene.driver} | {l.joint for l in scene.load if l.type == "torsion_spring"}
@@ -56,6 +61,23 @@ class TreeEquations:
         self.ends = np.cumsum([self.tree.scalars, 4 * len(self.tree.balls), len(away), self.nv])
         self.light, self.length = int(self.ends[1]), constraints.scene_length(scene)
         self.kept: np.ndarray | None = None
+        self._doubles: TreeEquations | None = None
+        self._varied(*way)
+
+    def _varied(self, seed: int, displaced: float) -> None:
+        """Sizes of the joint rates and of the rows of closures and drivers, weights of these rows, near one,
+        and by how much closures are displaced."""
+        rng, closing = np.random.default_rng(seed), self.closures.sizes(self.length)
+        self._rate_sizes = np.where(self.tree.turning, 1.0, self.length)
+        self._row_sizes = np.concatenate([closing, self._coordinate_sizes()[self.driven]])
+        self._weights = 1 + (PREFERENCE * rng.random(len(self._row_sizes)) if seed else 0.0)
+        self._displaced = self.arithmetic.array(displaced * closing * rng.uniform(-1, 1, len(closing)))
+
+    def _coordinate_sizes(self) -> np.ndarray:
+        """The scene's length for displacements, one for angles, of the joint coordinates and twists."""
+        return np.concatenate(
+            [self._rate_sizes[: self.tree.scalars], np.ones(len(self.twists.packed.bodies))]
+        )
 
     def light_rates(self, y: np.ndarray) -> np.ndarray:
         """Rates (K, light) of scalars and quaternions, the latter half spin times quaternion."""
@@ -73,13 +95,20 @@ class TreeEquations:
         turning = apply(at.coordinates.jacobian[:, self.tree.scalars :], at.rate)
         return np.concatenate([turning, acceleration], axis=1), distance
 
+    def in_doubles(self) -> TreeEquations:
+        """The same equations, with the same rows, in double precision."""
+        if self._doubles is None:
+            self._doubles = TreeEquations(self.scene, DOUBLE)
+        self._doubles.kept = self.kept
+        return self._doubles
+
     def at(self, t: np.ndarray, y: np.ndarray) -> Instant:
         """Everything of states (K, n) at times (K,)."""
         scalar, ball, angle, rate = self._split(y)
         placed = self.tree.placed(scalar, unit(ball), rate)
         own = scalar[..., None] * 0 + np.eye(self.tree.scalars, self.nv, dtype=int)
         coordinates = Rows(scalar, 0 * scalar, own).joined(self.twists.rows(placed, angle))
-        closing = self.closures.rows(placed)
+        closing = self.closures.rows(placed, self._displaced)
         wanted = self._wanted(t)
         driven = coordinates.among(self.driven)
         driven = Rows(driven.value - wanted[0], driven.drift - wanted[2], driven.jacobian)
@@ -165,15 +194,21 @@ class TreeEquations:
     def _choose(self, at: Instant) -> None:
         """Keeps a largest set of independent rows: the first one while it is well enough conditioned."""
         rows = doubles(at.rows.jacobian[0])
+        if self.kept is None:
+            self.rank = self._rank(rows)
+        rows = rows * self._rate_sizes / self._row_sizes[:, None]
+        _, order = qr(rows.T * self._weights, mode="r", pivoting=True)
+        best = np.sort(order[: self.rank])
+        if self.kept is None or _least(rows[self.kept]) < WORSE * _least(rows[best]):
+            self.kept = best
+
+    def _rank(self, rows: np.ndarray) -> int:
+        """How many of the rows (m, nv) are independent."""
         size = np.linalg.norm(rows, axis=1, keepdims=True)
         largest = max(size.max(initial=0.0), min(1.0, self.length**2))  # one joint rate moves so much
         rows = rows / np.where(size > RANK * largest, size, largest)  # those of rounding size stay small
-        r, order = qr(rows.T, mode="r", pivoting=True)
-        pivots = np.abs(np.diag(r))
-        if self.kept is None:
-            self.kept = np.sort(order[: int((pivots > RANK).sum())])
-        elif _least(rows[self.kept]) < WORSE * _least(rows[np.sort(order[: len(self.kept)])]):
-            self.kept = np.sort(order[: len(self.kept)])
+        pivots = np.abs(np.diag(qr(rows.T, mode="r", pivoting=True)[0]))
+        return int((pivots > RANK).sum())
 
     def _wanted(self, t: np.ndarray) -> np.ndarray:
         """(3, K, drivers) values of the drivers at times (K,), their rates and second rates."""

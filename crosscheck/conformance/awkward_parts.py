@@ -1,0 +1,104 @@
+"""Parts of awkward mechanisms: rods with products of inertia, rings of joints, rounded numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from crosscheck.conformance.hard_mechanisms import bar, hinge
+from crosscheck.conformance.relations import Isometry
+from mbref import rotations
+from mbref.scene import (
+    JOINT_TYPES,
+    Body,
+    Joint,
+    Scene,
+    Spherical,
+    Translational,
+)
+
+DOWN, Z = (0.0, 0.0, -9.81), (0.0, 0.0, 1.0)
+Triple = tuple[float, float, float]
+Rng = np.random.Generator
+Place = Sequence[float] | np.ndarray
+
+
+def triple(values: Any) -> Triple:
+    """Three doubles."""
+    x, y, z = (float(v) for v in values)
+    return x, y, z
+
+
+def rows(matrix: np.ndarray) -> tuple[Triple, Triple, Triple]:
+    """A matrix (3, 3) as the format has it."""
+    x, y, z = (triple(row) for row in matrix)
+    return x, y, z
+
+
+def direction(rng: Rng) -> np.ndarray:
+    """A unit vector (3,)."""
+    v = rng.normal(size=3)
+    return np.asarray(v / np.linalg.norm(v))
+
+
+def turned(rng: Rng, scene: Scene) -> Scene:
+    """The scene turned and shifted, so that its numbers are rounded."""
+    turn = rotations.to_matrix(rotations.from_vector(rng.normal(size=3)))
+    return Isometry(turn, rng.normal(size=3)).change(scene)
+
+
+def rod(name: str, start: Place, stop: Place, rng: Rng, thickness: float = 0.05) -> Body:
+    """A body between two points with products of inertia."""
+    way = np.subtract(stop, start)
+    length, mass = float(np.linalg.norm(way)), float(rng.uniform(0.3, 3.0))
+    along = way / length
+    across = np.eye(3) - np.outer(along, along) + thickness**2 * np.outer(along, along)
+    turn = rotations.to_matrix(rotations.from_vector(0.2 * rng.normal(size=3)))
+    inertia = mass * length**2 / 12 * (turn @ across @ turn.T)
+    return Body(
+        name=name, mass=mass, position=triple(np.add(start, stop) / 2),
+        inertia=rows((inertia + inertia.T) / 2),
+    )  # fmt: skip
+
+
+def ring(rng: Rng, name: str, kinds: Sequence[str], axes: Sequence[np.ndarray], points: np.ndarray) -> Scene:
+    """Rods through points (k, 3), a joint of a kind with an axis at each, from the ground to the ground."""
+    names = ["ground", *(f"link{k}" for k in range(len(points) - 1)), "ground"]
+    bodies = [rod(n, p, q, rng) for n, p, q in zip(names[1:-1], points[:-1], points[1:], strict=True)]
+    joints = [
+        joint(f"J{k}", kind, (names[k], names[k + 1]), triple(points[k]), axes[k])
+        for k, kind in enumerate(kinds)
+    ]
+    return Scene(name=name, gravity=DOWN, duration=0.5, body=tuple(bodies), joint=tuple(joints))
+
+
+def joint(name: str, kind: str, bodies: tuple[str, str], place: Any, axis: np.ndarray) -> Joint:
+    """A joint at a place, its axis or the first of two perpendicular ones given."""
+    other = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    axes = (triple(axis), triple(other / np.linalg.norm(other)))
+    return JOINT_TYPES[kind].at(
+        name, bodies, anchor=place, axis=triple(axis), axes=axes, anchors=(place, place)
+    )
+
+
+def turning_first(scene: Scene, spin: np.ndarray) -> Scene:
+    """The scene with the first body's angular velocity."""
+    first = scene.body[0].model_copy(update={"angular_velocity": triple(spin)})
+    return scene.with_(body=(first, *scene.body[1:]))
+
+
+def slider_crank(angle: float, crank: float, length: float) -> Scene:
+    """A planar slider-crank with its crank at an angle."""
+    b = np.array([crank * math.cos(angle), crank * math.sin(angle), 0.0])
+    c = np.array([b[0] + math.sqrt(length**2 - b[1] ** 2), 0.0, 0.0])
+    bodies = (bar("crank", (0, 0, 0), triple(b)), bar("rod", triple(b), triple(c)),
+              Body(name="slider", mass=2.0, inertia=(0.01, 0.01, 0.01), position=triple(c)))  # fmt: skip
+    joints = (
+        hinge("A", "ground", "crank", (0, 0, 0)), hinge("B", "crank", "rod", b),
+        Spherical(name="C", bodies=("rod", "slider"), anchor=triple(c)),
+        Translational(name="D", bodies=("slider", "ground"), anchor=triple(c), axis=(1.0, 0.0, 0.0)),
+    )  # fmt: skip
+    return Scene(name="slider_crank", gravity=(0.0, -9.81, 0.0), duration=0.3, body=bodies, joint=joints)

@@ -1,0 +1,78 @@
+"""The bound of a reference on awkward mechanisms: no tighter run and no closed form is farther away."""
+
+import numpy as np
+import pytest
+
+from crosscheck.conformance.awkward_mechanisms import AWKWARD, awkward
+from crosscheck.judge.metrics import error_series
+from crosscheck.judge.reference.arithmetic import EXTENDED, many_digits
+from crosscheck.judge.reference.bound import differences
+from crosscheck.judge.reference.reference import judged, runs
+from crosscheck.judge.reference.taylor import natural_motion
+from crosscheck.judge.reference.tree import tree_motion
+from crosscheck.judge.truth import closed_form
+from crosscheck.judge.truth.reference_truth import trajectory
+
+SECONDS = 200.0
+QUICK = ("gimbal", "stiff_chain", "rccc", "rounded_platform", "pushed_dead_centre")
+ENDING = ("locking", "phased_crank")  # before their duration, in a dead centre
+LARGE = ("chain_of_twenty", "tumbling_chain")  # of which thirty digits take minutes
+SHORTER = {"stiff_chain": 0.3, "stiff_dampers": 0.2, "rounded_door": 0.5}  # s
+
+
+def assert_bounded(kind: str, seed: int) -> None:
+    scene = awkward(kind, seed)
+    times = np.linspace(0.0, SHORTER.get(kind, scene.duration), 5)
+    motions = runs(scene, times, SECONDS)
+    found, reason = judged(scene, times, *motions)
+    assert not reason or kind in ENDING, reason
+    if closed_form(scene):
+        off = error_series(scene, trajectory(scene, found), closed_form(scene).poses(found.times))
+    else:
+        off = differences(scene, motions[0], in_many_digits(scene, found.times))
+    assert (off <= found.bound).all(), f"{off.max():.1e} away, bound {found.bound.max():.1e}"
+
+
+def in_many_digits(scene, times):
+    """By formulation A in thirty digits, with other rows."""
+    pytest.importorskip("flint", reason="python-flint is the extra `certify`")
+    motion = natural_motion(scene, times, many_digits(30), order=34, tolerance=1e-24, seed=2, seconds=SECONDS)
+    assert not motion.reason
+    texts = [
+        x.str(30, radius=False) for array in (motion.position, motion.orientation) for x in array.ravel()
+    ]
+    numbers, size = np.array([EXTENDED.dtype(x) for x in texts]), motion.position.size
+    places, turns = numbers[:size], numbers[size:]
+    arrays = {
+        "position": places.reshape(motion.position.shape),
+        "orientation": turns.reshape(motion.orientation.shape),
+    }
+    return type(motion)(**vars(motion) | arrays)
+
+
+@pytest.mark.parametrize("kind", QUICK)
+def test_awkward_mechanism_is_within_its_bound(kind):
+    assert_bounded(kind, 0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("kind", sorted(set(AWKWARD) - set(LARGE)))
+def test_every_awkward_mechanism_is_within_its_bound(kind, seed):
+    assert_bounded(kind, seed)
+
+
+def test_a_panel_that_its_points_do_not_resolve_is_no_solution():
+    """Newton's method once took such a panel of a gimbal for one that could be longer."""
+    scene, times = awkward("gimbal", 0), np.linspace(0.0, 0.12, 4)
+    a, b = (move(scene, times, EXTENDED, seconds=SECONDS) for move in (natural_motion, tree_motion))
+    assert differences(scene, a, b).max() < 1e-15
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_mechanism_that_locks_has_a_reference_until_then(seed):
+    scene = awkward("locking", seed)
+    times = np.linspace(0.0, scene.duration, 61)
+    found, reason = judged(scene, times, *runs(scene, times, SECONDS))
+    assert reason.startswith("its series ends, as at a singular position")
+    assert 10 < len(found.times) < len(times) and found.bound.max() < 1e-9
