@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from crosscheck.study.grid import Record
-from crosscheck.study.record_view import error, is_completed
+from crosscheck.study.record_view import error, error_text, is_completed
 from mbref.records import stored
 
 ERROR_RATIO = 2.0  # of errors; rounding and another order of operations scatter them by less above NOISE
@@ -99,7 +99,7 @@ def _sentences(old: Record | None, new: Record | None) -> Iterator[str]:
         return
     bound = max(r["metrics"].get("error_bound") or 0.0 for r in (old, new))
     if _is_changed(error(old), error(new), ERROR_RATIO, max(NOISE, bound)):
-        yield f"error {error(old):.2e} → {error(new):.2e}"
+        yield f"error {error_text(old)} → {error_text(new)}"
     if not (is_completed(new) and old["machine"] == new["machine"]):
         return
     both = old["repeated"] and new["repeated"]

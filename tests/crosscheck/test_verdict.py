@@ -156,6 +156,21 @@ def test_a_family_dearer_than_the_cheapest_that_reached_is_given_up():
     assert len(found.records) == 3, "the finer setting was run"
 
 
+def test_no_setting_reaches_an_error_below_what_the_truth_may_be_off():
+    rough = {"metrics": {"error": 1e-13, "error_bound": 2e-9}}
+    sweep = [Case("x", record("e", "x", 0.0) | rough)]
+    for level, count in ((1e-10, 0), (1e-8, 1)):
+        assert len(tuned(sweep, level, lambda cases: [case.record for case in cases]).reached) == count
+
+
+def test_differences_of_errors_below_the_bound_are_shown_by_it():
+    rough = {"metrics": {"error": 1e-13, "error_bound": 2e-9}}
+    runs = [record("a", "x", 0.0) | rough, record("a", "x", 1e-6), record("a", "x", 0.0) | rough]
+    old, new, same = ({"run": {**r, "repeated": False}} for r in runs)
+    assert changes(old, new)[0].sentences == ["error < 2e-09 → 1.00e-06"]
+    assert not changes(old, same)[0].sentences
+
+
 def saved(folder: Path, records: list[dict]) -> Path:
     folder.mkdir()
     for one in records:
