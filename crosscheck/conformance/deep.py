@@ -69,10 +69,12 @@ class Tally:
         return sum(counts[status] for status in DECIDED)
 
     def add(self, record: dict[str, Any]) -> None:
-        """Count a record's verdicts."""
+        """Count a record's verdicts, but those of older cards."""
         self.version, self.seeds = record["version"], self.seeds + 1
         for verdict in record["verdicts"]:
             card = verdict["property"]
+            if verdict["card"] != card_of(card):
+                continue
             self.counts.setdefault(card, Counter())[verdict["status"]] += 1
             if verdict["status"] == FAIL:
                 self.violations.append(verdict)
@@ -128,13 +130,18 @@ def _record(plan: Plan, seed: int, wanted: Collection[str]) -> dict[str, Any]:
         decided = {verdict.property for verdict in verdicts if verdict.status in DECIDED}
         cards = [card for card in asked if card in wanted and card not in decided]
         if cards:
-            bench = set_up(runner, Specimen(draw(seed), None, True, reference_time=0.0), plan.family)
-            version = bench.version
-            verdicts += list(_verdicts(plan, bench, cards))
+            specimen = Specimen(draw(seed), None, True, reference_time=0.0)
+            bench = suite.asked(runner, specimen, plan.family)
+            version = bench.version if isinstance(bench, Bench) else version
+            verdicts += _verdicts(plan, bench, cards) if isinstance(bench, Bench) else [bench]
     return {"version": version, "verdicts": [suite.record_of(verdict) for verdict in verdicts]}
 
 
 def _verdicts(plan: Plan, bench: Bench, cards: Sequence[str]) -> Iterator[Verdict]:
+    """The verdicts of the cards; that of the run alone where it does not complete."""
+    if not bench.cannot and REFUSAL not in cards and (run := suite.first_run(bench)).status == FAIL:
+        yield run
+        return
     for card in cards:
         if bench.cannot and card != REFUSAL:
             yield Verdict(card, bench.scene.name, CANNOT, reason=str(bench.cannot))

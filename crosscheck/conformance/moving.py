@@ -63,6 +63,9 @@ def moving_probes() -> dict[str, Scene]:
         "floating pair": floating_pair(),
         "two drivers": two_drivers(),
         "several springs": several_springs(),
+        "dampers alone": dampers_alone(),
+        "two torsion springs": two_torsion_springs(),
+        "rounded velocities": rounded_velocities(),
     }
     return {name: scene.with_(name=name) for name, scene in found.items()}
 
@@ -162,6 +165,43 @@ def several_springs() -> Scene:
         Scene(name="springs", gravity=GRAVITY, duration=DURATION, body=(HUB, BODY), joint=joints,
               load=springs + pushes)
     )  # fmt: skip
+
+
+def dampers_alone() -> Scene:
+    """Hub and body on ball joints, a damper without stiffness and a spring without natural length."""
+    joints = (BEARING, Spherical(name="J", bodies=("hub", "body"), anchor=(0.0, 0.0, 0.0)))
+    ends = ((-0.3, 0.6, 0.0), (0.4, -0.1, 0.1))
+    links = (
+        Spring(bodies=("hub", "body"), points=ends, stiffness=0.0, damping=6.0, natural_length=0.5),
+        Spring(bodies=("ground", "body"), points=((0.9, -0.6, 0.4), ends[1]), stiffness=40.0,
+               natural_length=0.0),
+    )  # fmt: skip
+    return _launched(
+        Scene(name="dampers", gravity=GRAVITY, duration=DURATION, body=(HUB, BODY), joint=joints, load=links)
+    )
+
+
+def two_torsion_springs() -> Scene:
+    """Two hinges one after the other, about the first a damper alone, about the second a stiff spring."""
+    hub = Revolute(name="H", bodies=("ground", "hub"), anchor=(-0.4, 0.3, 0.1), axis=(0.3, -0.4, 1.0))
+    joints = (hub, replaced(JOINTS["revolute"], bodies=("hub", "body")))
+    springs = (TorsionSpring(joint="H", stiffness=0.0, damping=0.3, natural_angle=2.0),
+               TorsionSpring(joint="J", stiffness=9.0, damping=0.0, natural_angle=-0.6))  # fmt: skip
+    return _launched(
+        Scene(name="torsions", gravity=GRAVITY, duration=DURATION, body=(HUB, BODY), joint=joints,
+              load=springs)
+    )  # fmt: skip
+
+
+def rounded_velocities() -> Scene:
+    """The spinning loop with velocities of two digits, which the joints do not allow quite."""
+    scene = spinning_loop()
+    names = ("velocity", "angular_velocity")
+    bodies = [
+        replaced(body, **{name: np.round(np.array(getattr(body, name)), 2) for name in names})
+        for body in scene.body
+    ]
+    return scene.with_(body=tuple(bodies))
 
 
 def consistent(scene: Scene, twists: np.ndarray) -> Scene:

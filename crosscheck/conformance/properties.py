@@ -177,6 +177,8 @@ def _of_reactions(
         return Outside("the engine gives no reactions, or the scene has no joint")
     if bench.exact.acceleration is None or not bench.scene.has_mass():
         return Outside("the accelerations are not known here")
+    if silent := [joint.name for joint in bench.scene.joint if joint.name not in bench.motion.reactions]:
+        return Finding(np.inf, REACTIONS, f"no reaction is given in {', '.join(silent)}")
     return Finding(measured(bench.scene, bench.motion, bench.exact), REACTIONS)
 
 
@@ -206,11 +208,13 @@ def determinism(bench: Bench) -> Finding:
 
 
 def other_times(bench: Bench) -> Finding:
-    """Other sample times, the first of them not 0, leave the motion at common times what it was."""
+    """Other sample times, the first of them not 0, and one alone leave the motion there what it was."""
     between = bench.times[:-1] + np.diff(bench.times) * np.resize([0.3, 0.7], len(bench.times) - 1)
     times = np.sort([*bench.times[1:], *between])
     common = _at(bench.run(bench.scene, times), np.isin(times, bench.times))
-    apart = difference(bench.scene, _at(bench.motion, slice(1, None)), common)
+    alone = bench.run(bench.scene, bench.times[-1:])
+    apart = max(difference(bench.scene, _at(bench.motion, slice(1, None)), common),
+                difference(bench.scene, _at(bench.motion, slice(-1, None)), alone))  # fmt: skip
     return Finding(apart, bench.own_accuracy, bench.floors)
 
 
@@ -264,7 +268,7 @@ PROPERTIES: Mapping[str, Property] = {
     "workless": _property(workless),
     "silence": _property(silence),
     "repeated": _property(determinism, _related),
-    "resampled": _property(other_times, _related, version=2),
+    "resampled": _property(other_times, _related, version=3),
     **{
         name: Property(f"The scene {name}: {relation.about}.", partial(related, name), _related, 3)
         for name, relation in RELATIONS.items()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -13,7 +13,8 @@ from typing import Protocol
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Owner, Setting, engine
-from crosscheck.processes.pool import Observation, capabilities, observe, run_isolated
+from crosscheck.processes.answer import well_formed
+from crosscheck.processes.pool import ChildFailed, Observation, capabilities, observe, run_isolated
 from crosscheck.processes.serve import failed
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
@@ -39,6 +40,17 @@ class Runner(Protocol):
         """Runs at the settings, one after another in one process."""
 
 
+@contextlib.contextmanager
+def answering() -> Iterator[None]:
+    """An exception of an engine that is asked is a ChildFailed with its words, as from a child process."""
+    try:
+        yield
+    except ImportError:
+        raise
+    except Exception as error:
+        raise ChildFailed(Outcome.CRASHED, f"{type(error).__name__}: {error}") from error
+
+
 def offered(simulator: Engine, scene: Scene, family: str) -> tuple[str, Cannot | None, list[Setting]]:
     """Version, refusal and settings of an engine, or of one of its families, which may not serve a scene."""
     if cannot := simulator.cannot(scene):
@@ -58,11 +70,13 @@ class Isolated:
 
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
         if family:
-            return offered(engine(self.name), scene, family)
+            with answering():
+                return offered(engine(self.name), scene, family)
         return capabilities(self.name, scene, self.time_limit)
 
     def cannot(self, scene: Scene) -> Cannot | None:
-        return engine(self.name).cannot(scene)
+        with answering():
+            return engine(self.name).cannot(scene)
 
     def observe(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
         return observe(self.name, scene, times, setting, self.time_limit)
@@ -86,10 +100,12 @@ class InProcess:
         return self.called or self.engine.name
 
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
-        return offered(self.engine, scene, family)
+        with answering():
+            return offered(self.engine, scene, family)
 
     def cannot(self, scene: Scene) -> Cannot | None:
-        return self.engine.cannot(scene)
+        with answering():
+            return self.engine.cannot(scene)
 
     def observe(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
         said = io.StringIO()
@@ -103,9 +119,9 @@ class InProcess:
         return [self.observe(scene, times, setting).value for setting in settings]
 
     def _run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """A run; an exception is the outcome CRASHED with its words, as in a child process."""
+        """A run; an exception or a malformed answer is the outcome CRASHED with its words, as in a child."""
         try:
-            return self.engine.run(scene, times, setting)
+            return well_formed(self.engine.run(scene, times, setting), scene, times)
         except Exception as error:
             words = f"{type(error).__name__}: {error}"
             return failed(self.name, self.engine.version(), scene, setting, Outcome.CRASHED, words)

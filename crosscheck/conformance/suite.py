@@ -94,13 +94,10 @@ def held_against(
     versions: set[str] = set()
 
     def examined(specimen: Specimen) -> list[Verdict]:
-        try:
-            bench = set_up(runner, specimen, family)
-        except ChildFailed as failure:
-            verdicts = [Verdict(REFUSAL, specimen.scene.name, FAIL, reason=str(failure))]
-        else:
+        bench = asked(runner, specimen, family)
+        if isinstance(bench, Bench):
             versions.add(bench.version)
-            verdicts = list(examine(bench))
+        verdicts = list(examine(bench)) if isinstance(bench, Bench) else [bench]
         if progress:
             progress(specimen.scene.name)
         return verdicts
@@ -109,6 +106,14 @@ def held_against(
         groups = threads.map(examined, [Specimen(undetermined()), *specimens])
         verdicts = [verdict for group in groups for verdict in group]
     return Conformance(runner.name, ", ".join(sorted(versions)), verdicts)
+
+
+def asked(runner: Runner, specimen: Specimen, family: str = "") -> Bench | Verdict:
+    """A bench; the verdict on the card of refusals where the engine does not even answer."""
+    try:
+        return set_up(runner, specimen, family)
+    except ChildFailed as failure:
+        return Verdict(REFUSAL, specimen.scene.name, FAIL, reason=str(failure))
 
 
 def examine(bench: Bench) -> Iterator[Verdict]:
@@ -159,7 +164,7 @@ def judged(label: str, bench: Bench) -> Verdict:
     """The verdict of one property on a bench whose engine can run the scene."""
     try:
         found = PROPERTIES[label].check(bench)
-    except Broken as broken:
+    except (Broken, ChildFailed) as broken:
         return Verdict(label, bench.scene.name, FAIL, reason=str(broken))
     except NoExact as unknown:
         return Verdict(label, bench.scene.name, OUTSIDE, reason=f"its exact motion is not known: {unknown}")
