@@ -224,7 +224,7 @@ def related(name: str, bench: Bench) -> Finding | Cannot | Outside:
     scene = relation.change(bench.scene, bench.motion)
     if isinstance(scene, Outside):
         return scene
-    if cannot := bench.runner.cannot(scene):
+    if cannot := bench.refuses(scene):
         return cannot
     expected = in_scene_order(scene, relation.expect(bench.scene, bench.motion))
     found = bench.run(scene, expected.times)

@@ -57,7 +57,7 @@ def offered(simulator: Engine, scene: Scene, family: str) -> tuple[str, Cannot |
         return simulator.version(), cannot, []
     settings = list(simulator.settings_of(scene, family) if family else simulator.settings(scene))
     if family and not settings:
-        cannot = Cannot(Owner.ENGINE, f"{family} does not serve this scene")
+        cannot = Cannot(Owner.MODEL, f"{family} does not claim this scene")
     return simulator.version(), cannot, settings
 
 

@@ -53,6 +53,7 @@ class Conformance:
     engine: str
     version: str
     verdicts: Sequence[Verdict]
+    family: str = ""  # of settings, where not the best
 
     @property
     def conforms(self) -> bool:
@@ -105,7 +106,7 @@ def held_against(
     with ThreadPoolExecutor(1 if isinstance(runner, InProcess) else os.cpu_count()) as threads:
         groups = threads.map(examined, [Specimen(undetermined()), *specimens])
         verdicts = [verdict for group in groups for verdict in group]
-    return Conformance(runner.name, ", ".join(sorted(versions)), verdicts)
+    return Conformance(runner.name, ", ".join(sorted(versions)), verdicts, family)
 
 
 def asked(runner: Runner, specimen: Specimen, family: str = "") -> Bench | Verdict:
@@ -180,7 +181,8 @@ def tables(conformance: Conformance) -> Iterator[Table | Text]:
     """A table of scenes × properties, then what the failures and gaps are."""
     by_place = {(v.scene, v.property): v for v in conformance.verdicts}
     properties = [n for n in (*FIRST, *PROPERTIES) if any(v.property == n for v in conformance.verdicts)]
-    title = f"{conformance.engine} {conformance.version}: ✓ pass, ✗ fail, – cannot, ○ outside; measured"
+    named = " ".join(filter(None, (conformance.engine, conformance.version, conformance.family)))
+    title = f"{named}: ✓ pass, ✗ fail, – cannot, ○ outside; measured"
     table = Table(Column("scene", no_wrap=True), *properties, title=title, box=SIMPLE, padding=(0, 1, 0, 0))
     for scene in dict.fromkeys(v.scene for v in conformance.verdicts):
         table.add_row(scene, *(_cell(by_place.get((scene, name))) for name in properties))

@@ -95,6 +95,7 @@ class Bench:
     version: str
     cannot: Cannot | None
     settings: Sequence[Setting]
+    family: str = ""  # where not the best is judged
 
     @property
     def scene(self) -> Scene:
@@ -118,6 +119,12 @@ class Bench:
     def run(self, scene: Scene, times: np.ndarray) -> Trajectory:
         """A completed run of a scene at the finest setting of the specimen; raises Broken."""
         return completed(scene, self.observed(scene, times, self.settings[-1]).value, len(times))
+
+    def refuses(self, scene: Scene) -> Cannot | None:
+        """Why the engine, or its family, cannot run another scene."""
+        if self.family:
+            return self.runner.offers(scene, self.family)[1]
+        return self.runner.cannot(scene)
 
     def observed(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
         """A run in a process of its own, and what it printed and left behind."""
@@ -214,7 +221,7 @@ def set_up(runner: Runner, specimen: Specimen, family: str = "") -> Bench:
     """A bench with what the engine says of the specimen, in its best family or the one named; raises
     ChildFailed when the engine cannot even say."""
     version, cannot, settings = runner.offers(specimen.scene, family)
-    return Bench(runner, specimen, version, cannot, best_family(settings))
+    return Bench(runner, specimen, version, cannot, best_family(settings), family)
 
 
 def completed(scene: Scene, run: Trajectory, samples: int) -> Trajectory:
