@@ -69,11 +69,12 @@ class Tally:
         return sum(counts[status] for status in DECIDED)
 
     def add(self, record: dict[str, Any]) -> None:
-        """Count a record's verdicts, but those of older cards."""
+        """Count a record's verdicts, but those of older cards, and of a run that ended alone that card's."""
         self.version, self.seeds = record["version"], self.seeds + 1
+        ended = [v["scene"] for v in record["verdicts"] if v["property"] == RUN and v["status"] == FAIL]
         for verdict in record["verdicts"]:
             card = verdict["property"]
-            if verdict["card"] != card_of(card):
+            if verdict["card"] != card_of(card) or (card != RUN and verdict["scene"] in ended):
                 continue
             self.counts.setdefault(card, Counter())[verdict["status"]] += 1
             if verdict["status"] == FAIL:

@@ -68,7 +68,8 @@ class Session:
         drawn = [Specimen(random_mechanism(seed), None, deep) for seed in seeds]
         self.specimens = {s.scene.name: s for s in [Specimen(undetermined()), *specimens(deep), *drawn]}
         self.benches: dict[str, Bench] = {}
-        self.known = config.cache.get(KEPT, {}) if config.cache else {}
+        self.cache = config.cache if config.pluginmanager.hasplugin("cacheprovider") else None
+        self.known = self.cache.get(KEPT, {}) if self.cache else {}
 
     def cards(self) -> list[tuple[str, str]]:
         """(scene, card) of every test."""
@@ -102,8 +103,8 @@ class Session:
             return Verdict(card, scene, CANNOT, reason=str(bench.cannot))
         found = verdict_on(card, bench)
         self.known[key] = found.status
-        if self.config.cache:
-            self.config.cache.set(KEPT, self.known)
+        if self.cache:
+            self.cache.set(KEPT, self.known)
         return found
 
 

@@ -1,6 +1,7 @@
 """Conformance: cards of the suite against engines, violations explained, and the defects that prove cards.
 
-Rendered from what ``crosscheck verify ENGINE --json`` prints.
+Rendered from what ``crosscheck verify ENGINE --json`` prints: verdicts on the suite's mechanisms, of an
+engine or one of its families, and, with ``--mechanisms``, counts on drawn mechanisms.
 """
 
 from __future__ import annotations
@@ -20,6 +21,16 @@ CAPTION = (
     "passes (✓) and fails (✗); –: on no mechanism can the engine be asked, ○: no mechanism is in the card's "
     "domain. Defects: the planted defects of an example engine that the card tells, each of one line."
 )
+FAMILIES = (
+    "Formulations and stabilisations of mbref on six moving mechanisms: the number of verdicts. A method "
+    "cannot be asked where it does not claim the mechanism, as one with redundant joints."
+)
+DRAWN = (
+    "Cards on drawn mechanisms: closed loops of 3 to 8 bodies with all kinds of joints, loads and drivers, "
+    "floating ones, rotors, and ones without masses. Shown is on how many a card holds, of how many it was "
+    "decided on."
+)
+ANY_DRAWN = "drawn mechanisms"  # in the place of a scene, in explanations
 UNEXPLAINED = "not explained yet"
 
 
@@ -27,8 +38,75 @@ def render(verified: Sequence[Verified]) -> list[Block]:
     """The section; nothing without verified engines."""
     if not verified:
         return []
-    return [Heading("Conformance", 2), Text(_engines(verified)), _cards(verified), *_violations(verified),
-            _defects()]  # fmt: skip
+    drawn = [found for found in verified if "mechanisms" in found]
+    families = [found for found in verified if found.get("family") and "verdicts" in found]
+    engines = [found for found in verified if "verdicts" in found and not found.get("family")]
+    blocks: list[Block] = [Heading("Conformance", 2)]
+    if engines:
+        blocks += [Text(_engines(engines)), _cards(engines), *_violations(engines)]
+    if families:
+        blocks += [Heading("Methods of mbref"), _families(families)]
+    if drawn:
+        blocks += [Heading("Drawn mechanisms"), _drawn(drawn), *_drawn_violations(drawn)]
+    return [*blocks, _defects()]
+
+
+def _families(verified: Sequence[Verified]) -> Table:
+    """One row for each family: the counts, and what is violated with its cause."""
+    rows = []
+    for found in verified:
+        counts = [
+            str(sum(v["status"] == s for v in found["verdicts"])) for s in (PASS, FAIL, CANNOT, OUTSIDE)
+        ]
+        failed = [v for v in found["verdicts"] if v["status"] == FAIL]
+        cards = dict.fromkeys(v["card"] for v in failed)
+        scenes = dict.fromkeys(v["scene"] for v in failed)
+        where = f"{', '.join(cards)} on {', '.join(scenes)}" if failed else "none"
+        rows.append((found["family"], *counts, where, _cause(found["family"], failed)))
+    header = ("Method", "Holds", "Violated", "Cannot", "Outside", "Violations", "Cause and remedy")
+    return Table(FAMILIES, header, rows, frozenset({1, 2, 3, 4}))
+
+
+def _cause(family: str, failed: Sequence[Mapping[str, Any]]) -> str:
+    """The sentences on a family's violations."""
+    causes = [explanations().get((f"mbref {family}", v["property"], v["scene"])) for v in failed]
+    told = dict.fromkeys(f"{known.cause} {known.remedy}" for known in causes if known)
+    return " ".join([*told, *([UNEXPLAINED] if None in causes else [])]) or "–"
+
+
+def _drawn(verified: Sequence[Verified]) -> Table:
+    """Cards against engines: on how many drawn mechanisms the card holds, of how many it decides on."""
+    names = {name: card for found in verified for name, card in found["cards"].items()}
+    rows = [
+        (card["card"], card["about"], *(_share(found["cards"].get(name, {})) for found in verified))
+        for name, card in names.items()
+    ]
+    engines = (" ".join(filter(None, (title(f["engine"]), f["family"]))) for f in verified)
+    return Table(DRAWN, ("Card", "It checks", *engines), rows, frozenset(range(2, 2 + len(verified))))
+
+
+def _share(counts: Mapping[str, Any]) -> str:
+    held, judged = counts.get(PASS, 0), counts.get(PASS, 0) + counts.get(FAIL, 0)
+    return "–" if not judged else f"{held}" if held == judged else f"{held} of {judged}"
+
+
+def _drawn_violations(verified: Sequence[Verified]) -> list[Block]:
+    """Violations by engine and card, with the largest number, cause and remedy."""
+    rows = []
+    for found in verified:
+        for name in dict.fromkeys(v["property"] for v in found["violations"]):
+            here = [v for v in found["violations"] if v["property"] == name]
+            worst = max(here, key=lambda v: (v["measured"] or 0.0) / (v["allowed"] or 1.0))
+            known = explanations().get((found["engine"], name, ANY_DRAWN))
+            cause, remedy = known or (worst["reason"] or UNEXPLAINED, "–")
+            numbers = _number(worst["measured"]), _number(worst["allowed"])
+            rows.append((title(found["engine"]), worst["card"], str(len(here)), worst["scene"], *numbers,
+                         cause, remedy))  # fmt: skip
+    if not rows:
+        return [Text("No drawn mechanism violates a card.")]
+    header = ("Engine", "Card", "Times", "Worst", "Measured", "Allowed", "Cause", "Remedy")
+    return [Table("Violated cards on drawn mechanisms, each with its worst.", header, rows,
+                  frozenset({2, 4, 5}))]  # fmt: skip
 
 
 def _engines(verified: Sequence[Verified]) -> str:

@@ -5,9 +5,10 @@ import json
 import pytest
 
 from crosscheck.conformance import explained
+from crosscheck.conformance.deep import AGREEMENT, Plan, Tally
 from crosscheck.conformance.properties import PROPERTIES
-from crosscheck.conformance.suite import FIRST, Conformance, Verdict
-from crosscheck.engine import BUILT_IN
+from crosscheck.conformance.suite import FIRST, Conformance, Verdict, record_of
+from crosscheck.engine import engine_names
 from reports import stored
 from reports.blocks import Table, Text
 from reports.sections import conformance
@@ -67,7 +68,35 @@ def test_without_records_there_is_no_section(tmp_path):
     assert conformance.render(stored.verified(tmp_path)) == []
 
 
+def test_methods_have_a_row_each_with_what_they_violate(tmp_path, monkeypatch):
+    (tmp_path / "conformance").mkdir()
+    record = Conformance("mbref", "1.0", VERDICTS, "lm2+none").to_record()
+    (tmp_path / "conformance" / "mbref_lm2.json").write_text(json.dumps(record))
+    known = {("mbref lm2+none", "truth", "pendulum"): explained.Explanation("It drifts.", "Project.")}
+    monkeypatch.setattr(conformance, "explanations", lambda: known)
+    [table] = [
+        b
+        for b in conformance.render(stored.verified(tmp_path))
+        if isinstance(b, Table) and b.header[0] == "Method"
+    ]
+    assert table.rows[0][:5] == ("lm2+none", "1", "1", "1", "1")
+    assert table.rows[0][5:] == (f"{VERDICTS[1].card()} on pendulum", "It drifts. Project.")
+
+
+def test_drawn_mechanisms_have_counts_and_violations_a_cause(tmp_path, monkeypatch):
+    (tmp_path / "conformance").mkdir()
+    tally = Tally(Plan("mujoco", 2))
+    tally.add({"version": "1.0", "verdicts": list(map(record_of, VERDICTS))})
+    (tmp_path / "conformance" / "mujoco_drawn.json").write_text(json.dumps(tally.to_record()))
+    known = {("mujoco", "truth", conformance.ANY_DRAWN): explained.Explanation("It slips.", "Hold it.")}
+    monkeypatch.setattr(conformance, "explanations", lambda: known)
+    _, _, cards, violated, *_ = conformance.render(stored.verified(tmp_path))
+    assert {row[0]: row[2] for row in cards.rows}[VERDICTS[1].card()] == "1 of 2"
+    assert violated.rows[0][2:] == ("1", "pendulum", "2.0e-03", "1.0e-06", "It slips.", "Hold it.")
+
+
 def test_explanations_are_of_engines_and_cards_that_exist():
     for engine, card, _ in explained.explanations():
-        assert engine in BUILT_IN and card in {*FIRST, *PROPERTIES}, (engine, card)
+        assert engine.partition(" ")[0] in engine_names(), engine
+        assert card in {*FIRST, *PROPERTIES, AGREEMENT}, card
     assert {proof.card for proof in explained.proofs()} == {*FIRST, *PROPERTIES}
