@@ -24,6 +24,7 @@ from mbref.stabilisation.base import Stabilisation
 DEFAULT = "alf-dual+projection/dop853"
 SHORT = {
     "kinematic": "alf-dual+projection/predictor",  # Newton–Raphson on Eqs. 1 to 3: integrators/predictor.py
+    "ali3-p": "mpi-qr+none/ali3",  # see integrators/ali3.py
     "taylor": "alf-dual+projection/taylor",  # see mbref/taylor
 }
 
@@ -89,6 +90,8 @@ class Method:
             raise MethodError(f"integrator {parts[2].name} only extrapolates: it goes with projection")
         if parts[2].step is None and not parts[1].projects:
             raise MethodError(f"integrator {parts[2].name} projects every step: it goes with projection")
+        if parts[2].holds_constraints and parts[1].name != "none":
+            raise MethodError(f"integrator {parts[2].name} holds the constraints itself: it goes with none")
         return Method(*parts, options)
 
 

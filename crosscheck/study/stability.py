@@ -28,7 +28,8 @@ SAMPLES = 21
 TIME_LIMIT = 20.0  # s of a run
 METHODS = (
     "alf-dual+projection", "taylor", "mpi-svd+projection", "mpi-svd+partitioning", "mpi-svd+baumgarte",
-    "mpi-svd+none", "mpi-gs+none", "alf+baumgarte", "lm1+baumgarte",
+    "mpi-svd+none", "mpi-gs+none", "alf+baumgarte", "lm1+baumgarte", "mpi-qr+null-space", "ali3-p",
+    "lm2-first-rows+baumgarte", "lm2-step-rows+baumgarte",
 )  # fmt: skip
 FAMILIES = {"mujoco": "projected", "pinocchio": "tuned", "exudyn": "tuned"}
 MBREF = "mbref"

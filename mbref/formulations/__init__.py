@@ -3,6 +3,7 @@
 from mbref.formulations.alf import ALF
 from mbref.formulations.alf_dual import ALF_DUAL
 from mbref.formulations.base import Formulation
+from mbref.formulations.dropped_rows import LM2_FIRST_ROWS, LM2_STEP_ROWS
 from mbref.formulations.lm1 import LM1
 from mbref.formulations.lm2 import LM2
 from mbref.formulations.mpi_gs import MPI_GS
@@ -11,5 +12,17 @@ from mbref.formulations.mpi_qr import MPI_QR
 from mbref.formulations.mpi_svd import MPI_SVD
 
 FORMULATIONS: dict[str, Formulation] = {
-    f.name: f for f in (LM1, LM2, ALF, ALF_DUAL, MPI_SVD, MPI_GS, MPI_GS_LITERAL, MPI_QR)
+    f.name: f
+    for f in (
+        LM1,
+        LM2,
+        LM2_FIRST_ROWS,
+        LM2_STEP_ROWS,
+        ALF,
+        ALF_DUAL,
+        MPI_SVD,
+        MPI_GS,
+        MPI_GS_LITERAL,
+        MPI_QR,
+    )
 }

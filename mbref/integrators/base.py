@@ -34,6 +34,7 @@ class Integrator:
     schema: type
     adaptive: bool
     options: Mapping[str, float] = field(default_factory=dict)
+    holds_constraints: bool = False  # its own steps end on the constraints: it goes without stabilisation
     integrates: bool = True  # otherwise only where drivers leave no freedom
 
     def highest_order(self, options: Mapping[str, float]) -> int:

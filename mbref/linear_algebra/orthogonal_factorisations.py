@@ -102,15 +102,21 @@ def minimum_norm(rank, scratch):
 
     From ``qr_pivoted`` of Dᵀ.
     """
-    b, order, tau, rhs, x = scratch.transposed, scratch.order, scratch.tau, scratch.b, scratch.x
-    n = b.shape[0]
-    for k in range(n):
-        x[k] = 0.0
+    b, order, rhs, x = scratch.transposed, scratch.order, scratch.b, scratch.x
+    x[:] = 0.0
     for k in range(rank):
         value = rhs[order[k]]
         for i in range(k):
             value -= b[i, k] * x[i]
         x[k] = value / b[k, k]
+    apply_reflectors(rank, scratch)
+
+
+@kernel
+def apply_reflectors(rank, scratch):
+    """``scratch.x`` (n,) := Q x, with the first reflectors of ``qr_pivoted``."""
+    b, tau, x = scratch.transposed, scratch.tau, scratch.x
+    n = b.shape[0]
     for k in range(rank - 1, -1, -1):
         value = x[k]
         for i in range(k + 1, n):
