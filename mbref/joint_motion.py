@@ -19,7 +19,8 @@ class JointMotion:
     (k,) in rad/s: revolute, cylindrical and planar joints.  ``displacement`` (k,) along the axis in m:
     translational and cylindrical joints.  ``rotation`` (k, 3) is the rotation vector of the second body
     relative to the first (rad, along the world's axes as they are fixed to the first body).  ``force`` and
-    ``moment`` (k, 3), N and N m in the world, act on the second body at its anchor.
+    ``moment`` (k, 3), N and N m in the world, act on the second body at its anchor; ``open`` (k,) counts the
+    dimensions of the two that equilibrium does not determine.
     """
 
     name: str
@@ -29,6 +30,7 @@ class JointMotion:
     rotation: np.ndarray
     force: np.ndarray | None
     moment: np.ndarray | None
+    open: np.ndarray | None = None
 
     def __repr__(self) -> str:
         has = [key for key in ("angle", "displacement", "force") if getattr(self, key) is not None]
@@ -50,7 +52,8 @@ def joint_motion(scene: Scene, motion: Trajectory, name: str) -> JointMotion:
     displacement = _displacement(scene, motion, joint, turned[0]) if slides else None
     wrench = (motion.reactions or {}).get(name)
     force, moment = (None, None) if wrench is None else (wrench[:, :3], wrench[:, 3:])
-    return JointMotion(name, angle, rate, displacement, _vector(relative), force, moment)
+    marks = (motion.open_reactions or {}).get(name)
+    return JointMotion(name, angle, rate, displacement, _vector(relative), force, moment, marks)
 
 
 def place_of(scene: Scene, motion: Trajectory, name: str, point: tuple[float, float, float]) -> np.ndarray:

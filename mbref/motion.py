@@ -124,7 +124,7 @@ def _body_columns(name: str, body: Any) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def _joint_columns(joint: JointMotion) -> Iterator[tuple[str, np.ndarray]]:
-    for key in ("angle", "rate", "displacement"):
+    for key in ("angle", "rate", "displacement", "open"):
         if (array := getattr(joint, key)) is not None:
             yield f"{joint.name}.{key}", array
     for key in ("force", "moment"):

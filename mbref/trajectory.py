@@ -103,7 +103,9 @@ class Trajectory:
     quaternions (w, x, y, z), body to world.  ``acceleration`` and ``angular_acceleration``
     (k, nb, 3, world) and ``reactions`` are None where the engine does not give them.
     ``reactions[joint]`` (k, 6) is the force and the moment (world) on the joint's second body at the
-    anchor on that body, the driver's share included.  ``crossings`` are the singular positions passed; None
+    anchor on that body, the driver's share included.  ``open_reactions[joint]`` (k,) counts the dimensions of
+    it that equilibrium does not determine, because of redundant rows or at a singular position; None where
+    that is not known.  ``crossings`` are the singular positions passed; None
     where the engine, or the method, does not look for them.
     """
 
@@ -121,6 +123,7 @@ class Trajectory:
     acceleration: np.ndarray | None = None
     angular_acceleration: np.ndarray | None = None
     reactions: Mapping[str, np.ndarray] | None = None
+    open_reactions: Mapping[str, np.ndarray] | None = None
     outcome: Outcome = Outcome.COMPLETED
     t_end: float = 0.0
     message: str = ""
@@ -172,7 +175,8 @@ class Trajectory:
                 name: {key: getattr(self, key)[:, b].tolist() for key in per_body}
                 for b, name in enumerate(self.bodies)
             },
-            "reactions": {k: np.asarray(v).tolist() for k, v in (self.reactions or {}).items()},
+            "reactions": _lists(self.reactions or {}),
+            "open_reactions": None if self.open_reactions is None else _lists(self.open_reactions),
             "crossings": None if self.crossings is None else [c.to_record() for c in self.crossings],
             "metrics": {},
             "cost": {f.name: getattr(self.cost, f.name) for f in fields(Cost)},
@@ -182,7 +186,7 @@ class Trajectory:
     def from_record(scene: str, record: Mapping[str, Any]) -> Trajectory:
         """The trajectory a record was made of."""
         names = tuple(record["bodies"])
-        k, crossings = len(record["times"]), record.get("crossings")
+        k, crossings, marks = len(record["times"]), record.get("crossings"), record.get("open_reactions")
 
         def stacked(key: str, width: int) -> np.ndarray:
             rows = [record["bodies"][name][key] for name in names]
@@ -205,7 +209,13 @@ class Trajectory:
             acceleration=optional("acceleration"),
             angular_acceleration=optional("angular_acceleration"),
             reactions=reactions or None,
+            open_reactions=None if marks is None else {n: np.array(v, dtype=int) for n, v in marks.items()},
             outcome=Outcome[record["outcome"]],
             cost=Cost(**record["cost"]),
             crossings=None if crossings is None else tuple(Crossing.from_record(c) for c in crossings),
         )
+
+
+def _lists(arrays: Mapping[str, np.ndarray]) -> dict[str, list[Any]]:
+    """Arrays by name as lists."""
+    return {name: np.asarray(array).tolist() for name, array in arrays.items()}

@@ -6,6 +6,11 @@ import numpy as np
 
 from mbref import rotations
 from mbref.equations.model import Model
+from mbref.equations.units import row_lengths
+
+MOST_ROWS = 120  # singular values of more rows at every sample take longer than the run
+OPEN = 1e-6  # singular value, to the largest, of a combination of unit rows that counts as vanished
+SHARE = 1e-6  # weight of a joint in such a combination below which it takes no part
 
 
 def reactions(
@@ -34,6 +39,34 @@ def reactions(
         moment = rotations.rotate(q[:, b, 3:], wrench[:, j, 3:]) - np.cross(arm, force)
         found[joint.name] = np.concatenate([force, moment], axis=1)
     return found
+
+
+def open_dimensions(
+    model: Model, times: np.ndarray, q: np.ndarray, v: np.ndarray
+) -> dict[str, np.ndarray] | None:
+    """Per joint the dimensions (k,) of its reaction that equilibrium does not determine at each sample.
+
+    Redundant rows leave reactions open always, a singular position where the motion passes it: there a
+    combination of rows vanishes, a left null vector of Φ_q (Wojtyra, J. Theor. Appl. Mech. 43, 2005).  From
+    q (k, nb, 7), v (k, nb, 6) at times (k,); None where the scene has no masses, or more than MOST_ROWS rows.
+    """
+    if model.kinematic or model.m > MOST_ROWS:
+        return None
+    rows = [model.terms(t, q[k].ravel(), v[k].ravel()).jacobian for k, t in enumerate(times)]
+    jacobian = np.array(rows).reshape(len(times), model.m, model.n)
+    lengths = row_lengths(jacobian.reshape(-1, model.n)).reshape(len(times), model.m, 1)
+    left, values, _ = np.linalg.svd(jacobian / lengths)
+    rank = np.sum(values > OPEN * values.max(axis=1, initial=0.0)[:, None], axis=1)
+    vanishing = left * (np.arange(model.m) >= rank[:, None])[:, None, :]
+    of_joint = np.array(model.row_joint)
+    return {
+        joint.name: np.sum(_singular_values(vanishing[:, of_joint == joint.name]) > SHARE, axis=1)
+        for joint in model.scene.joint
+    }
+
+
+def _singular_values(matrices: np.ndarray) -> np.ndarray:
+    return np.asarray(np.linalg.svd(matrices, compute_uv=False))
 
 
 def _acted_on(model: Model) -> tuple[np.ndarray, np.ndarray]:

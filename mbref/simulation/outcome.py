@@ -8,7 +8,7 @@ import numpy as np
 
 from mbref import __version__
 from mbref.equations.branches import singular_position
-from mbref.equations.joint_reactions import reactions
+from mbref.equations.joint_reactions import open_dimensions, reactions
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR
 from mbref.motion import Motion
 from mbref.simulation.run import Run
@@ -48,6 +48,7 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion
         bodies=tuple(body.name for body in run.scene.body),
         **model.motion(q, v, a),
         reactions=reactions(model, run.times[:reached], q, v, multipliers),
+        open_reactions=open_dimensions(model, run.times[:reached], q, v),
         outcome=OUTCOMES[status],
         t_end=float(loop.clock.time),
         message=_message(run, status),

@@ -10,6 +10,7 @@ from reports.sections import (
     accelerations,
     conformance,
     convergence,
+    crossings,
     energy,
     least_errors,
     mechanism,
@@ -41,6 +42,7 @@ OF_A_SCENE: Mapping[str, Part] = {
     "energy": energy.render,
     "accelerations": accelerations.render,
     "reactions": reactions.render,
+    "crossings": crossings.render,
     "outcomes": outcomes.render,
 }
 CLOSING: Mapping[str, Chapter] = {

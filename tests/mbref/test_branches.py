@@ -116,6 +116,26 @@ def test_crossings_in_a_record_and_none_where_nothing_looks_for_them(tmp_path):
     assert simulate(slider_crank(0.1, 0.3, 0.3, "crank"), "alf-dual+projection", [0.1]).crossings == ()
 
 
+def test_reactions_left_open_are_marked_at_a_singular_position_and_by_redundant_rows(tmp_path):
+    """The driven rhombus has one redundant row, in which all joints take part; one more row depends on the
+    others at its flat position, and not a micrometre beside it."""
+    flat = simulate(four_bar(), "alf-dual+projection", [0.05]).crossings[0].time
+    run = simulate(four_bar(), "alf-dual+projection", [0.001, flat, flat + 1e-5])
+    assert {joint: tuple(row) for joint, row in run.open_reactions.items()} == dict.fromkeys(
+        "ABCD", (1, 2, 1)
+    )
+    run.save(tmp_path / "run.json")
+    read = Motion.load(tmp_path / "run.json")
+    assert np.array_equal(read.joint("A").open, [1, 2, 1]) and np.array_equal(
+        read.columns()["D.open"], [1, 2, 1]
+    )
+
+
+def test_reactions_of_a_tree_are_open_nowhere():
+    run = simulate("point_pendulum", "alf-dual+projection", [0.1, 0.2])
+    assert all(not row.any() for row in run.open_reactions.values())
+
+
 def straight_arch(offset: float = 0.0) -> Scene:
     """Two equal links between fixed hinges, in line where the offset (m) of the hinge between them is 0."""
     hinges = (

@@ -8,9 +8,9 @@ from crosscheck.engine import Setting
 from crosscheck.judge.gauss_principle import gauss
 from crosscheck.study.grid import Case, run_case
 from mbref.scenes import SCENES
-from reports.blocks import Block, Table
+from reports.blocks import Block, Table, Text
 from reports.runs import SceneRuns, by_scene
-from reports.sections import accelerations, reactions, support
+from reports.sections import accelerations, crossings, reactions, support
 
 
 def runs_of(name: str) -> SceneRuns:
@@ -64,3 +64,19 @@ def test_support_section_and_engines_of_the_records():
     (table,) = [b for b in support.render([runs_of("planar_slider_crank_gravity")]) if isinstance(b, Table)]
     assert list(table.header) == ["Feature", "pinocchio", "mujoco"], table.header
     assert ("revolute joint", "✓", "✓") in table.rows, table.rows[:3]
+
+
+def test_singular_positions_passed_with_branches_and_reactions_left_open():
+    scene = SCENES["four_bar"]().with_(duration=0.05)
+    flat = 0.01258650902880526  # s, of the driven rhombus
+    record = run_case(Case(scene, np.array([0.0, flat, 0.05]), "mbref", Setting("alf-dual+projection", {})))
+    (group,) = by_scene([record], {scene.name: scene})
+    blocks = crossings.render(group)
+    assert [row[:2] for row in cells(blocks)] == [["1", "0.012586509"], ["2", "0.037759527"]]
+    assert [row[3] for row in cells(blocks)] == ["1", "1"], "the smooth branch is taken"
+    (text,) = [block.text for block in blocks if isinstance(block, Text)]
+    assert "reactions of A, B, C, D at t = 0.0125865 s" in text
+
+
+def test_no_table_of_singular_positions_where_none_is_passed():
+    assert not crossings.render(runs_of("spatial_slider_crank_gravity"))
