@@ -17,7 +17,7 @@ from crosscheck.engine import Setting
 from crosscheck.study.grid import Case, Record, study
 from crosscheck.study.progress import counted, shown
 from crosscheck.study.scouting import scout, settings, unasked
-from mbref.scene import Driver, Scene, Spring
+from mbref.scene import GROUND, Body, Driver, Revolute, Scene, Spring
 from mbref.scenes.four_bar import four_bar, four_bar_gravity
 from mbref.scenes.links import CRANK_RATE
 from mbref.scenes.planar_slider_crank import slider_crank
@@ -31,6 +31,8 @@ METHODS = (
     "mpi-svd+none", "mpi-gs+none", "alf+baumgarte", "lm1+baumgarte", "mpi-qr+null-space", "ali3-p",
     "lm2-first-rows+baumgarte", "lm2-step-rows+baumgarte",
 )  # fmt: skip
+FIXED_STEPS = {"ali3-p": 10_000}  # steps of a run by methods without a tolerance
+RANK_TOLERANCE = "rank_tolerance"  # the ladder whose difficulty is an option of mbref's methods
 FAMILIES = {"mujoco": "projected", "pinocchio": "tuned", "exudyn": "tuned"}
 MBREF = "mbref"
 
@@ -95,6 +97,16 @@ def ladders() -> tuple[Ladder, ...]:
             "N/m", [(k, _sprung(k)) for k in powers(0, 12, 9)],
         ),
         Ladder(
+            "tilt", "The second of two hinges of a door is tilted so much: it holds the door unless the tilt "
+            "is rounding. Between 1e-7 and 1e-9 the judge cannot tell, so that no rung lies there.",
+            "rad", [(a, _door(a)) for a in (1e-1, 1e-3, 1e-5, 1e-6, 1e-10, 1e-11, 1e-13, 1e-15)],
+        ),
+        Ladder(
+            RANK_TOLERANCE, "A slider-crank with three redundant rows turns under gravity, and singular "
+            "values or pivots below so much of the largest count as zero.",
+            "rank tolerance", [(r, _turning().with_(duration=0.5)) for r in powers(-16, -1, 9)],
+        ),
+        Ladder(
             "duration", "A slider-crank turns under gravity for so long.", "s",
             [(t, _turning().with_(duration=t)) for t in (0.3, 1.0, 3.0, 10.0, 30.0)],
         ),
@@ -124,6 +136,15 @@ def _heavy_slider(ratio: float) -> Scene:
 
 def _long_rod(ratio: float) -> Scene:
     return slider_crank(0.4 / ratio, 0.4, 0.3, "length_ratio", rate=30.0).with_(duration=0.5)
+
+
+def _door(tilt: float) -> Scene:
+    door = Body(name="door", position=(0.5, 0.0, 0.5), mass=1.0, inertia=(0.1, 0.2, 0.15))
+    hinges = tuple(
+        Revolute(name=name, bodies=(GROUND, "door"), anchor=(0.0, 0.0, z), axis=axis)
+        for name, z, axis in (("A", 0.0, (0.0, 0.0, 1.0)), ("B", 1.0, (tilt, 0.0, 1.0)))
+    )
+    return Scene(name="tilt", gravity=(0.0, -9.81, 0.0), body=(door,), joint=hinges, duration=0.5)
 
 
 def _scaled(unit: float) -> Scene:
@@ -183,11 +204,21 @@ def cases(engines: Sequence[str]) -> list[Case]:
 
 def _settings(scene: Scene, engines: Sequence[str]) -> Iterator[tuple[str, Setting]]:
     for method in METHODS:
-        yield MBREF, Setting(method, {"rtol": RTOL, "most_steps": MOST_STEPS})
+        yield MBREF, Setting(method, _options(method, scene))
+    if place(scene.name)[0] == RANK_TOLERANCE:
+        return
     for name in engines:
         offered = [s for s in settings(name, scene) if s.family == FAMILIES[name]]
         if offered:
             yield name, offered[max(0, len(offered) - 2)]
+
+
+def _options(method: str, scene: Scene) -> dict[str, float]:
+    ladder, difficulty = place(scene.name)
+    swept = {"rank_tolerance": difficulty} if ladder == RANK_TOLERANCE else {}
+    if method in FIXED_STEPS:
+        return {"largest_step": scene.duration / FIXED_STEPS[method], "most_steps": MOST_STEPS, **swept}
+    return {"rtol": RTOL, "most_steps": MOST_STEPS, **swept}
 
 
 def run(path: str | Path, engines: Sequence[str]) -> list[Record]:

@@ -12,7 +12,7 @@ from mbref.drawing.svg import COLOURS, GREY
 UNITS = {
     "position": "m", "velocity": "m/s", "angular_velocity": "rad/s", "acceleration": "m/s²",
     "angular_acceleration": "rad/s²", "orientation": "", "angle": "rad", "rate": "rad/s", "displacement": "m",
-    "force": "N", "moment": "N m", "energy": "J",
+    "force": "N", "moment": "N m", "energy": "J", "open": "",
 }  # fmt: skip
 DEFAULT = ("angle", "displacement", "energy")
 

@@ -47,7 +47,7 @@ class Limits:
     first_step: float = 0.0  # s, that is tried first; 0: the integrator's own guess
     smallest_step: float = 0.0  # s; 0 means a million-millionth of the duration
     forced_step: float = 0.0  # s; a step this short is taken whatever its error estimate; 0: none
-    largest_step: float = 0.0  # s; 0 means the duration
+    largest_step: float = 0.0  # s, of fixed steps too; 0 means the duration
     largest_turn: float = 0.0  # rad that the fastest body may turn in an adaptive step; 0: a safe angle
     most_steps: int = 5_000_000
     compared: bool = True  # whether a run without projection is compared with one with it

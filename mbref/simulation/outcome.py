@@ -11,6 +11,7 @@ from mbref.equations.branches import singular_position
 from mbref.equations.joint_reactions import open_dimensions, reactions
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR
 from mbref.motion import Motion
+from mbref.simulation.remedies import remedy
 from mbref.simulation.run import Run
 from mbref.simulation.stepping import DONE, LEFT_MOTION, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED, VIOLATED
 from mbref.trajectory import Cost, Crossing, Outcome
@@ -90,11 +91,16 @@ def _crossings(run: Run) -> tuple[Crossing, ...] | None:
 
 
 def _message(run: Run, status: int) -> str:
-    """One sentence: the cause and time of the end; or the correction of the start."""
-    if status == DONE:
-        crossings = int(run.memory.equations.system.counts.crossings)
-        passed = f"singular positions passed: {crossings}" if crossings else ""
-        return "; ".join(filter(None, (run.start.report(), passed)))
+    """One sentence: the cause and time of the end, and a remedy; or the correction of the start."""
+    if status != DONE:
+        return "; ".join(filter(None, (_cause(run, status), remedy(run, status))))
+    crossings = int(run.memory.equations.system.counts.crossings)
+    passed = f"singular positions passed: {crossings}" if crossings else ""
+    return "; ".join(filter(None, (run.start.report(), passed)))
+
+
+def _cause(run: Run, status: int) -> str:
+    """The cause and time of an early end."""
     memory = run.memory
     t = memory.loop.clock.time
     if status == VIOLATED:
@@ -110,6 +116,5 @@ def _message(run: Run, status: int) -> str:
         h = memory.control.smallest_step
         return f"the error estimate asks for a step below {h:.3g} s at t = {t:.6g} s"
     if status == LEFT_MOTION:
-        left = memory.loop.clock.passage
-        return f"{OUTCOMES[status].sentence}, as the default method shows, by t = {left:.6g} s"
+        return f"{OUTCOMES[status].sentence}, as the default method shows, by t = {t:.6g} s"
     return f"{OUTCOMES[status].sentence} at t = {t:.6g} s ({run.method.formulation.name})"

@@ -137,13 +137,13 @@ class Run:
     def _control(self) -> Control:
         limits, integrator = self.limits, self.method.integrator
         span = float(self.times[-1]) or 1.0
-        options = self.method.options_of(integrator)
+        options, largest_step = self.method.options_of(integrator), limits.largest_step or span
         turn = UNWRAPPED if self.model.has_angles else self.method.stabilisation.largest_turn
         return Control(
             order=integrator.highest_order(options),
-            fixed_step=0.0 if integrator.adaptive else options["step"],
+            fixed_step=0.0 if integrator.adaptive else min(options["step"], largest_step),
             smallest_step=limits.smallest_step or 1e-12 * span,
-            largest_step=limits.largest_step or span,
+            largest_step=largest_step,
             largest_turn=limits.largest_turn or turn,
             violation=limits.violation * max(1.0, scene_length(self.model)),
             most_steps=limits.most_steps,

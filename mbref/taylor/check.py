@@ -32,28 +32,29 @@ class CheckedRun(Run):
     def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
         """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
         status, seconds = super().advance(progress)
-        if status == DONE and self.model.closed_loops > 0 and self.limits.compared:
+        if self.memory.loop.clock.sample and self.model.closed_loops > 0 and self.limits.compared:
             began = time.process_time()
-            status = self._checked()
+            status = self._checked(status)
             self.making += time.process_time() - began
         return status, seconds
 
-    def _checked(self) -> int:
-        """DONE, LEFT_MOTION by the time (s) in ``clock.passage``, or UNDECIDED at the time of the clock.
+    def _checked(self, ended: int) -> int:
+        """The status of a run that ended with another one, compared up to there.
 
-        Where the projected run ends early for another reason than a branch in doubt, samples are compared up
-        to there.
+        LEFT_MOTION where it left the motion, whose samples end there; UNDECIDED, at the time of the clock,
+        where the projected run does not tell a branch of a run that is DONE; else as it was.
         """
         limits = Limits(rtol=TOLERANCE, code=GENERIC, most_steps=MOST_STEPS)
         projected = CrossingRun(self.scene, Method.parse(DEFAULT), self.times, limits)
         status, _ = projected.advance(None)
         theirs, clock = projected.memory.loop.clock, self.memory.loop.clock
-        off = self._distances(projected, int(theirs.sample))
+        off = self._distances(projected, min(int(theirs.sample), int(clock.sample)))
         if (off > self._allowed).any():
-            clock.passage = self.times[np.argmax(off > self._allowed)]
+            clock.sample = np.argmax(off > self._allowed)
+            clock.time = self.times[clock.sample]
             return LEFT_MOTION
-        if status != UNDECIDED:
-            return DONE
+        if ended != DONE or status != UNDECIDED:
+            return ended
         clock.time = theirs.time
         return UNDECIDED
 

@@ -202,6 +202,6 @@ def _stacked(rows: Sequence[tuple], width: int, d: int, numbers: int = 3) -> lis
     constant, form = np.array(columns[0], dtype=float), np.array(columns[1], dtype=float)
     return [
         constant.reshape(-1, width),
-        form.reshape(-1, d),
+        form.reshape(width * len(rows), d),
         *(np.array(c, dtype=float) for c in columns[2:]),
     ]

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure as Drawing
 from crosscheck.judge.tolerances import FALSE_SUCCESS
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error, is_completed
-from crosscheck.study.stability import MBREF, METHODS, RTOL, Ladder, ladders, place
+from crosscheck.study.stability import FIXED_STEPS, MBREF, METHODS, RTOL, Ladder, ladders, place
 from mbref.trajectory import Outcome
 from reports import figures
 from reports.blocks import Block, Figure, Heading, Table, Text
@@ -26,10 +26,10 @@ LETTERS = {  # of outcomes that the paper's tables do not have
 }  # fmt: skip
 HOW = (
     "Numbers are digits kept: minus the logarithm of the largest error. Red cells are false successes, "
-    f"completed with an error above {ALLOWED:g} (engines: {FALSE_SUCCESS:g}). A letter names the outcome "
-    "of a run that ended early: a singular matrix, b iteration not converged, c violation, d step failed, "
-    "u branch undecided, m left the motion, t out of time, x crashed, n not finite. "
-    "Empty cells were not run."
+    f"completed with an error above {ALLOWED:g}, or {FALSE_SUCCESS:g} of engines and of ali3-p, which has no "
+    "tolerance. A letter names the outcome of a run that ended early: a singular matrix, b iteration not "
+    "converged, c violation, d step failed, u branch undecided, m left the motion, t out of time, x crashed, "
+    "n not finite. Empty cells were not run."
 )
 WHEN = (
     "Where a mechanism passes singular positions, or comes near them, projection (the default) and taylor "
@@ -61,8 +61,9 @@ def _runs(records: Iterable[Record]) -> dict[str, Runs]:
 
 
 def is_false(record: Record) -> bool:
-    """Whether a run completed with an error above ALLOWED, or an engine's above FALSE_SUCCESS."""
-    allowed = ALLOWED if record["engine"] == MBREF else FALSE_SUCCESS
+    """Whether a run completed with an error above ALLOWED, or FALSE_SUCCESS where it has no tolerance."""
+    has_tolerance = record["engine"] == MBREF and record["family"] not in FIXED_STEPS
+    allowed = ALLOWED if has_tolerance else FALSE_SUCCESS
     return is_completed(record) and not error(record) <= allowed
 
 

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crosscheck.judge.truth import closed_form, truth_for
+from crosscheck.judge.truth.locked import locked
 from mbref import rotations
 from mbref.scene import Body, Driver, Revolute, Scene, Spherical, Translational, Universal
 from mbref.scenes import SCENES
@@ -160,3 +161,28 @@ def test_a_gap_however_small_is_no_crossing():
         for gap in (3e-13, 1e-9)
     )
     assert np.abs(narrow - wide).max() < 1e-4
+
+
+def door(tilt):
+    """A body on two hinges, the axis of the second tilted (rad)."""
+    body = Body(name="door", position=(0.5, 0.0, 0.5), mass=1.0, inertia=(0.1, 0.2, 0.15))
+    axes = {"A": (0.0, (0.0, 0.0, 1.0)), "B": (1.0, (tilt, 0.0, 1.0))}
+    hinges = tuple(
+        Revolute(name=name, bodies=("ground", "door"), anchor=(0, 0, z), axis=axis)
+        for name, (z, axis) in axes.items()
+    )
+    return Scene(name="door", gravity=(0, -9.81, 0), body=(body,), joint=hinges)
+
+
+def test_a_door_on_tilted_hinges_stays_and_on_aligned_ones_swings():
+    times = np.array([0.0, 0.1, 0.3])
+    rest = closed_form(door(1e-3))
+    assert rest.name == "locked"
+    assert np.array_equal(rest.poses(times).position, np.tile([0.5, 0.0, 0.5], (3, 1, 1)))
+    assert not rest.poses(times).velocity.any()
+    assert closed_form(door(0.0)).name == "pendulum"
+    assert closed_form(door(1e-8)) is None, "the judge cannot tell"
+
+
+def test_no_mechanism_with_a_freedom_or_a_driver_is_locked():
+    assert all(locked(make()) is None for name, make in SCENES.items()), "they move"

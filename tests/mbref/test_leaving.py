@@ -6,7 +6,7 @@ import pytest
 from crosscheck.judge.metrics import error_series, measure
 from crosscheck.judge.truth import closed_form
 from mbref.scenes.five_bar import five_bar_gravity
-from mbref.scenes.four_bar import four_bar_gravity
+from mbref.scenes.four_bar import four_bar, four_bar_gravity
 from mbref.scenes.planar_slider_crank import slider_crank
 from mbref.simulation.simulate import Limits, simulate
 
@@ -40,9 +40,25 @@ def test_a_run_that_left_its_motion_says_when():
     scene, end = SCENES["four_bar"]
     times = np.linspace(0.0, end, 31)
     run = simulate(scene, "mpi-gs+none", times, Limits(rtol=1e-6))
-    off = error_series(scene, run, closed_form(scene).poses(times)) > 1e-3
-    assert run.outcome.label == "LEFT_MOTION" and run.t_end == end and len(run.times) == len(times)
-    assert run.message.endswith(f"by t = {times[np.argmax(off)]:.6g} s")
+    whole = simulate(scene, "mpi-gs+none", times, Limits(rtol=1e-6, compared=False))
+    left = np.argmax(error_series(scene, whole, closed_form(scene).poses(times)) > 1e-3)
+    assert run.outcome.label == "LEFT_MOTION" and run.t_end == times[left]
+    assert np.array_equal(run.times, times[:left]), "samples end where the run left its motion"
+    assert f"by t = {run.t_end:.6g} s; " in run.message
+
+
+def test_a_run_that_fails_behind_another_motion_has_left_it():
+    """Along the tangent, a driven rhombus that begins 4e-13 rad before its flat position takes the fold."""
+    scene = four_bar(np.pi + 4e-13, "start")
+    run = simulate(scene, "mpi-qr+null-space", np.linspace(0.0, 0.05, 21), Limits(most_steps=20_000))
+    assert run.outcome.label != "COMPLETED"
+    assert not len(run.times) or measure(scene, run, closed_form(scene))["error"] < 1e-5
+
+
+def test_the_largest_step_bounds_steps_of_fixed_length():
+    scene = slider_crank(0.1, 0.3, 0.3, "crank", rate=3.0)
+    run = simulate(scene, "mpi-svd+none/rk4[step=2e-2]", [0.5, 1.0], Limits(largest_step=1e-2))
+    assert run.cost.steps == 100
 
 
 def test_coarse_steps_of_fixed_length_are_no_other_motion():

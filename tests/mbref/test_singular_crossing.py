@@ -23,6 +23,19 @@ def error_of(scene: Scene, end: float, method: str = "alf-dual+projection", **li
     return float(measure(scene, run, closed_form(scene))["error"])
 
 
+@pytest.mark.parametrize("method", ["alf-dual+projection", "taylor", "mpi-svd+none", "mpi-qr+null-space"])
+def test_a_mechanism_without_a_freedom_stays(method):
+    """Series without a variable have been an error of shapes."""
+    door = Body(name="door", position=(0.5, 0.0, 0.5), mass=1.0, inertia=(0.1, 0.2, 0.15))
+    hinges = (
+        Revolute(name="A", bodies=(GROUND, "door"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),
+        Revolute(name="B", bodies=(GROUND, "door"), anchor=(0.0, 0.0, 1.0), axis=(1e-3, 0.0, 1.0)),
+    )
+    scene = Scene(name="door", gravity=(0.0, -9.81, 0.0), body=(door,), joint=hinges)
+    run = simulate(scene, method, [0.1, 0.2])
+    assert run.outcome.label == "COMPLETED" and np.allclose(run.position, door.position, rtol=0, atol=1e-12)
+
+
 @pytest.mark.parametrize("code", ["generic", "specialised"])
 @pytest.mark.parametrize("inertia", [1e-8, 1e-6])
 def test_a_bead_on_an_arm_has_no_singular_position(inertia, code):

@@ -15,6 +15,7 @@ import numpy as np
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth.crankshaft import crankshaft
 from crosscheck.judge.truth.free_body import free_body
+from crosscheck.judge.truth.locked import locked
 from crosscheck.judge.truth.one_dof import Path, one_dof
 from crosscheck.judge.truth.parallelogram import parallelogram
 from crosscheck.judge.truth.picard import NoSolution
@@ -64,4 +65,4 @@ def closed_form(scene: Scene) -> Truth | None:
     for family in PATHS:
         if truth := one_dof(scene, family(scene)):
             return truth
-    return free_body(scene)
+    return free_body(scene) or locked(scene)

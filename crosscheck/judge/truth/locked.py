@@ -1,0 +1,41 @@
+"""Mechanisms that cannot move: their constraint rows leave no freedom, and no driver moves them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crosscheck.judge import constraints
+from crosscheck.judge.tolerances import FREEDOM, TRUTH_DRIVEN
+from crosscheck.judge.truth.one_dof import trajectory
+from mbref import rotations
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+
+
+class Locked:
+    """Truth of a scene that stays where it is."""
+
+    name = "locked"
+    accuracy = TRUTH_DRIVEN
+
+    def __init__(self, scene: Scene):
+        self._scene = scene
+
+    def poses(self, times: np.ndarray) -> Trajectory:
+        """Trajectory at times (k,) ≥ 0."""
+        times = np.asarray(times, dtype=float)
+        position, orientation = constraints.initial_poses(self._scene)
+        k, rest = len(times), np.zeros((len(times), *position.shape))
+        rotation = np.broadcast_to(rotations.to_matrix(orientation), (k, len(position), 3, 3))
+        placed = np.broadcast_to(position, rest.shape)
+        return trajectory(self._scene, self.name, times, placed, rotation, (rest, rest), (rest, rest))
+
+
+def locked(scene: Scene) -> Locked | None:
+    """The truth of a scene whose rows have full column rank at the start, or None."""
+    if scene.driver or not scene.joint:
+        return None
+    rows, _ = constraints.jacobian(scene, 0.0, *constraints.initial_poses(scene))
+    values = np.linalg.svd(rows, compute_uv=False)
+    rank = int(np.sum(values > FREEDOM * values.max(initial=1.0)))
+    return Locked(scene) if rank == 6 * len(scene.body) else None

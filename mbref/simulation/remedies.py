@@ -1,0 +1,69 @@
+"""Remedies: the change of method or limits that a failed run suggests, from the facts of method and scene."""
+
+from __future__ import annotations
+
+from mbref.equations.diagnosis import counts
+from mbref.formulations import FORMULATIONS
+from mbref.kernels.layout import NOT_CONVERGED, SINGULAR
+from mbref.simulation.run import Run
+from mbref.simulation.stepping import LEFT_MOTION, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED, VIOLATED
+
+FOLLOWS = "alf-dual+projection and taylor follow a motion through singular positions"
+BY_STATUS = {
+    VIOLATED: "+projection corrects violations after every step",
+    UNDECIDED: "a smaller rtol may tell the branch; --branch asks for one",
+    LEFT_MOTION: FOLLOWS,
+}
+DEFAULTS = ("alf-dual+projection/dop853", "alf-dual+projection/taylor")
+
+
+def remedy(run: Run, status: int) -> str:
+    """One clause that names what bears the cause of a failure; empty where none is known."""
+    if status == SINGULAR:
+        return _of_singular_matrix(run)
+    if status == NOT_CONVERGED:
+        return _of_iteration(run)
+    if status in (STEP_TOO_SMALL, TOO_MANY_STEPS):
+        return _of_steps(run)
+    return BY_STATUS.get(status, "")
+
+
+def _of_singular_matrix(run: Run) -> str:
+    formulation, scene = run.method.formulation, run.scene
+    massless = [
+        body.name for body, m in zip(scene.body, run.model.mass.reshape(-1, 6), strict=True) if not m.all()
+    ]
+    if massless and not formulation.handles_singular_mass:
+        return f"body {massless[0]!r} lacks mass or a moment of inertia: {_bearing(mass=True)}"
+    redundant = counts(scene).redundant
+    if redundant and not formulation.handles_redundancy:
+        return f"{redundant} constraint rows are redundant: {_bearing(redundancy=True)}"
+    return FOLLOWS if run.model.closed_loops else ""
+
+
+def _bearing(mass: bool = False, redundancy: bool = False) -> str:
+    """The formulations that claim to bear a singular mass matrix, or redundant rows."""
+    able = [
+        f.name
+        for f in FORMULATIONS.values()
+        if (f.handles_singular_mass or not mass)
+        and (f.handles_redundancy or not redundancy)
+        and not f.needs_independent_columns
+    ]
+    return f"{', '.join(able)} bear that"
+
+
+def _of_iteration(run: Run) -> str:
+    if run.method.integrator.holds_constraints:
+        return f"a step below {run.memory.control.fixed_step:g} s may converge"
+    return (
+        "mpi-svd and mpi-qr solve without iteration"
+        if run.method.formulation.name.startswith("alf")
+        else FOLLOWS
+    )
+
+
+def _of_steps(run: Run) -> str:
+    if str(run.method) in DEFAULTS or not run.model.closed_loops:
+        return "mbref diagnose tells how near the motion comes to a singular position"
+    return FOLLOWS

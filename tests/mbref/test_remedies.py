@@ -1,0 +1,42 @@
+"""A failed run names what bears its cause."""
+
+import re
+
+import numpy as np
+import pytest
+
+from mbref.scene import Body, Revolute, Scene
+from mbref.scenes import SCENES
+from mbref.scenes.four_bar import four_bar_gravity
+from mbref.simulation.simulate import Limits, simulate
+
+SLENDER = Scene(
+    name="slender",
+    gravity=(0.0, -9.81, 0.0),
+    body=(Body(name="rod", position=(0.5, 0.0, 0.0), mass=1.0, inertia=(0.0, 0.1, 0.1)),),
+    joint=(Revolute(name="A", bodies=("ground", "rod"), anchor=(0, 0, 0), axis=(0, 0, 1)),),
+)
+
+
+@pytest.mark.parametrize(
+    ("scene", "method", "words"),
+    [
+        (SCENES["bricard"](), "lm1+none", "1 constraint rows are redundant: .*alf-dual.*mpi-qr bear that"),
+        (SLENDER, "lm2+none", "body 'rod' lacks mass or a moment of inertia: lm1, alf bear that"),
+        (four_bar_gravity(0.3), "mpi-gs+none", "alf-dual.projection and taylor follow a motion"),
+        (
+            SCENES["planar_slider_crank"](),
+            "mpi-qr+none/rk4[step=1e-2]",
+            "alf-dual.projection|projection corrects",
+        ),
+    ],
+)
+def test_a_failure_names_what_bears_its_cause(scene, method, words):
+    run = simulate(scene, method, np.linspace(0.0, 1.5, 7), Limits(rtol=1e-6, most_steps=5_000))
+    assert run.outcome.label != "COMPLETED"
+    assert re.search("; .*(" + words + ")", run.message), run.message
+
+
+def test_what_a_remedy_names_bears_the_cause():
+    assert simulate(SLENDER, "alf+projection", [0.1]).outcome.label == "COMPLETED"
+    assert simulate(SLENDER, "lm1+projection", [0.1]).outcome.label == "COMPLETED"
