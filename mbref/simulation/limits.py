@@ -50,7 +50,7 @@ class Limits:
     largest_step: float = 0.0  # s, of fixed steps too; 0 means the duration
     largest_turn: float = 0.0  # rad that the fastest body may turn in an adaptive step; 0: a safe angle
     most_steps: int = 5_000_000
-    compared: bool = True  # whether a run without projection is compared with one with it
+    compared: bool = True  # whether a run that projection does not hold is compared with one that it holds
     branches: Branches = ()  # to take at crossings, both counted from 1; else the smooth one
     code: str = AUTO  # GENERIC kernels, SPECIALISED to the scene, or AUTO: where many steps are ahead
 

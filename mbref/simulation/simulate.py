@@ -18,7 +18,7 @@ from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.run import Run
 from mbref.simulation.stepping import DONE
 from mbref.specialised import Untraceable
-from mbref.taylor.check import CheckedRun
+from mbref.taylor.check import compare_with_default
 from mbref.taylor.run import CrossingRun, TaylorRun
 from mbref.taylor.series_run import NO_CODE, prepare_series
 
@@ -60,6 +60,7 @@ def simulate(
         raise MethodError(f"no machine code for {scene.name!r} by {method}: {reason}") from None
     built = time.process_time() - began - run.making
     status, seconds = run.advance(progress)
+    status = compare_with_default(run, status)
     if status == DONE:
         _check_branches(run)
     return trajectory_of(run, status, seconds, built + run.making)
@@ -79,7 +80,7 @@ def kind_of(method: Method) -> type[Run]:
     """How a run of the method treats singular positions."""
     if not method.integrator.step:
         return TaylorRun
-    return CrossingRun if method.stabilisation.projects else CheckedRun
+    return CrossingRun if method.stabilisation.projects else Run
 
 
 def prepare(method: Method) -> None:

@@ -61,6 +61,16 @@ def test_the_largest_step_bounds_steps_of_fixed_length():
     assert run.cost.steps == 100
 
 
+def test_a_rank_tolerance_that_drops_independent_rows_is_no_success():
+    """With a tenth of the largest singular value as zero, the slider-crank's motion is 0.8 off, projected."""
+    scene = slider_crank(0.304, 0.4048, 0.3, "coarse", rate=30.0).with_(gravity=(0.0, -9.81, 0.0))
+    times = np.linspace(0.0, 0.5, 21)
+    run = simulate(scene, "mpi-svd+projection", times, Limits(rank_tolerance=0.1))
+    assert run.outcome.label == "LEFT_MOTION"
+    sound = simulate(scene, "mpi-svd+projection", times, Limits(rank_tolerance=1e-3))
+    assert sound.outcome.label == "COMPLETED" and measure(scene, sound, closed_form(scene))["error"] < 1e-8
+
+
 def test_coarse_steps_of_fixed_length_are_no_other_motion():
     scene = slider_crank(0.1, 0.3, 0.3, "crank", rate=3.0)
     run = simulate(scene, "mpi-svd+none/rk4[step=2e-2]", [0.5, 1.0])
