@@ -160,7 +160,7 @@ def text(found: Line) -> str:
     bound = "none" if found["bound"] is None else f"{found['bound']:.0e}"
     cells += [f"{found['apart']:.0e}", bound, _cell(found["error"]), _cell(found["tighter"])]
     remarks = [f"{other} to {found['other_to']:.4g} s"] if found["other_to"] is not None else []
-    remarks += [f"twin by {by[1]}"] if other == "A" else []
+    remarks += ["twin by B"] if by == ["B", "B", "A"] else []
     reasons = {"no reference": found["reason"], "tighter run": found["tighter_reason"]}
     remarks += [f"{what}: {reason}" for what, reason in reasons.items() if reason]
     return f"| {' | '.join(cells)} | {'; '.join(remarks)} |"

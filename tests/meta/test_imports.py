@@ -98,6 +98,25 @@ def test_the_program_asks_crosscheck_s_command_line_for_its_records():
     assert not wrong, sorted(wrong)
 
 
+def test_the_formulations_of_the_reference_share_no_equations():
+    """Both have the judge's joint equations for start velocities and units, and numbers, and no more."""
+    arrows = graph("crosscheck")
+    natural, tree = (reached(arrows, f"crosscheck.judge.reference.{name}") for name in ("taylor", "tree"))
+    shared = {name.removeprefix("crosscheck.judge.") for name in natural & tree}
+    numbers = {"reference.arithmetic", "reference.motion", "reference.start_velocities"}
+    assert shared == numbers | {"constraints", "joint_residuals", "tolerances"}, sorted(shared)
+
+
+def reached(arrows: dict[str, set[str]], module: str) -> set[str]:
+    """All modules that one imports, straight or through others."""
+    found, waiting = set(), [module]
+    while waiting:
+        new = arrows.get(waiting.pop(), set()) - found
+        found |= new
+        waiting += new
+    return found
+
+
 def test_circles_and_upward_arrows_are_found():
     arrows = {"p": set(), "p.a.x": {"p.b.y"}, "p.b.y": {"p.a.z"}, "p.a.z": {"p.a.x"}, "p.c": {"p.a.x"}}
     assert circles(arrows) == [["p.a.x", "p.a.z", "p.b.y"]]
