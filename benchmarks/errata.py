@@ -54,7 +54,7 @@ def rows(problem: Published) -> list[str]:
     lines = [basis(table, motions), header, f"|---|--:|--:|{'--:|' * len(compared)}--:|"]
     for key, printed in problem.values.items():
         digits = [agreement(found[key], values[key]) for found in (*compared.values(), problem.values)]
-        cells = [key, f"{printed:.16g}", f"{values[key]:.16g}", *(f"{d:.1f}" for d in digits)]
+        cells = [key, f"{printed!r}", f"{values[key]:.16g}", *(f"{d:.1f}" for d in digits)]
         lines.append(f"| {' | '.join(cells)} |")
     return lines
 
