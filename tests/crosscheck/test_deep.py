@@ -11,13 +11,16 @@ import pytest
 from crosscheck.cli.commands import main
 from crosscheck.conformance import deep, drawn
 from crosscheck.conformance.properties import PROPERTIES
+from crosscheck.conformance.relations import RELATIONS
 from crosscheck.conformance.runners import InProcess
 from crosscheck.conformance.trial import Specimen, set_up
 from crosscheck.engine import Cannot, Engine, Owner
 from crosscheck.judge.constraints import closure, closure_rates, initial_poses, initial_twists
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.metrics import violation_series
+from mbref import Limits, simulate
 from mbref.scene import GROUND
+from mbref.trajectory import Outcome
 from tests.zoo.defects import DEFECTS
 from tests.zoo.defects import engine as example
 
@@ -113,3 +116,17 @@ def test_tally_and_seeds_that_decide_nothing(known):
     found = deep.examined(deep.Plan("example", 2))
     assert found.seeds == deep.MOST * 2 and set(found.open()) >= {"truth"}, found.counts
     assert all(not set(c) - {"cannot", "pass"} for c in itertools.islice(found.counts.values(), 5))
+
+
+@pytest.mark.xfail(
+    strict=True,
+    raises=(AssertionError, KeyError),
+    reason="a singular position is suspected where none is: the branch cannot be told (211), or the series "
+    "over it cannot be made of the variables left (101)",
+)
+@pytest.mark.parametrize(("seed", "change"), [(101, "rotated"), (211, "")])
+def test_drawn_mechanism_that_mbref_does_not_run(seed, change):
+    scene = drawn.mechanism(seed)
+    scene = RELATIONS[change].change(scene, None) if change else scene
+    run = simulate(scene, "alf-dual+projection", np.linspace(0.0, scene.duration, 3), Limits(rtol=1e-9))
+    assert run.outcome is Outcome.COMPLETED, run.message

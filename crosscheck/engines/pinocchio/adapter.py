@@ -22,6 +22,7 @@ from crosscheck.engines.initial_velocities import lacks_mass
 from crosscheck.engines.pinocchio.model import SUPPORTS, Loads, Mechanism
 from crosscheck.engines.sampling import Adaptive, Counts, Failed, Sample, rk4, run_through
 from crosscheck.engines.tree_reactions import LinkMotion, joint_reactions
+from crosscheck.judge.constraints import scene_length
 from mbref import rotations
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
@@ -41,6 +42,7 @@ BAUMGARTE = 0.1  # double root of the closure errors, in 1/step
 PROJECTIONS = 10  # Newton iterations at most; two are usual
 CLOSED = 1e-13  # m and rad, where a projection ends
 REDUNDANT = 1e-7  # of the largest singular value: redundant rows of states not quite closed are below
+NOTHING = 1e-12  # of the scene's length: rows of closures that the tree satisfies by itself are rounding
 CLOSED_ENOUGH = 1e-8  # m and rad, beyond which it has failed
 RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-11)  # finer ones get lost in the noise at singular positions
 TURN_PER_STEP = 0.25  # rad a driver may move within one adaptive step: closures can fold in between
@@ -126,6 +128,7 @@ class _PinocchioSimulation:
         self.counts = Counts()
         self.loads = Loads(mechanism)
         self.nq = self.model.nq
+        self.least = NOTHING * max(1.0, scene_length(scene))  # of a Jacobian's entry that is not rounding
         self.flat = self.nq == self.model.nv  # no quaternions: dq/dt = v
         self.driven = [(mechanism.q_of_v[i], self.nq + i, driver) for i, driver in mechanism.driven]
         self.free = np.setdiff1d(np.arange(self.model.nv), [i for i, _ in mechanism.driven])
@@ -240,7 +243,8 @@ class _PinocchioSimulation:
             point = closure.type == pin.ContactType.CONTACT_3D
             residual.append(data.c1Mc2.translation if point else pin.log6(data.c1Mc2).vector)
         jacobian = pin.getConstraintsJacobian(self.model, self.data, self.closures, self.closure_data)
-        return np.concatenate(residual), jacobian
+        moves = np.abs(jacobian).max(axis=1, keepdims=True) > self.least
+        return np.concatenate(residual), np.where(moves, jacobian, 0.0)
 
     def _least_change(
         self, t: float, root: np.ndarray, jacobian: np.ndarray, target: np.ndarray
