@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help check test lint deep shuffle fuzz kills mutants coverage report quick reference picture docs site bench clean
+.PHONY: help check test lint deep shuffle fuzz kills mutants coverage report quick reference picture docs site bench clean drawn
 
 help: ## show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -52,13 +52,23 @@ quick: $(VENV)/ready ## a comparison report in about three minutes, into report/
 	$(BIN)/crosscheck report --quick
 
 PROBES := --scene "heavy top" --scene "universal joint" --scene "cylindrical driver" --scene door \
-    --scene "floating pair" --scene "two drivers"
+    --scene "floating pair" --scene "two drivers" --scene "two torsion springs" --scene "drawn loop"
 
 reference: $(VENV)/ready ## the committed report with its records, anew, into reports/reference/
 	rm -rf reports/reference && $(BIN)/crosscheck report --quick --out reports/reference
 	mkdir reports/reference/conformance
 	for engine in mbref mujoco pinocchio exudyn; do $(BIN)/crosscheck verify $$engine --json \
 	    $(PROBES) > reports/reference/conformance/$$engine.json; done
+	$(BIN)/crosscheck report --render reports/reference
+
+DRAWN := mechanisms 200 --beside mbref=alf-dual+projection
+
+drawn: $(VENV)/ready ## every card on drawn mechanisms, for the committed report; resumes from build/drawn/
+	mkdir -p build/drawn
+	for engine in mujoco pinocchio exudyn; do $(BIN)/crosscheck verify $$engine --$(DRAWN) --json \
+	    --records build/drawn/$$engine.jsonl > reports/reference/conformance/$${engine}_drawn.json; done
+	$(BIN)/crosscheck verify mbref --family alf-dual+projection --mechanisms 2000 --json \
+	    --records build/drawn/mbref.jsonl > reports/reference/conformance/mbref_drawn.json
 	$(BIN)/crosscheck report --render reports/reference
 
 picture: $(VENV)/ready ## the README's moving picture, into reports/rendered/
