@@ -12,7 +12,9 @@ from crosscheck.engine import BUILT_IN, engine
 
 SPECIMENS = {specimen.scene.name: specimen for specimen in trial.specimens()}
 QUICK = ("heavy top", "universal joint", "cylindrical driver", "door", "floating pair", "two drivers")
-KNOWN: dict[tuple[str, str, str], str] = {}  # (engine, scene, card): why it fails
+KNOWN: dict[tuple[str, str, str], str] = {  # (engine, scene, card): why it fails
+    ("pinocchio", "drawn loop", "in millimetres"): "mu of the proximal solver is absolute, chosen for metres",
+}
 
 
 def violations(name: str, scenes: tuple[str, ...], related: bool) -> dict[tuple[str, str, str], str]:
