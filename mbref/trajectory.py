@@ -123,12 +123,12 @@ class Trajectory:
     acceleration: np.ndarray | None = None
     angular_acceleration: np.ndarray | None = None
     reactions: Mapping[str, np.ndarray] | None = None
-    open_reactions: Mapping[str, np.ndarray] | None = None
     outcome: Outcome = Outcome.COMPLETED
     t_end: float = 0.0
     message: str = ""
     cost: Cost = field(default_factory=Cost)
     crossings: tuple[Crossing, ...] | None = None
+    open_reactions: Mapping[str, np.ndarray] | None = None
 
     def __repr__(self) -> str:
         return (
