@@ -10,7 +10,7 @@ import numpy as np
 
 from mbref.formulations import FORMULATIONS
 from mbref.integrators import INTEGRATORS
-from mbref.method import DEFAULT
+from mbref.method import DEFAULT, SHORT
 from mbref.scene import Scene
 from mbref.stabilisation import STABILISATIONS
 
@@ -29,7 +29,7 @@ def add_method_options(parser: argparse.ArgumentParser, json: bool = True) -> No
     """Method, times and limits of a run; --json where the command prints its result."""
     parser.add_argument(
         "--method", default=DEFAULT,
-        help="formulation+stabilisation/integrator, taylor, or kinematic for a driven mechanism;\n"
+        help=f"formulation+stabilisation/integrator, or in short {', '.join(SHORT)};\n"
         f"formulations: {', '.join(FORMULATIONS)};\nstabilisations: {', '.join(STABILISATIONS)};\n"
         f"integrators: {', '.join(INTEGRATORS)} (default: {DEFAULT})",
     )  # fmt: skip

@@ -35,9 +35,11 @@ def _of_singular_matrix(run: Run) -> str:
     ]
     if massless and not formulation.handles_singular_mass:
         return f"body {massless[0]!r} lacks mass or a moment of inertia: {_bearing(mass=True)}"
-    redundant = counts(scene).redundant
-    if redundant and not formulation.handles_redundancy:
-        return f"{redundant} constraint rows are redundant: {_bearing(redundancy=True)}"
+    found = counts(scene)
+    if found.redundant and not formulation.handles_redundancy:
+        return (
+            f"constraint rows are redundant ({found.redundant} of {found.rows}): {_bearing(redundancy=True)}"
+        )
     return FOLLOWS if run.model.closed_loops else ""
 
 
