@@ -99,11 +99,15 @@ class NaturalCoordinates:
         while before != len(self.eliminate.expressed):
             before, rows = len(self.eliminate.expressed), [self._reduced(row) for row in rows]
             for row in rows:
-                if degree(row) == 1:
+                if degree(row) == 1 and not self._is_prescribed(row):
                     self.eliminate.add(as_expression(row))
             self.eliminate.settle()
         linear = ({(ONE, v): c for v, c in equation.items()} for equation in self.eliminate.left)
         return independent([row for row in (*rows, *linear) if degree(row) > 0])
+
+    def _is_prescribed(self, row: Polynomial) -> bool:
+        """Whether a driver has a part in a row, which then eliminates nothing: M would depend on time."""
+        return any(variable in self.given for pair in row for variable in pair)
 
     def _linear_equations(self) -> Iterator[Expression]:
         """Positions at rest, axes that joints share, coincident points; an expression that is zero each."""
@@ -145,9 +149,9 @@ class NaturalCoordinates:
         table = self.model.data.primitives
         driver, body = int(table.driver[p]), int(table.first[p])
         if table.kind[p] == DOT2:
-            (value,) = self._prescribed(driver, (VALUE,), 1 / self.length)
-            return [plus(self._undriven(p), -1 / self.length, {value: 1.0})]
-        cosine, sine = self._prescribed(driver, (COSINE, SINE), 1.0)
+            (value,) = self._prescribed(driver, (VALUE,))  # in the unit of length
+            return [plus(self._undriven(p), -1.0, {value: 1.0})]
+        cosine, sine = self._prescribed(driver, (COSINE, SINE))
         x, y = (self.direction(body, w) for w in (table.direction_first[p], table.turning_first[p]))
         turned = [product_sum([({cosine: 1.0}, b), ({sine: -1.0}, a)]) for a, b in zip(x, y, strict=True)]
         rows = []
@@ -165,7 +169,7 @@ class NaturalCoordinates:
         rows = [plus(row, -1.0, {v: 1.0}) for row, v in zip(turned, own, strict=True)]
         return [{(ONE, v): 1.0} for v in own], rows
 
-    def _prescribed(self, driver: int, functions: Sequence[int], scale: float) -> tuple[int, ...]:
+    def _prescribed(self, driver: int, functions: Sequence[int]) -> tuple[int, ...]:
         variables = self.images.add(self.nb, np.zeros((len(functions), 12)))
         self.given |= {v: (driver, function) for v, function in zip(variables, functions, strict=True)}
         return variables

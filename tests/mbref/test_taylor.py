@@ -9,7 +9,17 @@ from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from mbref.kernels.compilation import PLAIN
 from mbref.method import Method, MethodError
-from mbref.scene import Body, Cylindrical, Driver, Revolute, Scene, SceneError, Spring, TorsionSpring
+from mbref.scene import (
+    Body,
+    Cylindrical,
+    Driver,
+    Revolute,
+    Scene,
+    SceneError,
+    Spring,
+    TorsionSpring,
+    Translational,
+)
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
 from mbref.taylor.expressions import ONE, Elimination, independent
@@ -172,3 +182,25 @@ def test_blocks_are_added_multiplied_and_gathered():
     (block_sum if PLAIN else njit(block_sum))(0.7, a, b, lanes, out)
     assert np.allclose(out[8:], expected - b[1], rtol=1e-14, atol=1e-15) and not out[:8].any()
     assert [filled(size) for size in (0, 1, 8, 9)] == [0, 8, 8, 16]
+
+
+@pytest.mark.parametrize("length", [0.05, 1.0, 30.0])
+@pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (1.0, 2.0, 3.0)])
+def test_a_pendulum_on_a_driven_cart(axis, length):
+    """The cart's place is the driver's, in the unit of length of the scene; the pendulum is free."""
+    cart = Body(name="cart", mass=0.3, inertia=(1e-3, 1e-3, 1e-3), position=(0, 0, 0))
+    place = (0.2 * length, 0.1 * length, -0.2 * length)
+    bob = Body(name="bob", mass=2.5, inertia=tuple(np.array([0.02, 0.04, 0.04]) * length**2), position=place)
+    scene = Scene(
+        name="driven_cart", gravity=(0, 0, -9.81), body=(cart, bob),
+        joint=(
+            Translational(name="S", bodies=("ground", "cart"), anchor=(0, 0, 0), axis=axis),
+            Revolute(name="R", bodies=("cart", "bob"), anchor=(0, 0, 0), axis=(0, 1, 0)),
+        ),
+        driver=(Driver(joint="S", polynomial=(0.0, 0.2 * length, 0.7 * length)),),
+    )  # fmt: skip
+    times = [0.05, 0.1]
+    series = simulate(scene, "taylor", times, Limits(rtol=1e-10))
+    general = simulate(scene, "alf-dual+projection", times, Limits(rtol=1e-11))
+    assert series.outcome.label == "COMPLETED", series.message
+    assert np.allclose(series.position, general.position, rtol=0, atol=1e-9 * length)
