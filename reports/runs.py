@@ -68,6 +68,11 @@ class Run:
         return self.metric("error")
 
     @property
+    def by_error(self) -> tuple[bool, float]:
+        """The key that sorts runs by their error, those of unknown error last."""
+        return math.isnan(self.error), self.error
+
+    @property
     def said(self) -> str:
         """The error for a table cell: ``< 3e-12`` below the bound on the truth's own error."""
         return error_text(self.record)

@@ -101,7 +101,7 @@ def card_of(name: str) -> str:
 
 
 def about(name: str) -> str:
-    """What a card checks."""
+    """The check of a card in a sentence."""
     return ABOUT if name == AGREEMENT else suite.abouts()[name]
 
 

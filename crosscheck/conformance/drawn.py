@@ -16,8 +16,7 @@ from crosscheck.conformance.features import massless
 from crosscheck.conformance.moving import consistent
 from crosscheck.conformance.random_mechanisms import random_mechanism, triple
 from crosscheck.judge.constraints import closure_rates, initial_poses, initial_twists
-from crosscheck.judge.gauss_principle import goes_on, singular_values
-from crosscheck.judge.tolerances import RANK
+from crosscheck.judge.gauss_principle import goes_on, rank, rank_of, singular_values
 from mbref.scene import GROUND, Body, Driver, Fixed, Force, Joint, Load, Revolute, Scene, Sine, TorsionSpring
 
 DURATION = 0.05  # s: bodies of half a metre turn by a tenth of a radian
@@ -98,12 +97,12 @@ def _torsion(scene: Scene, rng: np.random.Generator) -> Iterator[TorsionSpring]:
 
 def _driven(scene: Scene, rng: np.random.Generator) -> Scene:
     """The scene with a driver that begins at the joint's own rate; without, where none leaves a motion."""
-    rank = _rank(scene)
+    before = rank(scene)
     joints = [joint for joint in scene.joint if joint.facts.driven]
     for joint in rng.permutation(np.array(joints, dtype=object)):
         driven = scene.with_(driver=(_driver(scene, joint, rng),))
         values = singular_values(driven)
-        if _rank(driven) == rank + 1 and values[rank] > REGULAR and goes_on(driven):
+        if rank_of(values) == before + 1 and values[before] > REGULAR and goes_on(driven):
             return driven
     return scene
 
@@ -116,8 +115,3 @@ def _driver(scene: Scene, joint: Joint, rng: np.random.Generator) -> Driver:
     wave = Sine(amplitude=amplitude, frequency=frequency, phase=phase)
     polynomial = (-amplitude * float(np.sin(phase)), float(rate), float(rng.uniform(-1, 1)))
     return Driver(joint=joint.name, polynomial=polynomial, sine=wave)
-
-
-def _rank(scene: Scene) -> int:
-    values = singular_values(scene)
-    return int(np.sum(values > RANK * values[0]))

@@ -6,8 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from crosscheck.judge.constraints import initial_poses, jacobian
-from crosscheck.judge.tolerances import RANK
+from crosscheck.judge.gauss_principle import rank
 from mbref import rotations
 from mbref.scene import (
     JOINT_TYPES,
@@ -78,11 +77,7 @@ def undetermined() -> Scene:
 
 def is_undetermined(scene: Scene) -> bool:
     """Whether a scene has neither masses nor drivers that prescribe its motion."""
-    if scene.has_mass():
-        return False
-    rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
-    values = np.linalg.svd(rows, compute_uv=False) if len(rows) else np.zeros(1)
-    return int(np.sum(values > RANK * values[0])) < 6 * len(scene.body)
+    return not scene.has_mass() and rank(scene) < 6 * len(scene.body)
 
 
 def massless(scene: Scene) -> Scene:

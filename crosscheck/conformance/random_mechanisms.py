@@ -10,7 +10,7 @@ import numpy as np
 from crosscheck.conformance.families import best_family
 from crosscheck.engine import engine
 from crosscheck.judge.constraints import initial_poses, jacobian
-from crosscheck.judge.gauss_principle import bias, gauss, singular_values, stacked
+from crosscheck.judge.gauss_principle import gauss, goes_on, rank_of, singular_values, stacked
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
 from mbref.scene import (
@@ -68,7 +68,7 @@ def compare(scene: Scene, engines: Sequence[str]) -> Comparison:
     and by Gauss's principle with the judge's own equations, against mbref's; runs in this process."""
     reference = initial_accelerations(scene, REFERENCE)
     values = singular_values(scene)
-    rank = int(np.sum(values > RANK * values[0]))
+    rank = rank_of(values)
     if reference is None:
         raise RuntimeError(f"{scene.name}: mbref gives no initial acceleration")
     scale = np.linalg.norm(reference, axis=-1).max()
@@ -141,11 +141,7 @@ class _Drawing:
             for body, x in zip(self.bodies, twists, strict=True)
         ]
         scene = scene.with_(body=tuple(moving))
-        coasting = bias(scene)
-        rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
-        left = rows @ np.linalg.lstsq(rows, coasting, rcond=RANK)[0] - coasting
-        size = max(1.0, float(np.linalg.norm(coasting)))
-        return scene if np.linalg.norm(left) <= CONTINUES * size else None
+        return scene if goes_on(scene, CONTINUES) else None
 
     def loads(self) -> tuple[Moment | Force | Spring, ...]:
         first, second = self.rng.choice(len(self.bodies), 2, replace=False)

@@ -28,7 +28,7 @@ class Runner(Protocol):
         """The engine's name."""
 
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
-        """Version, what the engine cannot do with the scene, and else its settings, or those of a family."""
+        """Version, the reason of a refusal, and else the settings of the engine, or those of a family."""
 
     def cannot(self, scene: Scene) -> Cannot | None:
         """What the engine cannot do with the scene."""

@@ -218,7 +218,7 @@ class Bench:
 
 
 def set_up(runner: Runner, specimen: Specimen, family: str = "") -> Bench:
-    """A bench with what the engine says of the specimen, in its best family or the one named; raises
+    """A bench with the engine's answer to the specimen, in its best family or the one named; raises
     ChildFailed when the engine cannot even say."""
     version, cannot, settings = runner.offers(specimen.scene, family)
     return Bench(runner, specimen, version, cannot, best_family(settings), family)

@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 
 from crosscheck.judge.constraints import closure_accelerations, inertia_matrices, initial_twists, jacobian
 from crosscheck.judge.energy import kinetic_energy
-from crosscheck.judge.gauss_principle import singular_values
+from crosscheck.judge.gauss_principle import rank as rank_at_start
 from crosscheck.judge.loads import Motion, wrenches
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
@@ -39,7 +39,7 @@ def gauss_motion(scene: Scene, times: tuple[float, ...], rtol: float = RTOL) -> 
     orientation = np.array([body.orientation for body in scene.body])
     parts = (position, orientation, velocity, spin, np.zeros(len(_springs(scene))))
     start = np.concatenate([np.ravel(part) for part in parts])
-    rank = _rank(scene)
+    rank = rank_at_start(scene)
     if times[-1] == 0:
         return _trajectory(scene, np.array(times), np.repeat(start[None], len(times), axis=0), rank)
     done = solve_ivp(
@@ -48,12 +48,6 @@ def gauss_motion(scene: Scene, times: tuple[float, ...], rtol: float = RTOL) -> 
     if not done.success:
         raise RuntimeError(f"{scene.name}: {done.message}")
     return _trajectory(scene, done.t, done.y.T, rank)
-
-
-def _rank(scene: Scene) -> int:
-    """Rank of the rows of joints and drivers at the start."""
-    values = singular_values(scene) if scene.joint else np.zeros(0)
-    return int(np.sum(values > RANK * values.max(initial=0.0)))
 
 
 def accelerations(scene: Scene, t: float, state: State, rank: int | None = None) -> np.ndarray:

@@ -18,7 +18,7 @@ from mbref import rotations
 from mbref.scene import Scene, TorsionSpring
 from mbref.trajectory import Trajectory
 
-CONTINUES = 1e-8  # of the accelerations: what a mobility of the instant, which stops at once, leaves
+CONTINUES = 1e-8  # of the accelerations: residual of a mobility of the instant, which stops at once
 NO_AXIS = np.zeros(3)  # no shared axis of turning: torsion springs are added here
 
 
@@ -77,6 +77,16 @@ def singular_values(scene: Scene) -> np.ndarray:
     return np.linalg.svd(scaled / np.linalg.norm(scaled, axis=1, keepdims=True), compute_uv=False)
 
 
+def rank_of(values: np.ndarray) -> int:
+    """How many singular values (k,) are more than rounding beside the largest."""
+    return int(np.sum(values > RANK * values.max(initial=0.0)))
+
+
+def rank(scene: Scene) -> int:
+    """Rank of the rows of joints and drivers at t = 0."""
+    return rank_of(singular_values(scene)) if scene.joint else 0
+
+
 def bias(scene: Scene) -> np.ndarray:
     """Acceleration residuals (rows,) of the bodies coasting: J a must be minus these."""
     pose, rates = initial_poses(scene), initial_twists(scene)
@@ -85,12 +95,13 @@ def bias(scene: Scene) -> np.ndarray:
     return np.concatenate([np.zeros(0), *rows.values()])
 
 
-def goes_on(scene: Scene) -> bool:
-    """Whether accelerations exist that keep the velocities on the joints: no mobility of the instant."""
+def goes_on(scene: Scene, within: float = CONTINUES) -> bool:
+    """Whether accelerations exist that keep the velocities on the joints, ``within`` a part of the least that
+    the joints ask for: no mobility of the instant."""
     rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
     coasting = bias(scene)
     left = rows @ np.linalg.lstsq(rows, coasting, rcond=RANK)[0] - coasting if len(rows) else coasting
-    return bool(np.linalg.norm(left) <= CONTINUES * max(1.0, float(np.linalg.norm(coasting))))
+    return bool(np.linalg.norm(left) <= within * max(1.0, float(np.linalg.norm(coasting))))
 
 
 def stacked(scene: Scene, run: Trajectory, sample: int) -> np.ndarray:

@@ -40,7 +40,7 @@ def tuned(cases: Sequence[Case], level: float, run: Callable[[Sequence[Case]], l
 
 
 def _reaches(record: Record, level: float) -> bool:
-    """Whether a run is known to be so near: errors below what the truth may be off tell no more."""
+    """Whether a run is known to be so near: an error below the bound of the truth tells no more."""
     bound = record["metrics"].get("error_bound") or 0.0
     return is_completed(record) and max(error(record), bound) <= level
 

@@ -39,7 +39,7 @@ def render(scene_runs: SceneRuns) -> list[Block]:
 
 def _looked(scene_runs: SceneRuns) -> Run | None:
     passed = [r for r in scene_runs.best().values() if r.completed and r.record.get("crossings")]
-    return min(passed, key=lambda r: (r.error != r.error, r.error), default=None)
+    return min(passed, key=lambda run: run.by_error, default=None)
 
 
 def _open_reactions(run: Run) -> Iterator[str]:

@@ -48,7 +48,7 @@ def _best(scene_runs: SceneRuns) -> dict[str, Run]:
     for run in scene_runs.best().values():
         engine = run.curve[0]
         if run.completed and run.record["reactions"]:
-            best[engine] = min(best.get(engine, run), run, key=lambda r: (r.error != r.error, r.error))
+            best[engine] = min(best.get(engine, run), run, key=lambda r: r.by_error)
     return best
 
 

@@ -94,7 +94,7 @@ def _row(group: SceneRuns) -> dict[str, list[Verdict]]:
     found: dict[str, list[Verdict]] = {}
     for engine in dict.fromkeys(engine for engine, _ in best):
         own = [run for (name, _), run in best.items() if name == engine]
-        first = min(own, key=lambda run: (not run.completed, run.error != run.error, run.error))
+        first = min(own, key=lambda run: (not run.completed, run.by_error))
         others = [run for run in own if run.curve[1] == DEFAULTS and run is not first]
         found[engine] = [_verdict(group, run) for run in (first, *others)]
     return found

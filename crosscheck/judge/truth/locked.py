@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck.judge import constraints
-from crosscheck.judge.tolerances import FREEDOM, TRUTH_DRIVEN
-from crosscheck.judge.truth.one_dof import trajectory
+from crosscheck.judge.tolerances import TRUTH_DRIVEN
+from crosscheck.judge.truth.one_dof import freedoms_at, trajectory
 from mbref import rotations
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
@@ -33,9 +33,7 @@ class Locked:
 
 def locked(scene: Scene) -> Locked | None:
     """The truth of a scene whose rows have full column rank at the start, or None."""
-    if scene.driver or not scene.joint:
+    rows = sum(len(lengths) for lengths in constraints.length_rows(scene).values())
+    if scene.driver or rows < 6 * len(scene.body):
         return None
-    rows, _ = constraints.jacobian(scene, 0.0, *constraints.initial_poses(scene))
-    values = np.linalg.svd(rows, compute_uv=False)
-    rank = int(np.sum(values > FREEDOM * values.max(initial=1.0)))
-    return Locked(scene) if rank == 6 * len(scene.body) else None
+    return None if freedoms_at(scene, *constraints.initial_poses(scene)) else Locked(scene)

@@ -200,10 +200,15 @@ def _fits(scene: Scene, path: Path) -> bool:
         return False
     residuals = constraints.closure(undriven, np.zeros(len(PROBES)), pose.position, orientation)
     gap = max((np.abs(r).max() for r in residuals.values()), default=0.0)
-    j, _ = constraints.jacobian(undriven, 0.0, pose.position[1].astype(float), orientation[1])
-    values = np.linalg.svd(j, compute_uv=False)
-    rank = int(np.sum(values > FREEDOM * values.max(initial=1.0)))
-    return gap <= ON_PATH * max(length, 1.0) and rank == 6 * len(scene.body) - 1
+    freedoms = freedoms_at(undriven, pose.position[1].astype(float), orientation[1])
+    return gap <= ON_PATH * max(length, 1.0) and freedoms == 1
+
+
+def freedoms_at(scene: Scene, position: np.ndarray, orientation: np.ndarray) -> int:
+    """Freedoms that the rows of a scene without drivers leave at a pose (nb, 3), (nb, 4)."""
+    rows, _ = constraints.jacobian(scene, 0.0, position, orientation)
+    values = np.linalg.svd(rows, compute_uv=False)
+    return 6 * len(scene.body) - int(np.sum(values > FREEDOM * values.max(initial=1.0)))
 
 
 def _torsion_angles_known(scene: Scene, path: Path) -> bool:
