@@ -53,9 +53,9 @@ def violation_rate(v, equations):
 
 
 @kernel
-def assemble_jacobian(equations):
-    """The blocks of Φ_q as a matrix (m, n), where the system has one."""
-    bodies, blocks, dense = equations.scene.row_bodies, equations.system.blocks, equations.system.jacobian
+def assemble_jacobian(equations, dense):
+    """The blocks of Φ_q as the matrix ``dense`` (m, n); a matrix without rows stays so."""
+    bodies, blocks = equations.scene.row_bodies, equations.system.blocks
     dense[:] = 0.0
     for row in range(dense.shape[0]):
         for side in range(2):
@@ -101,5 +101,5 @@ def assemble_system(t, q, v, equations):
     """The system M q̈ + Φ_qᵀ λ = g, Φ_q q̈ = rhs at (t, q, v), which the formulation then solves."""
     equations.system.counts.evaluations += 1
     evaluate(t, q, v, equations)
-    assemble_jacobian(equations)
+    assemble_jacobian(equations, equations.system.jacobian)
     right_hand_side(v, equations)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mbref import rotations
+from mbref.equations.diagnosis import scaled_jacobian
 from mbref.equations.model import Model
-from mbref.equations.units import row_lengths
 
 MOST_ROWS = 120  # singular values of more rows at every sample take longer than the run
 OPEN = 1e-6  # singular value, to the largest, of a combination of unit rows that counts as vanished
@@ -41,21 +41,17 @@ def reactions(
     return found
 
 
-def open_dimensions(
-    model: Model, times: np.ndarray, q: np.ndarray, v: np.ndarray
-) -> dict[str, np.ndarray] | None:
+def open_dimensions(model: Model, times: np.ndarray, q: np.ndarray) -> dict[str, np.ndarray] | None:
     """Per joint the dimensions (k,) of its reaction that equilibrium does not determine at each sample.
 
     Redundant rows leave reactions open always, a singular position where the motion passes it: there a
     combination of rows vanishes, a left null vector of Φ_q (Wojtyra, J. Theor. Appl. Mech. 43, 2005).  From
-    q (k, nb, 7), v (k, nb, 6) at times (k,); None where the scene has no masses, or more than MOST_ROWS rows.
+    q (k, nb, 7) at times (k,); None where the scene has no masses, or more than MOST_ROWS rows.
     """
     if model.kinematic or model.m > MOST_ROWS:
         return None
-    rows = [model.terms(t, q[k].ravel(), v[k].ravel()).jacobian for k, t in enumerate(times)]
-    jacobian = np.array(rows).reshape(len(times), model.m, model.n)
-    lengths = row_lengths(jacobian.reshape(-1, model.n)).reshape(len(times), model.m, 1)
-    left, values, _ = np.linalg.svd(jacobian / lengths)
+    rows = [scaled_jacobian(model, t, q[k].ravel()) for k, t in enumerate(times)]
+    left, values, _ = np.linalg.svd(np.array(rows).reshape(len(times), model.m, model.n))
     rank = np.sum(values > OPEN * values.max(axis=1, initial=0.0)[:, None], axis=1)
     vanishing = left * (np.arange(model.m) >= rank[:, None])[:, None, :]
     of_joint = np.array(model.row_joint)

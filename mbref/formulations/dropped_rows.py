@@ -18,14 +18,13 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from mbref.formulations.base import Dense, Formulation
+from mbref.formulations.lm2 import factor_schur_complement
 from mbref.formulations.moore_penrose import transpose
 from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import ACCELERATE, OK, SINGULAR
 from mbref.kernels.named_memory import Indices, Matrix, Vector, opener
-from mbref.linear_algebra.elimination import cholesky_factor, cholesky_solve, gram
+from mbref.linear_algebra.elimination import cholesky_solve
 from mbref.linear_algebra.orthogonal_factorisations import equilibrate, qr_pivoted
-
-SINGULAR_PIVOT = 1e-11  # of its diagonal entry, as in lm2
 
 
 class Choice(NamedTuple):
@@ -72,15 +71,9 @@ def solve_kept_rows(system, scratch):
             return SINGULAR
         acceleration[j] = system.force[j] / system.mass[j]
     put_kept_rows(system, scratch)
-    gram(scratch.transposed, s)
-    for k in range(rank):
-        scratch.work[k] = s[k, k]
     system.counts.factorisations += 1
-    if not cholesky_factor(s, rank):
+    if not factor_schur_complement(rank, scratch.transposed, s, scratch.work):
         return SINGULAR
-    for k in range(rank):
-        if not s[k, k] * scratch.work[k] < 1.0 / SINGULAR_PIVOT:
-            return SINGULAR
     cholesky_solve(s, rank, b)
     system.multipliers[:] = 0.0
     for k in range(rank):

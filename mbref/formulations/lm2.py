@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from mbref.formulations.base import Dense, Formulation
-from mbref.kernels.compilation import exchangeable
+from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import ACCELERATE, OK, SINGULAR
 from mbref.kernels.named_memory import Matrix, Vector, opener
 from mbref.linear_algebra.elimination import cholesky_factor, cholesky_solve, gram
@@ -30,6 +30,20 @@ class Scratch(NamedTuple):
 scratch_of = opener(Scratch)
 
 
+@kernel
+def factor_schur_complement(rows, dt, s, diagonal):
+    """The factor of Φ_q M⁻¹ Φ_qᵀ from the first columns of M^(-1/2) Φ_qᵀ; False where rows are dependent."""
+    gram(dt, s)
+    for i in range(rows):
+        diagonal[i] = s[i, i]
+    if not cholesky_factor(s, rows):
+        return False
+    for i in range(rows):  # noqa: SIM110 - kernels have no generators
+        if not s[i, i] * diagonal[i] < 1.0 / SINGULAR_PIVOT:
+            return False
+    return True
+
+
 @exchangeable(ACCELERATE)
 def accelerate(system):
     scratch, jacobian, acceleration = scratch_of(system.scratch), system.jacobian, system.acceleration
@@ -44,15 +58,9 @@ def accelerate(system):
         for i in range(m):
             b[i] += jacobian[i, j] * acceleration[j]
             dt[j, i] = jacobian[i, j] * system.inverse_root[j]
-    gram(dt, s)
-    for i in range(m):
-        diagonal[i] = s[i, i]
     system.counts.factorisations += 1
-    if not cholesky_factor(s, m):
+    if not factor_schur_complement(m, dt, s, diagonal):
         return SINGULAR
-    for i in range(m):
-        if not s[i, i] * diagonal[i] < 1.0 / SINGULAR_PIVOT:
-            return SINGULAR
     cholesky_solve(s, m, b)
     for j in range(n):
         for i in range(m - 1, -1, -1):  # the solution's last entry is found first

@@ -20,10 +20,8 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from numpy import sqrt
-
 from mbref.equations.coordinates import contract, displace
-from mbref.equations.evaluation import assemble_system
+from mbref.equations.evaluation import assemble_jacobian, assemble_system
 from mbref.formulations import alf
 from mbref.integrators.base import Integrator
 from mbref.integrators.one_step import propose
@@ -31,6 +29,7 @@ from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import NOT_CONVERGED, OK, SINGULAR, STEP
 from mbref.kernels.named_memory import Vector, opener
 from mbref.linear_algebra.elimination import cholesky_factor
+from mbref.linear_algebra.orthogonal_factorisations import equilibrate
 from mbref.linear_algebra.vectors import copy, largest
 
 ALPHA = 1e5  # α_unit: an iteration leaves about 1 / ALPHA of a violation; rounding grows by ALPHA
@@ -88,23 +87,12 @@ def put_trial_state(h, memory):
 @kernel
 def factorise(equations, scratch):
     """D = Φ_q M^(-1/2) in unit rows, and the factor of 1 + α_unit Dᵀ D; False where it does not exist."""
-    bodies, blocks, root = equations.scene.row_bodies, equations.system.blocks, equations.system.inverse_root
-    d, n = scratch.augmented.d, root.shape[0]
-    d[:] = 0.0
-    for row in range(d.shape[0]):
-        square = 0.0
-        for side in range(2):
-            start = 6 * bodies[row, side]
-            if start < n:
-                for k in range(6):
-                    d[row, start + k] = blocks[row, 6 * side + k] * root[start + k]
-                    square += d[row, start + k] * d[row, start + k]
-        scratch.row_scale[row] = 1.0 / sqrt(square) if square > 0.0 else 1.0
-        for j in range(n):
-            d[row, j] *= scratch.row_scale[row]
+    d, root = scratch.augmented.d, equations.system.inverse_root
+    assemble_jacobian(equations, d)
+    equilibrate(d, root, d, scratch.row_scale)
     alf.augmented(equations.system.mass, root, d, ALPHA, scratch.augmented.matrix)
     equations.system.counts.factorisations += 1
-    return cholesky_factor(scratch.augmented.matrix, n)
+    return cholesky_factor(scratch.augmented.matrix, root.shape[0])
 
 
 @kernel

@@ -49,7 +49,7 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion
         bodies=tuple(body.name for body in run.scene.body),
         **model.motion(q, v, a),
         reactions=reactions(model, run.times[:reached], q, v, multipliers),
-        open_reactions=open_dimensions(model, run.times[:reached], q, v),
+        open_reactions=open_dimensions(model, run.times[:reached], q),
         outcome=OUTCOMES[status],
         t_end=float(loop.clock.time),
         message=_message(run, status),

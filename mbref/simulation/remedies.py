@@ -5,6 +5,7 @@ from __future__ import annotations
 from mbref.equations.diagnosis import counts
 from mbref.formulations import FORMULATIONS
 from mbref.kernels.layout import NOT_CONVERGED, SINGULAR
+from mbref.method import DEFAULT, SHORT
 from mbref.simulation.run import Run
 from mbref.simulation.stepping import LEFT_MOTION, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED, VIOLATED
 
@@ -14,7 +15,7 @@ BY_STATUS = {
     UNDECIDED: "a smaller rtol may tell the branch; --branch asks for one",
     LEFT_MOTION: FOLLOWS,
 }
-DEFAULTS = ("alf-dual+projection/dop853", "alf-dual+projection/taylor")
+FOLLOWING = (DEFAULT, SHORT["taylor"])
 
 
 def remedy(run: Run, status: int) -> str:
@@ -66,6 +67,6 @@ def _of_iteration(run: Run) -> str:
 
 
 def _of_steps(run: Run) -> str:
-    if str(run.method) in DEFAULTS or not run.model.closed_loops:
+    if str(run.method) in FOLLOWING or not run.model.closed_loops:
         return "mbref diagnose tells how near the motion comes to a singular position"
     return FOLLOWS

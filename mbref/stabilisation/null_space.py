@@ -22,12 +22,14 @@ from typing import Annotated, NamedTuple
 from numpy import sqrt
 
 from mbref.equations.coordinates import coordinate_rates, normalise
-from mbref.equations.evaluation import assemble_system, evaluate
+from mbref.equations.evaluation import assemble_jacobian, assemble_system, evaluate
+from mbref.formulations.moore_penrose import transpose
 from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import ACCEPT, CHANGED, ENTER, OK, RATES, SINGULAR
 from mbref.kernels.named_memory import Indices, Matrix, Vector, opener
 from mbref.linear_algebra.orthogonal_factorisations import (
     apply_reflectors,
+    equilibrate,
     gram_schmidt,
     minimum_norm,
     qr_pivoted,
@@ -48,6 +50,8 @@ class Freedoms(NamedTuple):
 class Scratch(NamedTuple):
     """The bordered system, its factors, and the basis of the tangent space by rows."""
 
+    d: Annotated[Matrix, "m", "n"]  # Φ_q R with rows of unit length
+    row_scale: Annotated[Vector, "m"]
     transposed: Annotated[Matrix, "n", "m + n"]
     order: Annotated[Indices, "m + n"]
     tau: Annotated[Vector, "m + n"]
@@ -68,21 +72,13 @@ scratch_of = opener(Scratch)
 def put_bordered_system(memory):
     """[R Φ_qᵀ  Z₀] (n, m + n) with unit rows of Φ_q, and ν, at the state last evaluated; its factors."""
     equations, scratch = memory.equations, scratch_of(memory.chart)
-    bodies, blocks, root = equations.scene.row_bodies, equations.system.blocks, equations.scene.metric_root
-    a, n, m = scratch.transposed, root.shape[0], bodies.shape[0]
-    a[:] = 0.0
-    for row in range(m):
-        square = 0.0
-        for side in range(2):
-            start = 6 * bodies[row, side]
-            if start < n:
-                for k in range(6):
-                    a[start + k, row] = blocks[row, 6 * side + k] * root[start + k]
-                    square += a[start + k, row] * a[start + k, row]
-        scale = 1.0 / sqrt(square) if square > 0.0 else 1.0
-        scratch.b[row] = scale * equations.rows.nu[row]
-        for j in range(n):
-            a[j, row] *= scale
+    a, d, scale = scratch.transposed, scratch.d, scratch.row_scale
+    m, n = d.shape
+    assemble_jacobian(equations, d)
+    equilibrate(d, equations.scene.metric_root, d, scale)
+    transpose(d, a)
+    for i in range(m):
+        scratch.b[i] = scale[i] * equations.rows.nu[i]
     for k in range(n):
         for j in range(n):
             a[j, m + k] = scratch.tangent[k, j]
