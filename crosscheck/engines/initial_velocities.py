@@ -18,13 +18,16 @@ RANK_TOLERANCE = 1e-9  # relative to the largest singular value
 
 def lacks_mass(scene: Scene) -> Cannot | None:
     """The refusal of a scene without masses whose drivers leave some of the motion open; None of others."""
-    if scene.has_mass():
-        return None
-    rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
-    if np.linalg.matrix_rank(rows, RANK_TOLERANCE) == 6 * len(scene.body):
+    if scene.has_mass() or not may_move_freely(scene):
         return None
     without = ", ".join(body.name for body in scene.body if body.mass is None)
     return Cannot(Owner.MODEL, f"the drivers do not prescribe the whole motion, and {without} has no mass")
+
+
+def may_move_freely(scene: Scene) -> bool:
+    """Whether joints and drivers leave some of the motion open at t = 0."""
+    rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
+    return bool(np.linalg.matrix_rank(rows, RANK_TOLERANCE) < 6 * len(scene.body))
 
 
 def initial_rates(scene: Scene, tree: Tree) -> np.ndarray:

@@ -9,7 +9,8 @@ import pytest
 
 from crosscheck.conformance.drawn import mechanism
 from crosscheck.engine import Setting, engine
-from crosscheck.engines.mujoco.adapter import ADAPTIVE, ENGINE, HARD
+from crosscheck.engines.mujoco.adapter import ENGINE
+from crosscheck.engines.mujoco.families import ADAPTIVE, HARD, INTEGRATED_HERE, NEWTON
 from crosscheck.engines.mujoco.model import compiled
 from crosscheck.judge.metrics import order_of_convergence, violation_series
 from crosscheck.judge.truth import truth_for
@@ -164,12 +165,15 @@ def test_a_thin_disc_that_rounding_puts_beyond_the_triangle_is_accepted() -> Non
 
 @pytest.mark.parametrize("name", ["four_bar", "spatial_slider_crank_gravity"])
 def test_each_family_is_swept_from_coarse_to_fine(name: str) -> None:
-    sweep = engine("mujoco").settings(SCENES[name]())
-    families = ["defaults", "stock", "euler", "implicit", "tuned", "stiff", *ADAPTIVE]
+    scene = SCENES[name]()
+    sweep = engine("mujoco").settings(scene)
+    here = [family for family in INTEGRATED_HERE if scene.driver or family != NEWTON]
+    families = ["defaults", "stock", "euler", "implicit", "tuned", "stiff", *here]
     assert list(dict.fromkeys(s.family for s in sweep)) == families, f"families of {sweep}"
     assert any(s.options.get("step") == 2e-3 for s in sweep if s.family == "defaults"), "no default step"
     for family in families:
-        knob = [s.options["rtol" if family in ADAPTIVE else "step"] for s in sweep if s.family == family]
+        option = {NEWTON: "tolerance"}.get(family, "rtol" if family in INTEGRATED_HERE else "step")
+        knob = [s.options[option] for s in sweep if s.family == family]
         assert knob == sorted(set(knob), reverse=True) and len(knob) > 3, f"{family} sweeps {knob}"
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from crosscheck.engine import Setting, engine, engine_names
+from crosscheck.engines.mujoco.families import COMPILED
 from mbref.scenes import SCENES
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
@@ -63,6 +64,6 @@ def test_a_failed_run_is_no_candidate(grids):
 
 def test_families_integrated_by_crosscheck_are_families():
     named = {name: set(engine(name).integrated_here) for name in engine_names()}
-    assert named["mujoco"] == {"forward", "projected"}
+    assert named["mujoco"] == {"forward", "projected", *COMPILED}
     for name, families in named.items():
         assert families <= set(engine(name).families), name

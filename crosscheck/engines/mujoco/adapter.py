@@ -1,9 +1,5 @@
 """MuJoCo: joint coordinates, loops closed by soft equality constraints.
 
-The hardest closures that MuJoCo's documentation allows have a softness of 1e-4 of the inverse mass, its
-default ten times that.  Of the FAMILIES ``stiff`` costs an order of convergence, and brings
-a run through singular positions with less left of the closure errors that they magnify.
-
 A driver is an equality of one joint whose reference acceleration is rewritten at every evaluation.
 """
 
@@ -19,6 +15,19 @@ import numpy as np
 from crosscheck.engine import Cannot, Engine, Setting
 from crosscheck.engines.driver_motion import fastest_rate, motion, stated_rate
 from crosscheck.engines.initial_velocities import lacks_mass
+from crosscheck.engines.mujoco import compiled_run
+from crosscheck.engines.mujoco.families import (
+    ADAPTIVE,
+    COMPILED,
+    DEFAULT_STEP,
+    FAMILIES,
+    HARD,
+    INTEGRATED_HERE,
+    OPTIONS,
+    RK4,
+    STOCK,
+    sweep,
+)
 from crosscheck.engines.mujoco.model import SUPPORTS, compiled
 from crosscheck.engines.mujoco.projection import projected
 from crosscheck.engines.sampling import Adaptive, Counts, Failed, Sample, run_through, step_count
@@ -27,42 +36,10 @@ from mbref import rotations
 from mbref.scene import Driver, Scene
 from mbref.trajectory import Outcome, Trajectory
 
-HARD = 1e-8  # factor of the regulariser: its error is gone, and rounding does not yet take over
 CONVERGED, MOST_ITERATIONS = 1e-20, 50  # scaled gain of a Newton iteration; two or three are usual
-RK4 = "mjINT_RK4"
-STOCK = {"stock": RK4, "euler": "mjINT_EULER", "implicit": "mjINT_IMPLICIT",
-         "implicitfast": "mjINT_IMPLICITFAST"}  # fmt: skip
-BETA = 5.0  # double root of the closure errors, in fastest rates of the scene: survives singular passages
 STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance, as far as it is not clamped
-DEFAULT_STEP = 2e-3  # s
-STEPS = (0.15, 0.05, 0.015, 0.005, 0.0015)  # rad turned per step; 2 beta step stays below 2
-STIFF_STEPS = (0.015, 0.005, 0.0015, 0.0005)
-STIFF = 0.2  # double root of the stiff closures' errors, in 1/step
-RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10)  # finer ones get lost in the noise at singular positions
 TURN_PER_STEP = 0.25  # rad a driver may move within one adaptive step: closures can fold in between
-ADAPTIVE = {"forward": 1e-7, "projected": 1e-9}  # factor of the regulariser: less leaves noise to integrate
-LEAST_TURN = 0.03  # rad turned within the shortest adaptive step
-FAMILIES = {
-    "defaults": "the library's own options",
-    "stock": "closures as stiff as its documentation allows (time constant two steps, impedance 0.9999), RK4",
-    "euler": "stock closures, its first-order integrator Euler",
-    "implicit": "stock closures, its first-order integrator implicit",
-    "implicitfast": "stock closures, its first-order integrator implicitfast; only where a load damps",
-    "tuned": "the regulariser scaled away through invweight0, critically damped closures at five times the "
-    "fastest rate of the scene, RK4, Newton's method iterated to convergence",
-    "stiff": "the tuned model with closures as stiff as the step bears",
-    "forward": "the tuned model's accelerations (mj_forward) integrated by DOP853",
-    "projected": "as forward, every accepted state projected onto the closures",
-}
-OPTIONS = {
-    "step": "time step, s",
-    "rtol": "relative tolerance of a step",
-    "min_step": "shortest step, s",
-    "beta": "double root of the closure errors, 1/s",
-    "hard": "factor of the regulariser",
-}
 SCOUT_SAMPLES = 41  # of the coarse run that finds how fast a scene turns
-MAX_STEPS = 250_000
 
 
 class MuJoCo(Engine):
@@ -71,7 +48,7 @@ class MuJoCo(Engine):
     name = "mujoco"
     package = "mujoco"
     supports = SUPPORTS
-    families, options, integrated_here = FAMILIES, OPTIONS, tuple(ADAPTIVE)
+    families, options, integrated_here = FAMILIES, OPTIONS, INTEGRATED_HERE
 
     def version(self) -> str:
         """Version of MuJoCo; raises ImportError when it is not installed."""
@@ -85,21 +62,12 @@ class MuJoCo(Engine):
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
         """Fixed steps by the angle turned in one, adaptive ones by relative tolerance."""
-        rate = fastest_rate(scene, lambda step: self._coarse(scene, step))
-        beta, least = float(f"{BETA * rate:.2g}"), float(f"{LEAST_TURN / rate:.2g}")
-        steps, stiff = (_steps(scene, rate, angles) for angles in (STEPS, STIFF_STEPS))
-        plain = sorted({DEFAULT_STEP, *steps}, reverse=True)
-        return [
-            *(Setting("defaults", {"step": h}) for h in plain),
-            *(Setting(family, {"step": h}) for family in _stock(scene) for h in steps),
-            *(Setting("tuned", {"step": h, "beta": beta, "hard": HARD}) for h in steps),
-            *(Setting("stiff", {"step": h, "beta": float(f"{STIFF / h:.2g}"), "hard": HARD}) for h in stiff),
-            *(
-                Setting(family, {"rtol": r, "min_step": least, "beta": beta, "hard": hard})
-                for family, hard in ADAPTIVE.items()
-                for r in RTOLS
-            ),
-        ]
+        return sweep(scene, fastest_rate(scene, lambda step: self._coarse(scene, step)))
+
+    def prepare(self, families: Sequence[str]) -> None:
+        """Compile what the compiled family runs."""
+        if set(COMPILED) & set(families):
+            compiled_run.prepare()
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         """Simulate; raises ValueError for a family it does not have."""
@@ -107,25 +75,15 @@ class MuJoCo(Engine):
         run = _MujocoSimulation(scene, setting)
         labels = {"engine": self.name, "version": self.version(), "method": setting.family,
                   "settings": dict(setting.options)}  # fmt: skip
-        built = time.process_time() - start
         with run.installed(), np.errstate(all="ignore"):
+            if setting.family in COMPILED:
+                return run.integrated(times, start, labels)
+            built = time.process_time() - start
             return run_through(scene, times, run.advance, run.sample, run.counts, built, labels)
 
     def _coarse(self, scene: Scene, step: float) -> Trajectory:
         times = np.linspace(0, scene.duration, SCOUT_SAMPLES)
         return self.run(scene, times, Setting("tuned", {"step": step, "beta": 0.5 / step, "hard": HARD}))
-
-
-def _stock(scene: Scene) -> list[str]:
-    """The families of stock closures whose integrators differ on the scene."""
-    is_damped = any(load.is_damped for load in scene.load)
-    return [family for family in STOCK if is_damped or family != "implicitfast"]
-
-
-def _steps(scene: Scene, rate: float, angles: Sequence[float]) -> list[float]:
-    """Steps (s) that turn by the angles (rad) at a rate (rad/s), as far as they are not too many."""
-    steps = [float(f"{angle / rate:.2g}") for angle in angles]
-    return [h for h in steps if scene.duration / h <= MAX_STEPS] or steps[:1]
 
 
 class _MujocoSimulation:
@@ -134,7 +92,7 @@ class _MujocoSimulation:
     def __init__(self, scene: Scene, setting: Setting):
         import mujoco
 
-        self.mujoco, self.scene = mujoco, scene
+        self.mujoco, self.scene, self.setting = mujoco, scene, setting
         self.compiled = compiled(scene)
         self.model = self.compiled.model
         self.counts = Counts()
@@ -157,13 +115,16 @@ class _MujocoSimulation:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
         if setting.family in STOCK:
             model.eq_solref[:], model.eq_solimp[:] = (2 * self.nominal, 1.0), STIFFEST
-        elif setting.family in ("tuned", "stiff", *ADAPTIVE):
-            self._harden(options["beta"], options["hard"])
+        elif setting.family in ("tuned", "stiff", *INTEGRATED_HERE):
+            self._harden(options.get("beta", 0.0), options.get("hard", HARD))
         else:
             raise ValueError(f"mujoco has no family {setting.family!r}")
-        if setting.family in ADAPTIVE:
-            limit = TURN_PER_STEP / stated_rate(scene) if scene.driver else np.inf
-            limits = (options["min_step"], limit)
+        turn = options.get("turn", TURN_PER_STEP)
+        self.longest = turn / stated_rate(scene) if scene.driver else np.inf
+        if setting.family in COMPILED:
+            compiled_run.leave_out_unused(mujoco, model)
+        elif setting.family in ADAPTIVE:
+            limits = (options["min_step"], self.longest)
             settle = self._settle if setting.family == "projected" else None
             self.adaptive = Adaptive(self._rhs, settle, options["rtol"], *limits, self.counts)
             self.step = self._adaptively
@@ -189,6 +150,13 @@ class _MujocoSimulation:
         finally:
             mujoco.set_mjcb_control(None)
             mujoco.set_mju_user_warning(None)
+
+    def integrated(self, times: np.ndarray, start: float, labels: dict[str, Any]) -> Trajectory:
+        """The run of the compiled family; its construction began at ``start`` (s of process time)."""
+        family, options = self.setting.family, self.setting.options
+        run = compiled_run.compiled_run(self.scene, self.compiled, self.data, family, options, self.longest)
+        built = time.process_time() - start
+        return run.trajectory(self.scene, times, self.sample, built, labels)
 
     def _rows(self, equality: int) -> np.ndarray:
         """The constraint rows of an equality, at this step: MuJoCo leaves out those that nothing moves."""

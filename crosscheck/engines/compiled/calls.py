@@ -1,0 +1,108 @@
+"""C functions called by address from compiled code.
+
+An address is a number, so that compiled code keeps none of this process's addresses and can be cached.
+Without compilation (NUMBA_DISABLE_JIT) ctypes makes the calls.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+from llvmlite import ir
+from numba import config, types
+from numba.extending import intrinsic
+
+POINTER, REAL = ctypes.c_void_p, ctypes.c_double
+INTEGER = ir.IntType(types.intp.bitwidth)
+RATES = ctypes.CFUNCTYPE(ctypes.c_int32, POINTER, REAL, POINTER, POINTER)
+"""int rates(void *context, double t, double *y, double *rates): 0, or why there are none at y"""
+
+
+def _called(context: Any, builder: Any, address: Any, result: Any, arguments: list[Any]) -> Any:
+    """The call of the function at an integer address with integers as pointers, in LLVM."""
+    kinds = [argument.type for argument in arguments]
+    pointer = ir.PointerType(ir.FunctionType(result, kinds))
+    return builder.call(builder.inttoptr(address, pointer), arguments)
+
+
+@intrinsic
+def _rates_of(typing: Any, address: Any, context: Any, t: Any, y: Any, rates: Any) -> Any:
+    """The call of a RATES function."""
+
+    def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
+        return _called(target, builder, arguments[0], ir.IntType(32), arguments[1:])
+
+    return types.int32(types.intp, types.intp, types.float64, types.intp, types.intp), code
+
+
+@intrinsic
+def call_with_two(typing: Any, address: Any, first: Any, second: Any) -> Any:
+    """The call of ``void function(void *first, void *second)``."""
+
+    def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
+        _called(target, builder, arguments[0], ir.VoidType(), arguments[1:])
+        return target.get_dummy_value()
+
+    return types.void(types.intp, types.intp, types.intp), code
+
+
+@intrinsic
+def call_with_three(typing: Any, address: Any, first: Any, second: Any, third: Any) -> Any:
+    """The call of ``void function(void *first, void *second, void *third)``."""
+
+    def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
+        _called(target, builder, arguments[0], ir.VoidType(), arguments[1:])
+        return target.get_dummy_value()
+
+    return types.void(types.intp, types.intp, types.intp, types.intp), code
+
+
+@intrinsic
+def call_with_three_and_real(
+    typing: Any, address: Any, first: Any, second: Any, third: Any, real: Any
+) -> Any:
+    """The call of ``void function(void *first, void *second, void *third, double real)``."""
+
+    def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
+        _called(target, builder, arguments[0], ir.VoidType(), arguments[1:])
+        return target.get_dummy_value()
+
+    return types.void(types.intp, types.intp, types.intp, types.intp, types.float64), code
+
+
+@intrinsic
+def small_integers(typing: Any, address: Any) -> Any:
+    """The pointer to integers of 32 bits at an integer address."""
+
+    def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
+        return builder.inttoptr(arguments[0], target.get_value_type(signature.return_type))
+
+    return types.CPointer(types.int32)(types.intp), code
+
+
+@intrinsic
+def reals(typing: Any, address: Any) -> Any:
+    """The pointer to numbers at an integer address."""
+
+    def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
+        return builder.inttoptr(arguments[0], target.get_value_type(signature.return_type))
+
+    return types.CPointer(types.float64)(types.intp), code
+
+
+@intrinsic
+def integers(typing: Any, address: Any) -> Any:
+    """The pointer to integers at an integer address."""
+
+    def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
+        return builder.inttoptr(arguments[0], target.get_value_type(signature.return_type))
+
+    return types.CPointer(types.intp)(types.intp), code
+
+
+def _plain_rates_of(address: int, context: int, t: float, y: int, rates: int) -> int:
+    return int(RATES(address)(context, t, y, rates))
+
+
+rates_of = _plain_rates_of if config.DISABLE_JIT else _rates_of

@@ -1,0 +1,236 @@
+"""DOP853 from sample to sample, compiled, around a C function that gives the rates of a state.
+
+The 8(5,3) pair of Dormand and Prince (Hairer, Nørsett & Wanner, Solving Ordinary Differential Equations I,
+2nd edition, 1993, section II.5) with the step control that costs the fewest evaluations on mechanisms: the
+error is the largest over the components, the step's factor 0.8 error^(-1/8), between 0.2 and 100.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from scipy.integrate._ivp import dop853_coefficients as tableau
+
+from crosscheck.engines.compiled.calls import rates_of
+
+STAGES = tableau.N_STAGES
+A = np.ascontiguousarray(tableau.A[:STAGES, :STAGES])
+B, C = tableau.B.copy(), tableau.C[:STAGES].copy()
+ERROR3, ERROR5 = tableau.E3[:STAGES].copy(), tableau.E5[:STAGES].copy()
+
+SAFETY, SHRINK, GROW, RETRY = 0.8, 0.2, 100.0, 0.25
+ORDER = 8
+STRETCH = 1e-9  # by which a step may be longer to end at a sample
+SMALLEST = 1e-14  # step over the last sample's time, below which a run has failed
+JUMPS, LONGEST_JUMP = 16, 4.0  # lengths tried where the shortest step fails, the longest in shortest steps
+
+REACHED, NOT_FINITE, TOO_SMALL, TOO_MANY, REFUSED = range(5)  # how the way to a sample ends
+STEPS, REJECTED, EVALUATIONS = range(3)  # places of the counts
+
+
+class System(NamedTuple):
+    """The C function of the rates with its context, and the tolerances of a run."""
+
+    function: int  # address of ``int rates(void *context, double t, double *y, double *rates)``
+    context: int
+    quaternions: np.ndarray  # first places of unit quaternions within the state
+    rtol: float
+    atol: float
+    shortest: float  # s; taken whatever its error
+    longest: float  # s
+    most_steps: int
+    settle: int  # address of a C function that corrects an accepted state in place; or 0
+
+
+class Memory(NamedTuple):
+    """Numbers that a run keeps; n is the length of the state."""
+
+    y: np.ndarray  # (n,) the accepted state
+    slopes: np.ndarray  # (STAGES, n)
+    new: np.ndarray  # (n,)
+    errors: np.ndarray  # (2, n)
+    clock: np.ndarray  # time reached, step to be tried
+    counts: np.ndarray  # STEPS, REJECTED, EVALUATIONS
+
+
+def memory(y: np.ndarray) -> Memory:
+    """The memory of a run from a state (n,)."""
+    n = len(y)
+    return Memory(
+        y.copy(), np.zeros((STAGES, n)), np.zeros(n), np.zeros((2, n)), np.zeros(2), np.zeros(3, np.int64)
+    )
+
+
+@njit(cache=True)
+def is_finite(y):
+    """Whether all numbers are finite, and their sum too."""
+    return math.isfinite(np.sum(y))
+
+
+@njit(cache=True)
+def evaluate(system, t, y, rates, memory):
+    """Rates of a state; REACHED, NOT_FINITE, or REFUSED by the function."""
+    memory.counts[EVALUATIONS] += 1
+    if not is_finite(y):
+        return NOT_FINITE
+    if rates_of(system.function, system.context, t, y.ctypes.data, rates.ctypes.data) != 0:
+        return REFUSED
+    return REACHED if is_finite(rates) else NOT_FINITE
+
+
+@njit(cache=True)
+def add_slopes(weights, count, factor, slopes, total):
+    """total += factor Σ_s weights[s] slopes[s]; zero weights cost nothing."""
+    for s in range(count):
+        if weights[s] != 0.0:
+            weight = factor * weights[s]
+            for i in range(total.shape[0]):
+                total[i] += weight * slopes[s, i]
+
+
+@njit(cache=True)
+def attempt(system, h, memory):
+    """The new state of a step of h into ``memory.new``; its error over the tolerance, -1 where it has
+    none."""
+    t, y, new, slopes = memory.clock[0], memory.y, memory.new, memory.slopes
+    for s in range(1, STAGES):
+        new[:] = y
+        add_slopes(A[s], s, h, slopes, new)
+        if evaluate(system, t + C[s] * h, new, slopes[s], memory) != REACHED:
+            return -1.0
+    new[:] = y
+    add_slopes(B, STAGES, h, slopes, new)
+    if not is_finite(new):
+        return -1.0
+    ratio = error_ratio(system, h, memory)
+    return ratio if system.settle == 0 or is_settled(system, t + h, memory) else -1.0
+
+
+@njit(cache=True)
+def is_settled(system, t, memory):
+    """Corrects the new state; whether that was possible."""
+    new, spare = memory.new, memory.errors[0]
+    status = rates_of(system.settle, system.context, t, new.ctypes.data, spare.ctypes.data)
+    return status == 0 and is_finite(new)
+
+
+@njit(cache=True)
+def error_ratio(system, h, memory):
+    """The error of a step over the tolerance, from the estimates of orders 5 and 3."""
+    y, new, errors = memory.y, memory.new, memory.errors
+    errors[:] = 0.0
+    add_slopes(ERROR3, STAGES, 1.0, memory.slopes, errors[0])
+    add_slopes(ERROR5, STAGES, 1.0, memory.slopes, errors[1])
+    third, fifth = 0.0, 0.0
+    for i in range(y.shape[0]):
+        scale = system.atol + system.rtol * max(abs(y[i]), abs(new[i]))
+        third, fifth = max(third, abs(errors[0, i]) / scale), max(fifth, abs(errors[1, i]) / scale)
+    return h * fifth * fifth / math.sqrt(fifth * fifth + 0.01 * third * third) if fifth > 0.0 else 0.0
+
+
+@njit(cache=True)
+def growth(ratio):
+    """Factor of the step after an error over the tolerance."""
+    if ratio < 0.0:
+        return RETRY
+    return GROW if ratio == 0.0 else min(GROW, max(SHRINK, SAFETY * ratio ** (-1.0 / ORDER)))
+
+
+@njit(cache=True)
+def first_step(system, end, memory):
+    """The first guess of Hairer, Nørsett & Wanner, section II.4, from the sizes of y and y'."""
+    y, rate = memory.y, memory.slopes[0]
+    size, speed = 0.0, 0.0
+    for i in range(y.shape[0]):
+        scale = system.atol + system.rtol * abs(y[i])
+        size, speed = max(size, abs(y[i]) / scale), max(speed, abs(rate[i]) / scale)
+    return 0.01 * size / speed if min(size, speed) > 1e-5 else 1e-6 * end
+
+
+@njit(cache=True)
+def step_within(left, h):
+    """The next step towards a sample: all that is left, its half, or h."""
+    if h * (1.0 + STRETCH) >= left:
+        return left
+    return min(h, 0.5 * left)
+
+
+@njit(cache=True)
+def jump(system, left, memory):
+    """Takes the step, of the shortest and some longer ones, whose error is the least; 0 where all fail."""
+    best, least = 0.0, math.inf
+    for k in range(JUMPS):
+        h = min(system.shortest * (1.0 + (LONGEST_JUMP - 1.0) * k / (JUMPS - 1)), left)
+        ratio = attempt(system, h, memory)
+        if 0.0 <= ratio < least:
+            best, least = h, ratio
+    memory.counts[REJECTED] += JUMPS
+    if best > 0.0:
+        attempt(system, best, memory)
+    return best
+
+
+@njit(cache=True)
+def accept(system, t, memory):
+    """The new state is the accepted one; its quaternions are normalised."""
+    y = memory.y
+    y[:] = memory.new
+    for start in system.quaternions:
+        y[start : start + 4] /= math.sqrt(np.sum(y[start : start + 4] ** 2))
+    memory.clock[0] = t
+    memory.counts[STEPS] += 1
+
+
+@njit(cache=True)
+def step(system, target, end, memory):
+    """One accepted step towards a sample, or why there is none; the slope of the state is known."""
+    clock = memory.clock
+    while True:
+        left, wanted = target - clock[0], min(max(clock[1], system.shortest), system.longest)
+        h = step_within(left, wanted)
+        ratio = attempt(system, h, memory)
+        if 0.0 <= ratio <= 1.0:
+            clock[1] = max(h * growth(ratio), clock[1] if h < wanted else 0.0)
+            break
+        memory.counts[REJECTED] += 1
+        clock[1] = h * min(growth(ratio), 1.0)
+        if h <= system.shortest * (1.0 + STRETCH):
+            h = jump(system, left, memory)
+            if h == 0.0:
+                return NOT_FINITE
+            break
+        if not clock[1] > SMALLEST * end:
+            return TOO_SMALL
+    accept(system, target if h == left else clock[0] + h, memory)
+    return REACHED
+
+
+@njit(cache=True)
+def advance(system, target, end, memory):
+    """Steps to a sample time; REACHED, or why it is not."""
+    while memory.clock[0] < target:
+        if memory.counts[STEPS] >= system.most_steps:
+            return TOO_MANY
+        status = evaluate(system, memory.clock[0], memory.y, memory.slopes[0], memory)
+        if status != REACHED:
+            return status
+        if memory.clock[1] == 0.0:
+            memory.clock[1] = first_step(system, end, memory)
+        status = step(system, target, end, memory)
+        if status != REACHED:
+            return status
+    return REACHED
+
+
+@njit(cache=True)
+def integrate(system, times, samples, memory):
+    """States at the times into the rows of ``samples``; how it ended, and the number of samples reached."""
+    for k in range(times.shape[0]):
+        status = advance(system, times[k], times[-1], memory)
+        if status != REACHED:
+            return status, k
+        samples[k] = memory.y
+    return REACHED, times.shape[0]

@@ -1,0 +1,266 @@
+"""MuJoCo's states put onto its closures in compiled code, as C functions: Newton's method on the rows of its
+equalities (efc_pos, efc_J), by the least change of the velocities, redundant rows left out by pivoting."""
+
+from __future__ import annotations
+
+import math
+
+from numba import carray, cfunc
+from numba.extending import register_jitable
+
+from crosscheck.engines.compiled.calls import (
+    call_with_three,
+    call_with_three_and_real,
+    call_with_two,
+    integers,
+    reals,
+    small_integers,
+)
+from crosscheck.engines.mujoco.context import (
+    CENTRES,
+    CLOSURES,
+    COUNT,
+    DATA,
+    DRIVE,
+    DRIVE_WIDTH,
+    DRIVES,
+    FULL_MASS,
+    INTEGRATE,
+    JACOBIAN,
+    KINEMATICS,
+    MODEL,
+    MOST_ROWS,
+    NQ,
+    NV,
+    POSITION_STAGE,
+    QPOS,
+    QVEL,
+    RESIDUALS,
+    VELOCITY,
+    WEIGHTED,
+    WIDTH,
+    WORK,
+)
+from crosscheck.engines.mujoco.rates import SIGNATURE, put
+
+ITERATIONS = 10  # of Newton's method at most; two are usual
+CLOSED = 1e-13  # m and rad, where it ends
+CLOSED_ENOUGH = 1e-8  # m and rad, beyond which it has failed
+REDUNDANT = 1e-7  # of the largest row: what is left of a redundant one of a state not quite closed is below
+MET, NOT_MET = 0, 1
+TOLERANCE, EVALUATIONS, TIME = range(3)  # numbers of a motion that is followed
+
+
+@register_jitable
+def root_of(mass, n):
+    """The lower Cholesky factor, in place."""
+    for i in range(n):
+        for j in range(i + 1):
+            total = mass[i, j]
+            for k in range(j):
+                total -= mass[i, k] * mass[j, k]
+            mass[i, j] = math.sqrt(total) if i == j else total / mass[j, j]
+
+
+@register_jitable
+def spread(root, row, n):
+    """L⁻¹ times a row, in place."""
+    for i in range(n):
+        total = row[i]
+        for k in range(i):
+            total -= root[i, k] * row[k]
+        row[i] = total / root[i, i]
+
+
+@register_jitable
+def gather(root, change, n):
+    """L⁻ᵀ times a change, in place."""
+    for i in range(n - 1, -1, -1):
+        total = change[i]
+        for k in range(i + 1, n):
+            total -= root[k, i] * change[k]
+        change[i] = total / root[i, i]
+
+
+@register_jitable
+def largest(rows, left, count, n):
+    """The row with the largest square, of those that are left, and its square."""
+    best, most = -1, 0.0
+    for i in range(left, count):
+        size = 0.0
+        for j in range(n):
+            size += rows[i, j] * rows[i, j]
+        if size > most:
+            best, most = i, size
+    return best, most
+
+
+@register_jitable
+def least(rows, wanted, change, count, n):
+    """The least change with rows · change = wanted; rows that depend on others count once.
+
+    Rows are made orthonormal one by one, the largest that is left first.
+    """
+    change[:n] = 0.0
+    enough = 0.0
+    for k in range(min(count, n)):
+        best, square = largest(rows, k, count, n)
+        enough = REDUNDANT * REDUNDANT * square if k == 0 else enough
+        if best < 0 or square <= enough:
+            break
+        for j in range(n):
+            rows[k, j], rows[best, j] = rows[best, j], rows[k, j]
+        wanted[k], wanted[best] = wanted[best], wanted[k]
+        subtract(rows, wanted, k, count, n, 1.0 / math.sqrt(square))
+        for j in range(n):
+            change[j] += wanted[k] * rows[k, j]
+
+
+@register_jitable
+def subtract(rows, wanted, k, count, n, scale):
+    """Row k becomes a unit row, and what later rows have along it is taken out of them."""
+    wanted[k] *= scale
+    for j in range(n):
+        rows[k, j] *= scale
+    for i in range(k + 1, count):
+        along = 0.0
+        for j in range(n):
+            along += rows[i, j] * rows[k, j]
+        wanted[i] -= along * wanted[k]
+        for j in range(n):
+            rows[i, j] -= along * rows[k, j]
+
+
+@register_jitable
+def parts(c):
+    """Memory for the rows of closures, their values, the root of the mass, and a change."""
+    n, most = c[NV], c[MOST_ROWS]
+    work = carray(reals(c[WORK]), (most * (n + 1) + n * (n + 2),))
+    rows, rest = work[: most * n].reshape((most, n)), work[most * n :]
+    return rows, rest[:most], rest[most : most + n * n].reshape((n, n)), rest[most + n * n : most + n * n + n]
+
+
+@register_jitable
+def weigh(c, root):
+    """The lower Cholesky factor of the mass matrix of the data's position."""
+    if c[WEIGHTED] != 0:
+        call_with_three(c[FULL_MASS], c[MODEL], c[DATA], root.ctypes.data)
+        root_of(root, c[NV])
+
+
+@register_jitable
+def fetch(c, rows, root):
+    """The Jacobian's rows over the root of the mass, or without the driven coordinates; their number."""
+    n, count = c[NV], carray(small_integers(c[COUNT]), (1,))[0]
+    jacobian = carray(reals(carray(integers(c[JACOBIAN]), (1,))[0]), (count, n))
+    drives = carray(reals(c[DRIVE]), (c[DRIVES], c[DRIVE_WIDTH]))
+    for i in range(count):
+        rows[i] = jacobian[i]
+        if c[WEIGHTED] != 0:
+            spread(root, rows[i], n)
+            continue
+        for k in range(c[DRIVES]):
+            rows[i, int(drives[k, VELOCITY])] = 0.0
+    return count
+
+
+@register_jitable
+def residuals(c):
+    """The closure errors (m, rad) of the data's position."""
+    count = carray(small_integers(c[COUNT]), (1,))[0]
+    return carray(reals(carray(integers(c[RESIDUALS]), (1,))[0]), (count,))
+
+
+@register_jitable
+def place(c):
+    """MuJoCo's closures at the data's position."""
+    call_with_two(c[KINEMATICS], c[MODEL], c[DATA])
+    call_with_two(c[CENTRES], c[MODEL], c[DATA])
+    call_with_two(c[CLOSURES], c[MODEL], c[DATA])
+
+
+@register_jitable
+def change_by(c, rows, wanted, root, change, count):
+    """The least change of the velocities that gives the rows the wanted values."""
+    least(rows, wanted, change, count, c[NV])
+    if c[WEIGHTED] != 0:
+        gather(root, change, c[NV])
+
+
+@register_jitable
+def meet(c, tolerance):
+    """Moves the data's position onto the closures; the number of evaluations, negative where not met."""
+    rows, wanted, root, change = parts(c)
+    worst = math.inf
+    for k in range(ITERATIONS):
+        if k == 0 and c[WEIGHTED] != 0:
+            call_with_two(c[POSITION_STAGE], c[MODEL], c[DATA])
+            weigh(c, root)
+        else:
+            place(c)
+        errors = residuals(c)
+        worst = 0.0
+        for i in range(errors.shape[0]):
+            worst = max(worst, abs(errors[i]))
+            wanted[i] = -errors[i]
+        if not worst > tolerance:
+            return k + 1
+        change_by(c, rows, wanted, root, change, fetch(c, rows, root))
+        call_with_three_and_real(c[INTEGRATE], c[MODEL], c[QPOS], change.ctypes.data, 1.0)
+    return ITERATIONS if worst < CLOSED_ENOUGH else -ITERATIONS
+
+
+@register_jitable
+def meet_rates(c, qvel):
+    """Changes the data's velocities to those that the closures leave."""
+    rows, wanted, root, change = parts(c)
+    count = carray(small_integers(c[COUNT]), (1,))[0]
+    jacobian = carray(reals(carray(integers(c[JACOBIAN]), (1,))[0]), (count, c[NV]))
+    for i in range(count):
+        wanted[i] = 0.0
+        for j in range(c[NV]):
+            wanted[i] -= jacobian[i, j] * qvel[j]
+    change_by(c, rows, wanted, root, change, fetch(c, rows, root))
+    for j in range(c[NV]):
+        qvel[j] += change[j]
+
+
+@register_jitable
+def take(c, y, qpos, qvel):
+    """The data's state into y."""
+    state = carray(y, (c[NQ] + c[NV],))
+    state[: c[NQ]], state[c[NQ] :] = qpos, qvel
+
+
+@cfunc(SIGNATURE, cache=True)
+def settle(context, t, y, out):
+    """The state y at time t (s) put onto the closures, by the least kinetic energy; MET or NOT_MET."""
+    c = carray(context, (WIDTH,))
+    qpos, qvel = put(c, t, y)
+    if c[MOST_ROWS] == 0:
+        return MET
+    if meet(c, CLOSED) < 0:
+        return NOT_MET
+    meet_rates(c, qvel)
+    take(c, y, qpos, qvel)
+    return MET
+
+
+@cfunc(SIGNATURE, cache=True)
+def follow(context, t, y, numbers):
+    """The state y at time TIME moved to time t by Newton's method on the closures; MET or NOT_MET."""
+    c, n = carray(context, (WIDTH,)), carray(numbers, (3,))
+    state = carray(y, (c[NQ] + c[NV],))
+    qpos, qvel = carray(reals(c[QPOS]), (c[NQ],)), carray(reals(c[QVEL]), (c[NV],))
+    qpos[:], qvel[:] = state[: c[NQ]], state[c[NQ] :]
+    call_with_three_and_real(c[INTEGRATE], c[MODEL], c[QPOS], c[QVEL], t - n[TIME])
+    take(c, y, qpos, qvel)
+    put(c, t, y)
+    evaluations = meet(c, n[TOLERANCE])
+    n[EVALUATIONS] += abs(evaluations)
+    if evaluations < 0:
+        return NOT_MET
+    meet_rates(c, qvel)
+    take(c, y, qpos, qvel)
+    n[TIME] = t
+    return MET

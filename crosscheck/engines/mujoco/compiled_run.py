@@ -1,0 +1,103 @@
+"""MuJoCo without Python between samples: ``mj_forward`` in the compiled DOP853, with states projected onto
+MuJoCo's closures or not, and Newton's method on those closures where nothing but drivers moves a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from crosscheck.engines.initial_velocities import may_move_freely
+from crosscheck.engines.mujoco.families import NEWTON, PROJECTED_COMPILED
+from crosscheck.engines.mujoco.model import Compiled
+from crosscheck.engines.sampling import Sample
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from crosscheck.engines.mujoco.context import Context
+
+ITERATIONS = 3  # of Newton's method: one meets equalities, but for rounding
+UNUSED = ("CONTACT", "LIMIT", "FRICTIONLOSS", "ACTUATION", "SENSOR", "MIDPHASE", "CLAMPCTRL", "NATIVECCD",
+          "MULTICCD", "WARMSTART")  # fmt: skip
+
+
+def leave_out_unused(mujoco: Any, model: Any) -> None:
+    """No more of MuJoCo than a scene needs, and no more iterations than are exact."""
+    for name in UNUSED:
+        model.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
+    model.opt.iterations = ITERATIONS
+
+
+def prepare() -> None:
+    """Compile the steppers and the C functions, or load them from numba's cache."""
+    from crosscheck.engines.compiled import run
+    from crosscheck.engines.mujoco import closures, rates
+
+    run.prepare()
+    assert all(function.address for function in (rates.rates, closures.settle, closures.follow))
+
+
+@dataclass(frozen=True)
+class CompiledRun:
+    """A model and its data for the compiled steppers."""
+
+    family: str
+    options: Mapping[str, float]
+    context: Context
+    start: np.ndarray  # (nq + nv,)
+    longest: float  # s; of a step
+
+    def trajectory(
+        self, scene: Scene, times: np.ndarray, sample: Callable[[float], Sample], built: float,
+        labels: dict[str, Any],
+    ) -> Trajectory:  # fmt: skip
+        """The motion from the start; construction took ``built`` seconds."""
+        from crosscheck.engines.compiled.run import trajectory
+        from crosscheck.engines.mujoco.rates import load
+
+        def put(t: float, y: np.ndarray) -> None:
+            load(self.context, t, y)
+
+        system = self._newton() if self.family == NEWTON else self._dop853()
+        return trajectory(scene, times, system, self.start, put, sample, built, labels)
+
+    def _dop853(self) -> Any:
+        from crosscheck.engines.compiled.dop853 import System
+        from crosscheck.engines.compiled.run import MOST_STEPS
+        from crosscheck.engines.mujoco.closures import settle
+        from crosscheck.engines.mujoco.rates import rates
+
+        rtol = self.options["rtol"]
+        correction = settle.address if self.family == PROJECTED_COMPILED else 0
+        return System(
+            int(rates.address or 0), self.context.address, self.context.quaternions, rtol, rtol,
+            self.options["min_step"], self.longest, MOST_STEPS, int(correction or 0),
+        )  # fmt: skip
+
+    def _newton(self) -> Any:
+        from crosscheck.engines.compiled.newton import System
+        from crosscheck.engines.mujoco.closures import follow
+
+        tolerance = self.options["tolerance"]
+        return System(int(follow.address or 0), self.context.address, tolerance, self.longest)
+
+
+def compiled_run(
+    scene: Scene, built: Compiled, data: Any, family: str, options: Mapping[str, float], longest: float
+) -> CompiledRun:  # fmt: skip
+    """The run from the data's state; drivers become prescribed coordinates instead of equalities."""
+    from crosscheck.engines.mujoco.context import context
+
+    if family == NEWTON and may_move_freely(scene):
+        raise ValueError(
+            f"{NEWTON} cannot run {scene.name}: joints and drivers leave some of the motion open"
+        )
+    model = built.model
+    for equality, _ in built.drivers:
+        data.eq_active[equality] = 0
+    drivers = [(int(model.eq_obj1id[equality]), driver) for equality, driver in built.drivers]
+    numbers = context(model, data, drivers, is_weighted=family != NEWTON)
+    return CompiledRun(family, options, numbers, np.concatenate((data.qpos, data.qvel)), longest)

@@ -1,0 +1,104 @@
+"""Addresses and numbers of a MuJoCo model that its C functions in compiled code read.
+
+A state is qpos and qvel.  A driven coordinate has its prescribed value and rate, and an armature so large
+that the generalised force which belongs to the prescribed acceleration gives it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from crosscheck.engines.mujoco.struct_layout import offset
+from mbref.scene import Driver
+
+ARMATURE = 1e15  # of a driven coordinate, in mean inertias of the model
+LIBRARIES = ("libmujoco.so*", "libmujoco*.dylib", "mujoco.dll")
+FUNCTIONS = ("mj_forward", "mj_fwdPosition", "mj_kinematics", "mj_comPos", "mj_makeConstraint", "mj_fullM",
+             "mj_integratePos")  # fmt: skip
+(FORWARD, POSITION_STAGE, KINEMATICS, CENTRES, CLOSURES, FULL_MASS, INTEGRATE, MODEL, DATA, QPOS, QVEL, QACC,
+ FORCE, NQ, NV, SINGLE, SINGLES, TURN, TURNS, DRIVE, DRIVES, DRIVE_WIDTH, COUNT, RESIDUALS, JACOBIAN, WORK,
+ MOST_ROWS, WEIGHTED, WIDTH) = range(29)  # places in the context  # fmt: skip
+POSITION, VELOCITY, INERTIA, AMPLITUDE, FREQUENCY, PHASE, POLYNOMIAL = range(7)  # numbers of a drive
+ROWS = 7  # of an equality at most
+
+
+class Context(NamedTuple):
+    """The numbers that the C functions read, and the arrays that they point to."""
+
+    numbers: np.ndarray
+    quaternions: np.ndarray  # places in qpos
+    kept: tuple[Any, ...]
+
+    @property
+    def address(self) -> int:
+        """Of the numbers."""
+        return int(self.numbers.ctypes.data)
+
+
+def function(name: str) -> int:
+    """The address of a function of the library that the wheel carries."""
+    import mujoco
+
+    folder = Path(mujoco.__file__).parent
+    found = [path for pattern in LIBRARIES for path in sorted(folder.glob(pattern))]
+    return int(ctypes.cast(getattr(ctypes.CDLL(str(found[0])), name), ctypes.c_void_p).value or 0)
+
+
+def context(
+    model: Any, data: Any, drivers: Sequence[tuple[int, Driver]], is_weighted: bool = True
+) -> Context:
+    """The context of a model; ``drivers`` are joints of the model with their motions.
+
+    Closures are met by the least change of the velocities, by kinetic energy where ``is_weighted``.
+    """
+    single, turn = (np.array(pairs, dtype=np.int64).reshape(-1, 2) for pairs in _coordinates(model))
+    drives, most = _drives(model, drivers), ROWS * model.neq
+    work = np.zeros(most * (model.nv + 1) + model.nv * (model.nv + 2))
+    state = (data.qpos, data.qvel, data.qacc, data.qfrc_applied)
+    numbers = [
+        *map(function, FUNCTIONS), model._address, data._address, *map(_address, state), model.nq, model.nv,
+        _address(single), len(single), _address(turn), len(turn), _address(drives), *drives.shape,
+        *(data._address + offset(field) for field in ("ne", "efc_pos", "efc_J")), _address(work), most,
+        is_weighted,
+    ]  # fmt: skip
+    kept = (model, data, single, turn, drives, work)
+    return Context(np.array(numbers, dtype=np.int64), turn[:, 0].copy(), kept)
+
+
+def _address(array: np.ndarray) -> int:
+    return int(array.ctypes.data)
+
+
+def _coordinates(model: Any) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+    """Places in qpos and qvel of coordinates with a rate, and of quaternions with an angular velocity."""
+    import mujoco
+
+    kinds, single, turn = mujoco.mjtJoint, [], []
+    for kind, q, v in zip(model.jnt_type, model.jnt_qposadr, model.jnt_dofadr, strict=True):
+        if kind == kinds.mjJNT_BALL:
+            turn.append((q, v))
+        elif kind == kinds.mjJNT_FREE:
+            single += [(q + i, v + i) for i in range(3)]
+            turn.append((q + 3, v + 3))
+        else:
+            single.append((q, v))
+    return single, turn
+
+
+def _drives(model: Any, drivers: Sequence[tuple[int, Driver]]) -> np.ndarray:
+    """A row of numbers of each driver; its coordinate gets the armature."""
+    inertia = ARMATURE * model.stat.meaninertia
+    width = max((len(driver.polynomial) for _, driver in drivers), default=0)
+    table = np.zeros((len(drivers), POLYNOMIAL + width))
+    for row, (joint, driver) in zip(table, drivers, strict=True):
+        row[POSITION], row[VELOCITY] = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
+        model.dof_armature[model.jnt_dofadr[joint]] = row[INERTIA] = inertia
+        if sine := driver.sine:
+            row[AMPLITUDE : PHASE + 1] = sine.amplitude, sine.frequency, sine.phase
+        row[POLYNOMIAL : POLYNOMIAL + len(driver.polynomial)] = driver.polynomial
+    return table

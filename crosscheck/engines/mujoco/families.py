@@ -1,0 +1,114 @@
+"""MuJoCo's families of settings, and the sweep over their accuracies for a scene.
+
+The hardest closures that MuJoCo's documentation allows have a softness of 1e-4 of the inverse mass, its
+default ten times that.  Of the FAMILIES ``stiff`` costs an order of convergence, and brings
+a run through singular positions with less left of the closure errors that they magnify.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from crosscheck.engine import Setting
+from crosscheck.engines.initial_velocities import may_move_freely
+from crosscheck.engines.spanning_tree import spanning_tree
+from mbref.scene import Scene
+
+HARD = 1e-8  # factor of the regulariser: its error is gone, and rounding does not yet take over
+RK4 = "mjINT_RK4"
+STOCK = {"stock": RK4, "euler": "mjINT_EULER", "implicit": "mjINT_IMPLICIT",
+         "implicitfast": "mjINT_IMPLICITFAST"}  # fmt: skip
+BETA = 5.0  # double root of the closure errors, in fastest rates of the scene: survives singular passages
+DEFAULT_STEP = 2e-3  # s
+STEPS = (0.15, 0.05, 0.015, 0.005, 0.0015)  # rad turned per step; 2 beta step stays below 2
+STIFF_STEPS = (0.015, 0.005, 0.0015, 0.0005)
+STIFF = 0.2  # double root of the stiff closures' errors, in 1/step
+RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10)  # finer ones get lost in the noise at singular positions
+ADAPTIVE = {"forward": 1e-7, "projected": 1e-9}  # factor of the regulariser: less leaves noise to integrate
+FORWARD_COMPILED, PROJECTED_COMPILED, NEWTON = "forward, compiled", "projected, compiled", "newton, compiled"
+COMPILED = (FORWARD_COMPILED, PROJECTED_COMPILED, NEWTON)
+COMPILED_HARD = {"point": 1e-9, "weld": 1e-7}  # factor of the regulariser by closures; welds are redundant
+COMPILED_BETA = 0.1, 10.0  # double root of the closure errors, in fastest rates and in 1/duration
+TOLERANCES, NEWTON_TURN = (1e-4, 1e-7, 1e-10, 1e-13), 0.6
+COMPILED_RTOLS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
+LEAST_TURN = 0.03  # rad turned within the shortest adaptive step
+FAMILIES = {
+    "defaults": "the library's own options",
+    "stock": "closures as stiff as its documentation allows (time constant two steps, impedance 0.9999), RK4",
+    "euler": "stock closures, its first-order integrator Euler",
+    "implicit": "stock closures, its first-order integrator implicit",
+    "implicitfast": "stock closures, its first-order integrator implicitfast; only where a load damps",
+    "tuned": "the regulariser scaled away through invweight0, critically damped closures at five times the "
+    "fastest rate of the scene, RK4, Newton's method iterated to convergence",
+    "stiff": "the tuned model with closures as stiff as the step bears",
+    "forward": "the tuned model's accelerations (mj_forward) integrated by DOP853",
+    "projected": "as forward, every accepted state projected onto the closures",
+    FORWARD_COMPILED: "as forward, without Python: mj_forward of libmujoco called by a compiled DOP853",
+    PROJECTED_COMPILED: "as projected, without Python; the closures' errors do not decay of themselves",
+    NEWTON: "Newton's method on MuJoCo's closures, without Python; where drivers prescribe the whole motion",
+}
+INTEGRATED_HERE = (*ADAPTIVE, *COMPILED)
+OPTIONS = {
+    "step": "time step, s",
+    "rtol": "relative tolerance of a step",
+    "min_step": "shortest step, s",
+    "beta": "double root of the closure errors, 1/s",
+    "hard": "factor of the regulariser",
+    "tolerance": "closure errors that Newton's method leaves, m or rad",
+    "turn": "rad a driver may move within one step",
+}
+MAX_STEPS = 250_000
+
+
+def sweep(scene: Scene, rate: float) -> list[Setting]:
+    """Fixed steps by the angle turned in one at the scene's fastest rate (rad/s), adaptive ones by relative
+    tolerance; coarse to fine in each family."""
+    beta = _rounded(BETA * rate)
+    steps, stiff = (_steps(scene, rate, angles) for angles in (STEPS, STIFF_STEPS))
+    plain = sorted({DEFAULT_STEP, *steps}, reverse=True)
+    return [
+        *(Setting("defaults", {"step": h}) for h in plain),
+        *(Setting(family, {"step": h}) for family in _stock(scene) for h in steps),
+        *(Setting("tuned", {"step": h, "beta": beta, "hard": HARD}) for h in steps),
+        *(Setting("stiff", {"step": h, "beta": _rounded(STIFF / h), "hard": HARD}) for h in stiff),
+        *_adaptive(scene, rate),
+    ]
+
+
+def _adaptive(scene: Scene, rate: float) -> Iterator[Setting]:
+    least, stiff = _rounded(LEAST_TURN / rate), _rounded(BETA * rate)
+    of_rate, of_duration = COMPILED_BETA
+    slow = _rounded(max(of_rate * rate, of_duration / scene.duration))
+    welded = any(closure.kind == "weld" for closure in spanning_tree(scene).closures)
+    hard = COMPILED_HARD["weld" if welded else "point"]
+    for family, factor in ADAPTIVE.items():
+        yield from _by_rtol(family, RTOLS, least, stiff, factor)
+    yield from _by_rtol(FORWARD_COMPILED, COMPILED_RTOLS, least, slow, hard)
+    yield from _by_rtol(PROJECTED_COMPILED, COMPILED_RTOLS, least, 0.0, hard)
+    if scene.driver and not may_move_freely(scene):
+        yield from (
+            Setting(NEWTON, {"tolerance": tolerance, "turn": NEWTON_TURN}) for tolerance in TOLERANCES
+        )
+
+
+def _by_rtol(
+    family: str, rtols: Sequence[float], shortest: float, beta: float, hard: float
+) -> Iterator[Setting]:
+    for rtol in rtols:
+        yield Setting(family, {"rtol": rtol, "min_step": shortest, "beta": beta, "hard": hard})
+
+
+def _rounded(number: float) -> float:
+    return float(f"{number:.2g}")
+
+
+def _stock(scene: Scene) -> list[str]:
+    """The families of stock closures whose integrators differ on the scene."""
+    is_damped = any(load.is_damped for load in scene.load)
+    return [family for family in STOCK if is_damped or family != "implicitfast"]
+
+
+def _steps(scene: Scene, rate: float, angles: Sequence[float]) -> list[float]:
+    """Steps (s) that turn by the angles (rad) at a rate (rad/s), as far as they are not too many."""
+    steps = [_rounded(angle / rate) for angle in angles]
+    return [h for h in steps if scene.duration / h <= MAX_STEPS] or steps[:1]

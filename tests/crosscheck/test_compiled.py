@@ -1,0 +1,303 @@
+"""The compiled DOP853: closed forms, failures; engines' accelerations in it / truths, Python runs."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Setting, engine
+from crosscheck.engines.compiled import dop853
+from crosscheck.engines.compiled.calls import RATES
+from crosscheck.engines.compiled.run import MOST_STEPS
+from crosscheck.judge.metrics import measure, violation_series
+from crosscheck.judge.truth import truth_for
+from mbref.scene import Body, Driver, Revolute, Scene, Sine
+from mbref.scenes import SCENES
+from mbref.trajectory import Outcome, Trajectory
+from tests.crosscheck.measured import MARGIN, ROUNDING
+from tests.crosscheck.tree_scenes import every_joint
+
+FAMILY, PROJECTED, NEWTON = "forward, compiled", "projected, compiled", "newton, compiled"
+SINGULAR = {  # scene: relative tolerance, shortest step (s), measured error (m, rad)
+    "planar_slider_crank_equal": (1e-7, 1.7e-4, 2.7e-7),
+    "planar_slider_crank_heavy": (1e-9, 1.6e-3, 1.3e-9),
+    "four_bar_gravity": (1e-9, 3.8e-3, 4.3e-9),
+    "five_bar_gravity": (1e-9, 3.7e-3, 5.2e-10),
+    "four_bar": (1e-9, 2.4e-4, 3.9e-13),
+}
+DRIVEN = {  # scene: tolerance (m, rad), measured error
+    "spatial_slider_crank_driven": (1e-13, 1.8e-14),
+    "four_bar": (1e-10, 2.2e-14),
+    "five_bar": (1e-10, 5.3e-15),
+}
+SMOOTH = {  # scene: relative tolerance, closures' rate (1/s), measured error (m, rad)
+    "planar_slider_crank": (1e-10, 50.0, 6.9e-10),
+    "spatial_slider_crank_gravity": (1e-10, 20.0, 2.2e-10),
+    "spatial_slider_crank_driven": (1e-10, 50.0, 7.5e-12),
+    "slider_crank_chain": (1e-10, 50.0, 4.1e-11),
+    "bennett": (1e-10, 30.0, 1.3e-9),
+    "heavy_top": (1e-10, 15.0, 8.2e-10),
+    "andrews_squeezer": (1e-10, 330.0, 8.4e-10),
+}
+TURNED, APART, ALONE = 1.3e-8, 2.3e-8, 1.1e-9  # m or rad
+
+
+def integrate(
+    rates: Callable[[float, np.ndarray], np.ndarray], y: list[float], times: list[float], rtol: float,
+    quaternions: tuple[int, ...] = (), shortest: float = 1e-12, most: int = MOST_STEPS,
+) -> tuple[int, int, np.ndarray, dop853.Memory]:  # fmt: skip
+    """Status, samples reached, the samples and the memory; ``rates`` raises ArithmeticError to refuse."""
+    n = len(y)
+
+    def function(_: int, t: float, state: int, out: int) -> int:
+        numbers, slopes = (
+            np.ctypeslib.as_array(ctypes.cast(a, ctypes.POINTER(ctypes.c_double)), (n,)) for a in (state, out)
+        )
+        try:
+            slopes[:] = rates(t, numbers)
+        except ArithmeticError:
+            return 1
+        return 0
+
+    called = RATES(function)
+    address = int(ctypes.cast(called, ctypes.c_void_p).value or 0)
+    places = np.array(quaternions, dtype=np.int64)
+    system = dop853.System(address, 0, places, rtol, rtol, shortest, np.inf, most, 0)
+    memory, samples = dop853.memory(np.array(y)), np.zeros((len(times), n))
+    status, reached = dop853.integrate(system, np.array(times), samples, memory)
+    return status, reached, samples, memory
+
+
+def oscillator(t: float, y: np.ndarray) -> np.ndarray:
+    return np.array([y[1], -y[0]])
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-8, 1e-12])
+def test_an_oscillator_and_its_closed_form_within_the_tolerance(rtol: float) -> None:
+    times = [0.0, 0.3, 5.0, 20.0]
+    status, reached, samples, memory = integrate(oscillator, [1.0, 0.0], times, rtol)
+    assert (status, reached) == (dop853.REACHED, 4)
+    gap = abs(samples[:, 0] - np.cos(times)).max()
+    assert gap < 20 * rtol, f"{gap:.1e} off at a tolerance of {rtol:g}, {memory.counts[0]} steps"
+    assert memory.counts[dop853.STEPS] < 150, f"{memory.counts}: steps, rejected, evaluations"
+
+
+def test_the_error_of_a_step_falls_with_the_eighth_power() -> None:
+    """One step of h: the local error is of order 9."""
+    gaps = []
+    for h in (0.8, 0.4):
+        memory = integrate(oscillator, [1.0, 0.0], [h], 1e9)[3]
+        assert memory.counts[dop853.STEPS] == 1 or h > 0, memory.counts
+        gaps.append(abs(memory.y[0] - np.cos(h)))
+    order = np.log2(gaps[0] / gaps[1])
+    assert 8.5 < order < 10.5, f"order {order:.2f} of local errors {gaps}"
+
+
+def test_quaternions_stay_on_their_sphere() -> None:
+    """A constant angular velocity about z: the half-angle grows linearly."""
+
+    def rates(_: float, q: np.ndarray) -> np.ndarray:
+        w, x, y, z = q
+        return np.array([-z, y, -x, w])  # ω = 2 rad/s
+
+    samples = integrate(rates, [1.0, 0.0, 0.0, 0.0], [50.0], 1e-9, (0,))[2]
+    assert abs(np.linalg.norm(samples[0]) - 1) < 1e-15
+    assert abs(samples[0] - [np.cos(50.0), 0, 0, np.sin(50.0)]).max() < TURNED
+
+
+def test_a_run_ends_where_the_steps_are_used_up() -> None:
+    status, reached, _, memory = integrate(oscillator, [1.0, 0.0], [1.0, 1e6], 1e-8, most=500)
+    assert (status, reached) == (dop853.TOO_MANY, 1)
+    assert memory.counts[dop853.STEPS] == 500 and 1.0 < memory.clock[0] < 1e6
+
+
+@pytest.mark.parametrize("shortest", [1e-12, 1e-3])
+def test_a_motion_that_ends_in_infinity_is_not_finite(shortest: float) -> None:
+    """y' = y² reaches infinity at t = 1."""
+    with np.errstate(over="ignore"):
+        status, reached, samples, memory = integrate(
+            lambda _, y: y**2, [1.0], [0.5, 2.0], 1e-8, shortest=shortest
+        )
+    assert reached == 1 and status in (dop853.NOT_FINITE, dop853.TOO_SMALL)
+    assert abs(samples[0, 0] - 2.0) < 1e-6 and memory.counts[dop853.STEPS] < 5000
+
+
+def test_a_refusal_of_the_function_ends_the_run() -> None:
+    def rates(t: float, y: np.ndarray) -> np.ndarray:
+        if t > 0.7:
+            raise ArithmeticError
+        return oscillator(t, y)
+
+    status, reached, _, memory = integrate(rates, [1.0, 0.0], [0.5, 1.0], 1e-8)
+    assert status != dop853.REACHED and reached == 1
+    assert 0.5 <= memory.clock[0] <= 0.7 and memory.counts[dop853.STEPS] < 1000
+
+
+def test_the_shortest_step_passes_a_spike() -> None:
+    """Accelerations that are noise for an instant: taken in the shortest steps, not in ever shorter ones."""
+
+    def rates(t: float, y: np.ndarray) -> np.ndarray:
+        return np.array([1.0 + (1e3 * np.sin(1e7 * t) if abs(t - 0.5) < 1e-4 else 0.0)])
+
+    status, _, samples, memory = integrate(rates, [0.0], [1.0], 1e-10, shortest=1e-3)
+    assert status == dop853.REACHED and memory.counts[dop853.STEPS] < 100
+    assert abs(samples[0, 0] - 1.0) < 1.0
+
+
+def simulate(name: str, scene: Scene, samples: int, family: str, **options: float) -> Trajectory:
+    return engine(name).run(scene, np.linspace(0, scene.duration, samples), Setting(family, options))
+
+
+def apart(first: Trajectory, second: Trajectory) -> float:
+    """The largest difference of positions (m) and velocities (m/s), over their sizes where above 1."""
+    pairs = ((first.position, second.position), (first.velocity, second.velocity))
+    return max(float((abs(a - b) / np.maximum(1.0, abs(b))).max()) for a, b in pairs)
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_mujoco_compiled_and_truth(name: str) -> None:
+    pytest.importorskip("mujoco")
+    rtol, beta, measured = SMOOTH[name]
+    scene = SCENES[name]()
+    hard = 1e-7 if name == "bennett" else 1e-9
+    run = simulate("mujoco", scene, 6, FAMILY, rtol=rtol, min_step=1e-12, beta=beta, hard=hard)
+    assert run.outcome is Outcome.COMPLETED, run.message
+    error = measure(scene, run, truth_for(scene))["error"]
+    assert error < MARGIN * max(measured, ROUNDING), f"{name}: {error:.1e} from the truth"
+    assert run.cost.rhs > 11 * run.cost.steps > 0 and run.cost.seconds > 0
+
+
+def test_mujoco_compiled_and_in_python_with_every_joint_and_load() -> None:
+    pytest.importorskip("mujoco")
+    scene = every_joint().with_(duration=0.2)
+    options = {"rtol": 1e-9, "min_step": 1e-9, "beta": 30.0, "hard": 1e-7}
+    compiled, plain = (simulate("mujoco", scene, 6, family, **options) for family in (FAMILY, "forward"))
+    assert compiled.outcome is plain.outcome is Outcome.COMPLETED, compiled.message
+    assert apart(compiled, plain) < MARGIN * APART, f"apart by {apart(compiled, plain):.1e}"
+    worst = max(abs(compiled.reactions[j] - plain.reactions[j]).max() for j in plain.reactions)
+    assert worst < 1e-3 * max(abs(force).max() for force in plain.reactions.values()), f"{worst:.1e}"
+
+
+def test_mujoco_compiled_on_a_free_body_and_truth() -> None:
+    pytest.importorskip("mujoco")
+    body = Body(name="stone", mass=2.0, inertia=(0.1, 0.2, 0.3), position=(0, 0, 0),
+                angular_velocity=(0.1, 5.0, 0.1), velocity=(1.0, 0.0, 0.0))  # fmt: skip
+    scene = Scene(name="stone", body=(body,), gravity=(0.0, 0.0, -9.81), duration=2.0)
+    run = simulate("mujoco", scene, 5, FAMILY, rtol=1e-10, min_step=1e-12, beta=1.0, hard=1e-9)
+    error = measure(scene, run, truth_for(scene))["error"]
+    assert error < MARGIN * ALONE, f"{error:.1e} from the free body's motion"
+
+
+def test_mujoco_compiled_meets_a_driver_with_any_motion() -> None:
+    pytest.importorskip("mujoco")
+    driver = Driver(joint="A", polynomial=(0.0, 3.0, -20.0), sine=Sine(amplitude=0.4, frequency=30.0))
+    scene = SCENES["spatial_slider_crank"]().with_(driver=(driver,), load=(), duration=0.2)
+    run = simulate("mujoco", scene, 11, FAMILY, rtol=1e-10, min_step=1e-9, beta=50.0, hard=1e-9)
+    plain = simulate("mujoco", scene, 11, "projected", rtol=1e-10, min_step=1e-9, beta=400.0, hard=1e-9)
+    assert run.outcome is Outcome.COMPLETED, run.message
+    assert apart(run, plain) < MARGIN * APART, f"apart by {apart(run, plain):.1e}"
+
+
+def test_mujoco_compiled_that_fails_keeps_what_it_reached() -> None:
+    """Equal links without a shortest step: beyond the singular position nothing is finite."""
+    pytest.importorskip("mujoco")
+    scene = SCENES["planar_slider_crank_equal"]()
+    run = simulate("mujoco", scene, 21, FAMILY, rtol=1e-8, min_step=1e-3, beta=1e-3, hard=1e-9)
+    assert run.outcome is not Outcome.COMPLETED and run.message
+    assert 0 < len(run.times) < 21 and 0 < run.t_end < scene.duration
+    assert np.isfinite(run.position).all()
+
+
+@pytest.mark.parametrize("name", SINGULAR)
+def test_mujoco_compiled_and_projected_through_singular_positions_and_truth(name: str) -> None:
+    pytest.importorskip("mujoco")
+    rtol, shortest, measured = SINGULAR[name]
+    scene = SCENES[name]()
+    hard = 1e-7 if "bar" in name else 1e-9
+    run = simulate("mujoco", scene, 11, PROJECTED, rtol=rtol, min_step=shortest, beta=0.0, hard=hard)
+    assert run.outcome is Outcome.COMPLETED, run.message
+    error = measure(scene, run, truth_for(scene))["error"]
+    assert error < MARGIN * measured, f"{name}: {error:.1e} from the truth"
+    assert violation_series(scene, run).max() < 1e-12
+
+
+def test_projected_states_compiled_and_in_python_agree() -> None:
+    """Every joint, spring and driver, with redundant rows and quaternions."""
+    pytest.importorskip("mujoco")
+    scene = every_joint().with_(duration=0.2)
+    options = {"rtol": 1e-9, "min_step": 1e-9, "beta": 0.0, "hard": 1e-7}
+    compiled, plain = (simulate("mujoco", scene, 6, family, **options) for family in (PROJECTED, "projected"))
+    assert compiled.outcome is plain.outcome is Outcome.COMPLETED, compiled.message
+    assert apart(compiled, plain) < MARGIN * APART, f"apart by {apart(compiled, plain):.1e}"
+    assert violation_series(scene, compiled).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", DRIVEN)
+def test_newton_on_mujoco_s_closures_and_truth(name: str) -> None:
+    pytest.importorskip("mujoco")
+    tolerance, measured = DRIVEN[name]
+    scene = SCENES[name]()
+    run = simulate("mujoco", scene, 11, NEWTON, tolerance=tolerance, turn=0.6)
+    assert run.outcome is Outcome.COMPLETED, run.message
+    truth, found = truth_for(scene), run.velocity
+    error = measure(scene, run, truth)["error"]
+    assert error < MARGIN * max(measured, ROUNDING), f"{name}: {error:.1e} from the truth"
+    python = simulate("mujoco", scene, 11, "projected", rtol=1e-10, min_step=1e-4, beta=600.0, hard=1e-9)
+    gap = max(
+        abs(run.velocity - python.velocity).max(), abs(run.acceleration - python.acceleration).max() / 125
+    )
+    assert gap < 1e-5 * abs(found).max(), f"velocities or accelerations are {gap:.1e} m/s apart"
+
+
+def test_newton_says_where_the_closures_cannot_be_met() -> None:
+    """The rod is too short for a crank that is driven over the top."""
+    pytest.importorskip("mujoco")
+    scene = out_of_reach()
+    run = simulate("mujoco", scene, 5, NEWTON, tolerance=1e-10, turn=0.1)
+    assert run.outcome is Outcome.NOT_CONVERGED and "closures" in run.message
+    assert 0 < len(run.times) < 5 and 0 < run.t_end < scene.duration
+    with pytest.raises(ValueError, match="leave some of the motion open"):
+        simulate("mujoco", SCENES["planar_slider_crank"](), 5, NEWTON, tolerance=1e-10, turn=0.1)
+
+
+def out_of_reach() -> Scene:
+    """A driven four-bar whose coupler and rocker are too short for a whole turn of the crank."""
+    places = ((0.0, 0.0), (0.0, 0.3), (0.2, 0.3), (0.4, 0.0))
+    bodies, joints = [], []
+    for k, name in enumerate(("crank", "coupler", "rocker")):
+        middle = [(places[k][i] + places[k + 1][i]) / 2 for i in range(2)]
+        bodies.append(Body(name=name, mass=1.0, inertia=(0.1, 0.1, 0.1), position=(*middle, 0.0)))
+    names = ("ground", "crank", "coupler", "rocker", "ground")
+    for k, joint in enumerate("ABCD"):
+        joints.append(
+            Revolute(name=joint, bodies=(names[k], names[k + 1]), anchor=(*places[k], 0.0), axis=(0, 0, 1))
+        )
+    driver = Driver(joint="A", polynomial=(0.0, 3.0))
+    return Scene(name="short", body=tuple(bodies), joint=tuple(joints), driver=(driver,), duration=2.0)
+
+
+def test_newton_is_offered_where_drivers_prescribe_the_whole_motion() -> None:
+    pytest.importorskip("mujoco")
+    offered = {
+        name: NEWTON in {s.family for s in engine("mujoco").settings(SCENES[name]())}
+        for name in ("four_bar", "planar_slider_crank")
+    }
+    assert offered == {"four_bar": True, "planar_slider_crank": False}
+
+
+def test_the_places_of_mjdata_s_fields_are_those_of_the_library() -> None:
+    mujoco = pytest.importorskip("mujoco")
+    from crosscheck.engines.mujoco.model import compiled
+    from crosscheck.engines.mujoco.struct_layout import offset
+
+    model = compiled(SCENES["four_bar_gravity"]()).model
+    model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert ctypes.c_int.from_address(data._address + offset("ne")).value == data.ne == 6
+    for field in ("qpos", "efc_J", "efc_pos"):
+        pointer = ctypes.c_size_t.from_address(data._address + offset(field)).value
+        assert pointer == getattr(data, field).ctypes.data, field
