@@ -1,8 +1,8 @@
 """numba's cache of compiled kernels, kept in our folder as checked files.
 
-numba trusts the bytes of its own files: machine code that is damaged ends the process with a signal.  Its
-caches are made of a locator, which says where files lie, and a file, which stores and loads; ours take their
-place while one of our functions is decorated, and other users of numba keep theirs.
+numba trusts the bytes of its own files: machine code that is damaged ends the process with a signal.  While
+one of our functions is decorated, our cache takes the place of numba's, with a locator, which says where
+files lie, and a file, which stores and loads; other users of numba keep theirs.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from numba.core import caching
+from numba.core import caching, ccallback, dispatcher
+from numba.core.runtime import rtsys
 
 from mbref.kernels import checked_file
 
@@ -23,14 +24,39 @@ from mbref.kernels import checked_file
 @contextlib.contextmanager
 def kept_in(folder: Path) -> Iterator[None]:
     """Functions decorated meanwhile are cached below this folder, which is touched when one is compiled."""
-    implementation = caching.FunctionCache._impl_class
-    before = implementation._locator_classes, caching.IndexDataCacheFile
-    place = type("Place", (_Place,), {"folder": folder})
-    implementation._locator_classes, caching.IndexDataCacheFile = [place], _Files
+    before, dispatcher.FunctionCache = dispatcher.FunctionCache, _cache_in(folder)
+    ccallback.FunctionCache = dispatcher.FunctionCache
     try:
         yield
     finally:
-        implementation._locator_classes, caching.IndexDataCacheFile = before
+        dispatcher.FunctionCache = ccallback.FunctionCache = before
+
+
+class _Cache(caching.FunctionCache):
+    """The cache of one function, which says how compiled code is found, loaded and kept."""
+
+    def __init__(self, function: Callable):
+        super().__init__(function)
+        self._cache_file = _Files(
+            self._cache_path, self._impl.filename_base, self._impl.locator.get_source_stamp()
+        )
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The compiled function of this signature, or None.
+
+        numba first imports all operations that it can compile, SciPy's linear algebra among them.  Loading
+        needs its runtime alone; a compilation imports them itself.
+        """
+        rtsys.initialize(target_context)
+        return self._load_overload(sig, target_context)
+
+
+@functools.cache
+def _cache_in(folder: Path) -> type[_Cache]:
+    """The cache of functions below this folder."""
+    place = type("Place", (_Place,), {"folder": folder})
+    rules = type("Rules", (caching.CompileResultCacheImpl,), {"_locator_classes": [place]})
+    return type("Cache", (_Cache,), {"_impl_class": rules})
 
 
 class _Place:
