@@ -57,7 +57,7 @@ def _draw(options: argparse.Namespace) -> int:
 
 
 def _animate(options: argparse.Namespace) -> int:
-    from mbref.simulation.simulate import simulate
+    from mbref.cli.first_run import simulator
 
     scene, view = find_scene(options.scene), _view(options)
     path, times, limits = (
@@ -66,7 +66,10 @@ def _animate(options: argparse.Namespace) -> int:
         limits_of(options),
     )
     warn(scene)
-    with progress_bar("simulating", float(times[-1])) as progress:
+    with (
+        simulator(options.method) as simulate,
+        progress_bar("simulating", float(times[-1])) as progress,
+    ):
         motion = simulate(scene, options.method, times, limits, progress)
     path.write_text(moving(scene, motion, view), encoding="utf-8")
     print(path)

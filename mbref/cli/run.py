@@ -49,17 +49,18 @@ def _run(options: argparse.Namespace) -> int:
         limits_of(options, _branches(options.branch)),
         _writer(options.out),
     )
-    from mbref.simulation.simulate import simulate
+    from mbref.cli.first_run import simulator
 
     warn(scene)
-    with progress_bar("simulating", float(times[-1])) as progress:
-        motion = simulate(scene, options.method, times, limits, progress)
-    if options.out:
-        write(motion, options.out)
-    if options.json:
-        print(strict_json({"scene": scene.name, "records": [motion.to_record()]}))
-    else:
-        show(scene, motion)
+    with simulator(options.method) as simulate:
+        with progress_bar("simulating", float(times[-1])) as progress:
+            motion = simulate(scene, options.method, times, limits, progress)
+        if options.out:
+            write(motion, options.out)
+        if options.json:
+            print(strict_json({"scene": scene.name, "records": [motion.to_record()]}), flush=True)
+        else:
+            show(scene, motion)
     return 0 if motion.outcome.name == "COMPLETED" else 1
 
 

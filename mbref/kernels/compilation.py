@@ -120,9 +120,14 @@ class Exchangeable:
     def _compile(self) -> Callable:
         return cfunc(self.signature, **OPTIONS)(self.function)
 
-    def _say_compiling(self) -> None:
+    @property
+    def is_kept(self) -> bool:
+        """Whether the cache of this machine has the compiled kernel, or none is needed."""
         module = self.function.__module__.rpartition(".")[2]
-        if not any(CACHE.rglob(f"{module}.{self.function.__name__}-*.nbc")):
+        return PLAIN or any(CACHE.rglob(f"{module}.{self.function.__name__}-*.nbc"))
+
+    def _say_compiling(self) -> None:
+        if not self.is_kept:
             _announce_once()
 
 

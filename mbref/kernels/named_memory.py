@@ -29,7 +29,7 @@ from numba.extending import NativeValue, infer_getattr, intrinsic, models, regis
 from numba.np.numpy_support import from_dtype
 
 from mbref.kernels.compilation import INDEX_TABLE, INDICES, MATRIX, PLAIN, UNSIGNED, VECTOR
-from mbref.kernels.dimensions import Shapes, check_sizes, size_of
+from mbref.kernels.dimensions import check_sizes, size_of
 
 Vector = Annotated[np.ndarray, VECTOR]  # float64 (k,)
 Matrix = Annotated[np.ndarray, MATRIX]  # float64 (k, l)
@@ -40,6 +40,7 @@ Kernel = Callable[..., Any]  # annotated with its signature
 Address = Annotated[Any, "address"]  # of a packed schema that the reader names with ``opener``
 
 WORD, WORDS = ir.IntType(64), 3  # words of a field: address, rows, columns
+MOST_SHAPES = 256  # schemas whose shapes are remembered
 
 
 class Named(types.Type):
@@ -68,10 +69,12 @@ class Field(typing.NamedTuple):
     """One field of a schema: its numba type, its shape in names of dimensions, its first row in the table."""
 
     name: str
+    title: str  # with its schema's name
     kind: types.Type
     shape: tuple[str, ...]
     row: int
-    is_array: bool
+    schema: type | None  # of a field that is another schema
+    dtype: np.dtype | None  # of an array's entries, or of a record
 
 
 def is_record(schema: type) -> bool:
@@ -94,14 +97,19 @@ def fields_of(schema: type) -> Mapping[str, Field]:
     fields, row = {}, 0
     for name, hint in typing.get_type_hints(schema, include_extras=True).items():
         kind, shape = _kind_of(hint)
-        fields[name] = Field(name, kind, shape, row, isinstance(kind, types.Array))
-        row += rows_of(kind.schema) if isinstance(kind, Named) else 1
+        nested, dtype = kind.schema if isinstance(kind, Named) else None, None
+        if shape:
+            dtype = np.dtype(str(kind.dtype))
+        elif isinstance(kind, types.Record):
+            dtype = np.dtype((np.record, dtype_of(hint)))
+        fields[name] = Field(name, f"{schema.__name__}.{name}", kind, shape, row, nested, dtype)
+        row += rows_of(nested) if nested else 1
     return fields
 
 
 def rows_of(schema: type) -> int:
     """Rows that a schema takes in a table of addresses."""
-    return sum(rows_of(f.kind.schema) if isinstance(f.kind, Named) else 1 for f in fields_of(schema).values())
+    return sum(rows_of(field.schema) if field.schema else 1 for field in fields_of(schema).values())
 
 
 def _kind_of(hint: Any) -> tuple[types.Type, tuple[str, ...]]:
@@ -117,18 +125,29 @@ def _kind_of(hint: Any) -> tuple[types.Type, tuple[str, ...]]:
 
 def allocate(schema: type, sizes: Mapping[str, int], **given: Any) -> Any:
     """The schema with the fields ``given``, and zeros of the declared shapes for the others."""
-    values = {}
-    for field, hint in zip(fields_of(schema).values(), _hints(schema), strict=True):
-        if field.name in given:
-            values[field.name] = given[field.name]
-        elif isinstance(field.kind, Named):
-            values[field.name] = allocate(field.kind.schema, sizes)
-        elif isinstance(field.kind, types.Record):
-            values[field.name] = record(hint())
-        else:
-            shape = tuple(size_of(part, sizes) for part in field.shape)
-            values[field.name] = np.zeros(shape, dtype=_dtype(field.kind))
-    return schema(**values)
+    makers = _makers(schema, tuple(sizes.items()), frozenset(given))
+    return schema(**given, **{name: make() for name, make in makers})
+
+
+@functools.lru_cache(maxsize=MOST_SHAPES)
+def _makers(
+    schema: type, sizes: tuple[tuple[str, int], ...], given: frozenset[str]
+) -> list[tuple[str, Callable[[], Any]]]:
+    """The name of each field that is not given, and the function that makes it."""
+    hints = zip(fields_of(schema).values(), _hints(schema), strict=True)
+    return [
+        (field.name, _maker(field, hint, dict(sizes))) for field, hint in hints if field.name not in given
+    ]
+
+
+def _maker(field: Field, hint: Any, sizes: Mapping[str, int]) -> Callable[[], Any]:
+    """The function that makes a field: a schema, a record, or zeros."""
+    if field.schema:
+        return functools.partial(allocate, field.schema, sizes)
+    if not field.shape:
+        return lambda: record(hint())
+    shape = tuple(size_of(part, sizes) for part in field.shape)
+    return functools.partial(np.zeros, shape, field.dtype)
 
 
 @functools.cache
@@ -137,19 +156,13 @@ def _hints(schema: type) -> tuple[Any, ...]:
     return tuple(typing.get_type_hints(schema).values())
 
 
-@functools.cache
-def _dtype(kind: types.Array) -> np.dtype:
-    """NumPy's type of the entries of an array."""
-    return np.dtype(str(kind.dtype))
-
-
 def stacked(schema: type, rows: Sequence[Any], sizes: Mapping[str, int] | None = None) -> Any:
     """A schema of arrays from one instance for each of their rows; ``sizes`` are of further dimensions."""
     columns = {}
     for k, field in enumerate(fields_of(schema).values()):
         width = [size_of(part, sizes or {}) for part in field.shape[1:]]
         values = [row[k] for row in rows]
-        columns[field.name] = np.array(values, dtype=_dtype(field.kind)).reshape(len(rows), *width)
+        columns[field.name] = np.array(values, dtype=field.dtype).reshape(len(rows), *width)
     return schema(**columns)
 
 
@@ -167,8 +180,10 @@ class Packed:
             self.address = _address(values)
         else:
             leaves = list(_leaves(values))
-            check_sizes(tuple(leaf.shapes for leaf in leaves if leaf.field.is_array))
-            self.table = np.array([_words(leaf) for leaf in leaves], dtype=np.int64).reshape(-1, WORDS)
+            check_sizes(
+                tuple((field.title, field.shape, value.shape) for field, value in leaves if field.shape)
+            )
+            self.table = np.array([_words(field, value) for field, value in leaves], dtype=np.int64)
             self.address = self.table.ctypes.data
             self._numba_type_ = _kind(type(values))  # of this argument, read by numba's dispatcher
         self.argument = values if PLAIN else self
@@ -185,60 +200,40 @@ def packed(values: Any) -> Packed:
     return Packed(values)
 
 
-class Leaf(typing.NamedTuple):
-    """A field that takes one row of the table, and its value."""
-
-    name: str
-    field: Field
-    value: Any
-
-    @property
-    def shapes(self) -> Shapes:
-        """What the sizes of an array are checked by."""
-        return self.name, self.field.shape, self.value.shape
-
-
-def _leaves(values: Any) -> Iterator[Leaf]:
-    """All fields of a schema and of the schemas in it, each checked for its type."""
-    schema = type(values)
-    for field, value in zip(fields_of(schema).values(), values, strict=True):
-        name = f"{schema.__name__}.{field.name}"
-        if not field.is_array and isinstance(field.kind, Named):
-            if type(value) is not field.kind.schema:
-                raise TypeError(f"{name}: needs {field.kind.schema.__name__}, got {type(value).__name__}")
+def _leaves(values: Any) -> Iterator[tuple[Field, Any]]:
+    """Each field that takes a row of the table, and its value, checked for its type."""
+    for field, value in zip(fields_of(type(values)).values(), values, strict=True):
+        if field.schema:
+            if type(value) is not field.schema:
+                needed, found = field.schema.__name__, type(value).__name__
+                raise TypeError(f"{field.title}: needs {needed}, got {found}")
             yield from _leaves(value)
         else:
-            _check_type(name, field, value)
-            yield Leaf(name, field, value)
+            _check_type(field, value)
+            yield field, value
 
 
-def _check_type(name: str, field: Field, value: Any) -> None:
+def _check_type(field: Field, value: Any) -> None:
     """TypeError unless an array or record has the bytes that its field declares."""
-    kind = field.kind
-    if field.is_array:
-        fits = isinstance(value, np.ndarray) and value.dtype == _dtype(kind)
-        if not (fits and value.ndim == kind.ndim and value.flags.c_contiguous):
+    if field.shape:
+        fits = isinstance(value, np.ndarray) and value.dtype == field.dtype
+        if not (fits and value.ndim == len(field.shape) and value.flags.c_contiguous):
             found = f"{value.dtype} {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
-            raise TypeError(f"{name}: needs a contiguous {kind}, got {found}")
-    elif isinstance(kind, types.Record) and _record_kind(getattr(value, "dtype", np.dtype("f8"))) != kind:
-        raise TypeError(f"{name}: needs the record that its schema declares, got {type(value).__name__}")
+            raise TypeError(f"{field.title}: needs a contiguous {field.kind}, got {found}")
+    elif field.dtype is not None and getattr(value, "dtype", None) != field.dtype:
+        raise TypeError(
+            f"{field.title}: needs the record that its schema declares, got {type(value).__name__}"
+        )
 
 
-@functools.cache
-def _record_kind(dtype: np.dtype) -> types.Type:
-    return from_dtype(dtype)
-
-
-def _words(leaf: Leaf) -> tuple[int, int, int]:
+def _words(field: Field, value: Any) -> tuple[int, int, int]:
     """A row of the table: address, rows and columns."""
-    kind, value = leaf.field.kind, leaf.value
-    if leaf.field.is_array:
+    if field.shape:
         return _address(value), value.shape[0], value.shape[-1]
-    if isinstance(kind, types.Record):
+    if field.dtype is not None:
         return _address(value), 0, 0
-    if isinstance(kind, types.FunctionType):
-        return (0 if PLAIN or value is None else value.address), 0, 0
-    return (0 if value is None else value.address), 0, 0
+    is_nothing = value is None or (PLAIN and isinstance(field.kind, types.FunctionType))
+    return (0 if is_nothing else value.address), 0, 0
 
 
 def _address(values: np.ndarray | np.record) -> int:

@@ -21,6 +21,7 @@ from mbref.equations.initial_state import consistent_start, scene_length
 from mbref.equations.model import Model
 from mbref.equations.static_constraints import at_rest, held_by_rows, reduced_factor
 from mbref.equations.units import row_lengths
+from mbref.kernels.compilation import Exchangeable
 from mbref.kernels.layout import (
     Active,
     Control,
@@ -249,10 +250,15 @@ def missing_masses(scene: Scene) -> list[str]:
 
 def prepare(method: Method) -> None:
     """Compile the kernels of the method, or load them from the cache of this machine."""
+    for kernel in kernels_of(method):
+        kernel.prepare()
+
+
+def kernels_of(method: Method) -> list[Exchangeable]:
+    """All kernels that a run by the method calls, but those of its formulation's helpers."""
     integrator, chart = method.integrator, method.stabilisation
-    for kernel in (
+    kernels = (
         integrator.step, integrator.propose, chart.rates, chart.accept, method.formulation.accelerate,
         advance_to_end, evaluate_all, chart.enter.callable,
-    ):  # fmt: skip
-        if kernel is not None:
-            kernel.prepare()
+    )  # fmt: skip
+    return [kernel for kernel in kernels if kernel is not None]

@@ -22,7 +22,7 @@ from mbref.taylor.check import compare_with_default
 from mbref.taylor.run import CrossingRun, TaylorRun
 from mbref.taylor.series_run import NO_CODE, prepare_series
 
-__all__ = ["Limits", "checked_times", "prepare", "simulate", "why_no_code"]
+__all__ = ["Limits", "are_compiled", "checked_times", "prepare", "simulate", "why_no_code"]
 
 SAMPLES = 101  # where no times are asked for
 
@@ -91,6 +91,11 @@ def prepare(method: Method) -> None:
     general.prepare(method)
     general.prepare(Method.parse(DEFAULT))
     prepare_series()
+
+
+def are_compiled(method: Method) -> bool:
+    """Whether the kernels of a run by the method are in the cache of this machine."""
+    return all(kernel.is_kept for kernel in general.kernels_of(method))
 
 
 def why_no_code(scene: Scene, method: Method) -> str:
