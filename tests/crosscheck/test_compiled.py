@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from crosscheck.engine import Setting, engine
+from crosscheck.engine import Engine, Setting, engine
 from crosscheck.engines.compiled import dop853
 from crosscheck.engines.compiled.calls import RATES
 from crosscheck.engines.compiled.run import MOST_STEPS
@@ -41,6 +42,17 @@ SMOOTH = {  # scene: relative tolerance, closures' rate (1/s), measured error (m
     "bennett": (1e-10, 30.0, 1.3e-9),
     "heavy_top": (1e-10, 15.0, 8.2e-10),
     "andrews_squeezer": (1e-10, 330.0, 8.4e-10),
+}
+PINOCCHIO = {  # scene: relative tolerance, shortest step (s), measured error (m, rad) of "tuned, compiled"
+    "planar_slider_crank": (1e-10, 1e-12, 2.4e-9),
+    "spatial_slider_crank_gravity": (1e-10, 1e-12, 8.7e-11),
+    "spatial_slider_crank_driven": (1e-10, 1e-12, 1.2e-12),
+    "heavy_top": (1e-10, 1e-12, 8.2e-10),
+    "bennett": (1e-10, 5.5e-3, 1.1e-9),
+    "planar_slider_crank_heavy": (1e-9, 1.6e-3, 1.1e-9),
+    "planar_slider_crank_equal": (1e-9, 1.7e-4, 1.2e-9),
+    "five_bar_gravity": (1e-10, 3.7e-3, 2e-11),
+    "four_bar": (1e-9, 2.4e-4, 2.9e-13),
 }
 TURNED, APART, ALONE = 1.3e-8, 2.3e-8, 1.1e-9  # m or rad
 
@@ -301,3 +313,105 @@ def test_the_places_of_mjdata_s_fields_are_those_of_the_library() -> None:
     for field in ("qpos", "efc_J", "efc_pos"):
         pointer = ctypes.c_size_t.from_address(data._address + offset(field)).value
         assert pointer == getattr(data, field).ctypes.data, field
+
+
+@pytest.fixture(scope="module")
+def pinocchio() -> Engine:
+    """Pinocchio's adapter where its compiled families can be run."""
+    pytest.importorskip("pinocchio")
+    from crosscheck.engines.pinocchio.library import why_not
+
+    if reason := why_not():
+        pytest.skip(reason)
+    return engine("pinocchio")
+
+
+@pytest.mark.parametrize("name", PINOCCHIO)
+def test_pinocchio_compiled_and_truth(pinocchio: Engine, name: str) -> None:
+    rtol, shortest, measured = PINOCCHIO[name]
+    scene = SCENES[name]()
+    run = simulate("pinocchio", scene, 11, "tuned, compiled", rtol=rtol, min_step=shortest)
+    assert run.outcome is Outcome.COMPLETED, run.message
+    error = measure(scene, run, truth_for(scene))["error"]
+    assert error < MARGIN * max(measured, ROUNDING), f"{name}: {error:.1e} from the truth"
+    assert violation_series(scene, run).max() < 1e-12
+
+
+@pytest.mark.parametrize(("family", "python"), [("dop853, compiled", "dop853"), ("tuned, compiled", "tuned")])
+def test_pinocchio_compiled_and_in_python_with_many_joints(
+    pinocchio: Engine, family: str, python: str
+) -> None:
+    """Every joint with torsion springs, drivers with a sine, a free body and quaternions."""
+    joints = every_joint()
+    kept = [load for load in joints.load if load.type == "torsion_spring"]
+    assert kept
+    scene = joints.with_(duration=0.2, load=kept)
+    options = {"rtol": 1e-10, "min_step": 1e-9}
+    compiled = simulate("pinocchio", scene, 6, family, **options)
+    plain = simulate("pinocchio", scene, 6, python, **options)
+    assert compiled.outcome is plain.outcome is Outcome.COMPLETED, compiled.message
+    assert apart(compiled, plain) < MARGIN * APART, f"apart by {apart(compiled, plain):.1e}"
+
+
+def test_pinocchio_compiled_on_a_free_body_and_truth(pinocchio: Engine) -> None:
+    body = Body(name="stone", mass=2.0, inertia=(0.1, 0.2, 0.3), position=(0, 0, 0),
+                angular_velocity=(0.1, 5.0, 0.1), velocity=(1.0, 0.0, 0.0))  # fmt: skip
+    scene = Scene(name="stone", body=(body,), gravity=(0.0, 0.0, -9.81), duration=2.0)
+    run = simulate("pinocchio", scene, 5, "tuned, compiled", rtol=1e-10, min_step=1e-12)
+    error = measure(scene, run, truth_for(scene))["error"]
+    assert error < MARGIN * ALONE, f"{error:.1e} from the free body's motion"
+
+
+def test_pinocchio_s_compiled_families_are_left_out_with_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pinocchio")
+    from crosscheck.engines.pinocchio import compiled_run, library
+
+    scene = SCENES["flyball_governor"]()
+    if not library.why_not():
+        assert "load[0] of type 'spring'" in compiled_run.why_not(scene)
+    monkeypatch.setenv("CXX", "no-such-compiler")
+    assert library.why_not() == "no C++ compiler is installed (no-such-compiler)"
+    offered = {setting.family for setting in engine("pinocchio").settings(SCENES["point_pendulum"]())}
+    assert "tuned" in offered and "tuned, compiled" not in offered
+    monkeypatch.setattr(library, "EIGEN", Path("/nowhere"))
+    monkeypatch.setattr(library, "_prefix", lambda: Path("/nowhere"))
+    monkeypatch.delenv("CXX")
+    assert library.why_not() in (
+        "the headers of Eigen are not installed (package cmeel-eigen)",
+        "no C++ compiler is installed (c++, g++, clang++)",
+    )
+
+
+def test_a_damaged_library_is_compiled_anew(
+    pinocchio: Engine, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    from crosscheck.engines.pinocchio import library
+
+    def compile_fast(target: Path) -> None:
+        target.write_bytes(b"library")
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(library, "_compile", compile_fast)
+    assert library._kept() is None
+    path = library._compiled()
+    assert library._kept() == path and list(path.parent.iterdir()) == [path]
+    path.write_bytes(b"damaged")
+    assert library._kept() is None
+    assert library._compiled() == path == library._kept()
+    path.write_bytes(b"no library at all")
+    monkeypatch.setattr(library, "_kept", lambda: path)
+    with pytest.raises(library.NoLibrary, match="cannot be loaded"):
+        library.library.__wrapped__()
+
+
+def test_a_compiler_that_fails_is_said(
+    pinocchio: Engine, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    from crosscheck.engines.pinocchio import library
+
+    compiler = tmp_path / "fails"
+    compiler.write_text("#!/bin/sh\necho 'rates.cpp:1: error: out of luck' >&2\nexit 1\n")
+    compiler.chmod(0o755)
+    monkeypatch.setenv("CXX", str(compiler))
+    with pytest.raises(library.NoLibrary, match=r"the C\+\+ compiler failed: .*out of luck"):
+        library._compile(tmp_path / "library.so")

@@ -19,6 +19,16 @@ from scipy.linalg import solve_triangular
 from crosscheck.engine import Cannot, Engine, Setting
 from crosscheck.engines.driver_motion import fastest_rate, motion, stated_rate
 from crosscheck.engines.initial_velocities import lacks_mass
+from crosscheck.engines.pinocchio import compiled_run
+from crosscheck.engines.pinocchio.families import (
+    BAUMGARTE,
+    COMPILED,
+    FAMILIES,
+    FIXED,
+    OPTIONS,
+    TUNED_COMPILED,
+    sweep,
+)
 from crosscheck.engines.pinocchio.model import SUPPORTS, Loads, Mechanism
 from crosscheck.engines.sampling import Adaptive, Counts, Failed, Sample, rk4, run_through
 from crosscheck.engines.tree_reactions import LinkMotion, joint_reactions
@@ -33,39 +43,21 @@ CONVERGED = (
     1e-8,
     50,
 )  # change of the forces (N), mu, iterations: accelerations near singular positions
+WITHOUT_PYTHON = 1e-9, 1e-7, 5  # the same in compiled code: fewer iterations are as exact there
 FORCES = (
     1e-9,
     1e-6,
     50,
 )  # the same where redundant closures' forces are read, in which rounding grows as 1/mu
-BAUMGARTE = 0.1  # double root of the closure errors, in 1/step
 PROJECTIONS = 10  # Newton iterations at most; two are usual
 CLOSED = 1e-13  # m and rad, where a projection ends
 REDUNDANT = 1e-7  # of the largest singular value: redundant rows of states not quite closed are below
 NOTHING = 1e-12  # of the scene's length: rows of closures that the tree satisfies by itself are rounding
 CLOSED_ENOUGH = 1e-8  # m and rad, beyond which it has failed
-RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-11)  # finer ones get lost in the noise at singular positions
 TURN_PER_STEP = 0.25  # rad a driver may move within one adaptive step: closures can fold in between
-LEAST_TURN = 0.03  # rad turned within the shortest adaptive step
 SCOUT_RTOL = 1e-5
 SCOUT_SAMPLES = 41  # of the coarse run that finds how fast a scene turns
-STEPS = (0.2, 0.06, 0.02, 0.006, 0.002)  # rad turned per fixed step
-FINEST = 0.0007  # rad per step, of the stabilised family alone: only there the closure errors allow it
-MAX_FIXED_STEPS = 250_000
 HINTS = {"defaults": ": without regularisation the default solver settings cannot bear redundant closures"}
-FIXED = ("defaults", "proximal", "baumgarte")
-FAMILIES = {
-    "defaults": "the constraint solver as it comes (no regularisation, one iteration), RK4",
-    "proximal": "the solver iterated to convergence, which redundant closures need, RK4",
-    "baumgarte": "RK4 with the closures' own Baumgarte terms, double root 0.1/step",
-    "dop853": "DOP853 without stabilisation",
-    "tuned": "DOP853, every accepted state projected onto the closures",
-}
-OPTIONS = {
-    "step": "time step, s",
-    "rtol": "relative tolerance of a step",
-    "min_step": "shortest step, s",
-}
 
 
 class Pinocchio(Engine):
@@ -89,34 +81,29 @@ class Pinocchio(Engine):
     def settings(self, scene: Scene) -> Sequence[Setting]:
         """Fixed steps by the angle turned in one, adaptive ones by relative tolerance."""
         rate = fastest_rate(scene, lambda step: self._coarse(scene, step))
-        fixed = [
-            Setting(family, {"step": h})
-            for family in FIXED
-            for h in _steps(scene, rate, (*STEPS, FINEST) if family == "baumgarte" else STEPS)
-        ]
-        least = float(f"{LEAST_TURN / rate:.2g}")
-        adaptive = [{"rtol": r, "min_step": least} for r in RTOLS]
-        return fixed + [Setting(family, o) for family in ("dop853", "tuned") for o in adaptive]
+        return sweep(scene, rate)
+
+    def prepare(self, families: Sequence[str]) -> None:
+        """Compile what the compiled families run."""
+        if set(COMPILED) & set(families):
+            compiled_run.prepare()
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         """Simulate; raises ValueError for a family it does not have."""
         start = time.process_time()
-        run = _PinocchioSimulation(scene, setting)
+        python = Setting("dop853", setting.options) if setting.family in COMPILED else setting
+        run = _PinocchioSimulation(scene, python)
         labels = {"engine": self.name, "version": self.version(), "method": setting.family,
                   "settings": dict(setting.options)}  # fmt: skip
-        built = time.process_time() - start
         with np.errstate(all="ignore"):
+            if setting.family in COMPILED:
+                return run.without_python(times, setting, start, labels)
+            built = time.process_time() - start
             return run_through(scene, times, run.advance, run.sample, run.counts, built, labels)
 
     def _coarse(self, scene: Scene, step: float) -> Trajectory:
         times = np.linspace(0, scene.duration, SCOUT_SAMPLES)
         return self.run(scene, times, Setting("tuned", {"rtol": SCOUT_RTOL, "min_step": step}))
-
-
-def _steps(scene: Scene, rate: float, angles: Sequence[float]) -> list[float]:
-    """Steps (s) that turn by the angles (rad) at a rate (rad/s), as far as they are not too many."""
-    steps = [float(f"{angle / rate:.2g}") for angle in angles]
-    return [h for h in steps if scene.duration / h <= MAX_FIXED_STEPS] or steps[:1]
 
 
 class _PinocchioSimulation:
@@ -181,6 +168,20 @@ class _PinocchioSimulation:
         if not np.isfinite(rates).all():
             raise Failed(Outcome.NOT_FINITE, t, f"the accelerations are not finite at {t:.6g} s{self.hint}")
         return rates
+
+    def without_python(
+        self, times: np.ndarray, setting: Setting, start: float, labels: dict[str, Any]
+    ) -> Trajectory:
+        """The run of a compiled family; its construction began at ``start`` (s of process time)."""
+        solver = compiled_run.Solver(*WITHOUT_PYTHON, setting.options.get("beta", 0.0), self.least)
+        run = compiled_run.CompiledRun(self.mechanism, self.loads, solver)
+        built, is_projected = time.process_time() - start, setting.family == TUNED_COMPILED
+
+        def load(_: float, y: np.ndarray) -> None:
+            self.y = y
+
+        given = setting.options, is_projected, self._max_step()
+        return run.trajectory(times, *given, load, self.sample, built, labels)
 
     def split(self, t: float, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Configuration and velocity of a state vector; driven coordinates as prescribed at t."""

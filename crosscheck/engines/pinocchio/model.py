@@ -23,6 +23,7 @@ from crosscheck.engines.spanning_tree import (
     TURN,
     Closure,
     Link,
+    Mobility,
     Tree,
     spanning_tree,
 )
@@ -60,6 +61,7 @@ class Mechanism:
         self.model = pin.Model()
         self.model.gravity = pin.Motion(np.array(scene.gravity), np.zeros(3))
         self.joint: list[int] = []
+        self.motions: list[Mobility] = []  # of Pinocchio's joints
         self.origin: dict[int, np.ndarray] = {0: np.zeros(3)}
         for k, link in enumerate(self.tree.links):
             self._add(k, link)
@@ -81,6 +83,7 @@ class Mechanism:
             placement = pin.SE3(np.eye(3), link.anchor - self.origin[joint])
             joint = model.addJoint(joint, motions, placement, f"{k}.{i}")
             self.origin[joint] = link.anchor
+        self.motions += link.mobilities
         lever = link.position + link.offset - self.origin[joint]
         model.appendBodyToJoint(joint, pin.Inertia(link.mass, lever, link.inertia), pin.SE3.Identity())
         self.joint.append(joint)
@@ -155,10 +158,11 @@ class Loads:
         self.forces: list[_PointForce] = []
         self.springs: list[tuple[Spring, list[tuple[int, Any]]]] = []
         self.torsion: list[tuple[int, int, TorsionSpring]] = []
+        self.evaluated: list[Any] = []  # loads whose torques change with the position
         maps = twist_maps(mechanism.tree)
         for load in mechanism.scene.load:
             self._add(load, maps)
-        self.fixed = not (self.moments or self.forces or self.springs)
+        self.fixed = not self.evaluated
 
     def _add(self, load: Any, maps: np.ndarray) -> None:
         mechanism, scene = self.mechanism, self.mechanism.scene
@@ -168,11 +172,14 @@ class Loads:
             if _turns_about_one_direction(mechanism.tree, link):
                 self.constant += maps[link, 3:].T @ np.array(load.moment)
             else:
+                self.evaluated.append(load)
                 self.moments.append((mechanism.joint[link], np.array(load.moment)))
         elif isinstance(load, Force):
+            self.evaluated.append(load)
             joint, point = self._point(scene.body_index(load.body), load.point)
             self.forces.append(_PointForce(joint, point, np.array(load.force)))
         elif isinstance(load, Spring):
+            self.evaluated.append(load)
             pairs = zip(load.bodies, load.points, strict=True)
             self.springs.append((load, [self._point(scene.body_index(b), p) for b, p in pairs]))
         elif isinstance(load, TorsionSpring):

@@ -1,0 +1,66 @@
+"""Pinocchio's families of settings, and the sweep over their accuracies for a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from crosscheck.engine import Setting
+from crosscheck.engines.pinocchio import compiled_run
+from mbref.scene import Scene
+
+BAUMGARTE = 0.1  # double root of the closure errors, in 1/step
+RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-11)  # finer ones get lost in the noise at singular positions
+LEAST_TURN = 0.03  # rad turned within the shortest adaptive step
+STEPS = (0.2, 0.06, 0.02, 0.006, 0.002)  # rad turned per fixed step
+FINEST = 0.0007  # rad per step, of the stabilised family alone: only there the closure errors allow it
+MAX_FIXED_STEPS = 250_000
+FIXED = ("defaults", "proximal", "baumgarte")
+DOP853_COMPILED, TUNED_COMPILED = "dop853, compiled", "tuned, compiled"
+COMPILED = (DOP853_COMPILED, TUNED_COMPILED)
+COMPILED_RTOLS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
+FAMILIES = {
+    "defaults": "the constraint solver as it comes (no regularisation, one iteration), RK4",
+    "proximal": "the solver iterated to convergence, which redundant closures need, RK4",
+    "baumgarte": "RK4 with the closures' own Baumgarte terms, double root 0.1/step",
+    "dop853": "DOP853 without stabilisation",
+    "tuned": "DOP853, every accepted state projected onto the closures",
+    DOP853_COMPILED: "as dop853, without Python: constraintDynamics of its C++ library called by a compiled "
+    "DOP853; needs a C++ compiler and the package cmeel-eigen",
+    TUNED_COMPILED: "as tuned, without Python, with the same needs",
+}
+OPTIONS = {
+    "step": "time step, s",
+    "rtol": "relative tolerance of a step",
+    "min_step": "shortest step, s",
+    "beta": "double root of the closure errors, 1/s",
+}
+
+
+def sweep(scene: Scene, rate: float) -> list[Setting]:
+    """Fixed steps by the angle turned in one at the scene's fastest rate (rad/s), adaptive ones by relative
+    tolerance; coarse to fine in each family."""
+    fixed = [
+        Setting(family, {"step": h})
+        for family in FIXED
+        for h in _steps(scene, rate, (*STEPS, FINEST) if family == "baumgarte" else STEPS)
+    ]
+    least = float(f"{LEAST_TURN / rate:.2g}")
+    adaptive = [{"rtol": r, "min_step": least} for r in RTOLS]
+    compiled = [] if compiled_run.why_not(scene) else _compiled(least)
+    return fixed + [Setting(family, o) for family in ("dop853", "tuned") for o in adaptive] + compiled
+
+
+def _compiled(least: float) -> list[Setting]:
+    """The sweep of the compiled families; ``least`` is the shortest step (s)."""
+    given: list[tuple[str, dict[str, float]]] = [(DOP853_COMPILED, {"beta": 0.0}), (TUNED_COMPILED, {})]
+    return [
+        Setting(family, {"rtol": rtol, "min_step": least, **options})
+        for family, options in given
+        for rtol in COMPILED_RTOLS
+    ]
+
+
+def _steps(scene: Scene, rate: float, angles: Sequence[float]) -> list[float]:
+    """Steps (s) that turn by the angles (rad) at a rate (rad/s), as far as they are not too many."""
+    steps = [float(f"{angle / rate:.2g}") for angle in angles]
+    return [h for h in steps if scene.duration / h <= MAX_FIXED_STEPS] or steps[:1]
