@@ -16,8 +16,10 @@ from mbref.scene import Scene
 from mbref.simulation.simulate import simulate
 
 COARSEST, FINEST = -3.0, -12.0  # decades of a relative tolerance
+COMPILED = ", compiled"  # ends the name of a family without Python between samples
 BETAS = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  # 1/s, beside the engine's own
-SCAN = 1e-6  # relative tolerance at which rates of closures are compared
+SCANS = (1e-6, 1e-10)  # relative tolerances at which rates of closures are compared
+SHORTER = (1.0, 0.25)  # shortest steps of compiled families at singular positions, of the engine's own
 ORDER = 8  # of the integrator at which errors are reduced to costs there
 SHORTEST = 1e-9  # step over the duration, where no position is singular
 NEAR = 30.0  # an error so many times a level misses it by little
@@ -39,7 +41,7 @@ def refined(
 ) -> Iterator[Setting]:
     """Settings by tolerance in half decades, others as they are; coarse to fine in each family.
 
-    ``score`` is the cost of a run at one error, by which the rate of closures is chosen.
+    ``score`` is the cost of a run at one error, by which the rates of closures are chosen.
     """
     done = set()
     for setting in settings:
@@ -47,10 +49,23 @@ def refined(
             yield setting
         elif setting.family not in done:
             done.add(setting.family)
-            first = setting if singular else _without_shortest_step(setting, scene.duration)
-            if "beta" in first.options:
-                first = min(_with_rates(first), key=score)
-            yield from (_with(first, rtol=rtol) for rtol in half_decades())
+            for first in _variants(setting, scene, singular, score):
+                yield from (_with(first, rtol=rtol) for rtol in half_decades())
+
+
+def _variants(
+    setting: Setting, scene: Scene, singular: bool, score: Callable[[Setting], float]
+) -> Iterator[Setting]:
+    """The shortest steps and rates of closures at which a family is swept over the tolerances."""
+    steps = [setting if singular else _without_shortest_step(setting, scene.duration)]
+    if singular and setting.family.endswith(COMPILED):
+        steps = [_with(setting, min_step=setting.options["min_step"] * factor) for factor in SHORTER]
+    for first in steps:
+        if "beta" not in first.options:
+            yield first
+            continue
+        rates = {min(_with_rates(first, scan), key=score).options["beta"] for scan in SCANS}
+        yield from (_with(first, beta=beta) for beta in sorted(rates))
 
 
 def cost_at_one_error(seconds: float, error: float) -> float:
@@ -78,9 +93,9 @@ def _without_shortest_step(setting: Setting, duration: float) -> Setting:
     return _with(setting, min_step=SHORTEST * duration) if "min_step" in setting.options else setting
 
 
-def _with_rates(setting: Setting) -> Iterator[Setting]:
+def _with_rates(setting: Setting, rtol: float) -> Iterator[Setting]:
     for beta in (setting.options["beta"], *BETAS):
-        yield _with(setting, rtol=SCAN, beta=beta)
+        yield _with(setting, rtol=rtol, beta=beta)
 
 
 def _with(setting: Setting, **options: float) -> Setting:

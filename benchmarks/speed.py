@@ -5,9 +5,9 @@
 Every setting of every family is run once in a child process, coarse to fine, until it takes too long; then
 all that count take turns in REPEATS rounds of this process, brief ones several times a round, so that their
 code is warm.  Times are process CPU seconds of the stepping, medians, by one BLAS thread; errors are against
-the scene's truth; the cost at an error is read off the family's curve (settings: ``grids``).  Engines are
-called through crosscheck's adapters in Python; where an engine has no integrator, or a weaker one, a family's
-integrator is crosscheck's, which the table says.
+the scene's truth; the cost at an error is read off the family's curve (settings: ``grids``).  Families of an
+engine are of its own integrators, or integrated by crosscheck in Python, or in compiled code; the table says
+which.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 import numpy as np
-from grids import cost_at_one_error, misses, passes_singular_position, refined
+from grids import COMPILED, cost_at_one_error, misses, passes_singular_position, refined
 from limit import LIMIT
 from rich.console import Console
 from rich.table import Table
@@ -42,7 +42,7 @@ from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Cost, Outcome
 
-OURS, LIMIT_NAME = "mbref", LIMIT.name
+OURS, LIMIT_NAME, SERIES = "mbref", LIMIT.name, "taylor"
 ENGINES = ("mbref", "mujoco", "pinocchio", "exudyn", "sundials")
 OTHERS = ("general_integrators:SCIPY", "general_integrators:SCIKIT_SUNDAE", "limit:LIMIT")
 PAPER = (
@@ -78,6 +78,18 @@ class Run:
 
 
 Curve = tuple[str, str]  # engine and family
+OWN, COMPILED_HERE = "its own", "crosscheck's, compiled"
+OPPONENTS = {  # engines and kinds of integrators
+    "own integrators": (ENGINES[1:4], (OWN,)),
+    "engines": (ENGINES[1:4], ()),
+    "general": (("sundials", "scipy"), ()),
+    "limit": ((LIMIT_NAME,), ()),
+}
+OURSELVES: dict[str, Callable[[str], bool]] = {  # of the families' names
+    "series": lambda family: family == SERIES,
+    "specialised code": lambda family: family.endswith(SPECIALISED),
+    "general kernels": lambda family: family != SERIES and not family.endswith(SPECIALISED),
+}
 
 
 def competitors() -> list[str]:
@@ -119,13 +131,19 @@ def _sweep(name: str, scene: Scene, times: np.ndarray, singular: bool) -> Iterat
         return cost_at_one_error(run.cost["seconds"], run.error) if _is_usable(run) else math.inf
 
     for setting in refined(engine(name).settings(scene), scene, singular, score):
-        if setting.family in finished:
+        if (sweep := _part(setting)) in finished:
             continue
         run = _once(name, scene, times, setting)
         yield run
         is_dear = run.outcome == Outcome.TIMED_OUT.label or run.cost["seconds"] > TOO_LONG
         if is_dear or (_is_usable(run) and run.error < ENOUGH):
-            finished.add(setting.family)
+            finished.add(sweep)
+
+
+def _part(setting: Setting) -> tuple[Any, ...]:
+    """What is constant while a family is swept from coarse to fine."""
+    swept = "rtol" in setting.options
+    return setting.family, *(v for k, v in setting.options.items() if swept and k != "rtol")
 
 
 def _once(name: str, scene: Scene, times: np.ndarray, setting: Setting) -> Run:
@@ -143,13 +161,19 @@ def _times(run: Run) -> int:
 
 
 def _is_worth_timing(run: Run, curves: dict[Curve, list[Run]]) -> bool:
-    """Runs that give the cost at a level: of mbref in every family, of an engine in its best ones."""
+    """Runs that give the cost at a level: of mbref in every family, of an engine in the best ones of every
+    kind of integrator."""
     own = curves[run.engine, run.family]
     if run.cost["seconds"] > LONG or not any(run in _around(own, level) for level in ERROR_LEVELS):
         return False
     if run.engine in (OURS, LIMIT_NAME):
         return True
-    rivals = [_costs(runs) for (name, _), runs in curves.items() if name == run.engine]
+    kind = _integrator(run.engine, run.family)
+    rivals = [
+        _costs(runs)
+        for curve, runs in curves.items()
+        if curve[0] == run.engine and _integrator(*curve) == kind
+    ]
     best = [min(costs) for costs in zip(*rivals, strict=True)]
     return any(cost < NEAR * least for cost, least in zip(_costs(own), best, strict=True))
 
@@ -199,15 +223,27 @@ def _cheapest(runs: Sequence[Run], level: float) -> Run | None:
 
 
 def chosen(table: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Every family of mbref, and of every other engine the best at each level."""
+    """Every family of mbref, and of every other engine and kind of integrator the best at each level."""
     kept = []
     for row in table:
-        others = [other for other in table if other["engine"] == row["engine"]]
+        kind = _kind(row)
+        others = [other for other in table if _kind(other) == kind]
         best = [min(costs) for costs in zip(*(other["cost"] for other in others), strict=True)]
         wins = [c == b < math.inf for c, b in zip(row["cost"], best, strict=True)]
         if row["engine"] == OURS or any(wins):
             kept.append(row)
     return kept
+
+
+def _kind(row: dict[str, Any]) -> tuple[str, str]:
+    return row["engine"], _integrator(row["engine"], row["family"])
+
+
+def _integrator(name: str, family: str) -> str:
+    """Whose integrator a family has."""
+    if name not in ENGINES or family not in engine(name).integrated_here:
+        return OWN
+    return COMPILED_HERE if family.endswith(COMPILED) else "crosscheck's, in Python"
 
 
 def show(console: Console, scene: Scene, table: Sequence[dict[str, Any]]) -> None:
@@ -224,40 +260,34 @@ def show(console: Console, scene: Scene, table: Sequence[dict[str, Any]]) -> Non
     shown.add_column(f"run nearest {ERROR_LEVELS[1]:.0e}: error, evaluations, factorisations, Newton")
     for row in sorted(chosen(table), key=lambda row: row["cost"][1]):
         cells = [text for c, l in zip(row["cost"], limit, strict=True) for text in (_ms(c), _multiple(c / l))]
-        whose = "crosscheck's" if row["family"] in _integrated_here(row["engine"]) else "its own"
-        shown.add_row(row["engine"], row["family"], whose, *cells, _counts(row["runs"][1]))
+        shown.add_row(row["engine"], row["family"], _kind(row)[1], *cells, _counts(row["runs"][1]))
     console.print(shown)
     for sentence in misses(table, ERROR_LEVELS):
         console.print(sentence)
 
 
-def _integrated_here(name: str) -> Collection[str]:
-    """The families of an engine whose integrator is crosscheck's."""
-    return engine(name).integrated_here if name in ENGINES else ()
-
-
 def summary(console: Console, tables: dict[str, Sequence[dict[str, Any]]]) -> None:
-    """mbref's best by specialised code and by general kernels, against the best of the others."""
-    shown = Table(
-        title="The best of others, by adapters in Python, as a multiple of mbref's best, at errors of …"
-    )
+    """mbref's series, specialised code and general kernels, against the best of the others."""
+    shown = Table(title="The best of others, as a multiple of mbref's best, at errors of …")
     shown.add_column("scene", no_wrap=True)
     shown.add_column("mbref by", no_wrap=True)
-    groups = {"engines": ENGINES[1:4], "general": ("sundials", "scipy"), "limit": (LIMIT_NAME,)}
-    for name in groups:
+    for name in OPPONENTS:
         for level in ERROR_LEVELS:
             shown.add_column(f"{name} {level:.0e}", justify="right")
     for scene, table in tables.items():
-        others = [cost for names in groups.values() for cost in _best(_of(table, names))]
-        for whose, own in (("specialised code", True), ("general kernels", False)):
-            mine = [row for row in _of(table, (OURS,)) if row["family"].endswith(SPECIALISED) is own]
-            pairs = zip(others, _best(mine) * len(groups), strict=True)
+        others = [cost for names, kinds in OPPONENTS.values() for cost in _best(_of(table, names, kinds))]
+        for whose, belongs in OURSELVES.items():
+            mine = [row for row in _of(table, (OURS,)) if belongs(row["family"])]
+            pairs = zip(others, _best(mine) * len(OPPONENTS), strict=True)
             shown.add_row(scene, whose, *(_advantage(theirs, ours) for theirs, ours in pairs))
     console.print(shown)
 
 
-def _of(table: Sequence[dict[str, Any]], names: Sequence[str]) -> list[dict[str, Any]]:
-    return [row for row in table if row["engine"] in names]
+def _of(
+    table: Sequence[dict[str, Any]], names: Sequence[str], kinds: Sequence[str] = ()
+) -> list[dict[str, Any]]:
+    """Rows of these engines, and of these kinds of integrators where any are named."""
+    return [row for row in table if row["engine"] in names and (not kinds or _kind(row)[1] in kinds)]
 
 
 def _best(rows: Sequence[dict[str, Any]]) -> list[float]:
@@ -310,7 +340,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="JSON of every run and of the table")
     parser.add_argument("--plot", type=Path, help="a picture of the costs")
     options = parser.parse_args()
-    console = Console(width=None if sys.stdout.isatty() else 180)
+    console = Console(width=None if sys.stdout.isatty() else 220)
     simulators, tables, data = competitors(), {}, {"machine": machine(), "versions": versions(), "scenes": {}}
     for name in options.scene:
         scene = SCENES[name]()

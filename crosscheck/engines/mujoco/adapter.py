@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from crosscheck.engines.mujoco.families import (
 )
 from crosscheck.engines.mujoco.model import SUPPORTS, compiled
 from crosscheck.engines.mujoco.projection import projected
+from crosscheck.engines.planar_scene import planar_scene
 from crosscheck.engines.sampling import Adaptive, Counts, Failed, Sample, run_through, step_count
 from crosscheck.engines.tree_reactions import LinkMotion, joint_reactions, wrench
 from mbref import rotations
@@ -71,6 +73,8 @@ class MuJoCo(Engine):
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         """Simulate; raises ValueError for a family it does not have."""
+        if setting.family in COMPILED and (planar := planar_scene(scene)) is not scene:
+            return replace(self.run(planar, times, setting), reactions=None)
         start = time.process_time()
         run = _MujocoSimulation(scene, setting)
         labels = {"engine": self.name, "version": self.version(), "method": setting.family,

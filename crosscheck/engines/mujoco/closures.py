@@ -133,11 +133,29 @@ def subtract(rows, wanted, k, count, n, scale):
 
 @register_jitable
 def parts(c):
-    """Memory for the rows of closures, their values, the root of the mass, and a change."""
+    """Memory for the rows of closures, their values, the root of the mass, and a change; behind it stands the
+    size of an entry that is rounding."""
     n, most = c[NV], c[MOST_ROWS]
-    work = carray(reals(c[WORK]), (most * (n + 1) + n * (n + 2),))
+    work = carray(reals(c[WORK]), (most * (n + 1) + n * (n + 2) + 1,))
     rows, rest = work[: most * n].reshape((most, n)), work[most * n :]
     return rows, rest[:most], rest[most : most + n * n].reshape((n, n)), rest[most + n * n : most + n * n + n]
+
+
+@register_jitable
+def smallest(c):
+    """The size of a Jacobian's entry that is rounding."""
+    n, most = c[NV], c[MOST_ROWS]
+    size = most * (n + 1) + n * (n + 2) + 1
+    return carray(reals(c[WORK]), (size,))[size - 1]
+
+
+@register_jitable
+def moves(row, nothing):
+    """Whether anything moves a row."""
+    largest_entry = 0.0
+    for x in row:
+        largest_entry = max(largest_entry, abs(x))
+    return largest_entry > nothing
 
 
 @register_jitable
@@ -154,8 +172,11 @@ def fetch(c, rows, root):
     n, count = c[NV], carray(small_integers(c[COUNT]), (1,))[0]
     jacobian = carray(reals(carray(integers(c[JACOBIAN]), (1,))[0]), (count, n))
     drives = carray(reals(c[DRIVE]), (c[DRIVES], c[DRIVE_WIDTH]))
+    nothing = smallest(c)
     for i in range(count):
         rows[i] = jacobian[i]
+        if not moves(jacobian[i], nothing):
+            rows[i] = 0.0
         if c[WEIGHTED] != 0:
             spread(root, rows[i], n)
             continue

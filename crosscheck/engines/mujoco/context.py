@@ -25,6 +25,7 @@ FUNCTIONS = ("mj_forward", "mj_fwdPosition", "mj_kinematics", "mj_comPos", "mj_m
  MOST_ROWS, WEIGHTED, WIDTH) = range(29)  # places in the context  # fmt: skip
 POSITION, VELOCITY, INERTIA, AMPLITUDE, FREQUENCY, PHASE, POLYNOMIAL = range(7)  # numbers of a drive
 ROWS = 7  # of an equality at most
+NOTHING = 1e-12  # of the model's extent: a row of closures that nothing moves is rounding
 
 
 class Context(NamedTuple):
@@ -58,7 +59,8 @@ def context(
     """
     single, turn = (np.array(pairs, dtype=np.int64).reshape(-1, 2) for pairs in _coordinates(model))
     drives, most = _drives(model, drivers), ROWS * model.neq
-    work = np.zeros(most * (model.nv + 1) + model.nv * (model.nv + 2))
+    work = np.zeros(most * (model.nv + 1) + model.nv * (model.nv + 2) + 1)
+    work[-1] = NOTHING * max(1.0, model.stat.extent)
     state = (data.qpos, data.qvel, data.qacc, data.qfrc_applied)
     numbers = [
         *map(function, FUNCTIONS), model._address, data._address, *map(_address, state), model.nq, model.nv,

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 
 from crosscheck.engine import Setting
 from crosscheck.engines.initial_velocities import may_move_freely
+from crosscheck.engines.planar_scene import planar_scene
 from crosscheck.engines.spanning_tree import spanning_tree
 from mbref.scene import Scene
 
@@ -79,12 +80,12 @@ def _adaptive(scene: Scene, rate: float) -> Iterator[Setting]:
     least, stiff = _rounded(LEAST_TURN / rate), _rounded(BETA * rate)
     of_rate, of_duration = COMPILED_BETA
     slow = _rounded(max(of_rate * rate, of_duration / scene.duration))
-    welded = any(closure.kind == "weld" for closure in spanning_tree(scene).closures)
+    welded = any(closure.kind == "weld" for closure in spanning_tree(planar_scene(scene)).closures)
     hard = COMPILED_HARD["weld" if welded else "point"]
     for family, factor in ADAPTIVE.items():
-        yield from _by_rtol(family, RTOLS, least, stiff, factor)
-    yield from _by_rtol(FORWARD_COMPILED, COMPILED_RTOLS, least, slow, hard)
-    yield from _by_rtol(PROJECTED_COMPILED, COMPILED_RTOLS, least, 0.0, hard)
+        yield from _by_rtol(family, RTOLS, least, factor, stiff)
+    yield from _by_rtol(FORWARD_COMPILED, COMPILED_RTOLS, least, hard, slow)
+    yield from _by_rtol(PROJECTED_COMPILED, COMPILED_RTOLS, least, hard, None)
     if scene.driver and not may_move_freely(scene):
         yield from (
             Setting(NEWTON, {"tolerance": tolerance, "turn": NEWTON_TURN}) for tolerance in TOLERANCES
@@ -92,10 +93,11 @@ def _adaptive(scene: Scene, rate: float) -> Iterator[Setting]:
 
 
 def _by_rtol(
-    family: str, rtols: Sequence[float], shortest: float, beta: float, hard: float
+    family: str, rtols: Sequence[float], shortest: float, hard: float, beta: float | None
 ) -> Iterator[Setting]:
+    rate = {} if beta is None else {"beta": beta}
     for rtol in rtols:
-        yield Setting(family, {"rtol": rtol, "min_step": shortest, "beta": beta, "hard": hard})
+        yield Setting(family, {"rtol": rtol, "min_step": shortest, **rate, "hard": hard})
 
 
 def _rounded(number: float) -> float:

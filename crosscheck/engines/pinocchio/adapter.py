@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -30,6 +31,7 @@ from crosscheck.engines.pinocchio.families import (
     sweep,
 )
 from crosscheck.engines.pinocchio.model import SUPPORTS, Loads, Mechanism
+from crosscheck.engines.planar_scene import planar_scene
 from crosscheck.engines.sampling import Adaptive, Counts, Failed, Sample, rk4, run_through
 from crosscheck.engines.tree_reactions import LinkMotion, joint_reactions
 from crosscheck.judge.constraints import scene_length
@@ -90,6 +92,8 @@ class Pinocchio(Engine):
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         """Simulate; raises ValueError for a family it does not have."""
+        if setting.family in COMPILED and (planar := planar_scene(scene)) is not scene:
+            return replace(self.run(planar, times, setting), reactions=None)
         start = time.process_time()
         python = Setting("dop853", setting.options) if setting.family in COMPILED else setting
         run = _PinocchioSimulation(scene, python)
