@@ -133,7 +133,7 @@ def _integrated(
     control = Control(
         order=integrator.order, fixed_step=0.0, smallest_step=0.0, largest_step=times[-1], largest_turn=0.0,
         violation=0.0, most_steps=0.0, steps_per_call=0.0, forced_step=0.0, first_step=0.0, rtol=rtol,
-        atol=rtol,
+        atol=rtol, closed_loops=1.0,
     )  # fmt: skip
     numbers = np.array(by_hand.numbers(scene))
     memory = packed(
