@@ -21,7 +21,7 @@ QUICK_SCENES = {  # name → end time (s)
 QUICK_FAMILIES = ("defaults", "tuned")  # of an engine that has them, else its first ones
 MOST_FAMILIES, MOST_SETTINGS = 2, 3  # in the quick sweep, of an engine and of a family
 QUICK_SAMPLES, SAMPLES = 31, 101
-QUICK_LIMIT, LIMIT = 10.0, 120.0  # s of a run
+QUICK_LIMIT, LIMIT = 5.0, 120.0  # s of a run
 
 LONG, QUICK_LONG = 0.5, 0.05  # s; runs that take longer are timed by their single run
 Sweep = tuple[list[Case], list[Unable]]
