@@ -11,6 +11,7 @@ from mbref.equations.branches import singular_position
 from mbref.equations.joint_reactions import open_dimensions, reactions
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR
 from mbref.motion import Motion
+from mbref.simulation.dead_position import is_at_dead_position
 from mbref.simulation.remedies import remedy
 from mbref.simulation.run import Run
 from mbref.simulation.stepping import DONE, LEFT_MOTION, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED, VIOLATED
@@ -27,6 +28,11 @@ OUTCOMES = {
     UNDECIDED: Outcome.UNDECIDED,
     LEFT_MOTION: Outcome.LEFT_MOTION,
 }
+
+DEAD_POSITION = (
+    "the drivers come to a dead position at t = {:.6g} s, beyond which the mechanism cannot follow: "
+    "velocities grow without bound; end the motion before, or drive another joint"
+)
 
 
 def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion:
@@ -92,6 +98,8 @@ def _crossings(run: Run) -> tuple[Crossing, ...] | None:
 
 def _message(run: Run, status: int) -> str:
     """One sentence: the cause and time of the end, and a remedy; or the correction of the start."""
+    if status != DONE and is_at_dead_position(run):
+        return DEAD_POSITION.format(run.memory.loop.clock.time)
     if status != DONE:
         return "; ".join(filter(None, (_cause(run, status), remedy(run, status))))
     crossings = int(run.memory.equations.system.counts.crossings)

@@ -1,0 +1,30 @@
+"""Dead positions: drivers turn their joints as far as the mechanism can follow, and no further.
+
+Near such a position the velocities that the drivers ask for, over the rates of the drivers, grow with the
+inverse root of the time that is left: Φ_q v = ν is not consistent there.  Where branches of a motion cross,
+Φ_q loses rank too, but ν stays in its range, and the velocities stay bounded.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbref.equations.initial_state import scene_length
+from mbref.simulation.run import Run
+
+TRANSMISSION = 1e3  # of velocities over rates, at the place where steps or iterations fail
+ROUNDING = 1e-13  # relative singular value of redundant rows
+MOST_ROWS = 400  # least squares of more take seconds
+
+
+def is_at_dead_position(run: Run) -> bool:
+    """Whether a run that failed has come to a dead position of its drivers."""
+    state, model = run.memory.state, run.model
+    if not run.scene.driver or model.m > MOST_ROWS or not np.isfinite(state.coordinates).all():
+        return False
+    length = scene_length(model)
+    terms = model.terms(float(run.memory.loop.clock.time), state.coordinates, np.zeros(model.n))
+    jacobian = terms.jacobian * np.tile(np.repeat([length, 1.0], 3), model.nb)
+    velocities = np.linalg.lstsq(jacobian, terms.nu, rcond=ROUNDING)[0]
+    rate = np.abs(terms.nu).max() * max(1.0, 1.0 / length)
+    return bool(np.abs(velocities).max() > TRANSMISSION * rate > 0.0)

@@ -1,0 +1,88 @@
+"""Crossed four-bars, whose flat positions every turn passes, and four-bars whose crank cannot turn in full.
+
+The crossed branch is smooth at a flat position, where it meets the parallel one: coupler and frame have the
+same length, so have crank and rocker, and the rocker's pin lies where two circles cross, away from the
+parallelogram.
+"""
+
+import numpy as np
+import pytest
+
+from crosscheck.conformance.hard_mechanisms import linkage
+from mbref.scene import Driver
+from mbref.simulation.simulate import Limits, simulate
+
+END = 3.0  # s, in which a crank passes one to ten flat positions
+
+
+def crossing_of_circles(first, long, second, short, beside):
+    """Where circles about two points cross, on the side away from a third point; in the plane."""
+    way = second - first
+    distance = np.linalg.norm(way)
+    along = (long**2 - short**2 + distance**2) / (2 * distance)
+    way, aside = way / distance, np.array([-way[1], way[0]]) / distance
+    height = np.sqrt(max(long**2 - along**2, 0.0))
+    places = [first + along * way + sign * height * aside for sign in (1.0, -1.0)]
+    return max(places, key=lambda place: np.linalg.norm(place - beside))
+
+
+def pins(crank, frame, angle):
+    """Pins of the crossed four-bar at an angle of its crank, in the plane."""
+    end, pivot = crank * np.array([np.cos(angle), np.sin(angle)]), np.array([frame, 0.0])
+    return np.zeros(2), end, crossing_of_circles(end, frame, pivot, crank, end + pivot), pivot
+
+
+def drawn(seed):
+    """Lengths (m) of crank and frame, angle (rad) and rate (rad/s) of the crank at the start."""
+    rng = np.random.default_rng([seed, 7])
+    rate = rng.uniform(2.0, 8.0) * rng.choice([-1, 1])
+    return rng.uniform(0.1, 0.4), rng.uniform(0.45, 0.8), rng.uniform(0.2, 2.8), rate
+
+
+def four_bar(places, driver=None):
+    """The bars between places in the plane; the crank's hinge may be driven."""
+    scene = linkage("four-bar", [(*place, 0.0) for place in places]).with_(duration=END)
+    return scene.with_(driver=(Driver(joint="P0", polynomial=driver),)) if driver else scene
+
+
+@pytest.mark.parametrize("method", ["alf-dual+projection", "taylor"])
+@pytest.mark.parametrize("seed", range(10))
+def test_a_driven_crossed_four_bar_stays_crossed_through_flat_positions(seed, method):
+    crank, frame, angle, rate = drawn(seed)
+    times = np.linspace(0.0, END, 31)
+    run = simulate(four_bar(pins(crank, frame, angle), (0.0, rate)), method, times, Limits(rtol=1e-9))
+    places = [pins(crank, frame, angle + rate * t) for t in times]
+    expected = np.array([(end + pin) / 2 for _, end, pin, _ in places])
+    assert run.outcome.label == "COMPLETED" and run.crossings, run.message
+    assert np.abs(run.position[:, 1, :2] - expected).max() < 1e-11  # measured: 9e-14
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_swinging_crossed_four_bar_keeps_its_energy_and_its_branch(seed):
+    crank, frame, angle, rate = drawn(seed)
+    scene = four_bar(pins(crank, frame, angle))
+    spun = scene.with_(
+        body=(scene.body[0].model_copy(update={"angular_velocity": (0.0, 0.0, rate)}), *scene.body[1:])
+    )
+    run = simulate(spun, times=np.linspace(0.0, END, 31), limits=Limits(rtol=1e-9))
+    assert run.outcome.label == "COMPLETED", run.message
+    turns = 2 * np.arctan2(run.orientation[:, 0, 3], run.orientation[:, 0, 0])
+    places = [pins(crank, frame, turn) for turn in turns]
+    expected = np.array([(end + pin) / 2 for _, end, pin, _ in places])
+    assert np.abs(run.position[:, 1, :2] - expected).max() < 1e-11  # measured: 8e-14
+    energy = run.energy
+    assert np.ptp(energy) < 1e-7 * np.abs(energy).max()  # measured: 5e-9
+
+
+@pytest.mark.parametrize(
+    "method", ["alf-dual+projection", "taylor", "kinematic", "mpi-svd+none", "alf-dual+baumgarte"]
+)
+def test_a_driver_that_asks_for_more_than_a_full_swing_is_told(method):
+    """Bars of 0.3 m over a frame of 0.7 m: the crank reaches 67 degrees, where the others are in line."""
+    start, end, pivot = np.zeros(2), 0.3 * np.array([np.cos(0.3), np.sin(0.3)]), np.array([0.7, 0.0])
+    pin = crossing_of_circles(end, 0.3, pivot, 0.3, np.array([0.4, -1.0]))
+    run = simulate(four_bar((start, end, pin, pivot), (0.0, 2.0)), method, np.linspace(0.0, 2.0, 21))
+    dead = np.arccos((0.3**2 + 0.7**2 - 0.6**2) / (2 * 0.3 * 0.7))
+    assert run.outcome.label != "COMPLETED"
+    assert run.t_end == pytest.approx((dead - 0.3) / 2.0, abs=1e-6)
+    assert "the drivers come to a dead position at t = 0.3" in run.message
