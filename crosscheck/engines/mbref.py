@@ -93,9 +93,10 @@ class Mbref(Engine):
         from mbref.equations.degrees_of_freedom import undriven_freedoms
         from mbref.simulation.simulate import why_no_code
 
-        if family.startswith(KINEMATIC) and undriven_freedoms(scene) > 0:
-            return False
         method = _method(family)
+        is_kinematic = family.startswith(KINEMATIC) or method.formulation.needs_independent_columns
+        if is_kinematic and undriven_freedoms(scene) > 0:
+            return False
         if _has_singular_mass(scene) and not method.formulation.handles_singular_mass:
             return False
         if family.endswith(SPECIALISED):
