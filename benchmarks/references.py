@@ -180,7 +180,7 @@ def with_torsion_spring(scene: Scene) -> Scene:
 
 
 def summary(found: list[Line], duration: float) -> list[str]:
-    """What the lines of random mechanisms come to."""
+    """The sums of the lines of random mechanisms."""
     bodies, redundant = [f["bodies"] for f in found], sum(f["redundant"] > 0 for f in found)
     bounds = np.array([np.inf if f["bound"] is None else f["bound"] for f in found])
     seconds = [sum(f["seconds"]) for f in found]

@@ -141,7 +141,7 @@ def _sweep(name: str, scene: Scene, times: np.ndarray, singular: bool) -> Iterat
 
 
 def _part(setting: Setting) -> tuple[Any, ...]:
-    """What is constant while a family is swept from coarse to fine."""
+    """Facts that stay constant while a family is swept from coarse to fine."""
     swept = "rtol" in setting.options
     return setting.family, *(v for k, v in setting.options.items() if swept and k != "rtol")
 

@@ -32,8 +32,8 @@ def groups(folder: Path) -> list[SceneRuns]:
 
 
 def verified(folder: Path) -> list[Record]:
-    """What `crosscheck verify ENGINE --json` printed into ``folder``/conformance/*.json, in the order of the
-    engines that are known here."""
+    """The verdicts that `crosscheck verify ENGINE --json` printed into ``folder``/conformance/*.json, in the
+    order of the engines that are known here."""
     order = list(engine_names())
     found = [json.loads(path.read_text()) for path in sorted((folder / "conformance").glob("*.json"))]
     return sorted(found, key=lambda f: order.index(f["engine"]) if f["engine"] in order else len(order))

@@ -1,4 +1,4 @@
-"""What is held against an engine: one property, one short function of a bench."""
+"""Properties that an engine is held to: one property, one short function of a bench."""
 
 from __future__ import annotations
 
@@ -208,7 +208,7 @@ def determinism(bench: Bench) -> Finding:
 
 
 def other_times(bench: Bench) -> Finding:
-    """Other sample times, the first of them not 0, and one alone leave the motion there what it was."""
+    """Sampled at other times, the first of them not 0, or at one time alone, the motion stays."""
     between = bench.times[:-1] + np.diff(bench.times) * np.resize([0.3, 0.7], len(bench.times) - 1)
     times = np.sort([*bench.times[1:], *between])
     common = _at(bench.run(bench.scene, times), np.isin(times, bench.times))

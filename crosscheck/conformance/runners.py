@@ -31,7 +31,7 @@ class Runner(Protocol):
         """Version, the reason of a refusal, and else the settings of the engine, or those of a family."""
 
     def cannot(self, scene: Scene) -> Cannot | None:
-        """What the engine cannot do with the scene."""
+        """Why the engine cannot run the scene, or None."""
 
     def observe(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
         """A run at times (k,), s, with nothing left of runs before, and what it printed and left behind."""

@@ -23,7 +23,7 @@ PASS, FAIL, CANNOT, OUTSIDE = "pass", "fail", "cannot", "outside"
 REFUSAL, RUN = "refusal", "run"
 MARKS = {PASS: ("✓", "green"), FAIL: ("✗", "bold red"), CANNOT: ("–", "yellow"), OUTSIDE: ("○", "dim")}
 FIRST = {
-    REFUSAL: "What cannot be run is refused by cannot() with a reason, and what is not refused has settings.",
+    REFUSAL: "Scenes that cannot be run are refused by cannot() with a reason, and all others have settings.",
     RUN: "The run at the finest setting of the engine's best family completes.",
 }
 
@@ -48,7 +48,7 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Conformance:
-    """What an engine was found to do."""
+    """An engine's behaviour by one card on one scene."""
 
     engine: str
     version: str
@@ -62,7 +62,7 @@ class Conformance:
         return FAIL not in statuses and PASS in statuses
 
     def to_record(self) -> dict[str, Any]:
-        """What ``verify --json`` prints; numbers that are not finite are null."""
+        """The record that ``verify --json`` prints; numbers that are not finite are null."""
         verdicts = [record_of(verdict) for verdict in self.verdicts]
         return {**asdict(self), "conforms": self.conforms, "verdicts": verdicts}
 
@@ -208,7 +208,7 @@ def _card(name: str) -> str:
 
 
 def abouts() -> dict[str, str]:
-    """What every property checks, by name."""
+    """The check of every property in a sentence, by name."""
     return {**FIRST, **{name: entry.about for name, entry in PROPERTIES.items()}}
 
 

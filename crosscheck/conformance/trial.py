@@ -203,7 +203,7 @@ class Bench:
 
     @property
     def floors(self) -> str:
-        """What `own_accuracy` was measured from, in words."""
+        """The differences that `own_accuracy` was measured from, in words."""
         return f"twin runs {self.twins_apart:.1e} apart, two finest settings {self.steps_apart:.1e}"
 
     @cached_property

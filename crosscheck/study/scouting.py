@@ -31,7 +31,7 @@ def scout(engines: Sequence[str], scenes: Sequence[Scene], advance: Callable[[st
 
 
 def offer(engine_name: str, scene: Scene) -> Offer:
-    """What ``scout`` found out, else what the engine says in this process."""
+    """Settings that ``scout`` found out, else those that the engine gives in this process."""
     if (engine_name, scene) not in _found:
         _found[engine_name, scene] = _offered(engine_name, scene)
     return _found[engine_name, scene]

@@ -23,7 +23,7 @@ TURN = 0.35  # rad between two of them, at most, of the body that turns fastest
 
 
 def truth_record(scene: Scene, times: np.ndarray, reference_time: float) -> Record:
-    """What is known of the true motion of a scene at times (k,), and at the instants that show it moving.
+    """The true motion of a scene, as far as it is known, at times (k,), and at instants that show it move.
 
     ``kind`` is the family of the closed form, "reference", or "" where there is none; ``bound`` is on the
     error, ``until`` (s) how far it is known and ``reason`` why no further.

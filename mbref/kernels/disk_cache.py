@@ -97,7 +97,7 @@ class _Files:
         self._stem, self._stamp = Path(cache_path) / filename_base, source_stamp
 
     def load(self, key: Any) -> Any:
-        """What was saved under the key, or None."""
+        """The data saved under the key, or None."""
         data = checked_file.read(self._path(key))
         return None if data is None else pickle.loads(data)
 

@@ -66,7 +66,7 @@ def test_plug_in_and_conformance(installed, capsys, scene):
 
 
 def example(name: str, tmp_path: Path) -> str:
-    """What an example prints when it is run from an empty directory."""
+    """The output of an example when it is run from an empty directory."""
     run = subprocess.run(
         [sys.executable, ROOT / "examples" / name],
         cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True,

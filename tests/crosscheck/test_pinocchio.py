@@ -99,7 +99,7 @@ def test_joints_are_in_the_order_the_factorisation_needs(name: str) -> None:
 
 
 def test_mass_matrix_by_two_algorithms() -> None:
-    """What a wrong order of joints gets wrong: composite bodies against columns of the inverse dynamics."""
+    """A wrong order of joints shows here: composite bodies against columns of the inverse dynamics."""
     mechanism = Mechanism(every_joint())
     model, q = mechanism.model, mechanism.q0
     data = model.createData()

@@ -52,7 +52,7 @@ def test_sound_engine_and_a_second_run_that_resumes(tmp_path):
 
 
 def test_faulty_engine_and_its_finding(tmp_path, capsys, monkeypatch):
-    """What fails is kept as a scene file, and the command in its first lines fails again."""
+    """A failing mechanism is kept as a scene file, and the command in its first lines fails again."""
     defect = DEFECTS["a rod's speed of turning left out"]
     (tmp_path / "spatial_engine.py").write_text(SOURCE.read_text().replace(defect.old, defect.new))
     run = held(tmp_path, "distance and joint and closure", "--findings", str(tmp_path / "found"))

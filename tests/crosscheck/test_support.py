@@ -41,7 +41,7 @@ def test_probes_and_the_kinds_a_scene_may_have():
 
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
 def test_support_and_a_short_run(name):
-    """What is said to work runs: the probe over a hundredth of its time."""
+    """Features said to work run: the probe over a hundredth of its time."""
     engine_here = engine(name)
     for feature, scene in feature_scenes().items():
         if engine_here.cannot(scene) is None:

@@ -18,7 +18,7 @@ KNOWN: dict[tuple[str, str, str], str] = {  # (engine, scene, card): why it fail
 
 
 def violations(name: str, scenes: tuple[str, ...], related: bool) -> dict[tuple[str, str, str], str]:
-    """What fails, by engine, scene and card."""
+    """Known failures, by engine, scene and card."""
     found = {}
     for scene in scenes:
         bench = trial.set_up(InProcess(engine(name)), replace(SPECIMENS[scene], related=related))

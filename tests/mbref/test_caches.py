@@ -142,7 +142,7 @@ def test_a_killed_writer_leaves_a_whole_file(tmp_path: Path, capfd):
 
 
 def ran(script: str, folder: Path, cache: Path) -> tuple[str, str]:
-    """What a program prints that has its cache there; it is to end well."""
+    """The output of a program that has its cache there; it is to end well."""
     file = folder / "program.py"
     if not file.exists():
         file.write_text(script.format(root=str(ROOT)))

@@ -1,4 +1,4 @@
-"""What the decorators of kernels promise."""
+"""Promises of the decorators of kernels."""
 
 import numba
 import numpy as np

@@ -27,7 +27,7 @@ VARY = [Variation("joint[B].anchor[0]", 0.1, 1e-3, normal=True), Variation("body
 
 
 def poses(runs) -> dict[int, list]:
-    """What is compared: samples by place."""
+    """Samples by place, to be compared."""
     return {place: [run.position.tolist(), run.velocity.tolist()] for place, run in runs}
 
 

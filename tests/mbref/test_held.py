@@ -1,4 +1,4 @@
-"""What rows hold at rest: what is found, and that motion and reactions are those of all equations."""
+"""Statically determined rows: those found, and that motion and reactions are those of all equations."""
 
 import numpy as np
 import pytest

@@ -44,7 +44,7 @@ def engine(defect: Defect | None = None) -> Engine:
 
 
 def euler(rates: Callable, start: np.ndarray, times: np.ndarray, steps: int = 200) -> OptimizeResult:
-    """What a defect puts in the place of `solve_ivp`: Euler's method with small steps between samples."""
+    """The replacement of `solve_ivp` by a defect: Euler's method with small steps between samples."""
     y, t, samples = start, 0.0, []
     for target in times:
         for _ in range(steps if target > t else 0):

@@ -16,8 +16,8 @@ from mbref.scene import Scene
 
 SAFETY = 10.0
 LEAST = 1e-14
-"""What the doubles of a scene and of the samples leave open: positions are rounded to 1e-16 of themselves,
-and rows of loops that are redundant contradict each other by as much."""
+"""Errors that the doubles of a scene and of the samples leave open: positions are rounded to 1e-16
+of themselves, and rows of loops that are redundant contradict each other by as much."""
 USEFUL = 1e-6
 """A larger bound is no reference: the motions took different ways, as at a singular position."""
 

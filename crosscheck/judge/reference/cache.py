@@ -57,7 +57,7 @@ def save(scene: Scene, arrays: dict[str, np.ndarray]) -> None:
 
 
 def canonical(scene: Scene) -> str:
-    """What determines the motion of a scene, as JSON: all but its own name and duration."""
+    """All fields of a scene that determine its motion, as JSON: all but its name and duration."""
     return json.dumps({**scene.to_dict(), "name": "", "duration": 0.0}, sort_keys=True)
 
 

@@ -147,7 +147,7 @@ def judged(
 
 @dataclass(frozen=True)
 class _Kept:
-    """What is known of a scene's motion: samples, why there are no later ones, and the time it was given."""
+    """A scene's motion as far as it is known: samples, why none are later, and the CPU time given."""
 
     samples: Reference
     reason: str

@@ -30,7 +30,7 @@ OPEN = 1e-9  # residual, relative to the scene's length, of rows that were taken
 
 @dataclass(frozen=True)
 class Instant:
-    """What the equations of K states are made of: bodies, joint coordinates (see ``coordinates``), the rows
+    """Parts of the equations of K states: bodies, joint coordinates (see ``coordinates``), the rows
     of closures and drivers with their rates ``speed`` (K, m), and the joint rates (K, nv)."""
 
     placed: Placed
