@@ -11,13 +11,15 @@ import numpy as np
 
 def to_matrix(p: np.ndarray) -> np.ndarray:
     """Rotation matrices (…, 3, 3) of unit quaternions (…, 4)."""
-    w, x, y, z = np.moveaxis(np.asarray(p, dtype=float), -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    p = np.asarray(p, dtype=float)
+    w, x, y, z = p[..., 0], p[..., 1], p[..., 2], p[..., 3]
+    matrix = np.empty((*p.shape[:-1], 3, 3))
+    matrix[..., 0, 0], matrix[..., 0, 1] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z)
+    matrix[..., 0, 2], matrix[..., 1, 0] = 2 * (x * z + w * y), 2 * (x * y + w * z)
+    matrix[..., 1, 1], matrix[..., 1, 2] = 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
+    matrix[..., 2, 0], matrix[..., 2, 1] = 2 * (x * z - w * y), 2 * (y * z + w * x)
+    matrix[..., 2, 2] = 1 - 2 * (x * x + y * y)
+    return matrix
 
 
 def from_matrix(matrix: np.ndarray) -> np.ndarray:
@@ -58,6 +60,15 @@ def multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 def conjugate(p: np.ndarray) -> np.ndarray:
     """The inverse rotations (…, 4) of unit quaternions."""
     return np.asarray(p, dtype=float) * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Vector products (…, 3); for few vectors several times faster than NumPy's."""
+    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        product[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
+    return product
 
 
 def rotate(p: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -85,7 +85,7 @@ def poses(q: np.ndarray, v: np.ndarray, length: float) -> tuple[np.ndarray, np.n
     nb = len(coordinates)
     pose, rate = np.zeros((nb + 1, 12)), np.zeros((nb + 1, 12))
     axes = rotations.to_matrix(coordinates[:, 3:])
-    turning = np.cross(twists[:, None, 3:], axes)  # of rows a of R: (R [ω'])ᵀ = -ω' × a
+    turning = rotations.cross(twists[:, None, 3:], axes)  # of rows a of R: (R [ω'])ᵀ = -ω' × a
     pose[:nb, :3], pose[:nb, 3:] = coordinates[:, :3] / length, axes.reshape(nb, 9)
     rate[:nb, :3], rate[:nb, 3:] = twists[:, :3] / length, -turning.reshape(nb, 9)
     pose[nb, 3:] = np.eye(3).ravel()

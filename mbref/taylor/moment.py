@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mbref.kernels.layout import Counts
 from mbref.simulation.run import Run
 
 
@@ -25,15 +24,15 @@ def moment_of(run: Run) -> Moment:
     """A copy of the present state of a run."""
     state, clock, equations = run.memory.state, run.memory.loop.clock, run.memory.equations
     arrays = (state.coordinates, state.velocities, equations.angles)
-    crossings = int(equations.system.counts.crossings)
-    return Moment(float(clock.time), int(clock.sample), crossings, *(a.copy() for a in arrays))
+    crossings = int(equations.system.counts["crossings"])
+    return Moment(float(clock["time"]), int(clock["sample"]), crossings, *(a.copy() for a in arrays))
 
 
 def enter(moment: Moment, run: Run) -> None:
     """Bring a run of the same scene to a state."""
     state, clock, equations = run.memory.state, run.memory.loop.clock, run.memory.equations
-    clock.time, clock.sample = moment.time, moment.sample
-    equations.system.counts.crossings = moment.crossings
+    clock["time"], clock["sample"] = moment.time, moment.sample
+    equations.system.counts["crossings"] = moment.crossings
     state.coordinates[:], state.velocities[:] = moment.coordinates, moment.velocities
     equations.angles[:] = moment.angles
 
@@ -41,5 +40,4 @@ def enter(moment: Moment, run: Run) -> None:
 def put_counts(one: Run, other: Run) -> None:
     """The counts of one run to another."""
     source, target = one.memory.equations.system.counts, other.memory.equations.system.counts
-    for name in Counts._fields:
-        setattr(target, name, getattr(source, name))
+    target.setfield(source, source.dtype)

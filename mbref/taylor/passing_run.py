@@ -43,16 +43,16 @@ class PassingRun(SeriesRun):
             status = self._step()
             if status == PAUSED:
                 before, clear = clear, float(clearance(self._packed_taylor.argument))
-                if clear >= max(before, 1.0) and clock.time >= clock.passage:
+                if clear >= max(before, 1.0) and clock["time"] >= clock["passage"]:
                     break
         return status
 
     def _step(self) -> int:
         """One step of the series, whose crossing is recorded."""
         counts = self.memory.equations.system.counts
-        passed = int(counts.crossings)
+        passed = int(counts["crossings"])
         status = self.step_on()
-        if status not in (PAUSED, DONE) or counts.crossings == passed:
+        if status not in (PAUSED, DONE) or counts["crossings"] == passed:
             return status
         taken = dict(self.limits.branches).get(passed + 1, SMOOTH)
         crossing = self._placed(taken)
