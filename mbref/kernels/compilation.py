@@ -91,16 +91,15 @@ class Exchangeable:
 
     def __init__(self, function: Callable, signature: types.Type):
         self.function, self.signature = function, signature
-        self._compiled: Callable | None = function if PLAIN else None
 
-    @property
+    @functools.cached_property
     def pointer(self) -> Callable:
         """The function that kernels take: the compiled one, or the plain one without the JIT."""
-        if self._compiled is None:
-            self._say_compiling()
-            with kept_in(CACHE):
-                self._compiled = self._compile()
-        return self._compiled
+        if PLAIN:
+            return self.function
+        self._say_compiling()
+        with kept_in(CACHE):
+            return self._compile()
 
     def prepare(self) -> None:
         """Compile now, or load from the cache."""

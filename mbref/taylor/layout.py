@@ -13,6 +13,18 @@ from mbref.kernels.layout import Memory
 from mbref.kernels.named_memory import Indices, Matrix, Vector
 
 
+class Readings(NamedTuple):
+    """Variables as linear forms of their bodies' poses: position (m) and rotation matrix by rows.
+
+    A direction that a driver turns by ψ is cos ψ along - sin ψ across.
+    """
+
+    body: Annotated[Indices, "nz"]  # nb for the ground
+    driver: Annotated[Indices, "nz"]  # -1 for none
+    along: Annotated[Matrix, "nz", 12]
+    across: Annotated[Matrix, "nz", 12]
+
+
 class Rows(NamedTuple):
     """Constraint rows Φ: products of two lanes (each of them twice), linear terms and constants."""
 
@@ -163,6 +175,7 @@ class TaylorMemory(NamedTuple):
 
     run: Memory  # of the simulation: samples, counts, limits, and the general kernels
     polynomials: Polynomials
+    readings: Readings
     series: Series
     solver: Solver
     progress: Progress

@@ -53,7 +53,7 @@ class NaturalCoordinates:
         self.place = poses[:, :3] / self.length
         axes = rotations.to_matrix(poses[:, 3:])
         self._moving = moving.reshape(-1, 6)
-        self.images = Images(model.data.drivers, self.length)
+        self.images = Images(self.length)
         self.given: dict[int, tuple[int, int]] = {}
         self.centres = [self.images.add(b, np.eye(12)[:3]) for b in range(self.nb)]
         self._positions = range(3 * self.nb)

@@ -48,7 +48,6 @@ class SeriesRun(Run):
         moving = np.zeros(self.model.n, dtype=bool)
         moving[self.part.active.velocities] = True
         self.natural = NaturalCoordinates(self.model, self.start, moving)
-        self._variables = self.natural.images.of(self.natural.kept)
         self.taylor = self._taylor_memory(order)
         self.taylor.progress.order, self.taylor.progress.tolerance = order, tolerance
         self._packed_taylor = packed(self.taylor)
@@ -71,6 +70,7 @@ class SeriesRun(Run):
         return TaylorMemory(
             run=self.memory,
             polynomials=polynomials,
+            readings=natural.images.of(natural.kept),
             series=series,
             solver=allocate(Solver, sizes),
             progress=record(Progress()),
@@ -81,11 +81,7 @@ class SeriesRun(Run):
 
     def expand(self, until: float) -> int:
         """Expand at the present time and state, for steps until a time (s): OK or why that cannot be."""
-        memory, series, nz = self.memory, self.taylor.series, len(self.natural.kept)
-        t, state = float(memory.loop.clock.time), memory.state
-        series.terms[:2] = 0.0
-        series.terms[:2, :nz] = self._variables.at(t, state.coordinates, state.velocities)
-        self.taylor.angles[:] = memory.equations.angles[self.taylor.polynomials.torsions.slot]
+        self.taylor.angles[:] = self.memory.equations.angles[self.taylor.polynomials.torsions.slot]
         self.taylor.progress.end = until
         return int(enter(self._packed_taylor.argument))
 

@@ -36,6 +36,7 @@ from mbref.taylor.passage import (
     remember_pivots,
     size_of,
 )
+from mbref.taylor.readings import read_variables
 from mbref.taylor.samples import (
     LOST_MOTION,
     NOISE,
@@ -253,6 +254,7 @@ def step(memory):
 def enter(memory):
     """Choose the partition at the present state and expand there: OK or why that cannot be."""
     t = memory.run.loop.clock.time
+    read_variables(t, memory)
     expand_drivers(t, memory)
     memory.progress.rank = choose(memory)
     memory.solver.first[:] = 1e300
