@@ -42,6 +42,63 @@ def test_closures_get_the_rate_of_least_cost_and_no_shortest_step(grids):
     assert {(s.options["beta"], s.options["min_step"]) for s in kept[1:]} == {(4000.0, 0.01)}
 
 
+def test_compiled_families_get_two_shortest_steps_and_a_rate_for_each_scan(grids):
+    scene = SCENES["planar_slider_crank_heavy"]()
+    given = [Setting("forward, compiled", {"rtol": 1e-3, "min_step": 0.01, "beta": 4.0, "hard": 1e-9})]
+    rate = {1e-6: 10.0, 1e-10: 300.0}
+
+    def score(setting: Setting) -> float:
+        return abs(setting.options["beta"] - rate[setting.options["rtol"]])
+
+    found = list(grids.refined(given, scene, True, score))
+    swept = {(s.options["min_step"], s.options["beta"]) for s in found}
+    assert swept == {(h, beta) for h in (0.01, 0.0025) for beta in (10.0, 300.0)} and len(found) == 4 * 19
+    tolerances = [s.options["rtol"] for s in found[:19]]
+    assert tolerances == sorted(tolerances, reverse=True)
+
+
+def test_every_family_says_whose_integrator_it_has(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    from speed import COMPILED_HERE, OPPONENTS, OURSELVES, OWN, _integrator
+
+    assert _integrator("mujoco", "tuned") == _integrator("mbref", "taylor") == OWN
+    assert (
+        _integrator("pinocchio", "tuned, compiled")
+        == _integrator("mujoco", "newton, compiled")
+        == COMPILED_HERE
+    )
+    assert _integrator("pinocchio", "tuned") not in (OWN, COMPILED_HERE)
+    assert OPPONENTS["own integrators"][1] == (OWN,) and OPPONENTS["engines"][1] == ()
+    ours = {family: [w for w, belongs in OURSELVES.items() if belongs(family)] for family in
+            ("taylor", "kinematic", "lm2+projection, specialised")}  # fmt: skip
+    assert ours == {"taylor": ["series"], "kinematic": ["general kernels"],
+                    "lm2+projection, specialised": ["specialised code"]}  # fmt: skip
+
+
+def test_a_whole_process_pays_after_the_construction_is_earned(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    from whole_process import candidates, even
+
+    ours, theirs = (0.1, 0.005, 0.6), (1.0, 0.001, 0.2)
+    assert even(ours, 0.002, theirs, 0.004, 1) == "2"
+    assert even(ours, 0.002, theirs, 0.004, 2) == "202"
+    assert even(theirs, 0.002, ours, 0.004, 2) == "0"
+    assert even(ours, 0.004, theirs, 0.002, 1) == "never"
+    assert even(theirs, 0.004, ours, 0.002, 1) == "until 2"
+
+    def run(family: str, error: float | None, seconds: float) -> dict:
+        return {"engine": "mujoco", "family": family, "options": {"rtol": seconds}, "outcome": "COMPLETED",
+                "error": error, "seconds": [seconds], "cost": {"seconds": seconds}}  # fmt: skip
+
+    curves = [{"engine": "mujoco", "family": f, "cost": [1.0, c, None]} for f, c in
+              (("tuned", 3.0), ("stock", 2.0), ("forward, compiled", 1.0), ("defaults", None))]  # fmt: skip
+    made = (("tuned", 1e-7, 3.0), ("stock", 1e-7, 2.5), ("stock", 1e-8, 2.0), ("stock", None, 0.1),
+            ("forward, compiled", 1e-7, 1.0))  # fmt: skip
+    runs = [run(*numbers) for numbers in made]
+    found = candidates({"levels": [1e-3, 1e-6, 1e-9], "curves": curves, "runs": runs})
+    assert [(c.family, c.options["rtol"]) for c in found] == [("stock", 2.0), ("forward, compiled", 1.0)]
+
+
 def test_only_scenes_with_singular_positions_keep_the_shortest_step(grids):
     assert grids.passes_singular_position(SCENES["planar_slider_crank_heavy"]())
     assert not grids.passes_singular_position(SCENES["planar_slider_crank_gravity"]())
