@@ -275,6 +275,18 @@ def test_newton_on_mujoco_s_closures_and_truth(name: str) -> None:
     assert gap < 1e-5 * abs(found).max(), f"velocities or accelerations are {gap:.1e} m/s apart"
 
 
+def test_newton_on_a_single_driven_coordinate() -> None:
+    """A driven pendulum: no closure, one coordinate, an angle and its rate as prescribed."""
+    pytest.importorskip("mujoco")
+    pendulum = SCENES["point_pendulum"]()
+    driver = Driver(joint=pendulum.joint[0].name, polynomial=(0.0, 0.5, 0.25))
+    scene = pendulum.with_(driver=(driver,), duration=1.0)
+    run = simulate("mujoco", scene, 5, NEWTON, tolerance=1e-10, turn=0.1)
+    assert run.outcome is Outcome.COMPLETED, run.message
+    spun = np.linalg.norm(run.angular_velocity[:, 0], axis=1)
+    assert abs(spun - (0.5 + 0.5 * run.times)).max() < 1e-13, f"rates {spun}"
+
+
 def test_newton_says_where_the_closures_cannot_be_met() -> None:
     """The rod is too short for a crank that is driven over the top."""
     pytest.importorskip("mujoco")

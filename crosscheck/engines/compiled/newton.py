@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
 from numba import njit
 
 from crosscheck.engines.compiled.calls import rates_of
@@ -45,8 +46,8 @@ def advance(system, target, memory, numbers):
 @njit(cache=True)
 def integrate(system, times, samples, memory):
     """States at the times into the rows of ``samples``; how it ended, and the number of samples reached."""
-    numbers = memory.errors[0]
-    numbers[0], numbers[1], numbers[2] = system.tolerance, 0.0, 0.0
+    numbers = np.zeros(3)
+    numbers[0] = system.tolerance
     for k in range(times.shape[0]):
         status = advance(system, times[k], memory, numbers)
         memory.counts[EVALUATIONS] = int(numbers[1])

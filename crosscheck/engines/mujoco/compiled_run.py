@@ -1,5 +1,8 @@
 """MuJoCo without Python between samples: ``mj_forward`` in the compiled DOP853, with states projected onto
-MuJoCo's closures or not, and Newton's method on those closures where nothing but drivers moves a scene."""
+MuJoCo's closures or not, and Newton's method on those closures where nothing but drivers moves a scene.
+
+Where MuJoCo itself gives up (mju_error), it ends the process: a run in a child is then one that crashed.
+"""
 
 from __future__ import annotations
 
