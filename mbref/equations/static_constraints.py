@@ -173,6 +173,7 @@ def _holding(
     a motion, and which columns (n,) move and can rest.
     """
     column_of, free, found = model.entry_columns(), moving.copy(), True
+    listed = column_of.tolist()
     cannot_rest = lies_in(column_of, moving & ~can_rest)
     while found:
         bears = left & lies_in(column_of, free)
@@ -182,31 +183,27 @@ def _holding(
             groups.setdefault(tuple(np.sort(column_of[row, bears[row]]).tolist()), []).append(int(row))
         found = False
         for columns, rows in groups.items():
-            if not free[list(columns)].all():
-                continue  # another group has taken one of them in this round
-            chosen = _perpendicular(
-                np.array([samples[:, r][:, _places(column_of[r], columns)] for r in rows])
-            )
+            if len(rows) < len(columns) or not free[list(columns)].all():
+                continue  # too few rows, or another group has taken a column in this round
+            places = np.array([[listed[r].index(column) for column in columns] for r in rows])
+            chosen = _perpendicular(samples[:, np.array(rows)[:, None], places].swapaxes(0, 1))
             if len(chosen) == len(columns):
                 found = True
                 free[list(columns)] = False
                 yield Held(tuple(rows[k] for k in chosen), columns)
 
 
-def _places(column_of: np.ndarray, columns: Sequence[int]) -> list[int]:
-    """Where in a row's block (12,) these columns are."""
-    return [int(np.flatnonzero(column_of == column)[0]) for column in columns]
-
-
 def _perpendicular(rows: np.ndarray) -> list[int]:
     """Which of the rows (r, STATES, c) have a constant length and are perpendicular to those before."""
     chosen: list[int] = []
     lengths = np.sqrt((rows**2).sum(axis=2))
-    for k, (row, length) in enumerate(zip(rows, lengths, strict=True)):
-        if length.min() > SMALL and np.ptp(length) <= ROUNDING * length.max():
-            cosines = [(row * rows[j]).sum(axis=1) / (length * lengths[j]) for j in chosen]
-            if (np.abs(cosines) < ROUNDING).all():
-                chosen.append(k)
+    least, most = lengths.min(axis=1), lengths.max(axis=1)
+    steady = (least > SMALL) & (most - least <= ROUNDING * most)
+    directions = rows / np.maximum(lengths, SMALL)[:, :, None]
+    cosines = np.abs(np.einsum("isc,jsc->ijs", directions, directions)).max(axis=2)
+    for k in np.flatnonzero(steady).tolist():
+        if (cosines[k, chosen] < ROUNDING).all():
+            chosen.append(k)
     return chosen
 
 
