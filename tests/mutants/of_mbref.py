@@ -185,9 +185,9 @@ DEFECTS = (
         CLOSED_FORMS,
     ),
     Defect(
-        "mbref/taylor/images.py",
-        "drivers.amplitude[d] * drivers.frequency[d] * np.cos(argument)",
-        "drivers.amplitude[d] * drivers.frequency[d] * np.sin(argument)",
+        "mbref/taylor/readings.py",
+        "c * x_rate - s * y_rate - speed * turned",
+        "c * x_rate - s * y_rate + speed * turned",
         CLOSED_FORMS,
         "the rate is a first guess, which the correction of velocities makes exact: any number will do",
     ),
