@@ -32,9 +32,7 @@ RESOLUTION = 1e-14  # violation of a step beside a singular position, that passe
 ACROSS = 1e-13  # of a step that crosses
 CLOCK = 3e-16  # of the time: its rounding, over which drivers and variables move
 DEEPEST = 0.2  # of a step's first pivot: its last is not less, so that the next is not the worse for it
-SHORTEST = (
-    0.05  # the same, of a step that crosses: else the next attempt begins nearer, and crosses no further
-)
+SHORTEST = 0.05  # the same, of a step that crosses: refused, it would be tried again from nearer
 VANISHING = log(0.2)  # of a determinant over its values at both ends, that falls and rises linearly
 LONG, MOST_PARTS = 0.5, 8  # m or rad that a variable moves in a part of a step, and the most of them
 GOLDEN, SECTIONS = 0.6180339887498949, 70  # of the search for the least determinant

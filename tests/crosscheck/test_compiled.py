@@ -194,13 +194,19 @@ def test_mujoco_compiled_and_truth(name: str) -> None:
     assert run.cost.rhs > 11 * run.cost.steps > 0 and run.cost.seconds > 0
 
 
-def test_mujoco_compiled_and_in_python_with_every_joint_and_load() -> None:
-    pytest.importorskip("mujoco")
+def agreeing(family: str, in_python: str, beta: float) -> tuple[Scene, Trajectory, Trajectory]:
+    """Runs of MuJoCo with every joint and load, by a compiled family and in Python, which must agree."""
     scene = every_joint().with_(duration=0.2)
-    options = {"rtol": 1e-9, "min_step": 1e-9, "beta": 30.0, "hard": 1e-7}
-    compiled, plain = (simulate("mujoco", scene, 6, family, **options) for family in (FAMILY, "forward"))
+    options = {"rtol": 1e-9, "min_step": 1e-9, "beta": beta, "hard": 1e-7}
+    compiled, plain = (simulate("mujoco", scene, 6, each, **options) for each in (family, in_python))
     assert compiled.outcome is plain.outcome is Outcome.COMPLETED, compiled.message
     assert apart(compiled, plain) < MARGIN * APART, f"apart by {apart(compiled, plain):.1e}"
+    return scene, compiled, plain
+
+
+def test_mujoco_compiled_and_in_python_with_every_joint_and_load() -> None:
+    pytest.importorskip("mujoco")
+    _, compiled, plain = agreeing(FAMILY, "forward", beta=30.0)
     worst = max(abs(compiled.reactions[j] - plain.reactions[j]).max() for j in plain.reactions)
     assert worst < 1e-3 * max(abs(force).max() for force in plain.reactions.values()), f"{worst:.1e}"
 
@@ -250,11 +256,7 @@ def test_mujoco_compiled_and_projected_through_singular_positions_and_truth(name
 def test_projected_states_compiled_and_in_python_agree() -> None:
     """Every joint, spring and driver, with redundant rows and quaternions."""
     pytest.importorskip("mujoco")
-    scene = every_joint().with_(duration=0.2)
-    options = {"rtol": 1e-9, "min_step": 1e-9, "beta": 0.0, "hard": 1e-7}
-    compiled, plain = (simulate("mujoco", scene, 6, family, **options) for family in (PROJECTED, "projected"))
-    assert compiled.outcome is plain.outcome is Outcome.COMPLETED, compiled.message
-    assert apart(compiled, plain) < MARGIN * APART, f"apart by {apart(compiled, plain):.1e}"
+    scene, compiled, _ = agreeing(PROJECTED, "projected", beta=0.0)
     assert violation_series(scene, compiled).max() < 1e-12
 
 

@@ -67,7 +67,7 @@ class MuJoCo(Engine):
         return sweep(scene, fastest_rate(scene, lambda step: self._coarse(scene, step)))
 
     def prepare(self, families: Sequence[str]) -> None:
-        """Compile what the compiled family runs."""
+        """Compile the code of the compiled families."""
         if set(COMPILED) & set(families):
             compiled_run.prepare()
 

@@ -86,7 +86,7 @@ class Pinocchio(Engine):
         return sweep(scene, rate)
 
     def prepare(self, families: Sequence[str]) -> None:
-        """Compile what the compiled families run."""
+        """Compile the steppers and the library of the compiled families."""
         if set(COMPILED) & set(families):
             compiled_run.prepare()
 

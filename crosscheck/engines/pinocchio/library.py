@@ -1,7 +1,8 @@
 """Our C functions around Pinocchio, compiled once from ``rates.cpp`` against the headers of its wheel.
 
-The library lies in the user's cache folder, its name a hash of what it is made from and a hash of its bytes,
-so that a damaged one is made anew.  It needs a C++ compiler and Eigen's headers (package ``cmeel-eigen``).
+The library lies in the user's cache folder, its name a hash of source, compiler's command and Pinocchio's
+version, and a hash of its bytes, so that a damaged one is made anew.  It needs a C++ compiler and Eigen's
+headers (package ``cmeel-eigen``).
 """
 
 from __future__ import annotations
@@ -94,7 +95,7 @@ def _folder() -> Path:
 
 @functools.cache
 def _origin() -> str:
-    """Hash of what the library is made from."""
+    """Hash of Pinocchio's version, the compiler's command and the source."""
     import pinocchio
 
     text = "\n".join((pinocchio.__version__, *_command(Path("library")), SOURCE.read_text()))
