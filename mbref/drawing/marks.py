@@ -17,6 +17,7 @@ from mbref.trajectory import Trajectory
 ACTION = "#b3261e"  # of loads and drivers
 STUB = 20.0  # px, half of an axis drawn at a joint
 ARROW = 52.0  # px
+LETTER = 6.0  # px
 FACING = 0.7  # cosine to the line of sight above which an axis is seen as a point
 
 
@@ -203,8 +204,18 @@ def _spiral() -> str:
     return f'<polyline points="{points}" stroke="{ACTION}" stroke-width="1.5" fill="none"/>'
 
 
-def joint_name(stage: Stage, joint: Joint) -> str:
-    """The joint's name, up and to the left of its second body's anchor."""
-    name = svg.text(-9, -10, joint.name, f'fill="{INK}" font-weight="600"', "end")
-    side = anchors(joint)[1]
-    return svg.follow(stage.place(*side), name, stage.seconds)
+def joint_names(stage: Stage) -> Iterator[str]:
+    """The joints' names, up and to the left of their second bodies' anchors; joints that stay at one place
+    are named together."""
+    places = {joint.name: stage.place(*anchors(joint)[1]) for joint in stage.scene.joint}
+    while places:
+        place = next(iter(places.values()))
+        near = [name for name, other in places.items() if _stay_together(place, other)]
+        words = svg.text(-9, -10, ", ".join(near), f'fill="{INK}" font-weight="600"', "end")
+        yield svg.follow(place, words, stage.seconds)
+        places = {name: other for name, other in places.items() if name not in near}
+
+
+def _stay_together(place: np.ndarray, other: np.ndarray) -> bool:
+    """Whether two paths (k, 2), px, are nowhere as far apart as a letter is wide."""
+    return float(np.abs(place - other).max()) < LETTER

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mbref.drawing import svg
-from mbref.drawing.marks import Stage, driver_mark, ground_mark, joint_mark, joint_name, load_mark
+from mbref.drawing.marks import Stage, driver_mark, ground_mark, joint_mark, joint_names, load_mark
 from mbref.drawing.shapes import Shape, anchors, at_rest, attack, moved, shapes
 from mbref.drawing.svg import COLOURS, GREY, INK
 from mbref.drawing.view import Page, View, view_of
@@ -84,7 +84,7 @@ def _parts(stage: Stage, bodies: list[Shape], lines: list[np.ndarray]) -> Iterat
     for joint in scene.joint:
         yield from joint_mark(stage, joint)
     yield from (driver_mark(stage, driver) for driver in scene.driver)
-    yield from (joint_name(stage, joint) for joint in scene.joint)
+    yield from joint_names(stage)
     for b, frames in enumerate(lines):
         yield _body_name(bodies[b].name, frames, COLOURS[b % len(COLOURS)], stage.seconds)
 
@@ -101,17 +101,28 @@ def _body(shape: Shape, frames: np.ndarray, colour: str, seconds: float) -> str:
 
 
 def _body_name(name: str, frames: np.ndarray, colour: str, seconds: float) -> str:
-    """The name beside the middle of a bar, in the middle of a plate, below a block."""
-    points = frames[:, :-1] if frames.shape[1] > 3 else frames
+    """The name beside the longest part of a bar, in the middle of a plate, below a block."""
+    is_plate = frames.shape[1] > 3 and bool((frames[0, 0] == frames[0, -1]).all())
+    points = frames[:, :-1] if is_plate else _longest_part(frames)
     places = points.mean(axis=1) + 4.0 * np.array([0.0, 1.0])
     if frames.shape[1] == 1:
         places = places + np.array([0.0, 26.0])
-    elif frames.shape[1] < 4:
+    elif not is_plate:
         along = frames[:, -1] - frames[:, 0]
         across = np.stack([along[:, 1], -along[:, 0]], axis=1)
         reach = np.array([8.0 + 3.5 * len(name), 13.0])  # half of the name's width and height
         places = places + reach * across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
     return svg.follow(places, svg.text(0, 0, name, f'fill="{colour}"'), seconds)
+
+
+def _longest_part(frames: np.ndarray) -> np.ndarray:
+    """Of a line (k, n, 2) the two neighbours (k, 2, 2) that are the furthest apart at first, so that names
+    of bars that cross at their middles do not."""
+    if frames.shape[1] < 3:
+        return frames
+    parts = np.hypot(*np.diff(frames[0], axis=0).T)
+    i = int(np.argmax(parts > 0.99 * parts.max()))
+    return frames[:, i : i + 2]
 
 
 def _axes(page: Page) -> Iterator[str]:

@@ -44,8 +44,36 @@ def texts(picture: str) -> list[str]:
 @pytest.mark.parametrize("name", SCENES)
 def test_every_scene_is_drawn_with_the_names_of_its_parts(name):
     scene = SCENES[name]()
-    words = texts(still(scene))
-    assert {body.name for body in scene.body} | {joint.name for joint in scene.joint} <= set(words)
+    words = {word for text in texts(still(scene)) for word in text.split(", ")}
+    assert {body.name for body in scene.body} | {joint.name for joint in scene.joint} <= words
+
+
+def heights(picture: str) -> dict[str, float]:
+    """How far down each carried text stands, px, without its own shift."""
+    carried = [(group, group.find(f"{SVG}text")) for group in ET.fromstring(picture).iter(f"{SVG}g")]
+    return {text.text or "": float(group.attrib["transform"].rstrip(")").split(",")[1])
+            for group, text in carried if text is not None}  # fmt: skip
+
+
+def test_joints_at_one_place_are_named_together():
+    """Pin and guide of a slider; the names of the slider-crank's other joints stand alone."""
+    scene = SCENES["planar_slider_crank"]()
+    assert {"A", "B", "C, D"} <= set(texts(still(scene)))
+
+
+def test_names_of_bars_that_cross_at_their_middles_are_apart():
+    corners = {"rising": (1.0, 1.0, 0.0), "falling": (1.0, -1.0, 0.0)}
+    joints: list[dict[str, object]] = [
+        {"name": "pin", "type": "revolute", "bodies": ("rising", "falling"),
+         "anchor": (0, 0, 0), "axis": (0, 0, 1)}
+    ]  # fmt: skip
+    for name, (x, y, _) in corners.items():
+        for sign in (-1, 1):
+            end, ball = (sign * x, sign * y, 0.0), f"{name}{sign}"
+            joints.append({"name": ball, "type": "spherical", "bodies": ("ground", name), "anchor": end})
+    bodies = [{"name": name, "position": (0.0, 0.0, 0.0)} for name in corners]
+    found = heights(still(Scene(name="scissors", body=bodies, joint=joints)))
+    assert abs(found["rising"] - found["falling"]) > 26  # two lines of text
 
 
 def test_bars_keep_their_length_in_a_moving_picture(turning):
