@@ -17,6 +17,7 @@ import numpy as np
 from crosscheck.judge.constraints import inertia_matrices, initial_poses, initial_twists
 from mbref import rotations
 from mbref.scene import GROUND, Scene
+from mbref.scene_fields import meant
 from mbref.trajectory import Cost, Outcome, Trajectory
 
 __all__ = [
@@ -183,7 +184,8 @@ def engine(name: str) -> Engine:
     if ":" in name:
         module, attribute = name.split(":", 1)
         return _as_engine(name, getattr(import_module(module), attribute))
-    raise LookupError(f"unknown engine {name!r}; known: {', '.join(engine_names())}")
+    known = engine_names()
+    raise LookupError(f"unknown engine {name!r}; known: {', '.join(known)}{meant(name, known)}")
 
 
 def _as_engine(name: str, found: object) -> Engine:

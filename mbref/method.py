@@ -18,6 +18,7 @@ from mbref.integrators import INTEGRATORS
 from mbref.integrators.base import Integrator
 from mbref.kernels.layout import Settings
 from mbref.kernels.named_memory import Packed, packed, record
+from mbref.scene_fields import meant
 from mbref.stabilisation import STABILISATIONS
 from mbref.stabilisation.base import Stabilisation
 
@@ -114,7 +115,7 @@ def _part(text: str, table: Mapping[str, Part], kind: str, options: dict[str, di
     match = re.fullmatch(r"([\w-]+)(?:\[(.*)\])?", text.strip())
     name = match[1] if match else text
     if name not in table:
-        raise MethodError(f"unknown {kind} {name!r}; known: {', '.join(table)}")
+        raise MethodError(f"unknown {kind} {name!r}; known: {', '.join(table)}{meant(name, table)}")
     part = table[name]
     given = [item for item in (match[2] or "").split(",") if item.strip()] if match else []
     for position, item in enumerate(given):

@@ -31,7 +31,7 @@ from mbref.scene_joints import (
     Translational,
     Universal,
 )
-from mbref.scene_lines import with_lines
+from mbref.scene_lines import toml_hint, with_lines
 from mbref.scene_loads import LOAD_TYPES, Force, Load, Moment, Spring, TorsionSpring
 from mbref.scene_paths import replaced_at
 from mbref.scene_validation import (
@@ -200,7 +200,9 @@ class Scene(Entry):
             data = tomllib.loads(text)
         except OSError as error:
             raise SceneError([f"{path}: cannot be read: {error.strerror}"]) from None
-        except ValueError as error:  # no UTF-8, no TOML, or a number of thousands of digits
+        except tomllib.TOMLDecodeError as error:
+            raise SceneError([f"{path}: is not TOML: {error}{toml_hint(text, str(error))}"]) from None
+        except ValueError as error:  # no UTF-8, or a number of thousands of digits
             raise SceneError([f"{path}: is not TOML: {error}"]) from None
         except RecursionError:
             raise SceneError([f"{path}: is nested too deeply"]) from None

@@ -11,6 +11,17 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, Strict
 
 LARGEST, SMALLEST = 1e40, 1e-40  # sizes of numbers whose products and squares are still numbers
+OTHER_WORDS = {  # of other programs and books → ours
+    "hinge": "revolute", "pin": "revolute", "rotational": "revolute", "prismatic": "translational",
+    "slider": "translational", "slide": "translational", "ball": "spherical", "cardan": "universal",
+    "hooke": "universal", "weld": "fixed", "rigid": "fixed", "rod": "distance", "link": "distance",
+    "torque": "moment", "motor": "driver", "spring_damper": "spring", "rotational_spring": "torsion_spring",
+    "world": "ground", "frame": "ground", "base": "ground", "chassis": "ground", "bodies": "body",
+    "joints": "joint", "drivers": "driver", "loads": "load", "links": "body", "speed": "polynomial",
+    "velocity": "polynomial", "k": "stiffness", "c": "damping", "length": "natural_length",
+    "rest_length": "natural_length", "com": "position", "quaternion": "orientation",
+    "time": "duration", "end_time": "duration", "point": "anchor", "points": "anchors",
+}  # fmt: skip
 SHOWN = Repr()  # how a faulty value is quoted, however long or deep
 SHOWN.maxstring = SHOWN.maxother = SHOWN.maxlong = 80
 
@@ -24,9 +35,11 @@ def shown(value: Any) -> str:
 
 
 def meant(word: str, known: Iterable[str]) -> str:
-    """ "; did you mean 'rod'?" of the known word that is most alike, or nothing."""
-    alike = get_close_matches(word, [k for k in known if k], n=1)
-    return f"; did you mean {alike[0]!r}?" if alike else ""
+    """ "; did you mean 'rod'?" of the known word that is most alike or of the same meaning, or nothing."""
+    words = {k.lower(): k for k in known if k}
+    other = OTHER_WORDS.get(word.lower(), "")
+    alike = [other] if other in words else get_close_matches(word.lower(), words, n=1)
+    return f"; did you mean {words[alike[0]]!r}?" if alike else ""
 
 
 def checked_size(value: float) -> float:

@@ -11,6 +11,7 @@ from pydantic import Discriminator, field_validator
 from mbref.scene_fields import Entry, Name, Pair, Vector, VectorPair, direction
 
 X, Y, Z = 0, 1, 2
+SKEW = 0.05  # cosine between the axes of a universal joint that is no rounding of a right angle
 Coordinate = Literal["angle", "displacement"]
 Condition = Literal["perpendicular axes", "constant distance"]
 
@@ -112,8 +113,13 @@ class Universal(_AnchorJoint):
 
     @field_validator("axes")
     @classmethod
-    def _axes_have_length(cls, axes: tuple[Vector, Vector]) -> tuple[Vector, ...]:
-        return tuple(direction(axis) for axis in axes)
+    def _axes_have_length_and_are_perpendicular(cls, axes: tuple[Vector, Vector]) -> tuple[Vector, ...]:
+        lengths = [math.hypot(*direction(axis)) for axis in axes]
+        cosine = sum(a / lengths[0] * (b / lengths[1]) for a, b in zip(*axes, strict=True))
+        if abs(cosine) > SKEW:
+            angle = math.degrees(math.acos(max(-1.0, min(1.0, cosine))))
+            raise ValueError(f"must be perpendicular, but enclose {angle:.3g} degrees")
+        return axes
 
     @property
     def directions(self) -> tuple[Vector, ...]:

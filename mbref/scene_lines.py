@@ -8,6 +8,9 @@ from collections.abc import Iterator, Sequence
 TABLE = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]\]?")
 KEY = re.compile(r"\s*([\w-]+|\"[^\"]*\")\s*=")
 NAME = re.compile(r"\s*(?:name|joint)\s*=\s*[\"']([^\"']*)[\"']")
+SINGLE = re.compile(r"\s*\[\s*(body|joint|driver|load)\s*\]")
+LINE = re.compile(r" \(line \d+\)$")
+AT = re.compile(r"at line (\d+)")
 PATH = re.compile(r"(\w+)(?:\[([^\]]*)\])?(?:\.(\w+))?")
 
 Line = tuple[int, str, int, str]  # number from 1, table, its place among its kind, key ("" of a header)
@@ -17,7 +20,20 @@ def with_lines(text: str, faults: Sequence[str]) -> list[str]:
     """The faults, each with the line of the file that its path leads to, where there is one."""
     lines = list(_lines(text))
     names = _names(text, lines)
-    return [f"{fault}{_told(_line_of(lines, names, fault))}" for fault in faults]
+    return [
+        fault if LINE.search(fault) else f"{fault}{_told(_line_of(lines, names, fault))}" for fault in faults
+    ]
+
+
+def toml_hint(text: str, error: str) -> str:
+    """What follows a TOML reader's message: entries with single brackets, else the line that it names."""
+    lines = text.splitlines()
+    for number, line in enumerate(lines, 1):
+        if single := SINGLE.match(line):
+            return f"; line {number}: [{single[1]}] must be [[{single[1]}]], one for each {single[1]}"
+    if (at := AT.search(error)) and int(at[1]) <= len(lines):
+        return f": {lines[int(at[1]) - 1].strip()[:80]}"
+    return ""
 
 
 def _told(line: int | None) -> str:
@@ -51,6 +67,8 @@ def _line_of(lines: Sequence[Line], names: dict[tuple[str, str], int], fault: st
     if not match:
         return None
     table, entry, key = match.groups()
+    if entry is None and (header := [number for number, t, p, k in lines if t == table and not (p or k)]):
+        return header[0]
     if entry is None or not any(line[1] == table for line in lines):
         table, place, key = "", 0, match[1]
     else:

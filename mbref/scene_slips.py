@@ -11,7 +11,8 @@ import numpy as np
 from mbref.scene import GROUND, Scene
 
 TURN = 2 * math.pi
-APART = 1000.0  # times the next shorter length
+QUARTER = 90  # of which round numbers of degrees are multiples
+APART = 300.0  # times the next shorter length: one in millimetres is not always the longest
 GYRATION = 30.0  # radius of gyration over the mechanism's length
 STRONGEST = 100.0  # m/s², of gravity
 
@@ -40,8 +41,15 @@ def _angles(scene: Scene) -> Iterator[str]:
         if load.type == "torsion_spring" and abs(load.natural_angle) > TURN:
             yield _degrees(f"load[{i}].natural_angle", load.natural_angle)
     for driver in scene.driver:
-        if driver.sine and abs(driver.sine.phase) > TURN:
-            yield _degrees(f"driver[{driver.joint}].sine.phase", driver.sine.phase)
+        path, sine = f"driver[{driver.joint}]", driver.sine
+        turns = scene.joint_named(driver.joint).facts.driven == "angle"
+        if sine and abs(sine.phase) > TURN:
+            yield _degrees(f"{path}.sine.phase", sine.phase)
+        if sine and turns and abs(sine.amplitude) > TURN:
+            yield _degrees(f"{path}.sine.amplitude", sine.amplitude)
+        rate = driver.polynomial[1] if len(driver.polynomial) > 1 else 0.0
+        if turns and rate and rate % QUARTER == 0:
+            yield f"{path}.polynomial: {rate:g} rad/s is {rate / TURN:.3g} turns a second; is it in degrees?"
 
 
 def _degrees(path: str, angle: float) -> str:

@@ -19,6 +19,13 @@ RESERVED = (GROUND, "the fixed frame")  # names that no body can have
 DRIVABLE = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.driven)
 TORSIONAL = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.takes_torsion_spring)
 ACTS_ON = {name: load.acts_on for name, load in LOAD_TYPES.items()}
+NUMBERS = {  # field → what its list holds; of all others three numbers
+    "orientation": "four numbers (w, x, y, z)", "polynomial": "numbers, such as [0.0, 6.0]",
+    "bodies": "two names of bodies", "anchors": "two points of three numbers each",
+    "axes": "two axes of three numbers each", "points": "two points of three numbers each",
+    "body": "entries [[body]]", "joint": "entries [[joint]]", "driver": "entries [[driver]]",
+    "load": "entries [[load]]",
+}  # fmt: skip
 INERTIA_TOLERANCE = 1e-9  # relative; discs and thin rods meet the triangle inequality with equality
 
 
@@ -40,7 +47,7 @@ def checked_inertia(value: Any) -> tuple[Any, ...]:
     except (TypeError, ValueError, OverflowError):
         raise ValueError("must be three numbers or a 3x3 matrix") from None
     if array.shape not in ((3,), (3, 3)):
-        raise ValueError(f"must be three numbers or a 3x3 matrix, got shape {array.shape}")
+        raise ValueError(f"must be three numbers or a 3x3 matrix, got {shown(value)}")
     if not np.isfinite(array).all():
         raise ValueError("must be finite")
     checked_size(float(abs(array).max()))
@@ -55,7 +62,8 @@ def checked_inertia(value: Any) -> tuple[Any, ...]:
         raise ValueError(f"must have no negative principal moment, got {moments[0]:.6g}")
     if moments[2] > moments[0] + moments[1] + tolerance:
         raise ValueError(
-            f"violates the triangle inequality: {moments[2]:.6g} > {moments[0]:.6g} + {moments[1]:.6g}"
+            f"violates the triangle inequality: {moments[2]:.6g} > {moments[0]:.6g} + {moments[1]:.6g}; "
+            "a flat body across z has [a, b, a + b]"
         )
     return tuple(array.tolist()) if array.ndim == 1 else tuple(map(tuple, array.tolist()))
 
@@ -80,7 +88,8 @@ def field_faults(error: ValidationError, tables: Mapping[str, Sequence[str]]) ->
             "string_type": f"must be a string, got {got}",
             "string_too_short": "must not be empty",
             "too_short": "must not be empty",
-            "tuple_type": f"must be a list, got {got}",
+            "tuple_type": _must_hold(fault["loc"], got),
+            "too_long": _must_hold(fault["loc"], got),
             "union_tag_not_found": "is required",
             "union_tag_invalid": f"must be one of {tags}",
             "literal_error": f"must be {limit.get('expected')}, got {got}",
@@ -91,8 +100,17 @@ def field_faults(error: ValidationError, tables: Mapping[str, Sequence[str]]) ->
         default = f"{fault['msg'][0].lower()}{fault['msg'][1:]}, got {got}"
         if kind == "too_short" and fault["input"]:
             continue  # entries are there, but faulty ones were left out
+        if kind == "missing" and isinstance(fault["loc"][-1], int):  # of a list that is too short
+            yield _path(fault["loc"][:-1]), _must_hold(fault["loc"][:-1], got)
+            continue
         path = _path(fault["loc"]) + (".type" if kind.startswith("union_tag") else "")
         yield path, messages.get(kind, default)
+
+
+def _must_hold(location: Sequence[str | int], got: str) -> str:
+    """The message for a list of the wrong length, or no list, at a location."""
+    field = location[-1] if location else ""
+    return f"must be {NUMBERS.get(str(field), 'three numbers')}, got {got}"
 
 
 def _meant_field(location: Sequence[str | int], tables: Mapping[str, Sequence[str]]) -> str:
@@ -100,7 +118,8 @@ def _meant_field(location: Sequence[str | int], tables: Mapping[str, Sequence[st
     key, above = str(location[-1]), [part for part in location[:-1] if isinstance(part, str)]
     types: dict[str, Any] = {**JOINT_TYPES, **LOAD_TYPES}
     table = above[-1] if above else ""
-    return meant(key, types[table].model_fields if table in types else tables.get(table, ()))
+    known = types[table].model_fields if table in types else tables.get(table, ())
+    return meant(key, known) or f"; known: {', '.join(known)}"
 
 
 def named_paths(data: Mapping[str, Any], faults: Mapping[str, str]) -> Iterator[str]:
@@ -252,5 +271,5 @@ def _joint_faults(
         return  # reported as a field fault
     if name not in types:
         yield path, _unknown("joint", name, list(types))
-    elif types[name] not in allowed:
+    elif types[name] in JOINT_TYPES and types[name] not in allowed:
         yield path, f"{name!r} is {types[name]}; only {', '.join(allowed)} joints can {what}"

@@ -12,6 +12,7 @@ from crosscheck.cli import collection
 from crosscheck.cli.options import add_depth, add_reference_time
 from crosscheck.cli.passage import passage
 from crosscheck.cli.request import RequestError, find_scenes
+from mbref.command_line import Parser
 from mbref.scene import Scene, SceneError
 from reports.blocks import Block
 from reports.runs import Run, by_scene
@@ -102,8 +103,8 @@ def _write(blocks: Sequence[Block], out: Path) -> None:
 
 
 def _parser(sections: Sequence[str]) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="python -m reports",
+    parser = Parser(
+        prog="crosscheck report",
         description="Run the study, or what is missing of it, and render the report.",
         epilog="example: python -m reports --quick --out report",
     )
@@ -111,7 +112,9 @@ def _parser(sections: Sequence[str]) -> argparse.ArgumentParser:
     add_depth(parser)
     parser.add_argument("--quick", dest="depth", action="store_const", const="quick")
     add_reference_time(parser)
-    parser.add_argument("--section", action="append", choices=sections, help="only this one; may repeat")
+    parser.add_argument(
+        "--section", action="append", choices=sections, metavar="S", help="only this one; may repeat"
+    )
     parser.add_argument("--out", default="report", metavar="DIR", help="folder to write (default: report)")
     parser.add_argument("--render", metavar="DIR", help="render the records of a report again, run nothing")
     parser.add_argument("--picture", metavar="FILE", help="write only the moving picture of the README")

@@ -66,8 +66,15 @@ def _option(text: str) -> tuple[str, Any]:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be a number, got {text!r}") from None
+
+
 def _not_negative(text: str) -> float:
-    number = float(text)
+    number = _number(text)
     if not 0 <= number < math.inf:
         raise argparse.ArgumentTypeError(f"must be finite and not negative, got {text}")
     return number
@@ -85,7 +92,7 @@ def add_limits(parser: argparse.ArgumentParser, time_limit: float | None = TIME_
     on the depth."""
     default = f"{time_limit:g}" if time_limit else f"{QUICK_LIMIT:g} at quick depth, {TIME_LIMIT:g} else"
     parser.add_argument(
-        "--time-limit", type=float, default=time_limit, metavar="T",
+        "--time-limit", type=positive, default=time_limit, metavar="T",
         help=f"wall time a run may take (s); default: {default}",
     )  # fmt: skip
     add_reference_time(parser)
@@ -107,7 +114,7 @@ def whole(text: str) -> int:
 
 def positive(text: str) -> float:
     """A positive number of a command line."""
-    number = float(text)
+    number = _number(text)
     if not 0 < number < math.inf:
-        raise argparse.ArgumentTypeError(f"must be finite and positive, got {text}")
+        raise argparse.ArgumentTypeError(f"must be positive, got {text}")
     return number

@@ -8,6 +8,7 @@ from typing import Any
 from crosscheck.cli.listing import TABLES
 from crosscheck.cli.options import add_depth, add_limits, add_reference_time, add_selection, positive, whole
 from crosscheck.study.timings import REPEATS
+from mbref.command_line import Parser, commands
 
 Commands = Any  # the object that argparse adds subcommands to; its type is private
 EXIT = (
@@ -20,13 +21,13 @@ EXIT = (
 
 def parser() -> argparse.ArgumentParser:
     """The parser; its result has the name of the command as ``command``."""
-    found = argparse.ArgumentParser(
+    found = Parser(
         prog="crosscheck", description="The same mechanism in several engines, against truth.", epilog=EXIT
     )
     found.add_argument(
         "--version", action="store_true", help="print the versions of crosscheck and the engines"
     )
-    commands = found.add_subparsers(dest="command", metavar="COMMAND")
+    known = commands(found, dest="command", metavar="COMMAND")
     for add in (
         _add_list,
         _add_run,
@@ -37,7 +38,7 @@ def parser() -> argparse.ArgumentParser:
         _add_diff,
         _add_certify,
     ):
-        add(commands)
+        add(known)
     return found
 
 

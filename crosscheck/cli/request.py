@@ -5,16 +5,21 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from crosscheck.conformance.trial import Specimen, specimens
 from crosscheck.engine import BUILT_IN, Setting, default_engines, engine
+from crosscheck.judge.constraints import initial_twists
 from crosscheck.study.grid import Case, default_cases
+from crosscheck.study.scouting import scout, settings
 from crosscheck.study.sweep import of_few_families
 from mbref.scene import Scene, SceneError
-from mbref.scenes import find_scene
+from mbref.scene_fields import meant
+from mbref.scene_lines import with_lines
+from mbref.scenes import SCENES, find_scene
 
 SAMPLES = 101
 
@@ -35,7 +40,7 @@ def find_scenes(names: Sequence[str]) -> list[Scene]:
     scenes, faults = [], []
     for name in names:
         try:
-            scenes.append(find_scene(name))
+            scenes.append(_started(name))
         except SceneError as error:
             several = f"{name}: " if len(names) > 1 else ""
             faults += [several + fault for fault in error.faults]
@@ -45,6 +50,17 @@ def find_scenes(names: Sequence[str]) -> list[Scene]:
     if twice := sorted({name for name in called if called.count(name) > 1}):
         raise RequestError(*(f"scene {name!r} is asked for twice" for name in twice))
     return scenes
+
+
+def _started(name: str) -> Scene:
+    """The scene; SceneError with lines where the velocities that a file gives contradict its joints."""
+    scene = find_scene(name)
+    if name not in SCENES and Path(name).exists():
+        try:
+            initial_twists(scene)
+        except SceneError as error:
+            raise SceneError(with_lines(Path(name).read_text(encoding="utf-8-sig"), error.faults)) from None
+    return scene
 
 
 def find_certifiable(name: str) -> Scene:
@@ -89,7 +105,9 @@ def find_specimens(names: Sequence[str] | None, reference_time: float) -> list[S
     }
     if unknown := [name for name in names or () if name not in known and name not in given]:
         listed = ", ".join(known)
-        raise RequestError(*(f"unknown scene of the suite {name!r}; known: {listed}" for name in unknown))
+        raise RequestError(
+            *(f"unknown scene of the suite {name!r}; known: {listed}{meant(name, known)}" for name in unknown)
+        )
     return [{**known, **given}[name] for name in dict.fromkeys(names or known)]
 
 
@@ -204,7 +222,22 @@ def _single(
     gaps = {scene.name: engine(name).cannot(scene) for scene in scenes}
     if faults := [f"{name} cannot run {scene}: {gap}" for scene, gap in gaps.items() if gap]:
         raise RequestError(*faults)
+    scout([name], scenes, lambda _: None)
+    if strange := [fault for scene in scenes for fault in _strange_options(scene, name, setting)]:
+        raise RequestError(*dict.fromkeys(strange))
     return [Case(s, when, name, setting, time_limit) for s, when in zip(scenes, times, strict=True)]
+
+
+def _strange_options(scene: Scene, name: str, setting: Setting) -> list[str]:
+    """Faults of options that no setting of the family has; none where the family is beyond the sweep."""
+    own = [offered.options for offered in settings(name, scene) if offered.family == setting.family]
+    known = list(dict.fromkeys(option for options in own for option in options))
+    return [
+        f"--option: {name} {setting.family} has no option {option!r}; it has: {', '.join(known)}"
+        + meant(option, known)
+        for option in setting.options
+        if own and option not in known
+    ]
 
 
 def _able(
@@ -260,7 +293,9 @@ def _of_first_family(cases: Sequence[Case], engines: Sequence[str]) -> list[Case
 
 
 def _unknown_family(name: str, offered: Iterable[str]) -> str:
-    return f"unknown method or setting {name!r}; known: {', '.join(offered)}"
+    known = [*offered]
+    listed = ", ".join(map(repr, known))  # names such as 'taylor, compiled' have commas
+    return f"unknown method or setting {name!r}; known: {listed}{meant(name, known)}"
 
 
 def _at_tolerance(cases: Sequence[Case], rtol: float) -> list[Case]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from mbref import __version__
 from mbref.cli.diagnose import add as add_diagnose
@@ -15,8 +16,10 @@ from mbref.cli.pictures import add as add_pictures
 from mbref.cli.run import add as add_run
 from mbref.cli.scene_files import add as add_scene_files
 from mbref.cli.tables import add as add_tables
+from mbref.command_line import Parser, commands
 from mbref.method import MethodError
 from mbref.scene import SceneError
+from mbref.scene_lines import with_lines
 
 BAD_INPUT, INCOMPLETE, INTERRUPTED = 2, 1, 130
 EPILOG = """\
@@ -36,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return int(options.action(options))
     except SceneError as error:
-        return _refuse(error.faults)
+        return _refuse(_with_lines(options, error.faults))
     except (MethodError, ValueError) as error:
         return _refuse([str(error)])
     except KeyboardInterrupt:
@@ -49,6 +52,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _refuse([f"{error.filename or options.out}: {error.strerror}"])
 
 
+def _with_lines(options: argparse.Namespace, faults: Sequence[str]) -> Sequence[str]:
+    """The faults with lines of the scene's file, also those found when it is moved."""
+    path = Path(getattr(options, "scene", ""))
+    if path.suffix != ".toml" or not path.is_file():
+        return faults
+    return with_lines(path.read_text(encoding="utf-8-sig", errors="replace"), faults)
+
+
 def _refuse(faults: Sequence[str]) -> int:
     for fault in faults:
         print(fault, file=sys.stderr)
@@ -57,14 +68,14 @@ def _refuse(faults: Sequence[str]) -> int:
 
 def parser() -> argparse.ArgumentParser:
     """The command line's grammar."""
-    whole = argparse.ArgumentParser(
+    whole = Parser(
         prog="mbref", formatter_class=TEXT, epilog=EPILOG,
         description="Reference implementation of the constraint-handling methods of multibody dynamics.",
     )  # fmt: skip
     whole.add_argument("--version", action="version", version=_versions())
-    commands = whole.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    known = commands(whole, title="commands", required=True, metavar="COMMAND")
     for add in (add_scene_files, add_pictures, add_diagnose, add_run, add_ensemble, add_exchange, add_tables):
-        add(commands)
+        add(known)
     return whole
 
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 PIPED_WIDTH = 80  # characters of a line where no terminal says otherwise
+HOUR = 3600.0  # s
 PAUSE = 10.0  # s between two lines of progress where stderr is no terminal
 QUANTITIES = {  # of a body in a table → field of a trajectory
     "position, m": "position",
@@ -88,4 +89,5 @@ class Lines:
         if now - self._said >= PAUSE and done > 0:
             self._said = now
             left = (now - self._began) * (self._end / done - 1)
-            print(f"{self._what}: {100 * done / self._end:.0f} %, about {left:.0f} s left", file=sys.stderr)
+            told = f"about {left:.0f} s left" if left < HOUR else "more than an hour left"
+            print(f"{self._what}: {100 * done / self._end:.0f} %, {told}", file=sys.stderr)

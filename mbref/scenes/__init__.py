@@ -78,7 +78,17 @@ def find_scene(name: str) -> Scene:
     chain = re.fullmatch(r"(\w+)\[([1-9]\d*)\]", name)
     if chain and chain[1] in CHAINS:
         return CHAINS[chain[1]](int(chain[2]), name)
-    if name.endswith(".toml") or Path(name).exists():
+    if Path(name).exists():
         return Scene.from_file(name)
+    if name.endswith(".toml"):
+        raise SceneError([_missing(Path(name))])
     known = f"built-in: {', '.join(SCENES)}; or a .toml file"
     raise SceneError([f"unknown scene {name!r}; {known}{meant(name, SCENES)}"])
+
+
+def _missing(path: Path) -> str:
+    """The sentence on a scene file that is not there, with the file or the scene that was probably meant."""
+    if path.stem in SCENES:
+        return f"{path}: no such file; without .toml {path.stem!r} is a built-in scene"
+    here = [str(other) for other in path.parent.glob("*.toml")]
+    return f"{path}: no such file{meant(str(path), here)}"

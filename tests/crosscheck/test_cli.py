@@ -163,7 +163,10 @@ def test_a_run_that_crashes_and_exit_status_one(capsys, still):
         (["--duration", "inf"], "--duration: must be positive, got inf"),
         (["--rtol", "0"], "--rtol: must be positive, got 0"),
         (["--time-limit", "0"], "--time-limit: must be positive, got 0"),
-        (["--setting", "gentle"], "unknown method or setting 'gentle'; known: plain, noisy"),
+        (["--setting", "gentle"], "unknown method or setting 'gentle'; known: 'plain', 'noisy'"),
+        (["--setting", "noisi"], "did you mean 'noisy'?"),
+        (["--engine", "mujco"], "did you mean 'mujoco'?"),
+        (["--engine", FAKE, "--setting", "plain", "--option", "secs=1"], "plain has no option 'secs'"),
         (["--engine", "bullet"], "unknown engine 'bullet'; known: mbref, mujoco, pinocchio, exudyn"),
         (["--engine", "no_such_module:ENGINE"], "engine 'no_such_module:ENGINE' cannot be loaded"),
     ],
@@ -185,6 +188,18 @@ def test_faulty_scene_file_and_one_line_a_fault(capsys, tmp_path):
     assert (status, out) == (2, ""), (status, out)
     assert any(line.startswith("body[a].mass: must be positive, got -1.0 (line 5)") for line in lines), lines
     assert any(line.startswith("gravity") for line in lines), lines
+
+
+def test_velocities_that_contradict_the_joints_are_told_once_with_their_line(capsys, tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_text(
+        'name = "bad"\n[[body]]\nname = "a"\nmass = 1.0\ninertia = [1.0, 1.0, 1.0]\n'
+        "position = [1.0, 0.0, 0.0]\nvelocity = [5.0, 0.0, 0.0]\n"
+        '[[joint]]\nname = "A"\ntype = "revolute"\nbodies = ["ground", "a"]\n'
+        "anchor = [0.0, 0.0, 0.0]\naxis = [0.0, 0.0, 1.0]\n"
+    )
+    status, _, err = run_main(capsys, "compare", str(path))
+    assert status == 2 and err.count("contradict") == 1 and err.strip().endswith("(line 8)"), err
 
 
 def test_scene_of_no_name_and_the_known_ones(capsys):
@@ -247,7 +262,7 @@ def test_method_beyond_the_sweep_and_its_tolerances(capsys, still):
 
 def test_method_that_means_nothing_and_the_known_ones(capsys, still):
     status, _, err = run_main(capsys, "run", still, "--engine", "mbref", "--method", "lm9+none")
-    known = ", ".join(dict.fromkeys(s.family for s in engine("mbref").settings(Scene.from_file(still))))
+    known = ", ".join(dict.fromkeys(repr(s.family) for s in engine("mbref").settings(Scene.from_file(still))))
     assert status == 2 and f"unknown method or setting 'lm9+none'; known: {known}" in err, err
 
 

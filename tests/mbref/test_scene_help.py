@@ -45,11 +45,80 @@ def line_of(text: str) -> int:
          'type = "translational"'),
         ("duration = 2.0", "duration = 0.0", "duration", "must be positive", "duration"),
         ('body = "crank"', 'body = "crnk"', "load[0].body", "did you mean 'crank'?", 'body = "crank"'),
+        ('"ground", "crank"', '"world", "crank"', "joint[A].bodies[0]", "did you mean 'ground'?", 'bodies ='),
+        ('"ground", "crank"', '"ground", "Crank"', "joint[A].bodies[1]", "did you mean 'crank'?", 'bodies ='),
+        ('type = "revolute"', 'type = "hinge"', "joint[A].type", "did you mean 'revolute'?", 'type = "rev'),
+        ("position = [0.5, 0.0, 0.0]", "position = [0.5, 0.0]", "body[rod].position",
+         "must be three numbers, got [0.5, 0.0]", "position = [0.5"),
+        ("gravity = [0.0, -9.81, 0.0]", "gravity = -9.81", "gravity", "must be three numbers", "gravity"),
+        ("moment = [", "speed = [", "load[0].speed", "known: type, body, moment", "moment = ["),
+        ("[[load]]", "[[loads]]", "loads", "did you mean 'load'?", "[[load]]"),
     ],
 )  # fmt: skip
 def test_a_fault_has_its_line_and_a_suggestion(tmp_path, old, new, path, says, line):
     told = [fault for fault in faults(tmp_path, (old, new)) if fault.startswith(f"{path}: ")]
     assert len(told) == 1 and says in told[0] and told[0].endswith(f"(line {line_of(line)})"), told
+
+
+def test_a_driver_of_a_joint_without_a_known_type_is_no_second_fault(tmp_path):
+    found = faults(tmp_path, ('type = "revolute"', 'type = "hinge"'),
+                   ("[[load]]", '[[driver]]\njoint = "A"\n\n[[load]]'))  # fmt: skip
+    assert len(found) == 1
+
+
+def test_axes_of_a_universal_joint_are_perpendicular(tmp_path):
+    skew = 'type = "universal"\nbodies = ["crank", "rod"]\naxes = [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]'
+    text = template().replace('type = "revolute"\nbodies = ["crank", "rod"]', skew)
+    (tmp_path / "my.toml").write_text(text.replace("anchor = [0.2, 0.0, 0.0]\naxis = [0.0, 0.0, 1.0]",
+                                                   "anchor = [0.2, 0.0, 0.0]"))  # fmt: skip
+    with pytest.raises(SceneError, match=r"joint\[B\].axes: must be perpendicular, but enclose 45 degrees"):
+        Scene.from_file(tmp_path / "my.toml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("[[load]]", "[load]", "load: must be entries [[load]]"),
+        ("[[joint]]", "[joint]", "[joint] must be [[joint]], one for each joint"),
+        ("position = [0.5, 0.0, 0.0]", "position = 0.5, 0.0, 0.0", ": position = 0.5, 0.0, 0.0"),
+    ],
+)
+def test_what_is_not_toml_is_quoted_or_explained(tmp_path, old, new, says):
+    (fault,) = faults(tmp_path, (old, new))
+    assert says in fault
+
+
+def test_a_missing_file_suggests_one_beside_it_or_a_built_in_scene(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("pendulum.toml").touch()
+    for name, says in (("pendulm.toml", "did you mean 'pendulum.toml'?"), ("bennett.toml", "'bennett' is")):
+        with pytest.raises(SceneError, match=f"no such file.*{says}".replace("?", r"\?")):
+            find_scene(name)
+
+
+def test_a_fault_that_moving_finds_has_its_line_too(tmp_path, capsys):
+    text = template().replace("mass = 2.0\ninertia = [1e-4, 0.06, 0.06]\n", "")
+    (tmp_path / "my.toml").write_text(text)
+    assert main(["run", str(tmp_path / "my.toml")]) == 2
+    entry = text.splitlines().index('name = "rod"')
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert "'rod' has no mass" in said and said.endswith(f"(line {entry})")
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["rnu", "my.toml"], "did you mean 'run'?"),
+        (["run", "four_bar", "--methd", "lm1"], "mbref run: error: unknown option '--methd'; did you mean"),
+        (["run", "four_bar", "--duration", "1s"], "--duration: must be a number, got '1s'"),
+        (["list", "scene"], "did you mean 'scenes'?"),
+        ([], "mbref diagnose my.toml"),
+    ],
+)
+def test_a_wrong_command_line_is_answered_in_words(capsys, words, says):
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    assert ended.value.code == 2 and says in capsys.readouterr().err
 
 
 def test_a_missing_field_has_the_line_of_its_entry(tmp_path):
@@ -95,6 +164,18 @@ def test_angles_beyond_a_turn_are_probably_degrees():
         start = -math.sin(phase)
         slips = probable_slips(driven.with_(driver=({"joint": "A", "polynomial": [start], "sine": sine},)))
         assert len(slips) == told and all(s.startswith("driver[A].sine.phase: ") for s in slips), slips
+
+
+@pytest.mark.parametrize(("rate", "told"), [(720.0, 1), (-90.0, 1), (124.8, 0), (6.0, 0), (0.0, 0)])
+def test_rates_of_whole_quarters_of_a_turn_are_probably_degrees(rate, told):
+    driven = find_scene("four_bar").with_(driver=({"joint": "A", "polynomial": [0.0, rate]},))
+    assert len(probable_slips(driven)) == told
+
+
+def test_amplitudes_beyond_a_turn_are_probably_degrees():
+    sine = {"amplitude": 30.0, "frequency": 1.0, "phase": 0.0}
+    driven = find_scene("four_bar").with_(driver=({"joint": "A", "sine": sine},))
+    assert probable_slips(driven)[0].startswith("driver[A].sine.amplitude: 30 rad is more than a turn")
 
 
 def test_lengths_of_links():
@@ -158,6 +239,12 @@ def test_version_and_completion(capsys):
     assert capsys.readouterr().out.startswith("mbref 0.1.0 (Python 3.")
     assert main(["completion", "bash"]) == 0
     assert "animate" in capsys.readouterr().out
+
+
+def test_progress_that_creeps_tells_no_thousands_of_years(capsys):
+    times = iter([0.0, 20.0])
+    Lines("simulating", 1.0, lambda: next(times))(1e-12)
+    assert capsys.readouterr().err == "simulating: 0 %, more than an hour left\n"
 
 
 def test_progress_in_a_pipe_is_a_line_every_ten_seconds(capsys):

@@ -8,12 +8,14 @@ import pytest
 from imports import circles, graph, imported, sources, upward
 
 DOORS = (
-    r"formats|scene|scene_fields|scene_joints|scene_loads|scenes(\.\w+)?|scene_validation|trajectory|rotations|records"
+    r"command_line|formats|scene|scene_fields|scene_joints|scene_lines|scene_loads|scenes(\.\w+)?|scene_validation|trajectory|rotations|records"
     r"|__version__"
 )
 ALLOWED = {  # package → the names of mbref that it may import
     "crosscheck": re.compile(rf"mbref(\.({DOORS})(\.\w+)?)?"),
-    "reports": re.compile(r"mbref(\.(scene|trajectory|rotations|records|drawing\.(shapes|svg))(\.\w+)?)?"),
+    "reports": re.compile(
+        r"mbref(\.(command_line|scene|trajectory|rotations|records|drawing\.(shapes|svg))(\.\w+)?)?"
+    ),
 }
 ADAPTER = "crosscheck.engines.mbref"  # the one module that may import all of mbref
 
@@ -22,7 +24,8 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["rotations", "records", "trajectory"],
         ["scene", "scene_fields", "scene_joints", "scene_lines", "scene_loads", "scene_paths",
          "scene_validation"],
-        ["formats", "scenes", "scene_slips", "variation"], ["drawing"], ["joint_motion", "energy"],
+        ["command_line", "formats", "scenes", "scene_slips", "variation"], ["drawing"],
+        ["joint_motion", "energy"],
         ["motion"], ["kernels"], ["linear_algebra"], ["equations"], ["formulations"], ["stabilisation"],
         ["integrators"], ["method"], ["specialised"], ["simulation", "taylor"], ["design"], ["cli"],
         ["__main__"],

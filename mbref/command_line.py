@@ -1,0 +1,55 @@
+"""The parser of command lines: its messages are sentences, with the word that was probably meant."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+from mbref.scene_fields import meant
+
+CHOICE = re.compile(r"invalid choice: '?(.*?)'? \(choose from (.*)\)")
+NUMBER = re.compile(r"invalid (float|int) value: ")
+KINDS = {"float": "must be a number, got ", "int": "must be a whole number, got "}
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose commands answer for options that they do not have."""
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """The options; an unknown one is told by its command, with the option that was probably meant."""
+        found, unknown = self.parse_known_args(args, namespace)
+        if unknown:
+            command = getattr(found, "parser_of_command", self)
+            known = [option for action in command._actions for option in action.option_strings]
+            command.error(f"unknown option {unknown[0]!r}{meant(unknown[0], known)}"
+                          if unknown[0].startswith("-") else f"unknown argument {unknown[0]!r}")  # fmt: skip
+        return found
+
+    def error(self, message: str) -> NoReturn:
+        """Print the usage and the message, or where no command is named all commands, and exit with 2."""
+        if message.endswith("required: COMMAND"):
+            self.print_help(sys.stderr)
+            self.exit(2)
+        super().error(NUMBER.sub(lambda kind: KINDS[kind[1]], CHOICE.sub(_known, message)))
+
+
+def commands(parser: argparse.ArgumentParser, **names: Any) -> Any:
+    """The object that commands are added to; each is the ``parser_of_command`` of its options."""
+    return parser.add_subparsers(parser_class=_Command, **names)
+
+
+class _Command(Parser):
+    """The parser of one command."""
+
+    def __init__(self, *args: Any, **names: Any):
+        super().__init__(*args, **names)
+        self.set_defaults(parser_of_command=self)
+
+
+def _known(found: re.Match[str]) -> str:
+    """``unknown 'rnu'; known: run, list; did you mean 'run'?``."""
+    known: Sequence[str] = re.findall(r"[^',\s]+", found[2])
+    return f"unknown {found[1]!r}; known: {', '.join(known)}{meant(found[1], known)}"
