@@ -1,10 +1,12 @@
-"""Changed copies of the items of a scene."""
+"""Changed copies of scenes and of their items."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
+from crosscheck.judge.tolerances import ROUNDING
+from mbref.scene import Scene
 from mbref.scene_fields import Entry
 
 Item = TypeVar("Item", bound=Entry)
@@ -29,3 +31,25 @@ def fields_of(item: Entry) -> dict[str, Any]:
 
 def _plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
+
+
+def nudged(scene: Scene, rounding: float = ROUNDING) -> Scene:
+    """The scene with masses, gravity and positions moved by two units in the last place."""
+    factor = 1.0 + 2.0 * rounding
+
+    def grown(values: Sequence[float] | None) -> tuple[float, ...] | None:
+        return None if values is None else tuple(factor * x for x in values)
+
+    bodies = [
+        body.model_copy(update={"mass": body.mass and factor * body.mass, "position": grown(body.position),
+                                "velocity": grown(body.velocity)})
+        for body in scene.body
+    ]  # fmt: skip
+    return scene.with_(body=tuple(bodies), gravity=grown(scene.gravity))
+
+
+def weighed(scene: Scene) -> Scene:
+    """Another scene of the same name: with masses twice as large, under another gravity."""
+    bodies = [body.model_copy(update={"mass": body.mass and 2 * body.mass}) for body in scene.body]
+    x, y, z = scene.gravity
+    return scene.with_(body=tuple(bodies), gravity=(x + 1.0, y - 2.0, z + 3.0))

@@ -26,6 +26,7 @@ AGREEMENT = "agreement"
 ABOUT = "Trajectories of two engines agree within what the measured order and floor of both leave of error."
 MOST = 3  # seeds for each mechanism asked for, where a card says nothing of some
 DECIDED = (PASS, FAIL)
+NOTHING: dict[str, Any] = {"verdicts": ()}
 KINDS: tuple[tuple[Callable[[int], Scene], tuple[str, ...]], ...] = (
     (mechanism, (RUN, AGREEMENT, *(card for card in PROPERTIES if card not in ("momentum", "replayed")))),
     (floating, ("energy", "momentum", "reversed")),
@@ -107,20 +108,34 @@ def about(name: str) -> str:
 
 def examined(plan: Plan, path: str | None = None, progress: Callable[[str], None] | None = None) -> Tally:
     """Judge drawn mechanisms in this process until each card is decided on as many as planned, or seeds are
-    MOST times as many; records at ``path`` (JSON lines) are taken instead of runs, and added to."""
+    MOST times as many; records at ``path`` (JSON lines) are taken instead of runs, and added to where a card
+    is new."""
     known, tally = opened(path), Tally(plan)
     for seed in itertools.islice(itertools.count(plan.first), MOST * plan.mechanisms):
         wanted = tally.open()
         if not wanted:
             break
         key = f"{plan.engine} {plan.family} {seed}"
-        if key not in known:
-            known[key] = {"key": key, **_record(plan, seed, wanted)}
+        before = known.get(key, NOTHING)
+        if missing := unasked(before, wanted):
+            added = _record(plan, seed, missing)
+            asked = [*before.get("asked", ()), *map(card_of, missing)]
+            verdicts = [*before["verdicts"], *added["verdicts"]]
+            known[key] = {"key": key, **added, "asked": asked, "verdicts": verdicts}
             append(path, known[key])
         tally.add(known[key])
         if progress:
             progress(f"seed {seed}")
     return tally
+
+
+def unasked(record: dict[str, Any], wanted: Collection[str]) -> list[str]:
+    """Cards, of those wanted, that a seed's record says nothing of, in this version of the card; none where
+    the run itself failed."""
+    if any(v["property"] == RUN and v["status"] == FAIL for v in record["verdicts"]):
+        return []
+    asked = {*record.get("asked", ()), *(verdict["card"] for verdict in record["verdicts"])}
+    return [card for card in wanted if card_of(card) not in asked]
 
 
 def _record(plan: Plan, seed: int, wanted: Collection[str]) -> dict[str, Any]:

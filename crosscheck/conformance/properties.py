@@ -9,17 +9,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crosscheck.conformance.relations import RELATIONS
-from crosscheck.conformance.trial import Bench, Outside, Specimen, difference
+from crosscheck.conformance.precise import double_precision, settled, smooth
+from crosscheck.conformance.relations import RELATIONS, Relation
+from crosscheck.conformance.trial import NEIGHBOURS, Bench, Broken, Finding, Outside, Specimen, difference
 from crosscheck.engine import Cannot
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.energy import energy_series
 from crosscheck.judge.gauss_principle import stacked
 from crosscheck.judge.metrics import in_scene_order, violation_series
 from crosscheck.judge.momentum import momentum_series
+from crosscheck.judge.precision import motion_rate
 from crosscheck.judge.push_difference import pushes_apart
 from crosscheck.judge.reaction_balance import balance, idle
 from crosscheck.judge.tolerances import (
+    GRAINS,
     LIKE_TRUTH,
     REACTIONS,
     SAME_MOTION,
@@ -27,20 +30,13 @@ from crosscheck.judge.tolerances import (
     UNIT_NORM,
 )
 from mbref import rotations
-from mbref.scene import Moment, Scene
+from mbref.scene import Moment, Scene, SceneError
 from mbref.trajectory import Trajectory
 
+SECOND = ("acceleration", "angular_acceleration")
+NORMS = 4.0  # roundings of the engine by which the length of a quaternion may be off
 STATE = ("position", "orientation", "velocity", "angular_velocity")
 DENSE = 65  # samples from which the work of a moment is summed to 1e-8
-STEP = 1e-4  # of the duration: central differences of it are off by 1e-8 of what a motion does in its time
-
-
-class Finding(NamedTuple):
-    """``measured`` must not exceed ``allowed``; ``remark`` says more."""
-
-    measured: float
-    allowed: float
-    remark: str = ""
 
 
 Check = Callable[[Bench], Finding | Cannot | Outside]
@@ -67,7 +63,7 @@ def sample_times(bench: Bench) -> Finding:
 def unit_orientations(bench: Bench) -> Finding:
     """Orientations are unit quaternions."""
     norms = np.linalg.norm(bench.motion.orientation, axis=-1)
-    return Finding(float(np.abs(norms - 1).max()), UNIT_NORM)
+    return Finding(float(np.abs(norms - 1).max()), max(UNIT_NORM, NORMS * bench.rounding))
 
 
 def closure(bench: Bench) -> Finding:
@@ -77,8 +73,8 @@ def closure(bench: Bench) -> Finding:
 
 def velocities(bench: Bench) -> Finding:
     """Velocities and angular velocities (world) are the rates of the poses: central differences."""
-    h, middle = STEP * bench.scene.duration, bench.scene.duration / 2
-    run = bench.run(bench.scene, np.array([middle - h, middle, middle + h]))
+    run = _at(bench.close, slice(NEIGHBOURS - 1, NEIGHBOURS + 2))
+    h = (run.times[2] - run.times[0]) / 2
     moved = (run.position[2] - run.position[0]) / (2 * h)
     turn = rotations.multiply(run.orientation[2], rotations.conjugate(run.orientation[0]))
     turn *= np.where(turn[:, :1] < 0, -1.0, 1.0)
@@ -89,7 +85,8 @@ def velocities(bench: Bench) -> Finding:
     speeds = np.concatenate([run.velocity[1], length * run.angular_velocity[1]])
     off = speeds - np.concatenate([moved, length * turned])
     scale = max(np.linalg.norm(speeds, axis=1).max(), length / bench.scene.duration)
-    return Finding(float(np.linalg.norm(off, axis=1).max() / scale), LIKE_TRUTH)
+    noise = GRAINS * bench.rounding / (h * motion_rate(bench.scene, run))
+    return Finding(float(np.linalg.norm(off, axis=1).max() / scale), max(LIKE_TRUTH, noise))
 
 
 def truth(bench: Bench) -> Finding:
@@ -111,7 +108,7 @@ def convergence(bench: Bench) -> Finding | Outside:
 def rates_closed(bench: Bench) -> Finding:
     """Velocities obey joints and drivers at every sample."""
     off = violation_series(bench.scene, bench.motion, 1)
-    return Finding(float(off.max()) / _rate(bench), LIKE_TRUTH)
+    return Finding(float(off.max()) / motion_rate(bench.scene, bench.motion), LIKE_TRUTH)
 
 
 def true_velocities(bench: Bench) -> Finding | Outside:
@@ -121,7 +118,9 @@ def true_velocities(bench: Bench) -> Finding | Outside:
         return Outside("the formula of this scene gives poses alone")
     linear = np.linalg.norm(bench.motion.velocity - exact.velocity, axis=-1) / length
     angular = np.linalg.norm(bench.motion.angular_velocity - exact.angular_velocity, axis=-1)
-    return Finding(float(max(linear.max(), angular.max())) / _rate(bench), LIKE_TRUTH)
+    return Finding(
+        float(max(linear.max(), angular.max())) / motion_rate(bench.scene, bench.motion), LIKE_TRUTH
+    )
 
 
 def true_accelerations(bench: Bench) -> Finding | Outside:
@@ -136,7 +135,7 @@ def true_accelerations(bench: Bench) -> Finding | Outside:
     ]
     scale = max(float(np.abs(true).max()) for _, true in found)
     scale = max(scale, scene_length(bench.scene) / bench.scene.duration**2)
-    return Finding(max(float(np.abs(got - true).max()) for got, true in found) / scale, REACTIONS)
+    return Finding(float(np.max([np.abs(got - true).max() for got, true in found])) / scale, REACTIONS)
 
 
 def energy(bench: Bench) -> Finding | Outside:
@@ -182,13 +181,6 @@ def _of_reactions(
     return Finding(measured(bench.scene, bench.motion, bench.exact), REACTIONS)
 
 
-def _rate(bench: Bench) -> float:
-    """A rate (1/s) of the motion, no less than one over its time."""
-    moved = np.linalg.norm(bench.motion.velocity, axis=-1).max() / scene_length(bench.scene)
-    turned = np.linalg.norm(bench.motion.angular_velocity, axis=-1).max()
-    return max(float(moved), float(turned), 1 / bench.scene.duration)
-
-
 def silence(bench: Bench) -> Finding:
     """A run prints nothing and leaves no file in its working directory."""
     seen = bench.finest
@@ -200,11 +192,18 @@ def silence(bench: Bench) -> Finding:
 
 
 def determinism(bench: Bench) -> Finding:
-    """The same run again gives the same bits: in another process, and in one that has made runs before."""
-    first = bench.motion
+    """The same run again gives the same bits: in another process, and in one that has run another scene."""
     others = [bench.run(bench.scene, bench.times), *bench.shared_runs]
-    pairs = [(getattr(first, name), getattr(other, name)) for other in others for name in STATE]
-    return Finding(max(float(np.abs(a - b).max()) for a, b in pairs), 0.0)
+    return Finding(float(np.max([_bits_apart(bench.motion, other) for other in others])), 0.0)
+
+
+def _bits_apart(first: Trajectory, other: Trajectory) -> float:
+    """Largest difference of two numbers, states, accelerations and reactions; infinite where one has none."""
+    pairs = [(getattr(first, name), getattr(other, name)) for name in (*STATE, *SECOND)]
+    found = other.reactions or {}
+    pairs += [(wrench, found.get(joint)) for joint, wrench in (first.reactions or {}).items()]
+    told = [(a, b) for a, b in pairs if a is not None]
+    return float(np.max([np.inf if b is None else np.abs(a - b).max() for a, b in told]))
 
 
 def other_times(bench: Bench) -> Finding:
@@ -221,7 +220,7 @@ def other_times(bench: Bench) -> Finding:
 def related(name: str, bench: Bench) -> Finding | Cannot | Outside:
     """The scene changed as the relation says moves as it says, by accelerations and unique reactions too."""
     relation = RELATIONS[name]
-    scene = relation.change(bench.scene, bench.motion)
+    scene = changed(relation, bench)
     if isinstance(scene, Outside):
         return scene
     if cannot := bench.refuses(scene):
@@ -229,9 +228,17 @@ def related(name: str, bench: Bench) -> Finding | Cannot | Outside:
     expected = in_scene_order(scene, relation.expect(bench.scene, bench.motion))
     found = bench.run(scene, expected.times)
     poses = Finding(difference(scene, expected, found), bench.own_accuracy, bench.floors)
-    apart, of = pushes_apart(scene, expected, found)
+    apart, of = pushes_apart(scene, expected, found, bench.rank)
     pushes = Finding(apart, bench.own_pushes, f"of {of}")
     return max(poses, pushes, key=lambda finding: finding.measured / finding.allowed)
+
+
+def changed(relation: Relation, bench: Bench) -> Scene | Outside:
+    """The scene changed; raises Broken where the motion makes no valid scene."""
+    try:
+        return relation.change(bench.scene, bench.motion)
+    except (SceneError, ValueError) as fault:
+        raise Broken(f"its motion makes no valid scene: {fault}") from None
 
 
 def _at(run: Trajectory, samples: slice | np.ndarray) -> Trajectory:
@@ -262,12 +269,15 @@ PROPERTIES: Mapping[str, Property] = {
     "convergence": _property(convergence, version=2),
     "speeds": _property(true_velocities),
     "accelerations": _property(true_accelerations),
+    "settled": _property(settled),
+    "digits": _property(double_precision),
+    "smooth": _property(smooth),
     "energy": _property(energy, version=2),
     "momentum": _property(momentum),
     "balance": _property(balanced),
     "workless": _property(workless),
     "silence": _property(silence),
-    "repeated": _property(determinism, _related),
+    "repeated": _property(determinism, _related, version=2),
     "resampled": _property(other_times, _related, version=3),
     **{
         name: Property(f"The scene {name}: {relation.about}.", partial(related, name), _related, 3)

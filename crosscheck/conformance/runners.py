@@ -19,6 +19,8 @@ from crosscheck.processes.serve import failed
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
+Task = tuple[Scene, Setting]
+
 
 class Runner(Protocol):
     """One engine, asked and run; raises ChildFailed where the engine cannot even answer."""
@@ -26,6 +28,10 @@ class Runner(Protocol):
     @property
     def name(self) -> str:
         """The engine's name."""
+
+    @property
+    def rounding(self) -> float:
+        """Relative rounding of numbers that the engine claims."""
 
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
         """Version, the reason of a refusal, and else the settings of the engine, or those of a family."""
@@ -36,8 +42,8 @@ class Runner(Protocol):
     def observe(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
         """A run at times (k,), s, with nothing left of runs before, and what it printed and left behind."""
 
-    def in_turn(self, scene: Scene, times: np.ndarray, settings: Sequence[Setting]) -> list[Trajectory]:
-        """Runs at the settings, one after another in one process."""
+    def in_turn(self, tasks: Sequence[Task], times: np.ndarray) -> list[Trajectory]:
+        """Runs of scenes at settings, one after another in one process."""
 
 
 @contextlib.contextmanager
@@ -68,6 +74,11 @@ class Isolated:
     name: str
     time_limit: float
 
+    @property
+    def rounding(self) -> float:
+        with answering():
+            return engine(self.name).rounding
+
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
         if family:
             with answering():
@@ -81,8 +92,8 @@ class Isolated:
     def observe(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
         return observe(self.name, scene, times, setting, self.time_limit)
 
-    def in_turn(self, scene: Scene, times: np.ndarray, settings: Sequence[Setting]) -> list[Trajectory]:
-        return [run_isolated(self.name, scene, times, setting, self.time_limit) for setting in settings]
+    def in_turn(self, tasks: Sequence[Task], times: np.ndarray) -> list[Trajectory]:
+        return [run_isolated(self.name, scene, times, setting, self.time_limit) for scene, setting in tasks]
 
 
 @dataclass(frozen=True)
@@ -98,6 +109,10 @@ class InProcess:
     @property
     def name(self) -> str:
         return self.called or self.engine.name
+
+    @property
+    def rounding(self) -> float:
+        return self.engine.rounding
 
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
         with answering():
@@ -115,8 +130,8 @@ class InProcess:
             files = tuple(sorted(path.name for path in Path(place).iterdir()))
         return Observation(run, said.getvalue(), files)
 
-    def in_turn(self, scene: Scene, times: np.ndarray, settings: Sequence[Setting]) -> list[Trajectory]:
-        return [self.observe(scene, times, setting).value for setting in settings]
+    def in_turn(self, tasks: Sequence[Task], times: np.ndarray) -> list[Trajectory]:
+        return [self.observe(scene, times, setting).value for scene, setting in tasks]
 
     def _run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         """A run; an exception or a malformed answer is the outcome CRASHED with its words, as in a child."""

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
+from crosscheck.conformance.changes import nudged, weighed
 from crosscheck.conformance.closed_forms import CLOSED_FORMS, Exact
 from crosscheck.conformance.drawn import mechanism
 from crosscheck.conformance.families import best_family
@@ -18,10 +20,19 @@ from crosscheck.conformance.runners import Runner
 from crosscheck.engine import Cannot, Setting
 from crosscheck.judge.gauss_motion import NAME as GAUSS
 from crosscheck.judge.gauss_motion import gauss_motion
-from crosscheck.judge.metrics import error_series, in_scene_order
+from crosscheck.judge.metrics import error_series, in_scene_order, violation_series
+from crosscheck.judge.precision import motion_rate, not_finite
 from crosscheck.judge.push_difference import pushes_apart
 from crosscheck.judge.reference.reference import SECONDS
-from crosscheck.judge.tolerances import OWN_ACCURACY, ROUNDING, SAME_MOTION, SAME_PUSHES, TRUTH_DRIVEN, TWINS
+from crosscheck.judge.tolerances import (
+    GRAINS,
+    OWN_ACCURACY,
+    RANK,
+    SAME_MOTION,
+    SAME_PUSHES,
+    TRUTH_DRIVEN,
+    TWINS,
+)
 from crosscheck.judge.truth import NoSolution, closed_form, truth_for
 from crosscheck.processes.pool import Observation
 from mbref.scene import Scene
@@ -29,6 +40,9 @@ from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
 
 SAMPLES = 9
+STEP = 1e-4  # of the duration, between neighbouring samples: what differs by h² of a motion differs by 1e-8
+NEIGHBOURS = 4  # on either side of the middle
+TURN = 1e-3  # rad: the most that a motion turns from one neighbouring sample to the next
 SWEPT = 3  # settings from which order and floor are measured
 FASTEST, SLOWEST = 0.1, 0.5  # contractions that are believed: adaptive steps and a floor make others
 COARSER = 1e-8  # tolerance of the second integration of Gauss's principle, 100 times that of the first
@@ -60,6 +74,14 @@ class Outside:
     """A scene is out of a card's domain, and the reason."""
 
     reason: str
+
+
+class Finding(NamedTuple):
+    """``measured`` must not exceed ``allowed``; ``remark`` says more."""
+
+    measured: float
+    allowed: float
+    remark: str = ""
 
 
 @dataclass(frozen=True)
@@ -101,6 +123,11 @@ class Bench:
     def scene(self) -> Scene:
         return self.specimen.scene
 
+    @property
+    def rounding(self) -> float:
+        """Relative rounding of numbers that the engine claims."""
+        return self.runner.rounding
+
     @cached_property
     def times(self) -> np.ndarray:
         """Sample times (k,), s, both ends included."""
@@ -115,6 +142,13 @@ class Bench:
     def motion(self) -> Trajectory:
         """The completed run at the finest setting; raises Broken when there is none."""
         return completed(self.scene, self.finest.value, len(self.times))
+
+    @cached_property
+    def close(self) -> Trajectory:
+        """The completed run at evenly spaced times so near that differences of samples are rates."""
+        rate = motion_rate(self.scene, self.motion)
+        step = min(STEP * self.scene.duration, TURN / rate)
+        return self.run(self.scene, self.scene.duration / 2 + step * np.arange(-NEIGHBOURS, NEIGHBOURS + 1))
 
     def run(self, scene: Scene, times: np.ndarray) -> Trajectory:
         """A completed run of a scene at the finest setting of the specimen; raises Broken."""
@@ -132,10 +166,11 @@ class Bench:
 
     @property
     def shared_runs(self) -> list[Trajectory]:
-        """Completed runs at the finest setting, with one at the coarsest between them, in one process."""
-        settings = self.settings[-1], self.settings[0], self.settings[-1]
-        runs = self.runner.in_turn(self.scene, self.times, settings)
-        return [completed(self.scene, run, len(self.times)) for run in (runs[0], runs[2])]
+        """Completed runs at the finest setting, in one process: after one at the coarsest, and after one of
+        another scene of the same name."""
+        coarse, fine = (self.scene, self.settings[0]), (self.scene, self.settings[-1])
+        runs = self.runner.in_turn([coarse, fine, (weighed(self.scene), self.settings[-1]), fine], self.times)
+        return [completed(self.scene, run, len(self.times)) for run in (runs[1], runs[3])]
 
     @cached_property
     def sweep(self) -> list[Trajectory]:
@@ -175,6 +210,13 @@ class Bench:
         """Largest error of the finest run by the engine's measured order and floor."""
         return max(SAME_MOTION, OWN_ACCURACY * self.left, TWINS * self.twins_apart)
 
+    @cached_property
+    def rank(self) -> float:
+        """Part of the largest singular value of the joints' rows below which others are zero: RANK, or what
+        the run leaves of residuals and the engine rounds."""
+        left = float(violation_series(self.scene, self.motion).max())
+        return max(RANK, GRAINS * self.rounding, GRAINS * left)
+
     def _apart(self, k: int) -> float:
         return difference(self.scene, self.sweep[k], self.sweep[k + 1])
 
@@ -186,13 +228,14 @@ class Bench:
     @cached_property
     def twin(self) -> Trajectory:
         """The run of a scene that differs by two units in the last place of every number."""
-        return self.run(nudged(self.scene), self.times)
+        return self.run(nudged(self.scene, self.rounding), self.times)
 
     @cached_property
     def own_pushes(self) -> float:
         """As `own_accuracy`, of accelerations and unique reactions."""
-        twins = pushes_apart(self.scene, self.motion, self.twin)[0]
-        steps = pushes_apart(self.scene, *self.sweep[:2])[0] if len(self.sweep) > 1 else 0.0
+        twins = pushes_apart(self.scene, self.motion, self.twin, self.rank)[0]
+        coarser = self.sweep[1] if len(self.sweep) > 1 else self.motion
+        steps = pushes_apart(self.scene, self.motion, coarser, self.rank)[0]
         return max(SAME_PUSHES, OWN_ACCURACY * steps, TWINS * twins)
 
     @cached_property
@@ -230,6 +273,8 @@ def completed(scene: Scene, run: Trajectory, samples: int) -> Trajectory:
         raise Broken(f"{run.outcome.label} after {run.t_end:.3g} s: {run.message or run.outcome.sentence}")
     if len(run.times) != samples:
         raise Broken(f"it says it completed, with {len(run.times)} of {samples} samples")
+    if lost := not_finite(run):
+        raise Broken(f"it says it completed, with numbers that are not finite: {lost[0]}")
     return in_scene_order(scene, run)
 
 
@@ -238,21 +283,6 @@ def difference(scene: Scene, first: Trajectory, second: Trajectory) -> float:
     where one is not finite."""
     worst = float(error_series(scene, first, second).max())
     return worst if np.isfinite(worst) else np.inf
-
-
-def nudged(scene: Scene) -> Scene:
-    """The scene with masses, gravity and positions moved by two units in the last place."""
-    factor = 1.0 + 2.0 * ROUNDING
-
-    def grown(values: Sequence[float] | None) -> tuple[float, ...] | None:
-        return None if values is None else tuple(factor * x for x in values)
-
-    bodies = [
-        body.model_copy(update={"mass": body.mass and factor * body.mass, "position": grown(body.position),
-                                "velocity": grown(body.velocity)})
-        for body in scene.body
-    ]  # fmt: skip
-    return scene.with_(body=tuple(bodies), gravity=grown(scene.gravity))
 
 
 def exact_motion(specimen: Specimen, times: np.ndarray) -> Trajectory:

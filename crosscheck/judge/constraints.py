@@ -125,12 +125,23 @@ def initial_twists(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
 
 def scene_length(scene: Scene) -> float:
     """Characteristic length (m): the largest distance between two of the joint anchors and centres of
-    mass at t = 0; 1 for a scene whose points all coincide."""
+    mass at t = 0; where these coincide, the way of a body in flight or a radius of gyration, if larger,
+    and 1 without both."""
     points = [body.position for body in scene.body]
     for joint in scene.joint:
         points += joint.anchor_pair
     array = np.array(points)
-    return float(np.linalg.norm(array[:, None] - array[None], axis=-1).max()) or 1.0
+    return float(np.linalg.norm(array[:, None] - array[None], axis=-1).max()) or _of_one_point(scene) or 1.0
+
+
+def _of_one_point(scene: Scene) -> float:
+    """Largest way (m) that a body without joints goes, or radius of gyration."""
+    speeds = [np.linalg.norm(body.velocity or 0.0) for body in scene.body]
+    way = max(speeds) * scene.duration + np.linalg.norm(scene.gravity) * scene.duration**2 / 2
+    if not scene.has_mass():
+        return float(way)
+    largest = np.linalg.eigvalsh(inertia_matrices(scene))[:, -1]
+    return float(np.sqrt(largest / [body.mass for body in scene.body]).max(initial=way))
 
 
 def inertia_matrices(scene: Scene) -> np.ndarray:

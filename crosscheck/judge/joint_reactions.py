@@ -43,23 +43,24 @@ class Comparison:
 
 
 def shared_wrenches(
-    scene: Scene, t: float, position: np.ndarray, orientation: np.ndarray
+    scene: Scene, t: float, position: np.ndarray, orientation: np.ndarray, rank: float = RANK
 ) -> dict[str, np.ndarray]:
     """By joint, an orthonormal basis (6, k) of the wrenches (force, moment over the scene's length; world,
     on the second body at its anchor) that redundancy leaves open; k = 0 where the reaction is unique.
 
-    ``position`` (nb, 3) and ``orientation`` (nb, 4) are one pose at time t (s).
+    ``position`` (nb, 3) and ``orientation`` (nb, 4) are one pose at time t (s), which satisfies the joints
+    so well that singular values below ``rank`` times the largest are zeros.
     """
     rows, _ = jacobian(scene, t, position, orientation)
     units, found, start = np.repeat([1.0, scene_length(scene)], 3), {}, 0
     lengths = np.linalg.norm(rows, axis=1)
     u, s, _ = np.linalg.svd(rows / lengths[:, None])
-    open_ = u[:, int(np.sum(s > RANK * s[0])) :]
+    open_ = u[:, int(np.sum(s > rank * s[0])) :]
     for joint in scene.joint:
         count = len(length_rows(scene)[joint.name])
         own = slice(start, start + count)
         wrenches = on_second(scene, joint, rows[own], position, orientation) / units[:, None] / lengths[own]
-        found[joint.name] = _span(wrenches @ open_[own], np.abs(wrenches).max(initial=0.0))
+        found[joint.name] = _span(wrenches @ open_[own], rank * np.abs(wrenches).max(initial=0.0))
         start += count
     return found
 
@@ -160,7 +161,7 @@ def _anchor(scene: Scene, joint: Joint, position: np.ndarray, orientation: np.nd
     return local if body < 0 else position[body] + rotations.rotate(orientation[body], local)
 
 
-def _span(vectors: np.ndarray, scale: float) -> np.ndarray:
-    """Orthonormal basis (6, k) of the span of columns (6, n); those of rounding size do not count."""
+def _span(vectors: np.ndarray, least: float) -> np.ndarray:
+    """Orthonormal basis (6, k) of the span of columns (6, n); those below 1e3 ``least`` do not count."""
     u, s, _ = np.linalg.svd(vectors, full_matrices=False)
-    return u[:, s > 1e3 * RANK * scale]
+    return u[:, s > 1e3 * least]

@@ -6,20 +6,26 @@ import numpy as np
 
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.joint_reactions import LEAST, shared_wrenches
+from crosscheck.judge.tolerances import RANK
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
 Part = tuple[float, str]
 
 
-def pushes_apart(scene: Scene, expected: Trajectory, found: Trajectory) -> Part:
+def pushes_apart(scene: Scene, expected: Trajectory, found: Trajectory, rank: float = RANK) -> Part:
     """The larger of both differences, each relative to the largest expected one, and its name; of a scene
-    and two runs of the same sample times.  What one of the runs does not give is not compared."""
-    return max(_accelerations(scene, expected, found), _reactions(scene, expected, found))
+    and two runs of the same sample times.  What one of the runs does not give is not compared.  ``rank`` is
+    that of `shared_wrenches`."""
+    accelerations = accelerations_apart(scene, expected, found), "accelerations"
+    return max(accelerations, _reactions(scene, expected, found, rank))
 
 
-def _accelerations(scene: Scene, expected: Trajectory, found: Trajectory) -> Part:
-    """Angular accelerations count times the scene's length, and none less than its length in its time."""
+def accelerations_apart(scene: Scene, expected: Trajectory, found: Trajectory) -> float:
+    """Difference of accelerations, relative to the largest expected one, 0 where a run gives none.
+
+    Angular accelerations count times the scene's length, and none less than its length in its time.
+    """
     length, parts = scene_length(scene), []
     for name, unit in (("acceleration", 1.0), ("angular_acceleration", length)):
         first, second = getattr(expected, name), getattr(found, name)
@@ -28,10 +34,10 @@ def _accelerations(scene: Scene, expected: Trajectory, found: Trajectory) -> Par
                 (unit * np.abs(first).max(initial=0.0), unit * np.abs(first - second).max(initial=0.0))
             )
     scale = max([length / scene.duration**2, *(size for size, _ in parts)])
-    return float(max([0.0, *(apart for _, apart in parts)]) / scale), "accelerations"
+    return float(np.max([0.0, *(apart for _, apart in parts)]) / scale)
 
 
-def _reactions(scene: Scene, expected: Trajectory, found: Trajectory) -> Part:
+def _reactions(scene: Scene, expected: Trajectory, found: Trajectory, rank: float) -> Part:
     """At the last sample, of the joints that both runs have, across what redundancy leaves open; moments
     count over the scene's length."""
     first, second = expected.reactions or {}, found.reactions or {}
@@ -41,7 +47,7 @@ def _reactions(scene: Scene, expected: Trajectory, found: Trajectory) -> Part:
     units = np.repeat([1.0, scene_length(scene)], 3)
     weight = LEAST * sum(body.mass or 0.0 for body in scene.body)
     scale = max([weight, *(float(np.linalg.norm(w[-1] / units)) for w in first.values())])
-    shared = shared_wrenches(scene, found.times[-1], found.position[-1], found.orientation[-1])
+    shared = shared_wrenches(scene, found.times[-1], found.position[-1], found.orientation[-1], rank)
     worst = 0.0
     for name in common:
         apart = (second[name][-1] - first[name][-1]) / units

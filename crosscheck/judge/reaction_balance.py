@@ -99,20 +99,19 @@ def idle(scene: Scene, run: Trajectory, exact: Trajectory) -> float:
     length = scene_length(scene)
     wanted = demanded(scene, exact) / np.repeat([1.0, length], 3)
     units = np.repeat([1.0, length], 3)
-    worst = max(_idle_at(scene, run, k, units) for k in range(len(run.times)))
+    worst = float(np.max([_idle_at(scene, run, k, units) for k in range(len(run.times))]))
     return worst / _scale(scene, wanted)
 
 
 def _idle_at(scene: Scene, run: Trajectory, k: int, units: np.ndarray) -> float:
     position, orientation = run.position[k], run.orientation[k]
     rows, _ = jacobian(scene, run.times[k], position, orientation)
-    worst = 0.0
+    left = [np.zeros(6)]
     for joint, own in _own_rows(scene):
         held = on_second(scene, joint, rows[own], position, orientation) / units[:, None]
         wrench = (run.reactions or {})[joint.name][k] / units
-        left = wrench - held @ np.linalg.lstsq(held, wrench, rcond=RANK)[0]
-        worst = max(worst, float(np.abs(left).max()))
-    return worst
+        left.append(wrench - held @ np.linalg.lstsq(held, wrench, rcond=RANK)[0])
+    return float(np.abs(left).max())
 
 
 def _scale(scene: Scene, wanted: np.ndarray) -> float:

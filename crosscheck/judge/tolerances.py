@@ -92,6 +92,10 @@ SAME_MOTION = 1e-9
 """Difference of two runs of a conforming engine that should agree, where its own accuracy (the difference of
 its two finest settings) is better: rounding grows to this over some thousand steps."""
 
+GRAINS = 16.0
+"""Multiples of the rounding that an engine claims by which states at neighbouring times may leave a smooth
+curve: each is the sum of some rotated arms and of the rounding of a few steps between."""
+
 SAME_PUSHES = 1e-6
 """The same for accelerations and unique reactions, which are solved for at each sample: rounding of poses
 times the condition of the equations, of 1e6 at most away from singular positions."""

@@ -128,6 +128,18 @@ class Aging(Fake):
         return replace(trajectory, position=trajectory.position + 1e-14 * self.runs)
 
 
+class Keeping(Fake):
+    """Moves its bodies by the mass and setting of the first run of a process."""
+
+    kept: float | None = None
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        if self.kept is None:
+            self.kept = sum(body.mass or 0.0 for body in scene.body) + setting.options["seconds"]
+        trajectory = super().run(scene, times, setting)
+        return replace(trajectory, position=trajectory.position + 1e-14 * self.kept)
+
+
 class Slow(Recorder):
     """Needs two seconds before the first run of a process."""
 
@@ -189,6 +201,7 @@ class Versionless(Fake):
 
 FAKE, SEGFAULT, HANG, CHATTER, RAISE, QUIT = Fake(), Segfault(), Hang(), Chatter(), Raise(), Quit()
 THREADS, MISSING, RECORDER, AGING = Threads(), Missing(), Recorder(), Aging()
+KEEPING = Keeping()
 SLOW, STUCK, NO_SETTINGS = Slow(), Stuck(), NoSettings()
 MALFORMED, SCALARS, VERSIONLESS = Malformed(), Scalars(), Versionless()
 

@@ -44,9 +44,9 @@ def test_verify_command_and_an_engine_that_breaks_the_contract(capsys, monkeypat
     assert [v["status"] for v in undone] == ["fail"], undone
 
 
-@pytest.mark.parametrize(("fake", "status"), [("FAKE", "pass"), ("AGING", "fail")])
+@pytest.mark.parametrize(("fake", "status"), [("FAKE", "pass"), ("AGING", "fail"), ("KEEPING", "fail")])
 def test_what_a_run_leaves_to_the_next_and_the_property_that_tells(fake, status, monkeypatch):
-    """Of two engines that repeat themselves in processes of their own one does not within a process."""
+    """Of three engines that repeat themselves in processes of their own two do not within a process."""
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
     bench = trial.set_up(Isolated(f"fake_engines:{fake}", 60.0), SPECIMENS["pendulum"])
     repeated, reordered = (suite.verdict_on(card, bench) for card in ("repeated", "reordered"))

@@ -47,6 +47,24 @@ def test_every_card_and_the_sound_example_engine(known, tmp_path):
     assert deep.examined(plan, path).to_record() == found.to_record(), "records were not taken"
 
 
+def test_records_without_a_card(known, tmp_path, monkeypatch):
+    """A card that records say nothing of is asked anew, and no other."""
+    known(example())
+    path, plan = tmp_path / "records.jsonl", deep.Plan("example", 1)
+    monkeypatch.setattr(deep, "KINDS", ((drawn.mechanism, ("run", "closure", "smooth")),))
+    before = deep.examined(plan, path).to_record()
+    (record,) = [json.loads(line) for line in path.read_text().splitlines()]
+    del record["asked"]
+    record["verdicts"] = [v for v in record["verdicts"] if v["property"] != "smooth"]
+    path.write_text(json.dumps(record) + "\n")
+    asked = []
+    judged = deep.suite.verdict_on
+    monkeypatch.setattr(
+        deep.suite, "verdict_on", lambda card, bench: asked.append(card) or judged(card, bench)
+    )
+    assert deep.examined(plan, path).to_record() == before and asked == ["smooth"], asked
+
+
 def test_planted_defect_and_the_cards_that_find_it(known):
     known(example(DEFECTS["gyroscopic moment with the wrong sign"]))
     found = deep.examined(deep.Plan("example", 1))

@@ -1,0 +1,60 @@
+"""Cards on the last digits of a run: single precision, noise between samples, rates as exact as claimed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from crosscheck.conformance.trial import Bench, Finding, Outside
+from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.precision import grain, motion_rate, single_precision
+from crosscheck.judge.push_difference import accelerations_apart
+from crosscheck.judge.reaction_balance import balance, idle
+from crosscheck.judge.tolerances import GRAINS, OWN_ACCURACY, ROUNDING, SAME_MOTION, TWINS
+from mbref.trajectory import Trajectory
+
+
+def double_precision(bench: Bench) -> Finding | Outside:
+    """Numbers are not rounded to single precision, unless the engine says that it computes in that."""
+    if bench.rounding > ROUNDING:
+        return Outside(f"the engine says that its numbers are rounded to {bench.rounding:.1e}")
+    single = single_precision(bench.scene, bench.close)
+    return Finding(float(len(single)), 0.0, ", ".join(single[:3]))
+
+
+def smooth(bench: Bench) -> Finding:
+    """States at neighbouring times lie on smooth curves, but for the rounding that the engine claims."""
+    noise, where = grain(bench.scene, bench.close)
+    return Finding(noise, max(SAME_MOTION, GRAINS * bench.rounding), where)
+
+
+def settled(bench: Bench) -> Finding | Outside:
+    """Velocities, accelerations and reactions are exact within what the engine's own accuracy leaves."""
+    if len(bench.settings) < 2:
+        return Outside("the engine offers one setting")
+    if np.isnan(bench.exact.velocity).any():
+        return Outside("the formula of this scene gives poses alone")
+    return max(_rates(bench), key=lambda finding: finding.measured / finding.allowed)
+
+
+def _rates(bench: Bench) -> Iterator[Finding]:
+    """Against the exact ones: velocities; accelerations and reactions, where the engine gives them."""
+    scene, motion, exact = bench.scene, bench.motion, bench.exact
+    steps, twins = (_speeds_apart(bench, motion, run) for run in (*bench.sweep[1:2], bench.twin))
+    allowed = max(SAME_MOTION, OWN_ACCURACY * steps, TWINS * twins)
+    yield Finding(_speeds_apart(bench, motion, exact), allowed, "velocities")
+    if exact.acceleration is None:
+        return
+    yield Finding(accelerations_apart(scene, exact, motion), bench.own_pushes, "accelerations")
+    if scene.has_mass() and motion.reactions and len(motion.reactions) == len(scene.joint):
+        yield Finding(balance(scene, motion, exact), bench.own_pushes, "balance of reactions")
+        yield Finding(idle(scene, motion, exact), bench.own_pushes, "reactions along freedoms")
+
+
+def _speeds_apart(bench: Bench, first: Trajectory, second: Trajectory) -> float:
+    """Largest difference of velocities over the scene's length, and of angular velocities, over the rate of
+    the motion."""
+    linear = np.abs(first.velocity - second.velocity).max() / scene_length(bench.scene)
+    angular = np.abs(first.angular_velocity - second.angular_velocity).max()
+    return float(max(linear, angular)) / motion_rate(bench.scene, bench.motion)
