@@ -77,12 +77,14 @@ class Opening:
 
 @dataclass(frozen=True)
 class Verdict:
-    """One family in a cell of the matrix: its grade and sign, what is said below, and the record's place."""
+    """One family in a cell of the matrix: its grade and sign, what is said below, its place, and the link to
+    its best run."""
 
     family: str
     grade: str
     sign: str
     lines: Sequence[str]
+    place: str
     href: str
 
 

@@ -132,8 +132,8 @@ def numbers(text: str) -> Markup:
 
 
 def breakable(name: str) -> Markup:
-    """A name for the page that may be broken behind its underscores."""
-    return escape(name).replace("_", Markup("_<wbr>"))
+    """A name for the page that may be broken behind its underscores and plus signs."""
+    return escape(name).replace("_", Markup("_<wbr>")).replace("+", Markup("+<wbr>"))
 
 
 def file_name(name: str) -> str:

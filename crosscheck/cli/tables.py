@@ -23,13 +23,14 @@ from crosscheck.study.record_view import (
     never_moved,
     varied_settings,
 )
-from crosscheck.study.sentences import LEVEL, Verdict
+from crosscheck.study.sentences import LEVEL, SAID, Verdict
 from crosscheck.study.verdict import Grade, Judged, grade
 
 MEASURED = ("violation_position", "energy_error")  # metrics that the table of runs shows beside the error
 SETTINGS_WIDTH, NUMBER_WIDTH = 15, 8  # least widths of columns, so that numbers stay whole
-OUTCOME_WIDTH = 12  # at most, for 80 columns in all
+OUTCOME_WIDTH = 13  # at most, for 80 columns in all
 BEST = {"violation_position": "closure", "energy_error": "energy", "reaction_error": "reactions"}
+NO_ENERGY = "energy –: a driver or damper works, or samples are too far apart to count turns"
 TEXT_COLUMNS = 3  # the columns from the left that hold words and may be folded
 
 
@@ -106,12 +107,14 @@ def _print_best(console: Console, group: Judged) -> None:
         measured = [_measured(r, metric) for metric in BEST]
         table.add_row(*_identity(r, group.records), error_text(r), *measured)
     console.print(table)
+    if all(r["metrics"].get("energy_error") is None for r in group.records):
+        console.print(NO_ENERGY)
 
 
 def _print_advice(console: Console, group: Judged, path: str) -> None:
     """The command of every engine's fastest run that reaches LEVEL, else of its best one."""
     cheapest, best = group.cheapest(LEVEL), group.best()
-    console.print(f"settings to use: the fastest run within {LEVEL:.0e}, else the best")
+    console.print(f"\nsettings to use: the fastest run within {SAID}, else the best")
     for name in best:
         r = cheapest.get(name, best[name])
         if is_completed(r):
@@ -129,9 +132,9 @@ def _graded(record: Record) -> str:
 
 
 def _at(record: Record) -> str:
-    """`` at 0.1 s``; nothing for a run that completed or was ended from outside."""
+    """A line ``at 0.1 s``; nothing for a run that completed or was ended from outside."""
     silent = is_completed(record) or record["outcome"] in ("TIMED_OUT", "CRASHED")
-    return "" if silent else f" at {max(record['t_end'], 0):.4g} s"
+    return "" if silent else f"\nat {max(record['t_end'], 0):.4g} s"
 
 
 def _cost(record: Record) -> float:
@@ -149,9 +152,16 @@ def _seconds(record: Record) -> str:
 
 
 def _print_messages(console: Console, records: Sequence[Record]) -> None:
+    """Why runs failed; settings of a family that failed alike are told together."""
+    told: dict[tuple[str, str], list[str]] = {}
     for r in records:
         if not is_completed(r):
-            console.print(Text(f"{' '.join(_identity(r, records))}: {r['outcome']}: {r['message']}"))
+            name, settings = _identity(r, records)
+            told.setdefault((name, f"{r['outcome']}: {r['message']}"), []).append(settings)
+    if told:
+        console.print()
+    for (name, reason), settings in told.items():
+        console.print(Text(f"{name} {'; '.join(settings)}: {reason}"))
 
 
 def _letters(records: Sequence[Record]) -> dict[tuple[str, str], str]:
@@ -165,7 +175,7 @@ def _identity(record: Record, records: Sequence[Record]) -> tuple[str, str]:
 
 
 def _outcome(record: Record) -> str:
-    return record["outcome"].lower().replace("_", " ")
+    return record["outcome"].lower().removesuffix("_matrix").replace("_", " ")
 
 
 def _number(value: float | None) -> str:

@@ -16,6 +16,7 @@ from mbref.scene import Scene
 TITLES = {"mujoco": "MuJoCo", "pinocchio": "Pinocchio", "exudyn": "Exudyn", "simbody": "Simbody",
           "sundials": "SUNDIALS IDA", "ondsel": "OndselSolver"}  # fmt: skip
 LEVEL = ERROR_LEVELS[1]  # the error at which speeds are compared in words
+SAID = f"{LEVEL:.0e}".replace("e-0", "e-")
 
 ADAPTERS = " Times are CPU seconds of stepping, each engine as crosscheck's Python adapter calls it."
 
@@ -91,7 +92,7 @@ def fast(groups: Sequence[Judged]) -> str:
     found = {group.scene.name: group.costs(LEVEL) for group in groups}
     costs = {name: cost for name, cost in found.items() if cost}
     if not costs:
-        return f"No engine reaches an error of {LEVEL:.0e}, so speeds are not compared."
+        return f"No engine reaches an error of {SAID}, so speeds are not compared."
     never = [n for n in _engines(groups) if not any(n in cost for cost in costs.values())]
     end = f" {listed(map(title, never))} {'does' if len(never) == 1 else 'do'} not reach it." if never else ""
     return (_fast_on_one(*costs.values()) if len(groups) == 1 else _fast_on_several(costs)) + end + ADAPTERS
@@ -180,7 +181,7 @@ def _less_than_right(groups: Sequence[Judged], name: str) -> str:
 
 def _fast_on_one(costs: Mapping[str, float]) -> str:
     (first, least), *others = sorted(costs.items(), key=lambda item: item[1])
-    text = f"{title(first)} reaches an error of {LEVEL:.0e} in {seconds(least)} of stepping"
+    text = f"{title(first)} reaches an error of {SAID} in {seconds(least)} of stepping"
     if not others:
         return f"{text}."
     return (
@@ -195,7 +196,7 @@ def _fast_on_several(costs: Mapping[str, Mapping[str, float]]) -> str:
     ratios = [min(c for n, c in cost.items() if n != first) / cost[first]
               for cost in costs.values() if first in cost and len(cost) > 1]  # fmt: skip
     share = f"{count[first]} of {len(costs)}" if count[first] < len(costs) else f"all {len(costs)}"
-    text = f"{title(first)} is the fastest to an error of {LEVEL:.0e} on {share} scenes"
+    text = f"{title(first)} is the fastest to an error of {SAID} on {share} scenes"
     if ratios:
         text += f"; the best other engine takes {span(min(ratios), max(ratios))} as long"
     others = [f"{title(n)} on {listed(s for s, w in winners.items() if w == n)}" for n in count if n != first]
@@ -245,7 +246,11 @@ def _other_failures(groups: Sequence[Judged]) -> str:
     """Runs at other settings than defaults that failed or were wrong, counted."""
     runs = [r for group in groups for r in group.records if r["family"] != "defaults"]
     bad = {verdict: [r for r in runs if grade(r) is verdict] for verdict in (Grade.FAILED, Grade.WRONG)}
-    told = [f"{len(found)} {verdict}" for verdict, found in bad.items() if found]
+    said = {Grade.FAILED: "failed", Grade.WRONG: "{} wrong"}
+    told = [
+        f"{len(found)} {said[verdict].format('is' if len(found) == 1 else 'are')}"
+        for verdict, found in bad.items() if found
+    ]  # fmt: skip
     return f" Of {len(runs)} runs at other settings, {listed(told)}." if told else ""
 
 

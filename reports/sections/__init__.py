@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 
-from reports.blocks import Block, Heading
+from reports.blocks import Block, Heading, Text
 from reports.runs import SceneRuns
 from reports.sections import (
     accelerations,
@@ -52,6 +52,7 @@ CLOSING: Mapping[str, Chapter] = {
     "records": records.render,
 }
 CONFORMANCE = "conformance"  # the section that is rendered from verified engines
+NOTHING = "These scenes have nothing that the sections asked for would show."
 NAMES = (*OPENING, *OF_A_SCENE, CONFORMANCE, *CLOSING)
 
 
@@ -65,4 +66,5 @@ def blocks(
         out += [Heading(group.scene.name, 2), *(block for part in parts for block in part(group))]
     if CONFORMANCE in names:
         out += conformance.render(verified)
-    return out + [block for name, render in CLOSING.items() if name in names for block in render(groups)]
+    out += [block for name, render in CLOSING.items() if name in names for block in render(groups)]
+    return out or [Text(NOTHING)]

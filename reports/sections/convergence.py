@@ -111,6 +111,8 @@ def _caption(groups: Sequence[SceneRuns], curves: Sequence[Curve]) -> str:
         min(finite, key=finite.__getitem__),
         max(finite, key=finite.__getitem__),
     )
+    if len(finite) == 1:
+        return f"One slope: {finite[low, low_scene]:.2g} ({' '.join(low)}, {low_scene})."
     return (
         f"Slopes from {finite[low, low_scene]:.2g} ({' '.join(low)}, {low_scene}) to "
         f"{finite[high, high_scene]:.2g} ({' '.join(high)}, {high_scene})."

@@ -18,7 +18,7 @@ KEY = (
     f"= right: error up to {short(FLOOR)}; ≈ inaccurate: up to {short(FALSE_SUCCESS)}; ≠ wrong: above, "
     "although the run completes; × failed: no run completes. A cell has the engine's run of least error and "
     "the time of its steps; where the library's defaults are another family, they stand below it. A cell "
-    "leads to its runs, their versions and commands; an empty one: the engine cannot run the scene (Support)."
+    "leads to that run, its version and command; an empty one: the engine cannot run the scene (Support)."
 )
 
 
@@ -105,8 +105,8 @@ def _verdict(group: SceneRuns, run: Run) -> Verdict:
     lines = [run.said, duration(run.seconds)] if run.completed else [_end(run)]
     if failed := sum(not other.completed for other in runs) * run.completed:
         lines.append(f"{failed} of {len(runs)} failed")
-    href = f"#{places.of_family(group.scene.name, run.curve)}"
-    return Verdict(run.curve[1], str(found), SIGNS[found], lines, href)
+    place, href = places.of_cell(group.scene.name, run.curve), f"#{places.of_run(run)}"
+    return Verdict(run.curve[1], str(found), SIGNS[found], lines, place, href)
 
 
 def _end(run: Run) -> str:

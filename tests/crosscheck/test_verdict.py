@@ -72,7 +72,7 @@ def test_sentences_of_one_scene():
         "Exudyn is inaccurate at best: off by 1.70e-04."
     ), right([group()])
     assert fast([group()]) == (
-        "mbref reaches an error of 1e-06 in 1 ms of stepping; Pinocchio takes 32 times as long and MuJoCo "
+        "mbref reaches an error of 1e-6 in 1 ms of stepping; Pinocchio takes 32 times as long and MuJoCo "
         "takes 500 times as long. Exudyn does not reach it." + ADAPTERS
     ), fast([group()])
     assert breaks([group()]) == (
@@ -88,7 +88,7 @@ def test_other_results_and_other_sentences():
         "Both engines are right at their best settings; so are their libraries' defaults."
     )
     assert breaks([group(good)]) == "No engine's defaults fail or are wrong."
-    assert "No engine reaches an error of 1e-06" in fast([group([record("mujoco", "tuned", 1e-3)])])
+    assert "No engine reaches an error of 1e-6" in fast([group([record("mujoco", "tuned", 1e-3)])])
     lost = [record("mbref", "own", 1e-15), failed("exudyn", "tuned", 0.25)]
     assert right([group(lost)]) == (
         "mbref agrees with the truth to less than the truth's own bound, 3e-14. "
@@ -104,7 +104,7 @@ def test_sentences_of_several_scenes():
     sound = [record(engine, family, 1e-9, s, scene=SOUND.name) for engine, family, s in runs]
     truths = [{"scene": scene.name, **TRUTH} for scene in (REDUNDANT, SOUND)]
     groups = judged([REDUNDANT, SOUND], truths, [*RECORDS, *sound])
-    assert "fastest to an error of 1e-06 on 1 of 2 scenes" in fast(groups), fast(groups)
+    assert "fastest to an error of 1e-6 on 1 of 2 scenes" in fast(groups), fast(groups)
     assert "Elsewhere the fastest is Pinocchio on spatial_slider_crank" in fast(groups), fast(groups)
     assert "Pinocchio and Exudyn end at t = 0 s on planar_slider_crank, where a" in breaks(groups)
     assert "and Pinocchio are right at their best settings on the scenes they can run;" in headline(groups)
