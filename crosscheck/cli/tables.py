@@ -160,8 +160,8 @@ def _print_messages(console: Console, records: Sequence[Record]) -> None:
             told.setdefault((name, f"{r['outcome']}: {r['message']}"), []).append(settings)
     if told:
         console.print()
-    for (name, reason), settings in told.items():
-        console.print(Text(f"{name} {'; '.join(settings)}: {reason}"))
+    for (name, reason), alike in told.items():
+        console.print(Text(f"{name} {'; '.join(alike)}: {reason}"))
 
 
 def _letters(records: Sequence[Record]) -> dict[tuple[str, str], str]:
