@@ -23,11 +23,19 @@ def extrapolated_states(scene: Scene, nodes: Samples, times: np.ndarray) -> Samp
     known, values, forces = nodes
     unit = np.ptp(known)
     at, wanted = (known - known[-1]) / unit, (times - known[-1]) / unit
-    values = BarycentricInterpolator(at, values, axis=1)(wanted)
-    forces = BarycentricInterpolator(at, forces)(wanted)
+    weights = _weights(at)  # SciPy's own are rounded in a random order
+    values = BarycentricInterpolator(at, values, axis=1, wi=weights)(wanted)
+    forces = BarycentricInterpolator(at, forces, wi=weights)(wanted)
     for k, t in enumerate(times):
         values[:2, k] = projected(scene, float(t), *values[:2, k])
     return times, values, forces
+
+
+def _weights(at: np.ndarray) -> np.ndarray:
+    """Barycentric weights 1 / Π (tᵢ - tⱼ) of nodes (n,)."""
+    apart = at[:, None] - at
+    np.fill_diagonal(apart, 1.0)
+    return 1 / np.prod(apart, axis=1)
 
 
 def projected(
