@@ -66,6 +66,7 @@ def moving_probes() -> dict[str, Scene]:
         "dampers alone": dampers_alone(),
         "two torsion springs": two_torsion_springs(),
         "rounded velocities": rounded_velocities(),
+        "light and heavy": light_and_heavy(),
     }
     return {name: scene.with_(name=name) for name, scene in found.items()}
 
@@ -191,6 +192,16 @@ def two_torsion_springs() -> Scene:
         Scene(name="torsions", gravity=GRAVITY, duration=DURATION, body=(HUB, BODY), joint=joints,
               load=springs)
     )  # fmt: skip
+
+
+def light_and_heavy() -> Scene:
+    """The body at a 2000th of its mass on a hub of a hundred times its own, and of a tenth of its size."""
+    heavy = replaced(HUB, mass=100.0 * HUB.mass, inertia=100.0 * np.array(HUB.inertia))
+    light = replaced(BODY, mass=BODY.mass / 2000.0, inertia=np.array(BODY.inertia) / 200000.0)
+    joints = (BEARING, replaced(JOINTS["revolute"], bodies=("hub", "body")))
+    return _launched(
+        Scene(name="masses", gravity=GRAVITY, duration=DURATION, body=(heavy, light), joint=joints)
+    )
 
 
 def rounded_velocities() -> Scene:
