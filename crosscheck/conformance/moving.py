@@ -196,8 +196,8 @@ def two_torsion_springs() -> Scene:
 
 def light_and_heavy() -> Scene:
     """The body at a 2000th of its mass on a hub of a hundred times its own, and of a tenth of its size."""
-    heavy = replaced(HUB, mass=100.0 * HUB.mass, inertia=100.0 * np.array(HUB.inertia))
-    light = replaced(BODY, mass=BODY.mass / 2000.0, inertia=np.array(BODY.inertia) / 200000.0)
+    heavy = replaced(HUB, mass=200.0, inertia=100.0 * np.array(HUB.inertia))
+    light = replaced(BODY, mass=0.00075, inertia=np.array(BODY.inertia) / 200000.0)
     joints = (BEARING, replaced(JOINTS["revolute"], bodies=("hub", "body")))
     return _launched(
         Scene(name="masses", gravity=GRAVITY, duration=DURATION, body=(heavy, light), joint=joints)
