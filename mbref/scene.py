@@ -14,7 +14,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import tomli_w
 from pydantic import Field, Strict, ValidationError, field_validator, model_validator
 
 from mbref.scene_fields import Entry, Name, Positive, Quaternion, Real, Reals, Vector, as_list
@@ -34,6 +33,7 @@ from mbref.scene_joints import (
 from mbref.scene_lines import toml_hint, with_lines
 from mbref.scene_loads import LOAD_TYPES, Force, Load, Moment, Spring, TorsionSpring
 from mbref.scene_paths import replaced_at
+from mbref.scene_text import scene_text
 from mbref.scene_validation import (
     GROUND,
     SceneError,
@@ -190,7 +190,7 @@ class Scene(Entry):
 
     def save(self, path: str | Path) -> None:
         """Write the scene as TOML; ``Scene.from_file`` gives back an equal scene."""
-        Path(path).write_text(tomli_w.dumps(self.to_dict()), encoding="utf-8")
+        Path(path).write_text(scene_text(self.to_dict()), encoding="utf-8")
 
     @staticmethod
     def from_file(path: str | Path) -> Scene:

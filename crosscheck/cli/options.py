@@ -28,13 +28,14 @@ def add_selection(parser: argparse.ArgumentParser) -> None:
         action="append",
         metavar="M",
         help="a family of settings, or any method of mbref: formulation+stabilisation/integrator, such as "
-        "lm2+projection/dop853 (`crosscheck list methods`); may repeat; default: every family",
+        "lm2+projection/dop853 (`crosscheck list methods`); may repeat; default: as for --setting",
     )
     parser.add_argument(
         "--setting",
         action="append",
         metavar="FAMILY",
-        help="an engine's family of settings, such as defaults or tuned; may repeat; default: all",
+        help="an engine's family of settings, such as defaults or tuned; may repeat; default: at quick "
+        "depth these two or the first two, else all (`crosscheck list settings`)",
     )
     parser.add_argument(
         "--option", action="append", type=_option, metavar="NAME=VALUE",

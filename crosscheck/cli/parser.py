@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from textwrap import fill
 from typing import Any
 
 from crosscheck.cli.listing import TABLES
@@ -11,19 +12,29 @@ from crosscheck.study.timings import REPEATS
 from mbref.command_line import Parser, commands
 
 Commands = Any  # the object that argparse adds subcommands to; its type is private
+FIRST = """\
+first steps:
+  mbref new my.toml                         a commented mechanism to start from
+  crosscheck compare my.toml                a verdict in words, errors, speed, settings
+  crosscheck report my.toml --out report    the same as a page, report/index.html
+  crosscheck tune mujoco my.toml            the cheapest settings for an error of 1e-6
+
+"""
 EXIT = (
     "exit status: 0 when the command did what was asked, 1 otherwise, 2 for bad input, 130 when interrupted. "
-    "`run` gives 1 where a run did not complete; `compare`, `tune` and `report` give 0 although engines "
-    "fail, since that is what they are asked to find out, and `compare` 1 where two engines simulate "
-    "different mechanisms. `verify` gives 1 where a card is violated, `diff` where sets differ beyond noise."
+    "`run` gives 1 where a run did not complete; `compare` and `report` give 0 although engines fail, since "
+    "that is what they are asked to find out, and `compare` 1 where two engines simulate different "
+    "mechanisms. `tune` gives 1 where no setting reaches the error, `verify` where a card is violated, "
+    "`diff` where sets differ beyond noise."
 )
 
 
 def parser() -> argparse.ArgumentParser:
     """The parser; its result has the name of the command as ``command``."""
     found = Parser(
-        prog="crosscheck", description="The same mechanism in several engines, against truth.", epilog=EXIT
-    )
+        prog="crosscheck", description="The same mechanism in several engines, against truth.",
+        epilog=FIRST + fill(EXIT, 79), formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
     found.add_argument(
         "--version", action="store_true", help="print the versions of crosscheck and the engines"
     )

@@ -163,6 +163,15 @@ def test_strange_files_are_faults(text, says, tmp_path):
         Scene.from_file(tmp_path / "strange.toml")
 
 
+def test_a_saved_scene_is_laid_out_as_one_writes_it(tmp_path):
+    scene = SCENES["four_bar"]().with_(load=({"type": "moment", "body": "crank", "moment": (0, 0, 1)},))
+    scene.save(tmp_path / "my.toml")
+    lines = (tmp_path / "my.toml").read_text().splitlines()
+    assert lines.count("[[body]]") == 3 and lines.count("[[joint]]") == 4 and lines.count("[[load]]") == 1
+    assert 'name = "A"' in lines and "axis = [0.0, 0.0, 1.0]" in lines and "moment = [0.0, 0.0, 1.0]" in lines
+    assert Scene.from_file(tmp_path / "my.toml") == scene
+
+
 def test_faulty_values_are_quoted_in_short():
     deep = [0.0]
     for _ in range(900):

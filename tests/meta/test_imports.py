@@ -23,7 +23,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
     "mbref": (
         ["rotations", "records", "trajectory"],
         ["scene", "scene_fields", "scene_joints", "scene_lines", "scene_loads", "scene_paths",
-         "scene_validation"],
+         "scene_text", "scene_validation"],
         ["command_line", "formats", "scenes", "scene_slips", "variation"], ["drawing"],
         ["joint_motion", "energy"],
         ["motion"], ["kernels"], ["linear_algebra"], ["equations"], ["formulations"], ["stabilisation"],
