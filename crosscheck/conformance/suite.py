@@ -178,14 +178,16 @@ def judged(label: str, bench: Bench) -> Verdict:
 
 
 def tables(conformance: Conformance) -> Iterator[Table | Text]:
-    """A table of scenes × properties, then what the failures and gaps are."""
-    by_place = {(v.scene, v.property): v for v in conformance.verdicts}
+    """A table of scenes with the number of cards by status and those that fail, then what the failures and
+    gaps are."""
     properties = [n for n in (*FIRST, *PROPERTIES) if any(v.property == n for v in conformance.verdicts)]
     named = " ".join(filter(None, (conformance.engine, conformance.version, conformance.family)))
-    title = f"{named}: ✓ pass, ✗ fail, – cannot, ○ outside; measured"
-    table = Table(Column("scene", no_wrap=True), *properties, title=title, box=SIMPLE, padding=(0, 1, 0, 0))
+    title = f"{named}: cards that {', '.join(f'{mark} {status}' for status, (mark, _) in MARKS.items())}"
+    counts = [Column(mark, justify="right") for mark, _ in MARKS.values()]
+    table = Table("scene", *counts, "fails, or how near a pass is to its limit", title=title, box=SIMPLE)
     for scene in dict.fromkeys(v.scene for v in conformance.verdicts):
-        table.add_row(scene, *(_cell(by_place.get((scene, name))) for name in properties))
+        own = [v for v in conformance.verdicts if v.scene == scene]
+        table.add_row(scene, *(_count(own, status) for status in MARKS), _worst(own))
     yield table
     yield from (_sentence(verdict) for verdict in conformance.verdicts if verdict.status in (FAIL, CANNOT))
     yield from _domains(conformance)
@@ -212,12 +214,19 @@ def abouts() -> dict[str, str]:
     return {**FIRST, **{name: entry.about for name, entry in PROPERTIES.items()}}
 
 
-def _cell(verdict: Verdict | None) -> Text:
-    if verdict is None:
-        return Text("")
-    mark, style = MARKS[verdict.status]
-    number = "" if verdict.measured is None else f"{verdict.measured:.0e}" if verdict.measured else "0"
-    return Text(mark + number, style=style)
+def _count(verdicts: Sequence[Verdict], status: str) -> Text:
+    """How many verdicts have a status; nothing for none."""
+    number = sum(verdict.status == status for verdict in verdicts)
+    return Text(str(number or ""), style=MARKS[status][1])
+
+
+def _worst(verdicts: Sequence[Verdict]) -> Text:
+    """The cards that fail, else the pass that takes the largest share of what is allowed."""
+    if failed := [verdict.property for verdict in verdicts if verdict.status == FAIL]:
+        return Text(", ".join(failed), style=MARKS[FAIL][1])
+    shares = {v.property: v.measured / v.allowed for v in verdicts if v.measured is not None and v.allowed}
+    nearest = max(shares, key=lambda name: shares[name], default=None)
+    return Text("" if nearest is None else f"{nearest} at {100 * shares[nearest]:.2g} % of its limit")
 
 
 def _sentence(verdict: Verdict) -> Text:

@@ -123,8 +123,10 @@ def _motion_lines(along: AlongMotion | str | None) -> list[str]:
         return [f"  along the motion      not known: {along}"]
     if along is None:
         return []
+    still = "" if along.moves or along.stopped else ", in which nothing moves"
     lines = [
-        f"  along the motion of {along.end:g} s" + ("" if along.moves else ", in which nothing moves"),
+        f"  along the motion of {along.end:g} s{still}",
+        *[f"    it ends early       {along.stopped}"] * bool(along.stopped),
         f"    rank                {along.rank}",
         f"    redundant rows      {along.redundant}",
         f"    nearest singular    at t = {along.nearest_time:.3g} s, {along.nearest:.3g} away"

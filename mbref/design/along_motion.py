@@ -16,7 +16,7 @@ from mbref.method import DEFAULT
 from mbref.motion import Motion
 from mbref.scene import Scene, SceneError
 from mbref.simulation.simulate import Limits, simulate
-from mbref.trajectory import Crossing
+from mbref.trajectory import Crossing, Outcome
 
 SAMPLES = 61
 ROUNDING = (
@@ -35,7 +35,8 @@ class AlongMotion:
     small at every pose but not zero: rows that would be redundant but for rounding in the scene's numbers.
     ``crossings`` are the singular positions that the motion passes; ``shaky`` tells whether second order
     takes away freedoms of first order at every pose: they are none (A. Müller, Mech. Mach. Theory 2016).
-    ``nearest`` is the least distance to a singular position, at time ``nearest_time`` (s).
+    ``nearest`` is the least distance to a singular position, at time ``nearest_time`` (s).  ``stopped`` says
+    why the motion ended before the scene's duration, empty where it did not.
     """
 
     end: float
@@ -47,6 +48,7 @@ class AlongMotion:
     nearest_time: float
     crossings: tuple[Crossing, ...]
     shaky: bool
+    stopped: str
 
 
 def along_motion(scene: Scene) -> AlongMotion:
@@ -111,7 +113,7 @@ def _summary(model: Model, motion: Motion, values: np.ndarray) -> AlongMotion:
         rank=rank, redundant=model.m - rank,
         by_rounding=tuple(small[small > RANK_TOLERANCE].tolist()),
         nearest=float(nearest[at]), nearest_time=float(times[at]), crossings=motion.crossings or (),
-        shaky=_is_shaky(model, motion),
+        shaky=_is_shaky(model, motion), stopped="" if motion.outcome is Outcome.COMPLETED else motion.message,
     )  # fmt: skip
 
 

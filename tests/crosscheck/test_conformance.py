@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from crosscheck.cli.commands import main
 from crosscheck.conformance import suite, trial
@@ -75,3 +77,19 @@ def test_verify_command_and_crashing_engine(capsys, monkeypatch):
 def test_unknown_scene_of_the_suite_and_status_2(capsys):
     assert main(["verify", "mbref", "--scene", "nothing"]) == 2
     assert "unknown scene of the suite 'nothing'" in capsys.readouterr().err
+
+
+def test_the_table_has_a_line_a_scene_in_eighty_columns():
+    verdicts = [
+        suite.Verdict("truth", "door", "pass", 5e-7, 1e-6),
+        suite.Verdict("closure", "door", "pass", 1e-9, 1e-6),
+        suite.Verdict("energy", "door", "outside", reason="a driver moves it"),
+        suite.Verdict("truth", "pendulum", "fail", 2e-3, 1e-6),
+    ]  # fmt: skip
+    console = Console(file=io.StringIO(), width=80)
+    console.print(next(iter(suite.tables(suite.Conformance("mine", "1.0", verdicts)))))
+    lines = console.file.getvalue().splitlines()
+    assert any(
+        line.split() == ["door", "2", "1", "truth", "at", "50", "%", "of", "its", "limit"] for line in lines
+    ), lines
+    assert any(line.split() == ["pendulum", "1", "truth"] for line in lines), lines

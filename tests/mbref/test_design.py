@@ -145,6 +145,20 @@ def test_singular_positions_along_the_motion_are_found():
     assert far.nearest > 0.05 and far.redundant == counts(unequal).redundant
 
 
+def test_a_motion_that_ends_early_says_why():
+    """A four-bar of revolute joints, one of them askew, holds its own driver."""
+    scene = find_scene("four_bar")
+    corner = scene.joint_named("B")
+    askew = {"name": "B", "type": "revolute", "bodies": corner.bodies, "anchor": corner.anchor_pair[0],
+             "axis": (0.0, 0.1, 1.0)}  # fmt: skip
+    at_rest = [body.model_copy(update={"velocity": None, "angular_velocity": None}) for body in scene.body]
+    joints = [askew if joint.name == "B" else joint for joint in scene.joint]
+    stuck = scene.with_(body=at_rest, joint=joints)
+    found = along_motion(stuck.with_(duration=0.01))
+    assert found.end < 0.01 and found.stopped, found
+    assert along_motion(scene.with_(duration=0.01)).stopped == ""
+
+
 def test_rounded_axes_are_told_as_rounding():
     """The axis of one joint off by 2e-7: rank 17 at every pose but for that."""
     scene = find_scene("planar_slider_crank_gravity").with_(duration=0.2)
