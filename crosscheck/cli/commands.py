@@ -91,7 +91,8 @@ def _verify(arguments: argparse.Namespace) -> int:
         return _verify_drawn(engine, arguments)
     chosen = request.find_specimens(arguments.scene, arguments.reference_time)
     with counted("verifying", len(chosen) + 1) as advance:
-        found = suite.verify(engine, chosen, arguments.time_limit, advance, arguments.family)
+        runner = suite.runner(engine, arguments.time_limit, arguments.in_process)
+        found = suite.held_against(runner, chosen, advance, arguments.family)
     if arguments.json:
         print(json.dumps({**found.to_record(), **made_by()}, allow_nan=False))
     else:

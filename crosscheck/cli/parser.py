@@ -118,6 +118,11 @@ def _add_verify(commands: Commands) -> None:
         metavar="F",
         help="a family of settings, or a method of mbref; default: the best",
     )
+    parser.add_argument(
+        "--in-process",
+        action="store_true",
+        help="run in this process: fast, but a crash ends all, and repeated runs share the process",
+    )
     drawn = parser.add_argument_group("drawn mechanisms, in the place of scenes; runs are in this process")
     drawn.add_argument(
         "--mechanisms", type=whole, metavar="N", help="judge every card on N mechanisms drawn from seeds"

@@ -53,17 +53,12 @@ class Session:
     def __init__(self, config: pytest.Config):
         from crosscheck.conformance.features import undetermined
         from crosscheck.conformance.random_mechanisms import random_mechanism
-        from crosscheck.conformance.runners import InProcess, Isolated
+        from crosscheck.conformance.suite import runner
         from crosscheck.conformance.trial import Specimen, specimens
-        from crosscheck.engine import engine
 
         self.config, self.name = config, config.getoption("engine")
         limit = config.getoption("time_limit")
-        self.runner = (
-            InProcess(engine(self.name), self.name)
-            if config.getoption("in_process")
-            else Isolated(self.name, limit)
-        )
+        self.runner = runner(self.name, limit, config.getoption("in_process"))
         deep, first = config.getoption("depth") == "deep", config.getoption("mechanism_seed")
         seeds = range(first, first + config.getoption("mechanisms"))
         drawn = [Specimen(random_mechanism(seed), None, deep) for seed in seeds]

@@ -36,9 +36,6 @@ class Runner(Protocol):
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
         """Version, the reason of a refusal, and else the settings of the engine, or those of a family."""
 
-    def cannot(self, scene: Scene) -> Cannot | None:
-        """Why the engine cannot run the scene, or None."""
-
     def observe(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
         """A run at times (k,), s, with nothing left of runs before, and what it printed and left behind."""
 
@@ -85,10 +82,6 @@ class Isolated:
                 return offered(engine(self.name), scene, family)
         return capabilities(self.name, scene, self.time_limit)
 
-    def cannot(self, scene: Scene) -> Cannot | None:
-        with answering():
-            return engine(self.name).cannot(scene)
-
     def observe(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
         return observe(self.name, scene, times, setting, self.time_limit)
 
@@ -117,10 +110,6 @@ class InProcess:
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
         with answering():
             return offered(self.engine, scene, family)
-
-    def cannot(self, scene: Scene) -> Cannot | None:
-        with answering():
-            return self.engine.cannot(scene)
 
     def observe(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
         said = io.StringIO()

@@ -17,6 +17,7 @@ from crosscheck.conformance.features import is_undetermined, undetermined
 from crosscheck.conformance.properties import PROPERTIES, Finding
 from crosscheck.conformance.runners import InProcess, Isolated, Runner
 from crosscheck.conformance.trial import Bench, Broken, NoExact, Outside, Specimen, set_up
+from crosscheck.engine import engine
 from crosscheck.processes.pool import ChildFailed
 
 PASS, FAIL, CANNOT, OUTSIDE = "pass", "fail", "cannot", "outside"
@@ -72,17 +73,10 @@ def record_of(verdict: Verdict) -> dict[str, Any]:
     return {"card": verdict.card(), **{k: _finite(v) for k, v in asdict(verdict).items()}}
 
 
-def verify(
-    engine: str,
-    specimens: Sequence[Specimen],
-    time_limit: float,
-    progress: Callable[[str], None] | None = None,
-    family: str = "",
-) -> Conformance:
-    """Hold the suite against an engine (a name or ``module:attribute``), in its best family of settings or
-    the one named; every run is in a child process with a ``time_limit`` (s).  ``progress`` is told the scene
-    just done.  Raises LookupError."""
-    return held_against(Isolated(engine, time_limit), specimens, progress, family)
+def runner(name: str, time_limit: float, in_process: bool = False) -> Runner:
+    """A runner of an engine (a known name or ``module:attribute``), every run in a child process with a
+    ``time_limit`` (s), or all in this process without one.  Raises LookupError."""
+    return InProcess(engine(name), name) if in_process else Isolated(name, time_limit)
 
 
 def held_against(
@@ -91,7 +85,8 @@ def held_against(
     progress: Callable[[str], None] | None = None,
     family: str = "",
 ) -> Conformance:
-    """The verdicts on a runner's engine; runs in this process take place one after another."""
+    """The verdicts on a runner's engine in its best family of settings, or the one named; runs in this
+    process take place one after another.  ``progress`` is told the scene just done."""
     versions: set[str] = set()
 
     def examined(specimen: Specimen) -> list[Verdict]:

@@ -17,7 +17,7 @@ from crosscheck.conformance.families import best_family
 from crosscheck.conformance.features import feature_scenes
 from crosscheck.conformance.moving import moving_probes
 from crosscheck.conformance.runners import Runner
-from crosscheck.engine import Cannot, Setting
+from crosscheck.engine import Cannot, Owner, Setting
 from crosscheck.judge.gauss_motion import NAME as GAUSS
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.metrics import error_series, in_scene_order, violation_series
@@ -155,10 +155,12 @@ class Bench:
         return completed(scene, self.observed(scene, times, self.settings[-1]).value, len(times))
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Why the engine, or its family, cannot run another scene."""
-        if self.family:
-            return self.runner.offers(scene, self.family)[1]
-        return self.runner.cannot(scene)
+        """Why the engine, or the family that is judged, cannot run another scene."""
+        _, cannot, settings = self.runner.offers(scene, self.family)
+        family = self.settings[-1].family
+        if cannot or any(setting.family == family for setting in settings):
+            return cannot
+        return Cannot(Owner.MODEL, f"{family} is not offered for the changed scene")
 
     def observed(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
         """A run in a process of its own, and what it printed and left behind."""
