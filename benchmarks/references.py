@@ -50,6 +50,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("name", nargs="*", metavar="NAME", help="only these built-in scenes")
     parser.add_argument("--random", type=int, default=200, help="how many random mechanisms")
+    parser.add_argument("--first", type=int, default=0, help="the seed of the first of them")
     parser.add_argument("--duration", type=float, default=0.5, help="of their motion, s")
     parser.add_argument("--seconds", type=float, default=60.0, help="of CPU time for each reference")
     parser.add_argument(
@@ -73,7 +74,7 @@ def main() -> None:
     for scene in () if asked.only_random else built_in:
         line(scene, scene.duration, asked.seconds, asked.tight, asked.records)
     found = []
-    for seed in range(asked.random):
+    for seed in range(asked.first, asked.first + asked.random):
         tight = 0.0 if seed % asked.every else asked.tight
         scene = with_torsion_spring(random_mechanism(seed))
         found.append(line(scene, asked.duration, asked.seconds, tight, asked.records))

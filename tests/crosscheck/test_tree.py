@@ -54,6 +54,17 @@ def test_a_panel_that_is_too_long_says_how_long_it_may_be():
     assert not panel.settled and panel.factor < 1
 
 
+def test_a_panel_is_continued_to_the_digits_that_it_tells():
+    panels = Panels(EXTENDED, 34)
+    guess = np.repeat(EXTENDED.array([[1.0, 0.0]]), panels.count, axis=0)
+    panel = panels.panel(Oscillator(), EXTENDED.number(0.0), EXTENDED.number(2.0), guess)
+    longer, lost = panels.continued(panel, 1.3, 2.3)
+    states, _ = panels.sampled(longer, EXTENDED.array([1.0, 2.6]))
+    off = np.abs(doubles(states[:, 0] - np.cos(EXTENDED.array([1.0, 2.6])))).max()
+    assert off < lost < 1e-10
+    assert longer.time(longer.crossing) == pytest.approx(2.3)
+
+
 def test_distances_that_change_their_sign_tell_a_singular_position():
     nodes = -np.cos(np.pi * np.arange(40) / 39)
     signed = np.sin(nodes - 0.2) + 0.1 * nodes**2 - 0.004
@@ -80,6 +91,16 @@ def test_singular_positions_are_passed_on_the_smooth_branch(name):
     assert len(motion.crossings) >= 3
     off = np.abs(doubles(motion.position) - exact.position).max()
     assert off < 1e-11, f"{name}: off by {off:.1e} m after {len(motion.crossings)} singular positions"
+
+
+def test_singular_positions_without_a_panel_of_their_own_are_leapt_over():
+    """Picard's iteration does not settle across those of equal crank and rod, on however short a panel."""
+    scene, times = SCENES["planar_slider_crank_equal"](), np.linspace(0.0, 0.14, 8)
+    motion, exact = tree_motion(scene, times, EXTENDED, seconds=SECONDS), closed_form(scene).poses(times)
+    assert not motion.reason
+    assert motion.crossings == pytest.approx((0.061192, 0.120704), abs=3e-6)
+    off = np.abs(doubles(motion.position) - exact.position).max()
+    assert 0 < off < 1e-12, f"off by {off:.1e} m"
 
 
 def test_singular_start_is_refused():

@@ -155,14 +155,36 @@ class Panels:
 
     def sampled(self, panel: Panel, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """States (k, n) and rates of the columns after the light ones at times (k,) of a panel."""
-        both = np.concatenate([panel.states, panel.rates], axis=1)
-        c = self.times(self.series, both)  # Chebyshev coefficients
-        x = ((t - panel.start) / panel.length * 2 - 1)[:, None]
-        b, ahead = 0 * x + c[-1], 0 * x  # Clenshaw's recurrence
-        for row in c[-2:0:-1]:
-            b, ahead = 2 * x * b - ahead + row, b
-        values = c[0] + x * b - ahead
+        x = (t - panel.start) / panel.length * 2 - 1
+        values = _summed(self._coefficients(panel), x[:, None])
         return values[:, : panel.states.shape[1]], values[:, panel.states.shape[1] :]
+
+    def continued(self, panel: Panel, times: float, singular: float) -> tuple[Panel, float]:
+        """The panel, so many times longer, over a singular position (s), by the series cut at their smallest
+        terms at the new end; and the size of the first terms left out, relative to the states' columns."""
+        c, n = self._coefficients(panel), panel.states.shape[1]
+        size = np.abs(doubles(panel.states)).max(axis=0) + np.finfo(float).tiny
+        growth = np.polynomial.chebyshev.chebvander(2 * times - 1, self.count - 1)
+        terms = (np.abs(doubles(c[:, :n])) / size).max(axis=1) * growth.ravel()
+        pairs = np.maximum(terms[:-1], terms[1:])
+        cut = LAST + int(np.argmin(pairs[LAST:]))
+        values = _summed(c[:cut], ((self.nodes + 1) * times - 1)[:, None])
+        length = panel.length * times
+        place = 2 * (singular - float(panel.start)) / float(length) - 1
+        longer = Panel(panel.start, length, values[:, :n], values[:, n:], True, 1.0, place)
+        return longer, float(pairs[cut])
+
+    def _coefficients(self, panel: Panel) -> np.ndarray:
+        """Chebyshev coefficients (nodes, ·) of states and rates."""
+        return self.times(self.series, np.concatenate([panel.states, panel.rates], axis=1))
+
+
+def _summed(c: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Values (k, n) of Chebyshev series (m, n) at places x (k, 1), by Clenshaw's recurrence."""
+    b, ahead = 0 * x + c[-1], 0 * x
+    for row in c[-2:0:-1]:
+        b, ahead = 2 * x * b - ahead + row, b
+    return c[0] + x * b - ahead
 
 
 def _antiderivatives(values: np.ndarray) -> np.ndarray:

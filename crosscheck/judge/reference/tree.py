@@ -25,6 +25,9 @@ FIRST = 0.1  # of the time asked for: length of the first panel
 LEAST = 1e-10  # of the time asked for: shortest panel
 SLOW = 20  # of Picard's iterations, from which on a panel may be stiff
 NEAR_END = 0.7  # part of a panel from which on a singular position is too near its end
+BEYOND = 0.35  # half lengths from the end of a panel to a singular position that its series leaps over
+LEAST_LOST = 1e6  # rounding units that a leap may lose without trying from nearer
+SEVERAL = 3  # panels across one singular position that do not settle before it is leapt over
 
 
 def tree_motion(
@@ -56,6 +59,7 @@ class _Run:
         self.samples: list[tuple[np.ndarray, np.ndarray]] = []
         self.crossings: list[float] = []
         self.foreseen = 0.0  # time of the next singular position, or a past one
+        self.unsettled, self.lost = 0, np.inf  # panels across the next one, and digits of a leap over it
         self.taken = self.steps = 0
         self.stiff, self.is_stiff = StiffPanels(self.panels), False
 
@@ -70,6 +74,8 @@ class _Run:
                 return OVER
             tried = self._before_singular(length)
             panel = self._panel(tried, self._guess(panel, tried))
+            if not panel.settled and (leap := self._leap(panel.time(panel.foreseen))):
+                panel, tried = leap, leap.length
             length = length if panel.settled and tried < length else tried * panel.factor
             if not panel.settled or self.foreseen <= float(self.t):
                 self.foreseen = panel.time(panel.foreseen) or self.foreseen
@@ -100,6 +106,24 @@ class _Run:
         near = NEAR_END * float(length) < gap < (1 + NEAR_END) * float(length)
         return self.arithmetic.number(gap) - length / 2 if near else length
 
+    def _leap(self, singular: float | None) -> Panel | None:
+        """A panel over a singular position (s) that has no panel of its own, as the iteration there gains no
+        digits: a panel that ends before it, continued by its series; None where nearer ones lose less."""
+        if singular is None or singular <= self.t:
+            return None
+        self.unsettled += 1
+        if self.unsettled < SEVERAL:
+            return None
+        length = (self.arithmetic.number(singular) - self.t) / (1 + BEYOND / 2)
+        short = self._panel(length, self._guess(None, length))
+        if not short.settled:
+            return None
+        panel, lost = self.panels.continued(short, 1 + BEYOND, singular)
+        before, self.lost = self.lost, lost
+        if lost > np.sqrt(self.arithmetic.eps) or LEAST_LOST * self.arithmetic.eps < lost < before:
+            return None
+        return panel
+
     def _guess(self, tried: Panel | None, length: Any) -> np.ndarray:
         """States at the points of a panel: as now, or those of a longer panel that was tried before."""
         if tried is None or tried.settled:
@@ -119,6 +143,7 @@ class _Run:
         self.t, self.state, self.steps = after, state, self.steps + 1
         if (crossed := panel.time(panel.crossing)) is not None:
             self.crossings.append(crossed)
+            self.unsettled, self.lost = 0, np.inf
 
     def motion(self, reason: str, seconds: float) -> Motion:
         """The samples as the motion of the bodies."""
