@@ -163,7 +163,7 @@ class Panels:
         """The panel, so many times longer, over a singular position (s), by the series cut at their smallest
         terms at the new end; and the size of the first terms left out, relative to the states' columns."""
         c, n = self._coefficients(panel), panel.states.shape[1]
-        size = np.abs(doubles(panel.states)).max(axis=0) + np.finfo(float).tiny
+        size = self._size(panel.states, 0 * panel.states, n - panel.rates.shape[1])
         growth = np.polynomial.chebyshev.chebvander(2 * times - 1, self.count - 1)
         terms = (np.abs(doubles(c[:, :n])) / size).max(axis=1) * growth.ravel()
         pairs = np.maximum(terms[:-1], terms[1:])

@@ -167,15 +167,20 @@ class Stepper:
         """Hold other rows where these have become blunt and the position is not singular: blunt rows magnify
         what redundant ones contradict each other by."""
         now, best = self._sharpness[-1], max(self._sharpness)
-        if now > BLUNT * best:
-            return
-        before, self._held = self._held, self._choice(self._x, self.t)[0]
-        sharpness = self._sharp(self._x, self.t)
-        enough = min(KEEN * best, BETTER * now)
-        if len(self._held.numbers) == len(before.numbers) and sharpness > enough:
-            self._sharpness = [sharpness]
-        else:
-            self._held = before
+        if now <= BLUNT * best:
+            self._hold_others(self._x, self.t, min(KEEN * best, BETTER * now))
+
+    def _hold_others(self, x: np.ndarray, t: Any, least: float) -> bool:
+        """Hold the rows that are independent at coordinates x, if they are sharper than ``least`` there, and
+        sharper than the held ones here; whether they are."""
+        before, now = self._held, self._sharpness[-1]
+        self._held = self._choice(x, t)[0]
+        here, there = self._sharp(self._x, self.t), self._sharp(x, t)
+        if len(self._held.numbers) == len(before.numbers) and there > least and here > now:
+            self._sharpness = [here]
+            return True
+        self._held = before
+        return False
 
     def _refuse_singular_start(self, series: np.ndarray, d: Any) -> None:
         """Raise Ended where more rows are independent a little later than at the start."""
@@ -237,6 +242,8 @@ class Stepper:
         ahead = self._ahead(expansion.x, series, h)
         if ahead < now < NEAR * max(self._sharpness[-USUAL:]):
             middle = self._crossing(expansion.x, series, h)
+            if middle and self._others_serve(expansion.x[: series.terms(h)], middle):
+                return self._step(most)
             longer = self._expansion(2 * self._order) if middle else expansion
             if middle and self._may_leap(Series(longer.x).left_out(2 * middle)):
                 self.crossings.append(float(self.t) + middle)
@@ -245,6 +252,15 @@ class Stepper:
             h *= SHORTER
             ahead = self._ahead(expansion.x, series, h)
         return expansion, h
+
+    def _others_serve(self, series: np.ndarray, middle: float) -> bool:
+        """Whether only the held rows are dependent so far ahead (s), and others are not, which are then held:
+        the position there is not singular."""
+        d = self.of.arithmetic.number(middle)
+        if not self._hold_others(value(series, d), self.t + d, self._sharpness[-1]):
+            return False
+        self._project()
+        return True
 
     def _ahead(self, x: np.ndarray, series: Series, h: float) -> float:
         """Sharpness at the end of a step."""
