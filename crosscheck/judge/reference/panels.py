@@ -28,6 +28,9 @@ LONGEST, SHORTER, SHORTEST = 1.6, 0.6, 0.5  # factors on the length of the next 
 FLOOR = 1e-3  # of the largest column, below which a column counts as small
 DIVERGES = 1e3
 LAST = 3  # coefficients of a series that must be small
+FLAT = 0.1  # ratio of its last eighth to the one before, from which on a series ends in rounding noise
+NOISE = 4.0  # times the last eighth: noise that an iteration is left with
+NOISIEST = 1e5  # times the tolerance: noise with which a panel may settle
 
 
 class Equations(Protocol):
@@ -117,10 +120,9 @@ class Panels:
             y, last = self.arithmetic.settled(better), min(last, change)
             telling = TELLING if crossing is None else tolerance  # bridged iterates tell nothing
             if change <= telling:
-                fits, settled = (
-                    self._fits(rates * length, size[light:], change, tolerance),
-                    change <= tolerance,
-                )
+                series = self._series(rates * length, size[light:])
+                tolerance = max(tolerance, self._noise(series))
+                fits, settled = self._fits(series, change, tolerance), change <= tolerance
                 if fits < 1 / (1 if settled else ROUGHLY):
                     factor = max(SPARE * fits, SHORTEST)
                     return Panel(start, length, y, rates, False, factor, foreseen=crossing)
@@ -130,19 +132,30 @@ class Panels:
                     return Panel(start, length, y, rates, True, factor, crossing, ahead, sweeps=sweep)
         return Panel(start, length, guess, rates, False, SHORTER, foreseen=crossing)
 
-    def _fits(self, moved: np.ndarray, size: np.ndarray, change: float, tolerance: float) -> float:
+    def _series(self, moved: np.ndarray, size: np.ndarray) -> np.ndarray:
+        """Largest Chebyshev coefficients (nodes,) of columns (nodes, n) of such sizes (n,)."""
+        return (np.abs(doubles(self.times(self.series, moved))) / size).max(axis=1, initial=0.0)
+
+    def _noise(self, series: np.ndarray) -> float:
+        """The noise that the rates of ill-conditioned equations leave in an iterate; 0 where its series falls
+        to the end, or to the tolerance."""
+        few = len(series) // 8
+        before, last = series[-2 * few : -few].max(), series[-few:].max()
+        noisy = self.tolerance < last < NOISIEST * self.tolerance and last > FLAT * before
+        return NOISE * float(last) if noisy else 0.0
+
+    def _fits(self, series: np.ndarray, change: float, tolerance: float) -> float:
         """How many times longer a panel its points could resolve.
 
         The series falls geometrically: if an iterate needs k coefficients down to the size of its change,
         the solution needs k log(tolerance) / log(change); if they do not reach so far, the last tells.
         """
-        series = (np.abs(doubles(self.times(self.series, moved))) / size).max(axis=1, initial=0.0)
         level = max(change, tolerance)
         above = np.flatnonzero(series > level)
         needed = above.max(initial=0) + 1
         if needed > self.count - LAST:
             needed, level = self.count, min(max(series[-LAST:].max(), level), TELLING)
-        return (self.count - LAST) / (needed * np.log(tolerance) / np.log(level))
+        return float((self.count - LAST) / (needed * np.log(tolerance) / np.log(level)))
 
     @staticmethod
     def _size(y: np.ndarray, moved: np.ndarray, light: int) -> np.ndarray:
