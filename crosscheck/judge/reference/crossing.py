@@ -2,7 +2,8 @@
 
 On a smooth branch that crosses a singular position transversally, the least singular value of the constraint
 Jacobian is |s(t)| with s smooth and s(t*) = 0.  The accelerations stay smooth, but the equations for them
-lose digits near t*; there they are taken from a polynomial through the other points.
+lose digits near t*; there they are taken from a polynomial through the other points.  Where the iteration
+does not settle with these, the panel before is continued over the singular position (tree.py, panels.py).
 """
 
 from __future__ import annotations

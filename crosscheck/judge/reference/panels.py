@@ -8,7 +8,7 @@ halves the number of sweeps.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -96,9 +96,8 @@ class Panels:
 
     def panel(self, equations: Equations, start: Any, length: Any, guess: np.ndarray) -> Panel:
         """The solution from the first state of a guess (nodes, n) on."""
-        half, light, tolerance = length / 2, equations.light, self.tolerance
-        t, places = start + half * (self.nodes + 1), doubles(self.nodes)
-        y, y0, last, crossing = guess, guess[0], np.inf, None
+        t, places = start + length / 2 * (self.nodes + 1), doubles(self.nodes)
+        y, last, crossing = guess, np.inf, None
         for sweep in range(1, SWEEPS):
             is_over(np.inf)  # raises where the motion is no longer wanted
             with np.errstate(all="ignore"):
@@ -106,31 +105,46 @@ class Panels:
                 rates, distance = equations.other_rates(t, here)
                 if last < 1:
                     crossing = singular_time(places, distance) or crossing
-                    tolerance = self.tolerance * (1 if crossing is None else BRIDGED)
                 if crossing is not None:
                     rates = bridged(places, rates, distance)
-                better = y.copy()
-                better[:, light:] = y0[light:] + half * self.times(self.integral, rates)
-                moves = equations.light_rates(better)
-                better[:, :light] = y0[:light] + half * self.times(self.integral, moves)
-                size = self._size(better, np.concatenate([moves, rates], axis=1) * length, light)
+                better, size = self._integrated(equations, y, rates, length)
                 change = (np.abs(doubles(better - y)) / size).max(initial=0.0)
             if not np.isfinite(change) or change > DIVERGES * last:
                 return Panel(start, length, guess, rates, False, SHORTEST, foreseen=crossing)
             y, last = self.arithmetic.settled(better), min(last, change)
-            telling = TELLING if crossing is None else tolerance  # bridged iterates tell nothing
-            if change <= telling:
-                series = self._series(rates * length, size[light:])
-                tolerance = max(tolerance, self._noise(series))
-                fits, settled = self._fits(series, change, tolerance), change <= tolerance
-                if fits < 1 / (1 if settled else ROUGHLY):
-                    factor = max(SPARE * fits, SHORTEST)
-                    return Panel(start, length, y, rates, False, factor, foreseen=crossing)
-                if settled:
-                    factor = min(SPARE * fits, LONGEST if sweep < MANY else 1.0)
-                    ahead = singular_ahead(places, distance)
-                    return Panel(start, length, y, rates, True, factor, crossing, ahead, sweeps=sweep)
+            panel = Panel(start, length, y, rates, False, SHORTER, crossing, sweeps=sweep)
+            if (told := self._told(panel, size, change, distance)) is not None:
+                return told
         return Panel(start, length, guess, rates, False, SHORTER, foreseen=crossing)
+
+    def _integrated(
+        self, equations: Equations, y: np.ndarray, rates: np.ndarray, length: Any
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """States (nodes, n) from the first one on with rates of the columns after the light ones, and the
+        columns' sizes (n,)."""
+        light, half, better = equations.light, length / 2, y.copy()
+        better[:, light:] = y[0, light:] + half * self.times(self.integral, rates)
+        moves = equations.light_rates(better)
+        better[:, :light] = y[0, :light] + half * self.times(self.integral, moves)
+        return better, self._size(better, np.concatenate([moves, rates], axis=1) * length, light)
+
+    def _told(self, panel: Panel, size: np.ndarray, change: float, distance: np.ndarray) -> Panel | None:
+        """The panel once an iterate tells that it has settled, or how much shorter it has to be."""
+        tolerance = self.tolerance * (1 if panel.crossing is None else BRIDGED)
+        if change > (TELLING if panel.crossing is None else tolerance):  # bridged iterates tell nothing
+            return None
+        series = self._series(panel.rates * panel.length, size[-panel.rates.shape[1] :])
+        tolerance = max(tolerance, self._noise(series))
+        fits, settled = self._fits(series, change, tolerance), change <= tolerance
+        if fits < 1 / (1 if settled else ROUGHLY):
+            factor = max(SPARE * fits, SHORTEST)
+            return replace(panel, factor=factor, crossing=None, foreseen=panel.crossing, sweeps=0)
+        if not settled:
+            return None
+        factor = min(SPARE * fits, LONGEST if panel.sweeps < MANY else 1.0)
+        return replace(
+            panel, settled=True, factor=factor, foreseen=singular_ahead(doubles(self.nodes), distance)
+        )
 
     def _series(self, moved: np.ndarray, size: np.ndarray) -> np.ndarray:
         """Largest Chebyshev coefficients (nodes,) of columns (nodes, n) of such sizes (n,)."""

@@ -72,24 +72,32 @@ class _Run:
         while self.taken < len(self.times):
             if is_over(until):
                 return OVER
-            tried = self._before_singular(length)
-            panel = self._panel(tried, self._guess(panel, tried))
-            if not panel.settled and (leap := self._leap(panel.time(panel.foreseen))):
-                panel, tried = leap, leap.length
-            length = length if panel.settled and tried < length else tried * panel.factor
+            panel = self._tried(panel, self._before_singular(length))
+            is_shortened = panel.settled and panel.length < length
+            length = length if is_shortened else panel.length * panel.factor
             if not panel.settled or self.foreseen <= float(self.t):
                 self.foreseen = panel.time(panel.foreseen) or self.foreseen
-            if not panel.settled:
-                if length < LEAST * end:
-                    return "no panel of time is short enough"
-                continue
-            after = panel.start + panel.length
-            state = self.equations.closed(after, panel.states[-1])
-            if self.equations.gap(after, state) > OPEN:
+            if not panel.settled and length < LEAST * end:
+                return "no panel of time is short enough"
+            if panel.settled and not self._accepts(panel):
                 return "rows that were redundant at the start are not later: it is a singular position"
-            self._sample(panel)
-            self._advance(panel, after, state)
         return ""
+
+    def _tried(self, last: Panel | None, length: Any) -> Panel:
+        """A panel of a length, or one that leaps over a singular position, where several did not settle."""
+        panel = self._panel(length, self._guess(last, length))
+        leap = None if panel.settled else self._leap(panel.time(panel.foreseen))
+        return leap or panel
+
+    def _accepts(self, panel: Panel) -> bool:
+        """Takes samples, and the state at the end, of a settled panel; false where a loop is open then."""
+        after = panel.start + panel.length
+        state = self.equations.closed(after, panel.states[-1])
+        if self.equations.gap(after, state) > OPEN:
+            return False
+        self._sample(panel)
+        self._advance(panel, after, state)
+        return True
 
     def _panel(self, length: Any, guess: np.ndarray) -> Panel:
         """By Picard's iteration, or by Newton's method while decays are short against the panel."""
