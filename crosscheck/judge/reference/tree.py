@@ -27,6 +27,7 @@ SLOW = 20  # of Picard's iterations, from which on a panel may be stiff
 NEAR_END = 0.7  # part of a panel from which on a singular position is too near its end
 BEYOND = 0.35  # half lengths from the end of a panel to a singular position that its series leaps over
 LEAST_LOST = 1e6  # rounding units that a leap may lose without trying from nearer
+MOST_LOST = 1e-7  # by a leap at most; most of it is off the closed loops, onto which the end is put again
 SEVERAL = 3  # panels across one singular position that do not settle before it is leapt over
 
 
@@ -128,7 +129,7 @@ class _Run:
             return None
         panel, lost = self.panels.continued(short, 1 + BEYOND, singular)
         before, self.lost = self.lost, lost
-        if lost > np.sqrt(self.arithmetic.eps) or LEAST_LOST * self.arithmetic.eps < lost < before:
+        if lost > MOST_LOST or LEAST_LOST * self.arithmetic.eps < lost < before:
             return None
         return panel
 
