@@ -143,8 +143,9 @@ def take_sample(h, length, memory):
     """Record state, accelerations and multipliers at a distance h (s) into a step: OK or why there are none.
 
     Accelerations are the formulation's, but beside a singular position, where the state determines them ill,
-    the series'; multipliers balance the forces of either.  NOT_CONVERGED where the series' accelerations
-    contradict the formulation's.
+    the series'; multipliers balance the forces of either.  There the exact series of a passage give the state
+    too: a projection would divide their rounding by the distance.  NOT_CONVERGED where the series'
+    accelerations contradict the formulation's.
     """
     run, samples, k = memory.run, memory.run.loop.samples, memory.run.loop.clock.sample
     system, watch = run.equations.system, run.watch
@@ -154,8 +155,11 @@ def take_sample(h, length, memory):
     copy(system.acceleration, samples.accelerations[k])
     project_state(run.loop.times[k], run)
     put_angles(h, memory)
+    beside = watch.smallest_pivot < BESIDE * watch.reference_pivot
+    if beside and memory.progress.passing:
+        put_state(memory)
     assemble_system(run.loop.times[k], run.state.coordinates, run.state.velocities, run.equations)
-    if watch.smallest_pivot < BESIDE * watch.reference_pivot:
+    if beside:
         rows_times(samples.accelerations[k], run.equations, system.rhs)
     status = run.kernels.accelerate(system)
     if status == OK and not explained(system.acceleration, samples.accelerations[k], length, memory.progress):

@@ -143,9 +143,16 @@ def test_crossings_are_counted():
 
 
 @pytest.mark.parametrize("method", ["alf-dual+projection", "mpi-svd+projection", "taylor"])
-@pytest.mark.parametrize("scene", [four_bar(), four_bar_gravity(0.3)], ids=["driven", "swinging"])
+@pytest.mark.parametrize(
+    "scene",
+    [four_bar(), four_bar_gravity(0.3), four_bar_gravity(0.35)],
+    ids=["driven", "swinging", "swinging from higher"],
+)
 def test_accelerations_and_reactions_beside_a_crossing(scene, method):
-    """The exact reactions are finite there; the exact motion with them shares no code with mbref."""
+    """The exact reactions are finite there; the exact motion with them shares no code with mbref.
+
+    Without drivers, rounding is divided by the distance.
+    """
     (crossing, *_) = simulate(scene, "taylor", [0.3]).crossings
     rate = np.abs(crossing.angular_velocity[0]).max()
     distances = np.array([1e-1, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6, 1e-9])
@@ -154,5 +161,10 @@ def test_accelerations_and_reactions_beside_a_crossing(scene, method):
     exact = with_exact_reactions(scene, closed_form(scene).poses(times))
     scale = np.abs(exact.acceleration).max()
     assert np.abs(run.acceleration - exact.acceleration).max() < 1e-8 * scale
+    speeds = np.abs(exact.velocity).max()
+    assert np.abs(run.velocity - exact.velocity).max() < 3e-11 * speeds
+    away = np.concatenate([distances, [0.0], distances[::-1]])
+    allowed = 1e-6 if scene.driver else 1e-9 + 1e-9 / np.maximum(away, 3e-5)
     for name, true in exact.reactions.items():
-        assert np.abs(run.reactions[name] - true).max() < 1e-6 * np.abs(true).max(), name
+        off = np.abs(run.reactions[name] - true).max(axis=1)
+        assert (off < allowed * np.abs(true).max()).all(), name
