@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from mbref import rotations
 from mbref.design.placed import placed
-from mbref.equations.initial_state import scene_length, solve_positions
-from mbref.equations.model import Model
+from mbref.equations.initial_state import solve_positions
+from mbref.equations.model import FRAME, Model
 from mbref.scene import GROUND, Scene, SceneError
 
 Point = tuple[float, float, float]
@@ -37,9 +37,12 @@ class _Reshaped(Model):
         self._elsewhere = elsewhere
         super().__init__(scene)
 
-    def point(self, name: str, point: Sequence[float]) -> np.ndarray:
-        x, y, z = point
-        return super().point(name, tuple(self._elsewhere.get((name, (x, y, z)), point)))
+    def points(self, bodies: np.ndarray, points: np.ndarray) -> np.ndarray:
+        names = [body.name for body in self.bodies]
+        names.append(FRAME if GROUND in names else GROUND)
+        pairs = zip(bodies.tolist(), points.tolist(), strict=True)
+        moved = [self._elsewhere.get((names[b], (x, y, z)), np.array([x, y, z])) for b, (x, y, z) in pairs]
+        return super().points(bodies, np.array(moved).reshape(-1, 3))
 
 
 def assemble(scene: Scene, lengths: Mapping[tuple[str, str], float]) -> Assembled:
@@ -55,7 +58,7 @@ def assemble(scene: Scene, lengths: Mapping[tuple[str, str], float]) -> Assemble
     for share in np.linspace(0.0, 1.0, SHARES + 1)[1:]:
         model = _Reshaped(scene, {key: np.array(key[1]) + share * shift for key, shift in shifts.items()})
         q, phi = solve_positions(model, 0.0, q)
-        if np.abs(phi).max(initial=0.0) > CLOSED * max(1.0, scene_length(model)):
+        if np.abs(phi).max(initial=0.0) > CLOSED * max(1.0, model.length):
             raise SceneError([_open(model, phi, share)])
     return _compared(scene, placed(model, q), pairs)
 

@@ -8,12 +8,14 @@ expression that is not identically zero does not vanish there.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from mbref.equations.initial_state import Start, given_velocities, scene_length
+from mbref.equations.initial_state import Start, given_velocities
 from mbref.equations.model import Model, displaced
+from mbref.equations.random_states import random_states
 from mbref.kernels.scene_layout import Primitives, SceneData
 
 STATES = 2  # random states, so that an accidental zero at one does no harm
@@ -25,16 +27,18 @@ def active_entries(model: Model, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarr
 
     q (7 nb,) and v (6 nb,) are the start.  Columns of entries are those of ``layout.System.blocks``.
     """
-    rng = np.random.default_rng(1)
+    inside, states = model.entry_columns < model.n, random_states(1, STATES, model.n)
     moving = np.zeros(model.n, dtype=bool)
     entries = np.zeros((model.m, 12), dtype=bool)
     while True:
         driving_rows, driving_columns = np.zeros(model.m, dtype=bool), v != 0
-        for state in range(STATES + 1):
-            t = rng.uniform(0.1, 1.0) * model.scene.duration if state else 0.0
-            x, w = (moving * rng.normal(size=model.n) if state else np.zeros(model.n) for _ in range(2))
-            terms = model.blocks(t, displaced(q, x), w if state else v)
-            entries |= (terms.jacobian != 0) & (model.entry_columns() < model.n)
+        samples = [(0.0, q, v)]
+        for state in states:
+            moved = displaced(q, moving * state.displacement)
+            samples.append((state.part * model.scene.duration, moved, moving * state.velocity))
+        for sample in samples:
+            terms = model.blocks(*sample)
+            entries |= (terms.jacobian != 0) & inside
             driving_rows |= (terms.gamma != 0) | (terms.phi != 0) | (terms.nu != 0)
             driving_columns |= terms.force != 0
         found, rows = _reached(model, entries, driving_rows, driving_columns)
@@ -47,7 +51,7 @@ def _reached(
     model: Model, entries: np.ndarray, rows: np.ndarray, columns: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Columns (n,) and rows (m,) of the blocks that have a driving row or column."""
-    column = model.entry_columns()
+    column = model.entry_columns
     reached = np.append(columns, np.zeros(6, dtype=bool))
     while True:
         rows = rows | (entries & reached[column]).any(axis=1)
@@ -61,7 +65,7 @@ def _reached(
 def without_rounding(model: Model, start: Start) -> Start:
     """The start with zero for the roundings of zero in its coordinates, and in velocities not given."""
     q, v, small = start.q.reshape(-1, 7), start.v, np.full((model.nb, 7), STILL)
-    small[:, :3] *= scene_length(model)
+    small[:, :3] *= model.length
     given, _ = given_velocities(model, start.q)
     still = (np.abs(v) < STILL * np.max(np.abs(v), initial=0.0)) & (given == 0)
     return replace(start, q=np.where(np.abs(q) < small, 0.0, q).ravel(), v=np.where(still, 0.0, v))
@@ -72,22 +76,26 @@ def active_coordinates(q: np.ndarray, velocities: np.ndarray) -> np.ndarray:
 
     Turning about axis k of a body's own frame mixes the Euler parameters e0 and ek, and the other two.
     """
-    moves = np.zeros((q.size // 7, 7), dtype=bool)
-    free = np.zeros((q.size // 7, 6), dtype=bool)
-    free.reshape(-1)[velocities] = True
-    moves[:, :3] = free[:, :3]
-    for body, turns, p in zip(moves, free[:, 3:], q.reshape(-1, 7)[:, 3:], strict=True):
-        reached = p != 0
-        while True:
-            found = reached.copy()
-            for k in np.flatnonzero(turns):
-                for pair in ([0, 1 + k], [1 + (k + 1) % 3, 1 + (k + 2) % 3]):
-                    found[pair] |= reached[pair].any()
-            if np.array_equal(found, reached):
-                break
-            reached = found
-        body[3:] = reached & turns.any()
-    return np.flatnonzero(moves)
+    moves = [7 * (c // 6) + c % 6 for c in velocities.tolist() if c % 6 < 3]
+    turns: dict[int, list[int]] = {}
+    for column in velocities.tolist():
+        if column % 6 >= 3:
+            turns.setdefault(column // 6, []).append(column % 6 - 3)
+    for body, axes in turns.items():
+        first = 7 * body + 3
+        reached = _mixed({k for k in range(4) if q[first + k] != 0.0}, axes)
+        moves += [first + k for k in reached]
+    return np.array(sorted(moves), dtype=np.int64)
+
+
+def _mixed(reached: set[int], axes: Sequence[int]) -> set[int]:
+    """The Euler parameters that turns about these axes make other than zero, beside those reached."""
+    pairs = [pair for k in axes for pair in ({0, 1 + k}, {1 + (k + 1) % 3, 1 + (k + 2) % 3})]
+    while True:
+        found = reached.union(*(pair for pair in pairs if pair & reached))
+        if found == reached:
+            return found
+        reached = found
 
 
 def active_scene(model: Model, entries: np.ndarray) -> SceneData:

@@ -46,15 +46,6 @@ def consistent_start(model: Model) -> Start:
     return Start(q, v, position_violation, velocity_violation)
 
 
-def scene_length(model: Model) -> float:
-    """The largest distance between two of the centres of mass and joint anchors at t = 0 (m)."""
-    points = [body.position for body in model.scene.body]
-    for joint in model.scene.joint:
-        points += getattr(joint, "anchors", None) or [joint.anchor]
-    array = np.array(points)
-    return float(np.max(np.linalg.norm(array[:, None] - array[None], axis=-1))) or 1.0
-
-
 def _fault(model: Model, row: int, what: str) -> SceneError:
     name = model.row_joint[row]
     return SceneError([f"joint[{name}]: {what} at joint {name!r}"])
@@ -69,7 +60,7 @@ def corrected_positions(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]
         return q, 0.0
     phi = np.abs(model.blocks(0.0, q, np.zeros(model.n)).phi)
     before, worst = float(phi.max()), int(np.argmax(phi))
-    if before > GROSS * max(1.0, scene_length(model)):
+    if before > GROSS * max(1.0, model.length):
         raise _fault(model, worst, f"the initial positions violate the constraint by {before:.3g}")
     q, phi = solve_positions(model, 0.0, q)
     left, worst = float(np.abs(phi).max()), int(np.argmax(np.abs(phi)))
@@ -84,7 +75,7 @@ def solve_positions(model: Model, t: float, q: np.ndarray) -> tuple[np.ndarray, 
     With the pseudo-inverse, so that redundant rows and a singular start do no harm; the change is least
     in the metric of M.
     """
-    v, enough = np.zeros(model.n), 1e-14 * max(1.0, scene_length(model))
+    v, enough = np.zeros(model.n), 1e-14 * max(1.0, model.length)
     phi = model.blocks(t, q, v).phi
     for _ in range(MOST_ITERATIONS):
         terms = model.blocks(t, q, v)
@@ -132,7 +123,7 @@ def _velocities(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]:
     v, given = given_velocities(model, q)
     if model.m > LARGE:
         return _sparse_velocities(model, q, v, given)
-    scale = np.tile(np.repeat([1.0, 1 / scene_length(model)], 3), model.nb)
+    scale = np.tile(np.repeat([1.0, 1 / model.length], 3), model.nb)
     wanted = v[given] / scale[given]
     terms = model.terms(0.0, q, v)
     jacobian, nu = _unit_rows(terms.jacobian * scale, terms.nu)
@@ -160,7 +151,7 @@ def _sparse_velocities(
     """The same by sparse solutions: nearest to the given velocities first, then least where open."""
     from scipy.sparse import csr_array, vstack
 
-    scale = np.tile(np.repeat([1.0, 1 / scene_length(model)], 3), model.nb)
+    scale = np.tile(np.repeat([1.0, 1 / model.length], 3), model.nb)
     terms = model.blocks(0.0, q, v)
     jacobian, nu = model.sparse(terms.jacobian), terms.nu
     x = MinimumNorm(jacobian, scale**-2)(nu)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mbref import rotations
-from mbref.equations.diagnosis import scaled_jacobian
 from mbref.equations.model import Model
+from mbref.equations.units import row_lengths
 
 MOST_ROWS = 120  # singular values of more rows at every sample take longer than the run
 OPEN = 1e-6  # singular value, to the largest, of a combination of unit rows that counts as vanished
@@ -14,46 +14,44 @@ SHARE = 1e-6  # weight of a joint in such a combination below which it takes no 
 
 
 def reactions(
-    model: Model, times: np.ndarray, q: np.ndarray, v: np.ndarray, multipliers: np.ndarray
+    model: Model, q: np.ndarray, blocks: np.ndarray, multipliers: np.ndarray
 ) -> dict[str, np.ndarray] | None:
     """Per joint force (N) and moment (N m) (k, 6) on its second body at the anchor, world axes.
 
-    From q (k, nb, 7), v (k, nb, 6) and λ (k, m) at times (k,); None where the scene has no masses.
+    From q (k, nb, 7), the blocks (k, m, 12) of Φ_q and λ (k, m); None where the scene has no masses.
     """
     if model.kinematic:
         return None
-    joints = model.scene.joint
+    names = [joint.name for joint in model.scene.joint]
+    if not names:
+        return {}
     body, side = _acted_on(model)
-    sign = np.where(side == 1, 1.0, -1.0)
-    number = {joint.name: j for j, joint in enumerate(joints)}
-    rows = np.array([r for r, name in enumerate(model.row_joint) if name in number], dtype=int)
-    of = np.array([number[model.row_joint[r]] for r in rows], dtype=int)
-    wrench = np.zeros((len(times), len(joints), 6))  # about the centre of mass, moments in body axes
-    for k, t in enumerate(times):
-        blocks = model.blocks(t, q[k].ravel(), v[k].ravel()).jacobian.reshape(model.m, 2, 6)
-        np.add.at(wrench[k], of, -(sign[of] * multipliers[k, rows])[:, None] * blocks[rows, side[of]])
-    found = {}
-    for j, joint in enumerate(joints):
-        b, force = body[j], wrench[:, j, :3]
-        arm = model.anchor(joint, q) - q[:, b, :3]
-        moment = rotations.rotate(q[:, b, 3:], wrench[:, j, 3:]) - np.cross(arm, force)
-        found[joint.name] = np.concatenate([force, moment], axis=1)
-    return found
+    of = np.array([names.index(name) for name in model.row_joint if name in names], dtype=int)
+    rows, sign = np.arange(of.size), np.where(side == 1, -1.0, 1.0)[of]
+    pulls = blocks.reshape(len(q), model.m, 2, 6)[:, rows, side[of]]
+    starts = np.searchsorted(of, np.arange(len(names)))  # the rows of a joint stand together, in its order
+    wrench = np.add.reduceat((sign * multipliers[:, rows])[..., None] * pulls, starts, axis=1)
+    pose, force = q[:, body], wrench[..., :3]  # about the centre of mass, moments in body axes
+    arm = model.anchors(q) - pose[..., :3]
+    moment = rotations.rotate(pose[..., 3:], wrench[..., 3:]) - np.cross(arm, force)
+    found = np.concatenate([force, moment], axis=-1)
+    return {name: found[:, j] for j, name in enumerate(names)}
 
 
-def open_dimensions(model: Model, times: np.ndarray, q: np.ndarray) -> dict[str, np.ndarray] | None:
+def open_dimensions(model: Model, blocks: np.ndarray) -> dict[str, np.ndarray] | None:
     """Per joint the dimensions (k,) of its reaction that equilibrium does not determine at each sample.
 
     Redundant rows leave reactions open always, a singular position where the motion passes it: there a
     combination of rows vanishes, a left null vector of Φ_q (Wojtyra, J. Theor. Appl. Mech. 43, 2005).  From
-    q (k, nb, 7) at times (k,); None where the scene has no masses, or more than MOST_ROWS rows.
+    the blocks (k, m, 12) of Φ_q; None where the scene has no masses, or more than MOST_ROWS rows.
     """
     if model.kinematic or model.m > MOST_ROWS:
         return None
-    rows = [scaled_jacobian(model, t, q[k].ravel()) for k, t in enumerate(times)]
-    left, values, _ = np.linalg.svd(np.array(rows).reshape(len(times), model.m, model.n))
+    jacobian = model.dense(blocks)
+    left, values, _ = np.linalg.svd(jacobian / row_lengths(jacobian)[..., None])
     rank = np.sum(values > OPEN * values.max(axis=1, initial=0.0)[:, None], axis=1)
-    vanishing = left * (np.arange(model.m) >= rank[:, None])[:, None, :]
+    least = int(rank.min(initial=model.m))
+    vanishing = (left * (np.arange(model.m) >= rank[:, None])[:, None, :])[..., least:]
     of_joint = np.array(model.row_joint)
     return {
         joint.name: np.sum(_singular_values(vanishing[:, of_joint == joint.name]) > SHARE, axis=1)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,18 +16,12 @@ import numpy as np
 from mbref import rotations
 from mbref.equations.coordinates import displace
 from mbref.equations.evaluation import evaluate_all
-from mbref.equations.joints import driver_primitive, primitives_of
-from mbref.equations.joints.base import ROWS_OF, Primitive
 from mbref.equations.loads import has_angles
-from mbref.equations.packing import packed_drivers, packed_loads
+from mbref.equations.packing import packed_drivers, packed_loads, packed_primitives
 from mbref.equations.units import body_lengths, metric_root
 from mbref.kernels.layout import Counts, Equations, Frames, Settings, System
-from mbref.kernels.named_memory import allocate, packed, record, stacked
-from mbref.kernels.scene_layout import (
-    Bodies,
-    Primitives,
-    SceneData,
-)
+from mbref.kernels.named_memory import allocate, packed, record
+from mbref.kernels.scene_layout import Bodies, SceneData
 from mbref.scene import (
     GROUND,
     Body,
@@ -54,6 +49,7 @@ class Terms:
 class Model:
     """A scene packed once; ``bodies`` are those of the scene, then the ground if it is modelled.
 
+    ``entry_columns`` (m, 12) says the column of every entry of the blocks; those of the fixed frame are ≥ n.
     A scene without all masses is ``kinematic``: M is the identity and there are no forces.
     """
 
@@ -68,12 +64,15 @@ class Model:
         self._index[FRAME] = self.nb
         bodies = self._pack_bodies()
         lengths = body_lengths(self.bodies, self.joints)
+        primitives, self.row_joint, self._row_bodies = packed_primitives(self)
+        self.m = len(self.row_joint)
+        self.entry_columns = (6 * self._row_bodies[:, :, None] + np.arange(6)).reshape(self.m, 12)
         self.data = SceneData(
             gravity=np.array(self._gravity()),
             lengths=lengths,
             metric_root=metric_root(self.mass, lengths),
             bodies=bodies,
-            primitives=self._pack_primitives(),
+            primitives=primitives,
             row_bodies=self._row_bodies,
             drivers=packed_drivers(scene.driver),
             loads=packed_loads(self),
@@ -120,17 +119,24 @@ class Model:
         return replace(found, jacobian=self.dense(found.jacobian))
 
     def dense(self, blocks: np.ndarray) -> np.ndarray:
-        """Φ_q (m, n) from its blocks (m, 12)."""
-        matrix, rows = np.zeros((self.m, self.nb + 1, 6)), np.arange(self.m)
+        """Φ_q (…, m, n) from its blocks (…, m, 12)."""
+        matrix, rows = np.zeros((*blocks.shape[:-1], self.nb + 1, 6)), np.arange(self.m)
         for side in range(2):
-            matrix[rows, self._row_bodies[:, side]] = blocks[:, 6 * side : 6 * side + 6]
-        return matrix[:, : self.nb].reshape(self.m, self.n)
+            matrix[..., rows, self._row_bodies[:, side], :] = blocks[..., 6 * side : 6 * side + 6]
+        return matrix[..., : self.nb, :].reshape(*blocks.shape[:-1], self.n)
+
+    def blocks_along(self, times: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """Blocks (k, m, 12) of Φ_q at coordinates q (k, nb, 7) at times (k,) in s."""
+        at_rest, found = np.zeros(self.n), np.empty((len(times), self.m, 12))
+        for blocks, t, each in zip(found, times, q, strict=True):
+            blocks[:] = self.blocks(t, each.ravel(), at_rest).jacobian
+        return found
 
     def sparse(self, blocks: np.ndarray) -> csr_array:
         """Φ_q (m, n) from its blocks (m, 12), without zeros."""
         from scipy.sparse import csr_array
 
-        columns = self.entry_columns()
+        columns = self.entry_columns
         row, entry = np.nonzero((blocks != 0) & (columns < self.n))
         return csr_array((blocks[row, entry], (row, columns[row, entry])), shape=(self.m, self.n))
 
@@ -144,9 +150,15 @@ class Model:
             own.system.force.copy(),
         )  # fmt: skip
 
-    def entry_columns(self) -> np.ndarray:
-        """Column (m, 12) of every entry of the blocks; those of the fixed frame are ≥ n."""
-        return (6 * self._row_bodies[:, :, None] + np.arange(6)).reshape(self.m, 12)
+    @cached_property
+    def length(self) -> float:
+        """The largest distance between two of the scene's centres of mass and joint anchors at t = 0 (m)."""
+        points = [body.position for body in self.scene.body]
+        for joint in self.scene.joint:
+            points += getattr(joint, "anchors", None) or [joint.anchor]
+        array = np.array(points)
+        apart = array[:, None] - array
+        return float(np.sqrt((apart * apart).sum(axis=-1).max())) or 1.0
 
     @property
     def closed_loops(self) -> int:
@@ -162,13 +174,13 @@ class Model:
         """Index of a body, ``nb`` for the fixed frame."""
         return self._index[name]
 
-    def anchor(self, joint: Joint, q: np.ndarray) -> np.ndarray:
-        """World positions (…, 3) of the joint's anchor on its second body at coordinates q (…, nb, 7)."""
-        point = joint.anchor_pair[1]
-        b = self._index[joint.bodies[1]]
-        if b == self.nb:
-            return np.broadcast_to(point, (*q.shape[:-2], 3))
-        return q[..., b, :3] + rotations.rotate(q[..., b, 3:], self.point(joint.bodies[1], point))
+    def anchors(self, q: np.ndarray) -> np.ndarray:
+        """World positions (k, j, 3) of the joints' anchors on their second bodies at q (k, nb, 7)."""
+        second = np.array([self._index[joint.bodies[1]] for joint in self.scene.joint], dtype=int)
+        given = np.array([joint.anchor_pair[1] for joint in self.scene.joint], dtype=float).reshape(-1, 3)
+        frame = np.broadcast_to([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (len(q), 1, 7))
+        pose = np.concatenate([q, frame], axis=1)[:, second]
+        return pose[..., :3] + rotations.rotate(pose[..., 3:], self.points(second, given))
 
     def motion(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> dict[str, np.ndarray]:
         """Poses, velocities and accelerations of the scene's bodies as a Trajectory names them.
@@ -193,51 +205,26 @@ class Model:
         mass = np.array([1.0 if self.kinematic else body.mass or 1.0 for body in self.bodies])
         inertia = np.array([np.ones(3) if self.kinematic else moments for moments, _ in principal])
         self.mass = np.concatenate([np.repeat(mass[:, None], 3, axis=1), inertia], axis=1).ravel()
-        self._to_local = rotations.to_matrix(self.orientation).transpose(0, 2, 1)
+        to_local = rotations.to_matrix(self.orientation).transpose(0, 2, 1)
+        self._to_local = np.concatenate([to_local, np.eye(3)[None]])  # the fixed frame is the last
+        self._centres = np.array([*(body.position for body in self.bodies), (0.0, 0.0, 0.0)])
         return Bodies(mass, inertia)
 
     def direction(self, name: str, vector: Sequence[float]) -> np.ndarray:
         """A world vector (3,) at t = 0 in the principal frame of a body."""
-        b = self._index[name]
-        return np.asarray(vector, dtype=float) if b == self.nb else self._to_local[b] @ vector
+        return self.directions(np.array([self._index[name]]), np.array([vector], dtype=float))[0]
 
     def point(self, name: str, point: Sequence[float]) -> np.ndarray:
         """A world point (3,) at t = 0 in the principal frame of a body, from its centre of mass."""
-        b = self._index[name]
-        origin = np.zeros(3) if b == self.nb else np.array(self.bodies[b].position)
-        return self.direction(name, np.asarray(point) - origin)
+        return self.points(np.array([self._index[name]]), np.array([point], dtype=float))[0]
 
-    def _pack_primitives(self) -> Primitives:
-        driven = {driver.joint: k for k, driver in enumerate(self.scene.driver)}
-        rows, bodies, names = [], [], []
-        for joint in self.joints:
-            pair = [self._index[name] for name in joint.bodies]
-            for primitive in (*primitives_of(joint), *_driver_rows(joint, driven)):
-                driver = driven[joint.name] if primitive.driven else -1
-                rows.append(self._primitive(primitive, joint.bodies, driver, len(names)))
-                count = ROWS_OF[primitive.kind]
-                bodies += [pair] * count
-                names += [joint.name] * count
-        self.row_joint = tuple(names)
-        self.m = len(names)
-        self._row_bodies = np.array(bodies, dtype=np.int64).reshape(-1, 2)
-        return stacked(Primitives, rows)
+    def directions(self, bodies: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+        """World vectors (k, 3) at t = 0, each in the principal frame of a body of index (k,)."""
+        return (self._to_local[bodies] @ vectors[:, :, None])[:, :, 0]
 
-    def _primitive(self, primitive: Primitive, names: tuple[str, str], driver: int, row: int) -> Primitives:
-        first, second = names
-        return Primitives(
-            kind=primitive.kind,
-            first=self._index[first],
-            second=self._index[second],
-            driver=driver,
-            row=row,
-            point_first=self.point(first, primitive.point_first),
-            point_second=self.point(second, primitive.point_second),
-            direction_first=self.direction(first, primitive.first),
-            turning_first=self.direction(first, primitive.turning),
-            direction_second=self.direction(second, primitive.second),
-            length=primitive.length,
-        )
+    def points(self, bodies: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """World points (k, 3) at t = 0, each in the principal frame of a body of index (k,)."""
+        return self.directions(bodies, points - self._centres[bodies])
 
     def _gravity(self) -> tuple[float, ...]:
         return (0.0, 0.0, 0.0) if self.kinematic else self.scene.gravity
@@ -278,7 +265,3 @@ def _principal_axes(body: Body) -> tuple[np.ndarray, np.ndarray]:
     moments, axes = np.linalg.eigh(inertia)
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
     return np.maximum(moments, 0.0), axes
-
-
-def _driver_rows(joint: Joint, driven: dict[str, int]) -> list[Primitive]:
-    return [driver_primitive(joint)] if joint.name in driven else []

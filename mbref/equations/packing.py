@@ -1,21 +1,56 @@
-"""Drivers and loads of a scene as the arrays that kernels read."""
+"""Joints, drivers and loads of a scene as the arrays that kernels read."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbref.equations.joints.base import frame
+from mbref.equations.joints import driver_primitive, primitives_of
+from mbref.equations.joints.base import ROWS_OF, Primitive, frame
 from mbref.kernels.named_memory import stacked
-from mbref.kernels.scene_layout import FORCE, MOMENT, SPRING, TORSION_SPRING, Drivers, Loads
-from mbref.scene import Driver, Force, Load, Moment, SceneError, Sine, Spring, TorsionSpring
+from mbref.kernels.scene_layout import FORCE, MOMENT, SPRING, TORSION_SPRING, Drivers, Loads, Primitives
+from mbref.scene import Driver, Force, Joint, Load, Moment, SceneError, Sine, Spring, TorsionSpring
 
 if TYPE_CHECKING:
     from mbref.equations.model import Model
 
 AT_REST = Sine(amplitude=0.0, frequency=0.0, phase=0.0)
+
+
+def packed_primitives(model: Model) -> tuple[Primitives, tuple[str, ...], np.ndarray]:
+    """The primitives of all joints and drivers; of every row its joint's name (m,) and its bodies (m, 2)."""
+    driven = {driver.joint: k for k, driver in enumerate(model.scene.driver)}
+    listed = [(joint, primitive) for joint in model.joints for primitive in _of_joint(joint, driven)]
+    rows = [ROWS_OF[primitive.kind] for _, primitive in listed]
+    pairs = [[model.index(name) for name in joint.bodies] for joint, _ in listed]
+    bodies = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    first, second = bodies.T.copy()
+
+    def column(field: str, dtype: type = float, *width: int) -> np.ndarray:
+        values = [getattr(primitive, field) for _, primitive in listed]
+        return np.array(values, dtype=dtype).reshape(-1, *width)
+
+    primitives = Primitives(
+        kind=column("kind", np.int64),
+        first=first,
+        second=second,
+        driver=np.array([driven[j.name] if p.driven else -1 for j, p in listed], dtype=np.int64),
+        row=np.cumsum([0, *rows], dtype=np.int64)[:-1],
+        point_first=model.points(first, column("point_first", float, 3)),
+        point_second=model.points(second, column("point_second", float, 3)),
+        direction_first=model.directions(first, column("first", float, 3)),
+        turning_first=model.directions(first, column("turning", float, 3)),
+        direction_second=model.directions(second, column("second", float, 3)),
+        length=column("length"),
+    )
+    names = [joint.name for (joint, _), count in zip(listed, rows, strict=True) for _ in range(count)]
+    return primitives, tuple(names), np.repeat(bodies, rows, axis=0)
+
+
+def _of_joint(joint: Joint, driven: Mapping[str, int]) -> list[Primitive]:
+    return [*primitives_of(joint), *([driver_primitive(joint)] if joint.name in driven else [])]
 
 
 def packed_drivers(drivers: Sequence[Driver]) -> Drivers:

@@ -15,12 +15,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from math import hypot
 from typing import NamedTuple
 
 import numpy as np
 
 from mbref.equations.initial_state import LARGE, Start
 from mbref.equations.model import Model, displaced
+from mbref.equations.random_states import random_states
 from mbref.kernels.compilation import inlined
 from mbref.kernels.layout import SparseFactor, StaticRows
 from mbref.linear_algebra.minimum_norm import MinimumNorm
@@ -46,6 +48,13 @@ def columns_held(held: Sequence[Held]) -> list[int]:
     return [column for each in held for column in each.columns]
 
 
+def are_held(held: Sequence[Held], n: int) -> np.ndarray:
+    """Which of n columns are in one of the groups."""
+    found = np.zeros(n, dtype=bool)
+    found[columns_held(held)] = True
+    return found
+
+
 def lies_in(columns: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """Which entries, in these columns (m, 12), are in those wanted (n,); the fixed frame's are not."""
     return np.append(wanted, np.zeros(6, dtype=bool))[columns]
@@ -60,7 +69,7 @@ def reduced_factor(
     has their columns.
     """
     static = _static_rows(entries, columns, held)
-    active = moving & ~np.isin(np.arange(moving.size), columns_held(held))
+    active = moving & ~are_held(held, moving.size)
     row, entry = np.nonzero(entries & lies_in(columns, active))
     symbolic = symbolic_factorisation(row, columns[row, entry], 12 * row + entry, active)
     return sparse_factor(symbolic, static)
@@ -116,8 +125,8 @@ def _found(
     while resting.any():
         samples, driven = _samples(model, q, moving & ~resting)
         left = entries & (samples != 0).any(axis=0)
-        held = list(_holding(model, samples, left, driven, moving, can_rest))
-        found = np.isin(np.arange(model.n), columns_held(held))
+        held = list(_holding(_Rows(model, samples, left, driven), moving, can_rest))
+        found = are_held(held, model.n)
         if not (resting & ~found).any():
             works_against = driven & left.any(axis=1) & ~_bears_on(model, left, moving & ~found)
             return ([], entries) if works_against.any() else (held, left)
@@ -127,28 +136,28 @@ def _found(
 
 def _samples(model: Model, q: np.ndarray, displacing: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Jacobian blocks (STATES, m, 12) at random states, and which rows (m,) prescribe a motion."""
-    rng, samples, driven = np.random.default_rng(2), [], np.zeros(model.m, dtype=bool)
-    for _ in range(STATES):
-        t, x = rng.uniform(0.0, 1.0) * model.scene.duration, displacing * rng.normal(size=model.n)
-        terms = model.blocks(t, displaced(q, x), np.zeros(model.n))
-        samples.append(terms.jacobian)
+    samples, driven = np.empty((STATES, model.m, 12)), np.zeros(model.m, dtype=bool)
+    for sample, state in zip(samples, random_states(2, STATES, model.n), strict=True):
+        t = state.part * model.scene.duration
+        terms = model.blocks(t, displaced(q, displacing * state.displacement), np.zeros(model.n))
+        sample[:] = terms.jacobian
         driven |= terms.nu != 0
-    return np.array(samples), driven
+    return samples, driven
 
 
 def _bears_on(model: Model, entries: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Which rows (m,) have an entry (m, 12) in one of these columns (n,)."""
-    return (entries & lies_in(model.entry_columns(), columns)).any(axis=1)
+    return (entries & lies_in(model.entry_columns, columns)).any(axis=1)
 
 
 def _shared(model: Model, start: Start, entries: np.ndarray, held: Sequence[Held]) -> np.ndarray:
     """Columns (n,) among those held in which a row has an entry that is redundant at the start."""
-    columns, of_held = np.zeros(model.n + 6, dtype=bool), np.isin(np.arange(model.n), columns_held(held))
+    columns, of_held = np.zeros(model.n + 6, dtype=bool), are_held(held, model.n)
     rows = np.flatnonzero(_bears_on(model, entries, of_held))
     if rows.size:
         blocks = model.blocks(0.0, start.q, start.v).jacobian
         redundant = rows[_null_shares(model, blocks, rows) > REDUNDANT]
-        columns[model.entry_columns()[redundant][entries[redundant]]] = True
+        columns[model.entry_columns[redundant][entries[redundant]]] = True
     return columns[: model.n] & of_held
 
 
@@ -159,52 +168,75 @@ def _null_shares(model: Model, blocks: np.ndarray, rows: np.ndarray) -> np.ndarr
     return null_shares(MinimumNorm(model.sparse(blocks), np.ones(model.n)), rows)
 
 
-def _holding(
-    model: Model,
-    samples: np.ndarray,
-    left: np.ndarray,
-    driven: np.ndarray,
-    moving: np.ndarray,
-    can_rest: np.ndarray,
-) -> Iterator[Held]:
-    """Groups of rows that hold columns, each after those that let it bear on so few.
+class _Rows:
+    """Rows at random states: the free columns on which each bears, and its numbers there.
 
-    From Jacobian blocks (STATES, m, 12), which entries (m, 12) are other than zero, which rows (m,) prescribe
-    a motion, and which columns (n,) move and can rest.
+    From Jacobian blocks (STATES, m, 12), which entries (m, 12) are other than zero, and which rows (m,)
+    prescribe a motion, and then hold nothing.
     """
-    column_of, free, found = model.entry_columns(), moving.copy(), True
-    listed = column_of.tolist()
-    cannot_rest = lies_in(column_of, moving & ~can_rest)
-    while found:
-        bears = left & lies_in(column_of, free)
-        few = ~driven & bears.any(axis=1) & (bears.sum(axis=1) <= MOST)
+
+    def __init__(self, model: Model, samples: np.ndarray, left: np.ndarray, driven: np.ndarray):
+        self.numbers = samples.transpose(1, 2, 0).tolist()  # row, entry, state
+        self.entry: dict[int, dict[int, int]] = {}  # row, column -> entry
+        row, entry = np.nonzero(left & ~driven[:, None] & (model.entry_columns < model.n))
+        for r, c, e in zip(
+            row.tolist(), model.entry_columns[row, entry].tolist(), entry.tolist(), strict=True
+        ):
+            self.entry.setdefault(r, {})[c] = e
+
+    def grouped(self, free: Sequence[bool]) -> dict[tuple[int, ...], list[int]]:
+        """The rows that bear on no more than MOST free columns (n,), by those columns."""
         groups: dict[tuple[int, ...], list[int]] = {}
-        for row in np.flatnonzero(few & ~(bears & cannot_rest).any(axis=1)):
-            groups.setdefault(tuple(np.sort(column_of[row, bears[row]]).tolist()), []).append(int(row))
+        for row, entry in self.entry.items():
+            columns = tuple(sorted(column for column in entry if free[column]))
+            if 0 < len(columns) <= MOST:
+                groups.setdefault(columns, []).append(row)
+        return groups
+
+    def at(self, row: int, columns: Sequence[int]) -> list[list[float]]:
+        """The numbers of a row in these columns, state by state."""
+        numbers, entry = self.numbers[row], self.entry[row]
+        return list(zip(*(numbers[entry[column]] for column in columns), strict=True))
+
+
+def _holding(rows: _Rows, moving: np.ndarray, can_rest: np.ndarray) -> Iterator[Held]:
+    """Groups of rows that hold columns, of those (n,) that move and can rest.
+
+    Each stands after those that let it bear on so few.
+    """
+    free, rests, found = moving.tolist(), can_rest.tolist(), True
+    while found:
         found = False
-        for columns, rows in groups.items():
-            if len(rows) < len(columns) or not free[list(columns)].all():
-                continue  # too few rows, or another group has taken a column in this round
-            places = np.array([[listed[r].index(column) for column in columns] for r in rows])
-            chosen = _perpendicular(samples[:, np.array(rows)[:, None], places].swapaxes(0, 1))
+        for columns, bearing in rows.grouped(free).items():
+            if len(bearing) < len(columns) or not all(free[c] and rests[c] for c in columns):
+                continue  # too few rows, a column without mass, or one that another group has taken
+            chosen = _perpendicular([rows.at(row, columns) for row in bearing])
             if len(chosen) == len(columns):
                 found = True
-                free[list(columns)] = False
-                yield Held(tuple(rows[k] for k in chosen), columns)
+                for column in columns:
+                    free[column] = False
+                yield Held(tuple(bearing[k] for k in chosen), columns)
 
 
-def _perpendicular(rows: np.ndarray) -> list[int]:
-    """Which of the rows (r, STATES, c) have a constant length and are perpendicular to those before."""
+def _perpendicular(rows: Sequence[Sequence[Sequence[float]]]) -> list[int]:
+    """Which of the rows, state by state, have a constant length and are perpendicular to those before."""
     chosen: list[int] = []
-    lengths = np.sqrt((rows**2).sum(axis=2))
-    least, most = lengths.min(axis=1), lengths.max(axis=1)
-    steady = (least > SMALL) & (most - least <= ROUNDING * most)
-    directions = rows / np.maximum(lengths, SMALL)[:, :, None]
-    cosines = np.abs(np.einsum("isc,jsc->ijs", directions, directions)).max(axis=2)
-    for k in np.flatnonzero(steady).tolist():
-        if (cosines[k, chosen] < ROUNDING).all():
+    directions: list[list[list[float]]] = []
+    for k, row in enumerate(rows):
+        lengths = [hypot(*state) for state in row]
+        least, most = min(lengths), max(lengths)
+        if not (least > SMALL and most - least <= ROUNDING * most):
+            continue
+        own = [[x / length for x in state] for state, length in zip(row, lengths, strict=True)]
+        if all(_largest_cosine(own, other) < ROUNDING for other in directions):
             chosen.append(k)
+            directions.append(own)
     return chosen
+
+
+def _largest_cosine(one: Sequence[Sequence[float]], other: Sequence[Sequence[float]]) -> float:
+    """Between unit vectors, of any state."""
+    return max(abs(sum(x * y for x, y in zip(a, b, strict=True))) for a, b in zip(one, other, strict=True))
 
 
 @inlined

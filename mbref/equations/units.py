@@ -9,6 +9,7 @@ at least the value of the body's mass at SPREAD of its length.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import dist
 
 import numpy as np
 
@@ -26,8 +27,8 @@ def metric_root(mass: np.ndarray, lengths: np.ndarray) -> np.ndarray:
 
 
 def row_lengths(matrix: np.ndarray) -> np.ndarray:
-    """Lengths (m,) of the rows of a matrix (m, n), 1 for a row of zeros."""
-    lengths = np.linalg.norm(matrix, axis=1)
+    """Lengths (…, m) of the rows of matrices (…, m, n), 1 for a row of zeros."""
+    lengths = np.linalg.norm(matrix, axis=-1)
     return np.where(lengths > 0.0, lengths, 1.0)
 
 
@@ -39,9 +40,8 @@ def body_lengths(bodies: Sequence[Body], joints: Sequence[Joint]) -> np.ndarray:
         anchors = getattr(joint, "anchors", None) or [joint.anchor] * 2
         for name, anchor in zip(joint.bodies, anchors, strict=True):
             if name in index:
-                arm = np.subtract(anchor, bodies[index[name]].position)
-                arms[index[name]].append(float(np.linalg.norm(arm)))
-    lengths = np.array([np.mean(of_body) if of_body else 0.0 for of_body in arms])
+                arms[index[name]].append(dist(anchor, bodies[index[name]].position))
+    lengths = np.array([sum(of_body) / max(len(of_body), 1) for of_body in arms])
     has_arms = lengths > SMALLEST * lengths.max(initial=0.0)
     mean = float(np.mean(lengths[has_arms])) if np.any(has_arms) else 1.0
     return np.where(has_arms, lengths, mean)

@@ -14,9 +14,10 @@ the NamedTuple itself.  The table and its arrays stay in place while kernels run
 
 from __future__ import annotations
 
+import ctypes
 import functools
 import typing
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -29,7 +30,7 @@ from numba.extending import NativeValue, infer_getattr, intrinsic, models, regis
 from numba.np.numpy_support import from_dtype
 
 from mbref.kernels.compilation import INDEX_TABLE, INDICES, MATRIX, PLAIN, UNSIGNED, VECTOR
-from mbref.kernels.dimensions import check_sizes, size_of
+from mbref.kernels.dimensions import Shapes, check_sizes, size_of
 
 Vector = Annotated[np.ndarray, VECTOR]  # float64 (k,)
 Matrix = Annotated[np.ndarray, MATRIX]  # float64 (k, l)
@@ -168,7 +169,12 @@ def stacked(schema: type, rows: Sequence[Any], sizes: Mapping[str, int] | None =
 
 def record(values: Any) -> np.record:
     """The numbers of a record in memory of their own, to be read and written by name."""
-    return np.array([tuple(values)], dtype=dtype_of(type(values))).view(np.recarray)[0]
+    return np.array([values], dtype=_kind_of_record(type(values)))[0]
+
+
+@functools.cache
+def _kind_of_record(schema: type) -> np.dtype:
+    return np.dtype((np.record, dtype_of(schema)))
 
 
 class Packed:
@@ -179,11 +185,9 @@ class Packed:
         if isinstance(values, np.record):
             self.address = _address(values)
         else:
-            leaves = list(_leaves(values))
-            check_sizes(
-                tuple((field.title, field.shape, value.shape) for field, value in leaves if field.shape)
-            )
-            self.table = np.array([_words(field, value) for field, value in leaves], dtype=np.int64)
+            words, shapes = _words(values)
+            check_sizes(tuple(shapes))
+            self.table = np.array(words, dtype=np.int64)
             self.address = self.table.ctypes.data
             self._numba_type_ = _kind(type(values))  # of this argument, read by numba's dispatcher
         self.argument = values if PLAIN else self
@@ -200,44 +204,59 @@ def packed(values: Any) -> Packed:
     return Packed(values)
 
 
-def _leaves(values: Any) -> Iterator[tuple[Field, Any]]:
-    """Each field that takes a row of the table, and its value, checked for its type."""
+def _words(values: Any) -> tuple[list[int], list[Shapes]]:
+    """The table of a schema, WORDS a field: address, rows and columns; and the shapes of its arrays."""
+    words, shapes = [], []
     for field, value in zip(fields_of(type(values)).values(), values, strict=True):
         if field.schema:
-            if type(value) is not field.schema:
-                needed, found = field.schema.__name__, type(value).__name__
-                raise TypeError(f"{field.title}: needs {needed}, got {found}")
-            yield from _leaves(value)
+            _check_schema(field, value)
+            more, others = _words(value)
+            words += more
+            shapes += others
+        elif field.shape:
+            _check_array(field, value)
+            words += (_address(value), value.shape[0], value.shape[-1])
+            shapes.append((field.title, field.shape, value.shape))
         else:
-            _check_type(field, value)
-            yield field, value
+            words += (_address_of_other(field, value), 0, 0)
+    return words, shapes
 
 
-def _check_type(field: Field, value: Any) -> None:
-    """TypeError unless an array or record has the bytes that its field declares."""
-    if field.shape:
-        fits = isinstance(value, np.ndarray) and value.dtype == field.dtype
-        if not (fits and value.ndim == len(field.shape) and value.flags.c_contiguous):
-            found = f"{value.dtype} {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
-            raise TypeError(f"{field.title}: needs a contiguous {field.kind}, got {found}")
-    elif field.dtype is not None and getattr(value, "dtype", None) != field.dtype:
-        raise TypeError(
-            f"{field.title}: needs the record that its schema declares, got {type(value).__name__}"
-        )
+def _check_schema(field: Field, value: Any) -> None:
+    """TypeError unless a value has the schema that its field declares."""
+    if type(value) is not field.schema:
+        needed = field.schema.__name__ if field.schema else ""
+        raise TypeError(f"{field.title}: needs {needed}, got {type(value).__name__}")
 
 
-def _words(field: Field, value: Any) -> tuple[int, int, int]:
-    """A row of the table: address, rows and columns."""
-    if field.shape:
-        return _address(value), value.shape[0], value.shape[-1]
+def _check_array(field: Field, value: Any) -> None:
+    """TypeError unless an array has the entries and the order that its field declares."""
+    fits = isinstance(value, np.ndarray) and value.dtype == field.dtype
+    if not (fits and value.ndim == len(field.shape) and value.flags.c_contiguous):
+        found = f"{value.dtype} {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
+        raise TypeError(f"{field.title}: needs a contiguous {field.kind}, got {found}")
+
+
+def _address_of_other(field: Field, value: Any) -> int:
+    """The address of a record, a kernel or a packed schema; 0 for none."""
     if field.dtype is not None:
-        return _address(value), 0, 0
+        if getattr(value, "dtype", None) != field.dtype:
+            raise TypeError(
+                f"{field.title}: needs the record that its schema declares, got {type(value).__name__}"
+            )
+        return _address(value)
     is_nothing = value is None or (PLAIN and isinstance(field.kind, types.FunctionType))
-    return (0 if is_nothing else value.address), 0, 0
+    return 0 if is_nothing else int(value.address)
 
 
 def _address(values: np.ndarray | np.record) -> int:
+    """Where an array or record begins; the buffer tells it faster, of arrays that may be written to."""
+    if isinstance(values, np.ndarray) and values.size and values.flags.writeable:
+        return addressof(first_byte(values))
     return int(values.__array_interface__["data"][0])
+
+
+addressof, first_byte = ctypes.addressof, ctypes.c_char.from_buffer
 
 
 @infer_getattr

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbref.equations.initial_state import scene_length
 from mbref.simulation.run import Run
 
 TRANSMISSION = 1e3  # of velocities over rates, at the place where steps or iterations fail
@@ -22,7 +21,7 @@ def is_at_dead_position(run: Run) -> bool:
     state, model = run.memory.state, run.model
     if not run.scene.driver or model.m > MOST_ROWS or not np.isfinite(state.coordinates).all():
         return False
-    length = scene_length(model)
+    length = model.length
     terms = model.terms(float(run.memory.loop.clock.time), state.coordinates, np.zeros(model.n))
     jacobian = terms.jacobian * np.tile(np.repeat([length, 1.0], 3), model.nb)
     velocities = np.linalg.lstsq(jacobian, terms.nu, rcond=ROUNDING)[0]

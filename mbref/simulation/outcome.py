@@ -41,6 +41,7 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion
     reached, nb = int(loop.clock.sample), run.model.nb
     q, v, a, multipliers = (sample[:reached] for sample in loop.samples)
     q, v, a = q.reshape(reached, nb, 7), v.reshape(reached, nb, 6), a.reshape(reached, nb, 6)
+    blocks = model.blocks_along(run.times[:reached], q)
     return Motion(
         mechanism=run.scene,
         scene=run.scene.name,
@@ -54,8 +55,8 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion
         times=run.times[:reached],
         bodies=tuple(body.name for body in run.scene.body),
         **model.motion(q, v, a),
-        reactions=reactions(model, run.times[:reached], q, v, multipliers),
-        open_reactions=open_dimensions(model, run.times[:reached], q),
+        reactions=reactions(model, q, blocks, multipliers),
+        open_reactions=open_dimensions(model, blocks),
         outcome=OUTCOMES[status],
         t_end=float(loop.clock.time),
         message=_message(run, status),

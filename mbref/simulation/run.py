@@ -17,7 +17,7 @@ from mbref.equations.active_coordinates import (
 from mbref.equations.branches import Passed
 from mbref.equations.degrees_of_freedom import undriven_freedoms
 from mbref.equations.evaluation import evaluate_all
-from mbref.equations.initial_state import consistent_start, scene_length
+from mbref.equations.initial_state import consistent_start
 from mbref.equations.model import Model
 from mbref.equations.static_constraints import at_rest, held_by_rows, reduced_factor
 from mbref.equations.units import row_lengths
@@ -91,7 +91,7 @@ class Run:
             self.start = without_rounding(model, self.start)
             moving, entries = active_entries(model, self.start.q, self.start.v)
             held, entries = held_by_rows(model, self.start, moving, entries)
-            factor = reduced_factor(moving, entries, model.entry_columns(), held)
+            factor = reduced_factor(moving, entries, model.entry_columns, held)
             self.start = at_rest(self.start, held)
         if sparse:
             data = active_scene(model, entries)
@@ -146,7 +146,7 @@ class Run:
             smallest_step=limits.smallest_step or 1e-12 * span,
             largest_step=largest_step,
             largest_turn=limits.largest_turn or turn,
-            violation=limits.violation * max(1.0, scene_length(self.model)),
+            violation=limits.violation * max(1.0, self.model.length),
             most_steps=limits.most_steps,
             steps_per_call=STEPS_PER_CALL,
             forced_step=limits.forced_step,

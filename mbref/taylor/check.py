@@ -13,7 +13,6 @@ import time
 import numpy as np
 
 from mbref import rotations
-from mbref.equations.initial_state import scene_length
 from mbref.method import DEFAULT, Method
 from mbref.simulation.limits import GENERIC, Limits
 from mbref.simulation.run import RANK, Run
@@ -67,6 +66,6 @@ def _distances(run: Run, other: Run, samples: int) -> np.ndarray:
     """The largest distance (k,) of a body at each of the first samples: over the length, or rad."""
     mine, theirs = (r.memory.loop.samples.coordinates[:samples] for r in (run, other))
     mine, theirs = (q.reshape(samples, run.model.nb, 7) for q in (mine, theirs))
-    places = np.linalg.norm(mine[..., :3] - theirs[..., :3], axis=-1) / scene_length(run.model)
+    places = np.linalg.norm(mine[..., :3] - theirs[..., :3], axis=-1) / run.model.length
     turns = rotations.angle_between(mine[..., 3:], theirs[..., 3:])
     return np.maximum(places, turns).max(axis=-1, initial=0.0)

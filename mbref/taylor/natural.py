@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from mbref import rotations
-from mbref.equations.initial_state import Start, scene_length
+from mbref.equations.initial_state import Start
 from mbref.equations.model import Model
 from mbref.kernels.scene_layout import DISTANCE, DOT1, DOT2, POINT
 from mbref.taylor.expressions import (
@@ -48,7 +48,7 @@ class NaturalCoordinates:
 
     def __init__(self, model: Model, start: Start, moving: np.ndarray):
         self.model, self.nb = model, model.nb
-        self.length = 2.0 ** round(np.log2(scene_length(model)))
+        self.length = 2.0 ** round(np.log2(model.length))
         poses = start.q.reshape(-1, 7)
         self.place = poses[:, :3] / self.length
         axes = rotations.to_matrix(poses[:, 3:])

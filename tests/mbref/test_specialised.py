@@ -141,7 +141,7 @@ def test_a_trace_shows_that_what_is_left_out_stays_at_rest(scene):
     plain(assemble_system)(recording.t, state.coordinates, state.velocities, equations)
     active, system = run.part.active, equations.system
     bears = np.zeros((run.model.m, run.model.n + 6), dtype=bool)
-    np.put_along_axis(bears, run.model.entry_columns(), np.vectorize(is_something)(system.blocks), axis=1)
+    np.put_along_axis(bears, run.model.entry_columns, np.vectorize(is_something)(system.blocks), axis=1)
     rows = run.part.factor.symbolic.row.astype(int)
     still = np.setdiff1d(np.arange(run.model.n), active.velocities)
     others = np.setdiff1d(np.arange(run.model.m), rows)

@@ -2,65 +2,74 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import numpy as np
+from collections.abc import Sequence
+from math import sqrt
+from typing import NamedTuple
 
 from mbref.kernels.scene_layout import DISTANCE, DOT1, DOT2, POINT
 
+Vector = tuple[float, float, float]
+
 ZERO = (0.0, 0.0, 0.0)
+AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 ROWS_OF = {POINT: 3, DOT1: 1, DOT2: 1, DISTANCE: 1}
 
 
-@dataclass(frozen=True)
-class Primitive:
+class Primitive(NamedTuple):
     """One primitive equation; world vectors and points at t = 0, ``first`` fixed in the first body."""
 
     kind: int
-    point_first: tuple[float, ...] = ZERO
-    point_second: tuple[float, ...] = ZERO
-    first: tuple[float, ...] = ZERO
-    second: tuple[float, ...] = ZERO
-    turning: tuple[float, ...] = ZERO  # with a driver: fixed in the first body, a quarter turn from first
+    point_first: Vector = ZERO
+    point_second: Vector = ZERO
+    first: Vector = ZERO
+    second: Vector = ZERO
+    turning: Vector = ZERO  # with a driver: fixed in the first body, a quarter turn from first
     length: float = 0.0
     driven: bool = False
 
 
-def unit(v: tuple[float, ...]) -> np.ndarray:
+def unit(v: Sequence[float]) -> Vector:
     """v / |v|."""
-    return np.asarray(v, dtype=float) / np.linalg.norm(v)
+    x, y, z = map(float, v)
+    length = sqrt(x * x + y * y + z * z)
+    return x / length, y / length, z / length
 
 
-def frame(axis: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def cross(a: Vector, b: Vector) -> Vector:
+    """a × b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def frame(axis: Sequence[float]) -> tuple[Vector, Vector, Vector]:
     """A right-handed triad (x, y, z) with z along the axis."""
     z = unit(axis)
-    helper = np.eye(3)[np.argmin(np.abs(z))]
-    x = unit(np.cross(helper, z))
-    return x, np.cross(z, x), z
+    sizes = [abs(c) for c in z]
+    helper = AXES[sizes.index(min(sizes))]
+    x = unit(cross(helper, z))
+    return x, cross(z, x), z
 
 
-def coincident(anchor: tuple[float, ...]) -> Primitive:
+def coincident(anchor: Vector) -> Primitive:
     """The points of both bodies at the anchor stay together."""
     return Primitive(POINT, point_first=anchor, point_second=anchor)
 
 
-def perpendicular(first: np.ndarray, second: np.ndarray) -> Primitive:
+def perpendicular(first: Vector, second: Vector) -> Primitive:
     """A direction fixed in each body stay perpendicular."""
-    return Primitive(DOT1, first=tuple(first), second=tuple(second))
+    return Primitive(DOT1, first=first, second=second)
 
 
-def in_plane(anchor: tuple[float, ...], normal: np.ndarray) -> Primitive:
+def in_plane(anchor: Vector, normal: Vector) -> Primitive:
     """The second body's anchor stays in the plane through the first body's with that normal."""
-    return Primitive(DOT2, point_first=anchor, point_second=anchor, first=tuple(normal))
+    return Primitive(DOT2, point_first=anchor, point_second=anchor, first=normal)
 
 
-def driven_angle(axis: tuple[float, ...]) -> Primitive:
+def driven_angle(axis: Vector) -> Primitive:
     """The second body turns about the axis by the driver's angle."""
     x, y, _ = frame(axis)
-    return Primitive(DOT1, first=tuple(x), turning=tuple(y), second=tuple(x), driven=True)
+    return Primitive(DOT1, first=x, turning=y, second=x, driven=True)
 
 
-def driven_displacement(anchor: tuple[float, ...], axis: tuple[float, ...]) -> Primitive:
+def driven_displacement(anchor: Vector, axis: Vector) -> Primitive:
     """The second body's anchor advances along the axis by the driver's displacement."""
-    z = tuple(unit(axis))
-    return Primitive(DOT2, point_first=anchor, point_second=anchor, first=z, driven=True)
+    return Primitive(DOT2, point_first=anchor, point_second=anchor, first=unit(axis), driven=True)
