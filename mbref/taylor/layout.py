@@ -168,6 +168,8 @@ class Progress(NamedTuple):
     approaching: int = 1  # whether it is less than where the step before began
     largest_pivot: float = 0.1  # that the least one has been, of rows of length one about
     passing: int = 0  # whether singular positions are passed, or run up to
+    clearance: float = 0.0  # from singular positions, over that at which a passage ends
+    is_clear: int = 0  # whether the passage has ended
 
 
 class TaylorMemory(NamedTuple):

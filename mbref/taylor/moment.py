@@ -35,9 +35,3 @@ def enter(moment: Moment, run: Run) -> None:
     equations.system.counts["crossings"] = moment.crossings
     state.coordinates[:], state.velocities[:] = moment.coordinates, moment.velocities
     equations.angles[:] = moment.angles
-
-
-def put_counts(one: Run, other: Run) -> None:
-    """The counts of one run to another."""
-    source, target = one.memory.equations.system.counts, other.memory.equations.system.counts
-    target.setfield(source, source.dtype)

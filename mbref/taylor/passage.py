@@ -13,7 +13,7 @@
 
 from __future__ import annotations
 
-from numpy import log
+from numpy import exp, log
 
 from mbref.kernels.compilation import kernel
 from mbref.kernels.layout import OK
@@ -36,6 +36,7 @@ SHORTEST = 0.05  # the same, of a step that crosses: refused, it would be tried 
 VANISHING = log(0.2)  # of a determinant over its values at both ends, that falls and rises linearly
 LONG, MOST_PARTS = 0.5, 8  # m or rad that a variable moves in a part of a step, and the most of them
 GOLDEN, SECTIONS = 0.6180339887498949, 70  # of the search for the least determinant
+SECANTS = 12  # of the search for its change of sign, behind which it halves
 LEAST = 1e-9  # pivot over its largest below which the branch depends on rounding
 
 
@@ -165,8 +166,52 @@ def size_of(series, k, variables):
 def find_crossing(h, memory):
     """The time (s, from its beginning) at which a step of h seconds that crossed met the singular position.
 
-    The determinant vanishes there, as often as branches of loops cross; golden section finds its least size.
+    The determinant vanishes there, with a change of sign unless branches of several loops cross at once.
     """
+    change = sign_change(h, memory)
+    return change if change >= 0.0 else least_between(h, memory)
+
+
+@kernel
+def sign_change(h, memory):
+    """The time (s) at which the determinant changes its sign inside a step of h seconds; -1 if it does not.
+
+    By the Illinois algorithm (M. Dowell and P. Jarratt, BIT 11, 1971); where that is slow, because several
+    loops are flat at once and the root is a multiple one, by halving.
+    """
+    evaluate_series(0.0, memory)
+    _, unit = overlap(memory.state, memory)
+    start, end, side = 0.0, h, 0
+    before, after = value_at(start, unit, memory), value_at(end, unit, memory)
+    if not before * after < 0.0:
+        return -1.0
+    for k in range(SECTIONS):
+        middle = (start * after - end * before) / (after - before) if k < SECANTS else 0.5 * (start + end)
+        if not start < middle < end:
+            break
+        value = value_at(middle, unit, memory)
+        if value * after > 0.0:
+            end, after = middle, value
+            before = 0.5 * before if side == 1 else before
+            side = 1
+        else:
+            start, before = middle, value
+            after = 0.5 * after if side == -1 else after
+            side = -1
+    return end if abs(after) < abs(before) else start
+
+
+@kernel
+def value_at(h, unit, memory):
+    """The determinant at a distance h (s) from the step's beginning, over one of a logarithm."""
+    evaluate_series(h, memory)
+    negative, size = overlap(memory.state, memory)
+    return -exp(size - unit) if negative else exp(size - unit)
+
+
+@kernel
+def least_between(h, memory):
+    """The time (s) inside a step of h seconds at which the determinant is least, by golden section."""
     start, end = 0.0, h
     one, other = h - GOLDEN * h, GOLDEN * h
     before, after = size_at(one, memory), size_at(other, memory)

@@ -12,8 +12,8 @@ from mbref.scene import Scene
 from mbref.simulation.limits import Limits
 from mbref.simulation.stepping import DONE, PAUSED
 from mbref.taylor.moment import Moment, moment_of
+from mbref.taylor.passing import look_along, pass_on, place_crossing
 from mbref.taylor.series_run import SeriesRun
-from mbref.taylor.stepping import clearance, look_along, place_crossing
 
 BEHIND = 3e-3  # lengths or rad behind a crossing where another branch is entered
 CORRECTIONS = 6  # of the state there
@@ -28,30 +28,25 @@ class PassingRun(SeriesRun):
     def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
         super().__init__(scene, method, times, limits)
         self.taylor.progress.passing = True
-        self.memory.control.steps_per_call = 1
         self.memory.equations.system.settings.independent = True  # states are exact
         self.began: Moment | None = None
 
     def cross(self) -> int:
         """Pass a singular position from the state and time in memory: PAUSED, DONE or why that cannot be."""
-        clock, clear = self.memory.loop.clock, 0.0
-        self.taylor.progress.past_pivot = 1.0
+        progress = self.taylor.progress
         self.crossings, self.began = [], None
+        progress["past_pivot"], progress["clearance"], progress["is_clear"] = 1.0, 0.0, 0
         status = self.expand(self.times[-1])
         status = PAUSED if status == OK else status
-        while status == PAUSED:
-            status = self._step()
-            if status == PAUSED:
-                before, clear = clear, float(clearance(self._packed_taylor.argument))
-                if clear >= max(before, 1.0) and clock["time"] >= clock["passage"]:
-                    break
+        while status == PAUSED and not progress["is_clear"]:
+            status = self._pass_on()
         return status
 
-    def _step(self) -> int:
-        """One step of the series, whose crossing is recorded."""
+    def _pass_on(self) -> int:
+        """The steps over the next crossing, which is recorded, or those that lead clear of it."""
         counts = self.memory.equations.system.counts
         passed = int(counts["crossings"])
-        status = self.step_on()
+        status = int(pass_on(self._packed_taylor.argument))
         if status not in (PAUSED, DONE) or counts["crossings"] == passed:
             return status
         taken = dict(self.limits.branches).get(passed + 1, SMOOTH)
@@ -86,7 +81,8 @@ class PassingRun(SeriesRun):
             there, here = self._state_at(-ahead), self._state_at(0.0)
             q = displaced(here[0], displacement(there[0], crossing.coordinates))
             v = here[1] + velocities - there[1]
-        self.taylor.progress.past_pivot = 0.0
+        progress = self.taylor.progress
+        progress["past_pivot"], progress["clearance"], progress["is_clear"] = 0.0, 0.0, 0
         self.began = moment_of(self)
         return PAUSED
 

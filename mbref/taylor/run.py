@@ -20,7 +20,8 @@ from mbref.scene import Scene
 from mbref.simulation.limits import GENERIC, Limits
 from mbref.simulation.run import Run
 from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, TOO_MANY_STEPS, UNDECIDED
-from mbref.taylor.moment import Moment, enter, moment_of, put_counts
+from mbref.taylor.moment import Moment, enter, moment_of
+from mbref.taylor.passing import hand_over
 from mbref.taylor.passing_run import PassingRun
 from mbref.taylor.series_run import SeriesRun
 
@@ -79,20 +80,15 @@ class Passage:
     def __call__(self) -> int:
         """Take the run's state and time over one, and its samples: PAUSED, DONE or why that cannot be."""
         run, series = self._run, self._series()
+        mine, theirs = run.packed.argument, series.packed.argument
         before = moment_of(run)
-        enter(before, series)
-        put_counts(run, series)
-        series.memory.watch.reference_pivot = run.memory.watch.reference_pivot
-        series.memory.loop.clock.passage = run.memory.loop.clock.passage
+        hand_over(mine, theirs)
+        series.memory.watch["reference_pivot"] = run.memory.watch["reference_pivot"]
         status = series.cross()
-        behind = moment_of(series)
-        for mine, theirs in zip(series.memory.loop.samples, run.memory.loop.samples, strict=True):
-            theirs[before.sample : behind.sample] = mine[before.sample : behind.sample]
-        enter(behind, run)
-        put_counts(series, run)
+        hand_over(theirs, mine)
         if status not in (PAUSED, DONE):
             return status if status == TOO_MANY_STEPS else UNDECIDED
-        if not self._is_determined(series.began or before, behind, series):
+        if not self._is_determined(series.began or before, series):
             return UNDECIDED
         run.crossings += series.crossings
         return status
@@ -105,15 +101,16 @@ class Passage:
             run.making += time.process_time() - began
         return self._made
 
-    def _is_determined(self, before: Moment, behind: Moment, series: PassingRun) -> bool:
-        """Whether a twin comes to the same place over as many singular positions."""
+    def _is_determined(self, before: Moment, series: PassingRun) -> bool:
+        """Whether a twin comes to the same place as the run over as many singular positions."""
         if not series.has_freedom:
             return True
         change = max(self._run.memory.control.rtol, LEAST_CHANGE)
-        landing = series.landing
+        landing, clock = series.landing, self._run.memory.loop.clock
+        passed = self._run.memory.equations.system.counts["crossings"]
         enter(before._replace(velocities=before.velocities * (1.0 + change)), series)
         counts = series.memory.equations.system.counts
-        if series.follow(behind.time) != DONE or counts.crossings != behind.crossings:
+        if series.follow(clock["time"]) != DONE or counts["crossings"] != passed:
             return False
         near, speed = min(MAGNIFIED * change, APART), np.abs(landing[1]).max(initial=0.0)
         places, rates = np.abs(series.landing - landing).max(axis=1, initial=0.0)

@@ -15,8 +15,9 @@ from mbref.specialised import Untraceable
 from mbref.taylor.lanes import filled
 from mbref.taylor.layout import Progress, Series, Solver, TaylorMemory
 from mbref.taylor.natural import NaturalCoordinates
+from mbref.taylor.passing import hand_over, look_along, pass_on, place_crossing
 from mbref.taylor.polynomials import polynomials_of
-from mbref.taylor.stepping import advance_series, clearance, enter, look_along, place_crossing
+from mbref.taylor.stepping import advance_series, enter
 
 SHARE = 0.05  # of rtol + atol: the tolerance of a step
 NO_CODE = "its series are made by one code for every scene"
@@ -109,5 +110,5 @@ class SeriesRun(Run):
 
 def prepare_series() -> None:
     """Compile the kernels of the series, or load them from the cache of this machine."""
-    for kernel in (enter, advance_series, clearance, place_crossing, look_along):
+    for kernel in (enter, advance_series, hand_over, pass_on, place_crossing, look_along):
         kernel.prepare()

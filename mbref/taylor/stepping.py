@@ -10,11 +10,10 @@ from __future__ import annotations
 
 from numpy import exp, isfinite, log
 
-from mbref.kernels.compilation import FLOAT, INT, entry, inlined, kernel
+from mbref.kernels.compilation import INT, entry, inlined, kernel
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, OK
 from mbref.kernels.named_memory import Named
 from mbref.linear_algebra.vectors import larger
-from mbref.simulation.singular_crossing import WINDOW, relative_pivot
 from mbref.simulation.stepping import (
     DONE,
     PAUSED,
@@ -27,10 +26,8 @@ from mbref.taylor.lanes import LANES, gathered, load, store
 from mbref.taylor.layout import TaylorMemory
 from mbref.taylor.loads import ANGLE, TORSION_SERIES, expand_drivers
 from mbref.taylor.passage import (
-    AHEAD,
     exactness,
     exactness_across,
-    find_crossing,
     judge_branch,
     least_pivot,
     remember_pivots,
@@ -42,7 +39,6 @@ from mbref.taylor.samples import (
     NOISE,
     evaluate_series,
     find_poses,
-    project_state,
     put_angles,
     put_state,
     take_sample,
@@ -55,8 +51,6 @@ CORRECTIONS = 8
 ROUNDING = 1e-12  # of rows
 LOST_ROWS = 100.0  # tolerances by which rows may be off
 SHORTER = 0.7
-LEAVE = 1.5  # windows: the pivot from which on steps of the run are taken again
-CLEAR = 3.0  # of the pivot of ``AHEAD``: the same for a run in series
 
 
 @kernel
@@ -275,44 +269,6 @@ def advance_series(memory):
         if clock.time >= memory.progress.end:
             return DONE
     return PAUSED
-
-
-@entry(FLOAT(Named(TaylorMemory)))
-def clearance(memory):
-    """Distance from a singular position, over that from which steps of the run go on: the lesser of two.
-
-    One is by the pivots that steps of the run watch, one by those of series of a loose tolerance.
-    """
-    run, progress = memory.run, memory.progress
-    put_terms(memory.series.terms, memory)
-    project_state(run.loop.clock.time, run)
-    ahead = CLEAR * AHEAD * progress.largest_pivot
-    return min(relative_pivot(run.watch) / (LEAVE * WINDOW), least_pivot(memory) / ahead)
-
-
-@entry(FLOAT(Named(TaylorMemory)))
-def place_crossing(memory):
-    """Put the state where the last step crossed into memory; how long (s) before the step's end that is."""
-    length = memory.run.loop.clock.length
-    h = find_crossing(length, memory)
-    put_state_at(h, memory)
-    return length - h
-
-
-@entry(INT(FLOAT, Named(TaylorMemory)))
-def look_along(h, memory):
-    """Put the state at a distance h (s) from where the series now begins into memory."""
-    keep_terms(memory.series)
-    put_state_at(h, memory)
-    return OK
-
-
-@kernel
-def put_state_at(h, memory):
-    """Coordinates and velocities of all bodies at a distance h (s) from the step's beginning."""
-    evaluate_series(h, memory)
-    find_poses(memory)
-    put_state(memory)
 
 
 @kernel

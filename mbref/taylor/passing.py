@@ -1,0 +1,104 @@
+"""The kernels of a passage: from a run to the series and back, over singular positions and clear of them."""
+
+from __future__ import annotations
+
+from mbref.equations.coordinates import copy_state
+from mbref.kernels.compilation import FLOAT, INT, entry, kernel
+from mbref.kernels.layout import MEMORY, OK
+from mbref.kernels.named_memory import Named
+from mbref.linear_algebra.vectors import copy
+from mbref.simulation.singular_crossing import WINDOW, relative_pivot
+from mbref.simulation.stepping import DONE, PAUSED, TOO_MANY_STEPS
+from mbref.taylor.layout import TaylorMemory
+from mbref.taylor.passage import AHEAD, find_crossing, least_pivot
+from mbref.taylor.samples import evaluate_series, find_poses, project_state, put_state
+from mbref.taylor.stepping import keep_terms, put_terms, step
+
+LEAVE = 1.5  # windows: the pivot from which on steps of the run are taken again
+CLEAR = 3.0  # of the pivot of ``AHEAD``: the same for a run in series
+
+
+@entry(INT(MEMORY, MEMORY))
+def hand_over(source, target):
+    """State, time, samples and counts of a run to another of the same scene."""
+    copy_state(source.state, target.state)
+    copy(source.equations.angles, target.equations.angles)
+    mine, theirs = source.loop.clock, target.loop.clock
+    for k in range(theirs.sample, mine.sample):
+        copy(source.loop.samples.coordinates[k], target.loop.samples.coordinates[k])
+        copy(source.loop.samples.velocities[k], target.loop.samples.velocities[k])
+        copy(source.loop.samples.accelerations[k], target.loop.samples.accelerations[k])
+        copy(source.loop.samples.multipliers[k], target.loop.samples.multipliers[k])
+    theirs.time, theirs.sample, theirs.passage = mine.time, mine.sample, mine.passage
+    copy_counts(source.equations.system.counts, target.equations.system.counts)
+    return OK
+
+
+@kernel
+def copy_counts(source, target):
+    """All counts of one run to another."""
+    target.steps, target.rejected, target.evaluations = source.steps, source.rejected, source.evaluations
+    target.factorisations, target.newton = source.factorisations, source.newton
+    target.crossings = source.crossings
+
+
+@entry(INT(Named(TaylorMemory)))
+def pass_on(memory):
+    """Step over the next singular position, or clear of all of them: PAUSED; DONE at the end.
+
+    ``progress.is_clear`` says whether steps of the run go on from here: the series is as clear as they need,
+    and no nearer to a singular position than a step ago.
+    """
+    clock, counts, progress = memory.run.loop.clock, memory.run.equations.system.counts, memory.progress
+    passed = counts.crossings
+    while counts.steps < memory.run.control.most_steps:
+        status = step(memory)
+        if status != OK:
+            put_terms(memory.series.past, memory)
+            return status
+        if clock.time >= progress.end:
+            return DONE
+        before = progress.clearance
+        progress.clearance = clearance(memory)
+        progress.is_clear = progress.clearance >= max(before, 1.0) and clock.time >= clock.passage
+        if progress.is_clear or counts.crossings != passed:
+            return PAUSED
+    return TOO_MANY_STEPS
+
+
+@kernel
+def clearance(memory):
+    """Distance from a singular position, over that from which steps of the run go on: the lesser of two.
+
+    One is by the pivots that steps of the run watch, one by those of series of a loose tolerance.
+    """
+    run, progress = memory.run, memory.progress
+    put_terms(memory.series.terms, memory)
+    project_state(run.loop.clock.time, run)
+    ahead = CLEAR * AHEAD * progress.largest_pivot
+    return min(relative_pivot(run.watch) / (LEAVE * WINDOW), least_pivot(memory) / ahead)
+
+
+@entry(FLOAT(Named(TaylorMemory)))
+def place_crossing(memory):
+    """Put the state where the last step crossed into memory; how long (s) before the step's end that is."""
+    length = memory.run.loop.clock.length
+    h = find_crossing(length, memory)
+    put_state_at(h, memory)
+    return length - h
+
+
+@entry(INT(FLOAT, Named(TaylorMemory)))
+def look_along(h, memory):
+    """Put the state at a distance h (s) from where the series now begins into memory."""
+    keep_terms(memory.series)
+    put_state_at(h, memory)
+    return OK
+
+
+@kernel
+def put_state_at(h, memory):
+    """Coordinates and velocities of all bodies at a distance h (s) from the step's beginning."""
+    evaluate_series(h, memory)
+    find_poses(memory)
+    put_state(memory)
