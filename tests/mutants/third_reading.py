@@ -56,8 +56,8 @@ DEFECTS = (
     Defect("mbref/scene_validation.py", "abs(start) > 1e-12", "abs(start) > 1e-2", f"{M}scene.py"),
     Defect(
         "mbref/scene_slips.py",
-        "abs(driver.sine.phase) > TURN",
-        "driver.sine.phase > TURN",
+        "abs(sine.phase) > TURN",
+        "sine.phase > TURN",
         f"{HELP}::test_angles_beyond_a_turn_are_probably_degrees",
     ),
     Defect(
