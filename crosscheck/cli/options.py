@@ -56,7 +56,7 @@ def add_depth(parser: argparse.ArgumentParser) -> None:
     """How many settings of the engines are run."""
     parser.add_argument(
         "--depth", choices=("quick", "whole"), default="quick",
-        help="quick: at most two families of an engine and three settings of a family; whole: every setting",
+        help="quick: a few families of an engine and three settings of a family; whole: every setting",
     )  # fmt: skip
 
 

@@ -18,7 +18,13 @@ TITLES = {"mujoco": "MuJoCo", "pinocchio": "Pinocchio", "exudyn": "Exudyn", "sim
 LEVEL = ERROR_LEVELS[1]  # the error at which speeds are compared in words
 SAID = f"{LEVEL:.0e}".replace("e-0", "e-")
 
-ADAPTERS = " Times are CPU seconds of stepping, each engine as crosscheck's Python adapter calls it."
+COMPILED = ", compiled"  # how families end that call an engine's library without Python
+CLOCK = " Times are CPU seconds of stepping"
+ADAPTERS = ", each engine as crosscheck's Python adapter calls it."
+WITHOUT_PYTHON = (
+    ": families named `compiled` call an engine's library without Python, all others are called by "
+    "crosscheck's Python adapter."
+)
 
 
 class Verdict(NamedTuple):
@@ -95,7 +101,13 @@ def fast(groups: Sequence[Judged]) -> str:
         return f"No engine reaches an error of {SAID}, so speeds are not compared."
     never = [n for n in _engines(groups) if not any(n in cost for cost in costs.values())]
     end = f" {listed(map(title, never))} {'does' if len(never) == 1 else 'do'} not reach it." if never else ""
-    return (_fast_on_one(*costs.values()) if len(groups) == 1 else _fast_on_several(costs)) + end + ADAPTERS
+    text = _fast_on_one(*costs.values()) if len(groups) == 1 else _fast_on_several(costs)
+    return text + end + CLOCK + (WITHOUT_PYTHON if _has_compiled(groups) else ADAPTERS)
+
+
+def _has_compiled(groups: Sequence[Judged]) -> bool:
+    """Whether a family calls an engine's library without Python."""
+    return any(record["family"].endswith(COMPILED) for group in groups for record in group.records)
 
 
 def breaks(groups: Sequence[Judged]) -> str:

@@ -18,7 +18,7 @@ QUICK_SCENES = {  # name → end time (s)
     "four_bar": 0.02,
     "five_bar": 0.02,
 }
-QUICK_FAMILIES = ("defaults", "tuned")  # of an engine that has them, else its first ones
+QUICK_FAMILIES = ("defaults", "tuned", "forward, compiled", "newton, compiled")  # else an engine's first ones
 MOST_FAMILIES, MOST_SETTINGS = 2, 3  # in the quick sweep, of an engine and of a family
 QUICK_SAMPLES, SAMPLES = 31, 101
 QUICK_LIMIT, LIMIT = 5.0, 120.0  # s of a run

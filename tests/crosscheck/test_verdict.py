@@ -12,7 +12,7 @@ from rich.console import Console
 
 from crosscheck.cli import tables
 from crosscheck.study.difference import changes, circumstances, load
-from crosscheck.study.sentences import ADAPTERS, breaks, fast, headline, right, truth, verdict
+from crosscheck.study.sentences import ADAPTERS, CLOCK, WITHOUT_PYTHON, breaks, fast, headline, right, truth, verdict
 from crosscheck.study.tuning import tuned
 from crosscheck.study.verdict import Grade, Judged, grade, judged
 from crosscheck.study.wording import multiple, span
@@ -73,7 +73,7 @@ def test_sentences_of_one_scene():
     ), right([group()])
     assert fast([group()]) == (
         "mbref reaches an error of 1e-6 in 1 ms of stepping; Pinocchio takes 32 times as long and MuJoCo "
-        "takes 500 times as long. Exudyn does not reach it." + ADAPTERS
+        "takes 500 times as long. Exudyn does not reach it." + CLOCK + ADAPTERS
     ), fast([group()])
     assert breaks([group()]) == (
         "The defaults of Pinocchio and Exudyn end at t = 0 s, where a constraint is redundant. "
@@ -89,6 +89,8 @@ def test_other_results_and_other_sentences():
     )
     assert breaks([group(good)]) == "No engine's defaults fail or are wrong."
     assert "No engine reaches an error of 1e-6" in fast([group([record("mujoco", "tuned", 1e-3)])])
+    compiled = record("mujoco", "forward, compiled", 1e-9, 0.1)
+    assert fast([group([compiled])]).endswith("in 100 ms of stepping." + CLOCK + WITHOUT_PYTHON)
     lost = [record("mbref", "own", 1e-15), failed("exudyn", "tuned", 0.25)]
     assert right([group(lost)]) == (
         "mbref agrees with the truth to less than the truth's own bound, 3e-14. "
