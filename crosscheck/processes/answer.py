@@ -101,5 +101,7 @@ def _cost(value: Any) -> Cost:
     }
     if not all(math.isfinite(number) for number in numbers.values()):
         raise MalformedAnswer("cost: is not finite")
+    if min(numbers.values()) < 0:
+        raise MalformedAnswer("cost: is negative")
     plain: dict[str, Any] = {n: x if n.endswith("seconds") else int(x) for n, x in numbers.items()}
     return Cost(**plain)

@@ -178,6 +178,7 @@ DAMAGES = {
     "no rotation": lambda good: replace(good, orientation=0 * good.orientation),
     "unknown joint": lambda good: replace(good, reactions={"X": np.zeros((3, 6))}),
     "no cost": lambda good: replace(good, cost=1.0),
+    "negative cost": lambda good: replace(good, cost=Cost(seconds=-0.1)),
     "cost of NaN": lambda good: replace(good, cost=Cost(seconds=float("nan"))),
     "settings of objects": lambda good: replace(good, settings={"a": Fake}),
     "a local class": lambda good: type("Local", (), {})(),

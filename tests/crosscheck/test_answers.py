@@ -34,6 +34,7 @@ SAYS = {
     "unknown joint": "reactions: are not those of joints",
     "no cost": "cost: is float, not a Cost",
     "cost of NaN": "cost: is not finite",
+    "negative cost": "cost: is negative",
     "settings of objects": "settings: are no table",
     "a local class": "returned Local, not a Trajectory",
 }
