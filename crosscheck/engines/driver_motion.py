@@ -58,12 +58,11 @@ def fastest_rate(scene: Scene, coarse: Callable[[float], Trajectory], counts: Se
 
     ``coarse(step)`` runs the scene with steps of that length (s).  ``counts`` are the numbers of steps to
     try in turn: a run that fails, or turns by more than SCOUT_TURN in a step, is repeated with the next.
+    A stated rate needs no run, and the largest number of steps bounds what is returned.
     """
     for steps in counts:
         run = coarse(scene.duration / steps)
-        speeds = np.linalg.norm(run.angular_velocity, axis=2)
-        resolved = SCOUT_TURN * steps / scene.duration
-        rate = max(stated_rate(scene), float(speeds.max(initial=0.0)))
-        if run.outcome is Outcome.COMPLETED and rate < resolved:
+        speed = float(np.linalg.norm(run.angular_velocity, axis=2).max(initial=0.0))
+        if run.outcome is Outcome.COMPLETED and speed < SCOUT_TURN * steps / scene.duration:
             break
-    return min(rate, resolved)
+    return min(max(stated_rate(scene), speed), SCOUT_TURN * max(counts) / scene.duration)

@@ -16,6 +16,7 @@ from mbref.scene import Scene
 TITLES = {"mujoco": "MuJoCo", "pinocchio": "Pinocchio", "exudyn": "Exudyn", "simbody": "Simbody",
           "sundials": "SUNDIALS IDA", "ondsel": "OndselSolver"}  # fmt: skip
 LEVEL = ERROR_LEVELS[1]  # the error at which speeds are compared in words
+TIMED_OUT = "TIMED_OUT"
 SAID = f"{LEVEL:.0e}".replace("e-0", "e-")
 
 COMPILED = ", compiled"  # how families end that call an engine's library without Python
@@ -234,7 +235,9 @@ def _merged(found: Mapping[str, list[Judged]]) -> dict[tuple[str, ...], list[Jud
 
 def _failed(groups: Sequence[Judged], names: Sequence[str], scenes: Sequence[Judged]) -> str:
     ends = {f"{max(g.defaults()[n]['t_end'], 0):.3g}" for g in scenes for n in names}
+    outcomes = {g.defaults()[n]["outcome"] for g in scenes for n in names}
     when = f"end at t = {next(iter(ends))} s" if len(ends) == 1 else "do not complete"
+    when = "do not end within the time limit" if outcomes == {TIMED_OUT} else when
     rows = [g.redundant for g in scenes]
     cause = ""
     if all(rows):
@@ -301,6 +304,8 @@ def _engines(groups: Sequence[Judged]) -> list[str]:
 
 
 def _end(record: Record) -> str:
+    if record["outcome"] == TIMED_OUT:
+        return f"no result within {record['time_limit']:g} s (--time-limit)"
     return f"{record['outcome'].lower().replace('_', ' ')} at t = {max(record['t_end'], 0):.3g} s"
 
 

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import DOP853
 
+from crosscheck.engines.driver_motion import fastest_rate
 from crosscheck.engines.sampling import Adaptive, Counts, Failed, rk4, step_count
-from mbref.trajectory import Outcome
+from mbref.scene import Scene
+from mbref.trajectory import Outcome, Trajectory
 
 
 def oscillator(t: float, y: np.ndarray) -> np.ndarray:
@@ -22,6 +24,24 @@ def cosine(t: float) -> np.ndarray:
 def adaptive(rhs, rtol: float = 1e-9, **options) -> Adaptive:
     limits = {"min_step": 1e-4, "max_step": np.inf} | options
     return Adaptive(rhs, None, rtol, limits["min_step"], limits["max_step"], Counts())
+
+
+@pytest.mark.parametrize(("stiffness", "rate", "runs"), [(1e8, 5e2, 1), (1.0, 3.0, 1), (0.0, 2e3, 2)])
+def test_a_stated_rate_asks_for_no_second_coarse_run(stiffness: float, rate: float, runs: int) -> None:
+    """A mass on a stiff spring turns slowly; without one the body spins faster than 2000 steps resolve."""
+    scene = Scene(name="mass", duration=2.0, body=[{"name": "m", "mass": 400.0, "inertia": (1, 1, 1),
+        "position": (1.0, 0.0, 0.0)}], load=[{"type": "spring", "bodies": ("ground", "m"), "damping": 0.0,
+        "points": ((0, 0, 0), (1, 0, 0)), "stiffness": stiffness, "natural_length": 1.0}])  # fmt: skip
+    asked = []
+
+    def coarse(step: float) -> Trajectory:
+        asked.append(step)
+        spin = np.array([[[3.0 if stiffness else 2e3, 0.0, 0.0]]])
+        place, turn = np.ones((1, 1, 3)), np.array([[[1.0, 0.0, 0.0, 0.0]]])
+        return Trajectory("mass", "", "", "", {}, np.zeros(1), ("m",), place, turn, place, spin)
+
+    assert fastest_rate(scene, coarse) == pytest.approx(rate)
+    assert len(asked) == runs, asked
 
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-10])

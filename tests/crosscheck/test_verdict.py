@@ -52,6 +52,15 @@ def group(records=RECORDS, scene=REDUNDANT, **known: Any) -> Judged:
     return Judged(scene, {"scene": scene.name, **TRUTH, **known}, records)
 
 
+def test_runs_without_a_result_are_not_told_as_an_end_at_0():
+    late = [
+        record("mujoco", family, None, outcome="TIMED_OUT", t_end=0.0) for family in ("tuned", "defaults")
+    ]
+    found = group([record("mbref", "own", 1e-12), *late])
+    assert "MuJoCo completes no run: no result within 60 s (--time-limit)." in right([found])
+    assert "The defaults of MuJoCo do not end within the time limit" in breaks([found])
+
+
 @pytest.mark.parametrize(
     ("error", "verdict"),
     [(1e-8, Grade.RIGHT), (1.1e-8, Grade.INACCURATE), (1e-2, Grade.INACCURATE), (1.1e-2, Grade.WRONG),
