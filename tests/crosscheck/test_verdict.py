@@ -12,7 +12,17 @@ from rich.console import Console
 
 from crosscheck.cli import tables
 from crosscheck.study.difference import changes, circumstances, load
-from crosscheck.study.sentences import ADAPTERS, CLOCK, WITHOUT_PYTHON, breaks, fast, headline, right, truth, verdict
+from crosscheck.study.sentences import (
+    ADAPTERS,
+    CLOCK,
+    WITHOUT_PYTHON,
+    breaks,
+    fast,
+    headline,
+    right,
+    truth,
+    verdict,
+)
 from crosscheck.study.tuning import tuned
 from crosscheck.study.verdict import Grade, Judged, grade, judged
 from crosscheck.study.wording import multiple, span
