@@ -261,11 +261,8 @@ def _other_failures(groups: Sequence[Judged]) -> str:
     """Runs at other settings than defaults that failed or were wrong, counted."""
     runs = [r for group in groups for r in group.records if r["family"] != "defaults"]
     bad = {verdict: [r for r in runs if grade(r) is verdict] for verdict in (Grade.FAILED, Grade.WRONG)}
-    said = {Grade.FAILED: "failed", Grade.WRONG: "{} wrong"}
-    told = [
-        f"{len(found)} {said[verdict].format('is' if len(found) == 1 else 'are')}"
-        for verdict, found in bad.items() if found
-    ]  # fmt: skip
+    verbs = {Grade.FAILED: "", Grade.WRONG: f"{is_or_are(bad[Grade.WRONG])} "}
+    told = [f"{len(found)} {verbs[verdict]}{verdict}" for verdict, found in bad.items() if found]
     return f" Of {len(runs)} runs at other settings, {listed(told)}." if told else ""
 
 

@@ -20,7 +20,7 @@ def at_most(value: float, bound: float) -> str:
     return f"{math.ceil(value / 10.0 ** (exponent - 1)) / 10:.1f}e{exponent}"
 
 
-def is_or_are(names: Sequence[str]) -> str:
+def is_or_are(names: Sequence[object]) -> str:
     """``is`` of one, ``are`` of several."""
     return "is" if len(names) == 1 else "are"
 
