@@ -170,6 +170,9 @@ class Progress(NamedTuple):
     passing: int = 0  # whether singular positions are passed, or run up to
     clearance: float = 0.0  # from singular positions, over that at which a passage ends
     is_clear: int = 0  # whether the passage has ended
+    left: float = 0.0  # of the violation, where the step began; known after an attempt failed
+    entered: float = 0.0  # the least pivot where the series began
+    cut: int = 0  # the last order of the series that an attempt takes
 
 
 class TaylorMemory(NamedTuple):

@@ -37,17 +37,25 @@ VANISHING = log(0.2)  # of a determinant over its values at both ends, that fall
 LONG, MOST_PARTS = 0.5, 8  # m or rad that a variable moves in a part of a step, and the most of them
 GOLDEN, SECTIONS = 0.6180339887498949, 70  # of the search for the least determinant
 SECANTS = 12  # of the search for its change of sign, behind which it halves
+LEFT = 2.0  # of the violation that corrections leave, of rows that depend on others: it is no gap's
+CREPT = 1e-6  # pivot over its largest below which a crossing is rounding's, unless the series began there
 LEAST = 1e-9  # pivot over its largest below which the branch depends on rounding
 
 
 @kernel
 def remember_pivots(memory):
-    """Keep the pivots where a step begins."""
+    """Keep the pivots where a step begins, and whether they fall."""
+    before = memory.progress.past_pivot
+    remember_pivots_here(memory)
+    memory.progress.approaching = memory.progress.past_pivot <= before
+
+
+@kernel
+def remember_pivots_here(memory):
+    """Keep the pivots of the last factorisation, and the largest that the least one has been."""
     solver, progress = memory.solver, memory.progress
     copy(solver.last, solver.past)
-    pivot = least_pivot(memory)
-    progress.approaching = pivot <= progress.past_pivot
-    progress.past_choice, progress.past_pivot = progress.choice, pivot
+    progress.past_choice, progress.past_pivot = progress.choice, least_pivot(memory)
     progress.largest_pivot = max(progress.largest_pivot, progress.past_pivot)
 
 
@@ -244,10 +252,17 @@ def exactness(progress):
 @kernel
 def exactness_across(progress):
     """The tolerance of a step that crosses: its terms grow by rounding, with its length over the distance."""
-    pivot, near = progress.past_pivot, BEFORE * progress.largest_pivot
-    if progress.passing and progress.approaching and pivot < near:
-        return max(progress.tolerance, NOISE / pivot)
+    distance = progress.past_pivot / progress.largest_pivot
+    if progress.passing and progress.approaching and distance < BEFORE:
+        return max(progress.tolerance, NOISE / distance)
     return exactness(progress)
+
+
+@kernel
+def distance_ahead(h, memory):
+    """How far (s) a least pivot that falls linearly, and did so in an attempt of h seconds, is from zero."""
+    pivot, past = least_pivot(memory), memory.progress.past_pivot
+    return h * past / (past + pivot if memory.progress.crossed else past - pivot)
 
 
 @kernel
@@ -260,7 +275,7 @@ def resolution(memory):
         rounding = max(rounding, CLOCK * memory.run.loop.clock.time * speed)
     if progress.crossed:
         return max(ACROSS, rounding)
-    return max(RESOLUTION * progress.past_pivot / progress.largest_pivot, rounding)
+    return max(RESOLUTION * progress.past_pivot / progress.largest_pivot, rounding, LEFT * progress.left)
 
 
 @kernel
@@ -275,6 +290,8 @@ def judge_branch(h, last, memory):
         return OK
     if progress.crossed and turns_back(memory):
         return STEP_TOO_SMALL
+    if progress.crossed and progress.past_pivot < min(CREPT * progress.largest_pivot, progress.entered):
+        return UNDECIDED
     deepest = (SHORTEST if progress.crossed else DEEPEST) * progress.past_pivot
     if not progress.violation <= resolution(memory) or (not last and pivot < deepest):
         return STEP_TOO_SMALL

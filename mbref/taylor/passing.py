@@ -92,6 +92,7 @@ def place_crossing(memory):
 def look_along(h, memory):
     """Put the state at a distance h (s) from where the series now begins into memory."""
     keep_terms(memory.series)
+    memory.progress.cut = memory.progress.order
     put_state_at(h, memory)
     return OK
 

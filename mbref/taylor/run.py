@@ -2,8 +2,7 @@
 
 The state before a singular position is known to the run's tolerance alone, and the passage may magnify its
 error.  So, unless drivers prescribe the whole motion, the series are followed twice: a twin begins with
-velocities changed by the tolerance.  Where both end apart, or pass another number of singular positions, the
-motion is not determined.
+velocities changed by the tolerance.  Where both end apart, the motion is not determined.
 """
 
 from __future__ import annotations
@@ -29,6 +28,7 @@ TOLERANCE = 1e-13  # of the series that pass singular positions
 SERIES = "taylor[order=16]"  # of them: lower orders magnify rounding less
 LEAST_CHANGE = 1e-9  # of the velocities of a twin
 MAGNIFIED, APART = 100.0, 1e-2  # lengths by which twins end apart: over the change, and whatever it is
+CLOSER = 0.1  # the same, over as many singular positions as the twin did not count
 FASTER = 10.0  # the same of velocities, over the fastest
 
 
@@ -102,16 +102,20 @@ class Passage:
         return self._made
 
     def _is_determined(self, before: Moment, series: PassingRun) -> bool:
-        """Whether a twin comes to the same place as the run over as many singular positions."""
+        """Whether a twin comes to the same place as the run.
+
+        Nearer, where it counts another number of singular positions: a step may pass two.
+        """
         if not series.has_freedom:
             return True
         change = max(self._run.memory.control.rtol, LEAST_CHANGE)
         landing, clock = series.landing, self._run.memory.loop.clock
         passed = self._run.memory.equations.system.counts["crossings"]
         enter(before._replace(velocities=before.velocities * (1.0 + change)), series)
-        counts = series.memory.equations.system.counts
-        if series.follow(clock["time"]) != DONE or counts["crossings"] != passed:
+        if series.follow(clock["time"]) != DONE:
             return False
+        same = series.memory.equations.system.counts["crossings"] == passed
         near, speed = min(MAGNIFIED * change, APART), np.abs(landing[1]).max(initial=0.0)
+        near *= 1.0 if same else CLOSER
         places, rates = np.abs(series.landing - landing).max(axis=1, initial=0.0)
         return bool(places <= near and rates <= FASTER * near * speed)

@@ -22,12 +22,12 @@ CLEAR = 1e-6  # relative difference of accelerations that contradict each other
 def evaluate_series(h, memory):
     """All lanes and their first two derivatives at a distance h (s) from the step's beginning (Horner)."""
     past, state = memory.series.past, memory.state
-    orders, lanes = past.shape
+    last, lanes = memory.progress.cut, past.shape[1]
     for j in range(0, lanes, LANES):
-        value = load(past, (orders - 1) * lanes + j)
+        value = load(past, last * lanes + j)
         rate = 0.0 * value
         half = rate
-        for k in range(orders - 2, -1, -1):
+        for k in range(last - 1, -1, -1):
             half = rate + h * half
             rate = value + h * rate
             value = load(past, k * lanes + j) + h * value
@@ -175,7 +175,7 @@ def put_angles(h, memory):
     torsions, past = memory.polynomials.torsions, memory.series.past_angles
     for s in range(past.shape[0]):
         value = 0.0
-        for k in range(memory.progress.order, -1, -1):
+        for k in range(memory.progress.cut, -1, -1):
             value = value * h + past[s, k]
         memory.run.equations.angles[torsions.slot[s]] = value
         memory.angles[s] = value

@@ -166,10 +166,16 @@ def factorise(memory):
     if not invert(solver, False):
         if choose(memory) != progress.rank:
             return SINGULAR
-        assemble(memory)
-        invert(solver, True)
+        factorise_anew(memory)
     put_response(memory)
     return inertia_left(memory)
+
+
+@kernel
+def factorise_anew(memory):
+    """The inverse of K by a partition that has just been chosen."""
+    assemble(memory)
+    invert(memory.solver, True)
 
 
 @inlined

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from numpy import exp, isfinite, log
 
-from mbref.kernels.compilation import INT, entry, inlined, kernel
-from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, OK
+from mbref.kernels.compilation import INT, entry, kernel
+from mbref.kernels.layout import NOT_FINITE, OK
 from mbref.kernels.named_memory import Named
-from mbref.linear_algebra.vectors import larger
+from mbref.linear_algebra.vectors import copy, larger
 from mbref.simulation.stepping import (
     DONE,
     PAUSED,
@@ -22,15 +22,18 @@ from mbref.simulation.stepping import (
     TOO_MANY_STEPS,
     UNDECIDED,
 )
-from mbref.taylor.lanes import LANES, gathered, load, store
+from mbref.taylor.correction import correct, violation
+from mbref.taylor.lanes import LANES, load, store
 from mbref.taylor.layout import TaylorMemory
 from mbref.taylor.loads import ANGLE, TORSION_SERIES, expand_drivers
 from mbref.taylor.passage import (
+    distance_ahead,
     exactness,
     exactness_across,
     judge_branch,
     least_pivot,
     remember_pivots,
+    remember_pivots_here,
     size_of,
 )
 from mbref.taylor.readings import read_variables
@@ -44,86 +47,13 @@ from mbref.taylor.samples import (
     take_sample,
 )
 from mbref.taylor.series import expand
-from mbref.taylor.solver import choose, factorise, solution
+from mbref.taylor.solver import choose, factorise_anew
 
-SMALL = 1e-6  # a violation whose correction leaves its square
-CORRECTIONS = 8
 ROUNDING = 1e-12  # of rows
 LOST_ROWS = 100.0  # tolerances by which rows may be off
 SHORTER = 0.7
-
-
-@kernel
-def violation(memory):
-    """Φ of every row at the first coefficients; the largest."""
-    rows, products, terms = memory.polynomials.rows, memory.polynomials.products, memory.series.terms
-    phi, nz, largest = memory.solver.phi, memory.solver.order.shape[0], 0.0
-    for block in range(products.start.shape[0] - 1):
-        total = load(rows.constant, block * LANES)
-        for c in range(products.start[block], products.start[block + 1], LANES):
-            one = load(products.weight, c) * gathered(terms, 0, products.left, c)
-            total = total + one * gathered(terms, 0, products.right, c)
-        store(total, phi, block * LANES)
-    for e in range(rows.linear_row.shape[0]):
-        phi[nz + rows.linear_row[e]] += rows.linear_weight[e] * terms[0, rows.linear_lane[e]]
-    for r in range(nz, memory.solver.partner.shape[0]):
-        largest = larger(largest, phi[r])
-    return largest
-
-
-@inlined
-def violation_rate(memory):
-    """Φ' of every row at the first two coefficients."""
-    rows, products, terms = memory.polynomials.rows, memory.polynomials.products, memory.series.terms
-    phi, nz, lanes = memory.solver.phi, memory.solver.order.shape[0], memory.series.terms.shape[1]
-    for block in range(products.start.shape[0] - 1):
-        total = 0.0 * load(rows.constant, block * LANES)
-        for c in range(products.start[block], products.start[block + 1], LANES):
-            left, left_rate = gathered(terms, 0, products.left, c), gathered(terms, lanes, products.left, c)
-            right, right_rate = (
-                gathered(terms, 0, products.right, c),
-                gathered(terms, lanes, products.right, c),
-            )
-            total = total + load(products.weight, c) * (left * right_rate + left_rate * right)
-        store(total, phi, block * LANES)
-    for e in range(rows.linear_row.shape[0]):
-        phi[nz + rows.linear_row[e]] += rows.linear_weight[e] * terms[1, rows.linear_lane[e]]
-
-
-@inlined
-def subtract_violation(order, memory):
-    """Change the variables of order 0 or 1 by the least, in the metric of M, that takes Φ or Φ' away."""
-    solver, terms, variable = memory.solver, memory.series.terms, memory.series.variable
-    lanes = terms.shape[1]
-    for j in range(0, lanes, LANES):
-        store(-1.0 * load(solver.phi, j), solver.rhs, j)
-    for j in range(0, lanes, LANES):
-        change = load(variable, j) * solution(solver, j)
-        store(load(terms, order * lanes + j) + change, terms, order * lanes + j)
-
-
-@kernel
-def correct(memory):
-    """Correct positions and velocities, the first coefficients: OK, SINGULAR or NOT_CONVERGED."""
-    progress, left = memory.progress, 1.0
-    for attempt in range(CORRECTIONS):
-        left = violation(memory)
-        if attempt == 0:
-            progress.violation = left
-        status = factorise(memory)
-        if status != OK:
-            return status
-        subtract_violation(0, memory)
-        if left <= SMALL:
-            break
-    if not left <= SMALL:
-        return NOT_CONVERGED
-    pivot = least_pivot(memory)
-    if left > progress.tolerance * pivot * pivot:  # then the correction has changed the factor
-        status = factorise(memory)
-    violation_rate(memory)
-    subtract_violation(1, memory)
-    return status
+NEARLY = 0.2  # of a step's first pivot: a step that ends nearer to a singular position is tried beyond it
+OVER = 1.25  # its length then, over the distance
 
 
 @kernel
@@ -213,11 +143,52 @@ def attempt(h, last, memory):
 
 
 @kernel
+def return_to_start(memory):
+    """Back to where the step began: rows and variables as chosen there, and the violation that is left."""
+    progress, past, terms = memory.progress, memory.series.past, memory.series.terms
+    for k in range(2):
+        copy(past[k], terms[k])
+    progress.left = violation(memory)
+    if progress.choice != progress.past_choice:
+        choose(memory)
+        factorise_anew(memory)
+        remember_pivots_here(memory)
+
+
+@kernel
+def next_length(h, exact, memory):
+    """The length (s) of the attempt after one of h seconds: clearly over the singular position that it came
+    near to or crossed, by the series without its rounding; else one that does not reach it."""
+    progress = memory.progress
+    near = progress.crossed or least_pivot(memory) < NEARLY * progress.past_pivot
+    if progress.cut == progress.order and near and h > exact:
+        over = OVER * distance_ahead(h, memory)
+        progress.cut = least_term(over, memory)
+        return over
+    progress.cut = progress.order
+    return exact if h > exact else h * SHORTER
+
+
+@kernel
+def least_term(h, memory):
+    """The order, below the last, of the least term at a distance h (s): those beyond grow by rounding."""
+    past, variables = memory.series.past, memory.solver.order.shape[0]
+    best, least, power = 2, 1e300, h
+    for k in range(2, memory.progress.order):
+        power *= h
+        size = size_of(past, k, variables) * power
+        if size < least:
+            best, least = k, size
+    return best
+
+
+@kernel
 def step(memory):
     """One step, as many attempts as it takes, and the samples on its way."""
     loop, control, counts = memory.run.loop, memory.run.control, memory.run.equations.system.counts
     clock, times, progress = loop.clock, loop.times, memory.progress
     remember_series(memory)
+    progress.cut, progress.left = progress.order, 0.0
     left = progress.end - clock.time
     exact = min(longest_step(exactness(progress), memory), left)
     h = min(longest_step(exactness_across(progress), memory), left)
@@ -225,11 +196,12 @@ def step(memory):
         status = attempt(h, h >= left, memory)
         if status == OK and (progress.crossed or h <= exact):
             break
-        if status == SINGULAR_AHEAD or (status == UNDECIDED and h <= exact):
+        if status == SINGULAR_AHEAD or (status == UNDECIDED and (progress.crossed or h <= exact)):
             clock.passage = clock.time + h
             return status
         counts.rejected += 1
-        h = exact if h > exact else h * SHORTER
+        h = min(next_length(h, exact, memory), left)
+        return_to_start(memory)
         if not h >= control.smallest_step:
             return status
     now = progress.end if h >= left else clock.time + h

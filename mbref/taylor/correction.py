@@ -1,0 +1,86 @@
+"""Correction of a series' first coefficients: the least change, in the metric of M, that meets the rows."""
+
+from __future__ import annotations
+
+from mbref.kernels.compilation import inlined, kernel
+from mbref.kernels.layout import NOT_CONVERGED, OK
+from mbref.linear_algebra.vectors import larger
+from mbref.taylor.lanes import LANES, gathered, load, store
+from mbref.taylor.passage import least_pivot
+from mbref.taylor.solver import factorise, solution
+
+SMALL = 1e-6  # a violation whose correction leaves its square
+CORRECTIONS = 8
+
+
+@kernel
+def violation(memory):
+    """Φ of every row at the first coefficients; the largest."""
+    rows, products, terms = memory.polynomials.rows, memory.polynomials.products, memory.series.terms
+    phi, nz, largest = memory.solver.phi, memory.solver.order.shape[0], 0.0
+    for block in range(products.start.shape[0] - 1):
+        total = load(rows.constant, block * LANES)
+        for c in range(products.start[block], products.start[block + 1], LANES):
+            one = load(products.weight, c) * gathered(terms, 0, products.left, c)
+            total = total + one * gathered(terms, 0, products.right, c)
+        store(total, phi, block * LANES)
+    for e in range(rows.linear_row.shape[0]):
+        phi[nz + rows.linear_row[e]] += rows.linear_weight[e] * terms[0, rows.linear_lane[e]]
+    for r in range(nz, memory.solver.partner.shape[0]):
+        largest = larger(largest, phi[r])
+    return largest
+
+
+@inlined
+def violation_rate(memory):
+    """Φ' of every row at the first two coefficients."""
+    rows, products, terms = memory.polynomials.rows, memory.polynomials.products, memory.series.terms
+    phi, nz, lanes = memory.solver.phi, memory.solver.order.shape[0], memory.series.terms.shape[1]
+    for block in range(products.start.shape[0] - 1):
+        total = 0.0 * load(rows.constant, block * LANES)
+        for c in range(products.start[block], products.start[block + 1], LANES):
+            left, left_rate = gathered(terms, 0, products.left, c), gathered(terms, lanes, products.left, c)
+            right, right_rate = (
+                gathered(terms, 0, products.right, c),
+                gathered(terms, lanes, products.right, c),
+            )
+            total = total + load(products.weight, c) * (left * right_rate + left_rate * right)
+        store(total, phi, block * LANES)
+    for e in range(rows.linear_row.shape[0]):
+        phi[nz + rows.linear_row[e]] += rows.linear_weight[e] * terms[1, rows.linear_lane[e]]
+
+
+@inlined
+def subtract_violation(order, memory):
+    """Change the variables of order 0 or 1 by the least, in the metric of M, that takes Φ or Φ' away."""
+    solver, terms, variable = memory.solver, memory.series.terms, memory.series.variable
+    lanes = terms.shape[1]
+    for j in range(0, lanes, LANES):
+        store(-1.0 * load(solver.phi, j), solver.rhs, j)
+    for j in range(0, lanes, LANES):
+        change = load(variable, j) * solution(solver, j)
+        store(load(terms, order * lanes + j) + change, terms, order * lanes + j)
+
+
+@kernel
+def correct(memory):
+    """Correct positions and velocities, the first coefficients: OK, SINGULAR or NOT_CONVERGED."""
+    progress, left = memory.progress, 1.0
+    for attempt in range(CORRECTIONS):
+        left = violation(memory)
+        if attempt == 0:
+            progress.violation = left
+        status = factorise(memory)
+        if status != OK:
+            return status
+        subtract_violation(0, memory)
+        if left <= SMALL:
+            break
+    if not left <= SMALL:
+        return NOT_CONVERGED
+    pivot = least_pivot(memory)
+    if left > progress.tolerance * pivot * pivot:  # then the correction has changed the factor
+        status = factorise(memory)
+    violation_rate(memory)
+    subtract_violation(1, memory)
+    return status
