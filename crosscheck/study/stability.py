@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from crosscheck.engine import Setting
+from crosscheck.judge.truth import Truth, closed_form
 from crosscheck.study.grid import Case, Record, study
 from crosscheck.study.progress import counted, shown
 from crosscheck.study.scouting import scout, settings, unasked
@@ -102,6 +103,12 @@ def ladders() -> tuple[Ladder, ...]:
             "rad", [(a, _door(a)) for a in (1e-1, 1e-3, 1e-5, 1e-6, 1e-10, 1e-11, 1e-13, 1e-15)],
         ),
         Ladder(
+            "initial_violation",
+            "The velocities given to a slider-crank miss its joints by so much of the crank pin's speed; the "
+            "nearest velocities that meet the joints are the start.", "violation over speed",
+            [(v, _missing(v)) for v in powers(-14, -2, 9)],
+        ),
+        Ladder(
             RANK_TOLERANCE, "A slider-crank with three redundant rows turns under gravity, and singular "
             "values or pivots below so much of the largest count as zero.",
             "rank tolerance", [(r, _turning().with_(duration=0.5)) for r in powers(-16, -1, 9)],
@@ -124,6 +131,19 @@ def _gap(gap: float) -> Scene:
 
 def _turning() -> Scene:
     return slider_crank(0.304, 0.4048, 0.3, "duration", rate=30.0).with_(gravity=(0.0, -9.81, 0.0))
+
+
+def _missing(violation: float) -> Scene:
+    """The turning slider-crank with every velocity given, the slider's off along its guide."""
+    scene = _turning().with_(duration=0.5)
+    start = cast(Truth, closed_form(scene)).poses(np.zeros(1))
+    velocities, spins = start.velocity[0].copy(), start.angular_velocity[0]
+    velocities[2, 0] += violation * 2.0 * np.linalg.norm(velocities[0])
+    bodies = (
+        body.model_copy(update={"velocity": _times(v, 1.0), "angular_velocity": _times(w, 1.0)})
+        for body, v, w in zip(scene.body, velocities, spins, strict=True)
+    )
+    return scene.with_(body=tuple(bodies))
 
 
 def _heavy_slider(ratio: float) -> Scene:
