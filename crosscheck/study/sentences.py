@@ -23,8 +23,8 @@ COMPILED = ", compiled"  # how families end that call an engine's library withou
 CLOCK = " Times are CPU seconds of stepping"
 ADAPTERS = ", each engine as crosscheck's Python adapter calls it."
 WITHOUT_PYTHON = (
-    ": families named `compiled` call an engine's library without Python, all others are called by "
-    "crosscheck's Python adapter."
+    ": families with “compiled” in their names call an engine's library without Python, all others are "
+    "called by crosscheck's Python adapter."
 )
 
 
@@ -207,7 +207,7 @@ def _fast_on_several(costs: Mapping[str, Mapping[str, float]]) -> str:
     count = {name: list(winners.values()).count(name) for name in dict.fromkeys(winners.values())}
     first = max(count, key=lambda n: count[n])
     ratios = [min(c for n, c in cost.items() if n != first) / cost[first]
-              for cost in costs.values() if first in cost and len(cost) > 1]  # fmt: skip
+              for scene, cost in costs.items() if winners[scene] == first and len(cost) > 1]  # fmt: skip
     share = f"{count[first]} of {len(costs)}" if count[first] < len(costs) else f"all {len(costs)}"
     text = f"{title(first)} is the fastest to an error of {SAID} on {share} scenes"
     if ratios:

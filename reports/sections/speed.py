@@ -49,7 +49,7 @@ def failed(runs: Sequence[Run]) -> Failures:
 def _caption(scene_runs: SceneRuns, drawable: Sequence[Run]) -> str:
     text = (
         "Seconds of stepping against the largest error of any body at any sample; further left is more "
-        "accurate, lower is faster; engines run through adapters in Python. "
+        "accurate, lower is faster; families with “compiled” in their names call an engine without Python. "
         f"{len(scene_runs.completed())} of {len(scene_runs.runs)} runs completed."
     )
     if drawable:
