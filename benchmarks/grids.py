@@ -12,11 +12,11 @@ from dataclasses import replace
 from typing import Any
 
 from crosscheck.engine import Setting
+from crosscheck.study.sentences import COMPILED
 from mbref.scene import Scene
 from mbref.simulation.simulate import simulate
 
 COARSEST, FINEST = -3.0, -12.0  # decades of a relative tolerance
-COMPILED = ", compiled"  # ends the name of a family without Python between samples
 BETAS = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  # 1/s, beside the engine's own
 SCANS = (1e-6, 1e-10)  # relative tolerances at which rates of closures are compared
 SHORTER = (1.0, 0.25)  # shortest steps of compiled families at singular positions, of the engine's own

@@ -26,7 +26,7 @@ def with_lines(text: str, faults: Sequence[str]) -> list[str]:
 
 
 def toml_hint(text: str, error: str) -> str:
-    """What follows a TOML reader's message: entries with single brackets, else the line that it names."""
+    """The hint after a TOML reader's message: entries with single brackets, else the line that it names."""
     lines = text.splitlines()
     for number, line in enumerate(lines, 1):
         if single := SINGLE.match(line):

@@ -77,8 +77,8 @@ class Opening:
 
 @dataclass(frozen=True)
 class Verdict:
-    """One family in a cell of the matrix: its grade and sign, what is said below, its place, and the link to
-    its best run."""
+    """One family in a cell of the matrix: its grade and sign, the lines below, its place, and the link to its
+    best run."""
 
     family: str
     grade: str

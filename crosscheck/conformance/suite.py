@@ -173,8 +173,7 @@ def judged(label: str, bench: Bench) -> Verdict:
 
 
 def tables(conformance: Conformance) -> Iterator[Table | Text]:
-    """A table of scenes with the number of cards by status and those that fail, then what the failures and
-    gaps are."""
+    """A table of scenes with the number of cards by status and those that fail, then each failure and gap."""
     properties = [n for n in (*FIRST, *PROPERTIES) if any(v.property == n for v in conformance.verdicts)]
     named = " ".join(filter(None, (conformance.engine, conformance.version, conformance.family)))
     title = f"{named}: cards that {', '.join(f'{mark} {status}' for status, (mark, _) in MARKS.items())}"
@@ -216,7 +215,7 @@ def _count(verdicts: Sequence[Verdict], status: str) -> Text:
 
 
 def _worst(verdicts: Sequence[Verdict]) -> Text:
-    """The cards that fail, else the pass that takes the largest share of what is allowed."""
+    """The cards that fail, else the pass with the largest share of its allowed error."""
     if failed := [verdict.property for verdict in verdicts if verdict.status == FAIL]:
         return Text(", ".join(failed), style=MARKS[FAIL][1])
     shares = {v.property: v.measured / v.allowed for v in verdicts if v.measured is not None and v.allowed}

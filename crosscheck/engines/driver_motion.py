@@ -58,7 +58,7 @@ def fastest_rate(scene: Scene, coarse: Callable[[float], Trajectory], counts: Se
 
     ``coarse(step)`` runs the scene with steps of that length (s).  ``counts`` are the numbers of steps to
     try in turn: a run that fails, or turns by more than SCOUT_TURN in a step, is repeated with the next.
-    A stated rate needs no run, and the largest number of steps bounds what is returned.
+    The result is at most SCOUT_TURN in a step of the largest count.
     """
     for steps in counts:
         run = coarse(scene.duration / steps)

@@ -96,6 +96,6 @@ def motion_rate(scene: Scene, run: Trajectory) -> float:
 
 
 def _noise(series: np.ndarray) -> float:
-    """Largest sixth difference of series (k, …), over what it would be of noise of size one."""
+    """Largest sixth difference of series (k, …), over the sixth difference of noise of size one."""
     left = [np.tensordot(WEIGHTS, series[k : k + ORDER + 1], 1) for k in range(len(series) - ORDER)]
     return float(np.abs(left).max() / np.linalg.norm(WEIGHTS))
