@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from statistics import median
 
+from crosscheck.engine import Setting
 from crosscheck.judge.model_identity import gate, gate_times
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth import NoSolution, truth_for
@@ -13,15 +14,20 @@ from crosscheck.processes.pool import ChildFailed, time_interleaved
 from crosscheck.study.grid import Case, Record
 from crosscheck.study.record_view import is_completed
 from crosscheck.study.scouting import settings
+from crosscheck.study.sentences import COMPILED
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
 
 def identity_cases(scene: Scene, engines: Sequence[str], time_limit: float) -> list[Case]:
     """The short runs from which `model_difference` tells whether all engines simulate the scene: each at the
-    finest of its settings."""
-    finest = {name: found[-1] for name in engines if (found := settings(name, scene))}
+    finest of its settings, but for compiled families, whose compilation may take a minute."""
+    finest = {name: found[-1] for name in engines if (found := _called_from_python(settings(name, scene)))}
     return [Case(scene, gate_times(scene), name, s, time_limit) for name, s in finest.items()]
+
+
+def _called_from_python(found: Sequence[Setting]) -> Sequence[Setting]:
+    return [setting for setting in found if not setting.family.endswith(COMPILED)] or found
 
 
 def model_difference(scene: Scene, records: Sequence[Record], reference_time: float = SECONDS) -> str | None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mbref.kernels.beside import compiled_beside
 from mbref.method import DEFAULT, Method, MethodError
 from mbref.motion import Motion
 from mbref.scene import Scene
@@ -20,7 +21,7 @@ from mbref.simulation.stepping import DONE
 from mbref.specialised import Untraceable
 from mbref.taylor.check import compare_with_default
 from mbref.taylor.run import CrossingRun, TaylorRun
-from mbref.taylor.series_run import NO_CODE, prepare_series
+from mbref.taylor.series_run import KERNELS_OF_SERIES, NO_CODE, prepare_series
 
 __all__ = ["Limits", "are_compiled", "checked_times", "prepare", "simulate", "why_no_code"]
 
@@ -88,8 +89,9 @@ def prepare(method: Method) -> None:
 
     Those of the default method and of Taylor series are among them: comparisons and crossings need them.
     """
-    general.prepare(method)
-    general.prepare(Method.parse(DEFAULT))
+    with compiled_beside(KERNELS_OF_SERIES, prepare_series.__module__, prepare_series.__name__):
+        general.prepare(method)
+        general.prepare(Method.parse(DEFAULT))
     prepare_series()
 
 
@@ -99,9 +101,13 @@ def are_compiled(method: Method) -> bool:
 
 
 def why_no_code(scene: Scene, method: Method) -> str:
-    """Why a scene cannot have machine code of its own by this method; empty where it can, and now has it."""
+    """Why a scene cannot have machine code of its own by this method; empty where it can, and now has it.
+
+    The kernels of the method are compiled.
+    """
     if not method.integrator.step:
         return NO_CODE
+    prepare(method)
     try:
         Run(scene, method, np.array([scene.duration]), Limits(code=SPECIALISED))
     except Untraceable as reason:

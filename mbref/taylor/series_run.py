@@ -21,6 +21,7 @@ from mbref.taylor.stepping import advance_series, enter
 
 SHARE = 0.05  # of rtol + atol: the tolerance of a step
 NO_CODE = "its series are made by one code for every scene"
+KERNELS_OF_SERIES = (enter, advance_series, hand_over, pass_on, place_crossing, look_along)
 LEAST_ORDER, MOST_ORDER = 4, 30
 ORDERS_PER_DIGIT, FIRST_ORDER = 1.2, 6.0  # of the order that costs least
 
@@ -110,5 +111,5 @@ class SeriesRun(Run):
 
 def prepare_series() -> None:
     """Compile the kernels of the series, or load them from the cache of this machine."""
-    for kernel in (enter, advance_series, hand_over, pass_on, place_crossing, look_along):
+    for kernel in KERNELS_OF_SERIES:
         kernel.prepare()

@@ -19,6 +19,7 @@ from crosscheck.judge.truth import truth_for
 from crosscheck.processes.pool import run_isolated
 from crosscheck.study.fair_timing import identity_cases, model_difference
 from crosscheck.study.grid import run_case
+from crosscheck.study.sentences import COMPILED
 from mbref.scenes import SCENES
 from tests.crosscheck.measured import MARGIN
 
@@ -56,6 +57,12 @@ def test_plug_in_and_truth_and_gate(installed):
     run = run_isolated("tiny", scene, np.linspace(0, 0.1, 5), setting, 60.0)
     error = measure(scene, run, truth_for(scene))["error"]
     assert error is not None and error < 1e-8, f"tiny at {setting}: error {error}, allowed 1e-8"
+
+
+def test_gate_needs_no_compiled_family():
+    scene = SCENES["four_bar_gravity"]()
+    for case in identity_cases(scene, ["mbref", "mujoco", "pinocchio"], 60.0):
+        assert not case.setting.family.endswith(COMPILED), f"{case.engine}: {case.setting.family}"
 
 
 @pytest.mark.parametrize("scene", ["free_fall", pytest.param("pendulum", marks=pytest.mark.slow)])
