@@ -54,7 +54,8 @@ def _engines() -> Table:
 
 
 def _methods() -> Table:
-    title = "methods: formulation+stabilisation/integrator, such as lm2+baumgarte[alpha=10,beta=10]/rk4"
+    grammar = "formulation+stabilisation/integrator, such as lm2+baumgarte[alpha=10,beta=10]/rk4"
+    title = f"methods: {grammar}\n(meanings: mbref list methods)"
     table = Table("engine", "part", "name", "options", title=title)
     for name in engine_names():
         for part, entries in engine(name).family_parts().items():

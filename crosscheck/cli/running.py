@@ -30,7 +30,7 @@ PIPED_WIDTH = 180  # characters of a line, so that no cell of a table is folded
 
 
 class Asked(NamedTuple):
-    """Scenes, engines, their settings, sample times (k,) of every scene, and the wall time (s) of a run."""
+    """Scenes, engines, their settings, sample times (k,) of every scene, and the CPU time (s) of a run."""
 
     scenes: Sequence[Scene]
     engines: Sequence[str]

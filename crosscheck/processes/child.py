@@ -16,15 +16,20 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from multiprocessing import Pipe
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import psutil
+
 from mbref.trajectory import Outcome
 
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-ORPHAN_SECONDS = 10.0  # beyond the limit of its call, a child whose parent has died ends itself
+INTERVAL = 0.2  # s, at which the CPU time of a child is read
+LOADED = 10.0  # times its limit, in wall time, that a call may take where other processes have the cores
+ORPHAN_SECONDS = 10.0  # beyond that, a child whose parent has died ends itself
 ENDING_SECONDS = 10.0  # for a child that has hung up to end by itself, with an exit status that tells why
 PRINTED = 200  # characters of the last printed line that a message quotes
 
@@ -70,7 +75,7 @@ class Child:
         return self._process.poll() is None
 
     def call(self, function: Function, arguments: Arguments, time_limit: float) -> Observation:
-        """``function(*arguments)`` in the child, within ``time_limit`` (s).
+        """``function(*arguments)`` in the child, within ``time_limit`` (s of CPU time or of waiting).
 
         Raises ChildFailed; the child has then ended, as after an interrupt.
         """
@@ -98,7 +103,7 @@ class Child:
         self._printed.seek(0)  # the child writes at this place too: it shares the open file
         self._printed.truncate()
         with tempfile.TemporaryDirectory(prefix="crosscheck-", ignore_cleanup_errors=True) as folder:
-            self._ask((folder, time_limit + ORPHAN_SECONDS, function, arguments), time_limit)
+            self._ask((folder, LOADED * time_limit + ORPHAN_SECONDS, function, arguments), time_limit)
             is_value, value = self._answer()
             files = sorted(str(path.relative_to(folder)) for path in Path(folder).rglob("*"))
         if not is_value:
@@ -109,8 +114,29 @@ class Child:
         """Send the job and wait until there is something to receive."""
         with contextlib.suppress(BrokenPipeError):  # the child has hung up: receiving says so
             self._channel.send(job)
-        if not self._channel.poll(time_limit):
+        if not self._has_answer(time_limit):
             raise self._failure(Outcome.TIMED_OUT, f"no result after {time_limit:g} s")
+
+    def _has_answer(self, time_limit: float) -> bool:
+        """Whether something can be received before the child has used its time: CPU time, and wall time while
+        it uses no CPU time; on a loaded machine at most LOADED times the limit of wall time."""
+        began, used, cpu = time.monotonic(), 0.0, self._cpu_seconds()
+        while (left := time_limit - used) > 0:
+            interval = min(left, INTERVAL)
+            if self._channel.poll(interval):
+                return True
+            now = self._cpu_seconds()
+            used = max(used + (now - cpu or interval), (time.monotonic() - began) / LOADED)
+            cpu = now
+        return False
+
+    def _cpu_seconds(self) -> float:
+        """Of the process without those that it has started; 0 where it has ended."""
+        try:
+            times = psutil.Process(self._process.pid).cpu_times()
+        except psutil.Error:
+            return 0.0
+        return times.user + times.system
 
     def _answer(self) -> tuple[bool, Any]:
         try:

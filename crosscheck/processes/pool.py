@@ -34,9 +34,10 @@ def run_isolated(
 ) -> Trajectory:
     """The engine's trajectory at ``times`` (k,), computed in a child process.
 
-    ``engine_name`` is a known engine or ``module:attribute``; ``time_limit`` is wall time (s) of the
-    run, without imports and compiling.  A crash, a hang, an exception and a missing package are outcomes
-    CRASHED or TIMED_OUT of a trajectory without states.  Raises LookupError for an unknown engine.
+    ``engine_name`` is a known engine or ``module:attribute``; ``time_limit`` is CPU time (s) of the
+    run, or of waiting, without imports and compiling.  A crash, a hang, an exception and a missing package
+    are outcomes CRASHED or TIMED_OUT of a trajectory without states.  Raises LookupError for an unknown
+    engine.
     """
     _check(engine_name)
     with _lent(engine_name) as child:

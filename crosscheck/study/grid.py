@@ -42,7 +42,7 @@ Progress = Callable[[int, int, Record], None]  # cases done, cases in all, the r
 
 
 class Case(NamedTuple):
-    """One run of a study; ``time_limit`` is wall time (s), without imports and compiling, ``reference_time``
+    """One run of a study; ``time_limit`` is CPU time (s), without imports and compiling, ``reference_time``
     what the reference may take of CPU time (s) where the scene has no closed form."""
 
     scene: Scene

@@ -16,7 +16,31 @@ from mbref.integrators import INTEGRATORS
 from mbref.scenes import SCENES
 from mbref.stabilisation import STABILISATIONS
 
+METHOD = "a method: formulation+stabilisation/integrator, such as lm2+baumgarte[alpha=10,beta=10]/rk4"
 SHELLS = ("bash", "zsh", "tcsh")
+MEANINGS = {  # of the parts of a method
+    "lm1": "Lagrange multipliers with the accelerations by LU; no redundant rows",
+    "lm2": "multipliers first, by Cholesky; cheap; no redundant rows",
+    "lm2-first-rows": "lm2 without the rows that are dependent at t = 0",
+    "lm2-step-rows": "lm2 without the rows that are dependent at each step",
+    "alf": "augmented Lagrangian, a penalty iterated; bodies may lack inertia",
+    "alf-dual": "augmented Lagrangian on the multipliers; redundant rows; the default",
+    "mpi-svd": "Moore-Penrose inverse by singular values; any rank; dear",
+    "mpi-gs": "Moore-Penrose inverse by Gram-Schmidt; any rank",
+    "mpi-gs-literal": "Gram-Schmidt as the paper prints it; fully driven mechanisms only",
+    "mpi-qr": "Moore-Penrose inverse by pivoted QR; any rank; the cheapest of them",
+    "none": "constraint violations grow",
+    "baumgarte": "violations decay by feedback; an error in the motion remains",
+    "partitioning": "integrates independent coordinates and solves for the others",
+    "null-space": "integrates speeds along the constraints' tangent",
+    "projection": "back onto the constraints after each step; passes singular positions; the default",
+    "dop853": "Runge-Kutta of order 8 with adaptive steps; the default",
+    "rk4": "classical Runge-Kutta with a fixed step (s)",
+    "adams": "predictor-corrector of orders 1 to 12 with adaptive steps",
+    "ali3": "trapezoidal rule on positions, fixed step (s); without formulation: ali3-p",
+    "predictor": "extrapolation only, for fully driven mechanisms; without formulation: kinematic",
+    "taylor": "power series of order 4 to 30, fastest at small errors; without formulation: taylor",
+}
 
 
 def add(commands: Any) -> None:
@@ -59,15 +83,14 @@ def _scenes() -> Table:
 
 
 def _methods() -> Table:
-    table = Table(
-        "part", "name", "options and their defaults", title="a method: formulation+stabilisation/integrator"
-    )
+    table = Table("part", "name", "meaning; options and their defaults", title=METHOD)
     parts: Mapping[str, Mapping[str, Any]] = {
         "formulation": FORMULATIONS, "stabilisation": STABILISATIONS, "integrator": INTEGRATORS,
     }  # fmt: skip
     for part, entries in parts.items():
         for name, entry in entries.items():
-            table.add_row(part, name, ", ".join(f"{k}={v:g}" for k, v in entry.options.items()))
+            options = ", ".join(f"{k}={v:g}" for k, v in entry.options.items())
+            table.add_row(part, name, f"{MEANINGS[name]}\n[{options}]" if options else MEANINGS[name])
         table.add_section()
     return table
 

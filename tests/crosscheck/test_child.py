@@ -59,6 +59,26 @@ def test_late_call_and_its_child(child: Child):
     assert not child.is_alive
 
 
+def test_a_call_on_a_loaded_machine_has_its_cpu_time(child: Child, monkeypatch):
+    child.call(operator.add, (2, 3), 60.0)  # it has started
+    monkeypatch.setattr(child, "_cpu_seconds", lambda: time.monotonic() / 1000)  # others have the cores
+    child.call(time.sleep, (1.5,), 1.0)
+
+
+def test_a_busy_call_is_late(child: Child):
+    child.call(operator.add, (2, 3), 60.0)
+    with pytest.raises(ChildFailed, match=r"no result after 0\.5 s") as raised:
+        child.call(
+            pow,
+            (
+                3,
+                10**9,
+            ),
+            0.5,
+        )
+    assert raised.value.outcome is Outcome.TIMED_OUT
+
+
 def test_large_answers_arrive_whole(child: Child):
     many = list(range(1_000_000))
     assert child.call(sorted, (many,), 60.0).value == many
