@@ -26,6 +26,7 @@ __all__ = [
     "initial_poses", "initial_twists", "installed", "rotations",
 ]  # fmt: skip
 
+BEST = "tuned"  # the family that is an engine's best, where it has one of that name
 FamilyParts = Mapping[str, Mapping[str, Mapping[str, float]]]  # kind of part → name → options and defaults
 
 
@@ -94,6 +95,13 @@ class Setting:
                                      for k, v in self.options.items())  # fmt: skip
 
 
+def best_family(settings: Sequence[Setting]) -> list[Setting]:
+    """Of settings, those of the family "tuned", else of the first family, coarse to fine."""
+    families = [setting.family for setting in settings]
+    best = BEST if BEST in families or not families else families[0]
+    return [setting for setting in settings if setting.family == best]
+
+
 class Engine(ABC):
     """A simulator that takes a Scene and gives a Trajectory. Constructed without arguments.
 
@@ -130,6 +138,14 @@ class Engine(ABC):
         """The sweep over the accuracies of one family, coarse to fine; none where it does not serve the
         scene."""
         return [setting for setting in self.settings(scene) if setting.family == family]
+
+    def serves(self, scene: Scene, family: str) -> bool:
+        """Whether the sweep of a scene has the family; here by making that sweep."""
+        return bool(self.settings_of(scene, family))
+
+    def best_settings(self, scene: Scene) -> Sequence[Setting]:
+        """The sweep of the engine's best family, "tuned", or without that of its first."""
+        return best_family(self.settings(scene))
 
     def has_family(self, family: str) -> bool:
         """Whether `run` takes this family although the sweep of `settings` may leave it out."""

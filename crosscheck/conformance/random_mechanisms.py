@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.conformance.families import best_family
 from crosscheck.engine import engine
 from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.judge.gauss_principle import gauss, goes_on, rank_of, singular_values, stacked
@@ -83,7 +82,7 @@ def initial_accelerations(scene: Scene, name: str) -> np.ndarray | None:
     """Accelerations at t = 0 and angular ones times the scene's length (2 nb, 3), m/s², world, as the
     engine's own output; None when the run ends otherwise or reports none."""
     simulator = engine(name)
-    setting = best_family(simulator.settings(scene))[-1]
+    setting = simulator.best_settings(scene)[-1]
     run = simulator.run(scene, np.array([0.0, scene.duration / 100]), setting)
     if run.outcome is not Outcome.COMPLETED or run.acceleration is None:
         return None

@@ -12,10 +12,10 @@ from typing import Protocol
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Engine, Owner, Setting, engine
+from crosscheck.engine import Cannot, Engine, Setting, engine
+from crosscheck.processes import serve
 from crosscheck.processes.answer import well_formed
-from crosscheck.processes.pool import ChildFailed, Observation, capabilities, observe, run_isolated
-from crosscheck.processes.serve import failed
+from crosscheck.processes.pool import ChildFailed, Observation, ask, observe, run_isolated
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
@@ -36,6 +36,9 @@ class Runner(Protocol):
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
         """Version, the reason of a refusal, and else the settings of the engine, or those of a family."""
 
+    def refuses(self, scene: Scene, family: str) -> Cannot | None:
+        """Why the engine cannot run a scene at settings of a family."""
+
     def observe(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
         """A run at times (k,), s, with nothing left of runs before, and what it printed and left behind."""
 
@@ -54,16 +57,6 @@ def answering() -> Iterator[None]:
         raise ChildFailed(Outcome.CRASHED, f"{type(error).__name__}: {error}") from error
 
 
-def offered(simulator: Engine, scene: Scene, family: str) -> tuple[str, Cannot | None, list[Setting]]:
-    """Version, refusal and settings of an engine, or of one of its families, which may not serve a scene."""
-    if cannot := simulator.cannot(scene):
-        return simulator.version(), cannot, []
-    settings = list(simulator.settings_of(scene, family) if family else simulator.settings(scene))
-    if family and not settings:
-        cannot = Cannot(Owner.MODEL, f"{family} does not claim this scene")
-    return simulator.version(), cannot, settings
-
-
 @dataclass(frozen=True)
 class Isolated:
     """Every run in a child process with a time limit (s); ``name`` is known, or ``module:attribute``."""
@@ -77,10 +70,10 @@ class Isolated:
             return engine(self.name).rounding
 
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
-        if family:
-            with answering():
-                return offered(engine(self.name), scene, family)
-        return capabilities(self.name, scene, self.time_limit)
+        return ask(self.name, serve.offered, (scene, family), self.time_limit)
+
+    def refuses(self, scene: Scene, family: str) -> Cannot | None:
+        return ask(self.name, serve.refused, (scene, family), self.time_limit)
 
     def observe(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
         return observe(self.name, scene, times, setting, self.time_limit)
@@ -109,7 +102,11 @@ class InProcess:
 
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
         with answering():
-            return offered(self.engine, scene, family)
+            return serve.offers_of(self.engine, scene, family)
+
+    def refuses(self, scene: Scene, family: str) -> Cannot | None:
+        with answering():
+            return serve.refusal_of(self.engine, scene, family)
 
     def observe(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
         said = io.StringIO()
@@ -128,4 +125,4 @@ class InProcess:
             return well_formed(self.engine.run(scene, times, setting), scene, times)
         except Exception as error:
             words = f"{type(error).__name__}: {error}"
-            return failed(self.name, self.engine.version(), scene, setting, Outcome.CRASHED, words)
+            return serve.failed(self.name, self.engine.version(), scene, setting, Outcome.CRASHED, words)

@@ -13,11 +13,10 @@ import numpy as np
 from crosscheck.conformance.changes import nudged, weighed
 from crosscheck.conformance.closed_forms import CLOSED_FORMS, Exact
 from crosscheck.conformance.drawn import mechanism
-from crosscheck.conformance.families import best_family
 from crosscheck.conformance.features import feature_scenes
 from crosscheck.conformance.moving import moving_probes
 from crosscheck.conformance.runners import Runner
-from crosscheck.engine import Cannot, Owner, Setting
+from crosscheck.engine import Cannot, Setting
 from crosscheck.judge.gauss_motion import NAME as GAUSS
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.metrics import error_series, in_scene_order, violation_series
@@ -156,11 +155,7 @@ class Bench:
 
     def refuses(self, scene: Scene) -> Cannot | None:
         """Why the engine, or the family that is judged, cannot run another scene."""
-        _, cannot, settings = self.runner.offers(scene, self.family)
-        family = self.settings[-1].family
-        if cannot or any(setting.family == family for setting in settings):
-            return cannot
-        return Cannot(Owner.MODEL, f"{family} is not offered for the changed scene")
+        return self.runner.refuses(scene, self.settings[-1].family)
 
     def observed(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
         """A run in a process of its own, and what it printed and left behind."""
@@ -266,7 +261,7 @@ def set_up(runner: Runner, specimen: Specimen, family: str = "") -> Bench:
     """A bench with the engine's answer to the specimen, in its best family or the one named; raises
     ChildFailed when the engine cannot even say."""
     version, cannot, settings = runner.offers(specimen.scene, family)
-    return Bench(runner, specimen, version, cannot, best_family(settings), family)
+    return Bench(runner, specimen, version, cannot, settings, family)
 
 
 def completed(scene: Scene, run: Trajectory, samples: int) -> Trajectory:

@@ -29,6 +29,20 @@ def motion(driver: Driver, t: float) -> tuple[float, float, float]:
     return value, rate, acceleration
 
 
+def moving(driver: Driver) -> Callable[[float], tuple[float, float, float]]:
+    """`motion` of a driver as a function of time that keeps its last result: iterations of a step and its
+    rows ask for the same time again and again."""
+    kept: tuple[float, tuple[float, float, float]] = (math.nan, (0.0, 0.0, 0.0))
+
+    def at(t: float) -> tuple[float, float, float]:
+        nonlocal kept
+        if t != kept[0]:
+            kept = t, motion(driver, t)
+        return kept[1]
+
+    return at
+
+
 def stated_rate(scene: Scene) -> float:
     """The fastest rate (rad/s) that a scene states: of its duration, drivers, springs and velocities."""
     rates = [1 / scene.duration]

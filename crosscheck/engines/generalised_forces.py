@@ -12,6 +12,7 @@ import numpy as np
 from crosscheck.engines.constraint_equations import Frames
 from crosscheck.engines.geometry import in_body, joint_frame, point_in_body
 from crosscheck.judge.constraints import inertia_matrices
+from mbref.rotations import cross
 from mbref.scene import Force, Moment, Scene, Spring, TorsionSpring
 
 
@@ -64,7 +65,7 @@ class Forces:
         total = np.zeros((*f.r.shape[:-3], self.nb + 1, 6, 1))
         total[..., : self.nb, :3, :] += self.weight
         momentum = np.einsum("bij,...bj->...bi", self.inertia, omega)
-        total[..., : self.nb, 3:, 0] -= np.cross(omega, momentum)
+        total[..., : self.nb, 3:, 0] -= cross(omega, momentum)
         for body, moment in self.moments:
             total[..., body, 3:, :] += _to_body(f, body, moment)
         for end, force in self.pulls:
@@ -112,7 +113,7 @@ def _pull(f: Frames, end: tuple[int, np.ndarray], force: np.ndarray, total: np.n
     body, place = end
     local = _to_body(f, body, force)
     total[..., body, :3, :] += force
-    total[..., body, 3:, 0] += np.cross(place[:, 0], local[..., 0])
+    total[..., body, 3:, 0] += cross(place[:, 0], local[..., 0])
 
 
 def _tension(f: Frames, spring: Spring, ends: list[tuple[int, np.ndarray]]) -> np.ndarray:

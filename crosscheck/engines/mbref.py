@@ -83,13 +83,17 @@ class Mbref(Engine):
         methods = WITH_SINGULAR_MASS if _has_singular_mass(scene) else METHODS
         return [setting for family in methods for setting in self.settings_of(scene, family)]
 
+    def best_settings(self, scene: Scene) -> Sequence[Setting]:
+        methods = WITH_SINGULAR_MASS if _has_singular_mass(scene) else METHODS
+        return next(filter(None, (self.settings_of(scene, family) for family in methods)), ())
+
     def settings_of(self, scene: Scene, family: str) -> Sequence[Setting]:
-        if not self._serves(family, scene):
+        if not self.serves(scene, family):
             return []
         sweep = [{}] if family.startswith(KINEMATIC) else [{"rtol": rtol} for rtol in TOLERANCES]
         return [Setting(family, options) for options in sweep]
 
-    def _serves(self, family: str, scene: Scene) -> bool:
+    def serves(self, scene: Scene, family: str) -> bool:
         from mbref.equations.degrees_of_freedom import undriven_freedoms
         from mbref.simulation.simulate import why_no_code
 

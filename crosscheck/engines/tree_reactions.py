@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.engines.spanning_tree import GROUND_LINK, Tree
+from mbref.rotations import cross
 from mbref.scene import Distance, Force, Load, Moment, Scene, Spring, TorsionSpring
 
 ZERO = np.zeros(3)
@@ -36,7 +37,7 @@ class LinkMotion:
 
 def wrench(force: np.ndarray, point: np.ndarray, moment: np.ndarray = ZERO) -> np.ndarray:
     """(6,): a force at a point and a moment."""
-    return np.concatenate([force, moment + np.cross(point, force)])
+    return np.concatenate([force, moment + cross(point, force)])
 
 
 def joint_reactions(
@@ -81,9 +82,9 @@ def _inertial(scene: Scene, tree: Tree, motion: LinkMotion, k: int) -> np.ndarra
     link, rotation, omega = tree.links[k], motion.rotation[k], motion.angular_velocity[k]
     arm = rotation @ link.offset
     angular = motion.angular_acceleration[k]
-    acceleration = motion.acceleration[k] + np.cross(angular, arm) + np.cross(omega, np.cross(omega, arm))
+    acceleration = motion.acceleration[k] + cross(angular, arm) + cross(omega, cross(omega, arm))
     inertia = rotation @ link.inertia @ rotation.T
-    moment = inertia @ angular + np.cross(omega, inertia @ omega)
+    moment = inertia @ angular + cross(omega, inertia @ omega)
     return wrench(link.mass * (acceleration - np.array(scene.gravity)), motion.position[k] + arm, moment)
 
 
@@ -98,7 +99,7 @@ def _point(
     if link == GROUND_LINK:
         return np.array(point), ZERO
     arm = _arm(tree, motion, link, point)
-    return motion.position[link] + arm, motion.velocity[link] + np.cross(motion.angular_velocity[link], arm)
+    return motion.position[link] + arm, motion.velocity[link] + cross(motion.angular_velocity[link], arm)
 
 
 def _applied(scene: Scene, tree: Tree, motion: LinkMotion, load: Load) -> list[tuple[int, np.ndarray]]:
@@ -139,7 +140,7 @@ def _at_second_anchor(
     joint = scene.joint[j]
     link = tree.link_of(scene.body_index(joint.bodies[1]))
     anchor, _ = _point(tree, motion, link, joint.anchor_pair[1])
-    force, moment = on_second[:3], on_second[3:] - np.cross(anchor, on_second[:3])
+    force, moment = on_second[:3], on_second[3:] - cross(anchor, on_second[:3])
     if isinstance(joint, Distance):
         rod = next(n for n in tree.links if n.ends and np.array_equal(n.ends[1][1], joint.anchors[1])
                    and np.array_equal(n.ends[0][1], joint.anchors[0]))  # fmt: skip
@@ -151,5 +152,5 @@ def _acceleration(tree: Tree, motion: LinkMotion, link: int, point: Sequence[flo
     if link == GROUND_LINK:
         return ZERO
     arm, omega = _arm(tree, motion, link, point), motion.angular_velocity[link]
-    centripetal = np.cross(omega, np.cross(omega, arm))
-    return motion.acceleration[link] + np.cross(motion.angular_acceleration[link], arm) + centripetal
+    centripetal = cross(omega, cross(omega, arm))
+    return motion.acceleration[link] + cross(motion.angular_acceleration[link], arm) + centripetal

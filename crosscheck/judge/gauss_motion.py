@@ -19,6 +19,7 @@ from crosscheck.judge.gauss_principle import rank as rank_at_start
 from crosscheck.judge.loads import Motion, wrenches
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
+from mbref.rotations import cross
 from mbref.scene import Scene, TorsionSpring
 from mbref.trajectory import Outcome, Trajectory
 
@@ -90,7 +91,7 @@ def applied(scene: Scene, state: State) -> np.ndarray:
     motion = Motion(position[None], turn[None], velocity[None], spin[None], still)
     force, moment = (w[0] for w in wrenches(scene, motion, NO_AXIS))
     inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
-    gyroscopic = np.cross(spin, np.einsum("bij,bj->bi", inertia, spin))
+    gyroscopic = cross(spin, np.einsum("bij,bj->bi", inertia, spin))
     return np.hstack([force, moment - gyroscopic + _torsion(scene, orientation, spin, angles)])
 
 

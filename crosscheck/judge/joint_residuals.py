@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbref import rotations
+from mbref.rotations import cross
 from mbref.scene import GROUND, Driver, Joint, JointFacts, Scene
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -80,9 +81,9 @@ def _third_axes(joint: Joint) -> Sequence[Sequence[float]]:
 def _frame(axis: Sequence[float]) -> np.ndarray:
     """Quaternion of a frame whose third axis is along `axis`."""
     z = np.array(axis, dtype=float) / np.linalg.norm(axis)
-    x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
+    x = cross(z, np.eye(3)[np.argmin(np.abs(z))])
     x /= np.linalg.norm(x)
-    return rotations.from_matrix(np.column_stack([x, np.cross(z, x), z]))
+    return rotations.from_matrix(np.column_stack([x, cross(z, x), z]))
 
 
 def driver_value(driver: Driver, t: np.ndarray | float, derivative: int = 0) -> np.ndarray:
@@ -134,10 +135,10 @@ def velocity_rows(
     """Forbidden components (…, rows) of the frames' relative twist, of world velocities (…, nb + 1, 3)."""
     arms, offset, frames = _in_world(joint, position, orientation)
     w = [angular_velocity[..., b, :] for b in joint.bodies]
-    dv = _difference(velocity[..., b, :] + np.cross(w[k], arms[k]) for k, b in enumerate(joint.bodies))
+    dv = _difference(velocity[..., b, :] + cross(w[k], arms[k]) for k, b in enumerate(joint.bodies))
     if joint.keeps_distance:
         return _dot(offset, dv) / np.linalg.norm(offset, axis=-1, keepdims=True)
-    linear = _resolve(frames[0], dv - np.cross(w[0], offset))
+    linear = _resolve(frames[0], dv - cross(w[0], offset))
     angular = _resolve(frames[0], w[1] - w[0])
     crossing = [_dot(w[1] - w[0], _crossing(frames)[0])] if joint.keeps_axes_perpendicular else []
     return _rows(joint, linear, angular, crossing, t, 1)
@@ -152,17 +153,17 @@ def acceleration_rows(
     arms, offset, frames = _in_world(joint, position, orientation)
     w = [angular_velocity[..., b, :] for b in joint.bodies]
     dw = [angular_acceleration[..., b, :] for b in joint.bodies]
-    dv = _difference(velocity[..., b, :] + np.cross(w[k], arms[k]) for k, b in enumerate(joint.bodies))
+    dv = _difference(velocity[..., b, :] + cross(w[k], arms[k]) for k, b in enumerate(joint.bodies))
     da = _difference(
-        acceleration[..., b, :] + np.cross(dw[k], arms[k]) + np.cross(w[k], np.cross(w[k], arms[k]))
+        acceleration[..., b, :] + cross(dw[k], arms[k]) + cross(w[k], cross(w[k], arms[k]))
         for k, b in enumerate(joint.bodies)
     )
     if joint.keeps_distance:
         length = np.linalg.norm(offset, axis=-1, keepdims=True)
         along = _dot(offset, dv) / length
         return (_dot(offset, da) + _dot(dv, dv) - along**2) / length
-    seen = da - np.cross(dw[0], offset) - 2 * np.cross(w[0], dv) + np.cross(w[0], np.cross(w[0], offset))
-    angular = _resolve(frames[0], dw[1] - dw[0] - np.cross(w[0], w[1]))
+    seen = da - cross(dw[0], offset) - 2 * cross(w[0], dv) + cross(w[0], cross(w[0], offset))
+    angular = _resolve(frames[0], dw[1] - dw[0] - cross(w[0], w[1]))
     crossing = [_crossing_acceleration(frames, w, dw)] if joint.keeps_axes_perpendicular else []
     return _rows(joint, _resolve(frames[0], seen), angular, crossing, t, 2)
 
@@ -230,14 +231,14 @@ def _rows(
 def _crossing(frames: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
     """Unit normal of a universal's two axes, the sine of the angle between them, and the axes (world)."""
     axes = [rotations.rotate(frame, Z) for frame in frames]
-    normal = np.cross(axes[1], axes[0])
+    normal = cross(axes[1], axes[0])
     size = np.linalg.norm(normal, axis=-1, keepdims=True)
     return normal / size, size, axes
 
 
 def _crossing_acceleration(frames: list[np.ndarray], w: list[np.ndarray], dw: list[np.ndarray]) -> np.ndarray:
     normal, size, axes = _crossing(frames)
-    turning = np.cross(np.cross(w[1], axes[1]), axes[0]) + np.cross(axes[1], np.cross(w[0], axes[0]))
+    turning = cross(cross(w[1], axes[1]), axes[0]) + cross(axes[1], cross(w[0], axes[0]))
     turning = (turning - normal * _dot(normal, turning)) / size
     return _dot(dw[1] - dw[0], normal) + _dot(w[1] - w[0], turning)
 

@@ -59,6 +59,8 @@ class Child:
     """The child process; its owner closes it."""
 
     def __init__(self) -> None:
+        self.ready: Observation | None = None  # what making an engine ready gave, where copies run it
+        self._copies = False  # whether a copy makes the present call
         self._printed = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - closed by `close`
         self._channel, theirs = Pipe()
         with theirs:
@@ -74,13 +76,16 @@ class Child:
         """Whether the process has not ended."""
         return self._process.poll() is None
 
-    def call(self, function: Function, arguments: Arguments, time_limit: float) -> Observation:
-        """``function(*arguments)`` in the child, within ``time_limit`` (s of CPU time or of waiting).
+    def call(
+        self, function: Function, arguments: Arguments, time_limit: float, in_copy: bool = False
+    ) -> Observation:
+        """``function(*arguments)`` in the child, or in a copy of it that leaves nothing to later calls,
+        within ``time_limit`` (s of CPU time or of waiting).
 
         Raises ChildFailed; the child has then ended, as after an interrupt.
         """
         try:
-            return self._called(function, arguments, time_limit)
+            return self._called((function, arguments, in_copy), time_limit)
         except BaseException:
             self.kill()
             raise
@@ -99,11 +104,12 @@ class Child:
         self._channel.close()
         self._printed.close()
 
-    def _called(self, function: Function, arguments: Arguments, time_limit: float) -> Observation:
+    def _called(self, asked: tuple[Function, Arguments, bool], time_limit: float) -> Observation:
+        self._copies = asked[-1]
         self._printed.seek(0)  # the child writes at this place too: it shares the open file
         self._printed.truncate()
         with tempfile.TemporaryDirectory(prefix="crosscheck-", ignore_cleanup_errors=True) as folder:
-            self._ask((folder, LOADED * time_limit + ORPHAN_SECONDS, function, arguments), time_limit)
+            self._ask((folder, LOADED * time_limit + ORPHAN_SECONDS, *asked), time_limit)
             is_value, value = self._answer()
             files = sorted(str(path.relative_to(folder)) for path in Path(folder).rglob("*"))
         if not is_value:
@@ -131,12 +137,15 @@ class Child:
         return False
 
     def _cpu_seconds(self) -> float:
-        """Of the process without those that it has started; 0 where it has ended."""
+        """Of the process and the copy that calls for it, without others that they have started; 0 where it
+        has ended."""
         try:
-            times = psutil.Process(self._process.pid).cpu_times()
+            process = psutil.Process(self._process.pid)
+            copies = process.children() if self._copies else []
+            times = [member.cpu_times() for member in (process, *copies)]
         except psutil.Error:
             return 0.0
-        return times.user + times.system
+        return sum(used.user + used.system for used in times)
 
     def _answer(self) -> tuple[bool, Any]:
         try:

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import atexit
 import os
-from collections.abc import Iterator, Sequence
+import sys
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from threading import Lock
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +23,7 @@ from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
 MOST_IDLE = 8  # children that wait for a run: one of every engine, so that scouting has started them
+COPIES = sys.platform == "linux"  # elsewhere a forked process may miss what libraries of the system began
 READY_SECONDS = 600.0  # for imports and compiling, before the time of a run begins
 
 _idle: list[tuple[str, Child]] = []  # with their engines, the one used last at the end
@@ -51,10 +54,25 @@ def observe(
     engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, time_limit: float
 ) -> Observation:
     """`run_isolated` in a process of its own, with what it printed from its start on and the files that the
-    run left; both empty when the run gave no result, as its message then quotes what was printed."""
+    run left; both empty when the run gave no result, as its message then quotes what was printed.
+
+    The process is new, or a copy of one that has done nothing but make the engine ready.
+    """
     _check(engine_name)
+    if COPIES:
+        return _observed_in_copy(engine_name, scene, times, setting, time_limit)
     with closing(Child()) as child:
         return _observed(child, engine_name, scene, times, setting, time_limit)
+
+
+def _observed_in_copy(
+    engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, time_limit: float
+) -> Observation:
+    with _lent(f"{engine_name} {setting.family} ready") as child:
+        seen = _observed(child, engine_name, scene, times, setting, time_limit, in_copy=True)
+        if seen.value.outcome is not Outcome.COMPLETED:
+            child.kill()
+    return seen
 
 
 def capabilities(
@@ -64,9 +82,17 @@ def capabilities(
 
     Raises ChildFailed when that fails, LookupError for an unknown engine.
     """
+    return ask(engine_name, serve.capabilities, (scene,), time_limit)
+
+
+def ask(engine_name: str, question: Callable[..., Any], about: tuple[Any, ...], time_limit: float) -> Any:
+    """``question(engine_name, *about)`` in a child that has served the engine before, or a new one.
+
+    Raises ChildFailed when that fails, LookupError for an unknown engine.
+    """
     _check(engine_name)
     with _lent(engine_name) as child:
-        return child.call(serve.capabilities, (engine_name, scene), time_limit).value
+        return child.call(question, (engine_name, *about), time_limit).value
 
 
 def time_interleaved(
@@ -103,12 +129,20 @@ def _check(engine_name: str) -> None:
 
 
 def _observed(
-    child: Child, engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, time_limit: float
+    child: Child,
+    engine_name: str,
+    scene: Scene,
+    times: np.ndarray,
+    setting: Setting,
+    time_limit: float,
+    in_copy: bool = False,
 ) -> Observation:
     version = ""
     try:
-        version, said, _ = _made_ready(child, engine_name, setting.family)
-        seen = child.call(serve.run_once, (engine_name, scene, times, setting), time_limit)
+        if child.ready is None or not in_copy:
+            child.ready = _made_ready(child, engine_name, setting.family)
+        version, said, _ = child.ready
+        seen = child.call(serve.run_once, (engine_name, scene, times, setting), time_limit, in_copy)
     except ChildFailed as failure:
         outcome, message = failure.outcome, str(failure)
         return Observation(serve.failed(engine_name, version, scene, setting, outcome, message), "", ())

@@ -1,12 +1,13 @@
 """The child process: it serves call after call, each in a directory of its own, until its parent hangs up.
 
 ``python -m crosscheck.processes.serve`` has the channel to its parent as standard input.  It is sent
-(directory, seconds after which it ends itself in case the parent has died, function, arguments) and
-answers (True, value) or (False, sentence).
+(directory, seconds after which it ends itself in case the parent has died, function, arguments, whether a
+copy of it is to call the function) and answers (True, value) or (False, sentence).
 """
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import faulthandler
 import os
@@ -15,12 +16,13 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
+from multiprocessing import Pipe
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Setting, engine
+from crosscheck.engine import Cannot, Engine, Owner, Setting, engine
 from crosscheck.processes.answer import well_formed
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
@@ -61,6 +63,35 @@ def capabilities(engine_name: str, scene: Scene) -> Capabilities:
     return version, cannot, [] if cannot else list(simulator.settings(scene))
 
 
+def offered(engine_name: str, scene: Scene, family: str) -> Capabilities:
+    """As `offers_of` the engine of that name."""
+    return offers_of(engine(engine_name), scene, family)
+
+
+def offers_of(simulator: Engine, scene: Scene, family: str) -> Capabilities:
+    """An engine's version, the reason of a refusal, and else the settings of a family, or of its best."""
+    if cannot := simulator.cannot(scene):
+        return simulator.version(), cannot, []
+    settings = simulator.settings_of(scene, family) if family else simulator.best_settings(scene)
+    if family and not settings:
+        return simulator.version(), _unserved(family), []
+    return simulator.version(), None, list(settings)
+
+
+def refused(engine_name: str, scene: Scene, family: str) -> Cannot | None:
+    """As `refusal_of` the engine of that name."""
+    return refusal_of(engine(engine_name), scene, family)
+
+
+def refusal_of(simulator: Engine, scene: Scene, family: str) -> Cannot | None:
+    """Why an engine cannot run a scene at settings of a family, or None."""
+    return simulator.cannot(scene) or (None if simulator.serves(scene, family) else _unserved(family))
+
+
+def _unserved(family: str) -> Cannot:
+    return Cannot(Owner.MODEL, f"{family} does not serve this scene")
+
+
 def run_interleaved(
     scene: Scene, times: np.ndarray, jobs: Sequence[Job], repeats: int
 ) -> list[list[float]]:  # fmt: skip
@@ -97,14 +128,42 @@ def main() -> None:
         os.dup2(nothing.fileno(), 0)
     while True:
         try:
-            folder, last_resort, function, arguments = channel.recv()
+            folder, last_resort, function, arguments, in_copy = channel.recv()
         except EOFError:
             return
         os.chdir(folder)
-        faulthandler.dump_traceback_later(last_resort, exit=True)
-        answer = _answer(function, arguments)
-        faulthandler.cancel_dump_traceback_later()
-        channel.send_bytes(answer)
+        called = _answer_of_copy if in_copy else _answer_within
+        channel.send_bytes(called(last_resort, function, arguments))
+
+
+def _answer_within(last_resort: float, function: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
+    """The pickled answer; the process ends itself after ``last_resort`` (s)."""
+    faulthandler.dump_traceback_later(last_resort, exit=True)
+    answer = _answer(function, arguments)
+    faulthandler.cancel_dump_traceback_later()
+    return answer
+
+
+def _answer_of_copy(last_resort: float, function: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
+    """The pickled answer of a forked copy; where that gives none, this process ends as the copy did."""
+    ours, theirs = Pipe(duplex=False)
+    if not (copy := os.fork()):
+        ours.close()
+        theirs.send_bytes(_answer_within(last_resort, function, arguments))
+        os._exit(0)
+    theirs.close()
+    answer = b""
+    with contextlib.suppress(EOFError), ours:
+        answer = ours.recv_bytes()
+    status = os.waitstatus_to_exitcode(os.waitpid(copy, 0)[1])
+    return answer or _end_as(status)
+
+
+def _end_as(status: int) -> NoReturn:
+    """End this process by a signal, where the exit status is minus its number, or with the status."""
+    if status < 0:
+        os.kill(os.getpid(), -status)
+    os._exit(max(status, 0))
 
 
 def _answer(function: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:

@@ -82,6 +82,20 @@ class Plane:
         self.force = np.array([[*(b.mass * gravity[:2]), 0.0] for b in scene.body])
         for load in scene.load:
             self.force[scene.body_index(load.body), 2] += load.moment[2]
+        if scene.joint:
+            self.fix()
+
+    def fix(self):
+        """Ends of joints: joint, body, sign and arm at t = 0; rows (joints, 3, nb, 3) where no arm counts,
+        and those of x, y and angle that each joint keeps (joints, 2, 3)."""
+        joints, nb = self.scene.joint, len(self.scene.body)
+        ends = [(k, self.scene.body_index(name), sign) for k, joint in enumerate(joints)
+                for sign, name in zip((-1.0, 1.0), joint.bodies, strict=True) if name != GROUND]  # fmt: skip
+        self.of, self.on, self.sign = (np.array(column) for column in zip(*ends, strict=True))
+        self.arm = (np.array([joint.anchor[:2] for joint in joints])[self.of] - self.q0[self.on, :2]).T
+        self.still = np.zeros((len(joints), 3, nb, 3))
+        self.still[self.of, :, self.on] = self.sign[:, None, None] * np.eye(3)
+        self.kept = np.array([kept(joint) for joint in joints])
 
     def rates(self, y):
         """M a = f + Jᵀλ, J a = γ; least squares, so that redundant rows do no harm."""
@@ -89,24 +103,28 @@ class Plane:
         free, root = self.force.ravel() / self.mass, np.sqrt(self.mass)
         if not self.scene.joint:
             return np.concatenate([v.ravel(), free])
-        rows, gammas = map(np.concatenate, zip(*(self.joint(j, q, v) for j in self.scene.joint), strict=True))
-        jacobian = rows.reshape(len(rows), -1)
-        push = np.linalg.lstsq(jacobian / root, gammas - jacobian @ free, rcond=1e-10)[0]
+        jacobian, gamma = self.rows(q, v)
+        push = np.linalg.lstsq(jacobian / root, gamma - jacobian @ free, rcond=1e-10)[0]
         return np.concatenate([v.ravel(), free + push / root])
 
-    def joint(self, joint, q, v):
-        """Rows (2, nb, 3) of J and (2,) of γ: of a pin the point's x and y, of a slide across and angle."""
-        rows, gamma = np.zeros((3, *q.shape)), np.zeros(3)
-        for sign, name in zip((-1.0, 1.0), joint.bodies, strict=True):
-            if (b := self.scene.body_index(name)) >= 0:
-                c, s = np.cos(q[b, 2] - self.q0[b, 2]), np.sin(q[b, 2] - self.q0[b, 2])
-                x, y = [[c, -s], [s, c]] @ (np.array(joint.anchor)[:2] - self.q0[b, :2])
-                rows[:, b] = sign * np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
-                gamma += sign * v[b, 2] ** 2 * np.array([x, y, 0.0])
-        kept = np.eye(3)[:2]
-        if joint.type == "translational":
-            kept = np.array([[-joint.axis[1], joint.axis[0], 0.0], [0.0, 0.0, 1.0]])
-        return np.tensordot(kept, rows, 1), kept @ gamma
+    def rows(self, q, v):
+        """Rows J (2 joints, 3 nb) and γ: of a pin the point's x and y, of a slide across and angle."""
+        angle, (a, b) = q[self.on, 2] - self.q0[self.on, 2], self.arm
+        c, s = np.cos(angle), np.sin(angle)
+        x, y = self.sign * (c * a - s * b), self.sign * (s * a + c * b)
+        rows, coasting = self.still.copy(), np.zeros((len(self.still), 3))
+        rows[self.of, 0, self.on, 2], rows[self.of, 1, self.on, 2] = -y, x
+        np.add.at(coasting, (self.of, 0), v[self.on, 2] ** 2 * x)
+        np.add.at(coasting, (self.of, 1), v[self.on, 2] ** 2 * y)
+        jacobian = self.kept @ rows.reshape(len(rows), 3, -1)
+        return jacobian.reshape(2 * len(rows), -1), (self.kept @ coasting[..., None]).ravel()
+
+
+def kept(joint):
+    """Of x, y and angle, rows (2, 3): a pin keeps x and y, a slide the way across and the angle."""
+    if joint.type == "translational":
+        return [[-joint.axis[1], joint.axis[0], 0.0], [0.0, 0.0, 1.0]]
+    return [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
 
 
 def rk4(f, y, h):

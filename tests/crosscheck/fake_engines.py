@@ -150,6 +150,17 @@ class Slow(Recorder):
         self.is_ready = True
 
 
+class Herald(Recorder):
+    """Prints when it is made ready for the first time in a process."""
+
+    is_ready = False
+
+    def prepare(self, families: Sequence[str]) -> None:
+        if not self.is_ready:
+            print("a banner")
+        self.is_ready = True
+
+
 class Stuck(Fake):
     def prepare(self, families: Sequence[str]) -> None:
         time.sleep(600)
@@ -202,7 +213,7 @@ class Versionless(Fake):
 
 FAKE, SEGFAULT, HANG, CHATTER, RAISE, QUIT = Fake(), Segfault(), Hang(), Chatter(), Raise(), Quit()
 THREADS, MISSING, RECORDER, AGING = Threads(), Missing(), Recorder(), Aging()
-KEEPING = Keeping()
+KEEPING, HERALD = Keeping(), Herald()
 SLOW, STUCK, NO_SETTINGS = Slow(), Stuck(), NoSettings()
 MALFORMED, SCALARS, VERSIONLESS = Malformed(), Scalars(), Versionless()
 

@@ -74,6 +74,25 @@ def test_failure_of_an_engine_and_the_trajectory(fake: str, message: str, versio
     assert (ended.outcome, ended.message, ended.version) == (Outcome.CRASHED, message, version)
     assert (ended.method, ended.settings) == (PLAIN.family, PLAIN.options)
     assert ended.position.shape == (0, 1, 3), ended.position.shape
+    observed = observe(f"fake_engines:{fake}", still(), TIMES, PLAIN, 60.0)
+    assert observed.value.to_record() == ended.to_record(), (observed.value, ended)
+
+
+def test_observed_runs_and_a_process_for_each(tmp_path: Path):
+    """Each says what making the engine ready printed, and leaves no process behind."""
+    log = tmp_path / "log"
+    seen = [observe("fake_engines:HERALD", still(str(log)), TIMES, PLAIN, 60.0) for _ in range(3)]
+    assert [one.printed for one in seen] == ["a banner\n"] * 3, seen
+    processes = [int(line.split()[1]) for line in log.read_text().splitlines()]
+    assert len(set(processes)) == 3, processes
+    assert all(gone(process) for process in processes), processes
+
+
+def test_observed_run_that_hangs_is_killed_with_all_it_started(tmp_path: Path):
+    pid = tmp_path / "pid"
+    ended = observe("fake_engines:HANG", still(str(pid)), TIMES, PLAIN, 2.0).value
+    assert (ended.outcome, ended.message) == (Outcome.TIMED_OUT, "no result after 2 s"), ended.message
+    assert gone(int(pid.read_text())), f"grandchild {pid.read_text()} is still alive"
 
 
 def test_hang_is_killed_with_all_it_started(tmp_path: Path):

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crosscheck.conformance.families import best_family
 from crosscheck.engine import engine
 from crosscheck.judge.published import BY_SCENE, PUBLISHED
 from crosscheck.judge.reference.arithmetic import EXTENDED, doubles
@@ -127,6 +126,6 @@ def test_published_governor_is_as_near_as_its_step_allows():
 def test_the_best_family_of_mbref_runs_every_problem(name):
     """Bodies without moments of inertia had only families whose mass matrix is then singular."""
     scene = SCENES[name]()
-    setting = best_family(engine("mbref").settings(scene))[0]
+    setting = engine("mbref").best_settings(scene)[0]
     run = engine("mbref").run(scene, np.array([0.0, 1e-3]), setting)
     assert run.outcome is Outcome.COMPLETED, f"{setting.family}: {run.message}"

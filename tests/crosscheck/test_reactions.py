@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crosscheck.conformance.families import best_family
 from crosscheck.engine import engine
 from crosscheck.judge.constraints import initial_poses
 from crosscheck.judge.gauss_motion import gauss_motion
@@ -39,7 +38,7 @@ EXACT = 1.2e-11  # of mbref from the exact reactions
 
 def run(name: str, scene: Scene) -> Trajectory:
     simulator = engine(name)
-    return simulator.run(scene, TIMES, best_family(simulator.settings(scene))[-1])
+    return simulator.run(scene, TIMES, simulator.best_settings(scene)[-1])
 
 
 def door(kind: type) -> Scene:

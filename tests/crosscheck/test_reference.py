@@ -13,7 +13,6 @@ import pytest
 import mbref.equations.model
 from crosscheck.cli.request import find_certifiable
 from crosscheck.conformance.closed_forms import CLOSED_FORMS, free_fall, pendulum
-from crosscheck.conformance.families import best_family
 from crosscheck.conformance.features import BODY, JOINTS, feature_scenes, massless, undetermined
 from crosscheck.conformance.moving import moving_probes, several_springs
 from crosscheck.conformance.random_mechanisms import random_mechanism
@@ -470,7 +469,7 @@ def test_a_planted_defect_is_seen_by_the_other_two(plant, monkeypatch):
     """The two without the defect agree with each other, and neither agrees with the third."""
     scene, times = random_mechanism(3).with_(duration=0.2), np.linspace(0.0, 0.2, 3)
     plant(monkeypatch)
-    setting = best_family(engine("mbref").settings(scene))[-1]
+    setting = engine("mbref").best_settings(scene)[-1]
     found = {
         plant_in_a: natural_motion(scene, times, EXTENDED, seconds=SECONDS),
         plant_in_b: tree_motion(scene, times, EXTENDED, seconds=SECONDS),

@@ -65,6 +65,9 @@ class Exudyn(Engine):
             )
         return None
 
+    def serves(self, scene: Scene, family: str) -> bool:
+        return scene.has_mass() if family == "tuned" else super().serves(scene, family)
+
     def settings(self, scene: Scene) -> Sequence[Setting]:
         found = []
         if scene.has_mass():

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.driver_motion import motion
+from crosscheck.engines.driver_motion import moving
 from crosscheck.engines.exudyn.joints import JOINTS, marker_frame
 from crosscheck.engines.geometry import unit
 from crosscheck.judge.constraints import initial_twists
@@ -130,10 +130,11 @@ class _Parts:
         joint = self.scene.joint_named(driver.joint)
         turning = joint.facts.driven == "angle"
         markers.append(self._rotation(joint) if turning else self._translation(joint))
+        at = moving(driver)
         constraint = self.items.ObjectConnectorCoordinate(
             markerNumbers=markers,
-            offsetUserFunction=lambda mbs, t, item, offset: motion(driver, t)[0],
-            offsetUserFunction_t=lambda mbs, t, item, offset: motion(driver, t)[1],
+            offsetUserFunction=lambda mbs, t, item, offset: at(t)[0],
+            offsetUserFunction_t=lambda mbs, t, item, offset: at(t)[1],
         )
         return self.mbs.AddObject(constraint)
 
