@@ -65,17 +65,11 @@ def test_a_call_on_a_loaded_machine_has_its_cpu_time(child: Child, monkeypatch):
     child.call(time.sleep, (1.5,), 1.0)
 
 
-def test_a_busy_call_is_late(child: Child):
+@pytest.mark.parametrize("in_copy", [False, True])
+def test_a_busy_call_is_late(child: Child, in_copy: bool):
     child.call(operator.add, (2, 3), 60.0)
     with pytest.raises(ChildFailed, match=r"no result after 0\.5 s") as raised:
-        child.call(
-            pow,
-            (
-                3,
-                10**9,
-            ),
-            0.5,
-        )
+        child.call(pow, (3, 10**9), 0.5, in_copy)
     assert raised.value.outcome is Outcome.TIMED_OUT
 
 
