@@ -1,6 +1,6 @@
 """Cost of a simulated second at errors of 1e-3, 1e-6 and 1e-9: mbref, engines, general integrators, limit.
 
-    python benchmarks/speed.py [SCENE …] [--out FILE.json] [--plot FILE.png]
+    python benchmarks/speed.py [SCENE …] [--only ENGINE …] [--out FILE.json] [--plot FILE.png]
 
 Every setting of every family is run once in a child process, coarse to fine, until it takes too long; then
 all that count take turns in REPEATS rounds of this process, brief ones several times a round, so that their
@@ -44,7 +44,10 @@ from mbref.trajectory import Cost, Outcome
 
 OURS, LIMIT_NAME, SERIES = "mbref", LIMIT.name, "taylor"
 ENGINES = ("mbref", "mujoco", "pinocchio", "exudyn", "sundials")
-OTHERS = ("general_integrators:SCIPY", "general_integrators:SCIKIT_SUNDAE", "limit:LIMIT")
+OTHERS = (
+    "general_integrators:SCIPY", "general_integrators:SCIKIT_SUNDAE", "code_generators:CASADI",
+    "code_generators:HEYOKA", "limit:LIMIT",
+)  # fmt: skip
 PAPER = (
     "four_bar", "five_bar", "spatial_slider_crank", "spatial_slider_crank_driven", "planar_slider_crank",
     "planar_slider_crank_equal", "planar_slider_crank_heavy", "four_bar_gravity", "five_bar_gravity",
@@ -83,6 +86,7 @@ OPPONENTS = {  # engines and kinds of integrators
     "own integrators": (ENGINES[1:4], (OWN,)),
     "engines": (ENGINES[1:4], ()),
     "general": (("sundials", "scipy"), ()),
+    "generated code": (("casadi", "heyoka"), ()),
     "limit": ((LIMIT_NAME,), ()),
 }
 OURSELVES: dict[str, Callable[[str], bool]] = {  # of the families' names
@@ -92,10 +96,12 @@ OURSELVES: dict[str, Callable[[str], bool]] = {  # of the families' names
 }
 
 
-def competitors() -> list[str]:
-    """All whose packages are installed; says which are not."""
+def competitors(only: Sequence[str] = ()) -> list[str]:
+    """All, or those named ``only``, whose packages are installed; says which are not."""
     found = []
     for name in (*ENGINES, *OTHERS):
+        if only and engine(name).name not in only:
+            continue
         if installed(name):
             found.append(name)
         else:
@@ -337,11 +343,16 @@ def main() -> None:
     """Measure, print, store, draw."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("scene", nargs="*", default=PAPER, help=f"default: {' '.join(PAPER)}")
+    parser.add_argument("--only", action="append", default=[], metavar="ENGINE", help="may repeat")
     parser.add_argument("--out", type=Path, help="JSON of every run and of the table")
     parser.add_argument("--plot", type=Path, help="a picture of the costs")
     options = parser.parse_args()
     console = Console(width=None if sys.stdout.isatty() else 220)
-    simulators, tables, data = competitors(), {}, {"machine": machine(), "versions": versions(), "scenes": {}}
+    simulators, tables, data = (
+        competitors(options.only),
+        {},
+        {"machine": machine(), "versions": versions(), "scenes": {}},
+    )
     for name in options.scene:
         scene = SCENES[name]()
         runs = measured(scene, simulators)
