@@ -27,8 +27,9 @@ ABOUT = "Trajectories of two engines agree within what the measured order and fl
 MOST = 3  # seeds for each mechanism asked for, where a card says nothing of some
 DECIDED = (PASS, FAIL)
 NOTHING: dict[str, Any] = {"verdicts": ()}
+ELSEWHERE = ("momentum", "replayed", "dead end")  # cards of other kinds, or of a scene of the suite alone
 KINDS: tuple[tuple[Callable[[int], Scene], tuple[str, ...]], ...] = (
-    (mechanism, (RUN, AGREEMENT, *(card for card in PROPERTIES if card not in ("momentum", "replayed")))),
+    (mechanism, (RUN, AGREEMENT, *(card for card in PROPERTIES if card not in ELSEWHERE))),
     (floating, ("energy", "momentum", "reversed")),
     (rotor, ("replayed",)),
     (without_masses, (REFUSAL,)),

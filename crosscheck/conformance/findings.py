@@ -43,15 +43,16 @@ def shrunk(scene: Scene, fails: Callable[[Scene], bool], tries: int = TRIES) -> 
     return scene
 
 
-def keep(scene: Scene, verdict: suite.Verdict, engine: str, folder: Path) -> Path:
-    """Write a scene file that begins with the violation and the command that replays it; its path."""
+def keep(scene: Scene, verdict: suite.Verdict, engine: str, folder: Path, called: str = "") -> Path:
+    """Write a scene file that begins with the violation and the command that replays it; its path.
+    ``called`` is a scene of the suite which the command names in the file's place."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{engine}_{verdict.property}_{scene.name}.toml".replace(" ", "_").replace(":", "_")
     scene.save(path)
     numbers = "" if verdict.measured is None else f" {verdict.measured:.3g}, allowed {verdict.allowed:.3g}"
     words = [
         f"{engine}: {verdict.card()} fails{numbers} {verdict.reason}".rstrip(),
-        f"crosscheck verify {engine} --scene {path}",
+        f"crosscheck verify {engine} --scene {repr(called) if called else path}",
     ]
     path.write_text("".join(f"# {word}\n" for word in words) + path.read_text())
     return path
@@ -59,6 +60,8 @@ def keep(scene: Scene, verdict: suite.Verdict, engine: str, folder: Path) -> Pat
 
 def found(bench: Bench, verdict: suite.Verdict, folder: Path) -> Path:
     """Make a violation small and keep it; the file's path."""
+    if bench.specimen.dead_end:  # a smaller one may be none
+        return keep(bench.scene, verdict, bench.runner.name, folder, bench.scene.name)
     small = shrunk(bench.scene, violates(bench.runner, verdict.property))
     again = verdict
     if small != bench.scene:

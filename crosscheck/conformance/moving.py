@@ -30,6 +30,7 @@ from mbref.scene import (
     TorsionSpring,
     Universal,
 )
+from mbref.scenes.planar_slider_crank import slider_crank
 
 GRAVITY = (2.0, -6.5, -5.0)
 DURATION = 0.2  # s: the bodies turn by about half a radian
@@ -69,6 +70,13 @@ def moving_probes() -> dict[str, Scene]:
         "light and heavy": light_and_heavy(),
     }
     return {name: scene.with_(name=name) for name, scene in found.items()}
+
+
+def dead_end() -> Scene:
+    """A slider-crank of crank 0.3 m and rod 0.25 m, whose crank is driven beyond the angle where the rod
+    stands square on the slider's line: there the slider's speed grows without bound; behind is no pose."""
+    crank = Driver(joint="A", polynomial=(0.0, 4.0))
+    return slider_crank(0.3, 0.25, 0.2, "dead end").with_(driver=(crank,), duration=0.5)
 
 
 def heavy_top() -> Scene:

@@ -31,11 +31,12 @@ from crosscheck.judge.tolerances import (
 )
 from mbref import rotations
 from mbref.scene import Moment, Scene, SceneError
-from mbref.trajectory import Trajectory
+from mbref.trajectory import Outcome, Trajectory
 
 SECOND = ("acceleration", "angular_acceleration")
 NORMS = 4.0  # roundings of the engine by which the length of a quaternion may be off
 STATE = ("position", "orientation", "velocity", "angular_velocity")
+NO_ENDS = (Outcome.COMPLETED, Outcome.CRASHED, Outcome.TIMED_OUT)  # where no motion is to the end
 DENSE = 65  # samples from which the work of a moment is summed to 1e-8
 
 
@@ -69,6 +70,16 @@ def unit_orientations(bench: Bench) -> Finding:
 def closure(bench: Bench) -> Finding:
     """Joints and drivers hold at every sample: the judge's own joint equations."""
     return Finding(float(violation_series(bench.scene, bench.motion).max()), STAYS_CLOSED)
+
+
+def honest_end(bench: Bench) -> Finding:
+    """A run whose driver leads where no pose is ends with a failure, and joints hold at its samples."""
+    run = bench.finest.value
+    if run.outcome in NO_ENDS:
+        return Finding(np.inf, STAYS_CLOSED, f"{run.outcome.label} {run.message}".rstrip())
+    left = violation_series(bench.scene, in_scene_order(bench.scene, run))
+    worst = float(left.max(initial=0.0))
+    return Finding(worst if np.isfinite(worst) else np.inf, STAYS_CLOSED, run.outcome.label)
 
 
 def velocities(bench: Bench) -> Finding:
@@ -248,7 +259,11 @@ def _at(run: Trajectory, samples: slice | np.ndarray) -> Trajectory:
 
 
 def _every(specimen: Specimen) -> bool:
-    return True
+    return not specimen.dead_end
+
+
+def _dead_end(specimen: Specimen) -> bool:
+    return specimen.dead_end
 
 
 def _related(specimen: Specimen) -> bool:
@@ -263,6 +278,7 @@ PROPERTIES: Mapping[str, Property] = {
     "times": _property(sample_times),
     "unit": _property(unit_orientations),
     "closure": _property(closure),
+    "dead end": _property(honest_end, _dead_end),
     "rates": _property(rates_closed),
     "velocities": _property(velocities),
     "truth": _property(truth, version=2),

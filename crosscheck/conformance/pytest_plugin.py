@@ -72,14 +72,12 @@ class Session:
 
     def cards(self) -> list[tuple[str, str]]:
         """(scene, card) of every test."""
-        from crosscheck.conformance.properties import PROPERTIES
-        from crosscheck.conformance.suite import REFUSAL, RUN
+        from crosscheck.conformance.suite import REFUSAL, cards_of
 
         undetermined = next(iter(self.specimens))
         cases = [(undetermined, REFUSAL)]
         for name, specimen in list(self.specimens.items())[1:]:
-            asked = [card for card, entry in PROPERTIES.items() if entry.of(specimen)]
-            cases += [(name, card) for card in (REFUSAL, RUN, *asked)]
+            cases += [(name, card) for card in (REFUSAL, *cards_of(specimen))]
         return cases
 
     def bench(self, scene: str) -> Bench:

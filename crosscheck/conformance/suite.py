@@ -139,12 +139,16 @@ def verdict_on(card: str, bench: Bench) -> Verdict:
 
 def _run(bench: Bench) -> Iterator[Verdict]:
     """Whether the run at the finest setting completes, and what it shows if it does."""
-    yield (first := first_run(bench))
-    if first.status == FAIL:
-        return
-    for label, entry in PROPERTIES.items():
-        if entry.of(bench.specimen):
-            yield judged(label, bench)
+    for label in cards_of(bench.specimen):
+        yield (verdict := verdict_on(label, bench))
+        if label == RUN and verdict.status == FAIL:
+            return
+
+
+def cards_of(specimen: Specimen) -> list[str]:
+    """Cards that are asked where the engine can run the specimen; of a dead end not that it completes."""
+    asked = [card for card, entry in PROPERTIES.items() if entry.of(specimen)]
+    return asked if specimen.dead_end else [RUN, *asked]
 
 
 def first_run(bench: Bench) -> Verdict:

@@ -14,7 +14,7 @@ from crosscheck.conformance.changes import nudged, weighed
 from crosscheck.conformance.closed_forms import CLOSED_FORMS, Exact
 from crosscheck.conformance.drawn import mechanism
 from crosscheck.conformance.features import feature_scenes
-from crosscheck.conformance.moving import moving_probes
+from crosscheck.conformance.moving import dead_end, moving_probes
 from crosscheck.conformance.runners import Runner
 from crosscheck.engine import Cannot, Setting
 from crosscheck.judge.gauss_motion import NAME as GAUSS
@@ -86,12 +86,14 @@ class Finding(NamedTuple):
 @dataclass(frozen=True)
 class Specimen:
     """A scene of the suite; ``exact`` gives its poses where a formula does, ``related`` asks for the
-    metamorphic relations too, ``reference_time`` is CPU time (s) for a scene without a closed form."""
+    metamorphic relations too, ``reference_time`` is CPU time (s) for a scene without a closed form, and a
+    ``dead_end`` has drivers that the mechanism cannot follow to the end."""
 
     scene: Scene
     exact: Exact | None = None
     related: bool = False
     reference_time: float = SECONDS
+    dead_end: bool = False
 
 
 def specimens(deep: bool = False) -> list[Specimen]:
@@ -104,7 +106,8 @@ def specimens(deep: bool = False) -> list[Specimen]:
     }
     drawn = [mechanism(seed).with_(name=name) for name, seed in DRAWN.items()]
     scenes += [*(probes | moving_probes()).values(), *drawn]
-    return forms + [Specimen(scene, None, deep or scene.name in RELATED) for scene in scenes]
+    found = forms + [Specimen(scene, None, deep or scene.name in RELATED) for scene in scenes]
+    return [*found, Specimen(dead_end(), dead_end=True)]
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import time
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any
@@ -19,6 +20,8 @@ from mbref.trajectory import Cost, Outcome, Trajectory
 
 WIDTHS = {"position": 3, "orientation": 4, "velocity": 3, "angular_velocity": 3}
 OPTIONAL = {"acceleration": 3, "angular_acceleration": 3}
+CLOCK = time.get_clock_info("process_time").resolution
+LEAST = CLOCK if CLOCK < 1e-6 else 0.0  # s of a run; by a coarse clock a short run takes none
 UNIT_TOLERANCE = 1e-3  # of a quaternion's length; beyond it, it is none
 
 
@@ -30,7 +33,7 @@ def well_formed(answer: Any, scene: Scene, times: np.ndarray) -> Trajectory:
     """The engine's answer to ``run(scene, times, …)`` as a Trajectory of plain numbers.
 
     Raises MalformedAnswer where it is no Trajectory, has other bodies, other or too few samples, arrays of
-    another shape or fields of another type.
+    another shape or fields of another type, is of another scene or of no version, or took no time.
     """
     if not isinstance(answer, Trajectory):
         raise MalformedAnswer(f"the engine returned {type(answer).__name__}, not a Trajectory")
@@ -40,6 +43,10 @@ def well_formed(answer: Any, scene: Scene, times: np.ndarray) -> Trajectory:
     if not isinstance(answer.bodies, tuple | list) or sorted(map(str, answer.bodies)) != sorted(names):
         raise MalformedAnswer(f"bodies: are {answer.bodies!r}, not those of the scene, {names!r}")
     reached = _times(answer, times)
+    if answer.scene != scene.name:
+        raise MalformedAnswer(f"scene: is {answer.scene!r}, not {scene.name!r}")
+    if not str(answer.version).strip():
+        raise MalformedAnswer("version: is empty")
     plain: dict[str, Any] = {name: _array(name, getattr(answer, name), (reached.size, len(names), width))
              for name, width in (WIDTHS | OPTIONAL).items()
              if name in WIDTHS or getattr(answer, name) is not None}  # fmt: skip
@@ -48,7 +55,7 @@ def well_formed(answer: Any, scene: Scene, times: np.ndarray) -> Trajectory:
     texts: dict[str, Any] = {name: str(getattr(answer, name)) for name in ("version", "method", "message")}
     return replace(
         answer, **plain, **texts, times=reached, bodies=tuple(answer.bodies),
-        settings=_settings(answer.settings), cost=_cost(answer.cost), t_end=_number("t_end", answer.t_end),
+        settings=_settings(answer.settings), cost=_cost(answer), t_end=_number("t_end", answer.t_end),
         reactions=_reactions(answer.reactions, scene, reached.size),
     )  # fmt: skip
 
@@ -93,7 +100,8 @@ def _settings(value: Any) -> dict[str, Any]:
         raise MalformedAnswer("settings: are no table of plain values") from None
 
 
-def _cost(value: Any) -> Cost:
+def _cost(answer: Trajectory) -> Cost:
+    value: Any = answer.cost
     if not isinstance(value, Cost):
         raise MalformedAnswer(f"cost: is {type(value).__name__}, not a Cost")
     numbers = {
@@ -103,5 +111,7 @@ def _cost(value: Any) -> Cost:
         raise MalformedAnswer("cost: is not finite")
     if min(numbers.values()) < 0:
         raise MalformedAnswer("cost: is negative")
+    if answer.outcome is Outcome.COMPLETED and answer.t_end > 0 and numbers["seconds"] < LEAST:
+        raise MalformedAnswer("cost: is 0 s, of a run that completed")
     plain: dict[str, Any] = {n: x if n.endswith("seconds") else int(x) for n, x in numbers.items()}
     return Cost(**plain)

@@ -22,6 +22,7 @@ HELD = {"fixed": ALL, "revolute": ALL, "universal": ALL, "spherical": ALL, "tran
         "cylindrical": (0, 1), "planar": (2,), "distance": ()}  # fmt: skip
 SQUARE = {"fixed": RIGHT, "translational": RIGHT, "universal": ((2, 2),), "revolute": HINGE,
           "cylindrical": HINGE, "planar": HINGE}  # fmt: skip
+UNMET = 1e-8  # part of what the joints ask of the accelerations; 3e-11 is left of them in regular positions
 RANK = 1e-11  # pivots of redundant rows are rounding, 1e-15
 
 
@@ -46,7 +47,8 @@ class Spatial(Engine):
     def run(self, scene, times, setting):
         model, began = Mechanism(scene), time.process_time()
         rtol, span = setting.options["rtol"], (0.0, float(times[-1]))
-        done = solve_ivp(model.rates, span, model.start, "DOP853", times, rtol=rtol, atol=rtol)
+        start, holds = model.start, model.holds
+        done = solve_ivp(model.rates, span, start, "DOP853", times, events=holds, rtol=rtol, atol=rtol)
         states = [model.unpack(y) for y in done.y.T]
         solved = [model.solve(t, state) for t, state in zip(done.t, states, strict=True)]
         cost = Cost(time.process_time() - began, steps=done.nfev // 12, rhs=done.nfev)
@@ -56,7 +58,8 @@ class Spatial(Engine):
             scene.name, self.name, self.version(), setting.family, dict(setting.options), done.t,
             tuple(body.name for body in scene.body), place, rotations.from_matrix(turn), velocity, spin,
             rates[..., :3], rates[..., 3:], model.reactions(states, [push for _, push in solved]),
-            Outcome.COMPLETED if done.success else Outcome.STEP_FAILED, float(done.t[-1]), done.message, cost,
+            Outcome.COMPLETED if done.status == 0 else Outcome.STEP_FAILED,
+            float(done.t[-1]), done.message, cost,
         )  # fmt: skip
 
 
@@ -128,6 +131,13 @@ class Mechanism:
         parts = state.velocity[:n], turning, accelerations[:, :3], accelerations[:, 3:], twists
         return np.concatenate([np.ravel(part) for part in parts])
 
+    def holds(self, t, y):
+        """Falls below zero where no acceleration keeps the joints, as at a dead position of a driver."""
+        self.solve(t, self.unpack(y))
+        return UNMET - self.unmet
+
+    holds.terminal = True
+
     def solve(self, t, state):
         """M a = f + J' push, J a = gamma: accelerations (n, 6) and pushes by joint."""
         n = self.count
@@ -148,7 +158,9 @@ class Mechanism:
         flexible = jacobian @ inverse @ jacobian.T
         unit = 1 / np.sqrt(np.diag(flexible))  # rows of lengths and of angles, in any unit, count alike
         flexible, missing = flexible * unit * unit[:, None], unit * (gamma - jacobian @ free)
-        push = unit * np.linalg.lstsq(flexible, missing, rcond=RANK)[0] if len(gamma) else gamma
+        push = np.linalg.lstsq(flexible, missing, rcond=RANK)[0] if len(gamma) else gamma
+        self.unmet = np.abs(flexible @ push - missing).max(initial=0.0) / np.abs(missing).max(initial=1.0)
+        push = unit * push
         ends = np.cumsum([len(gamma) for gamma in gammas[1:]])
         return (free + inverse @ jacobian.T @ push).reshape(n, 6), np.split(push, ends[:-1])
 

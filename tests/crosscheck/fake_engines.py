@@ -45,7 +45,7 @@ class Fake(Engine):
             tuple(b.name for b in scene.body), still + [b.position for b in scene.body],
             np.zeros((k, nb, 4)) + [b.orientation for b in scene.body], still, still,
             outcome=Outcome[setting.options.get("outcome", "COMPLETED")], t_end=float(times[-1]),
-            cost=Cost(seconds=setting.options.get("seconds", 0.0)),
+            cost=Cost(seconds=setting.options.get("seconds", 0.1)),
         )  # fmt: skip
 
     def misbehave(self, scene: Scene) -> None:
@@ -190,6 +190,9 @@ DAMAGES = {
     "unknown joint": lambda good: replace(good, reactions={"X": np.zeros((3, 6))}),
     "no cost": lambda good: replace(good, cost=1.0),
     "negative cost": lambda good: replace(good, cost=Cost(seconds=-0.1)),
+    "cost of nothing": lambda good: replace(good, cost=Cost(seconds=0.0)),
+    "another scene": lambda good: replace(good, scene="moving"),
+    "no version": lambda good: replace(good, version=" "),
     "cost of NaN": lambda good: replace(good, cost=Cost(seconds=float("nan"))),
     "settings of objects": lambda good: replace(good, settings={"a": Fake}),
     "a local class": lambda good: type("Local", (), {})(),

@@ -51,4 +51,6 @@ def euler(rates: Callable, start: np.ndarray, times: np.ndarray, steps: int = 20
             y = y + (target - t) / steps * rates(t, y)
         samples.append(y)
         t = target
-    return OptimizeResult(t=times, y=np.array(samples).T, nfev=steps * len(times), success=True, message="")
+    return OptimizeResult(
+        t=times, y=np.array(samples).T, nfev=steps * len(times), success=True, status=0, message=""
+    )
