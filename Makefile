@@ -51,7 +51,7 @@ report: $(VENV)/ready ## the whole comparison report, into report/
 quick: $(VENV)/ready ## a comparison report in about three minutes, into report/
 	$(BIN)/crosscheck report --quick
 
-PROBES := --scene "heavy top" --scene "universal joint" --scene "cylindrical driver" --scene door \
+PROBES := --scene "dead end" --scene "tumbling body" --scene "heavy top" --scene "universal joint" --scene "cylindrical driver" --scene door \
     --scene "floating pair" --scene "two drivers" --scene "two torsion springs" --scene "drawn loop"
 
 VERIFIED = $$($(BIN)/python -c "from crosscheck.engine import default_engines as names; print(*names())")

@@ -27,7 +27,7 @@ ABOUT = "Trajectories of two engines agree within what the measured order and fl
 MOST = 3  # seeds for each mechanism asked for, where a card says nothing of some
 DECIDED = (PASS, FAIL)
 NOTHING: dict[str, Any] = {"verdicts": ()}
-ELSEWHERE = ("momentum", "replayed", "dead end")  # cards of other kinds, or of a scene of the suite alone
+ELSEWHERE = ("momentum", "replayed", "dead end", "refined")  # cards of other kinds, or of scenes of the suite
 KINDS: tuple[tuple[Callable[[int], Scene], tuple[str, ...]], ...] = (
     (mechanism, (RUN, AGREEMENT, *(card for card in PROPERTIES if card not in ELSEWHERE))),
     (floating, ("energy", "momentum", "reversed")),

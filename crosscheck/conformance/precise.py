@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from crosscheck.conformance.trial import Bench, Finding, Outside
+from crosscheck.conformance.trial import SWEPT, Bench, Finding, Outside
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.precision import grain, motion_rate, single_precision
 from crosscheck.judge.push_difference import accelerations_apart
@@ -27,6 +27,14 @@ def smooth(bench: Bench) -> Finding:
     """States at neighbouring times lie on smooth curves, but for the rounding that the engine claims."""
     noise, where = grain(bench.scene, bench.close)
     return Finding(noise, max(SAME_MOTION, GRAINS * bench.rounding), where)
+
+
+def refined(bench: Bench) -> Finding | Outside:
+    """Without joints, finer settings come nearer to each other, down to the rounding the engine claims."""
+    if len(bench.sweep) < SWEPT:
+        return Outside("the engine offers fewer than three settings that complete")
+    allowed = max(SAME_MOTION, GRAINS * bench.rounding, bench.steps_before)
+    return Finding(bench.steps_apart, allowed, f"{bench.steps_before:.1e} apart before")
 
 
 def settled(bench: Bench) -> Finding | Outside:

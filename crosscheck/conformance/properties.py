@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crosscheck.conformance.precise import double_precision, settled, smooth
+from crosscheck.conformance.precise import double_precision, refined, settled, smooth
 from crosscheck.conformance.relations import RELATIONS, Relation
 from crosscheck.conformance.trial import NEIGHBOURS, Bench, Broken, Finding, Outside, Specimen, difference
 from crosscheck.engine import Cannot
@@ -262,6 +262,10 @@ def _every(specimen: Specimen) -> bool:
     return not specimen.dead_end
 
 
+def _without_joints(specimen: Specimen) -> bool:
+    return not specimen.scene.joint
+
+
 def _dead_end(specimen: Specimen) -> bool:
     return specimen.dead_end
 
@@ -285,6 +289,7 @@ PROPERTIES: Mapping[str, Property] = {
     "convergence": _property(convergence, version=2),
     "speeds": _property(true_velocities),
     "accelerations": _property(true_accelerations),
+    "refined": _property(refined, _without_joints),
     "settled": _property(settled),
     "digits": _property(double_precision),
     "smooth": _property(smooth),

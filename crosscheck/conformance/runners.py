@@ -14,7 +14,7 @@ import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Setting, engine
 from crosscheck.processes import serve
-from crosscheck.processes.answer import well_formed
+from crosscheck.processes.answer import answered
 from crosscheck.processes.pool import ChildFailed, Observation, ask, observe, run_isolated
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
@@ -122,7 +122,7 @@ class InProcess:
     def _run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         """A run; an exception or a malformed answer is the outcome CRASHED with its words, as in a child."""
         try:
-            return well_formed(self.engine.run(scene, times, setting), scene, times)
+            return answered(self.engine, scene, times, setting)
         except Exception as error:
             words = f"{type(error).__name__}: {error}"
             return serve.failed(self.name, self.engine.version(), scene, setting, Outcome.CRASHED, words)

@@ -195,8 +195,13 @@ class Bench:
     def contraction(self) -> float:
         """Factor by which the difference of successive settings shrinks, by the three finest: the order of
         convergence in steps of the engine's own settings."""
-        before = self._apart(1) if len(self.sweep) == SWEPT else 0.0
+        before = self.steps_before
         return self.steps_apart / before if before > 0 else 1.0
+
+    @cached_property
+    def steps_before(self) -> float:
+        """Difference of the runs at the two settings before, 0 where there is none."""
+        return self._apart(1) if len(self.sweep) == SWEPT else 0.0
 
     @cached_property
     def left(self) -> float:

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engine import Engine, Setting
 from mbref.scene import Scene
 from mbref.trajectory import Cost, Outcome, Trajectory
 
@@ -58,6 +59,20 @@ def well_formed(answer: Any, scene: Scene, times: np.ndarray) -> Trajectory:
         settings=_settings(answer.settings), cost=_cost(answer), t_end=_number("t_end", answer.t_end),
         reactions=_reactions(answer.reactions, scene, reached.size),
     )  # fmt: skip
+
+
+def answered(simulator: Engine, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+    """The engine's run, `well_formed`, and told as of this engine, its version and these options; raises
+    MalformedAnswer."""
+    answer = well_formed(simulator.run(scene, times, setting), scene, times)
+    named = {"engine": simulator.name, "version": str(simulator.version())}
+    for name, own in named.items():
+        if getattr(answer, name) != own:
+            raise MalformedAnswer(f"{name}: is {getattr(answer, name)!r}, not {own!r}")
+    for option, value in _settings(setting.options).items():
+        if answer.settings.get(option) != value:
+            raise MalformedAnswer(f"settings: {option} is {answer.settings.get(option)!r}, not {value!r}")
+    return answer
 
 
 def _times(answer: Trajectory, times: np.ndarray) -> np.ndarray:

@@ -23,7 +23,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Owner, Setting, engine
-from crosscheck.processes.answer import well_formed
+from crosscheck.processes.answer import answered
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
@@ -53,7 +53,7 @@ def run_once(engine_name: str, scene: Scene, times: np.ndarray, setting: Setting
     except ImportError as error:
         message = f"{simulator.package} is not installed: {error}"
         return failed(engine_name, "", scene, setting, Outcome.CRASHED, message)
-    return well_formed(simulator.run(scene, times, setting), scene, times)
+    return answered(simulator, scene, times, setting)
 
 
 def capabilities(engine_name: str, scene: Scene) -> Capabilities:

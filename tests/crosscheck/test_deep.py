@@ -42,9 +42,10 @@ def test_every_card_and_the_sound_example_engine(known, tmp_path):
     path, plan = tmp_path / "records.jsonl", deep.Plan("example", 2)
     found = deep.examined(plan, path)
     assert not found.violations, found.violations
-    assert not found.open() and set(found.counts) == {*PROPERTIES, "run", "refusal"} - {"dead end"}, (
-        found.counts
-    )
+    assert not found.open() and set(found.counts) == {*PROPERTIES, "run", "refusal"} - {
+        "dead end",
+        "refined",
+    }, found.counts
     known(None)
     assert deep.examined(plan, path).to_record() == found.to_record(), "records were not taken"
 
