@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from crosscheck.judge.truth import closed_form, truth_for
 from crosscheck.judge.truth.locked import locked
 from mbref import rotations
-from mbref.scene import Body, Driver, Revolute, Scene, Spherical, Translational, Universal
+from mbref.scene import Body, Driver, Moment, Revolute, Scene, Spherical, Translational, Universal
 from mbref.scenes import SCENES
 from mbref.scenes.planar_slider_crank import planar_slider_crank, slider_crank
 from tests.crosscheck.truth_scenes import ALL, CLOSED, Z, free, pendulum, turned_scene
@@ -186,3 +186,20 @@ def test_a_door_on_tilted_hinges_stays_and_on_aligned_ones_swings():
 
 def test_no_mechanism_with_a_freedom_or_a_driver_is_locked():
     assert all(locked(make()) is None for name, make in SCENES.items()), "they move"
+
+
+def test_a_crank_that_turns_on_repeats_itself():
+    """Turns after the first, which are known from it, against the reduced equation followed all the way."""
+    scene = slider_crank(0.304, 0.4048, 0.3, "turning", rate=30.0).with_(gravity=(0.0, -9.81, 0.0))
+    folded, times = closed_form(scene), np.linspace(0.0, 2.0, 41)
+    turns = folded.coordinate(times)
+    followed = folded._reduced._solution.where(2, times)
+    assert turns[-1, 0] > 7 * 2 * np.pi
+    assert np.abs(turns[:, 0] - followed[:, 0]).max() < 1e-13
+
+
+def test_a_crank_that_is_pushed_does_not_repeat_itself():
+    scene = slider_crank(0.304, 0.4048, 0.3, "pushed", rate=30.0)
+    pushed = scene.with_(load=(Moment(body="crank", moment=(0.0, 0.0, 1e-9)),))
+    assert closed_form(scene)._reduced._turns(np.array([1.0]))[0] > 0
+    assert closed_form(pushed)._reduced._turns(np.array([1.0]))[0] == 0

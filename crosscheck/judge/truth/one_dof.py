@@ -25,6 +25,8 @@ from mbref.trajectory import Trajectory
 EYE = np.eye(3)
 TURNS = (Revolute, Cylindrical)  # joints that carry a torsion spring
 Pair = tuple[np.ndarray, np.ndarray]  # of linear and angular rates, (k, nb, 3) each
+TURN = 8 * np.arctan(REAL(1))
+REPEATED = 64 * float(np.finfo(REAL).eps)  # relative difference of what is the same after a turn
 PROBES = (0.0, 0.31, -0.83)  # path coordinates (rad, or lengths of the scene) where a path is tried
 
 
@@ -98,7 +100,7 @@ class Reduced:
     """q(t) of the reduced equation of motion, integrated along σ with dt = sqrt(I) dσ.
 
     There dq/dσ = s and ds/dσ = Q, where s = sqrt(I) q': the inertia drops out, and the time is one more
-    quadrature.
+    quadrature.  A motion that comes back with the same s after a turn of q repeats itself.
     """
 
     def __init__(self, scene: Scene, path: Path, rate: float):
@@ -112,11 +114,34 @@ class Reduced:
 
     def __call__(self, times: np.ndarray) -> tuple[np.ndarray, ...]:
         """q, q', q'' (k,) at times (k,) ≥ 0."""
-        q, s, _ = self._solution.where(2, times).T
+        turns, rest = self._turns(np.asarray(times, dtype=REAL))
+        q, s, _ = self._solution.where(2, rest).T
         root = self._terms(q, s)[0]
         rate = s / root
         _, push, half_slope = self._terms(q, rate)
-        return q, rate, (push - half_slope * rate**2) / root**2
+        return q + TURN * turns, rate, (push - half_slope * rate**2) / root**2
+
+    def _turns(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Whole turns (k,) of q before times (k,), and the times since, where the motion repeats itself."""
+        reached = self._solution.reach(lambda y: y[2] >= times.max(initial=0) or y[0] >= TURN)
+        if reached[0] < TURN or not self._repeats():
+            return np.zeros_like(times), times
+        period = self._solution.where(0, np.array([TURN]))[0, 2]
+        turns = np.floor(times / period)
+        return turns, times - turns * period
+
+    def _repeats(self) -> bool:
+        """Whether all that the motion depends on is the same after one turn of q."""
+        if self._damped or any(isinstance(load, TorsionSpring) for load in self._scene.load):
+            return False
+        before, after = (self._path.poses(np.array([q], dtype=REAL)) for q in (REAL(0), TURN))
+        same = all(
+            np.allclose(a, b, rtol=0, atol=REPEATED)
+            for a, b in ((before.position, after.position), (before.rotation, after.rotation))
+        )
+        _, start, _ = self._solution(np.zeros(1))[0]
+        _, end, _ = self._solution.where(0, np.array([TURN]))[0]
+        return bool(same and abs(end - start) <= REPEATED * abs(start))
 
     def _derivative(self, y: np.ndarray) -> np.ndarray:
         q, s, _ = y.T

@@ -56,6 +56,11 @@ class Solution:
         x = 2 * (times - edges[panel]) / (edges[panel + 1] - edges[panel]) - 1
         return np.einsum("kn,knm->km", _cardinal(x), values[panel])
 
+    def reach(self, is_enough: Callable[[np.ndarray], bool]) -> np.ndarray:
+        """The state (m,) at the end of the first panels behind which is enough."""
+        self._panels(lambda: not is_enough(self._state))
+        return self._state
+
     def where(self, component: int, wanted: np.ndarray) -> np.ndarray:
         """States (k, m) at which a component that grows from 0 has the wanted values (k,)."""
         wanted = np.asarray(wanted, dtype=REAL)
