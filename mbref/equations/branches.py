@@ -96,6 +96,19 @@ def branches(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Branches:
     return Branches(np.array([v, *velocities]), sentence + MULTIPLE * multiple)
 
 
+def tangents(model: Model, q: np.ndarray) -> np.ndarray:
+    """Directions (b, n) of the branches of undriven motions that meet at q (7 nb,); none where second order
+    does not tell simple ones."""
+    found = second_order(model, 0.0, q, np.zeros(model.n))
+    freedoms = found.kernel.shape[1]
+    if freedoms < 2 or not len(found.forms):
+        return np.zeros((0, model.n))
+    lines = (_roots(found.forms[0]), False) if freedoms == 2 else _roots_of_many(found.forms)
+    roots = [a for a in lines[0] if np.abs(_values(found.forms, a)).max() < SAME] if lines else []
+    along = [((found.kernel @ a) * found.scale)[:-1] for a in roots]
+    return np.array(along) if along else np.zeros((0, model.n))
+
+
 def second_order(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> SecondOrder:
     """The constraints at q (7 nb,) to second order: rows of unit length, columns by the lengths of bodies.
 

@@ -36,6 +36,7 @@ class Options(NamedTuple):
 
 
 STRONGER, LARGEST_ALPHA = 1e3, 1e16  # factor of the next α; from there on 1/α is rounding beside S
+REDUNDANT_ALPHA = 1e15  # the largest with which a matrix of redundant rows stays positive
 options_of, factor_of = opener(Options), opener(SparseFactor)
 
 
@@ -46,6 +47,8 @@ def accelerate(system):
     while status == NOT_CONVERGED and system.settings.independent and alpha < LARGEST_ALPHA:
         alpha *= STRONGER
         status = iterate_with(alpha, system)
+    if status == SINGULAR and alpha > options.alpha:  # of redundant rows, by rounding
+        status = iterate_with(REDUNDANT_ALPHA, system)
     add_static_multipliers(factor.static, system)
     return status
 

@@ -88,7 +88,8 @@ def step(rates, t, h, y, y_rate, y_new, memory):
         return -float(status)
     for i in range(y.shape[0]):
         y_new[i] = y[i] + h * solution(slopes, i)
-    rtol, atol, error3, error5 = control.rtol, control.atol, 0.0, 0.0
+    share, error3, error5 = memory.loop.clock.share, 0.0, 0.0
+    rtol, atol = share * control.rtol, share * control.atol
     for i in range(y.shape[0]):
         weight = 1.0 / (atol + rtol * max(abs(y[i]), abs(y_new[i])))
         errors3[i] = third_order(slopes, i) * weight

@@ -53,6 +53,7 @@ class Settings(NamedTuple):
     position_gain: float = 0.0
     rank_tolerance: float = 1e-10
     newton_tolerance: float = 1e-13
+    rounding: float = 1e-15  # violation of positions that is not corrected
     independent: int = 0  # whether rows of small singular values are known to be independent
 
 
@@ -193,6 +194,7 @@ class Clock(NamedTuple):
     length: float = 0.0  # s, of the last step
     suggested: float = 0.0  # s, that length before sample times cut it
     ratio: float = 0.0  # error of the last step over its tolerance
+    share: float = 1.0  # of rtol and atol: the tolerance of a step (``simulation.stepping.share``)
     y_size: int = 0  # length of y
     sample: int = 0  # the next one to take
     restart: int = 0  # the step since which the states are one smooth piece

@@ -40,7 +40,7 @@ class Limits:
     Whatever number is given, the field is a Python float or int: compiled code reads its bytes.
     """
 
-    rtol: float = 1e-9  # local error per step, relative …
+    rtol: float = 1e-9  # local error per step, less in runs of more than 1000 steps, relative …
     atol: float | None = None  # … and absolute (SI units); None means as rtol
     rank_tolerance: float = 1e-10  # relative; a singular value or pivot below it counts as zero
     violation: float = 3e-3  # largest |Φ| tolerated (m or rad), times the scene's length where over 1 m

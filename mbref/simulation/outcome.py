@@ -13,8 +13,17 @@ from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR
 from mbref.motion import Motion
 from mbref.simulation.dead_position import is_at_dead_position
 from mbref.simulation.remedies import remedy
+from mbref.simulation.rest_position import begins_at_rest
 from mbref.simulation.run import Run
-from mbref.simulation.stepping import DONE, LEFT_MOTION, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED, VIOLATED
+from mbref.simulation.stepping import (
+    CREEPING,
+    DONE,
+    LEFT_MOTION,
+    STEP_TOO_SMALL,
+    TOO_MANY_STEPS,
+    UNDECIDED,
+    VIOLATED,
+)
 from mbref.trajectory import Cost, Crossing, Outcome
 
 OUTCOMES = {
@@ -27,11 +36,17 @@ OUTCOMES = {
     TOO_MANY_STEPS: Outcome.STEP_FAILED,
     UNDECIDED: Outcome.UNDECIDED,
     LEFT_MOTION: Outcome.LEFT_MOTION,
+    CREEPING: Outcome.STEP_FAILED,
 }
 
 DEAD_POSITION = (
     "the drivers come to a dead position at t = {:.6g} s, beyond which the mechanism cannot follow: "
     "velocities grow without bound; end the motion before, or drive another joint"
+)
+
+REST_POSITION = (
+    "the motion begins at rest on a singular position, and the branch along which it is pushed cannot be "
+    "followed; velocities of the bodies along a branch tell it"
 )
 
 
@@ -101,6 +116,8 @@ def _message(run: Run, status: int) -> str:
     """One sentence: the cause and time of the end, and a remedy; or the correction of the start."""
     if status != DONE and is_at_dead_position(run):
         return DEAD_POSITION.format(run.memory.loop.clock.time)
+    if status == UNDECIDED and run.memory.loop.clock.time == 0.0 and begins_at_rest(run):
+        return REST_POSITION
     if status != DONE:
         return "; ".join(filter(None, (_cause(run, status), remedy(run, status))))
     crossings = int(run.memory.equations.system.counts.crossings)
@@ -121,6 +138,8 @@ def _cause(run: Run, status: int) -> str:
         )
     if status == TOO_MANY_STEPS:
         return f"{run.limits.most_steps} steps were taken without reaching the end, at t = {t:.6g} s"
+    if status == CREEPING:
+        return f"steps are so short at t = {t:.6g} s that the end is out of reach"
     if status == STEP_TOO_SMALL:
         h = memory.control.smallest_step
         return f"the error estimate asks for a step below {h:.3g} s at t = {t:.6g} s"

@@ -7,7 +7,14 @@ from mbref.formulations import FORMULATIONS
 from mbref.kernels.layout import NOT_CONVERGED, SINGULAR
 from mbref.method import DEFAULT, SHORT
 from mbref.simulation.run import Run
-from mbref.simulation.stepping import LEFT_MOTION, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED, VIOLATED
+from mbref.simulation.stepping import (
+    CREEPING,
+    LEFT_MOTION,
+    STEP_TOO_SMALL,
+    TOO_MANY_STEPS,
+    UNDECIDED,
+    VIOLATED,
+)
 
 FOLLOWS = "alf-dual+projection and taylor follow a motion through singular positions"
 BY_STATUS = {
@@ -24,7 +31,7 @@ def remedy(run: Run, status: int) -> str:
         return _of_singular_matrix(run)
     if status == NOT_CONVERGED:
         return _of_iteration(run)
-    if status in (STEP_TOO_SMALL, TOO_MANY_STEPS):
+    if status in (STEP_TOO_SMALL, TOO_MANY_STEPS, CREEPING):
         return _of_steps(run)
     return BY_STATUS.get(status, "")
 

@@ -23,6 +23,7 @@ from mbref.equations.static_constraints import at_rest, held_by_rows, reduced_fa
 from mbref.equations.units import row_lengths
 from mbref.kernels.compilation import Exchangeable
 from mbref.kernels.layout import (
+    NOT_CONVERGED,
     Active,
     Control,
     Kernels,
@@ -40,11 +41,12 @@ from mbref.linear_algebra.symbolic_factorisation import empty_factor
 from mbref.method import Method
 from mbref.scene import Scene, SceneError
 from mbref.simulation.limits import AUTO, SPECIALISED, Limits
-from mbref.simulation.stepping import PAUSED, SINGULAR_AHEAD, UNDECIDED, advance_to_end
+from mbref.simulation.stepping import CREEPING, PAUSED, SINGULAR_AHEAD, UNDECIDED, advance_to_end
 from mbref.specialised import Part, Specialised, Untraceable, specialise, with_specialised_code
 from mbref.stabilisation.base import Stabilisation
 
 STEPS_PER_CALL = 5_000  # between returns to Python, where an interrupt is heard and progress is told
+OUT_OF_REACH, PACE_STEPS = 100.0, 20_000  # limits of steps that the end is away, at the pace of so many
 MOST_ROWS, RANK = 120, 1e-6  # rows whose rank is found at the start; a singular value that is rounding
 MOST_COMPARED = 60  # rows whose gradients at both ends of a step are compared
 STEPS_WORTH_CODE = 20_000  # steps ahead from which on specialised code saves more than it takes to make
@@ -68,6 +70,7 @@ class Run:
         self.wants_code = limits.code == AUTO
         self.crossings: list[Passed] = []
         self.making = 0.0  # s of CPU time spent on specialised code
+        self._judged = 0.0, 0  # time (s) and steps when the pace was last judged
         if limits.code == SPECIALISED:
             self._specialise()
 
@@ -179,7 +182,9 @@ class Run:
         if self.method.stabilisation.projects:
             rank = independent_rows(self.model, self.start.q, self.part.factor.symbolic)
             memory.watch.generic_rank = rank
-            memory.equations.system.settings.independent = rank == memory.pivots.size
+            settings = memory.equations.system.settings
+            settings.independent = rank == memory.pivots.size
+            settings.rounding *= min(1.0, self.model.length)
         self.enter_state()
 
     def enter_state(self) -> None:
@@ -193,8 +198,9 @@ class Run:
         before, began, status = self.making, time.process_time(), PAUSED
         while status == PAUSED:
             status = advance_to_end(self.packed.argument)
-            if status == SINGULAR_AHEAD:
-                status = self.pass_singular_position()
+            if status == SINGULAR_AHEAD or self._fails_at_start(status):
+                status = self.pass_singular_position(status)
+            status = self._judge_pace(status)
             if self.wants_code and status == PAUSED and self._steps_ahead() >= STEPS_WORTH_CODE:
                 self.wants_code = False
                 with contextlib.suppress(Untraceable):  # then the general kernels go on
@@ -203,9 +209,26 @@ class Run:
                 progress(float(self.memory.loop.clock.time))
         return status, time.process_time() - began - (self.making - before)
 
-    def pass_singular_position(self) -> int:
-        """Go on behind the singular position that may be ahead: PAUSED, DONE or why that cannot be."""
-        return UNDECIDED
+    def _judge_pace(self, status: int) -> int:
+        """CREEPING instead of PAUSED where at the pace of the last steps the end is out of all reach."""
+        now, steps = float(self.memory.loop.clock.time), int(self.memory.equations.system.counts.steps)
+        before, taken = self._judged[0], steps - self._judged[1]
+        if status != PAUSED or taken < PACE_STEPS:
+            return status
+        self._judged = now, steps
+        creeps = taken * (self.times[-1] - now) > OUT_OF_REACH * self.limits.most_steps * (now - before)
+        return CREEPING if creeps else status
+
+    def _fails_at_start(self, status: int) -> bool:
+        """Whether the formulation's iteration does not converge at the first state."""
+        return status == NOT_CONVERGED and self.memory.equations.system.counts.steps == 0
+
+    def pass_singular_position(self, status: int) -> int:
+        """Go on behind the singular position that may be ahead: PAUSED, DONE or why that cannot be.
+
+        ``status`` says why the steps ended.
+        """
+        return UNDECIDED if status == SINGULAR_AHEAD else status
 
     def _steps_ahead(self) -> float:
         """Steps to the end at the pace so far, or to the limit of steps."""

@@ -19,6 +19,10 @@ from mbref.simulation.singular_crossing import (
 
 # how a call ends; evaluation statuses (SINGULAR, …) end it too
 DONE, VIOLATED, STEP_TOO_SMALL, TOO_MANY_STEPS, PAUSED, SINGULAR_AHEAD, UNDECIDED, LEFT_MOTION = range(10, 18)
+CREEPING = 18
+
+MANY, PACE = 1000.0, 50  # steps of a run whose errors add up to little, and from which on its pace is known
+LEAST_TOLERANCE = 1e-14  # of a step, unless rtol is less
 
 
 @kernel
@@ -58,6 +62,23 @@ def largest_step(memory):
     control, fastest = memory.control, fastest_turn(memory.state.velocities)
     h = control.largest_step
     return min(h, control.largest_turn / fastest) if fastest > 0.0 else h
+
+
+@kernel
+def share(suggested, memory):
+    """The part of rtol and atol that a step may lose: 1, but (MANY / steps)² in runs of more steps than MANY.
+
+    Errors of a motion's frequency add up to a phase that grows with the square of the time.  The number of
+    steps is expected from the pace so far, among the first ones also from the step that is suggested (s).
+    """
+    loop, steps = memory.loop, memory.equations.system.counts.steps
+    reached, end = loop.clock.time, loop.times[loop.times.shape[0] - 1]
+    if steps < PACE:
+        reached = max(reached, steps * suggested)
+    if not steps * end > MANY * reached:
+        return 1.0
+    part = MANY * reached / (steps * end)
+    return min(1.0, max(part * part, LEAST_TOLERANCE / memory.control.rtol))
 
 
 @kernel
@@ -161,6 +182,7 @@ def advance(target, y, y_rate, memory):
     propose, clock = memory.kernels.propose, loop.clock
     t, interval, y_new = clock.time, target - clock.time, loop.y_new[: clock.y_size]
     suggested = propose(clock.length, clock.suggested, clock.ratio, y, y_rate, memory)
+    clock.share = share(suggested, memory)
     suggested = proposed_or_first_step(suggested, memory)
     suggested = min(max(suggested, control.forced_step), largest_step(memory))
     while True:

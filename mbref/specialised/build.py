@@ -22,13 +22,12 @@ from mbref.equations.static_constraints import add_static_multipliers
 from mbref.kernels.compilation import CACHE, PLAIN
 from mbref.kernels.layout import OK, Active, Addresses, SparseFactor, State, System
 from mbref.kernels.named_memory import Packed, allocate, packed, record
-from mbref.linear_algebra.minimum_norm import NEVER
 from mbref.linear_algebra.sparse_cholesky import find_squared_pivots
 from mbref.method import Method
 from mbref.specialised.kept_code import code_of
 from mbref.specialised.machine_code import Code, Piece, processor
 from mbref.specialised.tracing import Record, Untraceable, inputs, numbers, plain
-from mbref.stabilisation.projection import REPEATED, newton_step, project_velocities
+from mbref.stabilisation.projection import REPEATED, project_velocities, whole_newton_step
 
 MOST_ROWS = 60  # the record of more would be too long (machine_code.MOST_OPERATIONS)
 
@@ -131,7 +130,7 @@ def project_piece(state: RecordingState) -> Piece:
     Velocities are corrected in every step; where one is enough they need next to no correction.
     """
     memory, (q, v) = state.memory, state.active
-    violation = plain(newton_step)(state.t, None, NEVER, memory)
+    violation = plain(whole_newton_step)(state.t, memory)
     if isinstance(violation, float) and violation < 0:
         raise Untraceable("the constraint rows cannot be factored at the start")
     plain(find_squared_pivots)(memory.factor)

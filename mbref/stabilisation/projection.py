@@ -33,6 +33,8 @@ LEAST_REFERENCE = 0.05  # that the smallest pivot is compared with, also at a st
 MOST_ITERATIONS = 10
 ROUNDING = 1e3  # tolerances: the violation below which iterations may fail to reduce it further
 SMALL, GOOD_REDUCTION = 1e-8, 1e-2  # a factor is kept while violations are so small and shrink so fast
+BENT = 1e-6  # and while the last correction, over its distance from a singular position, is so small
+MOVED = 30.0  # roundings of a last correction behind which rows and factor are found anew
 LARGEST_TURN = 2.5  # rad: less than half a turn, after which the next singular position may come
 FACTOR_FAILED = -1.0  # a Newton step's answer in place of the violation
 
@@ -107,17 +109,40 @@ def remove_violation(violation, iterations, factor, target):
 def newton_step(t, y, before, memory):
     """One step of Newton's method for Φ(q, t) = 0 in ``memory.state``; the largest |Φ| before it.
 
-    The last factor serves again while the violation ``before`` was small and shrinks well.
+    The last factor serves again while the violation ``before`` was small and shrinks well.  Positions whose
+    violation is rounding stay, so that the rows are theirs.
     """
     state, equations, scratch = memory.state, memory.equations, scratch_of(memory.chart)
     evaluate(t, state.coordinates, state.velocities, equations)
-    violation, tolerance = largest(equations.rows.phi), equations.system.settings.newton_tolerance
-    stale = before > SMALL or (violation > tolerance and not violation <= GOOD_REDUCTION * before)
+    violation, settings = largest(equations.rows.phi), equations.system.settings
+    stale = before > SMALL or (violation > settings.newton_tolerance and violation > GOOD_REDUCTION * before)
+    stale = stale or largest(scratch.correction) ** 2 > BENT * before
     if stale and not factorise_constraints(memory):
         return FACTOR_FAILED
     scratch.correction[:] = 0.0
-    remove_violation(equations.rows.phi, REPEATED, memory.factor, scratch.correction)
-    displace(state.coordinates, scratch.correction, scratch.change)
+    if not violation <= settings.rounding:
+        correct_positions(memory)
+    return violation
+
+
+@inlined
+def correct_positions(memory):
+    """Take Φ away from the coordinates in ``memory.state``, with the last factor."""
+    scratch = scratch_of(memory.chart)
+    remove_violation(memory.equations.rows.phi, REPEATED, memory.factor, scratch.correction)
+    displace(memory.state.coordinates, scratch.correction, scratch.change)
+
+
+@kernel
+def whole_newton_step(t, memory):
+    """As ``newton_step``, always with a factor of its own and a correction: for specialised code."""
+    state, equations, scratch = memory.state, memory.equations, scratch_of(memory.chart)
+    evaluate(t, state.coordinates, state.velocities, equations)
+    violation = largest(equations.rows.phi)
+    if not factorise_constraints(memory):
+        return FACTOR_FAILED
+    scratch.correction[:] = 0.0
+    correct_positions(memory)
     return violation
 
 
@@ -153,13 +178,27 @@ def project(t, y, memory):
     state = memory.state
     expand(y, memory.active, state)
     status = project_positions(t, y, memory)
-    if status != OK:
-        return status
+    if status != OK or not follow_last_correction(t, memory):
+        return SINGULAR if status == OK else status
     watch_pivots(memory)
     project_velocities(ALONE, memory)
     contract(state.coordinates, state.velocities, memory.active, y)
     flush_denormals(y)
     return OK
+
+
+@kernel
+def follow_last_correction(t, memory):
+    """Bring rows and factor to positions that the last correction moved by more than rounding.
+
+    So it is where the violation left was rounding, but a light body beside a heavy one moves the farther.
+    False where no factor exists.
+    """
+    equations, state = memory.equations, memory.state
+    if not largest(scratch_of(memory.chart).correction) > MOVED * equations.system.settings.rounding:
+        return True
+    evaluate(t, state.coordinates, state.velocities, equations)
+    return factorise_constraints(memory)
 
 
 @inlined

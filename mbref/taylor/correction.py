@@ -59,7 +59,22 @@ def subtract_violation(order, memory):
         store(-1.0 * load(solver.phi, j), solver.rhs, j)
     for j in range(0, lanes, LANES):
         change = load(variable, j) * solution(solver, j)
+        store(change, solver.change, j)
         store(load(terms, order * lanes + j) + change, terms, order * lanes + j)
+
+
+@kernel
+def changes_factor(left, memory):
+    """Whether the last correction, which took a violation away, has changed the factor.
+
+    It has by the correction over the distance from a singular position, which the least pivot tells; where
+    masses differ much, light bodies move the farther the heavier the others are, by the change over Φ.
+    """
+    solver, tolerance, change = memory.solver, memory.progress.tolerance, 0.0
+    pivot = least_pivot(memory)
+    for j in range(solver.order.shape[0]):
+        change = larger(change, solver.change[j])
+    return left > tolerance * pivot * pivot or change * change > tolerance * left
 
 
 @kernel
@@ -78,8 +93,7 @@ def correct(memory):
             break
     if not left <= SMALL:
         return NOT_CONVERGED
-    pivot = least_pivot(memory)
-    if left > progress.tolerance * pivot * pivot:  # then the correction has changed the factor
+    if changes_factor(left, memory):
         status = factorise(memory)
     violation_rate(memory)
     subtract_violation(1, memory)

@@ -151,6 +151,7 @@ class Solver(NamedTuple):
     response: Annotated[Matrix, "lanes", "lanes"]
     rhs: Annotated[Vector, "lanes"]
     phi: Annotated[Vector, "lanes"]  # in the lanes of the multipliers
+    change: Annotated[Vector, "lanes"]  # the last correction
 
 
 class Progress(NamedTuple):

@@ -28,7 +28,6 @@ class PassingRun(SeriesRun):
     def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
         super().__init__(scene, method, times, limits)
         self.taylor.progress.passing = True
-        self.memory.equations.system.settings.independent = True  # states are exact
         self.began: Moment | None = None
 
     def cross(self) -> int:
@@ -74,31 +73,77 @@ class PassingRun(SeriesRun):
         A state a little behind the crossing is corrected until the series about it comes from the crossing
         with the velocities of the branch.
         """
-        clock, velocities = self.memory.loop.clock, crossing.velocities[crossing.taken - 1]
-        clock.sample = int(np.searchsorted(self.times, crossing.time, side="right"))
-        ahead = self._time_behind(crossing.time, velocities)
-        clock.time = crossing.time + ahead
-        q, v, status = displaced(crossing.coordinates, ahead * velocities), velocities, OK
+        velocities = crossing.velocities[crossing.taken - 1]
+        self.memory.loop.clock.sample = int(np.searchsorted(self.times, crossing.time, side="right"))
+        following = self.times[self.memory.loop.clock.sample :]
+        ahead = self._time_in_which(velocities)
+        ahead = min(ahead, 0.5 * float(following[0] - crossing.time) if following.size else np.inf)
+        moved = displaced(crossing.coordinates, ahead * velocities), velocities
+        return self._come_from(crossing, velocities, ahead, moved)
+
+    def leave_rest(self, q: np.ndarray, acceleration: np.ndarray) -> int:
+        """Go on from rest at q (7 nb,), t = 0, along a branch with an acceleration (n,): PAUSED, DONE or why
+        that cannot be."""
+        self.crossings, still = [], np.zeros_like(acceleration)
+        ahead = self._time_in_which(0.5 * acceleration) ** 0.5
+        start = Passed(0.0, q, still, SMOOTH)
+        moved = displaced(q, 0.5 * ahead**2 * acceleration), ahead * acceleration
+        status = self._come_from(start, still, ahead, moved)
+        if status == PAUSED:
+            self._put_samples_before(ahead, q, acceleration)
+        self.taylor.progress.entered = self._least_pivot()
+        while status == PAUSED and not self.taylor.progress["is_clear"]:
+            status = self._pass_on()
+        return status
+
+    def _put_samples_before(self, ahead: float, q: np.ndarray, acceleration: np.ndarray) -> None:
+        """The samples from rest at q, t = 0, until a time (s) about which the series now begins."""
+        clock = self.memory.loop.clock
+        for k in range(int(np.searchsorted(self.times, ahead))):
+            t = float(self.times[k])
+            if t > 0.0:
+                there = *self._state_at(t - ahead), self.memory.equations.system.acceleration.copy()
+            else:
+                there = q, np.zeros_like(acceleration), acceleration
+            self._put_sample(k, *there)
+            clock.sample = k + 1
+        self._state_at(0.0)
+        self.began = moment_of(self)
+
+    def _put_sample(self, k: int, q: np.ndarray, v: np.ndarray, acceleration: np.ndarray) -> None:
+        """Sample k; multipliers balance the forces as well as they can, at rest along the branch alone."""
+        samples, terms = self.memory.loop.samples, self.model.terms(float(self.times[k]), q, v)
+        samples.coordinates[k], samples.velocities[k], samples.accelerations[k] = q, v, acceleration
+        across = terms.force - terms.mass * acceleration
+        samples.multipliers[k] = np.linalg.lstsq(terms.jacobian.T, across, rcond=None)[0]
+
+    def _come_from(
+        self,
+        start: Passed | SingularPosition,
+        velocities: np.ndarray,
+        ahead: float,
+        moved: tuple[np.ndarray, np.ndarray],
+    ) -> int:
+        """Go on a time ahead (s) of a singular position that is left with velocities (n,), from a state near
+        that of the motion, which is corrected: PAUSED, or why that cannot be."""
+        (q, v), self.memory.loop.clock.time = moved, start.time + ahead
         for _ in range(CORRECTIONS):
             self.memory.state.coordinates[:], self.memory.state.velocities[:] = q, v
             if (status := self.expand(self.times[-1])) != OK:
                 return status
             there, here = self._state_at(-ahead), self._state_at(0.0)
-            q = displaced(here[0], displacement(there[0], crossing.coordinates))
+            q = displaced(here[0], displacement(there[0], start.coordinates))
             v = here[1] + velocities - there[1]
         progress = self.taylor.progress
         progress["past_pivot"], progress["clearance"], progress["is_clear"] = 0.0, 0.0, 0
         self.began = moment_of(self)
         return PAUSED
 
-    def _time_behind(self, t: float, velocities: np.ndarray) -> float:
-        """Time (s) after t in which the fastest body moves by BEHIND; no sample lies before."""
+    def _time_in_which(self, velocities: np.ndarray) -> float:
+        """Time (s) in which the fastest body moves by BEHIND."""
         rates = velocities.reshape(-1, 6)
-        fastest = max(
-            np.abs(rates[:, :3] / self.model.data.lengths[:, None]).max(), np.abs(rates[:, 3:]).max()
-        )
-        following = self.times[self.memory.loop.clock.sample :]
-        return min(BEHIND / float(fastest), 0.5 * float(following[0] - t) if following.size else np.inf)
+        places = np.abs(rates[:, :3] / self.model.data.lengths[:, None]).max()
+        return BEHIND / float(max(places, np.abs(rates[:, 3:]).max()))
 
     def _state_at(self, ahead: float) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates and velocities at a distance (s) from where the series begins."""

@@ -13,10 +13,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from mbref.kernels.layout import OK
+from mbref.kernels.layout import NOT_CONVERGED, OK
 from mbref.method import Method
 from mbref.scene import Scene
 from mbref.simulation.limits import GENERIC, Limits
+from mbref.simulation.rest_position import leaving_acceleration
 from mbref.simulation.run import Run
 from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, TOO_MANY_STEPS, UNDECIDED
 from mbref.taylor.moment import Moment, enter, moment_of
@@ -39,16 +40,27 @@ class CrossingRun(Run):
         super().__init__(scene, method, times, limits)
         self._passage = Passage(self)
 
-    def pass_singular_position(self) -> int:
-        """PAUSED behind it, DONE at the end, else why the motion cannot be followed."""
-        memory = self.memory
+    def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
+        """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
+        status = self._passage.leave_rest()
+        if status == PAUSED and self.memory.loop.clock.time > 0.0:
+            self.enter_state()
+        return super().advance(progress) if status == PAUSED else (status, 0.0)
+
+    def pass_singular_position(self, status: int) -> int:
+        """PAUSED behind it, DONE at the end, else why the motion cannot be followed.
+
+        Rows that are all but dependent at the start, for which an iteration does not converge, are solved by
+        the elimination of the series.
+        """
+        why, memory = status, self.memory
         y, (coordinates, velocities) = memory.loop.y, memory.active
         memory.state.coordinates[coordinates] = y[: coordinates.size]
         memory.state.velocities[velocities] = y[coordinates.size : memory.loop.clock.y_size]
         status = self._passage()
         if status == PAUSED:
             self.enter_state()
-        return status
+        return why if status == UNDECIDED and why == NOT_CONVERGED else status
 
 
 class TaylorRun(SeriesRun):
@@ -57,8 +69,10 @@ class TaylorRun(SeriesRun):
     def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
         """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
         began, passage = time.process_time(), Passage(self)
-        status = self.expand(self.times[-1])
-        status = PAUSED if status == OK else status
+        status = passage.leave_rest()
+        if status == PAUSED:
+            status = self.expand(self.times[-1])
+            status = PAUSED if status == OK else status
         while status == PAUSED:
             status = self.step_on()
             if status == SINGULAR_AHEAD:
@@ -79,12 +93,26 @@ class Passage:
 
     def __call__(self) -> int:
         """Take the run's state and time over one, and its samples: PAUSED, DONE or why that cannot be."""
-        run, series = self._run, self._series()
+        series = self._series()
+        return self._followed(series, moment_of(self._run), series.cross)
+
+    def leave_rest(self) -> int:
+        """Leave a position at t = 0 where branches meet and the run rests: PAUSED, also where there is none,
+        DONE at the end, else why the motion cannot be followed."""
+        run, start = self._run, self._run.start.q
+        acceleration = leaving_acceleration(run)
+        if acceleration is None:
+            return PAUSED
+        series = self._series()
+        return self._followed(series, moment_of(run), lambda: series.leave_rest(start, acceleration))
+
+    def _followed(self, series: PassingRun, before: Moment, follow: Callable[[], int]) -> int:
+        """Hand the run over to series and back, which follow its motion from a moment on."""
+        run = self._run
         mine, theirs = run.packed.argument, series.packed.argument
-        before = moment_of(run)
         hand_over(mine, theirs)
         series.memory.watch["reference_pivot"] = run.memory.watch["reference_pivot"]
-        status = series.cross()
+        status = follow()
         hand_over(theirs, mine)
         if status not in (PAUSED, DONE):
             return status if status == TOO_MANY_STEPS else UNDECIDED

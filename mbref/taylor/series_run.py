@@ -43,6 +43,7 @@ class SeriesRun(Run):
         if limits.code == SPECIALISED:
             raise Untraceable(NO_CODE)
         super().__init__(scene, method, times, limits)
+        self.memory.equations.system.settings.independent = True  # at samples, where states are exact
         prepare_series()
         control = self.memory.control
         tolerance = SHARE * (control.rtol + control.atol)

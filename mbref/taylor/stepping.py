@@ -21,12 +21,14 @@ from mbref.simulation.stepping import (
     STEP_TOO_SMALL,
     TOO_MANY_STEPS,
     UNDECIDED,
+    share,
 )
 from mbref.taylor.correction import correct, violation
 from mbref.taylor.lanes import LANES, load, store
 from mbref.taylor.layout import TaylorMemory
 from mbref.taylor.loads import ANGLE, TORSION_SERIES, expand_drivers
 from mbref.taylor.passage import (
+    BEFORE,
     distance_ahead,
     exactness,
     exactness_across,
@@ -52,6 +54,7 @@ from mbref.taylor.solver import choose, factorise_anew
 ROUNDING = 1e-12  # of rows
 LOST_ROWS = 100.0  # tolerances by which rows may be off
 SHORTER = 0.7
+LOOSER = 1e4  # of rates in a passage: they count where a step is short beside the motion's own time
 NEARLY = 0.2  # of a step's first pivot: a step that ends nearer to a singular position is tried beyond it
 OVER = 1.25  # its length then, over the distance
 
@@ -70,17 +73,21 @@ def expand_from(t, memory):
 def longest_step(tolerance, memory):
     """The step at which the last two terms of the series are as large as the tolerance.
 
-    So are those of its rate, over the largest rate where that is above 1; a passage asks for rounding anyway.
+    So are those of its rate, over the largest rate where that is above 1; in a passage, which asks for
+    rounding anyway, they may be LOOSER, and do not count near a singular position.
     """
     progress, control, past = memory.progress, memory.run.control, memory.series.past
     counts, variables = memory.run.equations.system.counts, memory.solver.order.shape[0]
     h = control.largest_step
     shortest, of_rates = log(h), tolerance * max(1.0, size_of(past, 1, variables))
+    if progress.passing:
+        of_rates *= LOOSER
+    counted = not progress.passing or progress.past_pivot >= BEFORE * progress.largest_pivot
     for k in range(progress.order - 1, progress.order + 1):
         size = size_of(past, k, variables)
         if size > 0.0:
             shortest = min(shortest, log(tolerance / size) / k)
-            if not progress.passing:
+            if counted:
                 shortest = min(shortest, log(of_rates / (k * size)) / (k - 1))
     h = exp(shortest)
     if counts.steps == 0 and control.first_step > 0.0:
@@ -190,8 +197,9 @@ def step(memory):
     remember_series(memory)
     progress.cut, progress.left = progress.order, 0.0
     left = progress.end - clock.time
-    exact = min(longest_step(exactness(progress), memory), left)
-    h = min(longest_step(exactness_across(progress), memory), left)
+    whole = 1.0 if progress.passing else share(clock.length, memory.run)
+    exact = min(longest_step(whole * exactness(progress), memory), left)
+    h = min(longest_step(whole * exactness_across(progress), memory), left)
     while True:
         status = attempt(h, h >= left, memory)
         if status == OK and (progress.crossed or h <= exact):
