@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 
@@ -17,10 +18,11 @@ from crosscheck.study.stability import FIXED_STEPS, MBREF, METHODS, RTOL, Ladder
 from mbref.trajectory import Outcome
 from reports import figures
 from reports.blocks import Block, Figure, Heading, Table, Text
-from reports.runs import Curve, short
+from reports.runs import Curve
 
 ALLOWED = max(1e3 * RTOL, 1e-6)  # error of a method of mbref beyond which a completed run is a false success
 MOST_DIGITS = 15.0
+DARK = 14.0  # digits from which on a cell is so dark that white is read better on it
 LETTERS = {  # of outcomes that the paper's tables do not have
     "UNDECIDED": "u", "LEFT_MOTION": "m", "TIMED_OUT": "t", "CRASHED": "x", "NOT_FINITE": "n",
 }  # fmt: skip
@@ -99,12 +101,17 @@ def plot(label: str, difficulties: Sequence[float], runs: Runs) -> Drawing:
     for i, row in enumerate(runs.values()):
         for j, difficulty in enumerate(difficulties):
             _write(axes, i, j, row.get(difficulty))
-    axes.set_xticks(range(len(difficulties)), [short(d).replace("e+0", "e") for d in difficulties])
+    axes.set_xticks(range(len(difficulties)), [rung(d) for d in difficulties])
     axes.set_yticks(range(len(runs)), [_name(curve) for curve in runs])
     axes.set_xlabel(label)
     axes.grid(visible=False)
     axes.tick_params(length=0)
     return drawing
+
+
+def rung(difficulty: float) -> str:
+    """A difficulty below its column: 0.3, 1.5, 3e-5, 1e12."""
+    return re.sub(r"e([+-])0?", lambda sign: "e" + sign[1].strip("+"), f"{difficulty:g}")
 
 
 def _write(axes: figures.Axes, i: int, j: int, record: Record | None) -> None:
@@ -113,7 +120,7 @@ def _write(axes: figures.Axes, i: int, j: int, record: Record | None) -> None:
     if is_false(record):
         axes.fill_between([j - 0.5, j + 0.5], i - 0.5, i + 0.5, color="#c62828", linewidth=0)
     text = f"{_shown(record):.0f}" if is_completed(record) else _letter(record["outcome"])
-    colour = "white" if is_false(record) or _digits(record) > 11 else "black"
+    colour = "white" if is_false(record) or _digits(record) > DARK else "black"
     axes.text(j, i, text, ha="center", va="center", color=colour, fontsize=8)
 
 
