@@ -125,13 +125,14 @@ def door() -> Scene:
 
 
 def wound_spring() -> Scene:
-    """A body turning by some turns about a slanted hinge on the ground, against a torsion spring."""
+    """A body turning by some turns about a slanted hinge on the ground, against a spring and its weight."""
     hinge = JOINTS["revolute"]
     axis = np.array(hinge.directions[0]) / np.linalg.norm(hinge.directions[0])
     swing = np.cross(40.0 * axis, np.array(BODY.position) - np.array(hinge.anchor_pair[0]))
     body = replaced(BODY, angular_velocity=40.0 * axis, velocity=swing)
     spring = TorsionSpring(joint="J", stiffness=0.4, damping=0.01, natural_angle=0.4)
-    return Scene(name="wound spring", duration=0.45, body=(body,), joint=(hinge,), load=(spring,))
+    return Scene(name="wound spring", gravity=GRAVITY, duration=0.45, body=(body,), joint=(hinge,),
+                 load=(spring,))  # fmt: skip
 
 
 def floating_pair() -> Scene:
