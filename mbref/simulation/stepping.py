@@ -22,7 +22,7 @@ DONE, VIOLATED, STEP_TOO_SMALL, TOO_MANY_STEPS, PAUSED, SINGULAR_AHEAD, UNDECIDE
 CREEPING = 18
 
 MANY, PACE = 1000.0, 50  # steps of a run whose errors add up to little, and from which on its pace is known
-LEAST_TOLERANCE = 1e-14  # of a step, unless rtol is less
+LEAST_TOLERANCE, EARLY = 1e-13, 1e-2  # of a step, unless rtol is less; part of rtol of the first ones
 
 
 @kernel
@@ -70,15 +70,20 @@ def share(suggested, memory):
 
     Errors of a motion's frequency add up to a phase that grows with the square of the time.  The number of
     steps is expected from the pace so far, among the first ones also from the step that is suggested (s).
+    First steps may be far shorter than others, so that their part is EARLY at least.
     """
-    loop, steps = memory.loop, memory.equations.system.counts.steps
+    loop, steps, least = (
+        memory.loop,
+        memory.equations.system.counts.steps,
+        LEAST_TOLERANCE / memory.control.rtol,
+    )
     reached, end = loop.clock.time, loop.times[loop.times.shape[0] - 1]
     if steps < PACE:
-        reached = max(reached, steps * suggested)
+        reached, least = max(reached, steps * suggested), max(least, EARLY)
     if not steps * end > MANY * reached:
         return 1.0
     part = MANY * reached / (steps * end)
-    return min(1.0, max(part * part, LEAST_TOLERANCE / memory.control.rtol))
+    return min(1.0, max(part * part, least))
 
 
 @kernel

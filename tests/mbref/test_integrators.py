@@ -297,3 +297,10 @@ def test_long_runs_keep_a_thousand_tolerances(end, method):
     scene = next(scene for scene in stability.scenes() if scene.name == f"duration[{end:g}]")
     run = simulate(scene, method, np.linspace(0.0, end, 11), Limits(rtol=1e-9))
     assert run.outcome.label == "COMPLETED" and measure(scene, run, truth_for(scene))["error"] < 1e-6
+
+
+def test_short_first_steps_do_not_make_a_run_long():
+    """At 1e7 rad/s the first step is 1e-10 of the run; a tolerance by its pace would be below rounding."""
+    scene = next(scene for scene in stability.scenes() if scene.name == "speed[1e+07]")
+    run = simulate(scene, times=[scene.duration], limits=Limits(most_steps=2000))
+    assert run.outcome.label == "COMPLETED"
