@@ -9,11 +9,13 @@ import numpy as np
 
 from crosscheck.conformance.changes import mapped, replaced
 from crosscheck.conformance.trial import Outside
+from crosscheck.judge.constraints import initial_twists
 from mbref import rotations
 from mbref.scene import GROUND, Body, Cylindrical, Fixed, Joint, Scene, SceneError
 from mbref.trajectory import Trajectory
 
 HALF, LIMIT = " half", 0.2  # the halves' distance as a part of the largest that the inertia allows
+UNCHANGED = 1e-12  # of the largest velocity: what rounding changes
 
 
 def relabelled(scene: Scene) -> Scene:
@@ -99,12 +101,28 @@ def split(scene: Scene) -> Scene | Outside:
         return Outside("bodies have no mass to split")
     if body.velocity is None or body.angular_velocity is None:
         return Outside("the velocities of the body are left open")
+    if _is_corrected(scene):
+        return Outside("given velocities contradict the joints, and their correction counts bodies")
     try:
         return _in_halves(scene, body)
     except SceneError as error:
         return Outside(f"the halves are no bodies: {error.faults[0]}")
     except ValueError:
         return Outside("the body is too thin to have halves beside each other")
+
+
+def _is_corrected(scene: Scene) -> bool:
+    """Whether the velocities that a scene gives are changed until they obey the joints."""
+    given = [(body.velocity, body.angular_velocity) for body in scene.body]
+    consistent = zip(*initial_twists(scene), strict=True)
+    apart = [
+        np.abs(np.subtract(numbers, found)).max()
+        for pair, pair_found in zip(given, consistent, strict=True)
+        for numbers, found in zip(pair, pair_found, strict=True)
+        if numbers is not None
+    ]
+    scale = max(float(np.abs(twist).max()) for twist in initial_twists(scene))
+    return max(apart, default=0.0) > UNCHANGED * scale
 
 
 def _in_halves(scene: Scene, body: Body) -> Scene:

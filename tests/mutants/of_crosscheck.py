@@ -50,7 +50,7 @@ DEFECTS = (  # adapters and processes
     Defect(RE, "+ load.damping * rate)\n    axis", ")\n    axis", TREE),
     Defect(RE, "link, joint.anchor_pair[1])", "link, joint.anchor_pair[0])", TREE),
     Defect(RE, "if child_is_second else -carried[k]", "if child_is_second else carried[k]", TREE),
-    Defect(RE, "np.cross(omega, inertia @ omega)", "np.cross(inertia @ omega, omega)", TREE),
+    Defect(RE, "cross(omega, inertia @ omega)", "cross(inertia @ omega, omega)", TREE),
     Defect(RE, "force = force + rod.mass / 2 *", "force = force + rod.mass *", TREE),
     Defect(
         "crosscheck/study/timings.py",
@@ -64,14 +64,14 @@ DEFECTS = (  # adapters and processes
     # judge
     Defect(T, "driver.sine.phase + derivative", "derivative", BY_HAND),
     Defect(T, "driver.sine.amplitude * w**derivative", "driver.sine.amplitude * w", BY_HAND),
-    Defect(T, "- 2 * np.cross(w[0], dv)", "- np.cross(w[0], dv)", KINEMATICS),
+    Defect(T, "- 2 * cross(w[0], dv)", "- cross(w[0], dv)", KINEMATICS),
     Defect(
         T,
         "(_dot(offset, da) + _dot(dv, dv) - along**2)",
         "(_dot(offset, da) + _dot(dv, dv) + along**2)",
         BY_HAND,
     ),
-    Defect(T, "dw[1] - dw[0] - np.cross(w[0], w[1])", "dw[1] - dw[0]", KINEMATICS),
+    Defect(T, "dw[1] - dw[0] - cross(w[0], w[1])", "dw[1] - dw[0]", KINEMATICS),
     Defect(
         M,
         "return distance.max(axis=-1) / constraints",
