@@ -20,7 +20,9 @@ from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import ACCEPT, CHANGED, ENTER, NOT_CONVERGED, OK, RATES
 from mbref.kernels.named_memory import Indices, Matrix, Vector, opener
 from mbref.linear_algebra.elimination import full_pivot, lu_factor, lu_solve
+from mbref.linear_algebra.minimum_norm import NEVER
 from mbref.stabilisation.base import Stabilisation
+from mbref.stabilisation.projection import ROUNDING
 
 MOST_ITERATIONS = 20
 SINGULAR_PIVOT = 1e-13
@@ -174,7 +176,8 @@ def solve_dependent_coordinates(t, y, memory):
     """
     state, scratch = memory.state, scratch_of(memory.chart)
     order, rank, b = scratch.column_order, scratch.partition.rank, scratch.residual
-    system = memory.equations.system
+    system, before = memory.equations.system, NEVER
+    tolerance = system.settings.newton_tolerance
     predict_dependent(t, memory)
     for i in range(order.shape[0] - rank):
         state.coordinates[order[rank + i]] = y[i]
@@ -183,8 +186,9 @@ def solve_dependent_coordinates(t, y, memory):
         violation = find_residual(memory)
         if not factorise_dependent(memory):
             return NOT_CONVERGED
-        if violation <= system.settings.newton_tolerance:
+        if violation <= tolerance or before <= violation <= ROUNDING * tolerance:
             return OK
+        before = violation
         system.counts.newton += 1
         lu_solve(scratch.dependent, rank, scratch.exchanges, b)
         for i in range(rank):

@@ -14,8 +14,9 @@ from crosscheck.cli.commands import main
 from crosscheck.conformance import suite, trial
 from crosscheck.conformance.features import undetermined
 from crosscheck.conformance.relations import shaken
-from crosscheck.conformance.runners import Isolated
+from crosscheck.conformance.runners import InProcess, Isolated
 from crosscheck.conformance.trial import specimens
+from crosscheck.engine import engine
 from crosscheck.judge.truth import truth_for
 
 SPECIMENS = {specimen.scene.name: specimen for specimen in specimens()}
@@ -93,3 +94,11 @@ def test_the_table_has_a_line_a_scene_in_eighty_columns():
         line.split() == ["door", "2", "1", "truth", "at", "50", "%", "of", "its", "limit"] for line in lines
     ), lines
     assert any(line.split() == ["pendulum", "1", "truth"] for line in lines), lines
+
+
+def test_partitioning_keeps_a_motion_in_millimetres():
+    """Newton's method ends where rounding, 1000 times as large there, lets no violation shrink further."""
+    specimen, family = SPECIMENS["drawn loop"], "mpi-svd+partitioning"
+    bench = trial.set_up(InProcess(engine("mbref")), specimen, family)
+    verdict = suite.verdict_on("in millimetres", bench)
+    assert verdict.status == suite.PASS, verdict
