@@ -23,7 +23,7 @@ from crosscheck.judge.truth.one_dof import Path, initial_rate
 from mbref import __version__, rotations
 from mbref.integrators import INTEGRATORS
 from mbref.integrators.dop853 import STAGES, Stages
-from mbref.kernels.layout import OK, Control
+from mbref.kernels.layout import OK, Clock, Control
 from mbref.kernels.named_memory import Address, Vector, allocate, packed, record
 from mbref.linear_algebra.vectors import copy
 from mbref.scene import Scene
@@ -33,10 +33,17 @@ REPEATS = 100  # within one reading of the clock: one run is a matter of microse
 STEPS, REJECTED, EVALUATIONS = range(3)
 
 
+class Stepping(NamedTuple):
+    """What the integrator reads of the stepping loop: the share of the tolerance, which stays 1."""
+
+    clock: Clock
+
+
 class OneDegreeOfFreedom(NamedTuple):
     """Memory of the equation and of the integrator."""
 
     control: Control
+    loop: Stepping
     integrator: Address
     numbers: Annotated[Vector, "numbers"]
     y: Annotated[Vector, 2]
@@ -138,7 +145,7 @@ def _integrated(
     numbers = np.array(by_hand.numbers(scene))
     memory = packed(
         allocate(
-            OneDegreeOfFreedom, {}, control=record(control), numbers=numbers,
+            OneDegreeOfFreedom, {}, control=record(control), loop=allocate(Stepping, {}), numbers=numbers,
             integrator=packed(allocate(Stages, {"nb": 1})),
         )
     )  # fmt: skip
