@@ -34,7 +34,7 @@ STEPS, REJECTED, EVALUATIONS = range(3)
 
 
 class Stepping(NamedTuple):
-    """What the integrator reads of the stepping loop: the share of the tolerance, which stays 1."""
+    """The stepping loop as far as the integrator reads it: the share of the tolerance, which stays 1."""
 
     clock: Clock
 

@@ -41,8 +41,8 @@ NUMBERS = Arithmetic(math.sin, math.cos)
 
 
 class Symbol:
-    """A symbol of a code generator as an entry of arrays; what is added to zero or multiplied by zero or one
-    costs nothing."""
+    """A symbol of a code generator as an entry of arrays; sums with zero and products with zero or one add no
+    operation."""
 
     def __init__(self, value: Any):
         self.value = value
@@ -140,7 +140,7 @@ class Frame:
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """a × b."""
+    """a × b of symbols too, which `rotations.cross` does not take."""
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
@@ -223,10 +223,11 @@ class TreeEquations:
             spin, spin_rate = turned @ frame.spin, turned @ frame.spin_rate
             moment = turned @ self._moment(k) - link.inertia @ spin_rate - cross(spin, link.inertia @ spin)
             push = link.mass * (gravity - frame.acceleration)
-            columns = [
-                (i, _at(frame, c, frame.origin), turned @ c[2] if c[1] else np.zeros(3))
-                for c in frame.columns for i in c[:1]
-            ]  # fmt: skip
+            columns = []
+            for column in frame.columns:
+                i, turns, axis, _ = column
+                spun = turned @ axis if turns else np.zeros(3)
+                columns.append((i, _at(frame, column, frame.origin), spun))
             for i, linear, angular in columns:
                 force[i] += linear @ push + angular @ moment
                 for j, other, spun in columns:

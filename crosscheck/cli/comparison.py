@@ -102,7 +102,8 @@ def compare(
     ``families`` of settings to a few, at ``depth`` "whole" to all.  ``duration`` is the end time (s), by
     default the scene's, ``time_limit`` the CPU time (s) a run may take or wait, ``reference_time`` the CPU
     time (s) of the reference.  Records are kept in the folder ``out`` and not made again.  ``notice`` takes
-    sentences about what is left out.  Raises RequestError and SceneError with what cannot be done.
+    sentences about engines that are left out.  Raises RequestError for a request that cannot be met and
+    SceneError for a faulty scene.
     """
     if depth not in ("quick", "whole"):
         raise request.RequestError(f"depth: must be quick or whole, got {depth!r}")

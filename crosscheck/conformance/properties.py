@@ -83,7 +83,7 @@ def closure(bench: Bench) -> Finding:
 
 
 def honest_end(bench: Bench) -> Finding:
-    """A run whose driver leads where no pose is ends with a failure, and joints hold at its samples."""
+    """A run driven beyond the mechanism's last pose ends with a failure, and joints hold at its samples."""
     run = bench.finest.value
     if run.outcome in NO_ENDS:
         return Finding(np.inf, STAYS_CLOSED, f"{run.outcome.label} {run.message}".rstrip())

@@ -15,7 +15,7 @@ from mbref.scene import GROUND, Body, Cylindrical, Fixed, Joint, Scene, SceneErr
 from mbref.trajectory import Trajectory
 
 HALF, LIMIT = " half", 0.2  # the halves' distance as a part of the largest that the inertia allows
-UNCHANGED = 1e-12  # of the largest velocity: what rounding changes
+UNCHANGED = 1e-12  # of the largest velocity: changes by rounding
 
 
 def relabelled(scene: Scene) -> Scene:
@@ -113,16 +113,11 @@ def split(scene: Scene) -> Scene | Outside:
 
 def _is_corrected(scene: Scene) -> bool:
     """Whether the velocities that a scene gives are changed until they obey the joints."""
-    given = [(body.velocity, body.angular_velocity) for body in scene.body]
-    consistent = zip(*initial_twists(scene), strict=True)
-    apart = [
-        np.abs(np.subtract(numbers, found)).max()
-        for pair, pair_found in zip(given, consistent, strict=True)
-        for numbers, found in zip(pair, pair_found, strict=True)
-        if numbers is not None
-    ]
-    scale = max(float(np.abs(twist).max()) for twist in initial_twists(scene))
-    return max(apart, default=0.0) > UNCHANGED * scale
+    linear, angular = initial_twists(scene)
+    pairs = [(body.velocity, found) for body, found in zip(scene.body, linear, strict=True)]
+    pairs += [(body.angular_velocity, found) for body, found in zip(scene.body, angular, strict=True)]
+    apart = [np.abs(np.subtract(given, found)).max() for given, found in pairs if given is not None]
+    return max(apart, default=0.0) > UNCHANGED * max(np.abs(linear).max(), np.abs(angular).max())
 
 
 def _in_halves(scene: Scene, body: Body) -> Scene:

@@ -54,7 +54,7 @@ def observe(
     engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, time_limit: float
 ) -> Observation:
     """`run_isolated` in a process of its own, with what it printed from its start on and the files that the
-    run left; both empty when the run gave no result, as its message then quotes what was printed.
+    run left; both empty when the run gave no result, as its message then quotes the printed text.
 
     The process is new, or a copy of one that has done nothing but make the engine ready.
     """

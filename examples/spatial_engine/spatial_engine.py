@@ -22,7 +22,7 @@ HELD = {"fixed": ALL, "revolute": ALL, "universal": ALL, "spherical": ALL, "tran
         "cylindrical": (0, 1), "planar": (2,), "distance": ()}  # fmt: skip
 SQUARE = {"fixed": RIGHT, "translational": RIGHT, "universal": ((2, 2),), "revolute": HINGE,
           "cylindrical": HINGE, "planar": HINGE}  # fmt: skip
-UNMET = 1e-8  # part of what the joints ask of the accelerations; 3e-11 is left of them in regular positions
+UNMET = 1e-8  # residual of the joints' rows, relative; 3e-11 in regular positions
 RANK = 1e-11  # pivots of redundant rows are rounding, 1e-15
 
 

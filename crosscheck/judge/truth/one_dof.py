@@ -26,7 +26,9 @@ EYE = np.eye(3)
 TURNS = (Revolute, Cylindrical)  # joints that carry a torsion spring
 Pair = tuple[np.ndarray, np.ndarray]  # of linear and angular rates, (k, nb, 3) each
 TURN = 8 * np.arctan(REAL(1))
-REPEATED = 64 * float(np.finfo(REAL).eps)  # relative difference of what is the same after a turn
+REPEATED = 64 * float(
+    np.finfo(REAL).eps
+)  # relative difference of poses and slopes that count as equal after a turn
 PROBES = (0.0, 0.31, -0.83)  # path coordinates (rad, or lengths of the scene) where a path is tried
 
 
