@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
@@ -59,6 +60,18 @@ class Crossing:
     angular_velocity: np.ndarray
     taken: int
     sentence: str
+
+    def instants(self, end: float, count: int) -> np.ndarray:
+        """Times (count,), s, at which its branches are seen to part, of a run from 0 to ``end``.
+
+        From a quarter turn of the fastest body before the crossing to not quite half a turn after it, where
+        the next crossing often is; all of the run where no body turns.
+        """
+        rate = float(np.linalg.norm(self.angular_velocity, axis=-1).max(initial=0.0))
+        if not rate:
+            return np.linspace(0.0, end, count)
+        turn = 2 * math.pi / rate
+        return np.linspace(max(0.0, self.time - 0.25 * turn), min(end, self.time + 0.45 * turn), count)
 
     def to_record(self) -> dict[str, Any]:
         """The crossing as numbers, lists and text."""

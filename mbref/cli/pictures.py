@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from mbref.cli.branches import along_branches, chosen, of_several_branches, told
 from mbref.cli.options import TEXT, add_method_options, add_scene, limits_of, sample_times
 from mbref.cli.output import progress_bar, warn
-from mbref.drawing.picture import moving, still
+from mbref.drawing.picture import moving, side_by_side, still
 from mbref.drawing.png import png
 from mbref.drawing.view import View
 from mbref.scenes import find_scene
@@ -34,11 +36,21 @@ def add(commands: Any) -> None:
         "animate", help="the moving mechanism as SVG", formatter_class=TEXT,
         description="Simulate a scene and write its motion as an SVG that every browser plays.",
         epilog="examples:\n  mbref animate mechanism.toml\n"
-        "  mbref animate flyball_governor --duration 2 --view oblique --out governor.svg",
+        "  mbref animate flyball_governor --duration 2 --view oblique --out governor.svg\n"
+        "  mbref animate four_bar --branches",
     )  # fmt: skip
     add_scene(animate)
     animate.add_argument("--view", metavar="VIEW", help=VIEW)
     animate.add_argument("--out", metavar="FILE", help=".svg (default: as the scene, with -moving.svg)")
+    animate.add_argument(
+        "--branches", action="store_true",
+        help="the mechanism on every branch at a singular position that the motion passes, side by side",
+    )  # fmt: skip
+    animate.add_argument(
+        "--crossing", type=int, metavar="NUMBER",
+        help="with --branches: the singular position, counted from 1 (default: the first at which several\n"
+        "branches meet)",
+    )  # fmt: skip
     add_method_options(animate, json=False)
     animate.set_defaults(action=_animate)
 
@@ -61,7 +73,7 @@ def _animate(options: argparse.Namespace) -> int:
 
     scene, view = find_scene(options.scene), _view(options)
     path, times, limits = (
-        _path(options, "-moving", (".svg",)),
+        _path(options, "-branches" if options.branches else "-moving", (".svg",)),
         sample_times(options, scene),
         limits_of(options),
     )
@@ -71,12 +83,19 @@ def _animate(options: argparse.Namespace) -> int:
         progress_bar("simulating", float(times[-1])) as progress,
     ):
         motion = simulate(scene, options.method, times, limits, progress)
-    path.write_text(moving(scene, motion, view), encoding="utf-8")
+        motions, picture = {"": motion}, partial(moving, scene, motion, view)
+        if options.branches:
+            number = chosen(motion, options.crossing)
+            motions = along_branches(simulate, motion, options.method, limits, number)
+            picture = partial(side_by_side, scene, motions, f"{scene.name}: {told(motion, number)}", view)
+    path.write_text(picture(), encoding="utf-8")
     print(path)
-    if motion.outcome.name != "COMPLETED":
+    if not options.branches and (several := of_several_branches(motion)):
+        print(f"{told(motion, several[0])}; --branches shows them side by side")
+    ended = [m for m in motions.values() if m.outcome.name != "COMPLETED"]
+    for motion in ended:
         print(f"{motion.outcome.name}: {motion.message}")
-        return 1
-    return 0
+    return 1 if ended else 0
 
 
 def _view(options: argparse.Namespace) -> View | None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from mbref.scene import GROUND, Scene
 from mbref.trajectory import Trajectory
 
 WIDTH, TALLEST, MARGIN, FOOT = 720.0, 520.0, 64.0, 30.0  # px
+PANEL, NARROW, HEAD, LARGE, COLUMNS = 360.0, 44.0, 34.0, 20, 2  # of a picture side by side, px; panels a row
 FRAMES = 120  # of a moving picture at most
 SHORTEST, LONGEST = 4.0, 12.0  # s of one round of a moving picture
 
@@ -33,33 +35,89 @@ def moving(scene: Scene, motion: Trajectory, view: View | None = None, width: fl
     """
     if not motion.times.size:
         raise ValueError(f"the motion of {motion.scene!r} has no sample to draw: {motion.outcome.sentence}")
-    seconds = float(np.clip(motion.times[-1] - motion.times[0], SHORTEST, LONGEST))
-    return _picture(scene, thinned(motion), view, width, seconds)
+    return _picture(scene, thinned(motion), view, width, _round(motion.times))
+
+
+def side_by_side(
+    scene: Scene, motions: Mapping[str, Trajectory], words: str, view: View | None = None
+) -> str:
+    """Motions over the same time as one SVG that moves by itself, two in a row, each below its title.
+
+    All show the same part of space.  A motion that ended early stays at its last sample; where the reader
+    asks for no motion, all stand where one is furthest from the first.
+    """
+    times = max((motion.times for motion in motions.values()), key=len)
+    held = [
+        thinned(_samples(m, np.minimum(np.arange(len(times)), len(m.times) - 1))) for m in motions.values()
+    ]
+    page, apart = _page(scene, held, view, PANEL, NARROW), [_furthest(held)]
+    moving = [list(_parts(Stage(scene, motion, page, _round(times)))) for motion in held]
+    resting = [list(_parts(Stage(scene, _samples(motion, apart), page, 0.0))) for motion in held]
+    parts = svg.moving_or_still(_placed(moving, page.height), _placed(resting, page.height))
+    for k, title in enumerate(motions):
+        x, y = _corner(k, page.height)
+        parts.append(svg.text(x + PANEL / 2, y + HEAD - 10, title, f'fill="{INK}" font-size="{LARGE}"'))
+    width, height = PANEL * COLUMNS, _corner(len(held) + COLUMNS - 1, page.height)[1]
+    parts += _caption(page.scale, width, height, times, _round(times), LARGE)
+    return svg.document(width, height + FOOT, parts, words)
+
+
+def _placed(panels: Sequence[Sequence[str]], height: float) -> Iterator[str]:
+    """Panels of a height (px) in rows, each below room for its title."""
+    for k, parts in enumerate(panels):
+        x, y = _corner(k, height)
+        yield f'<g transform="translate({x:g} {y + HEAD:.1f})">{"".join(parts)}</g>'
+
+
+def _corner(k: int, height: float) -> tuple[float, float]:
+    """The upper left corner, px, of the k-th panel, from 0."""
+    return PANEL * (k % COLUMNS), (HEAD + height) * (k // COLUMNS)
 
 
 def thinned(motion: Trajectory) -> Trajectory:
     """The trajectory with every n-th of its samples only, at most 120."""
-    every = slice(None, None, math.ceil(len(motion.times) / FRAMES))
+    return _samples(motion, slice(None, None, math.ceil(len(motion.times) / FRAMES)))
+
+
+def _samples(motion: Trajectory, chosen: Any) -> Trajectory:
+    """The poses and velocities of a trajectory at some of its samples, given as an index of arrays."""
     keys = ("times", "position", "orientation", "velocity", "angular_velocity")
     return Trajectory(
         scene=motion.scene, engine=motion.engine, version=motion.version, method=motion.method, settings={},
         bodies=motion.bodies, outcome=motion.outcome, t_end=motion.t_end,
-        **{key: getattr(motion, key)[every] for key in keys},
+        **{key: getattr(motion, key)[chosen] for key in keys},
     )  # fmt: skip
 
 
+def _furthest(motions: Sequence[Trajectory]) -> int:
+    """The sample at which a body is furthest from its place in the first motion."""
+    places = np.array([motion.position for motion in motions])
+    return int(np.linalg.norm(places - places[0], axis=-1).max(axis=(0, 2)).argmax())
+
+
+def _round(times: np.ndarray) -> float:
+    """Seconds of one round of a motion over times (k,)."""
+    return float(np.clip(times[-1] - times[0], SHORTEST, LONGEST))
+
+
 def _picture(scene: Scene, motion: Trajectory, view: View | None, width: float, seconds: float) -> str:
-    bodies = shapes(scene)
-    lines = [moved(shape, motion, b) for b, shape in enumerate(bodies)]
-    shown = np.concatenate(
-        [p.reshape(-1, 3) for p in lines] + [np.array(_fixed_points(scene)).reshape(-1, 3)]
-    )
-    page = Page.around(shown, view or view_of(shown, _turning_axes(scene)), width, MARGIN, TALLEST)
-    stage = Stage(scene, motion, page, seconds)
-    parts = list(_parts(stage, bodies, [page.pixels(p) for p in lines]))
-    parts += [*_axes(page), *_caption(stage)]
+    page = _page(scene, [motion], view, width, MARGIN)
+    parts = _with_names(Stage(scene, motion, page, seconds))
+    if seconds:
+        parts = svg.moving_or_still(parts, _with_names(Stage(scene, _samples(motion, [0]), page, 0.0)))
+    parts += [*_axes(page), *_caption(page.scale, width, page.height, motion.times, seconds)]
     words = f"{scene.name}: {len(scene.body)} bodies, {len(scene.joint)} joints"
     return svg.document(width, page.height + FOOT, parts, words)
+
+
+def _page(
+    scene: Scene, motions: Sequence[Trajectory], view: View | None, width: float, margin: float
+) -> Page:
+    """The page that shows all that moves and what stands."""
+    bodies = list(enumerate(shapes(scene)))
+    moving = [moved(shape, motion, b).reshape(-1, 3) for motion in motions for b, shape in bodies]
+    shown = np.concatenate([*moving, np.array(_fixed_points(scene)).reshape(-1, 3)])
+    return Page.around(shown, view or view_of(shown, _turning_axes(scene)), width, margin, TALLEST)
 
 
 def _fixed_points(scene: Scene) -> list[tuple[float, float, float]]:
@@ -73,20 +131,34 @@ def _turning_axes(scene: Scene) -> list[tuple[float, float, float]]:
     return [joint.axis for joint in scene.joint if joint.type == "revolute"]
 
 
-def _parts(stage: Stage, bodies: list[Shape], lines: list[np.ndarray]) -> Iterator[str]:
+def _parts(stage: Stage) -> Iterator[str]:
     scene = stage.scene
     for joint in scene.joint:
         if GROUND in joint.bodies:
             yield from ground_mark(stage, joint)
-    for b, (shape, frames) in enumerate(zip(bodies, lines, strict=True)):
+    for b, (shape, frames) in enumerate(_lines(stage)):
         yield _body(shape, frames, COLOURS[b % len(COLOURS)], stage.seconds)
     yield from (load_mark(stage, load) for load in scene.load)
     for joint in scene.joint:
         yield from joint_mark(stage, joint)
     yield from (driver_mark(stage, driver) for driver in scene.driver)
-    yield from joint_names(stage)
-    for b, frames in enumerate(lines):
-        yield _body_name(bodies[b].name, frames, COLOURS[b % len(COLOURS)], stage.seconds)
+
+
+def _with_names(stage: Stage) -> list[str]:
+    """All parts, and over them the names of joints and bodies."""
+    names = [
+        _body_name(shape.name, frames, COLOURS[b % len(COLOURS)], stage.seconds)
+        for b, (shape, frames) in enumerate(_lines(stage))
+    ]
+    return [*_parts(stage), *joint_names(stage), *names]
+
+
+def _lines(stage: Stage) -> list[tuple[Shape, np.ndarray]]:
+    """The bodies' shapes and their pixels (k, n, 2)."""
+    return [
+        (shape, stage.page.pixels(moved(shape, stage.motion, b)))
+        for b, shape in enumerate(shapes(stage.scene))
+    ]
 
 
 def _body(shape: Shape, frames: np.ndarray, colour: str, seconds: float) -> str:
@@ -136,17 +208,18 @@ def _axes(page: Page) -> Iterator[str]:
             yield svg.text(x, y + 4, name, f'fill="{GREY}" font-size="12"')
 
 
-def _caption(stage: Stage) -> Iterator[str]:
+def _caption(
+    scale: float, width: float, height: float, times: np.ndarray, seconds: float, size: int = 12
+) -> Iterator[str]:
     """A bar of a round length, and of a moving picture how its time runs."""
-    page, motion = stage.page, stage.motion
-    length = _round_length(110 / page.scale)
-    left, y = page.width - 40 - length * page.scale, page.height + FOOT - 20
-    ends = f"M{left:.1f} {y - 4:.1f}v8m0 -4h{length * page.scale:.1f}m0 -4v8"
+    length, look = _round_length(110 / scale), f'fill="{INK}" font-size="{size}"'
+    left, y = width - 40 - length * scale, height + FOOT - 20
+    ends = f"M{left:.1f} {y - 4:.1f}v8m0 -4h{length * scale:.1f}m0 -4v8"
     yield f'<path d="{ends}" stroke="{INK}" fill="none"/>'
-    yield svg.text(left + length * page.scale / 2, y - 7, f"{length:g} m", f'fill="{INK}" font-size="12"')
-    if stage.seconds:
-        words = f"{motion.times[-1]:g} s in {stage.seconds:g} s"
-        yield svg.text(page.width / 2, y + 4, words, f'fill="{INK}" font-size="12"')
+    yield svg.text(left + length * scale / 2, y - 7, f"{length:g} m", look)
+    if seconds:
+        words = f"{times[-1] - times[0]:.4g} s in {seconds:.3g} s"
+        yield svg.text(width / 2, y + 4, words, look)
 
 
 def _round_length(longest: float) -> float:

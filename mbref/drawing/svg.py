@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from html import escape
 
 import numpy as np
@@ -60,6 +61,16 @@ def turn(radius: float, sense: float, colour: str, width: float = 2.2) -> str:
         f'<path d="{arc}" stroke="{colour}" stroke-width="{width:g}" fill="none"/>'
         f'<polygon points="{head}" fill="{colour}"/>'
     )
+
+
+def moving_or_still(moving: Iterable[str], still: Iterable[str]) -> list[str]:
+    """Parts that move, and those that stand in for them where the reader asks for less motion."""
+    style = (
+        "<style>.mbref-still{display:none}@media(prefers-reduced-motion:reduce)"
+        "{.mbref-still{display:inline}.mbref-moving{display:none}}</style>"
+    )
+    groups = {"mbref-moving": moving, "mbref-still": still}
+    return [style, *(f'<g class="{name}">{"".join(parts)}</g>' for name, parts in groups.items())]
 
 
 def document(width: float, height: float, parts: list[str], title: str) -> str:

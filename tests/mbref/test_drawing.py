@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mbref.drawing.marks import SIGNS
-from mbref.drawing.picture import moving, still, thinned
+from mbref.drawing.picture import moving, side_by_side, still, thinned
 from mbref.drawing.png import png
 from mbref.drawing.shapes import at_rest, shapes
 from mbref.drawing.view import Page, View, view_of
@@ -79,7 +79,7 @@ def test_names_of_bars_that_cross_at_their_middles_are_apart():
 def test_bars_keep_their_length_in_a_moving_picture(turning):
     scene, motion = turning
     lines = [
-        node for node in ET.fromstring(moving(scene, motion)).iter(f"{SVG}polyline")
+        node for node in ET.fromstring(moving(scene, motion)).find(f"{SVG}g").iter(f"{SVG}polyline")
         if node.get("stroke-width") == "6"
     ]  # fmt: skip
     assert len(lines) == len(scene.body)
@@ -101,6 +101,33 @@ def test_a_motion_without_samples_is_refused(turning):
     scene, motion = turning
     with pytest.raises(ValueError, match="has no sample"):
         moving(scene, dataclasses.replace(motion, times=np.zeros(0)))
+
+
+def test_a_moving_picture_has_a_still_one_for_readers_who_ask_for_it(turning):
+    moves, stands = ET.fromstring(moving(*turning)).findall(f"{SVG}g")[:2]
+    assert (moves.get("class"), stands.get("class")) == ("mbref-moving", "mbref-still")
+    assert list(moves.iter(f"{SVG}animate")) and not list(stands.iter(f"{SVG}animate"))
+    assert ".mbref-moving{display:none}" in moving(*turning) and "<style>" not in still(turning[0])
+
+
+def test_motions_side_by_side_share_scale_and_end(turning):
+    scene, motion = turning
+    short = dataclasses.replace(
+        motion, **{name: getattr(motion, name)[:100] for name in ("times", "position", "orientation")}
+    )
+    picture = side_by_side(scene, {"whole": motion, "<part>": short, "again": motion}, "three")
+    root = ET.fromstring(picture)
+    assert {"whole", "<part>", "again"} <= set(texts(picture)) and root.find(f"{SVG}title").text == "three"
+    panels = list(root.find(f"{SVG}g"))
+    frames = [
+        [line.find(f"{SVG}animate").attrib["values"].split(";") for line in panel.iter(f"{SVG}polyline")
+         if line.get("stroke-width") == "6"] for panel in panels
+    ]  # fmt: skip
+    assert frames[0] == frames[2] and len(frames[0]) == len(scene.body)
+    for whole, part in zip(frames[0], frames[1], strict=True):
+        assert part[:33] == whole[:33] and set(part[34:]) == {part[-1]}, "it stays at its last sample"
+    corners = [panel.get("transform") for panel in panels]
+    assert corners[0].split()[1] == corners[1].split()[1] != corners[2].split()[1], "two in a row"
 
 
 def test_link_with_three_joints_is_a_plate_and_a_pendulum_a_bar():

@@ -226,6 +226,33 @@ def test_run_writes_csv_and_json_and_animate_a_moving_picture(tmp_path, capsys, 
     assert "<animate " in (tmp_path / "planar_slider_crank-moving.svg").read_text()
 
 
+def test_animate_shows_branches_side_by_side(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["animate", "four_bar", "--duration", "0.05"]) == 0
+    assert "position 2 at t = 0.0377595 s: 2 branches; --branches shows" in capsys.readouterr().out
+    assert main(["animate", "four_bar", "--duration", "0.05", "--branches"]) == 0
+    picture = (tmp_path / "four_bar-branches.svg").read_text()
+    assert "branch 1, smooth" in picture and "branch 2" in picture
+    assert main(["animate", "five_bar", "--duration", "0.05", "--branches", "--crossing", "1"]) == 0
+    assert "branch 2" not in (tmp_path / "five_bar-branches.svg").read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("five_bar --duration 0.05", "nowhere up to t = 0.05 s has the motion a choice of branches: "
+         "singular position 1 at t = 0.0125865 s: one branch; singular position 2"),
+        ("planar_slider_crank --duration 0.1", "it passes no singular position"),
+        ("four_bar --duration 0.05 --crossing 3", "passes 2 singular positions up to t = 0.05 s, got 3"),
+        ("planar_slider_crank --duration 0.1 --method mpi-svd+none", "looks for no singular position"),
+    ],
+)  # fmt: skip
+def test_animate_says_why_there_are_no_branches(words, told, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["animate", *words.split(), "--branches"]) == 2
+    assert told in capsys.readouterr().err and not list(tmp_path.iterdir())
+
+
 def test_lists_fit_eighty_columns_and_have_every_name(capsys):
     assert main(["list"]) == 0
     out = capsys.readouterr().out

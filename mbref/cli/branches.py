@@ -1,0 +1,69 @@
+"""The motions of a scene along the branches that meet at one of its singular positions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from mbref.cli.first_run import Simulate
+from mbref.method import MethodError
+from mbref.motion import Motion
+from mbref.simulation.limits import Limits
+from mbref.trajectory import Outcome
+
+FRAMES = 101  # samples of a motion
+SMOOTH = 1  # the branch that is taken unless another is asked for
+
+
+def chosen(smooth: Motion, number: int | None) -> int:
+    """The number, from 1, of the singular position asked for, else of the first with several branches.
+
+    Raises MethodError where none was looked for, ValueError where there is none.
+    """
+    if smooth.crossings is None:
+        raise MethodError(
+            f"--branches: {smooth.method} looks for no singular position; +projection and taylor do"
+        )
+    passed, until = len(smooth.crossings), f"up to t = {smooth.t_end:g} s"
+    if number is not None and not 1 <= number <= passed:
+        raise ValueError(f"--crossing: the motion passes {passed} singular positions {until}, got {number}")
+    several = of_several_branches(smooth)
+    if number is None and not several:
+        which = "; ".join(told(smooth, k) for k in range(1, passed + 1)) or "it passes no singular position"
+        raise ValueError(f"--branches: nowhere {until} has the motion a choice of branches: {which}")
+    return number or several[0]
+
+
+def of_several_branches(motion: Motion) -> list[int]:
+    """The numbers, from 1, of the singular positions passed at which several branches meet."""
+    return [k for k, crossing in enumerate(motion.crossings or (), 1) if len(crossing.velocity) > 1]
+
+
+def along_branches(
+    simulate: Simulate, smooth: Motion, method: str, limits: Limits, number: int
+) -> dict[str, Motion]:
+    """The motions by title, from before a singular position of the smooth one to behind it."""
+    assert smooth.crossings is not None
+    crossing = smooth.crossings[number - 1]
+    times = crossing.instants(float(smooth.times[-1]), FRAMES)
+    motions = [
+        simulate(smooth.mechanism, method, times, replace(limits, branches={number: branch}), _quiet)
+        for branch in range(1, len(crossing.velocity) + 1)
+    ]
+    return {_title(branch, motion): motion for branch, motion in enumerate(motions, SMOOTH)}
+
+
+def told(motion: Motion, number: int) -> str:
+    """One sentence on a singular position."""
+    assert motion.crossings is not None
+    crossing = motion.crossings[number - 1]
+    return f"singular position {number} at t = {crossing.time:.6g} s: {crossing.sentence}"
+
+
+def _quiet(time: float) -> None:
+    """Progress of runs that follow the long one."""
+
+
+def _title(branch: int, motion: Motion) -> str:
+    """The branch's name and, where its run ended early, when."""
+    name = f"branch {branch}{', smooth' * (branch == SMOOTH)}"
+    return name if motion.outcome is Outcome.COMPLETED else f"{name}, ended at {motion.t_end:.4g} s"
