@@ -26,6 +26,7 @@ __all__ = [
     "initial_poses", "initial_twists", "installed", "rotations",
 ]  # fmt: skip
 
+BRANCHES = "branches"  # the option that chooses branches at singular positions, where an engine has one
 BEST = "tuned"  # the family that is an engine's best, where it has one of that name
 FamilyParts = Mapping[str, Mapping[str, Mapping[str, float]]]  # kind of part → name → options and defaults
 

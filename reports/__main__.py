@@ -84,7 +84,7 @@ def _blocks(
     if set(names) - {PAPER, STABILITY}:
         found = collection.comparison(out, scenes, is_quick, reference_time, _notice)
         named = {scene.name: scene for scene in found.scenes}
-        groups = by_scene(found.records, named, found.identities, found.truths, found.motions)
+        groups = by_scene(found.records, named, found.identities, found.truths, found.motions, found.branches)
         blocks += sections.blocks(groups, names, stored.verified(out))
     if STABILITY in names:
         blocks += stability.render(collection.stability_ladders(out, _notice))

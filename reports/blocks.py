@@ -76,6 +76,15 @@ class Opening:
 
 
 @dataclass(frozen=True)
+class Moving:
+    """Mechanisms that move beside one another: title and SVG of each, and their style sheet."""
+
+    caption: str
+    panels: Sequence[tuple[str, str]]
+    css: str
+
+
+@dataclass(frozen=True)
 class Verdict:
     """One family in a cell of the matrix: its grade and sign, the lines below, its place, and the link to its
     best run."""
@@ -144,4 +153,4 @@ class Listing:
     text: str
 
 
-Block = Heading | Text | Table | Figure | Listing | Opening | Matrix | Plot | Record
+Block = Heading | Text | Table | Figure | Listing | Opening | Moving | Matrix | Plot | Record

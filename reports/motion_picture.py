@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from html import escape
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,33 +42,69 @@ def picture(name: str, scene: Scene, exact: Trajectory, run: Trajectory | None, 
 
     Without motion, as where the reader asks for less, it stands where the two are furthest apart.
     """
-    view = _View(scene, exact)
-    still = (
-        0
-        if run is None
-        else int(np.linalg.norm(run.position - exact.position, axis=-1).max(axis=-1).argmax())
-    )
-    layers = [("true", exact)] + ([] if run is None else [(f"run tone{tone}", run)])
-    groups, frames = [], []
-    for layer, motion in layers:
-        parts = list(_parts(scene, motion, view))
-        elements = [
-            f'<{part.element} class="{name}{layer[0]}{i}" style="transform:{part.steps[still]}"/>'
-            for i, part in enumerate(parts)
-        ]
-        groups.append(f'<g class="{layer}">{"".join(elements)}</g>')
-        frames += [
-            _keyframes(f"{name}{layer[0]}{i}", motion.times, part.steps) for i, part in enumerate(parts)
-        ]
+    layers = [_Layer("true", exact)] + ([] if run is None else [_Layer(f"run tone{tone}", run)])
+    motions = [layer.motion for layer in layers]
     label = f"The mechanism {scene.name} in motion"
-    svg = (f'<svg class="moving" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{label}">'
+    return _drawn(name, label, scene, layers, _View(scene, motions[:1]), _furthest(motions))
+
+
+def branches(
+    name: str, scene: Scene, motions: Mapping[str, Trajectory], at: float, tone: int
+) -> dict[str, Picture]:
+    """A picture by title for each motion, in an engine's tone, over the first, in ink, with a line of time on
+    which the time ``at`` (s) is marked.
+
+    All show the same part of space and, without motion, the sample at which a motion is furthest from the
+    first.  A motion that ended early stays at its last sample.
+    """
+    every = list(motions.values())
+    view, still, pictures = _View(scene, every), _furthest(every), {}
+    for k, (title, motion) in enumerate(motions.items()):
+        layers = [_Layer("true", every[0]), _Layer(f"run tone{tone}", motion)]
+        drawn = _drawn(f"{name}-{k}", f"{scene.name}: {title}", scene, layers, view, still)
+        line = _line_of_time(f"{name}-{k}", float(view.shares(np.array(at))))
+        pictures[title] = Picture(drawn.svg.replace("</svg>", f"{line.svg}</svg>"), drawn.css + line.css)
+    return pictures
+
+
+class _Layer(NamedTuple):
+    """The classes a motion is drawn with, and the motion."""
+
+    look: str
+    motion: Trajectory
+
+
+def _drawn(name: str, label: str, scene: Scene, layers: Sequence[_Layer], view: _View, still: int) -> Picture:
+    """Layers over one another at a sample, and the keyframes that move them."""
+    groups, frames = [], []
+    for look, motion in layers:
+        parts = {f"{name}{look[0]}{i}": part for i, part in enumerate(_parts(scene, motion, view))}
+        elements = [
+            f'<{part.element} class="{each}" style="transform:{part.steps[still]}"/>'
+            for each, part in parts.items()
+        ]
+        groups.append(f'<g class="{look}">{"".join(elements)}</g>')
+        frames += [_keyframes(each, view.shares(motion.times), part.steps) for each, part in parts.items()]
+    svg = (f'<svg class="moving" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{escape(label)}">'
            f"{''.join(_ground(scene, view))}{''.join(groups)}</svg>")  # fmt: skip
     return Picture(svg, "".join(frames))
 
 
-def _furthest(exact: Trajectory, run: Trajectory) -> int:
-    """The sample at which a body is furthest from its true place."""
-    return int(np.linalg.norm(run.position - exact.position, axis=-1).max(axis=-1).argmax())
+def _line_of_time(name: str, marked: float) -> Picture:
+    """A line for the whole time with a mark at a share of it, and a dot that moves along it."""
+    left, right, y = MARGIN, WIDTH - MARGIN, HEIGHT - 14
+    x = left + marked * (right - left)
+    line = f'<path class="clock" d="M{left:g} {y:g}H{right:g}M{x:.1f} {y - 9:g}v18"/>'
+    dot = f'<g class="{name}n" style="transform:translate({x:.1f}px,{y:g}px)"><circle class="now" r="6"/></g>'
+    ends = [f"translate({end:g}px,{y:g}px)" for end in (left, right)]
+    return Picture(line + dot, _keyframes(f"{name}n", np.array([0.0, 1.0]), ends))
+
+
+def _furthest(motions: Sequence[Trajectory]) -> int:
+    """The sample, of those that all motions reached, at which a body is furthest from its first motion."""
+    reached = min(len(motion.times) for motion in motions)
+    places = np.array([motion.position[:reached] for motion in motions])
+    return int(np.linalg.norm(places - places[0], axis=-1).max(axis=(0, 2)).argmax())
 
 
 class _Part(NamedTuple):
@@ -78,21 +115,26 @@ class _Part(NamedTuple):
 
 
 class _View:
-    """From metres to pixels: the xy-plane of a planar motion, else an oblique view."""
+    """From metres to pixels: the xy-plane of a planar motion, else an oblique view; from times to shares."""
 
-    def __init__(self, scene: Scene, exact: Trajectory):
-        points = np.concatenate([moved(s, exact, b).reshape(-1, 3) for b, s in enumerate(shapes(scene))])
+    def __init__(self, scene: Scene, motions: Sequence[Trajectory]):
+        bodies = list(enumerate(shapes(scene)))
+        points = np.concatenate([moved(s, motion, b).reshape(-1, 3) for motion in motions for b, s in bodies])
         grounded = [
             joint.anchor_pair[joint.bodies.index(GROUND)] for joint in scene.joint if GROUND in joint.bodies
         ]
         points = np.concatenate([points, np.array(grounded).reshape(-1, 3)])
-        self.planar = is_planar(points)
+        self.planar, self.times = is_planar(points), max((m.times for m in motions), key=len)
         flat = project(points, self.planar)
         least, most = flat.min(axis=0), flat.max(axis=0)
         size = np.maximum(most - least, 1e-9 * max(float(np.ptp(flat)), 1e-9))
         room = np.array([WIDTH, HEIGHT]) - 2 * MARGIN
         self.scale = float((room / size).min())
         self.corner = (least + most) / 2 + np.array([-WIDTH, HEIGHT]) / (2 * self.scale)
+
+    def shares(self, times: np.ndarray) -> np.ndarray:
+        """Times, s, as shares of the time that is shown."""
+        return (times - self.times[0]) / ((self.times[-1] - self.times[0]) or 1.0)
 
     def pixels(self, points: np.ndarray) -> np.ndarray:
         """World points (…, 3) as pixels (…, 2)."""
@@ -125,11 +167,13 @@ def _line(start: np.ndarray, end: np.ndarray) -> _Part:
     return _Part(f'line x2="{longest:.1f}"', steps)
 
 
-def _keyframes(name: str, times: np.ndarray, steps: Sequence[str]) -> str:
-    end = float(times[-1]) or 1.0
+def _keyframes(name: str, shares: np.ndarray, steps: Sequence[str]) -> str:
+    """Steps at shares (k,) of a round; the last one stays until its end."""
     frames = "".join(
-        f"{100 * t / end:.4g}%{{transform:{step}}}" for t, step in zip(times, steps, strict=True)
+        f"{100 * share:.4g}%{{transform:{step}}}" for share, step in zip(shares, steps, strict=True)
     )
+    if shares[-1] < 1:
+        frames += f"100%{{transform:{steps[-1]}}}"
     return f".{name}{{animation:{name} {SECONDS:g}s linear infinite}}@keyframes {name}{{{frames}}}"
 
 

@@ -17,6 +17,7 @@ from reports.blocks import (
     Heading,
     Listing,
     Matrix,
+    Moving,
     Opening,
     Plot,
     Record,
@@ -25,6 +26,7 @@ from reports.blocks import (
     Verdict,
 )
 
+CODE = re.compile("`([^`]+)`")
 NUMBER = re.compile(r"(?:&lt; )?\d[\d.]*e[-+]?\d+|t = [\d.e-]*\d s|\d[\d.]* (?:ms|µs|s)\b")
 TITLE = "Closed-loop mechanisms: engines against truth"
 
@@ -58,7 +60,7 @@ def html(blocks: Sequence[Block], drawn: dict[str, str]) -> str:
         chapters=[b.text for b in blocks if isinstance(b, Heading) and b.level == 2],
         blocks=[(type(b).__name__.lower(), b) for b in blocks],
         has_opening=any(isinstance(b, Opening) for b in blocks),
-        motions=Markup("".join(b.css for b in blocks if isinstance(b, Opening))),
+        motions=Markup("".join(b.css for b in blocks if isinstance(b, Opening | Moving))),
         drawn={name: Markup(text) for name, text in drawn.items()},
     )
 
@@ -83,6 +85,8 @@ def _markdown(block: Block) -> str:
         case Opening():
             answers = (f"{label}: {sentence}" for label, sentence in block.sentences.items())
             return "\n\n".join(map(_words, (block.headline, *answers)))
+        case Moving():
+            return "\n\n".join([block.caption, "\n".join(f"- {_words(title)}" for title, _ in block.panels)])
         case Matrix():
             return f"{block.caption}\n\n{_matrix(block)}"
         case Record():
@@ -127,8 +131,9 @@ def _words(text: str) -> str:
 
 
 def numbers(text: str) -> Markup:
-    """The text for the page, its numbers with powers of ten unbroken."""
-    return Markup(NUMBER.sub(r'<span class="nb">\g<0></span>', str(escape(text))))
+    """The text for the page, its numbers with powers of ten unbroken, its commands as code."""
+    unbroken = NUMBER.sub(r'<span class="nb">\g<0></span>', str(escape(text)))
+    return Markup(CODE.sub(r"<code>\1</code>", unbroken))
 
 
 def breakable(name: str) -> Markup:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -111,6 +111,7 @@ class SceneRuns:
     gate: Sequence[Record] = ()  # short runs that show whether the engines simulate the same mechanism
     truth: Record | None = None  # of `crosscheck.study.truths`
     motion: Record | None = None  # the run of largest error at the instants shown of the truth's motion
+    branches: Sequence[Record] = ()  # runs along the branches that meet at singular positions
 
     def difference(self) -> str | None:
         """The first field in which an engine's mechanism is another one; None when all agree."""
@@ -157,19 +158,23 @@ def _rank(run: Run) -> tuple[bool, float, float]:
 
 def by_scene(
     records: Iterable[Record], scenes: Mapping[str, Scene], gates: Iterable[Record] = (),
-    truths: Iterable[Record] = (), motions: Iterable[Record] = (),
+    truths: Iterable[Record] = (), motions: Iterable[Record] = (), branches: Iterable[Record] = (),
 ) -> list[SceneRuns]:  # fmt: skip
     """Runs grouped by scene, in the order of ``scenes``, with the scene's records of the gate, of its truth
-    and of the motion shown; scenes without runs are left out."""
-    runs: dict[str, list[Run]] = {name: [] for name in scenes}
-    gate: dict[str, list[Record]] = {name: [] for name in scenes}
-    for record in records:
-        runs[record["scene"]].append(Run(record))
-    for record in gates:
-        gate[record["scene"]].append(record)
+    and of the motions shown; scenes without runs are left out."""
+    runs, gate, along = (_of_scenes(found, scenes) for found in (records, gates, branches))
     truth, motion = ({record["scene"]: record for record in group} for group in (truths, motions))
-    return [SceneRuns(scene, runs[name], gate[name], truth.get(name), motion.get(name))
-            for name, scene in scenes.items() if runs[name]]  # fmt: skip
+    return [SceneRuns(scene, [Run(r) for r in runs[name]], gate[name], truth.get(name), motion.get(name),
+                      along[name]) for name, scene in scenes.items() if runs[name]]  # fmt: skip
+
+
+def _of_scenes(records: Iterable[Record], scenes: Collection[str]) -> dict[str, list[Record]]:
+    """The records of every scene, in their order; those of others are left out."""
+    found: dict[str, list[Record]] = {name: [] for name in scenes}
+    for record in records:
+        if record["scene"] in found:
+            found[record["scene"]].append(record)
+    return found
 
 
 def ended_briefly(run: Run) -> str:

@@ -27,7 +27,7 @@ def groups(folder: Path) -> list[SceneRuns]:
     records = [r for r in stored(folder / "records.jsonl").values() if r["scene"] in named]
     gates = [r for r in records if _is_gate(named[r["scene"]], r)]
     runs = [_timed(r, times) for r in records if not any(r is gate for gate in gates)]
-    more = (list(stored(folder / name).values()) for name in ("truths.jsonl", "motions.jsonl"))
+    more = (list(stored(folder / f"{name}.jsonl").values()) for name in ("truths", "motions", "branches"))
     return by_scene(_ordered(runs), named, gates, *more)
 
 

@@ -229,9 +229,13 @@ def _single(
 
 
 def _strange_options(scene: Scene, name: str, setting: Setting) -> list[str]:
-    """Faults of options that no setting of the family has; none where the family is beyond the sweep."""
-    own = [offered.options for offered in settings(name, scene) if offered.family == setting.family]
-    known = list(dict.fromkeys(option for options in own for option in options))
+    """Faults of options that neither the family's settings nor, apart from the sweep, the engine has; none
+    where the family is beyond the sweep."""
+    sweep = settings(name, scene)
+    own = [offered.options for offered in sweep if offered.family == setting.family]
+    swept = {option for offered in sweep for option in offered.options}
+    general = [option for option in engine(name).options if option not in swept]
+    known = list(dict.fromkeys([*(option for options in own for option in options), *general]))
     return [
         f"--option: {name} {setting.family} has no option {option!r}; it has: {', '.join(known)}"
         + meant(option, known)

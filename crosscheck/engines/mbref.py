@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Engine, FamilyParts, Owner, Setting, Supports
+from crosscheck.engine import BRANCHES, Cannot, Engine, FamilyParts, Owner, Setting, Supports
 from crosscheck.judge.tolerances import ROUNDING
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
@@ -46,6 +46,10 @@ FAMILIES = {
     "mpi-qr+projection": "Moore-Penrose inverse by QR, projection, DOP853",
     "… , specialised": "the method before the comma as machine code of the scene, made before the clock runs",
 }
+OPTIONS = {
+    "rtol": "relative tolerance of a step",
+    BRANCHES: "pairs of a singular position and the branch to take there, from 1: [[2, 2]]",
+}
 LOADS = ("moment", "force", "spring", "torsion_spring")
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-10, 1e-11)
 
@@ -55,7 +59,7 @@ class Mbref(Engine):
 
     name = "mbref"
     package = "mbref"
-    families, options = FAMILIES, {"rtol": "relative tolerance of a step"}
+    families, options = FAMILIES, OPTIONS
 
     @functools.cached_property
     def supports(self) -> Supports:  # type: ignore[override]  # naming the engine imports nothing

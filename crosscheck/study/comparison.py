@@ -13,14 +13,13 @@ import numpy as np
 
 from crosscheck.judge.reference.motion import given_up
 from crosscheck.processes.pool import end_idle
-from crosscheck.study import sweep
+from crosscheck.study import pictures, sweep
 from crosscheck.study.chains import Chains
 from crosscheck.study.fair_timing import identity_cases
 from crosscheck.study.grid import Case, Record, key, known, record_of, study
 from crosscheck.study.hurried import Hurried
 from crosscheck.study.ladder import families, finest, first
 from crosscheck.study.progress import counted, shown
-from crosscheck.study.record_view import error, is_completed
 from crosscheck.study.scouting import scout, unasked
 from crosscheck.study.timings import REPEATS, with_timings
 from crosscheck.study.truths import key as truth_key
@@ -34,13 +33,15 @@ Truths = Future[list[Record]]
 
 class Collection(NamedTuple):
     """Records of a comparison: its scenes, its timed runs, the short runs that compare mechanisms, the truths
-    (`study.truths`), and of each scene one run at the instants of its truth's motion that are shown."""
+    (`study.truths`), and those shown moving (`study.pictures`): of each scene the run of largest error, and
+    the runs along the branches of its singular positions."""
 
     scenes: Sequence[Scene]
     records: Sequence[Record]
     identities: Sequence[Record]
     truths: Sequence[Record]
     motions: Sequence[Record]
+    branches: Sequence[Record]
 
 
 class Wanted(NamedTuple):
@@ -96,10 +97,10 @@ def _measured(
     by_key = (_few if wanted.is_quick else _all)(cases, gates, path)
     run = [case for case in cases if key(case) in by_key]
     told, found = [by_key[key(case)] for case in run], truths.result()
-    motions = _motions(scenes, run, told, found, wanted)
+    moving = _pictures(list(zip(run, told, strict=True)), found, wanted.out)
     long = sweep.QUICK_LONG if wanted.is_quick else sweep.LONG
     timed = with_timings(run, told, _file(wanted, "timings.jsonl"), notice, long, wanted.repeats)
-    return Collection(scenes, timed, [by_key[key(gate)] for gate in gates], found, motions)
+    return Collection(scenes, timed, [by_key[key(gate)] for gate in gates], found, *moving)
 
 
 def _few(cases: Sequence[Case], gates: Sequence[Case], path: Path | None) -> dict[str, Record]:
@@ -148,20 +149,14 @@ def _truths(scenes: Sequence[Scene], wanted: Wanted) -> list[Record]:
     return found
 
 
-def _motions(
-    scenes: Sequence[Scene], cases: Sequence[Case], records: Sequence[Record], truths: Sequence[Record],
-    wanted: Wanted,
-) -> list[Record]:  # fmt: skip
-    """Of each scene with a truth the completed run of largest error, again at the instants shown."""
-    if wanted.out is None:
-        return []
-    chosen = []
-    for scene, truth in zip(scenes, truths, strict=True):
-        own = [i for i, r in enumerate(records) if r["scene"] == scene.name and is_completed(r)]
-        if truth["motion"] and own:
-            worst = cases[max(own, key=lambda i: error(records[i]))]
-            chosen.append(worst._replace(times=np.array(truth["motion"]["times"])))
-    return study(chosen, None, _file(wanted, "motions.jsonl"))
+def _pictures(
+    runs: Sequence[pictures.Run], truths: Sequence[Record], out: Path | None
+) -> tuple[list[Record], list[Record]]:
+    """The runs that are shown moving; none where no report is made."""
+    if out is None:
+        return [], []
+    worst = pictures.worst_runs(runs, truths, out / "motions.jsonl")
+    return worst, pictures.branches(runs, out / "branches.jsonl")
 
 
 def _file(wanted: Wanted, name: str) -> Path | None:

@@ -14,6 +14,7 @@ from crosscheck.judge.reference.reference import NoReference, reference
 from crosscheck.judge.truth import NoSolution, Truth, closed_form
 from crosscheck.judge.truth.reference_truth import trajectory
 from crosscheck.study.grid import Record
+from crosscheck.study.pictures import shortened
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
@@ -91,11 +92,8 @@ def _nothing(reason: str) -> dict[str, Any]:
 def _motion(exact: Trajectory) -> dict[str, Any]:
     """The record of the instants shown: times, and the bodies' poses."""
     chosen = shown(exact)
-    poses = {
-        name: {
-            "position": exact.position[chosen, b].tolist(),
-            "orientation": exact.orientation[chosen, b].tolist(),
-        }
+    bodies = {
+        name: {"position": exact.position[chosen, b], "orientation": exact.orientation[chosen, b]}
         for b, name in enumerate(exact.bodies)
     }
-    return {"times": exact.times[chosen].tolist(), "bodies": poses}
+    return {"times": exact.times[chosen].tolist(), "bodies": shortened(bodies)}

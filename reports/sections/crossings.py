@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from reports.blocks import Block, Heading, Table, Text
+from crosscheck.engine import BRANCHES
+from crosscheck.study.grid import Record
+from mbref.trajectory import Outcome
+from reports import motion_picture, places
+from reports.blocks import Block, Heading, Moving, Table, Text
+from reports.engine_looks import tone
 from reports.runs import Run, SceneRuns, plain
 
 SHOWN = 12  # singular positions of one motion
 CAPTION = (
     "Positions at which the rank of the constraint Jacobian drops, passed by {label}; "
     "`mbref run --branch NUMBER=BRANCH` asks for another branch."
+)
+SMOOTH = 1  # the number of the branch that is taken unless another is asked for
+BESIDE = (
+    "Singular position {number} at t = {time:.5g} s, marked on the line of time, in the motion from "
+    "{start:.4g} s to {end:.4g} s. Coloured: the mechanism on each branch that meets there; grey: on the "
+    "smooth one. `mbref animate scenes/{scene}.toml --branches --crossing {number}` shows them."
 )
 
 
@@ -33,6 +44,7 @@ def render(scene_runs: SceneRuns) -> list[Block]:
     return [
         Heading("Singular positions"),
         Table(caption, header, rows, right=frozenset({0, 1, 3})),
+        *_pictures(scene_runs),
         *(Text(sentence) for sentence in _open_reactions(run)),
     ]
 
@@ -40,6 +52,42 @@ def render(scene_runs: SceneRuns) -> list[Block]:
 def _looked(scene_runs: SceneRuns) -> Run | None:
     passed = [r for r in scene_runs.best().values() if r.completed and r.record.get("crossings")]
     return min(passed, key=lambda run: run.by_error, default=None)
+
+
+def _pictures(scene_runs: SceneRuns) -> Iterator[Moving]:
+    """The mechanism on every branch of each singular position that was recorded, side by side."""
+    by_number: dict[int, list[Record]] = {}
+    for record in sorted(scene_runs.branches, key=_asked):
+        if len(record["crossings"] or ()) >= _asked(record)[0]:
+            by_number.setdefault(_asked(record)[0], []).append(record)
+    for number, records in by_number.items():
+        yield _beside(scene_runs, number, records)
+
+
+def _beside(scene_runs: SceneRuns, number: int, records: Sequence[Record]) -> Moving:
+    scene, times = scene_runs.scene, records[0]["times"]
+    time = records[0]["crossings"][number - 1]["time"]
+    motions = {_title(r, len(records)): motion_picture.poses(scene, r) for r in records}
+    name = places.of_family(scene.name, (str(number), "")).replace("r-", "b-")
+    pictures = motion_picture.branches(name, scene, motions, time, tone(records[0]["engine"]))
+    caption = BESIDE.format(number=number, time=time, start=times[0], end=times[-1], scene=scene.name)
+    panels = [(title, picture.svg) for title, picture in pictures.items()]
+    return Moving(caption, panels, "".join(picture.css for picture in pictures.values()))
+
+
+def _asked(record: Record) -> tuple[int, int]:
+    """The number of a singular position and of the branch that a run was asked to take there."""
+    [[number, branch]] = record["asked"]["options"][BRANCHES]
+    return number, branch
+
+
+def _title(record: Record, several: int) -> str:
+    """The name of a branch and, where its run ended early, how."""
+    branch = _asked(record)[1]
+    name = f"Branch {branch}{', smooth' * (branch == SMOOTH)}" if several > 1 else "The only branch"
+    if record["outcome"] == Outcome.COMPLETED.label:
+        return name
+    return f"{name}; ended at t = {record['t_end']:.4g} s: {record['outcome']}"
 
 
 def _open_reactions(run: Run) -> Iterator[str]:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from crosscheck.engine import Setting
 from crosscheck.judge.gauss_principle import gauss
+from crosscheck.study import pictures
 from crosscheck.study.grid import Case, run_case
 from mbref.scenes import SCENES
-from reports.blocks import Block, Table, Text
+from reports.blocks import Block, Moving, Table, Text
 from reports.runs import SceneRuns, by_scene
 from reports.sections import accelerations, crossings, reactions, support
 
@@ -74,8 +79,44 @@ def test_singular_positions_passed_with_branches_and_reactions_left_open():
     blocks = crossings.render(group)
     assert [row[:2] for row in cells(blocks)] == [["1", "0.012586509"], ["2", "0.037759527"]]
     assert [row[3] for row in cells(blocks)] == ["1", "1"], "the smooth branch is taken"
+    assert not any(isinstance(block, Moving) for block in blocks), "no motion was recorded"
     (text,) = [block.text for block in blocks if isinstance(block, Text)]
     assert "reactions of A, B, C, D at t = 0.0125865 s" in text
+
+
+@pytest.fixture(scope="module")
+def parted() -> SceneRuns:
+    """The driven rhombus with its motions on both branches where they part."""
+    scene = SCENES["four_bar"]().with_(duration=0.05)
+    case = Case(scene, np.linspace(0.0, 0.05, 3), "mbref", Setting("alf-dual+projection", {"rtol": 1e-9}))
+    record = run_case(case)
+    (group,) = by_scene([record], {scene.name: scene}, branches=pictures.branches([(case, record)], None))
+    return group
+
+
+def test_branches_move_side_by_side(parted):
+    (block,) = [b for b in crossings.render(parted) if isinstance(b, Moving)]
+    assert [title for title, _ in block.panels] == ["Branch 1, smooth", "Branch 2"]
+    assert "position 2 at t = 0.03776 s" in block.caption and "--branches --crossing 2" in block.caption
+    smooth, fold = (svg for _, svg in block.panels)
+    assert block.css.count("@keyframes") == 2 * (3 + 3 + 1), "three bodies twice and the line of time"
+    places = [re.findall(r'class="[^"]*r1" style="transform:([^"]+)"', svg) for svg in (smooth, fold)]
+    assert places[0] != places[1], "without motion the couplers of both branches stand apart"
+    assert 'aria-label="four_bar: Branch 2"' in fold and "<script" not in fold
+
+
+def test_a_branch_whose_run_ended_early_says_so_and_stays(parted):
+    first, second = sorted(parted.branches, key=lambda r: r["asked"]["options"]["branches"])
+    bodies = {n: {k: v[:40] for k, v in body.items()} for n, body in second["bodies"].items()}
+    early = {**second, "outcome": "STEP_FAILED", "t_end": second["times"][39],
+             "times": second["times"][:40], "bodies": bodies}  # fmt: skip
+    (block,) = [
+        b for b in crossings.render(replace(parted, branches=[first, early])) if isinstance(b, Moving)
+    ]
+    assert block.panels[1][0] == f"Branch 2; ended at t = {early['t_end']:.4g} s: STEP_FAILED"
+    (of_coupler,) = re.findall(r"@keyframes \S+-1r1\{(.*?\})\}", block.css)
+    frames = re.findall(r"([\d.]+)%\{transform:([^}]+)\}", of_coupler)
+    assert frames[-1][0] == "100" and frames[-1][1] == frames[-2][1] and len(frames) == 41
 
 
 def test_no_table_of_singular_positions_where_none_is_passed():

@@ -1,0 +1,76 @@
+"""Motions that a report shows moving: runs at the instants of a picture, to the digits of a screen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engine import BRANCHES, Setting, engine
+from crosscheck.study.grid import Case, Record, run_case, study
+from crosscheck.study.record_view import error, is_completed
+from mbref.trajectory import Crossing
+
+DIGITS = 6  # of a position over the mechanism's size, more than a picture has pixels
+FRAMES = 75  # instants of the motion on a branch
+MOST = 2  # singular positions of a scene whose branches are shown
+DROPPED = ("reactions", "open_reactions")  # fields of a record that no picture shows
+POSES = ("position", "orientation")
+
+Run = tuple[Case, Record]
+
+
+def worst_runs(runs: Sequence[Run], truths: Sequence[Record], path: Path | None) -> list[Record]:
+    """Of each scene whose true motion is shown the completed run of largest error, again at its instants."""
+    cases = []
+    for truth in truths:
+        own = [run for run in runs if run[1]["scene"] == truth["scene"] and is_completed(run[1])]
+        if truth["motion"] and own:
+            worst, _ = max(own, key=lambda run: error(run[1]))
+            cases.append(worst._replace(times=np.array(truth["motion"]["times"])))
+    return study(cases, None, path, run=_pictured)
+
+
+def branches(runs: Sequence[Run], path: Path | None) -> list[Record]:
+    """Of each scene the runs along every branch of a few of its singular positions."""
+    by_scene: dict[str, list[Run]] = {}
+    for run in runs:
+        if is_completed(run[1]) and run[1]["crossings"] and BRANCHES in engine(run[0].engine).options:
+            by_scene.setdefault(run[1]["scene"], []).append(run)
+    best = [min(own, key=lambda run: error(run[1])) for own in by_scene.values()]
+    return study([case for run in best for case in _along_branches(*run)], None, path, run=_pictured)
+
+
+def shown(crossings: Sequence[Mapping[str, Any]]) -> list[int]:
+    """The numbers, from 1, of the singular positions that are shown: those of several branches come first."""
+    several = [number for number, crossing in enumerate(crossings, 1) if len(crossing["velocity"]) > 1]
+    return (several or [1])[:MOST]
+
+
+def _along_branches(case: Case, record: Record) -> Iterator[Case]:
+    for number in shown(record["crossings"]):
+        crossing = Crossing.from_record(record["crossings"][number - 1])
+        times = crossing.instants(case.scene.duration, FRAMES)
+        for branch in range(1, len(crossing.velocity) + 1):
+            options = {**case.setting.options, BRANCHES: [[number, branch]]}
+            yield case._replace(times=times, setting=Setting(case.setting.family, options))
+
+
+def _pictured(case: Case) -> Record:
+    """The record of a run without what no picture shows."""
+    record = {name: value for name, value in run_case(case).items() if name not in DROPPED}
+    return {**record, "bodies": shortened(record["bodies"])}
+
+
+def shortened(bodies: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, list[list[float]]]]:
+    """The bodies' poses, their numbers rounded to DIGITS of the largest of their kind."""
+    largest = {key: max(np.abs(body[key]).max(initial=0.0) for body in bodies.values()) for key in POSES}
+    return {name: {key: _rounded(body[key], largest[key]) for key in POSES} for name, body in bodies.items()}
+
+
+def _rounded(values: Any, largest: float) -> list[list[float]]:
+    places = DIGITS - int(np.ceil(np.log10(largest))) if largest else DIGITS
+    rounded: list[list[float]] = np.round(np.array(values, dtype=float), places).tolist()
+    return rounded

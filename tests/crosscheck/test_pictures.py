@@ -1,0 +1,71 @@
+"""Motions to be shown: the runs they repeat / their poses, to the digits kept; branches / closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+
+from crosscheck.cli import main
+from crosscheck.engine import BRANCHES, Setting
+from crosscheck.study.grid import Case, run_case
+from crosscheck.study.pictures import DIGITS, FRAMES, branches, shortened, shown, worst_runs
+from mbref.scenes import SCENES
+
+RATE = 124.8  # rad/s, of the driven crank
+RHOMBUS = SCENES["four_bar"]().with_(duration=0.05)
+
+
+@pytest.fixture(scope="module")
+def run():
+    case = Case(RHOMBUS, np.linspace(0.0, 0.05, 3), "mbref", Setting("alf-dual+projection", {"rtol": 1e-9}))
+    return case, run_case(case)
+
+
+def test_runs_along_branches_part_behind_the_crossing(run, tmp_path):
+    first = branches([run], tmp_path / "branches.jsonl")
+    asked = [record["asked"]["options"] for record in first]
+    assert asked == [{"rtol": 1e-9, BRANCHES: [[2, branch]]} for branch in (1, 2)]
+    smooth, fold = (np.array(record["bodies"]["coupler"]["position"]) for record in first)
+    times = np.array(first[0]["times"])
+    crossing = 1.5 * math.pi / RATE
+    assert len(times) == FRAMES and times[0] == pytest.approx(math.pi / RATE) and times[-1] == 0.05
+    crank = 0.25 * np.exp(1j * (math.pi / 2 - RATE * times))
+    along_crank = np.column_stack([crank.real, crank.imag, 0 * times])
+    lifted = np.array([0.25, 0.0, 0.0])
+    assert np.abs(smooth - (2 * along_crank + lifted)).max() < 1e-6
+    assert np.abs(fold - np.where((times > crossing)[:, None], along_crank, smooth)).max() < 1e-6
+    size = (tmp_path / "branches.jsonl").stat().st_size
+    assert branches([run], tmp_path / "branches.jsonl") == first, "they are not run again"
+    assert (tmp_path / "branches.jsonl").stat().st_size == size
+
+
+def test_the_run_of_largest_error_is_kept_as_poses_alone(run):
+    case, record = run
+    worse = {**record, "metrics": {**record["metrics"], "error": 1.0}}
+    coarse = case._replace(setting=Setting("alf-dual+projection", {"rtol": 1e-3}))
+    truth = {"scene": RHOMBUS.name, "motion": {"times": [0.0, 0.01]}}
+    (kept,) = worst_runs([run, (coarse, worse)], [truth], None)
+    assert kept["asked"]["options"] == {"rtol": 1e-3} and kept["times"] == [0.0, 0.01]
+    assert set(kept["bodies"]["crank"]) == {"position", "orientation"} and "reactions" not in kept
+    assert not worst_runs([(case, {**record, "outcome": "CRASHED"})], [truth], None)
+
+
+def test_numbers_are_kept_to_digits_of_the_largest():
+    exact = {"a": {"position": [[123.456789012, 1e-9, 0.0]], "orientation": [[1.0, 0.0, 0.0, 0.0]]}}
+    assert shortened(exact)["a"]["position"] == [[123.457, 0.0, 0.0]] and DIGITS == 6
+    empty = {"a": {"position": np.zeros((0, 3)), "orientation": np.zeros((0, 4))}}
+    assert shortened(empty) == {"a": {"position": [], "orientation": []}}
+
+
+def test_positions_of_several_branches_are_shown_first():
+    alone, several = {"velocity": [1]}, {"velocity": [1, 2]}
+    assert shown([alone, several, several, several]) == [2, 3]
+    assert shown([alone, alone]) == [1]
+
+
+def test_an_option_beyond_the_sweep_is_taken(capsys):
+    asked = "run four_bar --engine mbref --setting alf-dual+projection --option branches=[[2,2]] --times 0.05"
+    assert main([*asked.split(), "--json"]) == 0
+    assert '"branches": [[2, 2]]' in capsys.readouterr().out
+    assert main([*asked.replace("branches", "branch").split()]) == 2
+    assert "has no option 'branch'; it has: rtol, branches; did you mean" in capsys.readouterr().err
