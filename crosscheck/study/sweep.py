@@ -15,8 +15,8 @@ QUICK_SCENES = {  # name → end time (s)
     "planar_slider_crank": 0.2,
     "spatial_slider_crank": 0.02,
     "spatial_slider_crank_driven": 0.05,
-    "four_bar": 0.02,
-    "five_bar": 0.02,
+    "four_bar": 0.05,
+    "five_bar": 0.05,
 }
 QUICK_FAMILIES = ("defaults", "tuned", "forward, compiled", "newton, compiled")  # else an engine's first ones
 MOST_FAMILIES, MOST_SETTINGS = 2, 3  # in the quick sweep, of an engine and of a family
