@@ -62,7 +62,7 @@ def branches(
     for k, (title, motion) in enumerate(motions.items()):
         layers = [_Layer("true", every[0]), _Layer(f"run tone{tone}", motion)]
         drawn = _drawn(f"{name}-{k}", f"{scene.name}: {title}", scene, layers, view, still)
-        line = _line_of_time(f"{name}-{k}", float(view.shares(np.array(at))))
+        line = _line_of_time(f"{name}-{k}", *view.shares(np.array([at, view.times[still]])))
         pictures[title] = Picture(drawn.svg.replace("</svg>", f"{line.svg}</svg>"), drawn.css + line.css)
     return pictures
 
@@ -90,12 +90,17 @@ def _drawn(name: str, label: str, scene: Scene, layers: Sequence[_Layer], view: 
     return Picture(svg, "".join(frames))
 
 
-def _line_of_time(name: str, marked: float) -> Picture:
-    """A line for the whole time with a mark at a share of it, and a dot that moves along it."""
+def _line_of_time(name: str, marked: float, still: float) -> Picture:
+    """A line for the whole time with a mark at a share of it, and a dot that moves along it.
+
+    Without motion the dot is at the share ``still``.
+    """
     left, right, y = MARGIN, WIDTH - MARGIN, HEIGHT - 14
-    x = left + marked * (right - left)
-    line = f'<path class="clock" d="M{left:g} {y:g}H{right:g}M{x:.1f} {y - 9:g}v18"/>'
-    dot = f'<g class="{name}n" style="transform:translate({x:.1f}px,{y:g}px)"><circle class="now" r="6"/></g>'
+    mark, now = (left + share * (right - left) for share in (marked, still))
+    line = f'<path class="clock" d="M{left:g} {y:g}H{right:g}M{mark:.1f} {y - 9:g}v18"/>'
+    dot = (
+        f'<g class="{name}n" style="transform:translate({now:.1f}px,{y:g}px)"><circle class="now" r="6"/></g>'
+    )
     ends = [f"translate({end:g}px,{y:g}px)" for end in (left, right)]
     return Picture(line + dot, _keyframes(f"{name}n", np.array([0.0, 1.0]), ends))
 

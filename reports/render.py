@@ -27,7 +27,7 @@ from reports.blocks import (
 )
 
 CODE = re.compile("`([^`]+)`")
-NUMBER = re.compile(r"(?:&lt; )?\d[\d.]*e[-+]?\d+|t = [\d.e-]*\d s|\d[\d.]* (?:ms|µs|s)\b")
+NUMBER = re.compile(r"(?:&lt; )?\d[\d.]*e[-+]?\d+|t = [\d.e-]*\d s|\d[\d.]* (?:ms|µs|s)\b|--[\w-]+")
 TITLE = "Closed-loop mechanisms: engines against truth"
 
 
@@ -131,7 +131,7 @@ def _words(text: str) -> str:
 
 
 def numbers(text: str) -> Markup:
-    """The text for the page, its numbers with powers of ten unbroken, its commands as code."""
+    """The text for the page, its numbers and options unbroken, its commands as code."""
     unbroken = NUMBER.sub(r'<span class="nb">\g<0></span>', str(escape(text)))
     return Markup(CODE.sub(r"<code>\1</code>", unbroken))
 

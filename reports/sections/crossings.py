@@ -14,6 +14,7 @@ from reports.blocks import Block, Heading, Moving, Table, Text
 from reports.engine_looks import tone
 from reports.runs import Run, SceneRuns, plain
 
+DIGITS = 12  # of the times shown, behind the point, s
 SHOWN = 12  # singular positions of one motion
 CAPTION = (
     "Positions at which the rank of the constraint Jacobian drops, passed by {label}; "
@@ -21,9 +22,9 @@ CAPTION = (
 )
 SMOOTH = 1  # the number of the branch that is taken unless another is asked for
 BESIDE = (
-    "Singular position {number} at t = {time:.5g} s, marked on the line of time, in the motion from "
-    "{start:.4g} s to {end:.4g} s. Coloured: the mechanism on each branch that meets there; grey: on the "
-    "smooth one. `mbref animate scenes/{scene}.toml --branches --crossing {number}` shows them."
+    "Singular position {number} at t = {time:.5g} s: {sentence}. In colour the mechanism on each branch, in "
+    "grey on the smooth one, from {start:.4g} s to {end:.4g} s; the line of time has a mark at the position. "
+    "`mbref animate scenes/{scene}.toml --branches --crossing {number}` shows the same."
 )
 
 
@@ -65,12 +66,19 @@ def _pictures(scene_runs: SceneRuns) -> Iterator[Moving]:
 
 
 def _beside(scene_runs: SceneRuns, number: int, records: Sequence[Record]) -> Moving:
-    scene, times = scene_runs.scene, records[0]["times"]
-    time = records[0]["crossings"][number - 1]["time"]
-    motions = {_title(r, len(records)): motion_picture.poses(scene, r) for r in records}
+    scene, crossing = scene_runs.scene, records[0]["crossings"][number - 1]
+    motions = {_title(record): motion_picture.poses(scene, record) for record in records}
     name = places.of_family(scene.name, (str(number), "")).replace("r-", "b-")
-    pictures = motion_picture.branches(name, scene, motions, time, tone(records[0]["engine"]))
-    caption = BESIDE.format(number=number, time=time, start=times[0], end=times[-1], scene=scene.name)
+    pictures = motion_picture.branches(name, scene, motions, crossing["time"], tone(records[0]["engine"]))
+    start, *_, end = (round(time, DIGITS) for time in records[0]["times"])
+    caption = BESIDE.format(
+        number=number,
+        time=crossing["time"],
+        sentence=crossing["sentence"],
+        start=start,
+        end=end,
+        scene=scene.name,
+    )
     panels = [(title, picture.svg) for title, picture in pictures.items()]
     return Moving(caption, panels, "".join(picture.css for picture in pictures.values()))
 
@@ -81,10 +89,10 @@ def _asked(record: Record) -> tuple[int, int]:
     return number, branch
 
 
-def _title(record: Record, several: int) -> str:
+def _title(record: Record) -> str:
     """The name of a branch and, where its run ended early, how."""
     branch = _asked(record)[1]
-    name = f"Branch {branch}{', smooth' * (branch == SMOOTH)}" if several > 1 else "The only branch"
+    name = f"Branch {branch}{', smooth' * (branch == SMOOTH)}"
     if record["outcome"] == Outcome.COMPLETED.label:
         return name
     return f"{name}; ended at t = {record['t_end']:.4g} s: {record['outcome']}"

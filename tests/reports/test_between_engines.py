@@ -97,7 +97,10 @@ def parted() -> SceneRuns:
 def test_branches_move_side_by_side(parted):
     (block,) = [b for b in crossings.render(parted) if isinstance(b, Moving)]
     assert [title for title, _ in block.panels] == ["Branch 1, smooth", "Branch 2"]
-    assert "position 2 at t = 0.03776 s" in block.caption and "--branches --crossing 2" in block.caption
+    assert (
+        "position 2 at t = 0.03776 s: 2 branches. In colour" in block.caption
+        and "--branches --crossing 2" in block.caption
+    )
     smooth, fold = (svg for _, svg in block.panels)
     assert block.css.count("@keyframes") == 2 * (3 + 3 + 1), "three bodies twice and the line of time"
     places = [re.findall(r'class="[^"]*r1" style="transform:([^"]+)"', svg) for svg in (smooth, fold)]
