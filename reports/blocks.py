@@ -85,6 +85,26 @@ class Moving:
 
 
 @dataclass(frozen=True)
+class Cell:
+    """A cell of a heat map: its text, its kind ("kept", "false", "ended" or ""), and how deep its colour is,
+    from 0 to 1."""
+
+    text: str
+    kind: str
+    depth: float = 0.0
+
+
+@dataclass(frozen=True)
+class HeatMap:
+    """Cells by row and column; ``label`` says what the columns are."""
+
+    caption: str
+    label: str
+    columns: Sequence[str]
+    rows: Mapping[str, Sequence[Cell]]
+
+
+@dataclass(frozen=True)
 class Verdict:
     """One family in a cell of the matrix: its grade and sign, the lines below, its place, and the link to its
     best run."""
@@ -153,4 +173,4 @@ class Listing:
     text: str
 
 
-Block = Heading | Text | Table | Figure | Listing | Opening | Moving | Matrix | Plot | Record
+Block = Heading | Text | Table | Figure | Listing | Opening | Moving | HeatMap | Matrix | Plot | Record

@@ -13,8 +13,10 @@ from markupsafe import Markup, escape
 from reports import figures
 from reports.blocks import (
     Block,
+    Cell,
     Figure,
     Heading,
+    HeatMap,
     Listing,
     Matrix,
     Moving,
@@ -87,6 +89,9 @@ def _markdown(block: Block) -> str:
             return "\n\n".join(map(_words, (block.headline, *answers)))
         case Moving():
             return "\n\n".join([block.caption, "\n".join(f"- {_words(title)}" for title, _ in block.panels)])
+        case HeatMap():
+            rows = [[name, *map(_heat, cells)] for name, cells in block.rows.items()]
+            return f"{block.caption}\n\n{_rows(Table('', [block.label, *block.columns], rows))}"
         case Matrix():
             return f"{block.caption}\n\n{_matrix(block)}"
         case Record():
@@ -94,6 +99,10 @@ def _markdown(block: Block) -> str:
             return "\n\n".join([f"### {_words(f'{block.scene}: {block.title}')}", *(f"- {t}" for t in told)])
         case Listing():
             return f"```\n{block.text}\n```"
+
+
+def _heat(cell: Cell) -> str:
+    return f"**{cell.text}**" if cell.kind == "false" else cell.text
 
 
 def _matrix(matrix: Matrix) -> str:

@@ -5,33 +5,26 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
-
-import matplotlib
-import numpy as np
-from matplotlib.figure import Figure as Drawing
 
 from crosscheck.judge.tolerances import FALSE_SUCCESS
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error, is_completed
 from crosscheck.study.stability import FIXED_STEPS, MBREF, METHODS, RTOL, Ladder, ladders, place
 from mbref.trajectory import Outcome
-from reports import figures
-from reports.blocks import Block, Figure, Heading, Table, Text
+from reports.blocks import Block, Cell, Heading, HeatMap, Table, Text
 from reports.runs import Curve
 
 ALLOWED = max(1e3 * RTOL, 1e-6)  # error of a method of mbref beyond which a completed run is a false success
 MOST_DIGITS = 15.0
-DARK = 14.0  # digits from which on a cell is so dark that white is read better on it
 LETTERS = {  # of outcomes that the paper's tables do not have
     "UNDECIDED": "u", "LEFT_MOTION": "m", "TIMED_OUT": "t", "CRASHED": "x", "NOT_FINITE": "n",
 }  # fmt: skip
 HOW = (
-    "Numbers are digits kept: minus the logarithm of the largest error. Red cells are false successes, "
-    f"completed with an error above {ALLOWED:g}, or {FALSE_SUCCESS:g} of engines and of ali3-p, which has no "
-    "tolerance. A letter names the outcome of a run that ended early: a singular matrix, b iteration not "
-    "converged, c violation, d step failed, u branch undecided, m left the motion, t out of time, x crashed, "
-    "n not finite. Empty cells were not run."
+    "Numbers are digits kept: minus the logarithm of the largest error. Red cells, bold in the text, are "
+    f"false successes: completed with an error above {ALLOWED:g}, or {FALSE_SUCCESS:g} of engines and "
+    "ali3-p, which has no tolerance. A letter names the outcome of a run that ended early: a singular matrix, b "
+    "iteration not converged, c violation, d step failed, u branch undecided, m left the motion, t out of "
+    "time, x crashed, n not finite. Empty cells were not run."
 )
 WHEN = (
     "Where a mechanism passes singular positions, or comes near them, projection (the default) and taylor "
@@ -48,7 +41,7 @@ def render(records: Sequence[Record]) -> list[Block]:
     """Advice, counts of false successes, and a heat map for each ladder."""
     found = _runs(records)
     shown = [ladder for ladder in ladders() if ladder.name in found]
-    maps = [_figure(ladder, found[ladder.name]) for ladder in shown]
+    maps = [_map(ladder, found[ladder.name]) for ladder in shown]
     return [Heading("Stability", 2), Text(WHEN), Text(HOW), _counts(shown, found), *maps]
 
 
@@ -85,28 +78,12 @@ def _counts(shown: Sequence[Ladder], found: Mapping[str, Runs]) -> Table:
     return Table(caption, ("Engine", "Method", "Right", "Ended", "False"), rows, right=frozenset({2, 3, 4}))
 
 
-def _figure(ladder: Ladder, runs: Runs) -> Figure:
-    draw = partial(plot, ladder.label, [d for d, _ in ladder.rungs], runs)
-    return Figure(
-        f"stability-{ladder.name}", f"{ladder.name.replace('_', ' ').capitalize()}. {ladder.words}", draw
-    )
-
-
-def plot(label: str, difficulties: Sequence[float], runs: Runs) -> Drawing:
-    """One row a method, one column a rung, the digits kept in the cells."""
-    drawing, [axes] = figures.canvas(7.4, 0.6 + 0.27 * len(runs))
-    digits = np.array([[_digits(row.get(d)) for d in difficulties] for row in runs.values()])
-    colours = matplotlib.colormaps["Blues"].with_extremes(bad="#eeeeee")
-    axes.imshow(np.ma.masked_invalid(digits), cmap=colours, vmin=0, vmax=20, aspect="auto")
-    for i, row in enumerate(runs.values()):
-        for j, difficulty in enumerate(difficulties):
-            _write(axes, i, j, row.get(difficulty))
-    axes.set_xticks(range(len(difficulties)), [rung(d) for d in difficulties])
-    axes.set_yticks(range(len(runs)), [_name(curve) for curve in runs])
-    axes.set_xlabel(label)
-    axes.grid(visible=False)
-    axes.tick_params(length=0)
-    return drawing
+def _map(ladder: Ladder, runs: Runs) -> HeatMap:
+    """One row a method, one column a rung."""
+    difficulties = [difficulty for difficulty, _ in ladder.rungs]
+    rows = {_name(curve): [_cell(row.get(d)) for d in difficulties] for curve, row in runs.items()}
+    caption = f"{ladder.name.replace('_', ' ').capitalize()}. {ladder.words}"
+    return HeatMap(caption, ladder.label, [rung(d) for d in difficulties], rows)
 
 
 def rung(difficulty: float) -> str:
@@ -114,14 +91,18 @@ def rung(difficulty: float) -> str:
     return re.sub(r"e([+-])0?", lambda sign: "e" + sign[1].strip("+"), f"{difficulty:g}")
 
 
-def _write(axes: figures.Axes, i: int, j: int, record: Record | None) -> None:
+def _cell(record: Record | None) -> Cell:
+    """Digits kept, the letter of an early end, or nothing."""
     if record is None:
-        return
-    if is_false(record):
-        axes.fill_between([j - 0.5, j + 0.5], i - 0.5, i + 0.5, color="#c62828", linewidth=0)
-    text = f"{_shown(record):.0f}" if is_completed(record) else _letter(record["outcome"])
-    colour = "white" if is_false(record) or _digits(record) > DARK else "black"
-    axes.text(j, i, text, ha="center", va="center", color=colour, fontsize=8)
+        return Cell("", "")
+    if not is_completed(record):
+        return Cell(_letter(record["outcome"]), "ended")
+    digits = _digits(error(record))
+    return (
+        Cell(f"{digits:.0f}", "false")
+        if is_false(record)
+        else Cell(f"{digits:.0f}", "kept", digits / MOST_DIGITS)
+    )
 
 
 def _name(curve: Curve) -> str:
@@ -133,12 +114,6 @@ def _letter(outcome: str) -> str:
     return Outcome[outcome].letter or LETTERS[outcome]
 
 
-def _shown(record: Record) -> float:
-    """Digits kept, 0 where none."""
-    value = error(record)
+def _digits(value: float) -> float:
+    """Digits that an error leaves, 0 where none."""
     return 0.0 if not value < 1.0 else min(MOST_DIGITS, -math.log10(max(value, 10**-MOST_DIGITS)))
-
-
-def _digits(record: Record | None) -> float:
-    """Digits of a completed run that is right, else not a number."""
-    return math.nan if record is None or not is_completed(record) or is_false(record) else _shown(record)

@@ -7,7 +7,8 @@ import pytest
 from crosscheck.engine import engine_names
 from crosscheck.judge.truth import closed_form
 from crosscheck.study import stability
-from reports.blocks import Figure, Table
+from reports.blocks import HeatMap, Table
+from reports.render import html, markdown
 from reports.sections import stability as section
 
 
@@ -63,12 +64,15 @@ def test_counts_tell_right_ended_and_false():
     ],
 )  # fmt: skip
 def test_a_cell_shows_digits_or_why_the_run_ended(error, outcome, text, red):
-    (figure,) = [b for b in section.render([record("gap", 1e-1, error, outcome)]) if isinstance(b, Figure)]
-    [axes] = figure.draw().axes
-    assert [t.get_text() for t in axes.texts] == [text]
-    assert bool(axes.collections) is red
-    assert axes.get_xlabel() == "gap, m" and axes.get_yticklabels()[0].get_text() == "taylor"
-    assert axes.get_xticklabels()[0].get_text() == "0.1"
+    blocks = section.render([record("gap", 1e-1, error, outcome)])
+    (heat,) = [b for b in blocks if isinstance(b, HeatMap)]
+    cell, *others = heat.rows["taylor"]
+    assert cell.text == text and (cell.kind == "false") is red
+    assert {other.text for other in others} == {""} and len(others) + 1 == len(heat.columns)
+    assert heat.label == "gap, m" and heat.columns[0] == "0.1"
+    assert (f"| taylor | {'**' * red}{text}{'**' * red} |" in markdown(blocks)) and "gap, m →" in html(
+        blocks, {}
+    )
 
 
 @pytest.mark.parametrize(
