@@ -22,9 +22,9 @@ LETTERS = {  # of outcomes that the paper's tables do not have
 HOW = (
     "Numbers are digits kept: minus the logarithm of the largest error. Red cells, bold in the text, are "
     f"false successes: completed with an error above {ALLOWED:g}, or {FALSE_SUCCESS:g} of engines and "
-    "ali3-p, which has no tolerance. A letter names the outcome of a run that ended early: a singular matrix, b "
-    "iteration not converged, c violation, d step failed, u branch undecided, m left the motion, t out of "
-    "time, x crashed, n not finite. Empty cells were not run."
+    "ali3-p, which has no tolerance. A letter names the outcome of a run that ended early: a singular "
+    "matrix, b iteration not converged, c violation, d step failed, u branch undecided, m left the motion, "
+    "t out of time, x crashed, n not finite. Empty cells were not run."
 )
 WHEN = (
     "Where a mechanism passes singular positions, or comes near them, projection (the default) and taylor "
