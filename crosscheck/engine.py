@@ -6,6 +6,8 @@ An engine of a third party needs to import nothing but this module.
 from __future__ import annotations
 
 import enum
+import os
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -193,7 +195,8 @@ def installed(name: str) -> bool:
 
 
 def engine(name: str) -> Engine:
-    """The engine of that name, or at ``module:attribute``; raises LookupError with the known names."""
+    """The engine of that name, or at ``module:attribute`` of a module that can be imported or lies in the
+    working directory; raises LookupError with the known names."""
     if name in BUILT_IN + OPTIONAL:
         return _as_engine(name, import_module(f"crosscheck.engines.{name}").ENGINE)
     for point in metadata.entry_points(group=ENTRY_POINTS):
@@ -201,6 +204,8 @@ def engine(name: str) -> Engine:
             return _as_engine(name, point.load())
     if ":" in name:
         module, attribute = name.split(":", 1)
+        if (here := os.getcwd()) not in sys.path:
+            sys.path.append(here)
         return _as_engine(name, getattr(import_module(module), attribute))
     known = engine_names()
     raise LookupError(f"unknown engine {name!r}; known: {', '.join(known)}{meant(name, known)}")

@@ -177,7 +177,7 @@ def judged(label: str, bench: Bench) -> Verdict:
 
 
 def tables(conformance: Conformance) -> Iterator[Table | Text]:
-    """A table of scenes with the number of cards by status and those that fail, then each failure and gap."""
+    """A table of scenes with the number of cards by status, each gap, the cards, and last each failure."""
     properties = [n for n in (*FIRST, *PROPERTIES) if any(v.property == n for v in conformance.verdicts)]
     named = " ".join(filter(None, (conformance.engine, conformance.version, conformance.family)))
     title = f"{named}: cards that {', '.join(f'{mark} {status}' for status, (mark, _) in MARKS.items())}"
@@ -187,9 +187,10 @@ def tables(conformance: Conformance) -> Iterator[Table | Text]:
         own = [v for v in conformance.verdicts if v.scene == scene]
         table.add_row(scene, *(_count(own, status) for status in MARKS), _worst(own))
     yield table
-    yield from (_sentence(verdict) for verdict in conformance.verdicts if verdict.status in (FAIL, CANNOT))
+    yield from (_sentence(verdict) for verdict in conformance.verdicts if verdict.status == CANNOT)
     yield from _domains(conformance)
     yield from (Text(f"{_card(name)}: {abouts()[name]}", style="dim") for name in properties)
+    yield from (_sentence(verdict) for verdict in conformance.verdicts if verdict.status == FAIL)
     yield _summary(conformance)
 
 
@@ -237,7 +238,9 @@ def _sentence(verdict: Verdict) -> Text:
 
 def _summary(conformance: Conformance) -> Text:
     counts = [f"{sum(v.status == status for v in conformance.verdicts)} {status}" for status in MARKS]
-    return Text(f"{conformance.engine}: {', '.join(counts)}")
+    scenes = {v.scene for v in conformance.verdicts}
+    run = {v.scene for v in conformance.verdicts if v.property == "run" and v.status in (PASS, FAIL)}
+    return Text(f"{conformance.engine}: {', '.join(counts)}; {len(run)} of {len(scenes)} scenes run")
 
 
 def _finite(value: Any) -> Any:

@@ -96,6 +96,17 @@ def test_the_table_has_a_line_a_scene_in_eighty_columns():
     assert any(line.split() == ["pendulum", "1", "truth"] for line in lines), lines
 
 
+def test_failures_stand_at_the_end_below_the_number_of_scenes_run():
+    verdicts = [
+        suite.Verdict("run", "door", "fail", reason="it crashed"),
+        suite.Verdict("refusal", "spring", "cannot", reason="no springs"),
+        suite.Verdict("run", "pendulum", "pass"),
+    ]
+    *_, failure, summary = map(str, suite.tables(suite.Conformance("mine", "1.0", verdicts)))
+    assert failure == "fail: door, run: it crashed"
+    assert summary == "mine: 1 pass, 1 fail, 1 cannot, 0 outside; 2 of 3 scenes run"
+
+
 def test_partitioning_keeps_a_motion_in_millimetres():
     """Newton's method ends where rounding, 1000 times as large there, lets no violation shrink further."""
     specimen, family = SPECIMENS["drawn loop"], "mpi-svd+partitioning"

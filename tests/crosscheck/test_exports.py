@@ -33,6 +33,13 @@ def test_importing_crosscheck_loads_nothing() -> None:
     assert "'numpy'" not in loaded and "'numba'" not in loaded and "'mbref'" not in loaded, loaded
 
 
+def test_an_engine_in_the_working_directory_is_found(tmp_path, monkeypatch) -> None:
+    (tmp_path / "beside_me.py").write_text("from crosscheck.engines.mbref import ENGINE\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [path for path in sys.path if path])
+    assert engine.engine("beside_me:ENGINE").name == "mbref"
+
+
 def test_an_engine_needs_one_module() -> None:
     """The example imports from crosscheck.engine alone, beside numpy and the standard library."""
     found = {
