@@ -132,6 +132,7 @@ def test_parts_without_a_counterpart_are_told():
     exported = FORMAT.write(find_scene("planar_slider_crank")).left_out
     assert exported[0] == "load[0] (moment on crank): apply it by mjData.xfrc_applied"
     assert FORMAT.write(find_scene("four_bar")).left_out[0].startswith("driver of A: ")
+    assert "<tendon" not in FORMAT.write(find_scene("four_bar")).text
 
 
 @pytest.mark.parametrize(
@@ -139,6 +140,8 @@ def test_parts_without_a_counterpart_are_told():
     [
         ('anchor="0.7 0 0"/>', 'anchor="0.7 0 0" active="false"/>', "'C' is not active"),
         ("</equality>", '<joint name="gear" joint1="A" joint2="D"/></equality>', "'gear' couples"),
+        ("</worldbody>", '<site name="mark"/></worldbody>', "1 sites that hold nothing"),
+        ("</equality>", '</equality><sensor><jointpos joint="A"/></sensor>', "1 sensors"),
         ('<joint name="A"/>', '<joint name="A" armature="0.1" frictionloss="1"/>', "armature of 1"),
     ],
 )  # fmt: skip

@@ -56,6 +56,9 @@ def _text(spec: Any) -> str:
         )  # fmt: skip
         for i in range(2):
             ET.SubElement(element, "site", site=f"{spring.name}.{i}")
+    for section in (equalities, tendons):
+        if not len(section):
+            root.remove(section)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 
