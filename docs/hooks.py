@@ -109,6 +109,21 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     return formulas(markdown)
 
 
+def on_page_content(html: str, **_: Any) -> str:
+    """Tables and formulas can be reached by keyboard, since they scroll where they are wide."""
+    return html.replace("<table>", '<table tabindex="0">').replace(
+        'display="block">', 'display="block" tabindex="0">'
+    )
+
+
+def on_post_page(output: str, **_: Any) -> str:
+    """The theme's search has a name for readers of screens."""
+    return output.replace(
+        'data-md-component="search" role="dialog"',
+        'data-md-component="search" role="dialog" aria-label="Search"',
+    )
+
+
 def _directory(match: re.Match[str]) -> str:
     """Links to folders outside the docs lose their target; links within the site stay."""
     target = re.search(r"\(([^)]*)\)", match[0])
@@ -125,10 +140,6 @@ def formulas(markdown: str) -> str:
         )
         parts[i] = re.sub(r"\$([^$\n]+)\$", lambda m: f"<span>{convert(m[1])}</span>", parts[i])
     return "".join(parts)
-
-
-def _displayed(match: re.Match[str]) -> str:
-    return str(convert(match[1].strip(), display="block"))
 
 
 class _Commands:

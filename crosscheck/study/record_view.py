@@ -75,8 +75,10 @@ def engine_and_family(record: Record) -> tuple[str, str]:
 
 def varied_settings(record: Record, records: Sequence[Record]) -> str:
     """The settings in which a record differs from others of its family, as printed (``rtol=1e-06``);
-    all of them when it is alone."""
+    those asked for when it is alone."""
     own = record["settings"]
     settings = [r["settings"] for r in records if engine_and_family(r) == engine_and_family(record)]
-    names = [k for k in own if len(settings) == 1 or any(s.get(k, own[k]) != own[k] for s in settings)]
+    names = [k for k in own if any(s.get(k, own[k]) != own[k] for s in settings)]
+    if len(settings) == 1:
+        own = names = record["asked"]["options"]
     return ", ".join(f"{k}={own[k]:g}" if isinstance(own[k], float) else f"{k}={own[k]}" for k in names)

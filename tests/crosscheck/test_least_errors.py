@@ -12,6 +12,7 @@ def record(
 ) -> dict[str, Any]:
     return {
         "scene": "bar", "engine": engine, "family": family, "settings": {"step": error},
+        "asked": {"options": {"step": error}},
         "outcome": outcome, "t_end": t_end, "metrics": {"error": error}, "cost": {"seconds": 2.0},
     }  # fmt: skip
 
