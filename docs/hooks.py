@@ -83,7 +83,7 @@ def figures() -> dict[str, str]:
     found["driver"] = still(driven, View.parse("xz"), 360)
     for name in MOVING:
         scene = find_scene(name)
-        found[f"motion_{name}"] = moving(scene, simulate(scene))
+        found[f"motion_{name}"] = moving(scene, simulate(scene), width=400)
     return found
 
 
