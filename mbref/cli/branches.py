@@ -44,7 +44,7 @@ def along_branches(
     """The motions by title, from before a singular position of the smooth one to behind it."""
     assert smooth.crossings is not None
     crossing = smooth.crossings[number - 1]
-    times = crossing.instants(float(smooth.times[-1]), FRAMES)
+    times = crossing.instants(smooth.t_end, FRAMES)
     motions = [
         simulate(smooth.mechanism, method, times, replace(limits, branches={number: branch}), _quiet)
         for branch in range(1, len(crossing.velocity) + 1)

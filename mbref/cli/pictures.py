@@ -48,7 +48,7 @@ def add(commands: Any) -> None:
     )  # fmt: skip
     animate.add_argument(
         "--crossing", type=int, metavar="NUMBER",
-        help="with --branches: the singular position, counted from 1 (default: the first at which several\n"
+        help="--branches at this singular position, counted from 1 (default: the first at which several\n"
         "branches meet)",
     )  # fmt: skip
     add_method_options(animate, json=False)
@@ -72,8 +72,9 @@ def _animate(options: argparse.Namespace) -> int:
     from mbref.cli.first_run import simulator
 
     scene, view = find_scene(options.scene), _view(options)
+    parted = options.branches or options.crossing is not None
     path, times, limits = (
-        _path(options, "-branches" if options.branches else "-moving", (".svg",)),
+        _path(options, "-branches" if parted else "-moving", (".svg",)),
         sample_times(options, scene),
         limits_of(options),
     )
@@ -84,13 +85,13 @@ def _animate(options: argparse.Namespace) -> int:
     ):
         motion = simulate(scene, options.method, times, limits, progress)
         motions, picture = {"": motion}, partial(moving, scene, motion, view)
-        if options.branches:
+        if parted:
             number = chosen(motion, options.crossing)
             motions = along_branches(simulate, motion, options.method, limits, number)
             picture = partial(side_by_side, scene, motions, f"{scene.name}: {told(motion, number)}", view)
     path.write_text(picture(), encoding="utf-8")
     print(path)
-    if not options.branches and (several := of_several_branches(motion)):
+    if not parted and (several := of_several_branches(motion)):
         print(f"{told(motion, several[0])}; --branches shows them side by side")
     ended = [m for m in motions.values() if m.outcome.name != "COMPLETED"]
     for motion in ended:

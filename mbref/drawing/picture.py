@@ -33,8 +33,7 @@ def moving(scene: Scene, motion: Trajectory, view: View | None = None, width: fl
     Samples are shown as they are, at most 120 of them, evenly in time where the trajectory is.
     Raises ValueError where the trajectory has no sample.
     """
-    if not motion.times.size:
-        raise ValueError(f"the motion of {motion.scene!r} has no sample to draw: {motion.outcome.sentence}")
+    _check(motion)
     return _picture(scene, thinned(motion), view, width, _round(motion.times))
 
 
@@ -44,8 +43,11 @@ def side_by_side(
     """Motions over the same time as one SVG that moves by itself, two in a row, each below its title.
 
     All show the same part of space.  A motion that ended early stays at its last sample; where the reader
-    asks for no motion, all stand where one is furthest from the first.
+    asks for no motion, all stand where one is furthest from the first.  Raises ValueError where a trajectory
+    has no sample.
     """
+    for motion in motions.values():
+        _check(motion)
     times = max((motion.times for motion in motions.values()), key=len)
     held = [
         thinned(_samples(m, np.minimum(np.arange(len(times)), len(m.times) - 1))) for m in motions.values()
@@ -72,6 +74,11 @@ def _placed(panels: Sequence[Sequence[str]], height: float) -> Iterator[str]:
 def _corner(k: int, height: float) -> tuple[float, float]:
     """The upper left corner, px, of the k-th panel, from 0."""
     return PANEL * (k % COLUMNS), (HEAD + height) * (k // COLUMNS)
+
+
+def _check(motion: Trajectory) -> None:
+    if not motion.times.size:
+        raise ValueError(f"the motion of {motion.scene!r} has no sample to draw: {motion.outcome.sentence}")
 
 
 def thinned(motion: Trajectory) -> Trajectory:

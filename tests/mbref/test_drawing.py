@@ -101,6 +101,8 @@ def test_a_motion_without_samples_is_refused(turning):
     scene, motion = turning
     with pytest.raises(ValueError, match="has no sample"):
         moving(scene, dataclasses.replace(motion, times=np.zeros(0)))
+    with pytest.raises(ValueError, match="has no sample"):
+        side_by_side(scene, {"a": motion, "b": dataclasses.replace(motion, times=np.zeros(0))}, "two")
 
 
 def test_a_moving_picture_has_a_still_one_for_readers_who_ask_for_it(turning):

@@ -233,7 +233,7 @@ def test_animate_shows_branches_side_by_side(tmp_path, capsys, monkeypatch):
     assert main(["animate", "four_bar", "--duration", "0.05", "--branches"]) == 0
     picture = (tmp_path / "four_bar-branches.svg").read_text()
     assert "branch 1, smooth" in picture and "branch 2" in picture
-    assert main(["animate", "five_bar", "--duration", "0.05", "--branches", "--crossing", "1"]) == 0
+    assert main(["animate", "five_bar", "--duration", "0.05", "--crossing", "1"]) == 0
     assert "branch 2" not in (tmp_path / "five_bar-branches.svg").read_text()
 
 
