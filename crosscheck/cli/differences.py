@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
+from collections.abc import Iterator, Sequence
 
 from rich.console import Console
 
@@ -12,13 +14,15 @@ from crosscheck.study.difference import ERROR_RATIO, NOISE, TIME_RATIO, Change, 
 
 COUNT = (
     f"{{}} of {{}} runs changed: another outcome, an error above {NOISE:g} that changed by more than "
-    f"{ERROR_RATIO:g} times, or a time that changed by more than {TIME_RATIO:g} times on the same machine."
+    f"{ERROR_RATIO:g} times, a time that changed by more than {TIME_RATIO:g} times on the same machine, or a "
+    "run of one set alone."
 )
 HEADER = ("scene", "engine", "family", "settings", "change")
 
 
 def show(console: Console, old: str, new: str, is_all: bool) -> bool:
-    """Print versions, machines and runs that changed, or all runs; returns whether any did.
+    """Print versions, machines, how many runs one set alone has, and the runs that changed, or all runs;
+    returns whether any did.
 
     Raises RequestError for a file without records.
     """
@@ -30,13 +34,23 @@ def show(console: Console, old: str, new: str, is_all: bool) -> bool:
     changed = [change for change in found if change.sentences]
     for sentence in circumstances(before, after):
         console.print(sentence, soft_wrap=True)
-    if shown := found if is_all else changed:
+    if not is_all:
+        for sentence in _of_one_set(changed):
+            console.print(sentence, soft_wrap=True)
+    if shown := found if is_all else [change for change in changed if change.old and change.new]:
         table = listing_table("runs", HEADER)
         for change in shown:
             table.add_row(*_row(change))
         console.print(table)
     console.print(COUNT.format(len(changed), len(found)), soft_wrap=True)
     return bool(changed)
+
+
+def _of_one_set(changed: Sequence[Change]) -> Iterator[str]:
+    """How many runs of every engine one set alone has."""
+    alone = [change for change in changed if change.old is None or change.new is None]
+    counts = Counter((change.identity[1], *change.sentences) for change in alone)
+    yield from (f"{engine}: {number} runs {sentence}" for (engine, sentence), number in counts.items())
 
 
 def _row(change: Change) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from crosscheck.cli import tables
+from crosscheck.cli import differences, tables
 from crosscheck.study.difference import changes, circumstances, load
 from crosscheck.study.sentences import (
     ADAPTERS,
@@ -213,6 +213,18 @@ def test_differences_beyond_noise(tmp_path):
     }, found  # fmt: skip
     assert circumstances(before, after) == ["a: 1 → 1, 2"], circumstances(before, after)
     assert not any(change.sentences for change in changes(before, before))
+
+
+def test_runs_of_one_set_alone_are_counted_by_engine(tmp_path):
+    both, gone = record("a", "x", 1e-5, 0.1), [record("b", family, 1e-5, 0.1) for family in "pq"]
+    folders = [saved(tmp_path / name, runs) for name, runs in (("old", [both, *gone]), ("new", [both]))]
+    said = []
+    for is_all in (False, True):
+        console = Console(width=80, file=io.StringIO())
+        assert differences.show(console, *map(str, folders), is_all)
+        said.append(console.file.getvalue())
+    assert "b: 2 runs only in the old set" in said[0] and "runs\nscene" not in said[0]
+    assert said[0].count("only in the old set") == 1 and said[1].count("only in the old set") == 2
 
 
 def test_times_of_other_machines_are_not_compared():
