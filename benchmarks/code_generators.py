@@ -15,7 +15,7 @@ import shutil
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +39,6 @@ static void {macro}(const double *y, double *result) {{
 """
 ENDS = {1: "the motion is not finite", 2: "no step is short enough", 3: "too many steps"}
 PLAIN, PROJECTED = "dop853, compiled", "projected, compiled"
-REPEATS, BRIEF = 20, 1e-3  # a run is repeated within one reading of the clock while it is briefer (s)
 RATE = 0.1  # 1/s, of the closures where they are not projected; `grids` tries others
 LEAST_TURN = 0.03  # rad turned within the shortest step, which only singular positions need
 SCOUT = 1e-6  # relative tolerance of the run that finds how fast a scene turns
@@ -96,7 +95,9 @@ class CasADi(Generator):
         library = _library(scene, setting.options.get("beta", 0.0))
         built = time.process_time() - began
         run = _Run(times, equations.start)
-        seconds = _repeated(lambda: run.advance(library, setting))
+        began = time.process_time()
+        run.advance(library, setting)
+        seconds = time.process_time() - began
         message = "" if run.status == 0 else ENDS[run.status]
         cost = Cost(seconds, built, *(int(count) for count in run.counts[:3]))
         return self._trajectory(scene, times, setting, run.samples[: run.counts[3]], message, cost)
@@ -132,17 +133,6 @@ class _Run:
 
 def _pointer(array: np.ndarray) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
-
-
-def _repeated(integrate: Callable[[], Any]) -> float:
-    """CPU seconds of one integration, repeated while that is brief."""
-    done, began = 0, time.process_time()
-    while True:
-        integrate()
-        done += 1
-        seconds = time.process_time() - began
-        if seconds > BRIEF or done == REPEATS:
-            return seconds / done
 
 
 @functools.lru_cache(maxsize=16)
@@ -205,14 +195,10 @@ class Heyoka(Generator):
 
         began, equations = time.process_time(), equations_of(scene)
         integrator, longest = _integrator(scene, setting.options["tol"]), float(np.diff(times).max())
-        built, found = time.process_time() - began, []
-
-        def integrate() -> None:
-            integrator.time, integrator.state[:] = 0.0, equations.start
-            found[:] = integrator.propagate_grid(times, max_delta_t=longest)
-
-        seconds = _repeated(integrate)
-        outcome, *_, steps, _, states = found
+        built, began = time.process_time() - began, time.process_time()
+        integrator.time, integrator.state[:] = 0.0, equations.start
+        outcome, *_, steps, _, states = integrator.propagate_grid(times, max_delta_t=longest)
+        seconds = time.process_time() - began
         reached = outcome == heyoka.taylor_outcome.time_limit and np.isfinite(states).all()
         message = "" if reached else f"the integrator ended with {outcome.name}"
         states = states if reached else states[:0]

@@ -90,9 +90,9 @@ OPPONENTS = {  # engines and kinds of integrators
     "limit": ((LIMIT_NAME,), ()),
 }
 OURSELVES: dict[str, Callable[[str], bool]] = {  # of the families' names
-    "series": lambda family: family == SERIES,
-    "specialised code": lambda family: family.endswith(SPECIALISED),
-    "general kernels": lambda family: family != SERIES and not family.endswith(SPECIALISED),
+    "series": lambda family: family.startswith(SERIES),
+    "specialised code": lambda family: family.endswith(SPECIALISED) and not family.startswith(SERIES),
+    "general kernels": lambda family: not family.endswith(SPECIALISED) and not family.startswith(SERIES),
 }
 
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 METHODS = (
     "alf-dual+projection, specialised",
     "alf-dual+projection",
+    "taylor, specialised",
     "taylor",
     "lm2+projection, specialised",
     "kinematic, specialised",

@@ -55,8 +55,11 @@ def lu_solve(a, n, pivots, b):
 
 @kernel
 def determinant(a, n):
-    """The determinant of a[:n, :n]: whether it is negative, and the logarithm of its size; LU in place."""
-    negative, size = False, 0.0
+    """The determinant of a[:n, :n]: whether it is negative, and the logarithm of its size; LU in place.
+
+    Logarithms are taken of as many pivots at a time as a number's range allows.
+    """
+    negative, size, product = False, 0.0, 1.0
     for k in range(n):
         best = k
         for i in range(k + 1, n):
@@ -68,12 +71,14 @@ def determinant(a, n):
                 a[k, j], a[best, j] = a[best, j], a[k, j]
         if a[k, k] < 0.0:
             negative = not negative
-        size += log(max(abs(a[k, k]), 1e-300))
+        product *= max(abs(a[k, k]), 1e-150)
+        if not 1e-150 < product < 1e150:
+            size, product = size + log(product), 1.0
         for i in range(k + 1, n):
             factor = a[i, k] / a[k, k] if a[k, k] != 0.0 else 0.0
             for j in range(k, n):
                 a[i, j] -= factor * a[k, j]
-    return negative, size
+    return negative, size + log(product)
 
 
 @kernel

@@ -201,10 +201,7 @@ class Run:
             if status == SINGULAR_AHEAD or self._fails_at_start(status):
                 status = self.pass_singular_position(status)
             status = self._judge_pace(status)
-            if self.wants_code and status == PAUSED and self._steps_ahead() >= STEPS_WORTH_CODE:
-                self.wants_code = False
-                with contextlib.suppress(Untraceable):  # then the general kernels go on
-                    self._specialise()
+            self.specialise_where_it_pays(status)
             if progress is not None:
                 progress(float(self.memory.loop.clock.time))
         return status, time.process_time() - began - (self.making - before)
@@ -229,6 +226,13 @@ class Run:
         ``status`` says why the steps ended.
         """
         return UNDECIDED if status == SINGULAR_AHEAD else status
+
+    def specialise_where_it_pays(self, status: int) -> None:
+        """Go on with machine code of the scene's own where many steps are ahead of a run that is PAUSED."""
+        if self.wants_code and status == PAUSED and self._steps_ahead() >= STEPS_WORTH_CODE:
+            self.wants_code = False
+            with contextlib.suppress(Untraceable):  # then the general kernels go on
+                self._specialise()
 
     def _steps_ahead(self) -> float:
         """Steps to the end at the pace so far, or to the limit of steps."""

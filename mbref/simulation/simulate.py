@@ -21,7 +21,7 @@ from mbref.simulation.stepping import DONE
 from mbref.specialised import Untraceable
 from mbref.taylor.check import compare_with_default
 from mbref.taylor.run import CrossingRun, TaylorRun
-from mbref.taylor.series_run import KERNELS_OF_SERIES, NO_CODE, prepare_series
+from mbref.taylor.series_run import KERNELS_OF_SERIES, prepare_series
 
 __all__ = ["Limits", "are_compiled", "checked_times", "prepare", "simulate", "why_no_code"]
 
@@ -105,11 +105,9 @@ def why_no_code(scene: Scene, method: Method) -> str:
 
     The kernels of the method are compiled.
     """
-    if not method.integrator.step:
-        return NO_CODE
     prepare(method)
     try:
-        Run(scene, method, np.array([scene.duration]), Limits(code=SPECIALISED))
+        kind_of(method)(scene, method, np.array([scene.duration]), Limits(code=SPECIALISED))
     except Untraceable as reason:
         return str(reason)
     return ""

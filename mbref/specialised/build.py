@@ -21,15 +21,15 @@ from mbref.equations.model import Model
 from mbref.equations.static_constraints import add_static_multipliers
 from mbref.kernels.compilation import CACHE, PLAIN
 from mbref.kernels.layout import OK, Active, Addresses, SparseFactor, State, System
+from mbref.kernels.machine_code import Code, code_at, processor
 from mbref.kernels.named_memory import Packed, allocate, packed, record
 from mbref.linear_algebra.sparse_cholesky import find_squared_pivots
 from mbref.method import Method
-from mbref.specialised.kept_code import code_of
-from mbref.specialised.machine_code import Code, Piece, processor
+from mbref.specialised.assembly import Piece, text_of
 from mbref.specialised.tracing import Record, Untraceable, inputs, numbers, plain
 from mbref.stabilisation.projection import REPEATED, project_velocities, whole_newton_step
 
-MOST_ROWS = 60  # the record of more would be too long (machine_code.MOST_OPERATIONS)
+MOST_ROWS = 60  # the record of more would be too long (assembly.MOST_OPERATIONS)
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,6 @@ class Specialised:
     """The addresses of a scene's machine code; keep it while it is used."""
 
     addresses: Addresses
-    operations: dict[str, int]  # per piece
     code: Code
 
 
@@ -152,8 +151,9 @@ def specialise(model: Model, method: Method, rank_tolerance: float, start: Start
     if part.factor.symbolic.row.size > MOST_ROWS:
         raise Untraceable(f"{part.factor.symbolic.row.size} rows are active, more than {MOST_ROWS}")
     arguments = (model, method, rank_tolerance, start, part)
-    operations, code = code_of(CACHE / "scenes" / f"{_key(*arguments)}.code", lambda: _pieces(*arguments))
-    return Specialised(Addresses(*map(code.address, Addresses._fields)), operations, code)
+    path = CACHE / "scenes" / f"{_key(*arguments)}.code"
+    code = code_at(path, lambda: text_of(_pieces(*arguments)))
+    return Specialised(Addresses(*map(code.address, Addresses._fields)), code)
 
 
 def _pieces(*arguments: Any) -> list[Piece]:

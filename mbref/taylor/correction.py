@@ -26,7 +26,7 @@ def violation(memory):
         store(total, phi, block * LANES)
     for e in range(rows.linear_row.shape[0]):
         phi[nz + rows.linear_row[e]] += rows.linear_weight[e] * terms[0, rows.linear_lane[e]]
-    for r in range(nz, memory.solver.partner.shape[0]):
+    for r in range(nz, memory.solver.order.shape[0] + memory.solver.row.shape[0]):
         largest = larger(largest, phi[r])
     return largest
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable
 
-import numpy as np
 from llvmlite import ir
 from numba import f8, i8, types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
@@ -116,17 +115,6 @@ def _gathered(typing, array, offset, lanes, first):
     return block(array, i8, lanes, i8), generate
 
 
-@intrinsic
-def _placed(typing, number, lane, value):
-    def generate(context, builder, signature, arguments):
-        number, lane, value = arguments
-        lanes = ir.Constant(ir.VectorType(WORD, LANES), list(range(LANES)))
-        found = builder.icmp_signed("==", _repeated(builder, lane), lanes)
-        return builder.select(found, _repeated(builder, number), value)
-
-    return block(f8, i8, value), generate
-
-
 def _plain_load(array, offset):
     return array.reshape(-1)[offset : offset + LANES].copy()
 
@@ -139,15 +127,9 @@ def _plain_gathered(array, offset, lanes, first):
     return array.reshape(-1)[offset + lanes[first : first + LANES]]
 
 
-def _plain_placed(number, lane, value):
-    return np.where(np.arange(LANES) == lane, number, value)
-
-
 load = _plain_load if PLAIN else _load
 """(array, offset): the block at array[offset …]."""
 store = _plain_store if PLAIN else _store
 """(value, array, offset): put a block at array[offset …]."""
 gathered = _plain_gathered if PLAIN else _gathered
 """(array, offset, lanes, first): the block of array[offset + lanes[first + k]], k = 0 … LANES - 1."""
-placed = _plain_placed if PLAIN else _placed
-"""(number, lane, value): the block with the number in a lane; as it is for a lane outside it."""

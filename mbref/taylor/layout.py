@@ -1,8 +1,8 @@
 """The memory of a Taylor method: a scene's polynomials, their series, and the matrix that solves each order.
 
-Sizes: nz variables, nr rows, ng functions that drivers prescribe, nb bodies, orders of a series from 0 on.  A
-coefficient of the series is a row of ``lanes`` numbers: variables, multipliers, functions, filled up with
-zeros.  Variables and lengths are in units of the scene's length.
+Sizes: nz variables (filled up: wide), nr rows, ng functions that drivers prescribe, nb bodies, orders of a
+series from 0 on.  A coefficient of the series is a row of ``lanes`` numbers: variables, multipliers,
+functions, filled up with zeros.  Variables and lengths are in units of the scene's length.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Products(NamedTuple):
 class Inertia(NamedTuple):
     """Mass matrix, constant force, and the force of constant moments, linear in the variables."""
 
-    mass: Annotated[Matrix, "nz", "nz"]
+    mass: Annotated[Matrix, "nz", "wide"]
     force: Annotated[Vector, "lanes"]
     source: Annotated[Indices, "moments"]  # lanes, of which each block of lanes has its blocks
     weight: Annotated[Vector, "moments"]
@@ -128,7 +128,7 @@ class Series(NamedTuple):
 
 
 class Solver(NamedTuple):
-    """K = [M Gᵀ; G 0], its columns in the order of the pivots' rows, its inverse and the response.
+    """The linear system of each order, its partition and the response.
 
     A row of ``response`` has the lanes that follow from one number on the right-hand side: of an equation
     (none from a row that depends on others) or of a function prescribed.
@@ -137,17 +137,16 @@ class Solver(NamedTuple):
     row: Annotated[Indices, "nr"]  # the independent rows first
     order: Annotated[Indices, "nz"]  # their dependent variables first
     work: Annotated[Matrix, "nr", "nz"]
-    partner: Annotated[Indices, "nz + nr"]  # of equations: their columns of K
-    pivot: Annotated[Indices, "nz + nr"]  # the order of elimination
-    first: Annotated[Vector, "nz + nr"]  # pivots when they were chosen
-    last: Annotated[Vector, "nz + nr"]  # pivots of the last factorisation
-    past: Annotated[Vector, "nz + nr"]  # pivots where the step began
+    first: Annotated[Vector, "nz"]  # pivots when they were chosen: of G, then of the reduced mass matrix
+    last: Annotated[Vector, "nz"]  # pivots of the last factorisation
+    past: Annotated[Vector, "nz"]  # pivots where the step began
     past_gradient: Annotated[Matrix, "nr", "nz"]  # G where the step began
     product: Annotated[Matrix, "nr", "nr"]  # of gradients at both ends of a step
-    place: Annotated[Indices, "2*twofold"]  # of the entries of G in K, and of those of Gᵀ
-    base: Annotated[Matrix, "nz + nr + 1", "lanes"]  # K without what depends on the variables
-    inverse: Annotated[Matrix, "nz + nr + 1", "lanes"]  # the last row takes entries that K has not
-    column: Annotated[Vector, "nz + nr"]
+    place: Annotated[Indices, "twofold"]  # in the tableau, of the products of rows
+    linear: Annotated[Matrix, "nr + 1", "wide"]  # the part of the tableau that depends on no variable
+    tableau: Annotated[Matrix, "nr + 1", "wide"]  # of rows and variables; the last row takes functions
+    reduced: Annotated[Matrix, "nz", "wide"]  # mass matrix, in the rows of the independent variables
+    forces: Annotated[Matrix, "nz", "lanes"]  # that the motion leaves at dependent variables
     response: Annotated[Matrix, "lanes", "lanes"]
     rhs: Annotated[Vector, "lanes"]
     phi: Annotated[Vector, "lanes"]  # in the lanes of the multipliers
@@ -176,6 +175,13 @@ class Progress(NamedTuple):
     cut: int = 0  # the last order of the series that an attempt takes
 
 
+class SceneCode(NamedTuple):
+    """Machine code of the scene's own, for one order of the series; 0 for none."""
+
+    order: int = 0
+    expand: int = 0  # address of the function that finds all orders
+
+
 class TaylorMemory(NamedTuple):
     """All that the kernels of the method share."""
 
@@ -185,6 +191,7 @@ class TaylorMemory(NamedTuple):
     series: Series
     solver: Solver
     progress: Progress
+    code: SceneCode
     state: Annotated[Matrix, 3, "lanes"]  # variables and their two derivatives at some time
     pose: Annotated[Matrix, 3, "12*nb"]
     angles: Annotated[Vector, "torsions"]  # rad, unwrapped, at the time of expansion

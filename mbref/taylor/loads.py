@@ -143,7 +143,11 @@ def add_torsions(k, memory):
 @kernel
 def expand_drivers(t, memory):
     """The functions that drivers prescribe, as series about time t."""
-    given, functions, n = memory.polynomials.given, memory.series.terms, memory.solver.partner.shape[0]
+    given, functions, n = (
+        memory.polynomials.given,
+        memory.series.terms,
+        memory.solver.order.shape[0] + memory.solver.row.shape[0],
+    )
     driven, drivers = memory.series.driven, memory.run.equations.scene.drivers
     for g in range(given.driver.shape[0]):
         expand_driver(t, given.driver[g], drivers, driven)

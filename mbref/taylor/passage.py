@@ -20,8 +20,8 @@ from mbref.kernels.layout import OK
 from mbref.linear_algebra.elimination import determinant
 from mbref.linear_algebra.vectors import copy, larger
 from mbref.simulation.stepping import SINGULAR_AHEAD, STEP_TOO_SMALL, UNDECIDED
+from mbref.taylor.partition import put_gradient
 from mbref.taylor.samples import evaluate_series
-from mbref.taylor.solver import put_gradient
 
 NEAR = 0.3  # least pivot of G, over the largest that it has been, below which a singular position is near
 AHEAD = 0.03  # the same, below which a series of a loose tolerance gives way to an exact one
@@ -34,7 +34,8 @@ CLOCK = 3e-16  # of the time: its rounding, over which drivers and variables mov
 DEEPEST = 0.2  # of a step's first pivot: its last is not less, so that the next is not the worse for it
 SHORTEST = 0.05  # the same, of a step that crosses: refused, it would be tried again from nearer
 VANISHING = log(0.2)  # of a determinant over its values at both ends, that falls and rises linearly
-LONG, MOST_PARTS = 0.5, 8  # m or rad that a variable moves in a part of a step, and the most of them
+LONG, MOST_PARTS = 0.5, 8  # that a variable moves in a part of a step, and the most parts
+STEEPEST = 1.5  # that a pivot falls and rises in a step, over the most that a variable moves
 GOLDEN, SECTIONS = 0.6180339887498949, 70  # of the search for the least determinant
 SECANTS = 12  # of the search for its change of sign, behind which it halves
 LEFT = 2.0  # of the violation that corrections leave, of rows that depend on others: it is no gap's
@@ -69,15 +70,22 @@ def least_pivot(memory):
 
 
 @kernel
-def may_cross(pivot, memory):
-    """Whether a step may cross two branches at once: it ends near one, or a pivot has changed its sign."""
+def moved_in(h, memory):
+    """The most that a variable moves in a step of h seconds, at the rates of both ends."""
+    variables, series = memory.solver.order.shape[0], memory.series
+    return h * max(size_of(series.past, 1, variables), size_of(series.terms, 1, variables))
+
+
+@kernel
+def keeps_signs(memory):
+    """Whether the pivots are those of the rows and variables where the step began, with the same signs."""
     progress, solver = memory.progress, memory.solver
-    if progress.choice != progress.past_choice or is_near(pivot, progress):
-        return True
+    if progress.choice != progress.past_choice:
+        return False
     for k in range(progress.rank):  # noqa: SIM110 - no generators in kernels
         if solver.last[k] * solver.past[k] <= 0.0:
-            return True
-    return False
+            return False
+    return True
 
 
 @kernel
@@ -122,14 +130,19 @@ def turns_back(memory):
 def has_crossed(h, pivot, memory):
     """Whether a step of h seconds crosses: its determinant changes the sign, or vanishes between its ends.
 
-    Branches of several loops that cross at once leave the sign: then, in a motion that does not turn back,
-    the determinant is looked at where a least pivot vanishes that falls and rises linearly.
+    Pivots of the same rows and variables whose signs stay have vanished twice or never, and twice takes a
+    way that is long beside them: else no determinant is needed.  Branches of several loops that cross at once
+    leave the sign of the determinant: in a motion that does not turn back, it is looked at where a least
+    pivot vanishes that falls and rises linearly.
     """
-    progress = memory.progress
+    progress, moved = memory.progress, moved_in(h, memory)
+    brief = progress.past_pivot + pivot > STEEPEST * moved
+    if brief and keeps_signs(memory):
+        return False
     far = progress.passing and progress.past_pivot >= BEFORE * progress.largest_pivot
-    if changes_sign(h, memory):
+    if changes_sign(h, min(int(moved / LONG) + 1, MOST_PARTS), memory):
         return True
-    if far or not may_cross(pivot, memory) or turns_back(memory):
+    if far or brief or (keeps_signs(memory) and not is_near(pivot, progress)) or turns_back(memory):
         return False
     _, behind = overlap(memory.series.terms, memory)
     _, before = overlap(memory.series.past, memory)
@@ -139,15 +152,13 @@ def has_crossed(h, pivot, memory):
 
 
 @kernel
-def changes_sign(h, memory):
+def changes_sign(h, parts, memory):
     """Whether the determinant of the gradients at both ends of a step of h seconds is negative.
 
     A long step is looked at in parts, because rows that turn by a right angle change the sign too.  The
     gradient where the step began is kept.
     """
     series, changes = memory.series, False
-    moved = h * size_of(series.past, 1, memory.solver.order.shape[0])
-    parts = min(int(moved / LONG) + 1, MOST_PARTS)
     remember_gradient(memory)
     for part in range(1, parts):
         evaluate_series(h * part / parts, memory)

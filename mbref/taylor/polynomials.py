@@ -130,7 +130,9 @@ def _inertia(of: NaturalCoordinates, forms: Forms, lanes: int) -> Inertia:
     terms: list[list[tuple]] = [[(j, row[j]) for j in np.flatnonzero(row)] for row in linear]
     slots, start = _slots([*terms, *[[]] * (lanes - forms.d)], (0, 0.0))
     force = np.concatenate([force, np.zeros(lanes - forms.d)])
-    return Inertia(forms.mass(), force, *_columns(slots, 1), start)
+    mass = np.zeros((forms.d, filled(forms.d)))
+    mass[:, : forms.d] = forms.mass()
+    return Inertia(mass, force, *_columns(slots, 1), start)
 
 
 def _moment(

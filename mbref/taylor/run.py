@@ -68,7 +68,7 @@ class TaylorRun(SeriesRun):
 
     def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
         """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
-        began, passage = time.process_time(), Passage(self)
+        before, began, passage = self.making, time.process_time(), Passage(self)
         status = passage.leave_rest()
         if status == PAUSED:
             status = self.expand(self.times[-1])
@@ -79,9 +79,10 @@ class TaylorRun(SeriesRun):
                 status = passage()
                 if status == PAUSED and self.expand(self.times[-1]) != OK:
                     status = UNDECIDED
+            self.specialise_where_it_pays(status)
             if progress is not None:
                 progress(float(self.memory.loop.clock.time))
-        return status, time.process_time() - began - self.making
+        return status, time.process_time() - began - (self.making - before)
 
 
 class Passage:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from mbref.kernels.compilation import inlined, kernel
 from mbref.taylor.lanes import LANES, gathered, load, store
 from mbref.taylor.loads import add_loads, start_loads
+from mbref.taylor.scene_code import call
 from mbref.taylor.solver import solution
 
 
@@ -73,7 +74,7 @@ def add_to_later_sums(k, last, memory):
 def solve_order(k, last, memory):
     """Order k + 2 of the variables and order k of the multipliers; loads are in the sums."""
     series, terms, rhs = memory.series, memory.series.terms, memory.solver.rhs
-    n, lanes = memory.solver.partner.shape[0], terms.shape[1]
+    n, lanes = memory.solver.order.shape[0] + memory.solver.row.shape[0], terms.shape[1]
     put_sums(k, memory)
     for g in range(n, n + memory.polynomials.given.driver.shape[0]):
         rhs[g] = terms[k + 2, g]
@@ -104,6 +105,9 @@ def expand_with_springs(last, memory):
 def expand(memory):
     """All orders of the variables from the first two, which are consistent."""
     springs, torsions = memory.polynomials.springs, memory.polynomials.torsions
+    if memory.code.order == memory.progress.order:
+        call(memory.code.expand, memory.series.terms, memory.solver.response)
+        return
     start_sums(memory)
     if springs.damping.shape[0] + torsions.damping.shape[0] == 0:
         expand_without_springs(memory.progress.order - 2, memory)

@@ -2,34 +2,38 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+
 import numpy as np
 
 from mbref.kernels.layout import OK
 from mbref.kernels.named_memory import allocate, packed, record
 from mbref.method import Method
 from mbref.scene import Scene
-from mbref.simulation.limits import SPECIALISED, Limits
+from mbref.simulation.limits import AUTO, GENERIC, SPECIALISED, Limits
 from mbref.simulation.run import Run
 from mbref.simulation.stepping import PAUSED
-from mbref.specialised import Untraceable
 from mbref.taylor.lanes import filled
-from mbref.taylor.layout import Progress, Series, Solver, TaylorMemory
+from mbref.taylor.layout import Progress, Rows, SceneCode, Series, Solver, TaylorMemory
 from mbref.taylor.natural import NaturalCoordinates
 from mbref.taylor.passing import hand_over, look_along, pass_on, place_crossing
 from mbref.taylor.polynomials import polynomials_of
+from mbref.taylor.scene_code import NAME, code_of
 from mbref.taylor.stepping import advance_series, enter
 
 SHARE = 0.05  # of rtol + atol: the tolerance of a step
-NO_CODE = "its series are made by one code for every scene"
 KERNELS_OF_SERIES = (enter, advance_series, hand_over, pass_on, place_crossing, look_along)
 LEAST_ORDER, MOST_ORDER = 4, 30
-ORDERS_PER_DIGIT, FIRST_ORDER = 1.2, 6.0  # of the order that costs least
+CHEAPEST = {GENERIC: (6.0, 1.2), SPECIALISED: (8.0, 1.6)}  # order: at a tolerance of 1, and more per digit
 
 
-def order_of(tolerance: float, wanted: float) -> int:
-    """The order of the series: the one wanted, or for 0 by the tolerance; ValueError outside 4 to 30."""
+def order_of(tolerance: float, wanted: float, code: str) -> int:
+    """The order of the series: the one wanted, or for 0 the cheapest; ValueError outside 4 to 30."""
     if wanted == 0:
-        best = 2 * round((FIRST_ORDER - ORDERS_PER_DIGIT * np.log10(tolerance)) / 2)
+        first, per_digit = CHEAPEST[code]
+        best = 2 * round((first - per_digit * np.log10(tolerance)) / 2)
         return int(np.clip(best, LEAST_ORDER, MOST_ORDER))
     if wanted not in range(LEAST_ORDER, MOST_ORDER + 1):
         raise ValueError(f"taylor: order must be {LEAST_ORDER} to {MOST_ORDER}, got {wanted:g}")
@@ -40,20 +44,22 @@ class SeriesRun(Run):
     """The steps of one simulation in Taylor series; the memory of the general kernels takes its samples."""
 
     def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
-        if limits.code == SPECIALISED:
-            raise Untraceable(NO_CODE)
-        super().__init__(scene, method, times, limits)
+        super().__init__(scene, method, times, replace(limits, code=GENERIC))
         self.memory.equations.system.settings.independent = True  # at samples, where states are exact
         prepare_series()
         control = self.memory.control
         tolerance = SHARE * (control.rtol + control.atol)
-        order = order_of(tolerance, method.options_of(method.integrator)["order"])
+        code = SPECIALISED if limits.code == SPECIALISED else GENERIC
+        order = order_of(tolerance, method.options_of(method.integrator)["order"], code)
         moving = np.zeros(self.model.n, dtype=bool)
         moving[self.part.active.velocities] = True
         self.natural = NaturalCoordinates(self.model, self.start, moving)
         self.taylor = self._taylor_memory(order)
         self.taylor.progress.order, self.taylor.progress.tolerance = order, tolerance
         self._packed_taylor = packed(self.taylor)
+        self.wants_code = limits.code == AUTO
+        if limits.code == SPECIALISED:
+            self._specialise()
 
     def _taylor_memory(self, order: int) -> TaylorMemory:
         natural = self.natural
@@ -62,7 +68,7 @@ class SeriesRun(Run):
         sizes = {
             "orders": orders, "nz": nz, "ng": ng, "nr": nr, "nb": self.model.nb,
             "lanes": filled(max(1, nz + nr + ng)), "slots": polynomials.products.left.size,
-            "twofold": polynomials.rows.row.size,
+            "twofold": polynomials.rows.row.size, "wide": filled(nz),
             "torsions": polynomials.torsions.slot.size,
         }  # fmt: skip
         series = allocate(Series, sizes)
@@ -75,12 +81,21 @@ class SeriesRun(Run):
             polynomials=polynomials,
             readings=natural.images.of(natural.kept),
             series=series,
-            solver=allocate(Solver, sizes),
+            solver=solver_of(polynomials.rows, sizes),
             progress=record(Progress()),
+            code=record(SceneCode()),
             state=np.zeros((3, sizes["lanes"])),
             pose=np.zeros((3, 12 * self.model.nb)),
             angles=np.zeros(polynomials.torsions.slot.size),
         )
+
+    def _specialise(self) -> None:
+        """Expand by code of the scene's own from now on, made or loaded; raises Untraceable."""
+        began = time.process_time()
+        self._code = code_of(self.taylor)
+        code = self.taylor.code
+        code.expand, code.order = self._code.address(NAME), self.taylor.progress.order
+        self.making += time.process_time() - began
 
     def expand(self, until: float) -> int:
         """Expand at the present time and state, for steps until a time (s): OK or why that cannot be."""
@@ -108,6 +123,17 @@ class SeriesRun(Run):
     def landing(self) -> np.ndarray:
         """Values and rates (2, nz) of the variables where the last series begins."""
         return self.taylor.series.terms[:2, : len(self.natural.kept)].copy()
+
+
+def solver_of(rows: Rows, sizes: Mapping[str, int]) -> Solver:
+    """The memory of the linear system, whose tableau has the rows' linear terms and places for the others."""
+    solver, nr, nz = allocate(Solver, sizes), sizes["nr"], sizes["nz"]
+    of_variables = rows.linear_lane < nz
+    places = rows.linear_row[of_variables], rows.linear_lane[of_variables]
+    np.add.at(solver.linear, places, rows.linear_weight[of_variables])
+    outside = nr * sizes["wide"]
+    solver.place[:] = np.where(rows.lane < nz, rows.row * sizes["wide"] + rows.lane, outside)
+    return solver
 
 
 def prepare_series() -> None:

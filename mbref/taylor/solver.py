@@ -1,170 +1,208 @@
-"""The linear system of each order: M z + Gᵀ λ = f, G z = b, by the inverse of its matrix K.
+"""The linear system of each order: M z + Gᵀ λ = f, G z = b, reduced to the motions that the rows allow.
 
-Independent rows, and a dependent variable for each, come from complete pivoting of G.  The pivots of K are
-then G's, once in its rows and once in those of the dependent variables, and the reduced mass matrix's in
-those of the others (R. A. Wehage and E. J. Haug, J. Mech. Design 104, 1982): a mass matrix that is singular
-but for the motions that the rows allow does no harm.  Rows that depend on others have no multiplier.
+All variables are z = N b + T u of the independent ones u.  N and T come from one exchange of rows and
+dependent variables in a tableau of G (R. A. Wehage and E. J. Haug, J. Mech. Design 104, 1982), u from the
+reduced mass matrix Tᵀ M T: a mass matrix that is singular but for the motions that the rows allow does no
+harm.  Rows that depend on others have no multiplier.
 """
 
 from __future__ import annotations
 
 from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.layout import OK, SINGULAR
-from mbref.taylor.lanes import LANES, load, placed, store
+from mbref.taylor.lanes import LANES, load, store
+from mbref.taylor.partition import choose
 
 KEPT = 0.05  # a pivot over its first below which rows and variables are chosen again
 WITHOUT_INERTIA = 1e-13  # of the largest inertia of a variable
 
 
-@kernel
-def put_gradient(y, memory):
-    """G at variables y[0] into ``work``; rows are of length one about, or zero in all positions."""
-    rows, work = memory.polynomials.rows, memory.solver.work
-    work[:] = 0.0
-    for e in range(rows.linear_row.shape[0]):
-        if rows.linear_lane[e] < work.shape[1]:
-            work[rows.linear_row[e], rows.linear_lane[e]] += rows.linear_weight[e]
-    for e in range(rows.row.shape[0]):
-        if rows.lane[e] < work.shape[1]:
-            work[rows.row[e], rows.lane[e]] += rows.weight[e] * y[0, rows.other[e]]
-
-
-@kernel
-def largest_entry(work, row, order, k):
-    """The largest entry among the rows and columns from k on, and its places."""
-    best, at_row, at_column = -1.0, k, k
-    for p in range(k, row.shape[0]):
-        for q in range(k, order.shape[0]):
-            size = abs(work[row[p], order[q]])
-            if size > best:
-                best, at_row, at_column = size, p, q
-    return best, at_row, at_column
-
-
-@kernel
-def eliminate(work, row, order, k):
-    """Subtract the pivot row k from those after it."""
-    for p in range(k + 1, row.shape[0]):
-        factor = work[row[p], order[k]] / work[row[k], order[k]]
-        if factor != 0.0:
-            for q in range(k, order.shape[0]):
-                work[row[p], order[q]] -= factor * work[row[k], order[q]]
-
-
-@kernel
-def choose(memory):
-    """Choose independent rows and dependent variables by complete pivoting; how many there are."""
-    solver, tolerance = memory.solver, memory.run.equations.system.settings.rank_tolerance
-    row, order, work, rank = solver.row, solver.order, solver.work, 0
-    put_gradient(memory.series.terms, memory)
-    for k in range(row.shape[0]):
-        row[k] = k
-    for k in range(order.shape[0]):
-        order[k] = k
-    while rank < min(row.shape[0], order.shape[0]):
-        size, p, q = largest_entry(work, row, order, rank)
-        if size <= tolerance:
-            break
-        row[rank], row[p] = row[p], row[rank]
-        order[rank], order[q] = order[q], order[rank]
-        eliminate(work, row, order, rank)
-        rank += 1
-    pair(rank, memory)
-    memory.progress.choice += 1
-    return rank
-
-
-@kernel
-def pair(rank, memory):
-    """Partners and order of the pivots, and the constant part of K."""
-    solver, rows, mass = memory.solver, memory.polynomials.rows, memory.polynomials.inertia.mass
-    nz, nr = solver.order.shape[0], solver.row.shape[0]
-    for k in range(nz + nr):
-        solver.partner[k] = k
-    for k in range(rank):
-        solver.partner[nz + solver.row[k]], solver.partner[solver.order[k]] = (
-            solver.order[k],
-            nz + solver.row[k],
-        )
-        solver.pivot[k], solver.pivot[rank + k] = nz + solver.row[k], solver.order[k]
-    for k in range(rank, nz):
-        solver.pivot[rank + k] = solver.order[k]
-    for k in range(rank, nr):
-        solver.pivot[nz + k] = nz + solver.row[k]
-    solver.base[:] = 0.0
-    for i in range(nz):
-        for j in range(nz):
-            solver.base[i, solver.partner[j]] = mass[i, j]
-    for k in range(rank, nr):
-        solver.base[nz + solver.row[k], nz + solver.row[k]] = 1.0
-    base = solver.base.reshape(-1)
-    for e in range(rows.linear_row.shape[0]):
-        for place in places_in_matrix(rows.linear_row[e], rows.linear_lane[e], solver):
-            base[place] += rows.linear_weight[e]
-    for e in range(rows.row.shape[0]):
-        solver.place[2 * e], solver.place[2 * e + 1] = places_in_matrix(rows.row[e], rows.lane[e], solver)
-
-
 @inlined
-def places_in_matrix(row, lane, solver):
-    """Where an entry of G stands in K, and where one of Gᵀ does; in the last row for those left out."""
-    nz, lanes = solver.order.shape[0], solver.base.shape[1]
-    equation = nz + row
-    if lane < nz and solver.partner[equation] != equation:
-        return equation * lanes + solver.partner[lane], lane * lanes + solver.partner[equation]
-    outside = solver.partner.shape[0] * lanes
-    return outside, outside
+def exchange(memory):
+    """Exchange the independent rows of G, at the first coefficients, and their dependent variables.
 
-
-@inlined
-def assemble(memory):
-    """K at the first coefficients."""
+    Behind it a row of the tableau tells its dependent variable: by the right-hand sides of rows, in the lanes
+    of their variables, and by minus the independent variables.
+    """
     solver, rows, terms = memory.solver, memory.polynomials.rows, memory.series.terms
-    a, place = solver.inverse.reshape(-1), solver.place
-    for j in range(0, a.shape[0], LANES):
-        store(load(solver.base, j), a, j)
-    for e in range(rows.row.shape[0]):
-        value = rows.weight[e] * terms[0, rows.other[e]]
-        a[place[2 * e]] += value
-        a[place[2 * e + 1]] += value
+    tableau, place = solver.tableau.reshape(-1), solver.place
+    for j in range(0, tableau.shape[0], LANES):
+        store(load(solver.linear, j), tableau, j)
+    for e in range(place.shape[0]):
+        tableau[place[e]] += rows.weight[e] * terms[0, rows.other[e]]
+    for k in range(memory.progress.rank):
+        r, c = solver.row[k], solver.order[k]
+        solver.last[k] = solver.tableau[r, c]
+        exchange_one(r, c, memory.progress.rank, solver)
 
 
 @inlined
-def invert(solver, first):
-    """The inverse of K in place of it (Gauss–Jordan); whether all pivots are as large as the first."""
-    sharp = True
-    for step in range(solver.pivot.shape[0]):
-        k = solver.pivot[step]
-        pivot = solver.inverse[k, k]
-        solver.last[step] = pivot
-        if first:
-            solver.first[step] = abs(pivot)
-        sharp = sharp and abs(pivot) > KEPT * solver.first[step]
-        eliminate_column(k, 1.0 / pivot, solver)
-    return sharp
+def exchange_one(r, c, rank, solver):
+    """Exchange a row of the tableau and a variable: the row over its pivot, then none of it in the others.
 
-
-@inlined
-def eliminate_column(k, factor, solver):
-    """Column k of a becomes the k-th unit vector's, which then gives way to the inverse's."""
-    a, column, lanes = solver.inverse, solver.column, solver.inverse.shape[1]
-    for i in range(column.shape[0]):
-        column[i] = a[i, k]
+    Their entries in the variable's lane become minus themselves over the pivot: e - e (1 + 1 / pivot).
+    """
+    tableau, lanes = solver.tableau, solver.tableau.shape[1]
+    factor = 1.0 / tableau[r, c]
+    tableau[r, c] += 1.0
     for j in range(0, lanes, LANES):
-        row = factor * placed(1.0, k - j, load(a, k * lanes + j))
-        for i in range(column.shape[0]):
-            store(placed(0.0, k - j, load(a, i * lanes + j)) - column[i] * row, a, i * lanes + j)
-        store(row, a, k * lanes + j)
+        store(factor * load(tableau, r * lanes + j), tableau, r * lanes + j)
+    for k in range(rank):
+        i = solver.row[k]
+        entry = tableau[i, c]
+        if i != r and entry != 0.0:
+            for j in range(0, lanes, LANES):
+                left = load(tableau, i * lanes + j) - entry * load(tableau, r * lanes + j)
+                store(left, tableau, i * lanes + j)
+    tableau[r, c] = factor
+
+
+@inlined
+def spread(memory):
+    """N in the rows of the dependent variables' response and Tᵀ in those of the independent ones."""
+    solver, rank, response = memory.solver, memory.progress.rank, memory.solver.response
+    tableau, nz, lanes = solver.tableau, solver.order.shape[0], solver.response.shape[1]
+    zero = 0.0 * load(solver.linear, 0)
+    for place in range(0, (nz + solver.row.shape[0]) * lanes, LANES):
+        store(zero, response, place)
+    for k in range(rank):
+        r, i = solver.row[k], solver.order[k]
+        for p in range(rank):
+            response[i, nz + solver.row[p]] = tableau[r, solver.order[p]]
+        for p in range(rank, nz):
+            response[solver.order[p], i] = -tableau[r, solver.order[p]]
+    for p in range(rank, nz):
+        response[solver.order[p], solver.order[p]] = 1.0
+
+
+@inlined
+def reduce_inertia(memory):
+    """Tᵀ M T in ``reduced``, in lanes of variables, and -Tᵀ M N beside Tᵀ in the rows of the response."""
+    solver, mass, rank = memory.solver, memory.polynomials.inertia.mass, memory.progress.rank
+    reduced, wide = solver.reduced, mass.shape[1]
+    for q in range(rank, solver.order.shape[0]):
+        i = solver.order[q]
+        for j in range(0, wide, LANES):
+            pushed = load(mass, i * wide + j)
+            for k in range(rank):
+                pushed = pushed - solver.tableau[solver.row[k], i] * load(mass, solver.order[k] * wide + j)
+            store(pushed, reduced, i * wide + j)
+        reduce_row(i, memory)
+
+
+@inlined
+def reduce_row(i, memory):
+    """Of the momentum that goes with an independent variable: what the dependent ones share in the others."""
+    solver, rank, wide = memory.solver, memory.progress.rank, memory.solver.reduced.shape[1]
+    reduced, change, nz = solver.reduced, solver.change, solver.order.shape[0]
+    for j in range(0, wide, LANES):
+        shared = 0.0 * load(reduced, i * wide + j)
+        for k in range(rank):
+            shared = shared + reduced[i, solver.order[k]] * load(solver.tableau, solver.row[k] * wide + j)
+        store(shared, change, j)
+    for k in range(rank):
+        solver.response[i, nz + solver.row[k]] = -change[solver.order[k]]
+    for j in range(0, wide, LANES):
+        store(load(reduced, i * wide + j) - load(change, j), reduced, i * wide + j)
+
+
+@inlined
+def solve_reduced(memory):
+    """The response of the independent variables, by Gauss–Jordan elimination of the reduced mass matrix."""
+    solver, rank = memory.solver, memory.progress.rank
+    reduced, response, nz = solver.reduced, solver.response, solver.order.shape[0]
+    wide, lanes = reduced.shape[1], response.shape[1]
+    for p in range(rank, nz):
+        c = solver.order[p]
+        solver.last[p] = reduced[c, c]
+        factor = 1.0 / reduced[c, c]
+        for j in range(0, lanes, LANES):
+            store(factor * load(response, c * lanes + j), response, c * lanes + j)
+        for j in range(0, wide, LANES):
+            store(factor * load(reduced, c * wide + j), reduced, c * wide + j)
+        for q in range(rank, nz):
+            i = solver.order[q]
+            entry = reduced[i, c]
+            if i != c and entry != 0.0:
+                for j in range(0, lanes, LANES):
+                    left = load(response, i * lanes + j) - entry * load(response, c * lanes + j)
+                    store(left, response, i * lanes + j)
+                for j in range(0, wide, LANES):
+                    store(
+                        load(reduced, i * wide + j) - entry * load(reduced, c * wide + j),
+                        reduced,
+                        i * wide + j,
+                    )
+
+
+@inlined
+def put_dependent(memory):
+    """The response of the dependent variables: N, and T of the independent ones'."""
+    solver, rank, nz = memory.solver, memory.progress.rank, memory.solver.order.shape[0]
+    response, tableau, lanes = solver.response, solver.tableau, solver.response.shape[1]
+    for k in range(rank):
+        r, i = solver.row[k], solver.order[k]
+        for j in range(0, lanes, LANES):
+            total = load(response, i * lanes + j)
+            for q in range(rank, nz):
+                total = total - tableau[r, solver.order[q]] * load(response, solver.order[q] * lanes + j)
+            store(total, response, i * lanes + j)
+
+
+@inlined
+def put_multipliers(memory):
+    """The response of the multipliers: Nᵀ of the forces that the dependent variables' motion leaves."""
+    solver, rank, nz = memory.solver, memory.progress.rank, memory.solver.order.shape[0]
+    response, forces, lanes = solver.response, solver.forces, solver.response.shape[1]
+    for k in range(rank):
+        put_force(k, solver.order[k], memory)
+    for p in range(rank):
+        e = nz + solver.row[p]
+        for j in range(0, lanes, LANES):
+            total = load(response, e * lanes + j)
+            for k in range(rank):
+                total = total + solver.tableau[solver.row[k], solver.order[p]] * load(forces, k * lanes + j)
+            store(total, response, e * lanes + j)
+
+
+@inlined
+def put_force(k, i, memory):
+    """The force left at a variable: the one on the right-hand side minus that of its inertia."""
+    solver, mass, lanes = memory.solver, memory.polynomials.inertia.mass, memory.solver.response.shape[1]
+    for j in range(0, lanes, LANES):
+        left = 0.0 * load(mass, 0)
+        for other in range(solver.order.shape[0]):
+            if mass[i, other] != 0.0:
+                left = left - mass[i, other] * load(solver.response, other * lanes + j)
+        store(left, solver.forces, k * lanes + j)
+    solver.forces[k, i] += 1.0
+
+
+@inlined
+def is_sharp(solver):
+    """Whether all pivots are nearly as large as when they were chosen."""
+    for k in range(solver.first.shape[0]):  # noqa: SIM110 - no generators in kernels
+        if not abs(solver.last[k]) > KEPT * solver.first[k]:
+            return False
+    return True
+
+
+@kernel
+def eliminate_all(memory):
+    """The exchange of rows and dependent variables, and the response of the independent ones."""
+    exchange(memory)
+    spread(memory)
+    reduce_inertia(memory)
+    solve_reduced(memory)
 
 
 @kernel
 def factorise(memory):
     """The response at the first coefficients; SINGULAR where rows or inertia have another rank."""
-    solver, progress = memory.solver, memory.progress
     memory.run.equations.system.counts.factorisations += 1
-    assemble(memory)
-    if not invert(solver, False):
-        if choose(memory) != progress.rank:
+    eliminate_all(memory)
+    if not is_sharp(memory.solver):
+        if choose(memory) != memory.progress.rank:
             return SINGULAR
         factorise_anew(memory)
     put_response(memory)
@@ -173,19 +211,20 @@ def factorise(memory):
 
 @kernel
 def factorise_anew(memory):
-    """The inverse of K by a partition that has just been chosen."""
-    assemble(memory)
-    invert(memory.solver, True)
+    """The pivots of a partition that has just been chosen, and the response of its independent variables."""
+    solver = memory.solver
+    eliminate_all(memory)
+    for k in range(solver.first.shape[0]):
+        solver.first[k] = abs(solver.last[k])
 
 
 @inlined
 def inertia_left(memory):
     """SINGULAR where a motion that the rows allow has no inertia."""
     solver, mass, largest = memory.solver, memory.polynomials.inertia.mass, 0.0
-    rank, nz = memory.progress.rank, solver.order.shape[0]
-    for i in range(nz):
+    for i in range(mass.shape[0]):
         largest = max(largest, mass[i, i])
-    for k in range(2 * rank, rank + nz):
+    for k in range(memory.progress.rank, mass.shape[0]):
         if not solver.first[k] > WITHOUT_INERTIA * largest:
             return SINGULAR
     return OK
@@ -193,15 +232,10 @@ def inertia_left(memory):
 
 @inlined
 def put_response(memory):
-    """The rows of the inverse in the order of the equations, and those of the functions prescribed."""
-    solver, functions = memory.solver, memory.polynomials.given.driver.shape[0]
-    a, response, nz = solver.inverse, solver.response, solver.order.shape[0]
-    n, lanes = solver.partner.shape[0], response.shape[1]
-    for e in range(n):
-        source = solver.partner[e]
-        kept = 0.0 if e >= nz and source == e else 1.0
-        for j in range(0, lanes, LANES):
-            store(kept * load(a, source * lanes + j), response, e * lanes + j)
+    """The response of all variables and multipliers, and to the functions prescribed."""
+    functions = memory.polynomials.given.driver.shape[0]
+    put_dependent(memory)
+    put_multipliers(memory)
     if functions > 0:
         add_functions(functions, memory)
 
@@ -210,7 +244,7 @@ def put_response(memory):
 def add_functions(functions, memory):
     """The response to functions prescribed: what rows that depend on them take, and themselves."""
     solver, rows, terms = memory.solver, memory.polynomials.rows, memory.series.terms
-    response, n = solver.response, solver.partner.shape[0]
+    response, n = solver.response, solver.order.shape[0] + solver.row.shape[0]
     for g in range(n, n + functions):
         for j in range(response.shape[1]):
             response[g, j] = 0.0
@@ -227,7 +261,7 @@ def add_functions(functions, memory):
 def subtract_row(row, lane, value, solver):
     """Of a row's dependence on a function: what it takes away from the right-hand side."""
     response, lanes, nz = solver.response, solver.response.shape[1], solver.order.shape[0]
-    if lane >= solver.partner.shape[0]:
+    if lane >= nz + solver.row.shape[0]:
         for j in range(0, lanes, LANES):
             more = value * load(response, (nz + row) * lanes + j)
             store(load(response, lane * lanes + j) - more, response, lane * lanes + j)

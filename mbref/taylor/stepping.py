@@ -27,6 +27,7 @@ from mbref.taylor.correction import correct, violation
 from mbref.taylor.lanes import LANES, load, store
 from mbref.taylor.layout import TaylorMemory
 from mbref.taylor.loads import ANGLE, TORSION_SERIES, expand_drivers
+from mbref.taylor.partition import choose
 from mbref.taylor.passage import (
     BEFORE,
     distance_ahead,
@@ -49,7 +50,7 @@ from mbref.taylor.samples import (
     take_sample,
 )
 from mbref.taylor.series import expand
-from mbref.taylor.solver import choose, factorise_anew
+from mbref.taylor.solver import factorise_anew
 
 ROUNDING = 1e-12  # of rows
 LOST_ROWS = 100.0  # tolerances by which rows may be off
@@ -199,7 +200,7 @@ def step(memory):
     left = progress.end - clock.time
     whole = 1.0 if progress.passing else share(clock.length, memory.run)
     exact = min(longest_step(whole * exactness(progress), memory), left)
-    h = min(longest_step(whole * exactness_across(progress), memory), left)
+    h = min(longest_step(whole * exactness_across(progress), memory), left) if progress.passing else exact
     while True:
         status = attempt(h, h >= left, memory)
         if status == OK and (progress.crossed or h <= exact):

@@ -70,8 +70,8 @@ def test_every_family_says_whose_integrator_it_has(monkeypatch: pytest.MonkeyPat
     assert _integrator("pinocchio", "tuned") not in (OWN, COMPILED_HERE)
     assert OPPONENTS["own integrators"][1] == (OWN,) and OPPONENTS["engines"][1] == ()
     ours = {family: [w for w, belongs in OURSELVES.items() if belongs(family)] for family in
-            ("taylor", "kinematic", "lm2+projection, specialised")}  # fmt: skip
-    assert ours == {"taylor": ["series"], "kinematic": ["general kernels"],
+            ("taylor", "taylor, specialised", "kinematic", "lm2+projection, specialised")}  # fmt: skip
+    assert ours == {"taylor": ["series"], "taylor, specialised": ["series"], "kinematic": ["general kernels"],
                     "lm2+projection, specialised": ["specialised code"]}  # fmt: skip
 
 

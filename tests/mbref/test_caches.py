@@ -39,17 +39,17 @@ SCENE = """
 import sys
 sys.path.insert(0, {root!r})
 from pathlib import Path
-from mbref.specialised import kept_code
-from mbref.specialised.machine_code import Piece
+from mbref.kernels.machine_code import code_at
+from mbref.specialised.assembly import Piece, text_of
 from mbref.specialised.tracing import Record, inputs
 
-def pieces():
+def text():
     record = Record()
     (x,) = inputs(record, "y", [2.0])
-    return [Piece("rates", record, [x * 3.0])]
+    return text_of([Piece("rates", record, [x * 3.0])])
 
-operations, code = kept_code.code_of(Path(sys.argv[1]) / "scene.code", pieces)
-print(operations["rates"], code.address("rates") != 0)
+code = code_at(Path(sys.argv[1]) / "scene.code", text)
+print(code.address("rates") != 0)
 """
 
 
@@ -159,7 +159,7 @@ def kept(cache: Path, pattern: str) -> list[Path]:
 
 
 @pytest.mark.parametrize(
-    ("script", "pattern", "says"), [(SMALL_KERNEL, "*.nbc", "7.0\n"), (SCENE, "*.code", "2 True\n")]
+    ("script", "pattern", "says"), [(SMALL_KERNEL, "*.nbc", "7.0\n"), (SCENE, "*.code", "True\n")]
 )
 @pytest.mark.parametrize("damage", [lambda data: data[: len(data) // 2], lambda data: b"\0" * len(data)])
 def test_damaged_code_is_made_anew(script, pattern, says, damage, tmp_path: Path):
@@ -177,7 +177,7 @@ def test_damaged_code_is_made_anew(script, pattern, says, damage, tmp_path: Path
     assert (out, "damaged" in error) == (says, False), error
 
 
-@pytest.mark.parametrize(("script", "says"), [(SMALL_KERNEL, "7.0\n"), (SCENE, "2 True\n")])
+@pytest.mark.parametrize(("script", "says"), [(SMALL_KERNEL, "7.0\n"), (SCENE, "True\n")])
 def test_without_a_place_for_the_cache_code_is_made_each_time(script, says, tmp_path: Path):
     (tmp_path / "file").write_text("no folder")
     out, error = ran(script, tmp_path, tmp_path / "file")

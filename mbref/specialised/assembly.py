@@ -1,4 +1,4 @@
-"""Machine code of a record: straight-line LLVM IR, compiled once and kept on disk.
+"""LLVM IR of a record, in a straight line.
 
 A record becomes a function ``i64 f(double t, double* y, double* angles, double* out, double* more)`` of the
 operations that its results need; it returns 0 when all its guards held.  A sum may take a product in before
@@ -7,11 +7,8 @@ it is rounded (``contract``); no other operation is rounded differently from the
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
-
-import llvmlite.binding as llvm
 
 from mbref.specialised.tracing import COMPARISONS, Record, Scalar, Untraceable, operand
 
@@ -99,47 +96,12 @@ def _instructions(result: str, name: str, *operands: str) -> list[str]:
     ]
 
 
-def compiled(pieces: Sequence[Piece]) -> bytes:
-    """Object code of the pieces; raises Untraceable where they are too long to compile in a second."""
+def text_of(pieces: Sequence[Piece]) -> str:
+    """The LLVM IR of the pieces; raises Untraceable where they are too long to compile in a second."""
     length = sum(len(piece.live()) for piece in pieces)
     if length > MOST_OPERATIONS:
         raise Untraceable(f"{length} operations, more than {MOST_OPERATIONS}")
     declarations = [
         f"declare double @{name}(double{', double' if name == 'atan2' else ''})" for name in CALLS.values()
     ]
-    module = llvm.parse_assembly("\n".join([*declarations, *(piece.assembly() for piece in pieces)]))
-    module.verify()
-    return _target_machine().emit_object(module)
-
-
-class Code:
-    """Object code in memory; ``address(name)`` of a piece is good while this object lives."""
-
-    def __init__(self, data: bytes):
-        empty = llvm.parse_assembly("")
-        self._engine = llvm.create_mcjit_compiler(empty, _target_machine())
-        self._engine.add_object_file(llvm.ObjectFileRef.from_data(data))
-        self._engine.finalize_object()
-
-    def address(self, name: str) -> int:
-        """Where the function of a piece begins."""
-        return self._engine.get_function_address(name)
-
-
-def processor() -> str:
-    """The processor that the code is for."""
-    return f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
-
-
-@functools.cache
-def _target() -> llvm.Target:
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    return llvm.Target.from_default_triple()
-
-
-def _target_machine() -> llvm.TargetMachine:
-    """A fresh one each time: an engine takes it over."""
-    return _target().create_target_machine(
-        cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2, jit=True
-    )
+    return "\n".join([*declarations, *(piece.assembly() for piece in pieces)])

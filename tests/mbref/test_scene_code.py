@@ -1,0 +1,90 @@
+"""Machine code of a scene's series against the kernels that serve every scene."""
+
+import numpy as np
+import pytest
+
+from crosscheck.conformance.random_mechanisms import random_mechanism
+from mbref.kernels.layout import OK
+from mbref.method import Method, MethodError
+from mbref.scenes import SCENES, find_scene
+from mbref.simulation.outcome import trajectory_of
+from mbref.simulation.simulate import Limits, simulate, why_no_code
+from mbref.taylor import scene_code
+from mbref.taylor.run import TaylorRun
+
+TAYLOR = Method.parse("taylor")
+ORDER_16 = Method.parse("taylor[order=16]")
+MECHANISMS = (
+    "planar_slider_crank", "spatial_slider_crank", "spatial_slider_crank_driven", "bricard",
+    "slider_crank_chain", "heavy_top",
+)  # fmt: skip
+
+
+def terms(scene, code):
+    """Terms (orders, lanes) of the series about the start, each over t^order, t its own time (s)."""
+    run = TaylorRun(scene, ORDER_16, np.array([0.1]), Limits(code=code))
+    assert run.expand(0.1) == OK
+    found = run.taylor.series.terms.copy()
+    sizes = np.abs(found[2:]).max(axis=1)
+    time = (sizes[0] / sizes.max()) ** (1.0 / max(1, sizes.argmax()))
+    return found * time ** np.arange(len(found))[:, None]
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_terms_are_those_of_the_kernels(name):
+    generic, own = (terms(SCENES[name](), code) for code in ("generic", "specialised"))
+    assert np.abs(generic - own).max() <= 1e-11 * np.abs(generic).max()
+
+
+@pytest.mark.parametrize("seed", (3, 11, 17, 21))
+def test_terms_of_random_mechanisms_are_those_of_the_kernels(seed):
+    scene = random_mechanism(seed)
+    scene = scene.with_(load=tuple(load for load in scene.load if not hasattr(load, "stiffness")))
+    generic, own = (terms(scene, code) for code in ("generic", "specialised"))
+    assert np.abs(generic - own).max() <= 1e-11 * np.abs(generic).max()
+
+
+@pytest.mark.parametrize(
+    "name", (*MECHANISMS[:4], "four_bar", "planar_slider_crank_equal", "four_bar_gravity")
+)
+def test_runs_agree_with_the_kernels(name):
+    times = np.linspace(0.0, 0.2, 5)
+    generic, own = (
+        simulate(SCENES[name](), ORDER_16, times, Limits(rtol=1e-11, code=code))
+        for code in ("generic", "specialised")
+    )
+    assert generic.outcome == own.outcome and len(own.times) == len(times), own.message
+    assert np.abs(generic.position - own.position).max() < 1e-9
+    assert abs(generic.cost.steps - own.cost.steps) <= 0.05 * generic.cost.steps
+
+
+def test_auto_takes_the_code_where_many_steps_are_ahead():
+    scene, times = SCENES["planar_slider_crank"](), np.array([0.4])
+    limits = Limits(rtol=1e-9, largest_step=1.2e-5)
+    run = TaylorRun(scene, TAYLOR, times, limits)
+    auto = trajectory_of(run, *run.advance(None), 0.0)
+    assert run.taylor.code.order == run.taylor.progress.order
+    generic = simulate(scene, "taylor", times, Limits(rtol=1e-9, code="generic"))
+    assert np.abs(auto.position - generic.position).max() < 1e-6
+    short = TaylorRun(scene, TAYLOR, np.array([0.1]), limits)
+    short.advance(None)
+    assert short.taylor.code.order == 0, "a short run does not make code"
+
+
+def test_one_process_loads_the_code_of_a_scene_once():
+    first, again = (
+        TaylorRun(SCENES["four_bar"](), TAYLOR, np.array([0.1]), Limits(code="specialised")) for _ in "ab"
+    )
+    assert first.taylor.code.expand == again.taylor.code.expand != 0
+    finer = TaylorRun(SCENES["four_bar"](), TAYLOR, np.array([0.1]), Limits(rtol=1e-12, code="specialised"))
+    assert finer.taylor.code.expand != first.taylor.code.expand, "another order has its own"
+
+
+def test_a_scene_that_has_no_code_is_told_why(monkeypatch):
+    assert why_no_code(SCENES["four_bar"](), TAYLOR) == ""
+    assert "springs" in why_no_code(SCENES["andrews_squeezer"](), TAYLOR)
+    with pytest.raises(MethodError, match="products of blocks, more than 12000"):
+        simulate(find_scene("four_bar_chain[40]"), "taylor", [0.01], Limits(code="specialised"))
+    monkeypatch.setattr(scene_code, "PLAIN", True)
+    with pytest.raises(MethodError, match="without the JIT"):
+        simulate(SCENES["four_bar"](), "taylor", [0.01], Limits(code="specialised"))
