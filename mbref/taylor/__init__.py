@@ -1,1 +1,1 @@
-"""Taylor series of a motion in natural coordinates, one compiled code for every scene."""
+"""Taylor series of a motion in natural coordinates, by kernels for every scene or code of a scene's own."""

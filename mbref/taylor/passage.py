@@ -40,6 +40,7 @@ GOLDEN, SECTIONS = 0.6180339887498949, 70  # of the search for the least determi
 SECANTS = 12  # of the search for its change of sign, behind which it halves
 LEFT = 2.0  # of the violation that corrections leave, of rows that depend on others: it is no gap's
 CREPT = 1e-6  # pivot over its largest below which a crossing is rounding's, unless the series began there
+LOST_ROW = 1e-6  # of the largest pivot: formulations may take a row with less for one that depends on others
 LEAST = 1e-9  # pivot over its largest below which the branch depends on rounding
 
 
@@ -189,6 +190,17 @@ def find_crossing(h, memory):
     """
     change = sign_change(h, memory)
     return change if change >= 0.0 else least_between(h, memory)
+
+
+@kernel
+def is_at_crossing(at, h, memory):
+    """Whether the rows leave a motion free to the formulation, beyond that of the series, at a time (s) of a
+    step of h seconds that crossed: pivots fall linearly."""
+    progress = memory.progress
+    if not progress.crossed:
+        return False
+    crossing = find_crossing(h, memory)
+    return abs(at - crossing) * progress.past_pivot <= LOST_ROW * progress.largest_pivot * crossing
 
 
 @kernel

@@ -170,6 +170,15 @@ def take_sample(h, length, memory):
 
 
 @kernel
+def take_sample_of_series(memory):
+    """Record the sample that was refused with the accelerations of the series: OK."""
+    run = memory.run
+    copy(run.loop.samples.accelerations[run.loop.clock.sample], run.equations.system.acceleration)
+    record_sample(run)
+    return OK
+
+
+@kernel
 def put_angles(h, memory):
     """The torsion springs' angles at a distance h (s) from the step's beginning, for the formulation."""
     torsions, past = memory.polynomials.torsions, memory.series.past_angles

@@ -11,7 +11,7 @@ from __future__ import annotations
 from numpy import exp, isfinite, log
 
 from mbref.kernels.compilation import INT, entry, kernel
-from mbref.kernels.layout import NOT_FINITE, OK
+from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, OK
 from mbref.kernels.named_memory import Named
 from mbref.linear_algebra.vectors import copy, larger
 from mbref.simulation.stepping import (
@@ -33,6 +33,7 @@ from mbref.taylor.passage import (
     distance_ahead,
     exactness,
     exactness_across,
+    is_at_crossing,
     judge_branch,
     least_pivot,
     remember_pivots,
@@ -48,6 +49,7 @@ from mbref.taylor.samples import (
     put_angles,
     put_state,
     take_sample,
+    take_sample_of_series,
 )
 from mbref.taylor.series import expand
 from mbref.taylor.solver import factorise_anew
@@ -215,7 +217,10 @@ def step(memory):
             return status
     now = progress.end if h >= left else clock.time + h
     while clock.sample < times.shape[0] and times[clock.sample] <= now:
-        status = take_sample(times[clock.sample] - clock.time, h, memory)
+        at = times[clock.sample] - clock.time
+        status = take_sample(at, h, memory)
+        if status == NOT_CONVERGED and is_at_crossing(at, h, memory):
+            status = take_sample_of_series(memory)
         if status != OK:
             return status
     put_angles(h, memory)

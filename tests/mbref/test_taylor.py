@@ -201,3 +201,15 @@ def test_a_pendulum_on_a_driven_cart(axis, length):
     general = simulate(scene, "alf-dual+projection", times, Limits(rtol=1e-11))
     assert series.outcome.label == "COMPLETED", series.message
     assert np.allclose(series.position, general.position, rtol=0, atol=1e-9 * length)
+
+
+@pytest.mark.parametrize("method", ["alf-dual+projection", "taylor"])
+@pytest.mark.parametrize("name", ["planar_slider_crank_equal", "planar_slider_crank_heavy"])
+def test_a_sample_at_a_singular_position(name, method):
+    """The rows leave one more motion free there, whose acceleration is that of the positions beside it."""
+    crossing = simulate(SCENES[name](), method, [2.0 if "heavy" in name else 0.1]).crossings[0].time
+    times = crossing * np.array([1.0, 1.0 + 3e-7, 1.2])
+    run = simulate(SCENES[name](), method, times)
+    assert run.outcome.name == "COMPLETED", run.message
+    assert np.abs(run.acceleration[0] - run.acceleration[1]).max() < 1e-5 * np.abs(run.acceleration[1]).max()
+    assert all(marks[0] > marks[2] for marks in run.open_reactions.values()), "its reactions are open"
