@@ -5,7 +5,8 @@
 Sweeps: light and cart_poles (inertias of 1e-11 … 1e-4 kg m²), turning (parallelograms that turn back before
 the flat position), gaps (slider-cranks whose rod is longer than the crank by 1e-1 … 1e-12 m), driven (rhombi
 and five-bars from random angles), starts (the same just before the flat position), heavy (the equal
-slider-crank with a flywheel).  A false success is COMPLETED with an error against the scene's truth, which
+slider-crank with a flywheel).  Turnings that rounding of the joints' places may hide behind a gap are counted
+apart where they do not complete.  A false success is COMPLETED with an error against the scene's truth, which
 shares no code with mbref, above max(1e3 rtol, 1e-6); cart-poles are judged by their energy.
 """
 
@@ -65,6 +66,28 @@ def turning(count: int) -> Iterator[tuple[Scene, float]]:
             yield make(-distance, f"turning{k}"), 1.5
 
 
+def turning_is_determined(scene: Scene) -> bool:
+    """Whether rounding of the joints' places cannot hide where a parallelogram turns back.
+
+    Links of length l whose sides differ by Δ = AB + AD - BC - CD come no nearer to the flat position than
+    √(4 Δ / l) rad before they go over to another branch; they turn back as far from it as they began.
+    """
+    a, b, c, d = (np.array(next(j.anchor for j in scene.joint if j.name == name)) for name in "ABCD")
+    unit = lambda one, other: (one - other) / np.linalg.norm(one - other)  # noqa: E731
+    slopes = (
+        unit(a, b) + unit(a, d),
+        unit(b, a) - unit(b, c),
+        -unit(c, b) - unit(c, d),
+        unit(d, a) - unit(d, c),
+    )
+    rounding = sum(
+        float(np.abs(slope) @ np.spacing(np.abs(at))) / 2
+        for slope, at in zip(slopes, (a, b, c, d), strict=True)
+    )
+    length = float(np.linalg.norm(b - a))
+    return bool(math.asin(abs(b[1]) / length) > math.sqrt(4.0 * rounding / length))
+
+
 def gaps(count: int) -> Iterator[tuple[Scene, float]]:
     """Slider-cranks that miss the singular position by a gap."""
     for gap in np.geomspace(1e-1, 1e-12, count):
@@ -106,18 +129,23 @@ def outcome_of(scene: Scene, end: float, method: str, rtol: float) -> tuple[str,
 
 def report(name: str, runs: Iterator[tuple[Scene, float]], method: str, rtol: float) -> None:
     """Print one row."""
-    allowed, false, worst, failed = max(1e3 * rtol, 1e-6), 0, 0.0, Counter()
+    allowed, false, worst, failed, hidden = max(1e3 * rtol, 1e-6), 0, 0.0, Counter(), 0
     total = 0
     for scene, end in runs:
         label, error = outcome_of(scene, end, method, rtol)
         total += 1
         if label != "COMPLETED":
-            failed[label] += 1
+            is_hidden = name == "turning" and not turning_is_determined(scene)
+            hidden += is_hidden
+            failed[label] += not is_hidden
             continue
         false += not error <= allowed
         worst = max(worst, error)
     count = sum(failed.values())
-    print(f"{name:12} {total:5} runs {false:4} false {count:4} failed {worst:9.1e} worst {dict(failed)}")
+    print(
+        f"{name:12} {total:5} runs {false:4} false {count:4} failed {hidden:4} hidden by rounding "
+        f"{worst:9.1e} worst {dict(+failed)}"
+    )
 
 
 def main() -> None:

@@ -8,7 +8,8 @@ is decided.  Regularised rows are those of unit length in the metric of M.  The 
 ``linear_algebra.minimum_norm`` with b = γ - Φ_q q̈_0, on a sparse factor of S + I/α; it stops when the next
 change would be ≤ epsilon, relative to the larger of 1 and the acceleration.  Small inertias make small
 singular values, for which it begins again with a larger α where rows are known to be independent: those of
-redundant rows, off the constraints, are no rows' own.
+redundant rows, off the constraints, are no rows' own.  Rows that are nearly dependent at the start, as those
+of two hinges that are tilted a little, make smaller ones yet, which conjugate directions find.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from mbref.formulations.base import Formulation, Sparse
 from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import ACCELERATE, NOT_CONVERGED, SINGULAR, SparseFactor
 from mbref.kernels.named_memory import opener
-from mbref.linear_algebra.minimum_norm import solve_to_tolerance
+from mbref.linear_algebra.minimum_norm import go_on_by_conjugate_directions, solve_to_tolerance
 from mbref.linear_algebra.sparse_cholesky import regularised_factor, subtract_product
 
 
@@ -44,6 +45,8 @@ options_of, factor_of = opener(Options), opener(SparseFactor)
 def accelerate(system):
     options, factor = options_of(system.options), factor_of(system.scratch)
     alpha, status = options.alpha, iterate_with(options.alpha, system)
+    if system.settings.nearly_dependent:
+        status = go_on_by_conjugate_directions(factor, alpha, system.acceleration, system.multipliers)
     while status == NOT_CONVERGED and system.settings.independent and alpha < LARGEST_ALPHA:
         alpha *= STRONGER
         status = iterate_with(alpha, system)

@@ -55,6 +55,7 @@ class Settings(NamedTuple):
     newton_tolerance: float = 1e-13
     rounding: float = 1e-15  # violation of positions that is not corrected
     independent: int = 0  # whether rows of small singular values are known to be independent
+    nearly_dependent: int = 0  # whether rows are so at the start, as those of two hinges that are tilted
 
 
 class Counts(NamedTuple):
@@ -155,6 +156,7 @@ class SparseFactor(NamedTuple):
     residual: Annotated[Vector, "r"]
     step: Annotated[Vector, "r"]
     total: Annotated[Vector, "r"]
+    direction: Annotated[Vector, "r"]
     root: Annotated[Vector, "c"]  # M^(-1/2)
     change: Annotated[Vector, "c"]
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy import sqrt
 
-from mbref.kernels.compilation import FLOAT, INT, VECTOR, entry, inlined
+from mbref.kernels.compilation import FLOAT, INT, VECTOR, entry, inlined, kernel
 from mbref.kernels.layout import NOT_CONVERGED, OK, SparseFactor
 from mbref.kernels.named_memory import Named, packed
 from mbref.linear_algebra.sparse_cholesky import regularised_factor, solve, subtract_product, times_transpose
@@ -29,6 +29,7 @@ TINY, NEVER = 1e-300, 1e300
 LEAST = 2  # iterations of ``solve_to_tolerance``: enough but near singular positions, so that they are fixed
 ALPHA = 1e10  # of systems solved once: singular values below 1e-5 of unit rows are left alone
 ITERATIONS, ROUNDING = 20, 1e-15
+DEPENDENT = 1e-11  # singular value of unit rows below which the rest counts as dependent
 FACTOR = Named(SparseFactor)
 
 
@@ -55,6 +56,64 @@ def solve_to_tolerance(factor, epsilon, most, target, multipliers):
     for i in range(row.shape[0]):
         multipliers[row[i]] = total[i]
     return status
+
+
+@kernel
+def go_on_by_conjugate_directions(factor, alpha, target, multipliers):
+    """Go on from where ``solve_to_tolerance`` ended, by Craig's method with S + I/α as its preconditioner.
+
+    A singular value that is small beside α^(-1/2) takes about one direction (J. E. Craig, J. Math. and
+    Physics 34, 1955).  Returns OK where rounding, or rows dependent but for DEPENDENT, are left; else
+    NOT_CONVERGED.
+    """
+    residual, step, change, direction = factor.residual, factor.step, factor.change, factor.direction
+    direction[:], before = 0.0, 1.0
+    for _ in range(ITERATIONS):
+        subtract_product(factor, change, residual)
+        copy(residual, step)
+        solve(factor, step)
+        along = product(residual, step)
+        if along <= alpha * (ROUNDING * size_of(target, factor)) ** 2:
+            return OK
+        for i in range(step.shape[0]):
+            direction[i] = step[i] + along / before * direction[i]
+        times_transpose(factor, direction, change)
+        square, before = product(change, change), along
+        if along * alpha * DEPENDENT**2 >= square:
+            return OK
+        go_along(along / square, factor, target, multipliers)
+    return NOT_CONVERGED
+
+
+@inlined
+def go_along(length, factor, target, multipliers):
+    """Change ``target`` and ``multipliers`` by a length times the direction."""
+    row, change, total = factor.symbolic.row, factor.change, factor.total
+    for i in range(row.shape[0]):
+        total[i] -= length * factor.direction[i]
+        multipliers[row[i]] = total[i]
+    for j in range(change.shape[0]):
+        change[j] *= length
+    add_scaled(factor, target)
+
+
+@kernel
+def size_of(target, factor):
+    """The larger of 1 and the norm of M^(1/2) target (n,)."""
+    column, root, square = factor.symbolic.column, factor.root, 1.0
+    for j in range(root.shape[0]):
+        value = target[column[j]] / root[j]
+        square = max(square, value * value)
+    return sqrt(square)
+
+
+@kernel
+def product(a, b):
+    """The inner product of two vectors."""
+    total = 0.0
+    for i in range(a.shape[0]):
+        total += a[i] * b[i]
+    return total
 
 
 @inlined

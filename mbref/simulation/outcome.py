@@ -49,6 +49,13 @@ REST_POSITION = (
     "followed; velocities of the bodies along a branch tell it"
 )
 
+NEARLY_DEPENDENT = (
+    "constraint rows depend on each other there but for {:.1e} (singular value of unit rows), and whether "
+    "they take a freedom cannot be told: align the joints within 1e-10, or tilt them by 1e-8 at least"
+)
+REDUNDANT = "rows that depend on others at the start but for {:.1e} count as redundant"
+ROUNDING = 1e-13  # a singular value that needs no mention
+
 
 def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion:
     """The samples reached, in the scene's frames and units."""
@@ -118,11 +125,18 @@ def _message(run: Run, status: int) -> str:
         return DEAD_POSITION.format(run.memory.loop.clock.time)
     if status == UNDECIDED and run.memory.loop.clock.time == 0.0 and begins_at_rest(run):
         return REST_POSITION
+    rounded = REDUNDANT.format(run.ranks.next) if run.ranks.next > ROUNDING else ""
     if status != DONE:
-        return "; ".join(filter(None, (_cause(run, status), remedy(run, status))))
+        return "; ".join(filter(None, (_cause(run, status), rounded, _remedy(run, status))))
     crossings = int(run.memory.equations.system.counts.crossings)
     passed = f"singular positions passed: {crossings}" if crossings else ""
-    return "; ".join(filter(None, (run.start.report(), passed)))
+    return "; ".join(filter(None, (run.start.report(), rounded, passed)))
+
+
+def _remedy(run: Run, status: int) -> str:
+    """The remedy of an early end; for rows that are nearly dependent at the start, one of the scene."""
+    nearly = run.memory.equations.system.settings.nearly_dependent and run.memory.loop.clock.time == 0.0
+    return NEARLY_DEPENDENT.format(run.ranks.least) if nearly else remedy(run, status)
 
 
 def _cause(run: Run, status: int) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -47,7 +48,8 @@ from mbref.stabilisation.base import Stabilisation
 
 STEPS_PER_CALL = 5_000  # between returns to Python, where an interrupt is heard and progress is told
 OUT_OF_REACH, PACE_STEPS = 100.0, 20_000  # limits of steps that the end is away, at the pace of so many
-MOST_ROWS, RANK = 120, 1e-6  # rows whose rank is found at the start; a singular value that is rounding
+MOST_ROWS, RANK = 120, 1e-10  # rows whose rank is found at the start; a singular value that counts as none
+NEARLY = 1e-5  # least singular value below which rows are nearly dependent
 MOST_COMPARED = 60  # rows whose gradients at both ends of a step are compared
 STEPS_WORTH_CODE = 20_000  # steps ahead from which on specialised code saves more than it takes to make
 UNWRAPPED = 1.0  # rad that a body may turn in a step where torsion springs unwrap: two turn less than π apart
@@ -179,11 +181,13 @@ class Run:
         memory = self.memory
         memory.state.coordinates[:] = self.start.q
         memory.state.velocities[:] = self.start.v
+        self.ranks = NO_RANKS
         if self.method.stabilisation.projects:
-            rank = independent_rows(self.model, self.start.q, self.part.factor.symbolic)
-            memory.watch.generic_rank = rank
+            self.ranks = ranks_at(self.model, self.start.q, self.part.factor.symbolic)
+            memory.watch.generic_rank = self.ranks.rank
             settings = memory.equations.system.settings
-            settings.independent = rank == memory.pivots.size
+            settings.independent = self.ranks.rank == memory.pivots.size
+            settings.nearly_dependent = self.ranks.least < NEARLY
             settings.rounding *= min(1.0, self.model.length)
         self.enter_state()
 
@@ -253,14 +257,27 @@ class Run:
         self.making += time.process_time() - began
 
 
-def independent_rows(model: Model, q: np.ndarray, symbolic: Symbolic) -> int:
-    """Number of rows of Φ_q that are independent, if only just, at q (7 nb,); of those that take part."""
+class Ranks(NamedTuple):
+    """Singular values of unit rows of Φ_q: how many are above RANK, the least of these, and the next one."""
+
+    rank: int
+    least: float
+    next: float
+
+
+NO_RANKS = Ranks(0, 1.0, 0.0)
+
+
+def ranks_at(model: Model, q: np.ndarray, symbolic: Symbolic) -> Ranks:
+    """Those of the rows that take part, at q (7 nb,); rank 0 where there are too many."""
     rows, columns = symbolic.row.astype(int), symbolic.column.astype(int)
     if rows.size > MOST_ROWS or not rows.size:
-        return 0
+        return NO_RANKS
     jacobian = model.terms(0.0, q, np.zeros(model.n)).jacobian[np.ix_(rows, columns)]
     jacobian *= model.data.metric_root[columns]
-    return int(np.linalg.matrix_rank(jacobian / row_lengths(jacobian)[:, None], tol=RANK))
+    values = np.linalg.svd(jacobian / row_lengths(jacobian)[:, None], compute_uv=False)
+    rank = int((values > RANK).sum())
+    return Ranks(rank, float(values[rank - 1]) if rank else 1.0, float(np.append(values, 0.0)[rank]))
 
 
 NO_KERNELS = Kernels(*[None] * len(Kernels._fields))

@@ -15,13 +15,14 @@ import numpy as np
 from mbref import rotations
 from mbref.method import DEFAULT, Method
 from mbref.simulation.limits import GENERIC, Limits
-from mbref.simulation.run import RANK, Run
+from mbref.simulation.run import Run
 from mbref.simulation.stepping import DONE, LEFT_MOTION, UNDECIDED
 from mbref.taylor.run import CrossingRun
 
 MOST_STEPS = 100_000
 TOLERANCE = 1e-10  # of the projected run
 OFF = (1e3, 1e-6)  # lengths or rad by which a run may be off: over its tolerance, and whatever that is
+DROPS = 1e-6  # rank tolerance above which independent rows may be dropped
 COARSE = 0.1  # the same of a run in fixed steps, whose error its tolerance does not limit
 
 
@@ -53,7 +54,7 @@ def compare_with_default(run: Run, ended: int) -> int:
 
 
 def _may_leave(run: Run) -> bool:
-    held = run.method.stabilisation.projects and run.limits.rank_tolerance <= RANK
+    held = run.method.stabilisation.projects and run.limits.rank_tolerance <= DROPS
     return run.model.closed_loops > 0 and not held
 
 

@@ -7,8 +7,9 @@
   the gap its rows are violated by g at least, and by more the further it goes.  A step near a singular
   position is therefore as exact as rounding allows, and violated by rounding alone.
 - Near a singular position rounding moves the state along the vanishing direction by its ratio to the pivot,
-  and turns the velocity by as much again.  A motion that comes nearer than LEAST and does not cross is lost;
-  whether a nearer one is determined, its twin tells (``mbref.taylor.run``).
+  and turns the velocity by as much again.  A motion that comes nearer than LEAST and does not cross is lost.
+  Rounding of the lengths may open a gap that a motion meets before it turns back nearer than ROOT: that is
+  lost too.  Whether another one is determined, its twin tells (``mbref.taylor.run``).
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from mbref.linear_algebra.vectors import copy, larger
 from mbref.simulation.stepping import SINGULAR_AHEAD, STEP_TOO_SMALL, UNDECIDED
 from mbref.taylor.partition import put_gradient
 from mbref.taylor.samples import evaluate_series
+from mbref.taylor.turning import pivot_of_turning, turns_back
 
 NEAR = 0.3  # least pivot of G, over the largest that it has been, below which a singular position is near
 AHEAD = 0.03  # the same, below which a series of a loose tolerance gives way to an exact one
@@ -42,6 +44,8 @@ LEFT = 2.0  # of the violation that corrections leave, of rows that depend on ot
 CREPT = 1e-6  # pivot over its largest below which a crossing is rounding's, unless the series began there
 LOST_ROW = 1e-6  # of the largest pivot: formulations may take a row with less for one that depends on others
 LEAST = 1e-9  # pivot over its largest below which the branch depends on rounding
+ROOT = 2.5e-8  # pivot, of unit rows, at the root of the gaps that rounding of the lengths may open
+FALLEN = 0.5  # of the pivot where a passage began: a larger one has not come near
 
 
 @kernel
@@ -119,15 +123,6 @@ def overlap(y, memory):
 
 
 @kernel
-def turns_back(memory):
-    """Whether the rates of the variables at both ends of a step point against each other."""
-    past, terms, along = memory.series.past, memory.series.terms, 0.0
-    for i in range(memory.solver.order.shape[0]):
-        along += past[1, i] * terms[1, i]
-    return along <= 0.0
-
-
-@kernel
 def has_crossed(h, pivot, memory):
     """Whether a step of h seconds crosses: its determinant changes the sign, or vanishes between its ends.
 
@@ -143,7 +138,8 @@ def has_crossed(h, pivot, memory):
     far = progress.passing and progress.past_pivot >= BEFORE * progress.largest_pivot
     if changes_sign(h, min(int(moved / LONG) + 1, MOST_PARTS), memory):
         return True
-    if far or brief or (keeps_signs(memory) and not is_near(pivot, progress)) or turns_back(memory):
+    turns = turns_back(memory.series.terms, memory)
+    if far or brief or (keeps_signs(memory) and not is_near(pivot, progress)) or turns:
         return False
     _, behind = overlap(memory.series.terms, memory)
     _, before = overlap(memory.series.past, memory)
@@ -311,13 +307,17 @@ def judge_branch(h, last, memory):
         return SINGULAR_AHEAD if ahead else OK
     if not (progress.crossed or is_near(pivot, progress)):
         return OK
-    if progress.crossed and turns_back(memory):
+    turned = turns_back(memory.series.terms, memory)
+    if progress.crossed and turned:
         return STEP_TOO_SMALL
     if progress.crossed and progress.past_pivot < min(CREPT * progress.largest_pivot, progress.entered):
         return UNDECIDED
     deepest = (SHORTEST if progress.crossed else DEEPEST) * progress.past_pivot
     if not progress.violation <= resolution(memory) or (not last and pivot < deepest):
         return STEP_TOO_SMALL
+    root = min(ROOT, FALLEN * progress.entered)
+    if turned and pivot_of_turning(h, memory) < root:
+        return UNDECIDED
     if progress.crossed or last or pivot >= progress.past_pivot:
         return OK
-    return OK if pivot >= LEAST * progress.largest_pivot else UNDECIDED
+    return OK if pivot >= max(root, LEAST * progress.largest_pivot) else UNDECIDED

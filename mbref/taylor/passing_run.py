@@ -36,15 +36,11 @@ class PassingRun(SeriesRun):
         self.crossings, self.began = [], None
         progress["past_pivot"], progress["clearance"], progress["is_clear"] = 1.0, 0.0, 0
         status = self.expand(self.times[-1])
-        self.taylor.progress.entered = self._least_pivot()
+        self.taylor.progress.entered = self.least_pivot()
         status = PAUSED if status == OK else status
         while status == PAUSED and not progress["is_clear"]:
             status = self._pass_on()
         return status
-
-    def _least_pivot(self) -> float:
-        pivots = self.taylor.solver.last[: int(self.taylor.progress.rank)]
-        return float(np.abs(pivots).min(initial=1.0))
 
     def _pass_on(self) -> int:
         """The steps over the next crossing, which is recorded, or those that lead clear of it."""
@@ -91,7 +87,7 @@ class PassingRun(SeriesRun):
         status = self._come_from(start, still, ahead, moved)
         if status == PAUSED:
             self._put_samples_before(ahead, q, acceleration)
-        self.taylor.progress.entered = self._least_pivot()
+        self.taylor.progress.entered = self.least_pivot()
         while status == PAUSED and not self.taylor.progress["is_clear"]:
             status = self._pass_on()
         return status

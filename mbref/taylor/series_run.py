@@ -14,10 +14,11 @@ from mbref.method import Method
 from mbref.scene import Scene
 from mbref.simulation.limits import AUTO, GENERIC, SPECIALISED, Limits
 from mbref.simulation.run import Run
-from mbref.simulation.stepping import PAUSED
+from mbref.simulation.stepping import PAUSED, UNDECIDED
 from mbref.taylor.lanes import filled
 from mbref.taylor.layout import Progress, Rows, SceneCode, Series, Solver, TaylorMemory
 from mbref.taylor.natural import NaturalCoordinates
+from mbref.taylor.passage import ROOT
 from mbref.taylor.passing import hand_over, look_along, pass_on, place_crossing
 from mbref.taylor.polynomials import polynomials_of
 from mbref.taylor.scene_code import NAME, code_of
@@ -25,6 +26,10 @@ from mbref.taylor.stepping import advance_series, enter
 
 SHARE = 0.05  # of rtol + atol: the tolerance of a step
 KERNELS_OF_SERIES = (enter, advance_series, hand_over, pass_on, place_crossing, look_along)
+ROUNDING = 1e-16  # of a singular value
+OFF = 2e-7  # lengths or rad, and fastest velocities, by which a series may miss the start
+BESIDE = 1e-7  # pivot of unit rows below which rounding turns a free motion by 1e-2
+FASTER = 0.05  # the same of velocities that drivers prescribe
 LEAST_ORDER, MOST_ORDER = 4, 30
 CHEAPEST = {GENERIC: (6.0, 1.2), SPECIALISED: (8.0, 1.6)}  # order: at a tolerance of 1, and more per digit
 
@@ -46,6 +51,7 @@ class SeriesRun(Run):
     def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
         super().__init__(scene, method, times, replace(limits, code=GENERIC))
         self.memory.equations.system.settings.independent = True  # at samples, where states are exact
+        self._decide_rank()
         prepare_series()
         control = self.memory.control
         tolerance = SHARE * (control.rtol + control.atol)
@@ -60,6 +66,12 @@ class SeriesRun(Run):
         self.wants_code = limits.code == AUTO
         if limits.code == SPECIALISED:
             self._specialise()
+
+    def _decide_rank(self) -> None:
+        """Have the elimination count as many rows as independent as singular values do at the start."""
+        settings, (_, least, rounding) = self.memory.equations.system.settings, self.ranks
+        if settings.nearly_dependent:
+            settings.rank_tolerance = (least * max(rounding, ROUNDING)) ** 0.5
 
     def _taylor_memory(self, order: int) -> TaylorMemory:
         natural = self.natural
@@ -101,7 +113,36 @@ class SeriesRun(Run):
         """Expand at the present time and state, for steps until a time (s): OK or why that cannot be."""
         self.taylor.angles[:] = self.memory.equations.angles[self.taylor.polynomials.torsions.slot]
         self.taylor.progress.end = until
-        return int(enter(self._packed_taylor.argument))
+        status = int(enter(self._packed_taylor.argument))
+        starts = status == OK and float(self.memory.loop.clock.time) == 0.0
+        return UNDECIDED if starts and (self._hides_rank() or self._misses_state()) else status
+
+    def _hides_rank(self) -> bool:
+        """Whether rounding hides the freedoms of a start at which rows are nearly dependent.
+
+        Natural coordinates count others then, or the motion could go over to another branch.
+        """
+        if not self.memory.equations.system.settings.nearly_dependent:
+            return False
+        beside = BESIDE if self.memory.state.velocities.any() else ROOT
+        if self.has_freedom and self.least_pivot() < beside:
+            return True
+        return self.part.active.velocities.size - self.ranks.rank != self.freedoms
+
+    def _misses_state(self) -> bool:
+        """Whether the series misses the state in memory.
+
+        Numbers were taken for rounding then, or rounding over the distance from a singular position turns
+        velocities; drivers that prescribe them hold the motion all the same.
+        """
+        state = self.memory.state
+        q, v = state.coordinates.copy(), state.velocities.copy()
+        look_along(0.0, self._packed_taylor.argument)
+        moved, changed = np.abs(state.coordinates - q).max(), np.abs(state.velocities - v).max()
+        allowed = OFF if self.has_freedom else FASTER
+        off = moved > OFF * max(1.0, self.model.length) or changed > allowed * np.abs(v).max()
+        state.coordinates[:], state.velocities[:] = q, v
+        return bool(off)
 
     def step_on(self) -> int:
         """As many steps as are taken at a time: PAUSED after them, DONE at the end, or why there are none."""
@@ -114,10 +155,19 @@ class SeriesRun(Run):
             status = self.step_on()
         return status
 
+    def least_pivot(self) -> float:
+        """The least pivot of the rows where the series begins; 1 without rows."""
+        return float(np.abs(self.taylor.solver.last[: int(self.taylor.progress.rank)]).min(initial=1.0))
+
     @property
     def has_freedom(self) -> bool:
         """Whether the rows leave a motion to the forces."""
-        return int(self.taylor.progress.rank) < len(self.natural.kept)
+        return self.freedoms > 0
+
+    @property
+    def freedoms(self) -> int:
+        """Variables that the rows leave to the forces."""
+        return len(self.natural.kept) - int(self.taylor.progress.rank)
 
     @property
     def landing(self) -> np.ndarray:

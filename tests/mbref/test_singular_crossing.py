@@ -9,9 +9,10 @@ from crosscheck.judge.metrics import measure
 from crosscheck.judge.reaction_balance import with_exact_reactions
 from crosscheck.judge.truth import closed_form
 from crosscheck.study import stability
-from mbref.scene import GROUND, Body, Revolute, Scene, Translational
+from mbref import rotations
+from mbref.scene import GROUND, Body, Fixed, Revolute, Scene, Translational
 from mbref.scenes.five_bar import five_bar, five_bar_gravity
-from mbref.scenes.four_bar import four_bar, four_bar_gravity
+from mbref.scenes.four_bar import four_bar, four_bar_gravity, parallelogram
 from mbref.scenes.planar_slider_crank import planar_slider_crank_heavy, slider_crank
 from mbref.simulation.simulate import Limits, simulate
 
@@ -51,18 +52,66 @@ def test_units_do_not_matter_to_a_crossing(unit, method):
     assert error_of(scaled, 5.0, method) < 1e-6
 
 
+def door(tilt: float, seed: int) -> Scene:
+    """A door that hangs on two hinges, the second tilted (rad), in an orientation of its own."""
+    turn = rotations.from_vector(np.random.default_rng(seed).normal(size=3) if seed else np.zeros(3))
+    turned = lambda *vector: tuple(map(float, rotations.rotate(turn, np.array(vector))))  # noqa: E731
+    body = Body(
+        name="door",
+        position=turned(0.5, 0.0, 0.5),
+        orientation=tuple(turn),
+        mass=1.0,
+        inertia=(0.1, 0.2, 0.15),
+    )
+    hinges = tuple(
+        Revolute(name=name, bodies=(GROUND, "door"), anchor=turned(0.0, 0.0, z), axis=turned(x, 0.0, 1.0))
+        for name, z, x in (("A", 0.0, 0.0), ("B", 1.0, tilt))
+    )
+    return Scene(name="door", gravity=turned(0.0, -9.81, 0.0), body=(body,), joint=hinges)
+
+
 @pytest.mark.parametrize("tilt", [1e-3, 1e-5, 1e-6])
 @pytest.mark.parametrize("method", ["alf-dual+projection", "taylor", "mpi-svd+none", "mpi-qr+null-space"])
 def test_a_mechanism_without_a_freedom_stays(method, tilt):
     """Series without a variable have been an error of shapes, and small tilts one of iterations."""
-    door = Body(name="door", position=(0.5, 0.0, 0.5), mass=1.0, inertia=(0.1, 0.2, 0.15))
-    hinges = (
-        Revolute(name="A", bodies=(GROUND, "door"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),
-        Revolute(name="B", bodies=(GROUND, "door"), anchor=(0.0, 0.0, 1.0), axis=(tilt, 0.0, 1.0)),
-    )
-    scene = Scene(name="door", gravity=(0.0, -9.81, 0.0), body=(door,), joint=hinges)
+    scene = door(tilt, seed=0)
     run = simulate(scene, method, [0.1, 0.2])
-    assert run.outcome.label == "COMPLETED" and np.allclose(run.position, door.position, rtol=0, atol=1e-12)
+    assert run.outcome.label == "COMPLETED"
+    assert np.allclose(run.position, scene.body[0].position, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("method", ["alf-dual+projection", "taylor", "mpi-svd+projection"])
+def test_a_door_on_tilted_hinges_is_held_or_undecided_and_swings_where_the_tilt_is_rounding(method, seed):
+    for tilt in (1e-7, 1e-8, 1e-9, 3e-10, 1e-11, 1e-15):
+        scene = door(tilt, seed)
+        run = simulate(scene, method, [0.1, 0.2])
+        if 1e-10 < tilt < 1e-8 and run.outcome.label == "UNDECIDED":
+            assert "depend on each other there" in run.message and len(run.times) == 0
+        else:
+            assert run.outcome.label == "COMPLETED", f"{tilt}: {run.message}"
+            moved = np.abs(run.position - scene.body[0].position).max()
+            assert moved < 1e-12 if tilt > 1e-10 else moved > 0.1, tilt
+            assert ("count as redundant" in run.message) == (tilt == 1e-11)
+
+
+@pytest.mark.parametrize("method", ["alf-dual+projection", "taylor"])
+@pytest.mark.parametrize("tilt", [1e-5, 1e-7, 1e-8])
+def test_what_hangs_on_a_tilted_door_swings_as_on_a_fixed_one(tilt, method):
+    held = door(tilt, seed=1)
+    at = held.body[0].position
+    flap = Body(
+        name="flap", mass=0.7, inertia=(0.02, 0.01, 0.02), position=(at[0] + 0.3, at[1], at[2] + 0.1),
+        orientation=held.body[0].orientation,
+    )  # fmt: skip
+    hinge = Revolute(name="flap", bodies=("door", "flap"), anchor=at, axis=(0.0, 0.6, 0.8))
+    wall = Fixed(name="wall", bodies=(GROUND, "door"), anchor=at)
+    times = np.linspace(0.0, 0.5, 6)
+    bodies = (held.body[0], flap)
+    tilted = simulate(held.with_(body=bodies, joint=(*held.joint, hinge)), method, times)
+    fixed = simulate(held.with_(body=bodies, joint=(wall, hinge)), method, times)
+    assert tilted.outcome.label == fixed.outcome.label == "COMPLETED", tilted.message
+    assert np.abs(tilted.position - fixed.position).max() < 1e-9
 
 
 @pytest.mark.parametrize("code", ["generic", "specialised"])
@@ -84,6 +133,41 @@ def test_a_motion_that_turns_back_before_the_flat_position_is_followed(loop, dis
     scene = RHOMBI[loop][1](-distance)
     assert error_of(scene, 1.5, code=code) < 1e-8
     assert "passed" not in simulate(scene, "alf-dual+projection", [1.5], Limits(code=code)).message
+
+
+@pytest.mark.parametrize("method", ["alf-dual+projection", "taylor"])
+@pytest.mark.parametrize("loop", RHOMBI)
+def test_turning_back_at_the_root_of_rounding_is_undecided_or_right(loop, method):
+    """A run at 4e-8 rad has completed 1.9e-6 off."""
+    for distance in np.geomspace(1e-8, 1e-7, 11):
+        scene = RHOMBI[loop][1](-distance)
+        run = simulate(scene, method, np.linspace(0.0, 1.5, 21))
+        if run.outcome.label == "COMPLETED":
+            assert measure(scene, run, closed_form(scene))["error"] < 1e-6, distance
+        else:
+            assert run.outcome.label == "UNDECIDED", run.message
+            assert distance < 6e-8 or method == "taylor", f"{distance}: {run.message}"
+
+
+@pytest.mark.parametrize("method", ["alf-dual+projection", "taylor"])
+@pytest.mark.parametrize("rate", [-5.0, -0.5])
+def test_a_free_motion_that_begins_beside_the_flat_position_is_undecided_or_right(rate, method):
+    """Rounding of the start, over the square of the distance, turns the velocities that are given."""
+    completed = 0
+    for distance in (*np.geomspace(-1e-6, -1e-9, 5), 1e-5, 1e-7, 2e-8, 3e-9):
+        scene = parallelogram(distance, "parallelogram").with_(gravity=(0.0, -9.81, 0.0))
+        crank, coupler, rocker = scene.body
+        turning = (
+            body.model_copy(update={"angular_velocity": (0.0, 0.0, turn)})
+            for body, turn in ((crank, rate), (coupler, 0.0), (rocker, rate))
+        )
+        scene = scene.with_(body=tuple(turning))
+        run = simulate(scene, method, np.linspace(0.0, 1.0, 11))
+        assert run.outcome.label in ("COMPLETED", "UNDECIDED"), run.message
+        if run.outcome.label == "COMPLETED":
+            completed += 1
+            assert measure(scene, run, closed_form(scene))["error"] < 2e-6, distance
+    assert completed > 0
 
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6])
