@@ -62,6 +62,9 @@ def along_motion(scene: Scene) -> AlongMotion:
     times = np.linspace(0.0, scene.duration, SAMPLES)
     method = DEFAULT if scene.has_mass() else "kinematic"
     motion = simulate(scene, method, times, Limits(most_steps=MOST_STEPS))
+    if not motion.times.size:  # the axes of joints may be rounded
+        limits = Limits(most_steps=MOST_STEPS, rank_tolerance=ROUNDING)
+        motion = simulate(scene, method, times, limits)
     if not motion.times.size:
         raise SceneError([f"scene: the motion could not begin: {motion.message}"])
     values = _singular_values(model, motion.times, motion.position, motion.orientation)

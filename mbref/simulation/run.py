@@ -48,7 +48,7 @@ from mbref.stabilisation.base import Stabilisation
 
 STEPS_PER_CALL = 5_000  # between returns to Python, where an interrupt is heard and progress is told
 OUT_OF_REACH, PACE_STEPS = 100.0, 20_000  # limits of steps that the end is away, at the pace of so many
-MOST_ROWS, RANK = 120, 1e-10  # rows whose rank is found at the start; a singular value that counts as none
+MOST_ROWS = 120  # rows whose rank is found at the start
 NEARLY = 1e-5  # least singular value below which rows are nearly dependent
 MOST_COMPARED = 60  # rows whose gradients at both ends of a step are compared
 STEPS_WORTH_CODE = 20_000  # steps ahead from which on specialised code saves more than it takes to make
@@ -183,7 +183,8 @@ class Run:
         memory.state.velocities[:] = self.start.v
         self.ranks = NO_RANKS
         if self.method.stabilisation.projects:
-            self.ranks = ranks_at(self.model, self.start.q, self.part.factor.symbolic)
+            tolerance = self.limits.rank_tolerance
+            self.ranks = ranks_at(self.model, self.start.q, self.part.factor.symbolic, tolerance)
             memory.watch.generic_rank = self.ranks.rank
             settings = memory.equations.system.settings
             settings.independent = self.ranks.rank == memory.pivots.size
@@ -258,7 +259,7 @@ class Run:
 
 
 class Ranks(NamedTuple):
-    """Singular values of unit rows of Φ_q: how many are above RANK, the least of these, and the next one."""
+    """Singular values of unit rows of Φ_q: how many exceed a tolerance, the least of them, the next."""
 
     rank: int
     least: float
@@ -268,7 +269,7 @@ class Ranks(NamedTuple):
 NO_RANKS = Ranks(0, 1.0, 0.0)
 
 
-def ranks_at(model: Model, q: np.ndarray, symbolic: Symbolic) -> Ranks:
+def ranks_at(model: Model, q: np.ndarray, symbolic: Symbolic, tolerance: float) -> Ranks:
     """Those of the rows that take part, at q (7 nb,); rank 0 where there are too many."""
     rows, columns = symbolic.row.astype(int), symbolic.column.astype(int)
     if rows.size > MOST_ROWS or not rows.size:
@@ -276,7 +277,7 @@ def ranks_at(model: Model, q: np.ndarray, symbolic: Symbolic) -> Ranks:
     jacobian = model.terms(0.0, q, np.zeros(model.n)).jacobian[np.ix_(rows, columns)]
     jacobian *= model.data.metric_root[columns]
     values = np.linalg.svd(jacobian / row_lengths(jacobian)[:, None], compute_uv=False)
-    rank = int((values > RANK).sum())
+    rank = int((values > tolerance).sum())
     return Ranks(rank, float(values[rank - 1]) if rank else 1.0, float(np.append(values, 0.0)[rank]))
 
 

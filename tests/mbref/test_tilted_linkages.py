@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mbref import simulate
+from mbref import Limits, simulate
 from mbref.scene import GROUND, Body, Driver, Revolute, Scene, Translational
+from mbref.scenes import SCENES
 
 RATE, TIMES = 7.0, np.linspace(0.0, 2.0, 21)
 METHODS = ("alf-dual+projection", "mpi-svd+projection", "taylor")
@@ -95,3 +96,16 @@ def test_a_tilted_linkage_passes_its_singular_positions(linkage, seed, unit, met
     for b, place in enumerate(places):
         exact = np.array([plane.point(complex(place(z))) for z in turned])
         assert np.abs(run.position[:, b] - exact).max() < 1e-9 * unit
+
+
+def test_rounded_axes_count_as_redundant_where_that_is_asked_for():
+    scene = SCENES["planar_slider_crank_gravity"]()
+    rounded, times = scene.with_("joint[B].axis", [2e-7, 0.0, 1.0]), [0.1, 0.2]
+    refused = simulate(rounded, times=times)
+    assert refused.outcome.name == "UNDECIDED" and "--rank-tolerance" in refused.message
+    run, planar = (
+        simulate(rounded, times=times, limits=Limits(rank_tolerance=1e-6)),
+        simulate(scene, times=times),
+    )
+    assert run.outcome.name == "COMPLETED" and "count as redundant" in run.message, run.message
+    assert np.abs(run.position - planar.position).max() < 1e-5
