@@ -40,11 +40,6 @@ def add_method_options(parser: argparse.ArgumentParser, json: bool = True) -> No
         help="generic: the kernels that serve every scene; specialised: machine code made for this scene;\n"
         "auto (default): specialised code once 20 000 steps are ahead.  Both agree to rounding",
     )  # fmt: skip
-    parser.add_argument(
-        "--rank-tolerance", type=float, default=1e-10, metavar="S",
-        help="constraint rows of smaller relative singular values count as redundant (default 1e-10);\n"
-        "1e-6 where the digits of a scene's axes are rounded",
-    )  # fmt: skip
     parser.add_argument("--max-step", type=float, default=0.0, help="largest step, s (default: the duration)")
     if json:
         parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
@@ -86,15 +81,9 @@ def limits_of(options: argparse.Namespace, branches: Mapping[int, int] | None = 
 
     try:
         return Limits(
-            rtol=options.rtol,
-            rank_tolerance=options.rank_tolerance,
-            largest_step=options.max_step,
-            code=options.code,
-            branches=branches or {},
+            rtol=options.rtol, largest_step=options.max_step, code=options.code, branches=branches or {}
         )
     except ValueError as error:
         raise ValueError(
-            f"--{error}".replace("largest_step", "max-step")
-            .replace("branches", "branch")
-            .replace("rank_tolerance", "rank-tolerance")
+            f"--{error}".replace("largest_step", "max-step").replace("branches", "branch")
         ) from None

@@ -51,8 +51,7 @@ REST_POSITION = (
 
 NEARLY_DEPENDENT = (
     "constraint rows depend on each other there but for {:.1e} (singular value of unit rows), and whether "
-    "they take a freedom cannot be told: align the joints, tilt them more, or count such rows as redundant "
-    "by --rank-tolerance {:.0e}"
+    "they take a freedom cannot be told: give the axes and points of the joints with 12 digits"
 )
 REDUNDANT = "rows that depend on others at the start but for {:.1e} count as redundant"
 ROUNDING = 1e-13  # a singular value that needs no mention
@@ -137,8 +136,7 @@ def _message(run: Run, status: int) -> str:
 def _remedy(run: Run, status: int) -> str:
     """The remedy of an early end; for rows that are nearly dependent at the start, one of the scene."""
     nearly = run.memory.equations.system.settings.nearly_dependent and run.memory.loop.clock.time == 0.0
-    least = run.ranks.least
-    return NEARLY_DEPENDENT.format(least, 10.0 * least) if nearly else remedy(run, status)
+    return NEARLY_DEPENDENT.format(run.ranks.least) if nearly else remedy(run, status)
 
 
 def _cause(run: Run, status: int) -> str:

@@ -22,7 +22,7 @@ from mbref.taylor.run import CrossingRun
 MOST_STEPS = 100_000
 TOLERANCE = 1e-10  # of the projected run
 OFF = (1e3, 1e-6)  # lengths or rad by which a run may be off: over its tolerance, and whatever that is
-DROPS = 1e-6  # rank tolerance above which independent rows may be dropped
+DROPS = 1e-10  # rank tolerance above which independent rows may be dropped
 COARSE = 0.1  # the same of a run in fixed steps, whose error its tolerance does not limit
 
 

@@ -98,14 +98,10 @@ def test_a_tilted_linkage_passes_its_singular_positions(linkage, seed, unit, met
         assert np.abs(run.position[:, b] - exact).max() < 1e-9 * unit
 
 
-def test_rounded_axes_count_as_redundant_where_that_is_asked_for():
-    scene = SCENES["planar_slider_crank_gravity"]()
-    rounded, times = scene.with_("joint[B].axis", [2e-7, 0.0, 1.0]), [0.1, 0.2]
-    refused = simulate(rounded, times=times)
-    assert refused.outcome.name == "UNDECIDED" and "--rank-tolerance" in refused.message
-    run, planar = (
-        simulate(rounded, times=times, limits=Limits(rank_tolerance=1e-6)),
-        simulate(scene, times=times),
-    )
-    assert run.outcome.name == "COMPLETED" and "count as redundant" in run.message, run.message
-    assert np.abs(run.position - planar.position).max() < 1e-5
+@pytest.mark.parametrize("tolerance", [1e-10, 1e-6])
+def test_rounded_axes_of_a_loop_are_no_success(tolerance):
+    """The axis of one joint off by 2e-7: whether the loop turns or is locked, rounding decides."""
+    scene = SCENES["planar_slider_crank_gravity"]().with_("joint[B].axis", [2e-7, 0.0, 1.0])
+    run = simulate(scene, times=[0.1, 0.2], limits=Limits(rank_tolerance=tolerance, most_steps=3000))
+    assert run.outcome.name != "COMPLETED"
+    assert "7.3e-09" in run.message, run.message
