@@ -96,7 +96,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class HeatMap:
-    """Cells by row and column; ``label`` says what the columns are."""
+    """Cells by row and column; ``label`` names the quantity of the columns."""
 
     caption: str
     label: str

@@ -37,23 +37,37 @@ def exchange(memory):
 
 
 @inlined
+def multiply_row(matrix, i, factor):
+    """Multiply row i of a matrix by a factor."""
+    lanes = matrix.shape[1]
+    for j in range(i * lanes, (i + 1) * lanes, LANES):
+        store(factor * load(matrix, j), matrix, j)
+
+
+@inlined
+def subtract_multiple(matrix, i, factor, k):
+    """Subtract row k of a matrix, times a factor, from row i."""
+    lanes = matrix.shape[1]
+    for j in range(0, lanes, LANES):
+        left = load(matrix, i * lanes + j) - factor * load(matrix, k * lanes + j)
+        store(left, matrix, i * lanes + j)
+
+
+@inlined
 def exchange_one(r, c, rank, solver):
     """Exchange a row of the tableau and a variable: the row over its pivot, then none of it in the others.
 
     Their entries in the variable's lane become minus themselves over the pivot: e - e (1 + 1 / pivot).
     """
-    tableau, lanes = solver.tableau, solver.tableau.shape[1]
+    tableau = solver.tableau
     factor = 1.0 / tableau[r, c]
     tableau[r, c] += 1.0
-    for j in range(0, lanes, LANES):
-        store(factor * load(tableau, r * lanes + j), tableau, r * lanes + j)
+    multiply_row(tableau, r, factor)
     for k in range(rank):
         i = solver.row[k]
         entry = tableau[i, c]
         if i != r and entry != 0.0:
-            for j in range(0, lanes, LANES):
-                left = load(tableau, i * lanes + j) - entry * load(tableau, r * lanes + j)
-                store(left, tableau, i * lanes + j)
+            subtract_multiple(tableau, i, entry, r)
     tableau[r, c] = factor
 
 
@@ -92,7 +106,7 @@ def reduce_inertia(memory):
 
 @inlined
 def reduce_row(i, memory):
-    """Of the momentum that goes with an independent variable: what the dependent ones share in the others."""
+    """Subtract the dependent variables' share from a row of Tᵀ M, and put it into the response."""
     solver, rank, wide = memory.solver, memory.progress.rank, memory.solver.reduced.shape[1]
     reduced, change, nz = solver.reduced, solver.change, solver.order.shape[0]
     for j in range(0, wide, LANES):
@@ -111,28 +125,18 @@ def solve_reduced(memory):
     """The response of the independent variables, by Gauss–Jordan elimination of the reduced mass matrix."""
     solver, rank = memory.solver, memory.progress.rank
     reduced, response, nz = solver.reduced, solver.response, solver.order.shape[0]
-    wide, lanes = reduced.shape[1], response.shape[1]
     for p in range(rank, nz):
         c = solver.order[p]
         solver.last[p] = reduced[c, c]
         factor = 1.0 / reduced[c, c]
-        for j in range(0, lanes, LANES):
-            store(factor * load(response, c * lanes + j), response, c * lanes + j)
-        for j in range(0, wide, LANES):
-            store(factor * load(reduced, c * wide + j), reduced, c * wide + j)
+        multiply_row(response, c, factor)
+        multiply_row(reduced, c, factor)
         for q in range(rank, nz):
             i = solver.order[q]
             entry = reduced[i, c]
             if i != c and entry != 0.0:
-                for j in range(0, lanes, LANES):
-                    left = load(response, i * lanes + j) - entry * load(response, c * lanes + j)
-                    store(left, response, i * lanes + j)
-                for j in range(0, wide, LANES):
-                    store(
-                        load(reduced, i * wide + j) - entry * load(reduced, c * wide + j),
-                        reduced,
-                        i * wide + j,
-                    )
+                subtract_multiple(response, i, entry, c)
+                subtract_multiple(reduced, i, entry, c)
 
 
 @inlined
