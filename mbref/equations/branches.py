@@ -63,6 +63,13 @@ class SingularPosition(NamedTuple):
     sentence: str
 
 
+class Passage(NamedTuple):
+    """Whether velocities at a singular position fit a branch to second order, and one alone."""
+
+    fits: bool
+    is_simple: bool
+
+
 class SecondOrder(NamedTuple):
     """Directions (n + 1, d) allowed by the constraints to first order, and the forms (c, d, d) of second."""
 
@@ -83,30 +90,60 @@ def branches(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Branches:
         return Branches(v[None], NO_OTHER)
     if not len(found.forms):
         return Branches(v[None], OPEN)
-    lines = (_roots(found.forms[0]), False) if freedoms == 2 else _roots_of_many(found.forms)
-    if lines is None:
+    roots, sort = _lines(found)
+    if sort == CONE:
         return Branches(v[None], CONE)
-    roots, multiple = lines
-    roots = [a for a in roots if np.abs(_values(found.forms, a)).max() < SAME]
     velocities = [_velocity(model, found, a, v) for a in roots if _angle(a, mine) > SAME]
     velocities = [w for w in velocities if w is not None]
     if freedoms == 2 and len(found.forms) == 1 and len(roots) == 1:
         return Branches(v[None], TANGENT)
     sentence = f"{1 + len(velocities)} branches" if velocities else ALONE
-    return Branches(np.array([v, *velocities]), sentence + MULTIPLE * multiple)
+    return Branches(np.array([v, *velocities]), sentence + sort)
 
 
 def tangents(model: Model, q: np.ndarray) -> np.ndarray:
     """Directions (b, n) of the branches of undriven motions that meet at q (7 nb,); none where second order
     does not tell simple ones."""
     found = second_order(model, 0.0, q, np.zeros(model.n))
-    freedoms = found.kernel.shape[1]
-    if freedoms < 2 or not len(found.forms):
-        return np.zeros((0, model.n))
-    lines = (_roots(found.forms[0]), False) if freedoms == 2 else _roots_of_many(found.forms)
-    roots = [a for a in lines[0] if np.abs(_values(found.forms, a)).max() < SAME] if lines else []
-    along = [((found.kernel @ a) * found.scale)[:-1] for a in roots]
+    along = [((found.kernel @ a) * found.scale)[:-1] for a in _lines(found)[0]]
     return np.array(along) if along else np.zeros((0, model.n))
+
+
+def passage_of(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Passage | None:
+    """How velocities v (n,) stand to the branches at q (7 nb,), t (s); None where no branches meet."""
+    found = second_order(model, t, q, v)
+    if not _is_singular(found):
+        return None
+    a = _direction(found, v)
+    rank = np.linalg.matrix_rank(2.0 * found.forms @ a, tol=SAME)
+    return Passage(
+        fits=bool(np.abs(_values(found.forms, a)).max() < SAME),
+        is_simple=bool(rank == min(len(found.forms), len(a) - 1)),
+    )
+
+
+def velocities_along_branch(
+    model: Model, q: np.ndarray, v: np.ndarray, given: np.ndarray
+) -> np.ndarray | None:
+    """The velocities (n,) of a branch at q (7 nb,), t = 0, that agree with the given entries (n,) of v (n,).
+
+    Of several branches the one with the least kinetic energy; None where second order tells none.
+    """
+    found = second_order(model, 0.0, q, v)
+    along = [_as_given((found.kernel @ a) * found.scale, v, given) for a in _lines(found)[0]]
+    along = [w for w in along if w is not None]
+    return min(along, key=lambda w: w @ (model.mass * w)) if along else None
+
+
+def _as_given(u: np.ndarray, v: np.ndarray, given: np.ndarray) -> np.ndarray | None:
+    """A direction (n + 1,) at the rate of the given entries of v, or of time; None where it does not fit."""
+    velocities, share = u[:-1], u[:-1] @ np.where(given, u[:-1], 0.0)
+    if abs(u[-1]) > SAME * np.linalg.norm(u):
+        velocities = velocities / u[-1]
+    elif share > SAME**2 * (u @ u):
+        velocities = velocities * (velocities @ np.where(given, v, 0.0)) / share
+    off = np.abs(np.where(given, velocities - v, 0.0)).max()
+    return velocities if off <= SAME * np.abs(v).max() else None
 
 
 def second_order(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> SecondOrder:
@@ -161,6 +198,22 @@ def _values(forms: np.ndarray, a: np.ndarray) -> np.ndarray:
 def _angle(a: np.ndarray, b: np.ndarray) -> float:
     """The angle (rad) between two lines."""
     return float(np.arccos(min(1.0, abs(a @ b))))
+
+
+def _is_singular(found: SecondOrder) -> bool:
+    """Whether a position has more freedoms of first order than any motion of second order."""
+    return found.kernel.shape[1] >= 2 and len(found.forms) > 0
+
+
+def _lines(found: SecondOrder) -> tuple[list[np.ndarray], str]:
+    """Isolated directions (d,) on which all forms are zero; and CONE, MULTIPLE or nothing of the others."""
+    if not _is_singular(found):
+        return [], ""
+    several = (_roots(found.forms[0]), False) if len(found.kernel.T) == 2 else _roots_of_many(found.forms)
+    if several is None:
+        return [], CONE
+    roots, multiple = several
+    return [a for a in roots if np.abs(_values(found.forms, a)).max() < SAME], MULTIPLE * multiple
 
 
 def _roots(form: np.ndarray) -> list[np.ndarray]:

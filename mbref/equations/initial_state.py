@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbref import rotations
+from mbref.equations.branches import MOST_ROWS, passage_of, velocities_along_branch
 from mbref.equations.model import Model, displaced
 from mbref.equations.units import row_lengths
 from mbref.linear_algebra.minimum_norm import MinimumNorm
@@ -17,6 +18,10 @@ LARGE = 40  # rows; above, dense singular values take longer than sparse factors
 GROSS = 0.05  # of the scene's length, or of its speed: a larger inconsistency is a fault
 MOST_ITERATIONS = 30
 OPEN_WEIGHT, REPEATS = 1e-4, 5  # weight of open velocities beside given ones, and how often it is compensated
+BRANCH = (
+    "initial velocities that the scene leaves open at a singular position are those of the branch with the "
+    "least kinetic energy"
+)
 LEAST_WEIGHT = 1e-6  # of a turn that no inertia resists, relative to the largest mass or inertia
 
 
@@ -28,6 +33,7 @@ class Start:
     v: np.ndarray  # (6 nb,)
     position_violation: float  # largest |Φ| before correction (m or rad)
     velocity_violation: float  # largest |Φ_q v - ν| of fully given velocities before correction
+    follows_branch: bool = False  # whether velocities that the scene leaves open are those of a branch
 
     def report(self) -> str:
         """One sentence for the user; empty where nothing but rounding was corrected."""
@@ -36,14 +42,26 @@ class Start:
             parts.append(f"positions were off the constraints by {self.position_violation:.2e}")
         if self.velocity_violation > 1e-9:
             parts.append(f"velocities by {self.velocity_violation:.2e}")
-        return f"initial {' and '.join(parts)}; corrected" if parts else ""
+        corrected = f"initial {' and '.join(parts)}; corrected" if parts else ""
+        return "; ".join(filter(None, (corrected, BRANCH if self.follows_branch else "")))
 
 
 def consistent_start(model: Model) -> Start:
     """The nearest consistent state; raises SceneError naming the joint that is grossly violated."""
     q, position_violation = corrected_positions(model, model.start())
-    v, velocity_violation = _velocities(model, q)
-    return Start(q, v, position_violation, velocity_violation)
+    v, velocity_violation, leaves_open = _velocities(model, q)
+    along = _along_branch(model, q, v) if leaves_open and np.any(v) else None
+    follows = along is not None
+    return Start(q, along if follows else v, position_violation, velocity_violation, follows)
+
+
+def _along_branch(model: Model, q: np.ndarray, v: np.ndarray) -> np.ndarray | None:
+    """Velocities (6 nb,) along a branch of a singular start that agree with those that the scene gives; None
+    where v (6 nb,) are, or where second order tells no such branch."""
+    passage = passage_of(model, 0.0, q, v) if model.closed_loops and model.m <= MOST_ROWS else None
+    if passage is None or passage.fits:
+        return None
+    return velocities_along_branch(model, q, v, given_velocities(model, q)[1])
 
 
 def _fault(model: Model, row: int, what: str) -> SceneError:
@@ -114,15 +132,15 @@ def given_velocities(model: Model, q: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return v.ravel(), given.ravel()
 
 
-def _velocities(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]:
-    """Velocities that meet Φ_q v = ν, and how far the given ones were from that.
+def _velocities(model: Model, q: np.ndarray) -> tuple[np.ndarray, float, bool]:
+    """Velocities that meet Φ_q v = ν, how far the given ones were from that, and whether some may be open.
 
     Among the solutions those nearest to the given velocities (angular ones times the scene's length);
     velocities left open are least in the metric of M.
     """
     v, given = given_velocities(model, q)
     if model.m > LARGE:
-        return _sparse_velocities(model, q, v, given)
+        return *_sparse_velocities(model, q, v, given), not given.all()
     scale = np.tile(np.repeat([1.0, 1 / model.length], 3), model.nb)
     wanted = v[given] / scale[given]
     terms = model.terms(0.0, q, v)
@@ -142,7 +160,7 @@ def _velocities(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]:
     if open_.size:
         weight = np.sqrt(model.mass) * scale
         x = x - open_ @ _least_norm(weight[:, None] * open_, weight * x)
-    return x * scale, float(np.max(residual, initial=0.0))
+    return x * scale, float(np.max(residual, initial=0.0)), bool(open_.size)
 
 
 def _sparse_velocities(

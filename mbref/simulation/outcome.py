@@ -13,8 +13,8 @@ from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR
 from mbref.motion import Motion
 from mbref.simulation.dead_position import is_at_dead_position
 from mbref.simulation.remedies import remedy
-from mbref.simulation.rest_position import begins_at_rest
 from mbref.simulation.run import Run
+from mbref.simulation.singular_start import begins_at_rest, fits_no_branch
 from mbref.simulation.stepping import (
     CREEPING,
     DONE,
@@ -47,6 +47,11 @@ DEAD_POSITION = (
 REST_POSITION = (
     "the motion begins at rest on a singular position, and the branch along which it is pushed cannot be "
     "followed; velocities of the bodies along a branch tell it"
+)
+
+NO_BRANCH = (
+    "the motion begins on a singular position, and its velocities agree with none of the branches that meet "
+    "there; leave out the velocities of some bodies, and they are made to agree"
 )
 
 NEARLY_DEPENDENT = (
@@ -125,6 +130,8 @@ def _message(run: Run, status: int) -> str:
         return DEAD_POSITION.format(run.memory.loop.clock.time)
     if status == UNDECIDED and run.memory.loop.clock.time == 0.0 and begins_at_rest(run):
         return REST_POSITION
+    if status == UNDECIDED and run.memory.loop.clock.time == 0.0 and fits_no_branch(run):
+        return NO_BRANCH
     rounded = REDUNDANT.format(run.ranks.next) if run.ranks.next > ROUNDING else ""
     if status != DONE:
         return "; ".join(filter(None, (_cause(run, status), rounded, _remedy(run, status))))

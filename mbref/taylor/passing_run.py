@@ -10,10 +10,11 @@ from mbref.kernels.layout import OK
 from mbref.method import Method
 from mbref.scene import Scene
 from mbref.simulation.limits import Limits
-from mbref.simulation.stepping import DONE, PAUSED
+from mbref.simulation.singular_start import Leaving
+from mbref.simulation.stepping import DONE, PAUSED, UNDECIDED
 from mbref.taylor.moment import Moment, moment_of
 from mbref.taylor.passing import look_along, pass_on, place_crossing
-from mbref.taylor.series_run import SeriesRun
+from mbref.taylor.series_run import OFF, SeriesRun
 
 BEHIND = 3e-3  # lengths or rad behind a crossing where another branch is entered
 CORRECTIONS = 6  # of the state there
@@ -77,31 +78,40 @@ class PassingRun(SeriesRun):
         moved = displaced(crossing.coordinates, ahead * velocities), velocities
         return self._come_from(crossing, velocities, ahead, moved)
 
-    def leave_rest(self, q: np.ndarray, acceleration: np.ndarray) -> int:
-        """Go on from rest at q (7 nb,), t = 0, along a branch with an acceleration (n,): PAUSED, DONE or why
-        that cannot be."""
-        self.crossings, still = [], np.zeros_like(acceleration)
-        ahead = self._time_in_which(0.5 * acceleration) ** 0.5
-        start = Passed(0.0, q, still, SMOOTH)
-        moved = displaced(q, 0.5 * ahead**2 * acceleration), ahead * acceleration
-        status = self._come_from(start, still, ahead, moved)
+    def leave(self, way: Leaving) -> int:
+        """Go on from a singular position at t = 0: PAUSED, DONE or why that cannot be."""
+        q, v, acceleration = way
+        moves, self.crossings = np.any(v), []
+        ahead = self._time_in_which(v) if moves else self._time_in_which(0.5 * acceleration) ** 0.5
+        ahead = min(ahead, 0.5 * float(self.times[-1]))
+        moved = displaced(q, ahead * v + 0.5 * ahead**2 * acceleration), v + ahead * acceleration
+        status = self._come_from(Passed(0.0, q, v, SMOOTH), v, ahead, moved)
+        if status == PAUSED and moves and self._misses(q, v, ahead):
+            return UNDECIDED
         if status == PAUSED:
-            self._put_samples_before(ahead, q, acceleration)
+            self._put_samples_before(ahead, way)
         self.taylor.progress.entered = self.least_pivot()
         while status == PAUSED and not self.taylor.progress["is_clear"]:
             status = self._pass_on()
         return status
 
-    def _put_samples_before(self, ahead: float, q: np.ndarray, acceleration: np.ndarray) -> None:
-        """The samples from rest at q, t = 0, until a time (s) about which the series now begins."""
+    def _misses(self, q: np.ndarray, v: np.ndarray, ahead: float) -> bool:
+        """Whether the series, a time ahead (s) of its beginning, misses coordinates and velocities."""
+        there = self._state_at(-ahead)
+        moved, changed = np.abs(displacement(q, there[0])).max(), np.abs(there[1] - v).max()
+        return bool(moved > OFF * max(1.0, self.model.length) or changed > OFF * np.abs(v).max())
+
+    def _put_samples_before(self, ahead: float, way: Leaving) -> None:
+        """The samples from a singular position at t = 0 until a time (s) about which the series begins."""
         clock = self.memory.loop.clock
         for k in range(int(np.searchsorted(self.times, ahead))):
             t = float(self.times[k])
-            if t > 0.0:
-                there = *self._state_at(t - ahead), self.memory.equations.system.acceleration.copy()
-            else:
-                there = q, np.zeros_like(acceleration), acceleration
-            self._put_sample(k, *there)
+            q, v = self._state_at(t - ahead)
+            acceleration = self.memory.equations.system.acceleration.copy()
+            if t == 0.0:
+                q, v = way.coordinates, way.velocities
+                acceleration = acceleration if np.any(v) else way.acceleration
+            self._put_sample(k, q, v, acceleration)
             clock.sample = k + 1
         self._state_at(0.0)
         self.began = moment_of(self)

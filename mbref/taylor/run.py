@@ -17,8 +17,8 @@ from mbref.kernels.layout import NOT_CONVERGED, OK
 from mbref.method import Method
 from mbref.scene import Scene
 from mbref.simulation.limits import GENERIC, Limits
-from mbref.simulation.rest_position import leaving_acceleration
 from mbref.simulation.run import Run
+from mbref.simulation.singular_start import fits_no_branch, leaving
 from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, TOO_MANY_STEPS, UNDECIDED
 from mbref.taylor.moment import Moment, enter, moment_of
 from mbref.taylor.passing import hand_over
@@ -42,7 +42,7 @@ class CrossingRun(Run):
 
     def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
         """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
-        status = self._passage.leave_rest()
+        status = self._passage.leave_start()
         if status == PAUSED and self.memory.loop.clock.time > 0.0:
             self.enter_state()
         return super().advance(progress) if status == PAUSED else (status, 0.0)
@@ -69,7 +69,7 @@ class TaylorRun(SeriesRun):
     def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
         """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
         before, began, passage = self.making, time.process_time(), Passage(self)
-        status = passage.leave_rest()
+        status = passage.leave_start()
         if status == PAUSED:
             status = self.expand(self.times[-1])
             status = PAUSED if status == OK else status
@@ -97,15 +97,14 @@ class Passage:
         series = self._series()
         return self._followed(series, moment_of(self._run), series.cross)
 
-    def leave_rest(self) -> int:
-        """Leave a position at t = 0 where branches meet and the run rests: PAUSED, also where there is none,
-        DONE at the end, else why the motion cannot be followed."""
-        run, start = self._run, self._run.start.q
-        acceleration = leaving_acceleration(run)
-        if acceleration is None:
-            return PAUSED
+    def leave_start(self) -> int:
+        """Leave a singular position at t = 0: PAUSED, also where there is none, DONE at the end, else why the
+        motion cannot be followed."""
+        way = leaving(self._run) if self._run.times[-1] > 0.0 else None
+        if way is None:
+            return UNDECIDED if fits_no_branch(self._run) else PAUSED
         series = self._series()
-        return self._followed(series, moment_of(run), lambda: series.leave_rest(start, acceleration))
+        return self._followed(series, moment_of(self._run), lambda: series.leave(way))
 
     def _followed(self, series: PassingRun, before: Moment, follow: Callable[[], int]) -> int:
         """Hand the run over to series and back, which follow its motion from a moment on."""

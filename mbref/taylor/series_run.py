@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mbref.kernels.layout import OK
+from mbref.kernels.layout import OK, SINGULAR
 from mbref.kernels.named_memory import allocate, packed, record
 from mbref.method import Method
 from mbref.scene import Scene
@@ -114,8 +114,13 @@ class SeriesRun(Run):
         self.taylor.angles[:] = self.memory.equations.angles[self.taylor.polynomials.torsions.slot]
         self.taylor.progress.end = until
         status = int(enter(self._packed_taylor.argument))
-        starts = status == OK and float(self.memory.loop.clock.time) == 0.0
-        return UNDECIDED if starts and (self._hides_rank() or self._misses_state()) else status
+        return status if self.memory.loop.clock["time"] > 0.0 else self._judged_start(status)
+
+    def _judged_start(self, status: int) -> int:
+        """UNDECIDED instead of OK, or of rows whose rank rounding changes, where rounding hides the motion."""
+        if status == SINGULAR and self.memory.equations.system.settings.nearly_dependent:
+            return UNDECIDED
+        return UNDECIDED if status == OK and (self._hides_rank() or self._misses_state()) else status
 
     def _hides_rank(self) -> bool:
         """Whether rounding hides the freedoms of a start at which rows are nearly dependent.

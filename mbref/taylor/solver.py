@@ -13,7 +13,7 @@ from mbref.kernels.layout import OK, SINGULAR
 from mbref.taylor.lanes import LANES, load, store
 from mbref.taylor.partition import choose
 
-KEPT = 0.05  # a pivot over its first below which rows and variables are chosen again
+KEPT = 0.5  # a pivot over its first below which rows and variables are chosen again
 WITHOUT_INERTIA = 1e-13  # of the largest inertia of a variable
 
 

@@ -1,0 +1,82 @@
+"""Starts on a singular position, which the motion leaves along one of the branches that meet there.
+
+Φ_q leaves more freedoms there than any branch has, and accelerations that it allows leave the constraints.
+A motion goes on along the branch of its velocities, which is the only one where the rates of the second-order
+forms along these velocities are independent.  From rest, Gauss's principle of least constraint takes, of the
+accelerations along the branches, the one nearest to that of free bodies, in the metric of M.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mbref.equations.branches import MOST_ROWS, passage_of, tangents
+from mbref.simulation.run import Run
+
+STILL = 1e-12  # of a force along a branch over the largest: a body that nothing moves stays at rest
+
+
+class Leaving(NamedTuple):
+    """How a motion leaves a singular position at t = 0: velocities (n,), from rest the acceleration (n,)."""
+
+    coordinates: np.ndarray
+    velocities: np.ndarray
+    acceleration: np.ndarray
+
+
+def leaving(run: Run) -> Leaving | None:
+    """How a run leaves its start where that is a singular position whose branches second order tells apart;
+    None elsewhere."""
+    if begins_at_rest(run):
+        acceleration = leaving_acceleration(run)
+        return None if acceleration is None else Leaving(run.start.q, run.start.v, acceleration)
+    passage = passage_of(run.model, 0.0, run.start.q, run.start.v) if begins_in_motion(run) else None
+    if passage is None or not (passage.fits and passage.is_simple):
+        return None
+    return Leaving(run.start.q, run.start.v, np.zeros_like(run.start.v))
+
+
+def fits_no_branch(run: Run) -> bool:
+    """Whether a run begins on a singular position with velocities that agree with no branch there."""
+    passage = passage_of(run.model, 0.0, run.start.q, run.start.v) if begins_in_motion(run) else None
+    return passage is not None and not passage.fits
+
+
+def freedoms_of_first_order(run: Run) -> int:
+    """Freedoms that Φ_q leaves at the start of a run that projects; 0 where ranks are not looked at."""
+    if not run.method.stabilisation.projects or run.model.m > MOST_ROWS:
+        return 0
+    return int(run.part.active.velocities.size - run.memory.watch.generic_rank)
+
+
+def begins_at_rest(run: Run) -> bool:
+    """Whether a run begins closed loops without drivers at rest, with two freedoms of first order or more."""
+    if run.scene.driver or np.any(run.start.v) or not run.model.closed_loops:
+        return False
+    return freedoms_of_first_order(run) > 1
+
+
+def begins_in_motion(run: Run) -> bool:
+    """Whether a run begins closed loops in motion, with dependent rows that leave two freedoms of first order
+    or more: time is one of them where drivers prescribe the motion."""
+    if not np.any(run.start.v) or not run.model.closed_loops or run.ranks.rank == run.memory.pivots.size:
+        return False
+    return freedoms_of_first_order(run) > (0 if run.scene.driver else 1)
+
+
+def leaving_acceleration(run: Run) -> np.ndarray | None:
+    """The acceleration (n,) of a run from rest along a branch; None unless several branches meet there.
+
+    It is u (uᵀ g) / (uᵀ M u) of the direction u for which (uᵀ g)² / (uᵀ M u) is largest.
+    """
+    found = tangents(run.model, run.start.q)
+    if len(found) < 2:
+        return None
+    terms = run.model.terms(0.0, run.start.q, run.start.v)
+    push, inertia = found @ terms.force, np.einsum("bi,i,bi->b", found, run.model.mass, found)
+    best = int(np.argmax(push**2 / inertia))
+    if not abs(push[best]) > STILL * np.abs(terms.force).max(initial=0.0) * np.abs(found[best]).max():
+        return None
+    return found[best] * (push[best] / inertia[best])
