@@ -117,7 +117,7 @@ class SeriesRun(Run):
         return status if self.memory.loop.clock["time"] > 0.0 else self._judged_start(status)
 
     def _judged_start(self, status: int) -> int:
-        """UNDECIDED instead of OK, or of rows whose rank rounding changes, where rounding hides the motion."""
+        """UNDECIDED in place of OK, or of a rank that rounding changes, where rounding hides the motion."""
         if status == SINGULAR and self.memory.equations.system.settings.nearly_dependent:
             return UNDECIDED
         return UNDECIDED if status == OK and (self._hides_rank() or self._misses_state()) else status
