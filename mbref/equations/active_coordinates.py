@@ -14,37 +14,48 @@ from dataclasses import replace
 import numpy as np
 
 from mbref.equations.initial_state import Start, given_velocities
-from mbref.equations.model import Model, displaced
-from mbref.equations.random_states import random_states
-from mbref.kernels.scene_layout import Primitives, SceneData
+from mbref.equations.model import Model, Terms
+from mbref.equations.random_states import RandomStates, random_states
 
 STATES = 2  # random states, so that an accidental zero at one does no harm
 STILL = 1e-12  # of the scene's length, of 1, or of the largest velocity: the rounding of corrections
 
 
-def active_entries(model: Model, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def active_entries(
+    model: Model, q: np.ndarray, v: np.ndarray, read: list[RandomStates] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Which velocities (n,) can move, and which Jacobian entries (m, 12) of theirs can be other than zero.
 
     q (7 nb,) and v (6 nb,) are the start.  Columns of entries are those of ``layout.System.blocks``.
+    The states at which equations are read are added to ``read``.
     """
-    inside, states = model.entry_columns < model.n, random_states(1, STATES, model.n)
+    states = random_states(1, STATES, model.n)
     moving = np.zeros(model.n, dtype=bool)
-    entries = np.zeros((model.m, 12), dtype=bool)
+    entries, start_rows, start_columns = patterns(model, at_start(model, q, v))
+    start_columns |= v != 0
     while True:
-        driving_rows, driving_columns = np.zeros(model.m, dtype=bool), v != 0
-        samples = [(0.0, q, v)]
-        for state in states:
-            moved = displaced(q, moving * state.displacement)
-            samples.append((state.part * model.scene.duration, moved, moving * state.velocity))
-        for sample in samples:
-            terms = model.blocks(*sample)
-            entries |= (terms.jacobian != 0) & inside
-            driving_rows |= (terms.gamma != 0) | (terms.phi != 0) | (terms.nu != 0)
-            driving_columns |= terms.force != 0
-        found, rows = _reached(model, entries, driving_rows, driving_columns)
+        sample = states.of(moving, moving)
+        if read is not None:
+            read.append(sample)
+        others, rows, columns = patterns(model, model.at(q, sample))
+        entries |= others
+        found, driven = _reached(model, entries, rows | start_rows, columns | start_columns)
         if np.array_equal(found, moving):
-            return moving, entries & rows[:, None]
+            return moving, entries & driven[:, None]
         moving = found
+
+
+def at_start(model: Model, q: np.ndarray, v: np.ndarray) -> Terms:
+    """The terms at t = 0, one state as ``Model.along`` has it."""
+    return model.along(np.zeros(1), q.reshape(1, -1), v.reshape(1, -1))
+
+
+def patterns(model: Model, terms: Terms) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which entries (m, 12) of the Jacobian are other than zero at one of k states; which rows (m,) ask for a
+    motion, and on which columns (n,) a force acts."""
+    entries = (terms.jacobian != 0).any(axis=0) & (model.entry_columns < model.n)
+    rows = ((terms.gamma != 0) | (terms.phi != 0) | (terms.nu != 0)).any(axis=0)
+    return entries, rows, (terms.force != 0).any(axis=0)
 
 
 def _reached(
@@ -98,10 +109,7 @@ def _mixed(reached: set[int], axes: Sequence[int]) -> set[int]:
         reached = found
 
 
-def active_scene(model: Model, entries: np.ndarray) -> SceneData:
-    """The model's data without the primitives none of whose rows has an entry (m, 12)."""
-    primitives = model.data.primitives
+def active_primitives(model: Model, entries: np.ndarray) -> np.ndarray:
+    """The primitives, by number, that have a row with an entry (m, 12)."""
     rows = np.flatnonzero(entries.any(axis=1))
-    kept = np.unique(np.searchsorted(primitives.row, rows, side="right") - 1)
-    chosen = Primitives(*(np.ascontiguousarray(column[kept]) for column in primitives))
-    return model.data._replace(primitives=chosen)
+    return np.unique(np.searchsorted(model.structure.row, rows, side="right") - 1)

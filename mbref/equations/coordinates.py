@@ -47,6 +47,13 @@ def displace(q, x, change):
     normalise(q)
 
 
+@kernel
+def displace_all(q, x, change):
+    """``displace`` of every row of q (k, 7 nb) by one of x (k, 6 nb)."""
+    for k in range(q.shape[0]):
+        displace(q[k], x[k], change)
+
+
 @inlined
 def expand(y, active, state):
     """The whole state of y; entries that y does not have stay as they are."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from mbref.equations.loads import forces
 from mbref.equations.primitives import constraints
-from mbref.kernels.compilation import FLOAT, VECTOR, entry, inlined, kernel
+from mbref.kernels.compilation import INT, MATRIX, VECTOR, entry, inlined, kernel
 from mbref.kernels.layout import EQUATIONS
+from mbref.linear_algebra.vectors import copy
 
 
 @inlined
@@ -74,12 +75,22 @@ def evaluate(t, q, v, equations):
     forces(equations)
 
 
-@entry(FLOAT(FLOAT, VECTOR, VECTOR, EQUATIONS))
-def evaluate_all(t, q, v, equations):
-    """``evaluate`` with Φ', for Python; returns t."""
-    evaluate(t, q, v, equations)
-    violation_rate(v, equations)
-    return t
+@entry(INT(VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, EQUATIONS))
+def evaluate_along(times, q, v, blocks, rows, forces, equations):
+    """``evaluate`` at k states, for Python: Φ_q as blocks (k, 12 m), (Φ, ν, γ) (k, 3 m), g (k, n); returns k.
+
+    From times (k,), coordinates q (k, 7 nb) and velocities v (k, n).
+    """
+    count, m = times.shape[0], equations.rows.phi.shape[0]
+    for k in range(count):
+        evaluate(times[k], q[k], v[k], equations)
+        found = equations.system.blocks.reshape(-1)
+        copy(found, blocks[k])
+        copy(equations.rows.phi, rows[k, :m])
+        copy(equations.rows.nu, rows[k, m : 2 * m])
+        copy(equations.rows.gamma, rows[k, 2 * m :])
+        copy(equations.system.force, forces[k])
+    return count
 
 
 @inlined

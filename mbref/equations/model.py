@@ -14,13 +14,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbref import rotations
-from mbref.equations.coordinates import displace
-from mbref.equations.evaluation import evaluate_all
+from mbref.equations.coordinates import displace_all
+from mbref.equations.evaluation import evaluate_along
 from mbref.equations.loads import has_angles
 from mbref.equations.packing import packed_drivers, packed_loads, packed_primitives
+from mbref.equations.random_states import RandomStates
 from mbref.equations.units import body_lengths, metric_root
 from mbref.kernels.layout import Counts, Equations, Frames, Settings, System
-from mbref.kernels.named_memory import allocate, packed, record
+from mbref.kernels.lent_memory import copied, fill, lent, shapes_of, take_back
+from mbref.kernels.named_memory import allocate, record
 from mbref.kernels.scene_layout import Bodies, SceneData
 from mbref.scene import (
     GROUND,
@@ -64,33 +66,46 @@ class Model:
         self._index[FRAME] = self.nb
         bodies = self._pack_bodies()
         lengths = body_lengths(self.bodies, self.joints)
-        primitives, self.row_joint, self._row_bodies = packed_primitives(self)
-        self.m = len(self.row_joint)
-        self.entry_columns = (6 * self._row_bodies[:, :, None] + np.arange(6)).reshape(self.m, 12)
+        self.structure, primitives = packed_primitives(self)
+        self.m, self.row_joint = len(self.structure.row_joint), self.structure.row_joint
+        self.entry_columns = self.structure.entry_columns
         self.data = SceneData(
             gravity=np.array(self._gravity()),
             lengths=lengths,
             metric_root=metric_root(self.mass, lengths),
             bodies=bodies,
             primitives=primitives,
-            row_bodies=self._row_bodies,
+            row_bodies=self.structure.row_bodies,
             drivers=packed_drivers(scene.driver),
             loads=packed_loads(self),
         )
-        self._own = packed(self.equations())
+        self._lend_memory()
+
+    def _lend_memory(self) -> None:
+        """Have memory of evaluations with the numbers of this scene."""
+        self._own = lent((Equations, *self.sizes.values(), shapes_of(self.data)), self.equations)
+        self.put_numbers(self._own.values, self.data)
+
+    def give_back(self) -> None:
+        """Leave the memory of evaluations to the next model; this one evaluates no more."""
+        take_back(self._own)
+        del self._own
 
     @property
     def sizes(self) -> dict[str, int]:
         """Sizes of the model's memory (see ``kernels.layout``)."""
-        angles = max(1, int(np.sum(self.data.loads.angle >= 0)))
+        angles = max(1, int(np.count_nonzero(self.data.loads.angle >= 0)))
         return {"nb": self.nb, "n": self.n, "m": self.m, "angles": angles, "dense_rows": 0, "width": 12}
 
-    def equations(self, sizes: Mapping[str, int] | None = None, **system: Any) -> Equations:
-        """Fresh memory of an evaluation; ``system`` names fields of its System that are given."""
-        sizes = sizes or self.sizes
+    def equations(
+        self, sizes: Mapping[str, int] | None = None, data: SceneData | None = None, **system: Any
+    ) -> Equations:
+        """Fresh memory of an evaluation, with a copy of the scene's data or of others.
+
+        ``system`` names fields of its System that are given.
+        """
+        sizes, data = sizes or self.sizes, data or self.data
         defaults = {
-            "mass": self.mass.copy(),
-            "inverse_root": 1 / np.sqrt(np.where(self.mass > 0, self.mass, 1.0)),
             "settings": record(Settings()),
             "counts": record(Counts()),
             "options": None,
@@ -98,10 +113,18 @@ class Model:
         }
         frames = allocate(Frames, sizes)
         frames.rotation[:, ::4] = 1.0
-        return allocate(
-            Equations, sizes, scene=self.data, frames=frames,
+        found = allocate(
+            Equations, sizes, scene=copied(data), frames=frames,
             system=allocate(System, sizes, **{**defaults, **system}),
         )  # fmt: skip
+        self.put_numbers(found, data)
+        return found
+
+    def put_numbers(self, equations: Equations, data: SceneData) -> None:
+        """Have memory of evaluations hold the data of a scene and the masses of this model."""
+        fill(equations.scene, data)
+        equations.system.mass[:] = self.mass
+        equations.system.inverse_root[:] = 1 / np.sqrt(np.where(self.mass > 0, self.mass, 1.0))
 
     @property
     def has_angles(self) -> bool:
@@ -120,17 +143,22 @@ class Model:
 
     def dense(self, blocks: np.ndarray) -> np.ndarray:
         """Φ_q (…, m, n) from its blocks (…, m, 12)."""
-        matrix, rows = np.zeros((*blocks.shape[:-1], self.nb + 1, 6)), np.arange(self.m)
+        matrix, rows = np.zeros((*blocks.shape[:-1], self.nb + 1, 6)), self.structure.rows
         for side in range(2):
-            matrix[..., rows, self._row_bodies[:, side], :] = blocks[..., 6 * side : 6 * side + 6]
+            matrix[..., rows, self.structure.row_bodies[:, side], :] = blocks[..., 6 * side : 6 * side + 6]
         return matrix[..., : self.nb, :].reshape(*blocks.shape[:-1], self.n)
 
-    def blocks_along(self, times: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """Blocks (k, m, 12) of Φ_q at coordinates q (k, nb, 7) at times (k,) in s."""
-        at_rest, found = np.zeros(self.n), np.empty((len(times), self.m, 12))
-        for blocks, t, each in zip(found, times, q, strict=True):
-            blocks[:] = self.blocks(t, each.ravel(), at_rest).jacobian
-        return found
+    def along(self, times: np.ndarray, q: np.ndarray, v: np.ndarray) -> Terms:
+        """The terms at k states, with the blocks (k, m, 12) in place of Jacobians; mass (n,) is that of all.
+
+        From times (k,) in s, q (k, 7 nb) and v (k, n).
+        """
+        count = len(times)
+        blocks, rows = np.empty((count, 12 * self.m)), np.empty((count, 3 * self.m))
+        forces = np.empty((count, self.n))
+        evaluate_along(times, q, v, blocks, rows, forces, self._own.packed.argument)
+        phi, nu, gamma = (rows[:, k * self.m : (k + 1) * self.m] for k in range(3))
+        return Terms(self.mass, blocks.reshape(count, self.m, 12), phi, nu, gamma, forces)
 
     def sparse(self, blocks: np.ndarray) -> csr_array:
         """Φ_q (m, n) from its blocks (m, 12), without zeros."""
@@ -142,13 +170,18 @@ class Model:
 
     def blocks(self, t: float, q: np.ndarray, v: np.ndarray) -> Terms:
         """The terms with the blocks (m, 12) of both bodies' columns in place of the Jacobian."""
-        own = self._own.values
-        evaluate_all(float(t), np.ascontiguousarray(q), np.ascontiguousarray(v), self._own.argument)
-        rows = own.rows
-        return Terms(
-            self.mass, own.system.blocks.copy(), rows.phi.copy(), rows.nu.copy(), rows.gamma.copy(),
-            own.system.force.copy(),
-        )  # fmt: skip
+        at = np.ascontiguousarray(q).reshape(1, -1), np.ascontiguousarray(v).reshape(1, -1)
+        found = self.along(np.array([float(t)]), *at)
+        return Terms(self.mass, found.jacobian[0], found.phi[0], found.nu[0], found.gamma[0], found.force[0])
+
+    def blocks_along(self, times: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """Blocks (k, m, 12) of Φ_q at coordinates q (k, nb, 7) at times (k,) in s."""
+        return self.along(times, q.reshape(len(q), 7 * self.nb), np.zeros((len(q), self.n))).jacobian
+
+    def at(self, q: np.ndarray, states: RandomStates) -> Terms:
+        """``along`` at states about coordinates q (7 nb,), of times that are parts of the duration."""
+        moved = all_displaced(q, states.displacement)
+        return self.along(states.part * self.scene.duration, moved, states.velocity)
 
     @cached_property
     def length(self) -> float:
@@ -232,8 +265,14 @@ class Model:
 
 def displaced(q: np.ndarray, x: np.ndarray) -> np.ndarray:
     """q ⊕ x: coordinates (7 nb,) moved by (δr, δπ') per body (6 nb,), see ``coordinates.displace``."""
-    moved = np.ascontiguousarray(q, dtype=float).copy()
-    displace(moved, np.ascontiguousarray(x, dtype=float), np.zeros_like(moved))
+    return all_displaced(q, x.reshape(1, -1))[0]
+
+
+def all_displaced(q: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """q ⊕ x (k, 7 nb) for each of x (k, 6 nb)."""
+    moved = np.empty((len(x), q.size))
+    moved[:] = q
+    displace_all(moved, np.ascontiguousarray(x, dtype=float), np.zeros(q.size))
     return moved
 
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbref.equations.joints import driver_primitive, primitives_of
-from mbref.equations.joints.base import ROWS_OF, Primitive, frame
+from mbref.equations.joints.base import Primitive, Vector, frame
+from mbref.equations.structure import Structure, structure_of
 from mbref.kernels.named_memory import stacked
 from mbref.kernels.scene_layout import FORCE, MOMENT, SPRING, TORSION_SPRING, Drivers, Loads, Primitives
 from mbref.scene import Driver, Force, Joint, Load, Moment, SceneError, Sine, Spring, TorsionSpring
@@ -19,34 +20,37 @@ if TYPE_CHECKING:
 AT_REST = Sine(amplitude=0.0, frequency=0.0, phase=0.0)
 
 
-def packed_primitives(model: Model) -> tuple[Primitives, tuple[str, ...], np.ndarray]:
-    """The primitives of all joints and drivers; of every row its joint's name (m,) and its bodies (m, 2)."""
+def packed_primitives(model: Model) -> tuple[Structure, Primitives]:
+    """The structure of the constraint rows, and the primitives of all joints and drivers."""
     driven = {driver.joint: k for k, driver in enumerate(model.scene.driver)}
     listed = [(joint, primitive) for joint in model.joints for primitive in _of_joint(joint, driven)]
-    rows = [ROWS_OF[primitive.kind] for _, primitive in listed]
-    pairs = [[model.index(name) for name in joint.bodies] for joint, _ in listed]
-    bodies = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-    first, second = bodies.T.copy()
-
-    def column(field: str, dtype: type = float, *width: int) -> np.ndarray:
-        values = [getattr(primitive, field) for _, primitive in listed]
-        return np.array(values, dtype=dtype).reshape(-1, *width)
-
-    primitives = Primitives(
-        kind=column("kind", np.int64),
-        first=first,
-        second=second,
-        driver=np.array([driven[j.name] if p.driven else -1 for j, p in listed], dtype=np.int64),
-        row=np.cumsum([0, *rows], dtype=np.int64)[:-1],
-        point_first=model.points(first, column("point_first", float, 3)),
-        point_second=model.points(second, column("point_second", float, 3)),
-        direction_first=model.directions(first, column("first", float, 3)),
-        turning_first=model.directions(first, column("turning", float, 3)),
-        direction_second=model.directions(second, column("second", float, 3)),
-        length=column("length"),
+    structure = structure_of(
+        model.nb,
+        tuple(
+            (p.kind, joint.name, *map(model.index, joint.bodies), driven[joint.name] if p.driven else -1)
+            for joint, p in listed
+        ),
     )
-    names = [joint.name for (joint, _), count in zip(listed, rows, strict=True) for _ in range(count)]
-    return primitives, tuple(names), np.repeat(bodies, rows, axis=0)
+    vectors = np.array([_vectors(p) for _, p in listed], dtype=float).reshape(-1, 5, 3).swapaxes(0, 1)
+    directions = model.directions(structure.of_directions, vectors[2:].reshape(-1, 3)).reshape(3, -1, 3)
+    return structure, Primitives(
+        kind=structure.kind,
+        first=structure.first,
+        second=structure.second,
+        driver=structure.driver,
+        row=structure.row,
+        point_first=model.points(structure.first, vectors[0]),
+        point_second=model.points(structure.second, vectors[1]),
+        direction_first=directions[0],
+        turning_first=directions[1],
+        direction_second=directions[2],
+        length=np.array([p.length for _, p in listed], dtype=float),
+    )
+
+
+def _vectors(p: Primitive) -> tuple[Vector, ...]:
+    """Two points, then three directions, in the order of ``Structure.of_directions``."""
+    return p.point_first, p.point_second, p.first, p.turning, p.second
 
 
 def _of_joint(joint: Joint, driven: Mapping[str, int]) -> list[Primitive]:

@@ -11,18 +11,23 @@ from typing import NamedTuple
 import numpy as np
 
 
-class RandomState(NamedTuple):
-    """A time as a part of the duration, a displacement (n,) of the coordinates, and velocities (n,)."""
+class RandomStates(NamedTuple):
+    """k times as parts of the duration, displacements (k, n) of the coordinates, and velocities (k, n)."""
 
-    part: float
+    part: np.ndarray
     displacement: np.ndarray
     velocity: np.ndarray
 
+    def of(self, displacing: np.ndarray, moving: np.ndarray | None = None) -> RandomStates:
+        """The same with only these coordinates (n,) displaced, and these velocities (n,) or none."""
+        velocity = np.zeros_like(self.velocity) if moving is None else moving * self.velocity
+        return RandomStates(self.part, displacing * self.displacement, velocity)
+
 
 @lru_cache(maxsize=64)
-def random_states(seed: int, count: int, n: int) -> tuple[RandomState, ...]:
+def random_states(seed: int, count: int, n: int) -> RandomStates:
     """So many states, the same for the same arguments."""
     rng = np.random.default_rng(seed)
-    return tuple(
-        RandomState(rng.uniform(0.1, 1.0), rng.normal(size=n), rng.normal(size=n)) for _ in range(count)
-    )
+    drawn = [(rng.uniform(0.1, 1.0), rng.normal(size=n), rng.normal(size=n)) for _ in range(count)]
+    part, displacement, velocity = map(np.array, zip(*drawn, strict=True))
+    return RandomStates(part, displacement, velocity)

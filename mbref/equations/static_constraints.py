@@ -21,13 +21,13 @@ from typing import NamedTuple
 import numpy as np
 
 from mbref.equations.initial_state import LARGE, Start
-from mbref.equations.model import Model, displaced
-from mbref.equations.random_states import random_states
+from mbref.equations.model import Model
+from mbref.equations.random_states import RandomStates, random_states
 from mbref.kernels.compilation import inlined
-from mbref.kernels.layout import SparseFactor, StaticRows
+from mbref.kernels.layout import StaticRows, Symbolic
 from mbref.linear_algebra.minimum_norm import MinimumNorm
 from mbref.linear_algebra.redundancy import dense_null_shares, null_shares
-from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation, unsigned
+from mbref.linear_algebra.symbolic_factorisation import symbolic_factorisation, unsigned
 
 STATES = 3  # random states at which rows are examined
 MOST = 3  # columns that a group of rows holds
@@ -60,10 +60,10 @@ def lies_in(columns: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     return np.append(wanted, np.zeros(6, dtype=bool))[columns]
 
 
-def reduced_factor(
+def reduced_pattern(
     moving: np.ndarray, entries: np.ndarray, columns: np.ndarray, held: Sequence[Held]
-) -> SparseFactor:
-    """Memory of the sparse factor over the active columns (n,) that no row holds.
+) -> tuple[Symbolic, StaticRows]:
+    """The factorisation over the active columns (n,) that no row holds, and the rows that hold the others.
 
     ``entries`` (m, 12) says which numbers of the Jacobian's blocks are other than zero, ``columns`` (m, 12)
     has their columns.
@@ -71,8 +71,7 @@ def reduced_factor(
     static = _static_rows(entries, columns, held)
     active = moving & ~are_held(held, moving.size)
     row, entry = np.nonzero(entries & lies_in(columns, active))
-    symbolic = symbolic_factorisation(row, columns[row, entry], 12 * row + entry, active)
-    return sparse_factor(symbolic, static)
+    return symbolic_factorisation(row, columns[row, entry], 12 * row + entry, active), static
 
 
 def _static_rows(entries: np.ndarray, columns: np.ndarray, held: Sequence[Held]) -> StaticRows:
@@ -95,37 +94,65 @@ def _static_rows(entries: np.ndarray, columns: np.ndarray, held: Sequence[Held])
     return StaticRows(*map(unsigned, (rows, starts, own, own_columns, firsts, others)))
 
 
+class Tried(NamedTuple):
+    """Rows that may hold these columns, in a round of random states, and those of them that do."""
+
+    round: int
+    rows: list[int]
+    columns: tuple[int, ...]
+    chosen: list[int]
+
+
+class Asked:
+    """What was asked of a scene's numbers to find the rows that hold columns."""
+
+    def __init__(self) -> None:
+        self.read: list[RandomStates] = []  # at which the Jacobian was read
+        self.tried: list[Tried] = []
+        self.shared = np.zeros(0, dtype=int)  # rows that may be redundant
+
+
 def held_by_rows(
-    model: Model, start: Start, moving: np.ndarray, entries: np.ndarray
+    model: Model, start: Start, moving: np.ndarray, entries: np.ndarray, asked: Asked | None = None
 ) -> tuple[list[Held], np.ndarray]:
     """Groups of statically determined rows and the active velocities (n,) that they hold, in the order found.
 
     And the Jacobian's ``entries`` (m, 12) that can be other than zero while those velocities are zero.
     """
-    can_rest = moving & (model.mass > 0)
-    held, left = _found(model, start.q, moving, entries, can_rest)
-    shared = _shared(model, start, entries, held)
+    can_rest, asked = moving & (model.mass > 0), asked or Asked()
+    held, left = _found(model, start.q, moving, entries, can_rest, asked)
+    asked.shared = np.flatnonzero(_bears_on(model, entries, are_held(held, model.n)))
+    blocks = model.blocks(0.0, start.q, start.v).jacobian
+    redundant = asked.shared[are_redundant(model, blocks, asked.shared)]
+    shared = _columns_of(model, entries, redundant) & are_held(held, model.n)
     if shared.any():
-        held, left = _found(model, start.q, moving, entries, can_rest & ~shared)
+        held, left = _found(model, start.q, moving, entries, can_rest & ~shared, asked)
     return held, left
 
 
-def at_rest(start: Start, held: Sequence[Held]) -> Start:
+def at_rest(start: Start, columns: Sequence[int]) -> Start:
     """The start with zero for the roundings of zero in the velocities held."""
     v = start.v.copy()
-    v[columns_held(held)] = 0.0
+    v[columns] = 0.0
     return replace(start, v=v)
 
 
 def _found(
-    model: Model, q: np.ndarray, moving: np.ndarray, entries: np.ndarray, can_rest: np.ndarray
+    model: Model, q: np.ndarray, moving: np.ndarray, entries: np.ndarray, can_rest: np.ndarray, asked: Asked
 ) -> tuple[list[Held], np.ndarray]:
     """As ``held_by_rows``, of the columns that can rest (n,)."""
     resting = can_rest
     while resting.any():
-        samples, driven = _samples(model, q, moving & ~resting)
+        states = random_states(2, STATES, model.n).of(moving & ~resting)
+        asked.read.append(states)
+        terms = model.at(q, states)
+        samples, driven = terms.jacobian, (terms.nu != 0).any(axis=0)
         left = entries & (samples != 0).any(axis=0)
-        held = list(_holding(_Rows(model, samples, left, driven), moving, can_rest))
+        rows, held = _Rows(model, samples, left, driven), []
+        for bearing, columns, chosen in _tries(rows, moving, can_rest):
+            asked.tried.append(Tried(len(asked.read) - 1, bearing, columns, chosen))
+            if len(chosen) == len(columns):
+                held.append(Held(tuple(bearing[k] for k in chosen), columns))
         found = are_held(held, model.n)
         if not (resting & ~found).any():
             works_against = driven & left.any(axis=1) & ~_bears_on(model, left, moving & ~found)
@@ -134,31 +161,21 @@ def _found(
     return [], entries
 
 
-def _samples(model: Model, q: np.ndarray, displacing: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Jacobian blocks (STATES, m, 12) at random states, and which rows (m,) prescribe a motion."""
-    samples, driven = np.empty((STATES, model.m, 12)), np.zeros(model.m, dtype=bool)
-    for sample, state in zip(samples, random_states(2, STATES, model.n), strict=True):
-        t = state.part * model.scene.duration
-        terms = model.blocks(t, displaced(q, displacing * state.displacement), np.zeros(model.n))
-        sample[:] = terms.jacobian
-        driven |= terms.nu != 0
-    return samples, driven
-
-
 def _bears_on(model: Model, entries: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Which rows (m,) have an entry (m, 12) in one of these columns (n,)."""
     return (entries & lies_in(model.entry_columns, columns)).any(axis=1)
 
 
-def _shared(model: Model, start: Start, entries: np.ndarray, held: Sequence[Held]) -> np.ndarray:
-    """Columns (n,) among those held in which a row has an entry that is redundant at the start."""
-    columns, of_held = np.zeros(model.n + 6, dtype=bool), are_held(held, model.n)
-    rows = np.flatnonzero(_bears_on(model, entries, of_held))
-    if rows.size:
-        blocks = model.blocks(0.0, start.q, start.v).jacobian
-        redundant = rows[_null_shares(model, blocks, rows) > REDUNDANT]
-        columns[model.entry_columns[redundant][entries[redundant]]] = True
-    return columns[: model.n] & of_held
+def _columns_of(model: Model, entries: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Columns (n,) in which these rows have an entry (m, 12)."""
+    columns = np.zeros(model.n + 6, dtype=bool)
+    columns[model.entry_columns[rows][entries[rows]]] = True
+    return columns[: model.n]
+
+
+def are_redundant(model: Model, blocks: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Which of these rows of the Jacobian whose blocks (m, 12) are given are redundant."""
+    return _null_shares(model, blocks, rows) > REDUNDANT if rows.size else np.zeros(0, dtype=bool)
 
 
 def _null_shares(model: Model, blocks: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -199,10 +216,13 @@ class _Rows:
         return list(zip(*(numbers[entry[column]] for column in columns), strict=True))
 
 
-def _holding(rows: _Rows, moving: np.ndarray, can_rest: np.ndarray) -> Iterator[Held]:
-    """Groups of rows that hold columns, of those (n,) that move and can rest.
+def _tries(
+    rows: _Rows, moving: np.ndarray, can_rest: np.ndarray
+) -> Iterator[tuple[list[int], tuple[int, ...], list[int]]]:
+    """Rows that may hold columns, of those (n,) that move and can rest; the columns, and which rows do.
 
-    Each stands after those that let it bear on so few.
+    Rows hold where as many of them do as there are columns.  Each stands after those that let it bear on so
+    few.
     """
     free, rests, found = moving.tolist(), can_rest.tolist(), True
     while found:
@@ -215,7 +235,7 @@ def _holding(rows: _Rows, moving: np.ndarray, can_rest: np.ndarray) -> Iterator[
                 found = True
                 for column in columns:
                     free[column] = False
-                yield Held(tuple(bearing[k] for k in chosen), columns)
+            yield bearing, columns, chosen
 
 
 def _perpendicular(rows: Sequence[Sequence[Sequence[float]]]) -> list[int]:

@@ -66,7 +66,7 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion
     """The samples reached, in the scene's frames and units."""
     model, loop, counts = run.model, run.memory.loop, run.memory.equations.system.counts
     reached, nb = int(loop.clock.sample), run.model.nb
-    q, v, a, multipliers = (sample[:reached] for sample in loop.samples)
+    q, v, a, multipliers = (sample[:reached].copy() for sample in loop.samples)
     q, v, a = q.reshape(reached, nb, 7), v.reshape(reached, nb, 6), a.reshape(reached, nb, 6)
     blocks = model.blocks_along(run.times[:reached], q)
     return Motion(

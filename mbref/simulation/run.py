@@ -5,23 +5,18 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
-from mbref.equations.active_coordinates import (
-    active_coordinates,
-    active_entries,
-    active_scene,
-    without_rounding,
-)
+from mbref.equations.active_coordinates import without_rounding
 from mbref.equations.branches import Passed
 from mbref.equations.degrees_of_freedom import undriven_freedoms
-from mbref.equations.evaluation import evaluate_all
+from mbref.equations.evaluation import evaluate_along
 from mbref.equations.initial_state import consistent_start
 from mbref.equations.model import Model
-from mbref.equations.static_constraints import at_rest, held_by_rows, reduced_factor
-from mbref.equations.units import row_lengths
+from mbref.equations.reduction import Reduction, reduction_of
+from mbref.equations.static_constraints import at_rest
 from mbref.kernels.compilation import Exchangeable
 from mbref.kernels.layout import (
     NOT_CONVERGED,
@@ -33,22 +28,22 @@ from mbref.kernels.layout import (
     SparseFactor,
     SpecialisedCode,
     State,
-    Symbolic,
     Watch,
 )
+from mbref.kernels.lent_memory import Lent, lent, shapes_of, take_back, write
 from mbref.kernels.named_memory import allocate, packed, record
 from mbref.kernels.scene_layout import SceneData
 from mbref.linear_algebra.symbolic_factorisation import empty_factor
 from mbref.method import Method
 from mbref.scene import Scene, SceneError
 from mbref.simulation.limits import AUTO, SPECIALISED, Limits
+from mbref.simulation.ranks import NO_RANKS, ranks_at
 from mbref.simulation.stepping import CREEPING, PAUSED, SINGULAR_AHEAD, UNDECIDED, advance_to_end
 from mbref.specialised import Part, Specialised, Untraceable, specialise, with_specialised_code
 from mbref.stabilisation.base import Stabilisation
 
 STEPS_PER_CALL = 5_000  # between returns to Python, where an interrupt is heard and progress is told
 OUT_OF_REACH, PACE_STEPS = 100.0, 20_000  # limits of steps that the end is away, at the pace of so many
-MOST_ROWS = 120  # rows whose rank is found at the start
 NEARLY = 1e-5  # least singular value below which rows are nearly dependent
 MOST_COMPARED = 60  # rows whose gradients at both ends of a step are compared
 STEPS_WORTH_CODE = 20_000  # steps ahead from which on specialised code saves more than it takes to make
@@ -63,10 +58,12 @@ class Run:
         self.model = Model(scene)
         self._check_freedoms()
         self.start = consistent_start(self.model)
-        data, factor, active = self._reduce()
-        self.memory = self._allocate(data, factor, active)
+        reduction = self._reduce()
         prepare(method)  # so that the run alone is timed
-        self._use(method.stabilisation)
+        self._lent = self._lend_memory(reduction)
+        self.memory, self.packed = self._lent.values, self._lent.packed
+        if method.stabilisation.projects:
+            self.part = Part(self.memory.active, self.memory.factor)
         self._enter()
         self.specialised: Specialised | None = None
         self.wants_code = limits.code == AUTO
@@ -75,6 +72,12 @@ class Run:
         self._judged = 0.0, 0  # time (s) and steps when the pace was last judged
         if limits.code == SPECIALISED:
             self._specialise()
+
+    def give_back(self) -> None:
+        """Leave the memory to the next run; this one cannot be read any more."""
+        if self.specialised is None:
+            take_back(self._lent)
+        self.model.give_back()
 
     def _check_freedoms(self) -> None:
         """SceneError where bodies without mass, or a method that does not integrate, leave a freedom."""
@@ -88,30 +91,44 @@ class Run:
         if freedoms > 0:
             raise SceneError(missing_masses(self.scene))
 
-    def _reduce(self) -> tuple[SceneData, SparseFactor, Active]:
-        """The primitives, the factor and the entries of y that the method needs; sets ``part``."""
-        model, data, factor = self.model, self.model.data, empty_factor()
-        sparse, projects = self.method.formulation.linear_algebra.sparse, self.method.stabilisation.projects
-        if sparse or projects:
-            self.start = without_rounding(model, self.start)
-            moving, entries = active_entries(model, self.start.q, self.start.v)
-            held, entries = held_by_rows(model, self.start, moving, entries)
-            factor = reduced_factor(moving, entries, model.entry_columns, held)
-            self.start = at_rest(self.start, held)
-        if sparse:
-            data = active_scene(model, entries)
-        if not projects:
-            return data, factor, Active(np.arange(7 * model.nb), np.arange(model.n))
-        velocities = factor.symbolic.column.astype(np.int64)
-        active = Active(active_coordinates(self.start.q, velocities), velocities)
-        self.part = Part(active, factor)
-        return data, factor, active
+    def _reduce(self) -> Reduction | None:
+        """What the method needs of the equations; None where it needs them all.  Corrects the start."""
+        if not (self.method.formulation.linear_algebra.sparse or self.method.stabilisation.projects):
+            return None
+        self.start = without_rounding(self.model, self.start)
+        reduction = reduction_of(self.model, self.start)
+        self.start = at_rest(self.start, reduction.held)
+        return reduction
 
-    def _allocate(self, data: SceneData, factor: SparseFactor, active: Active) -> Memory:
+    def _lend_memory(self, reduction: Reduction | None) -> Lent:
+        """Memory with the numbers of this run."""
+        model, method = self.model, self.method
+        sparse = reduction is not None and method.formulation.linear_algebra.sparse
+        data = reduction.scene(model.data) if reduction and sparse else model.data
+        key = (Memory, *self._identity(), reduction, self.times.size, *model.sizes.values(), shapes_of(data))
+        memory = lent(key, lambda: self._allocate(data, reduction))
+        equations = memory.values.equations
+        model.put_numbers(equations, data)
+        write(equations.system.settings, method.settings(self.limits.rank_tolerance))
+        write(memory.values.control, self._control())
+        memory.values.loop.times[:] = self.times
+        return memory
+
+    def _identity(self) -> tuple[Any, ...]:
+        """All of the method that is in its memory: kernels, schemas and options."""
+        formulation, stabilisation, integrator = self.method.parts
+        schemas = formulation.linear_algebra, stabilisation.memory, integrator.schema
+        numbers = formulation.numbers, stabilisation.numbers
+        options = (tuple(self.method.options_of(part).items()) for part in self.method.parts)
+        return self._kernels(stabilisation), schemas, numbers, *options
+
+    def _allocate(self, data: SceneData, reduction: Reduction | None) -> Memory:
+        """Memory of the method for the data of a scene, ready but for numbers."""
         model, method = self.model, self.method
         formulation, stabilisation, integrator = method.parts
-        algebra = formulation.linear_algebra
+        factor, active = self._factor(reduction)
         pivots = factor.symbolic.row.size
+        algebra = formulation.linear_algebra
         sizes = {**model.sizes, "k": self.times.size, "dense_rows": algebra.rows(model.m), "pivots": pivots}
         compared = pivots <= MOST_COMPARED
         sizes["compared_rows"] = pivots if compared else 0
@@ -119,10 +136,10 @@ class Run:
         sizes["compared_columns"] = factor.root.size if compared else 0
         equations = model.equations(
             sizes,
-            settings=record(method.settings(self.limits.rank_tolerance)),
+            data,
             options=formulation.packed_options(method.options_of(formulation)),
             scratch=packed(algebra.scratch(model.m, model.n, factor)),
-        )._replace(scene=data)
+        )
         return Memory(
             equations=equations,
             state=allocate(State, sizes),
@@ -132,13 +149,20 @@ class Run:
             control=record(self._control()),
             watch=record(Watch()),
             pivots=np.ones(pivots),
-            loop=allocate(Loop, sizes, times=self.times),
-            kernels=NO_KERNELS,
+            loop=allocate(Loop, sizes),
+            kernels=self._kernels(stabilisation),
             code=allocate(SpecialisedCode, sizes),
             chart=packed(allocate(stabilisation.memory, sizes)) if stabilisation.memory else None,
             chart_options=method.packed_options(stabilisation),
             integrator=packed(allocate(integrator.schema, sizes)),
         )
+
+    def _factor(self, reduction: Reduction | None) -> tuple[SparseFactor, Active]:
+        """The factor, and the entries of y, which are all where the method does not project."""
+        factor = empty_factor() if reduction is None else reduction.factor()
+        if reduction is None or not self.method.stabilisation.projects:
+            return factor, Active(np.arange(7 * self.model.nb), np.arange(self.model.n))
+        return factor, reduction.active
 
     def _control(self) -> Control:
         limits, integrator = self.limits, self.method.integrator
@@ -161,8 +185,8 @@ class Run:
             closed_loops=self.model.closed_loops,
         )
 
-    def _use(self, chart: Stabilisation) -> None:
-        """Run on the kernels of this chart from now on."""
+    def _kernels(self, chart: Stabilisation) -> Kernels:
+        """The kernels of the method on this chart."""
         integrator = self.method.integrator
         kernels = Kernels(
             step=integrator.step,
@@ -173,9 +197,7 @@ class Run:
             accept=chart.accept,
             accelerate=self.method.formulation.accelerate,
         )
-        pointers = Kernels(*(kernel.pointer if kernel else None for kernel in kernels))
-        self.memory = self.memory._replace(kernels=pointers)
-        self.packed = packed(self.memory)
+        return Kernels(*(kernel.pointer if kernel else None for kernel in kernels))
 
     def _enter(self) -> None:
         memory = self.memory
@@ -253,35 +275,10 @@ class Run:
         rank_tolerance = self.limits.rank_tolerance
         self.specialised = specialise(self.model, self.method, rank_tolerance, self.start, self.part)
         code = self.memory.code._replace(addresses=record(self.specialised.addresses))
-        self.memory = self.memory._replace(code=code)
-        self._use(with_specialised_code(stabilisation))
+        kernels = self._kernels(with_specialised_code(stabilisation))
+        self.memory = self.memory._replace(code=code, kernels=kernels)
+        self.packed = packed(self.memory)
         self.making += time.process_time() - began
-
-
-class Ranks(NamedTuple):
-    """Singular values of unit rows of Φ_q: how many exceed a tolerance, the least of them, the next."""
-
-    rank: int
-    least: float
-    next: float
-
-
-NO_RANKS = Ranks(0, 1.0, 0.0)
-
-
-def ranks_at(model: Model, q: np.ndarray, symbolic: Symbolic, tolerance: float) -> Ranks:
-    """Those of the rows that take part, at q (7 nb,); rank 0 where there are too many."""
-    rows, columns = symbolic.row.astype(int), symbolic.column.astype(int)
-    if rows.size > MOST_ROWS or not rows.size:
-        return NO_RANKS
-    jacobian = model.terms(0.0, q, np.zeros(model.n)).jacobian[np.ix_(rows, columns)]
-    jacobian *= model.data.metric_root[columns]
-    values = np.linalg.svd(jacobian / row_lengths(jacobian)[:, None], compute_uv=False)
-    rank = int((values > tolerance).sum())
-    return Ranks(rank, float(values[rank - 1]) if rank else 1.0, float(np.append(values, 0.0)[rank]))
-
-
-NO_KERNELS = Kernels(*[None] * len(Kernels._fields))
 
 
 def missing_masses(scene: Scene) -> list[str]:
@@ -304,6 +301,6 @@ def kernels_of(method: Method) -> list[Exchangeable]:
     integrator, chart = method.integrator, method.stabilisation
     kernels = (
         integrator.step, integrator.propose, chart.rates, chart.accept, method.formulation.accelerate,
-        advance_to_end, evaluate_all, chart.enter.callable,
+        advance_to_end, evaluate_along, chart.enter.callable,
     )  # fmt: skip
     return [kernel for kernel in kernels if kernel is not None]

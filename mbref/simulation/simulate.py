@@ -64,7 +64,9 @@ def simulate(
     status = compare_with_default(run, status)
     if status == DONE:
         _check_branches(run)
-    return trajectory_of(run, status, seconds, built + run.making)
+    motion = trajectory_of(run, status, seconds, built + run.making)
+    run.give_back()
+    return motion
 
 
 def _check_branches(run: Run) -> None:

@@ -1,0 +1,79 @@
+"""Reduction: the primitives, rows and columns of a scene that a run needs, found once for scenes that agree.
+
+What is left out of a run depends on the scene's numbers.  A scene of equal structure is asked for the same
+answers (``evidence``): where all are the same, every decision would be, and the reduction is that of the
+scene before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbref.equations.active_coordinates import active_coordinates, active_entries, active_primitives
+from mbref.equations.evidence import Evidence
+from mbref.equations.initial_state import Start
+from mbref.equations.model import Model
+from mbref.equations.random_states import RandomStates
+from mbref.equations.static_constraints import Asked, columns_held, held_by_rows, reduced_pattern
+from mbref.equations.structure import Structure
+from mbref.kernels.layout import Active, SparseFactor, StaticRows, Symbolic
+from mbref.kernels.scene_layout import Primitives, SceneData
+from mbref.linear_algebra.symbolic_factorisation import sparse_factor
+
+MOST_STRUCTURES, MOST_OF_ONE = 64, 8  # whose reductions are kept
+
+_known: dict[Structure, list[Reduction]] = {}
+
+
+@dataclass(frozen=True, eq=False)
+class Reduction:
+    """Primitives, by number, with an entry; columns that rows hold at rest; the others, and their factor."""
+
+    primitives: np.ndarray
+    held: list[int]
+    active: Active
+    symbolic: Symbolic
+    static: StaticRows
+    evidence: Evidence
+
+    def factor(self) -> SparseFactor:
+        """Memory of the factor."""
+        return sparse_factor(self.symbolic, self.static)
+
+    def scene(self, data: SceneData) -> SceneData:
+        """The data of a scene without the primitives that have no entry."""
+        if self.primitives.size == data.primitives.kind.size:
+            return data
+        return data._replace(primitives=Primitives(*(column[self.primitives] for column in data.primitives)))
+
+
+def reduction_of(model: Model, start: Start) -> Reduction:
+    """The reduction of a scene at its start: one that is known for its structure and agrees, or found now."""
+    known = _known.get(model.structure, [])
+    for reduction in known:
+        if reduction.evidence.agrees(model, start):
+            return reduction
+    found = _found(model, start)
+    if model.structure not in _known and len(_known) >= MOST_STRUCTURES:
+        _known.pop(next(iter(_known)), None)
+    _known[model.structure] = [found, *known][:MOST_OF_ONE]
+    return found
+
+
+def _found(model: Model, start: Start) -> Reduction:
+    read: list[RandomStates] = []
+    moving, entries = active_entries(model, start.q, start.v, read)
+    asked = Asked()
+    held, left = held_by_rows(model, start, moving, entries, asked)
+    symbolic, static = reduced_pattern(moving, left, model.entry_columns, held)
+    velocities = symbolic.column.astype(np.int64)
+    return Reduction(
+        primitives=active_primitives(model, left),
+        held=columns_held(held),
+        active=Active(active_coordinates(start.q, velocities), velocities),
+        symbolic=symbolic,
+        static=static,
+        evidence=Evidence(model, start, read, entries, asked),
+    )

@@ -1,0 +1,99 @@
+"""Lent memory: memory of kernels that is made and packed once, and serves one run after another.
+
+To allocate and pack the memory of a small mechanism takes longer than a short run.  Memory that is taken back
+is lent again for the same key with the bytes that it had when it was made, so that nothing of one run reaches
+the next.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Hashable, Iterator
+from typing import Any
+
+import numpy as np
+
+from mbref.kernels.named_memory import Packed, packed
+
+MOST_KEYS, MOST_OF_A_KEY, MOST_BYTES = 64, 4, 1 << 20  # kept for later; larger memory is not kept
+
+
+class Lent:
+    """Packed memory of a schema, and the bytes with which it begins."""
+
+    def __init__(self, values: Any, key: Hashable):
+        self.values, self.key, self.packed = values, key, packed(values)
+        self._first = [(address, ctypes.string_at(address, size)) for address, size in set(_places(values))]
+
+    @property
+    def size(self) -> int:
+        """Bytes in arrays and records."""
+        return sum(len(first) for _, first in self._first)
+
+    def restore(self) -> None:
+        """Have all arrays and records as they were made."""
+        for address, first in self._first:
+            ctypes.memmove(address, first, len(first))
+
+
+def _places(values: Any) -> Iterator[tuple[int, int]]:
+    """Address and size of each array and record of a schema, and of the packed schemas in it."""
+    if isinstance(values, Packed):
+        yield from _places(values.values)
+    elif isinstance(values, tuple):
+        for value in values:
+            yield from _places(value)
+    elif isinstance(values, np.ndarray | np.record) and values.nbytes:
+        yield int(values.__array_interface__["data"][0]), values.nbytes
+
+
+_kept: dict[Hashable, list[Lent]] = {}
+
+
+def lent(key: Hashable, make: Callable[[], Any]) -> Lent:
+    """Memory of a key, which says all of what ``make`` makes: kept, or else made."""
+    kept = _kept.get(key)
+    try:
+        memory = kept.pop() if kept else None
+    except IndexError:  # another thread was faster
+        memory = None
+    if memory is None:
+        return Lent(make(), key)
+    memory.restore()
+    return memory
+
+
+def take_back(memory: Lent) -> None:
+    """Keep memory that nobody uses any more."""
+    if memory.size > MOST_BYTES:
+        return
+    if memory.key not in _kept and len(_kept) >= MOST_KEYS:
+        _kept.pop(next(iter(_kept)), None)
+    kept = _kept.setdefault(memory.key, [])
+    if len(kept) < MOST_OF_A_KEY:
+        kept.append(memory)
+
+
+def fill(target: Any, source: Any) -> None:
+    """Copy the arrays of one instance of a schema into those of another."""
+    for mine, theirs in zip(target, source, strict=True):
+        if isinstance(theirs, tuple):
+            fill(mine, theirs)
+        else:
+            mine[...] = theirs
+
+
+def write(record: np.record, values: Any) -> None:
+    """Have a record hold these numbers."""
+    for name, value in zip(values._fields, values, strict=True):
+        record[name] = value
+
+
+def shapes_of(values: Any) -> tuple[Any, ...]:
+    """The shapes of the arrays of a schema."""
+    return tuple(shapes_of(value) if isinstance(value, tuple) else value.shape for value in values)
+
+
+def copied(values: Any) -> Any:
+    """The same schema with arrays of its own."""
+    return type(values)(*(copied(v) if isinstance(v, tuple) else v.copy() for v in values))

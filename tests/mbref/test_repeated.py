@@ -1,0 +1,159 @@
+"""Runs whose structure was run before: the same bits as those of a process that has run nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from crosscheck.conformance.random_mechanisms import random_mechanism
+from mbref.equations import reduction
+from mbref.kernels import lent_memory
+from mbref.method import Method
+from mbref.motion import Motion
+from mbref.scene import Body, Force, Revolute, Scene, Spring, Translational
+from mbref.scenes import SCENES
+from mbref.simulation.run import Run
+from mbref.simulation.simulate import Limits, simulate
+from mbref.variation import Variation, variants
+
+TIMES = np.linspace(0.0, 0.02, 4)
+METHODS = ("alf-dual+projection", "mpi-svd+baumgarte", "lm2+projection", "lm1+partitioning", "taylor")
+CRANK, SPATIAL = SCENES["planar_slider_crank"](), SCENES["spatial_slider_crank"]()
+X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+
+
+@pytest.fixture(autouse=True)
+def nothing_known() -> Iterator[None]:
+    """Begin as a new process does."""
+    forget()
+    yield
+    forget()
+
+
+def forget() -> None:
+    reduction._known.clear()
+    lent_memory._kept.clear()
+
+
+def results(run: Motion) -> list:
+    """All numbers of a run, as bytes."""
+    arrays = [getattr(run, key) for key in ("position", "orientation", "velocity", "angular_velocity")]
+    arrays += [run.acceleration, run.angular_acceleration]
+    for table in (run.reactions, run.open_reactions):
+        arrays += [table[name] for name in sorted(table)]
+    cost = [run.cost.steps, run.cost.rhs, run.cost.factorisations, run.cost.newton]
+    return [run.outcome.name, run.message, run.t_end, cost, *(array.tobytes() for array in arrays)]
+
+
+def simulated(scene: Scene, method: str = METHODS[0]) -> list:
+    return results(simulate(scene, method, TIMES, Limits(rtol=1e-7, most_steps=5000)))
+
+
+def alone(scene: Scene, method: str = METHODS[0]) -> list:
+    """The results of a run of which nothing is known."""
+    forget()
+    return simulated(scene, method)
+
+
+def known(scene: Scene) -> int:
+    """How many reductions are known once the scene has been run."""
+    simulated(scene)
+    return sum(map(len, reduction._known.values()))
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("scene", [CRANK, SPATIAL, SCENES["five_bar"]()], ids=lambda scene: scene.name)
+def test_variants_in_a_row_and_alone_agree(scene, method):
+    varied = [Variation("body[0].mass", 0.5, 2.0), Variation("gravity[1]", -10.0, 10.0)]
+    scenes = list(variants(scene, varied, 4))
+    expected = [alone(each, method) for each in scenes]
+    forget()
+    assert [simulated(each, method) for each in scenes * 2] == expected * 2
+    assert lent_memory._kept, "nothing was lent again"
+
+
+def test_random_mechanisms_in_a_row_and_alone_agree():
+    scenes = [random_mechanism(seed) for seed in range(10)]
+    expected = [alone(scene) for scene in scenes]
+    forget()
+    assert [simulated(scene) for scene in scenes * 2] == expected * 2
+
+
+def crank_with(force: tuple[float, float, float], **changes) -> Scene:
+    """The planar slider-crank with a force on its rod; a force across the plane bends it out of the plane."""
+    place = CRANK.body[1].position
+    return CRANK.with_(
+        load=(*CRANK.load, Force(body=CRANK.body[1].name, point=place, force=force)), **changes
+    )
+
+
+def rail(point: tuple[float, float, float], stiffness: float = 20.0, inertia: float = 0.02) -> Scene:
+    """A slide on an arm, pulled by a spring at a point that may turn both out of their plane."""
+    body = {"mass": 1.0, "position": (0.3, 0.0, 0.0)}
+    return Scene(
+        name="rail", duration=0.5,
+        body=(
+            Body(name="arm", mass=1.0, inertia=(0.01, 0.02, 0.02), position=(0.1, 0.0, 0.0)),
+            Body(name="slide", inertia=(inertia, inertia, inertia), **body),
+        ),
+        joint=(
+            Revolute(name="pin", bodies=("ground", "arm"), anchor=(0.0, 0.0, 0.0), axis=Z),
+            Translational(name="guide", bodies=("arm", "slide"), anchor=(0.3, 0.0, 0.0), axis=X),
+        ),
+        load=(
+            Spring(bodies=("ground", "slide"), points=((0.3, 0.5, point[2]), (0.3, 0.0, 0.0)),
+                   stiffness=stiffness, natural_length=0.3),
+            Force(body="slide", point=(0.3, 0.0, 0.0), force=point),
+        ),
+    )  # fmt: skip
+
+
+NUMBERS_DECIDE = {
+    "a force out of the plane": [crank_with((0.0, 1.0, 0.0)), crank_with((0.0, 1.0, 0.5))],
+    "gravity out of the plane": [CRANK.with_(gravity=(0.0, g, h)) for g, h in ((-9.8, 0.0), (-9.8, 1.0))],
+    "motion at the start": [
+        SPATIAL.with_(body=tuple(b.model_copy(update={"angular_velocity": None}) for b in SPATIAL.body)),
+        SPATIAL.with_("body[crank].angular_velocity", (0.0, 3.0, 0.0)),
+    ],
+    "a spring out of the plane": [rail((0.0, 0.0, 0.0)), rail((0.0, 0.0, 0.2))],
+    "no moment of inertia": [rail((0.0, 0.0, 0.2)), rail((0.0, 0.0, 0.2), inertia=0.0)],
+}
+
+
+@pytest.mark.parametrize("scenes", NUMBERS_DECIDE.values(), ids=NUMBERS_DECIDE.keys())
+def test_numbers_that_decide_what_takes_part_are_asked(scenes):
+    """In every order, each scene gets what it needs, whatever was needed before."""
+    expected = [alone(scene) for scene in scenes]
+    for order in permutations(range(len(scenes))):
+        forget()
+        assert [simulated(scenes[k]) for k in order * 2] == [expected[k] for k in order * 2]
+
+
+@pytest.mark.parametrize("name", ["a force out of the plane", "a spring out of the plane"])
+def test_another_reduction_is_found_where_numbers_decide_so(name):
+    one, other = NUMBERS_DECIDE[name]
+    assert (known(one), known(one), known(other), known(one)) == (1, 1, 2, 2)
+
+
+def test_variants_share_a_reduction():
+    scenes = variants(CRANK, [Variation("joint[B].anchor[0]", 0.304, 1e-4, normal=True)], 20)
+    assert {known(scene) for scene in scenes} == {1}
+
+
+def test_memory_in_use_is_not_lent():
+    method, limits = Method.parse(METHODS[0]), Limits()
+    one = Run(CRANK, method, TIMES, limits)
+    other = Run(CRANK, method, TIMES, limits)
+    assert one.memory is not other.memory
+    one.give_back()
+    third = Run(CRANK, method, TIMES, limits)
+    assert third.memory is one.memory and third.memory is not other.memory
+
+
+def test_what_is_kept_is_bounded():
+    for count in range(2, lent_memory.MOST_KEYS + 10):
+        simulate(CRANK, METHODS[0], np.linspace(0.0, 1e-4, count))
+    assert len(lent_memory._kept) <= lent_memory.MOST_KEYS
