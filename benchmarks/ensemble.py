@@ -4,8 +4,8 @@
 
 The first table is of CPU time of simulations one after another in this process: construction of a run,
 stepping, and the rest, which is samples, reactions and the trajectory; the least of REPEATS rounds, in which
-scenes take turns.  The second is of wall time of whole ensembles after the processes have started, the passing of
-scenes and trajectories between them included; the median of as many rounds, in which numbers of processes do.
+scenes take turns.  The second is of wall time of whole ensembles after the processes have started, with the
+passing of scenes and trajectories between them; the median of as many rounds.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ import numpy as np
 
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.simulation.ensemble import ensemble, processes
+from mbref.simulation.ensemble import ensemble
+from mbref.simulation.processes import processes
 from mbref.simulation.simulate import Limits, simulate
 from mbref.variation import Variation, variants
 

@@ -29,7 +29,8 @@ from crosscheck.engine import Setting
 from crosscheck.study.grid import Case, study
 from mbref.scene import Body, Scene
 from mbref.scenes import SCENES
-from mbref.simulation.ensemble import ensemble, processes
+from mbref.simulation.ensemble import ensemble
+from mbref.simulation.processes import processes
 from mbref.variation import Variation, variants
 
 HERE = Path(__file__).parent

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -93,8 +93,7 @@ def solve_positions(model: Model, t: float, q: np.ndarray) -> tuple[np.ndarray, 
     With the pseudo-inverse, so that redundant rows and a singular start do no harm; the change is least
     in the metric of M.
     """
-    v, enough = np.zeros(model.n), 1e-14 * max(1.0, model.length)
-    phi = model.blocks(t, q, v).phi
+    v, enough, phi = np.zeros(model.n), 1e-14 * max(1.0, model.length), np.zeros(model.m)
     for _ in range(MOST_ITERATIONS):
         terms = model.blocks(t, q, v)
         phi = terms.phi
@@ -128,7 +127,9 @@ def given_velocities(model: Model, q: np.ndarray) -> tuple[np.ndarray, np.ndarra
             v[b, :3], given[b, :3] = body.velocity, True
         if body.angular_velocity is not None:
             to_body = rotations.conjugate(q.reshape(-1, 7)[b, 3:])
-            v[b, 3:], given[b, 3:] = rotations.rotate(to_body, np.array(body.angular_velocity)), True
+            turning = any(body.angular_velocity)
+            v[b, 3:] = rotations.rotate(to_body, np.array(body.angular_velocity)) if turning else 0.0
+            given[b, 3:] = True
     return v.ravel(), given.ravel()
 
 
@@ -143,7 +144,10 @@ def _velocities(model: Model, q: np.ndarray) -> tuple[np.ndarray, float, bool]:
         return *_sparse_velocities(model, q, v, given), not given.all()
     scale = np.tile(np.repeat([1.0, 1 / model.length], 3), model.nb)
     wanted = v[given] / scale[given]
-    terms = model.terms(0.0, q, v)
+    terms = model.blocks(0.0, q, v)
+    if not (wanted.any() or terms.nu.any()):
+        return np.zeros(model.n), 0.0, not given.all()
+    terms = replace(terms, jacobian=model.dense(terms.jacobian))
     jacobian, nu = _unit_rows(terms.jacobian * scale, terms.nu)
     x, open_ = _solutions(jacobian, nu)
     if np.max(np.abs(jacobian @ x - nu), initial=0.0) > GROSS * np.max(np.abs(x), initial=0.0):

@@ -221,22 +221,26 @@ class Model:
         From q (k, nb, 7), v and a (k, nb, 6) of the principal frames to the bodies' own, world axes.
         """
         own, p = slice(0, len(self.scene.body)), q[..., 3:]
+        turned = rotations.multiply(p, rotations.conjugate(self.principal)) if self._turns_frames else p
+        to_world = rotations.to_matrix(p)
+        spin, spin_rate = (np.einsum("...ij,...j->...i", to_world, rates[..., 3:]) for rates in (v, a))
         return {
             "position": q[:, own, :3],
-            "orientation": rotations.multiply(p, rotations.conjugate(self.principal))[:, own],
+            "orientation": turned[:, own],
             "velocity": v[:, own, :3],
-            "angular_velocity": rotations.rotate(p, v[..., 3:])[:, own],
+            "angular_velocity": spin[:, own],
             "acceleration": a[:, own, :3],
-            "angular_acceleration": rotations.rotate(p, a[..., 3:])[:, own],
+            "angular_acceleration": spin_rate[:, own],
         }
 
     def _pack_bodies(self) -> Bodies:
         principal = [_principal_axes(body) for body in self.bodies]
-        self.principal = rotations.from_matrix(np.array([axes for _, axes in principal]))
         given = np.array([body.orientation for body in self.bodies])
-        self.orientation = rotations.multiply(given, self.principal)
+        self._turns_frames = any(axes is not None for _, axes in principal)
+        self.principal = _quaternions([axes for _, axes in principal])
+        self.orientation = rotations.multiply(given, self.principal) if self._turns_frames else given
         mass = np.array([1.0 if self.kinematic else body.mass or 1.0 for body in self.bodies])
-        inertia = np.array([np.ones(3) if self.kinematic else moments for moments, _ in principal])
+        inertia = np.ones((self.nb, 3)) if self.kinematic else np.array([moments for moments, _ in principal])
         self.mass = np.concatenate([np.repeat(mass[:, None], 3, axis=1), inertia], axis=1).ravel()
         to_local = rotations.to_matrix(self.orientation).transpose(0, 2, 1)
         self._to_local = np.concatenate([to_local, np.eye(3)[None]])  # the fixed frame is the last
@@ -296,11 +300,20 @@ def _with_ground(scene: Scene) -> tuple[tuple[Body, ...], tuple[Joint, ...]]:
 FRAME = "the fixed frame"  # holds a modelled ground
 
 
-def _principal_axes(body: Body) -> tuple[np.ndarray, np.ndarray]:
-    """Principal moments and the rotation from the principal frame to the body's."""
-    inertia = np.array(body.inertia if body.inertia is not None else np.ones(3))
-    if inertia.ndim == 1:
-        return inertia, np.eye(3)
+def _quaternions(axes: Sequence[np.ndarray | None]) -> np.ndarray:
+    """Quaternions (k, 4) of rotation matrices, of which None stands for no rotation."""
+    if all(each is None for each in axes):
+        return np.tile([1.0, 0.0, 0.0, 0.0], (len(axes), 1))
+    return rotations.from_matrix(np.array([np.eye(3) if each is None else each for each in axes]))
+
+
+def _principal_axes(body: Body) -> tuple[Sequence[float], np.ndarray | None]:
+    """Principal moments, and the rotation from the principal frame to the body's; None for the same frame."""
+    if body.inertia is None:
+        return (1.0, 1.0, 1.0), None
+    if not isinstance(body.inertia[0], tuple):
+        return body.inertia, None
+    inertia = np.array(body.inertia)
     moments, axes = np.linalg.eigh(inertia)
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
     return np.maximum(moments, 0.0), axes

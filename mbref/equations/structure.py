@@ -20,6 +20,7 @@ class Structure:
     ``entry_columns`` (m, 12) says the column of every entry of the blocks; those of the fixed frame are ≥ n.
     """
 
+    nb: int  # bodies; the fixed frame has this number
     kind: np.ndarray  # (p,)
     first: np.ndarray  # (p,) bodies
     second: np.ndarray  # (p,)
@@ -41,6 +42,7 @@ def structure_of(nb: int, places: tuple[PrimitivePlace, ...]) -> Structure:
     rows = np.array([ROWS_OF[place[0]] for place in places], dtype=np.int64)
     row_bodies = np.repeat(np.stack([first, second], axis=1), rows, axis=0)
     return Structure(
+        nb=nb,
         kind=kind,
         first=first,
         second=second,

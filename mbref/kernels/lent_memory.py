@@ -24,11 +24,7 @@ class Lent:
     def __init__(self, values: Any, key: Hashable):
         self.values, self.key, self.packed = values, key, packed(values)
         self._first = [(address, ctypes.string_at(address, size)) for address, size in set(_places(values))]
-
-    @property
-    def size(self) -> int:
-        """Bytes in arrays and records."""
-        return sum(len(first) for _, first in self._first)
+        self.size = sum(len(first) for _, first in self._first)  # bytes in arrays and records
 
     def restore(self) -> None:
         """Have all arrays and records as they were made."""

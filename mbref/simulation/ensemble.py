@@ -4,29 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-    wait,
-)
+from concurrent.futures import BrokenExecutor, Executor, Future
 from dataclasses import asdict
-from multiprocessing import get_context
 from pathlib import Path
 from queue import SimpleQueue
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from mbref import __version__, records
 from mbref.method import DEFAULT, Method
 from mbref.scene import Scene
+from mbref.simulation.processes import processes
 from mbref.simulation.simulate import Limits, checked_times, prepare, simulate
 from mbref.trajectory import Outcome, Trajectory
 
@@ -59,65 +49,24 @@ def ensemble(
     known = records.opened(path)  # before anything is compiled or run for it
     prepare(Method.parse(method))  # once, not in every process at the same time
     pending: dict[Future[Trajectory], Job] = {}
+    done: SimpleQueue[Future[Trajectory]] = SimpleQueue()
+    run: Callable[..., Trajectory] = simulate
     try:
         for place, scene in enumerate(scenes):
-            key = _key(scene, times, method, limits)
+            key = _key(scene, times, method, limits) if path else ""
             if key in known:
                 yield place, Trajectory.from_record(scene.name, known[key])
                 continue
-            job = Job(place, key, scene, method, limits)
-            pending[executor.submit(simulate, scene, method, times, limits)] = job
+            future = executor.submit(run, scene, method, times, limits)
+            pending[future] = Job(place, key, scene, method, limits)
+            future.add_done_callback(done.put)
             while len(pending) >= AHEAD:
-                yield from _ended(pending, path)
+                yield _ended(done.get(), pending, path)
         while pending:
-            yield from _ended(pending, path)
+            yield _ended(done.get(), pending, path)
     finally:
         for future in pending:
             future.cancel()
-
-
-class Processes(Executor):
-    """Processes that each make one call after another; one that is killed fails its own call alone.
-
-    (A ProcessPoolExecutor of several fails all the calls that it has been given.)
-    """
-
-    def __init__(self, workers: int) -> None:
-        self._threads = ThreadPoolExecutor(workers)
-        self._idle: SimpleQueue[ProcessPoolExecutor] = SimpleQueue()
-        for _ in range(workers):
-            self._idle.put(_process())
-
-    def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
-        """The future of a call; BrokenExecutor is its exception where its process is killed."""
-        return self._threads.submit(self._call, function, arguments, named)
-
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes when their calls have ended."""
-        self._threads.shutdown(wait, cancel_futures=cancel_futures)
-        while not self._idle.empty():
-            self._idle.get().shutdown(wait)
-
-    def _call(self, function: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
-        process = self._idle.get()
-        try:
-            return process.submit(function, *arguments, **named).result()
-        except BrokenExecutor:
-            process.shutdown()
-            process = _process()
-            raise
-        finally:
-            self._idle.put(process)
-
-
-def processes(workers: int | None = None) -> Processes:
-    """So many processes, by default one a core; an interrupt is heard by their parent alone."""
-    return Processes(workers or os.cpu_count() or 1)
-
-
-def _process() -> ProcessPoolExecutor:
-    quiet = (signal.SIGINT, signal.SIG_IGN)
-    return ProcessPoolExecutor(1, get_context("spawn"), initializer=signal.signal, initargs=quiet)
 
 
 class Job(NamedTuple):
@@ -131,20 +80,17 @@ class Job(NamedTuple):
 
 
 def _ended(
-    pending: dict[Future[Trajectory], Job], path: str | Path | None
-) -> Iterator[tuple[int, Trajectory]]:
-    """The results there are, at least one, stored and taken off the pending ones."""
-    ended = []
-    for future in wait(pending, return_when=FIRST_COMPLETED).done:
-        job = pending.pop(future)
-        try:
-            run = future.result()
-        except BrokenExecutor:
-            run = _crashed(job)
-        else:
-            records.append(path, {"key": job.key, **run.to_record()})
-        ended.append((job.place, run))
-    yield from ended
+    future: Future[Trajectory], pending: dict[Future[Trajectory], Job], path: str | Path | None
+) -> tuple[int, Trajectory]:
+    """A result, stored and taken off the pending ones."""
+    job = pending.pop(future)
+    try:
+        run = future.result()
+    except BrokenExecutor:
+        return job.place, _crashed(job)
+    if path:
+        records.append(path, {"key": job.key, **run.to_record()})
+    return job.place, run
 
 
 def _crashed(job: Job) -> Trajectory:

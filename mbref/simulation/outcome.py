@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-
 import numpy as np
 
 from mbref import __version__
@@ -76,7 +74,7 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion
         version=__version__,
         method=str(run.method),
         settings={
-            **asdict(run.limits),
+            **vars(run.limits),
             "branches": [list(pair) for pair in dict(run.limits.branches).items()],
         },
         times=run.times[:reached],

@@ -15,7 +15,8 @@ from mbref.cli import main
 from mbref.scene import SceneError
 from mbref.scenes import SCENES
 from mbref.scenes.spatial_slider_crank import OFFSET, RADIUS, ROD
-from mbref.simulation.ensemble import ensemble, processes
+from mbref.simulation.ensemble import ensemble
+from mbref.simulation.processes import processes
 from mbref.simulation.simulate import Limits, simulate
 from mbref.variation import Variation, variants
 

@@ -1,0 +1,104 @@
+"""Processes that each make one call after another; one that is killed fails its own call alone.
+
+(A ProcessPoolExecutor of several fails all the calls that it has been given.)  A call and its result go
+through a pipe without threads in between, which take longer than a short run.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+from collections.abc import Callable
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from multiprocessing.reduction import ForkingPickler
+from queue import SimpleQueue
+from typing import Any
+
+
+class Processes(Executor):
+    """So many processes that wait for calls."""
+
+    def __init__(self, workers: int) -> None:
+        self._threads = ThreadPoolExecutor(workers)
+        self._idle: SimpleQueue[Worker] = SimpleQueue()
+        for _ in range(workers):
+            self._idle.put(Worker())
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
+        """The future of a call; BrokenExecutor is its exception where its process is killed."""
+        return self._threads.submit(self._call, function, arguments, named)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the processes when their calls have ended."""
+        self._threads.shutdown(wait, cancel_futures=cancel_futures)
+        while not self._idle.empty():
+            self._idle.get().end(wait)
+
+    def _call(self, function: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
+        worker = self._idle.get()
+        try:
+            return worker.call(function, arguments, named)
+        except BrokenProcessPool:
+            worker.end()
+            worker = Worker()
+            raise
+        finally:
+            self._idle.put(worker)
+
+
+class Worker:
+    """One process; it ends when it is told to, or when its parent has ended."""
+
+    def __init__(self) -> None:
+        context = get_context("spawn")
+        self._pipe, theirs = context.Pipe()
+        self._process = context.Process(target=_answer, args=(theirs,))
+        self._process.start()
+        theirs.close()
+
+    def call(self, function: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
+        """The result or the exception of a call made there; BrokenProcessPool where the process is killed."""
+        try:
+            self._pipe.send((function, arguments, named))
+            succeeded, found = self._pipe.recv()
+        except (EOFError, OSError):
+            raise BrokenProcessPool("the process was killed") from None
+        if not succeeded:
+            raise found
+        return found
+
+    def end(self, wait: bool = True) -> None:
+        """Have the process end after its call."""
+        self._pipe.close()
+        if wait:
+            self._process.join()
+
+
+def _answer(pipe: Connection) -> None:
+    """Make the calls that come through a pipe, until its other end is closed; interrupts are the parent's."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with contextlib.suppress(EOFError, OSError):
+        while True:
+            function, arguments, named = pipe.recv()
+            try:
+                answer = ForkingPickler.dumps((True, function(*arguments, **named)))
+            except Exception as error:
+                answer = _of_error(error)
+            pipe.send_bytes(answer)
+
+
+def _of_error(error: Exception) -> Any:
+    """An error for another process, by its text where it cannot be sent itself."""
+    try:
+        return ForkingPickler.dumps((False, error))
+    except Exception:
+        return ForkingPickler.dumps((False, RuntimeError(repr(error))))
+
+
+def processes(workers: int | None = None) -> Processes:
+    """So many processes, by default one a core; an interrupt is heard by their parent alone."""
+    return Processes(workers or os.cpu_count() or 1)
