@@ -43,10 +43,9 @@ from mbref.scenes import SCENES
 from mbref.trajectory import Cost, Outcome
 
 OURS, LIMIT_NAME, SERIES = "mbref", LIMIT.name, "taylor"
-ENGINES = ("mbref", "mujoco", "pinocchio", "exudyn", "sundials")
+ENGINES = ("mbref", "mujoco", "pinocchio", "exudyn", "sundials", "casadi", "heyoka")
 OTHERS = (
-    "general_integrators:SCIPY", "general_integrators:SCIKIT_SUNDAE", "code_generators:CASADI",
-    "code_generators:HEYOKA", "limit:LIMIT",
+    "general_integrators:SCIPY", "general_integrators:SCIKIT_SUNDAE", "limit:LIMIT",
 )  # fmt: skip
 PAPER = (
     "four_bar", "five_bar", "spatial_slider_crank", "spatial_slider_crank_driven", "planar_slider_crank",

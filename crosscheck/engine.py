@@ -23,9 +23,9 @@ from mbref.scene_fields import meant
 from mbref.trajectory import Cost, Outcome, Trajectory
 
 __all__ = [
-    "BUILT_IN", "ENTRY_POINTS", "GROUND", "OPTIONAL", "Cannot", "Cost", "Engine", "Outcome", "Owner", "Scene",
-    "Setting", "Supports", "Trajectory", "default_engines", "engine", "engine_names", "inertia_matrices",
-    "initial_poses", "initial_twists", "installed", "rotations",
+    "BUILT_IN", "ENTRY_POINTS", "GROUND", "ON_REQUEST", "OPTIONAL", "Cannot", "Cost", "Engine", "Outcome",
+    "Owner", "Scene", "Setting", "Supports", "Trajectory", "default_engines", "engine", "engine_names",
+    "inertia_matrices", "initial_poses", "initial_twists", "installed", "rotations",
 ]  # fmt: skip
 
 BRANCHES = "branches"  # the option that chooses branches at singular positions, where an engine has one
@@ -172,17 +172,25 @@ class Engine(ABC):
 
 BUILT_IN = ("mbref", "mujoco", "pinocchio", "exudyn")
 OPTIONAL = ("simbody", "sundials", "ondsel")  # take part where their packages are installed
+ON_REQUEST = ("casadi", "heyoka")  # take part where they are named: each scene is compiled first
 ENTRY_POINTS = "crosscheck.engines"
 
 
 def engine_names() -> tuple[str, ...]:
-    """Names of the built-in and optional engines and of those that installed packages offer."""
-    return (*BUILT_IN, *OPTIONAL, *(point.name for point in metadata.entry_points(group=ENTRY_POINTS)))
+    """Names of crosscheck's own engines and of those that installed packages offer."""
+    return (
+        *BUILT_IN,
+        *OPTIONAL,
+        *ON_REQUEST,
+        *(point.name for point in metadata.entry_points(group=ENTRY_POINTS)),
+    )
 
 
 def default_engines() -> tuple[str, ...]:
-    """The engines that run when none is named: all but the optional ones that are not installed."""
-    return tuple(name for name in engine_names() if name not in OPTIONAL or installed(name))
+    """The engines that run when none is named: all but those that run on request, and the optional ones that
+    are not installed."""
+    asked = (name for name in engine_names() if name not in ON_REQUEST)
+    return tuple(name for name in asked if name not in OPTIONAL or installed(name))
 
 
 def installed(name: str) -> bool:
@@ -197,7 +205,7 @@ def installed(name: str) -> bool:
 def engine(name: str) -> Engine:
     """The engine of that name, or at ``module:attribute`` of a module that can be imported or lies in the
     working directory; raises LookupError with the known names."""
-    if name in BUILT_IN + OPTIONAL:
+    if name in BUILT_IN + OPTIONAL + ON_REQUEST:
         return _as_engine(name, import_module(f"crosscheck.engines.{name}").ENGINE)
     for point in metadata.entry_points(group=ENTRY_POINTS):
         if point.name == name:

@@ -9,11 +9,11 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from crosscheck.cli import collection
-from crosscheck.cli.options import add_depth, add_reference_time
+from crosscheck.cli.options import add_depth, add_engines, add_reference_time
 from crosscheck.cli.passage import passage
 from crosscheck.cli.request import RequestError, find_scenes
 from mbref.command_line import Parser
-from mbref.scene import Scene, SceneError
+from mbref.scene import SceneError
 from reports.blocks import Block
 from reports.runs import Run, by_scene
 
@@ -37,7 +37,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     names = arguments.section or (NAMES if is_quick or arguments.scene else (*NAMES, STABILITY, PAPER))
     try:
         scenes = find_scenes(arguments.scene) if arguments.scene else None
-        blocks = _blocks(out, scenes, is_quick, names, arguments.reference_time)
+        wanted = collection.Runs(scenes, arguments.engine, is_quick, arguments.reference_time)
+        blocks = _blocks(out, wanted, names)
     except (RequestError, SceneError) as error:
         for fault in error.faults:
             _notice(fault)
@@ -73,16 +74,14 @@ def _render(folder: Path, names: Sequence[str]) -> int:
     return 0
 
 
-def _blocks(
-    out: Path, scenes: Sequence[Scene] | None, is_quick: bool, names: Sequence[str], reference_time: float
-) -> list[Block]:
+def _blocks(out: Path, wanted: collection.Runs, names: Sequence[str]) -> list[Block]:
     """The blocks of the named sections; only the records they need are made."""
     from reports import sections, stored
     from reports.sections import paper, stability
 
     blocks: list[Block] = []
     if set(names) - {PAPER, STABILITY}:
-        found = collection.comparison(out, scenes, is_quick, reference_time, _notice)
+        found = collection.comparison(out, wanted, _notice)
         named = {scene.name: scene for scene in found.scenes}
         groups = by_scene(found.records, named, found.identities, found.truths, found.motions, found.branches)
         blocks += sections.blocks(groups, names, stored.verified(out))
@@ -109,6 +108,7 @@ def _parser(sections: Sequence[str]) -> argparse.ArgumentParser:
         epilog="example: python -m reports --quick --out report",
     )
     parser.add_argument("scene", nargs="*", metavar="SCENE", help="default: built-in scenes")
+    add_engines(parser)
     add_depth(parser)
     parser.add_argument("--quick", dest="depth", action="store_const", const="quick")
     add_reference_time(parser)

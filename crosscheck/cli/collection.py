@@ -28,14 +28,22 @@ class Paper(NamedTuple):
     illustration: Illustration
 
 
-def comparison(
-    out: Path, scenes: Sequence[Scene] | None, is_quick: bool, reference_time: float, notice: Notice
-) -> Collection:
-    """The records of a comparison, stored in ``out``; without ``scenes`` on the built-in ones.
+class Runs(NamedTuple):
+    """The runs of a report: scenes and engines, or None for the default ones, their depth, and the time (s)
+    for a reference."""
 
-    Raises RequestError when no engine is installed.
+    scenes: Sequence[Scene] | None
+    engines: Sequence[str] | None
+    is_quick: bool
+    reference_time: float
+
+
+def comparison(out: Path, wanted: Runs, notice: Notice) -> Collection:
+    """The records of a comparison, stored in ``out``.
+
+    Raises RequestError for an unknown engine, and when none is installed.
     """
-    engines = find_engines(None, notice)
+    scenes, engines, is_quick = wanted.scenes, find_engines(wanted.engines, notice), wanted.is_quick
     if scenes is None:
         scenes = sweep.quick_scenes() if is_quick else sweep.whole_scenes()
     samples = sweep.QUICK_SAMPLES if is_quick else sweep.SAMPLES
@@ -50,7 +58,7 @@ def comparison(
             raise RequestError("no engine can run these scenes")
         return cases
 
-    return collected(chosen, engines, Wanted(times, reference_time, is_quick, out), plan, notice)
+    return collected(chosen, engines, Wanted(times, wanted.reference_time, is_quick, out), plan, notice)
 
 
 def stability_ladders(out: Path, notice: Notice) -> list[Record]:

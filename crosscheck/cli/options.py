@@ -6,7 +6,7 @@ import argparse
 import math
 from typing import Any
 
-from crosscheck.engine import engine_names
+from crosscheck.engine import ON_REQUEST, engine_names
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.study.command import parsed_option
 from crosscheck.study.grid import TIME_LIMIT
@@ -21,8 +21,7 @@ def add_selection(parser: argparse.ArgumentParser) -> None:
         metavar="SCENE",
         help="a built-in scene (`crosscheck list scenes`) or a .toml file",
     )
-    known = ", ".join(engine_names())
-    parser.add_argument("--engine", action="append", metavar="E", help=f"{known}; may repeat; default: all")
+    add_engines(parser)
     parser.add_argument(
         "--method",
         action="append",
@@ -50,6 +49,14 @@ def add_selection(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
     add_limits(parser, None)
+
+
+def add_engines(parser: argparse.ArgumentParser) -> None:
+    """The engines that run."""
+    parser.add_argument(
+        "--engine", action="append", metavar="E",
+        help=f"{', '.join(engine_names())}; may repeat; default: all but {' and '.join(ON_REQUEST)}",
+    )  # fmt: skip
 
 
 def add_depth(parser: argparse.ArgumentParser) -> None:

@@ -7,7 +7,15 @@ from textwrap import fill
 from typing import Any
 
 from crosscheck.cli.listing import TABLES
-from crosscheck.cli.options import add_depth, add_limits, add_reference_time, add_selection, positive, whole
+from crosscheck.cli.options import (
+    add_depth,
+    add_engines,
+    add_limits,
+    add_reference_time,
+    add_selection,
+    positive,
+    whole,
+)
 from crosscheck.study.timings import REPEATS
 from mbref.command_line import Parser, commands
 
@@ -143,6 +151,7 @@ def _add_report(commands: Commands) -> None:
         "scene", nargs="*", metavar="SCENE",
         help="built-in scenes or .toml files; default: five short built-in ones, at whole depth all of them",
     )  # fmt: skip
+    add_engines(parser)
     add_depth(parser)
     parser.add_argument(
         "--quick", dest="depth", action="store_const", const="quick", help="the same as --depth quick"

@@ -14,7 +14,7 @@ from crosscheck.study.wording import agree, at_most, is_or_are, its_or_their, li
 from mbref.scene import Scene
 
 TITLES = {"mujoco": "MuJoCo", "pinocchio": "Pinocchio", "exudyn": "Exudyn", "simbody": "Simbody",
-          "sundials": "SUNDIALS IDA", "ondsel": "OndselSolver"}  # fmt: skip
+          "sundials": "SUNDIALS IDA", "ondsel": "OndselSolver", "casadi": "CasADi"}  # fmt: skip
 LEVEL = ERROR_LEVELS[1]  # the error at which speeds are compared in words
 TIMED_OUT = "TIMED_OUT"
 SAID = f"{LEVEL:.0e}".replace("e-0", "e-")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from crosscheck.conformance.features import BODY, JOINTS
-from crosscheck.engine import BUILT_IN, OPTIONAL, Cannot, Engine, Owner, Setting, Supports, engine
+from crosscheck.engine import BUILT_IN, ON_REQUEST, OPTIONAL, Cannot, Engine, Owner, Setting, Supports, engine
 from crosscheck.engines.constraint_equations import Constraints
 from crosscheck.engines.spanning_tree import spanning_tree
 from crosscheck.judge.constraints import initial_poses, jacobian
@@ -22,7 +22,7 @@ from mbref.scene_joints import JointEntry
 from mbref.scene_loads import LoadEntry
 from mbref.trajectory import Trajectory
 
-EVERY_ENGINE = (*BUILT_IN, *OPTIONAL)
+EVERY_ENGINE = (*BUILT_IN, *OPTIONAL, *ON_REQUEST)
 
 
 class Screw(JointEntry):

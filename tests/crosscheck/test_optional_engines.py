@@ -7,13 +7,13 @@ from importlib import metadata
 import pytest
 
 from crosscheck.cli.request import RequestError, find_engines, missing_package
-from crosscheck.engine import BUILT_IN, OPTIONAL, default_engines, engine, engine_names, installed
+from crosscheck.engine import BUILT_IN, ON_REQUEST, OPTIONAL, default_engines, engine, engine_names, installed
 
 
 @pytest.fixture
 def nothing_more(monkeypatch: pytest.MonkeyPatch) -> None:
     """An installation without the optional engines' packages."""
-    version, absent = metadata.version, {engine(name).package for name in OPTIONAL}
+    version, absent = metadata.version, {engine(name).package for name in OPTIONAL + ON_REQUEST}
 
     def found(package: str) -> str:
         if package in absent:
@@ -32,7 +32,7 @@ def test_missing_packages_and_the_engines_that_run(nothing_more: None) -> None:
     assert not any(name in notice for notice in notices for name in OPTIONAL), f"said unasked: {notices}"
 
 
-@pytest.mark.parametrize("name", OPTIONAL)
+@pytest.mark.parametrize("name", OPTIONAL + ON_REQUEST)
 def test_what_is_asked_for_and_what_to_install(nothing_more: None, name: str) -> None:
     reason = missing_package(name)
     assert reason and f"pip install {engine(name).package}" in reason, reason

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = ("mbref", "crosscheck", "reports")
 FILES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 MAY_IMPORT = {"mbref": {"mbref"}, "crosscheck": {"crosscheck", "mbref"}, "reports": set(PACKAGES)}
-ENGINE_PACKAGES = {"mujoco", "pinocchio", "exudyn", "opensim", "pyondsel", "sksundae", "casadi"}
+ENGINE_PACKAGES = {"mujoco", "pinocchio", "exudyn", "opensim", "pyondsel", "sksundae", "casadi", "heyoka"}
 LONGEST = 330  # lines of a file
 
 

@@ -1,22 +1,21 @@
 """Our C functions around Pinocchio, compiled once from ``rates.cpp`` against the headers of its wheel.
 
-The library lies in the user's cache folder, its name a hash of source, compiler's command and Pinocchio's
-version, and a hash of its bytes, so that a damaged one is made anew.  It needs a C++ compiler and Eigen's
-headers (package ``cmeel-eigen``).
+The library is kept in the user's cache folder for its source, compiler's command and Pinocchio's version.
+It needs a C++ compiler and Eigen's headers (package ``cmeel-eigen``).
 """
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import functools
-import hashlib
 import os
 import shutil
 import subprocess
-import tempfile
 from pathlib import Path
 
+from crosscheck.engines import kept
+
+FOLDER = "pinocchio"  # of the cache
 SOURCE = Path(__file__).with_name("rates.cpp")
 COMPILERS = ("c++", "g++", "clang++")
 FLAGS = (
@@ -88,45 +87,22 @@ def _command(target: Path) -> list[str]:
     return [compiler, *FLAGS, *headers, str(SOURCE), "-o", str(target), *link]
 
 
-def _folder() -> Path:
-    root = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return root / "mbref" / "pinocchio"
-
-
 @functools.cache
 def _origin() -> str:
     """Hash of Pinocchio's version, the compiler's command and the source."""
     import pinocchio
 
-    text = "\n".join((pinocchio.__version__, *_command(Path("library")), SOURCE.read_text()))
-    return hashlib.sha256(text.encode()).hexdigest()[:32]
+    return kept.hashed(pinocchio.__version__, *_command(Path("library")), SOURCE.read_text())
 
 
 def _kept() -> Path | None:
-    """The library in the cache whose bytes are those of its name."""
-    for path in sorted(_folder().glob(f"{_origin()}-*.so")):
-        with contextlib.suppress(OSError):
-            if path.stem.partition("-")[2] == hashlib.sha256(path.read_bytes()).hexdigest()[:32]:
-                return path
-    return None
+    """The library in the cache."""
+    return kept.kept(FOLDER, _origin(), ".so")
 
 
 def _compiled() -> Path:
-    """Compiles the library and puts it, whole, into the cache; into a temporary folder where that fails."""
-    folder = _folder()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        made = Path(tempfile.mkstemp(dir=folder)[1])
-    except OSError:
-        folder = Path(tempfile.mkdtemp())
-        made = folder / "made"
-    try:
-        _compile(made)
-        path = folder / f"{_origin()}-{hashlib.sha256(made.read_bytes()).hexdigest()[:32]}.so"
-        os.replace(made, path)
-    finally:
-        made.unlink(missing_ok=True)
-    return path
+    """Compiles the library and puts it into the cache."""
+    return kept.keep(FOLDER, _origin(), ".so", _compile)
 
 
 def _compile(target: Path) -> None:

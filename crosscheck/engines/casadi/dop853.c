@@ -1,6 +1,7 @@
 /* DOP853 around generated rates, compiled with them into one piece: N numbers of a state, tableau and step control
    as in crosscheck/engines/compiled/dop853.py.  Included after RATES, SETTLE, STAGES, A, B, C, E3, E5. */
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 #define SAFETY 0.8
@@ -79,14 +80,16 @@ static double jump(double left, double shortest, double rtol, int settles, const
   return best;
 }
 
-/* States at the times into samples (count, N); counts are steps, rejected steps, evaluations and samples. */
-int integrate(const double *start, const double *times, long count, double rtol, double shortest, int settles,
-              double *samples, long *counts) {
+/* States at the times into samples (count, N); counts are steps, rejected steps, evaluations and samples;
+   the last step begins or ends at reached. */
+int integrate(const double *start, const double *times, int64_t count, double rtol, double shortest, int settles,
+              double *samples, int64_t *counts, double *reached) {
   double y[N], new[N], slopes[STAGES][N], t = 0.0, next = 0.0, end = times[count - 1];
   memcpy(y, start, sizeof y);
   memset(counts, 0, 4 * sizeof *counts);
-  for (long k = 0; k < count; k++) {
+  for (int64_t k = 0; k < count; k++) {
     while (t < times[k]) {
+      *reached = t;
       if (++counts[0] > 1000000) return TOO_MANY;
       RATES(y, slopes[0]);
       counts[2]++;
@@ -121,5 +124,6 @@ int integrate(const double *start, const double *times, long count, double rtol,
     memcpy(samples + k * N, y, sizeof y);
     counts[3]++;
   }
+  *reached = t;
   return REACHED;
 }

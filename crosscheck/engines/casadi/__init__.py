@@ -1,0 +1,5 @@
+"""CasADi's generated C code as an engine."""
+
+from crosscheck.engines.casadi.adapter import ENGINE
+
+__all__ = ["ENGINE"]

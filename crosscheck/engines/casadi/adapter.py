@@ -1,0 +1,122 @@
+"""CasADi: C code generated from a mechanism's equations in joint coordinates, in a compiled DOP853.
+
+CasADi eliminates common subexpressions, and a C compiler optimises its code and the integrator as one piece
+for this machine; the step control is that of crosscheck's compiled DOP853.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from crosscheck.engine import Cannot, Owner, Setting
+from crosscheck.engines.casadi.library import library, why_not
+from crosscheck.engines.driver_motion import stated_rate
+from crosscheck.engines.sampling import Failed
+from crosscheck.engines.symbolic.generator import RTOL, Generator, equations_of, sweep
+from mbref.scene import Scene
+from mbref.trajectory import Cost, Outcome, Trajectory
+
+PLAIN, PROJECTED = "dop853, compiled", "projected, compiled"
+FAMILIES = {
+    PROJECTED: "CasADi's C code in a compiled DOP853, states projected onto the closures after each step",
+    PLAIN: "CasADi's C code in a compiled DOP853, closure errors fed back",
+}
+OPTIONS = {
+    **RTOL,
+    "min_step": "shortest step (s), taken whatever its error",
+    "beta": "double root of the closure errors (1/s)",
+}
+RTOLS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
+ENDS = {  # status: outcome and sentence
+    1: (Outcome.NOT_FINITE, "the motion is not finite after {t:.6g} s"),
+    2: (Outcome.STEP_FAILED, "no step after {t:.6g} s is short enough for the tolerance"),
+    3: (Outcome.STEP_FAILED, "{steps} steps have only reached {t:.6g} s"),
+}
+RATE = 0.1  # 1/s, of the closures where they are not projected
+LEAST_TURN = 0.03  # rad turned within the shortest step, which only singular positions need
+SCOUT = {"rtol": 1e-6}  # of the run that finds how fast a scene turns
+SCOUT_STEP, SCOUTED = 1e-5, 101  # its shortest step over the duration, and its samples
+
+
+class CasADi(Generator):
+    """CasADi (PyPI ``casadi``), beside a C compiler."""
+
+    name = package = "casadi"
+    families, options, integrated_here = FAMILIES, OPTIONS, tuple(FAMILIES)
+
+    def refuses(self, scene: Scene) -> Cannot | None:
+        """As its equations, and every scene where there is no C compiler."""
+        if found := super().refuses(scene):
+            return found
+        return Cannot(Owner.ADAPTER, reason) if (reason := why_not()) else None
+
+    def settings(self, scene: Scene) -> Sequence[Setting]:
+        """Both families by relative tolerance, their shortest step by how fast a coarse run turns."""
+        shortest = float(f"{LEAST_TURN / _fastest(scene):.2g}")
+        fed_back = sweep(PLAIN, RTOLS, min_step=shortest, beta=RATE)
+        return [*sweep(PROJECTED, RTOLS, min_step=shortest), *fed_back]
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        """Simulate; raises ValueError for a family it does not have."""
+        self._known(setting)
+        began, equations = time.process_time(), equations_of(scene)
+        compiled = library(scene, setting.options.get("beta", 0.0))
+        run, built = _Run(times, equations.start), time.process_time() - began
+        began = time.process_time()
+        run.advance(compiled, setting)
+        seconds = time.process_time() - began
+        cost = Cost(seconds, built, *(int(count) for count in run.counts[:3]))
+        return self._trajectory(scene, times, setting, run.reached(), run.failure(), cost)
+
+
+@functools.lru_cache(maxsize=16)
+def _fastest(scene: Scene) -> float:
+    """The fastest rate (rad/s or m/s) of a joint coordinate in a coarse run, or that a scene states."""
+    equations = equations_of(scene)
+    run = _Run(np.linspace(0.0, scene.duration, SCOUTED), equations.start)
+    run.advance(library(scene, 0.0), Setting(PROJECTED, {**SCOUT, "min_step": SCOUT_STEP * scene.duration}))
+    rates = run.reached()[:, equations.n :]
+    return float(np.abs(rates[np.isfinite(rates).all(axis=1)]).max(initial=stated_rate(scene)))
+
+
+class _Run:
+    """Arrays of one integration."""
+
+    def __init__(self, times: np.ndarray, start: np.ndarray):
+        self.times, self.start = np.ascontiguousarray(times, dtype=float), start
+        self.samples, self.counts = np.zeros((len(times), len(start))), np.zeros(4, dtype=np.int64)
+        self.status, self.clock = 0, np.zeros(1)
+
+    def advance(self, compiled: ctypes.CDLL, setting: Setting) -> None:
+        """From the start to the last time."""
+        options = setting.options
+        self.status = compiled.integrate(
+            _pointer(self.start), _pointer(self.times), ctypes.c_int64(len(self.times)),
+            ctypes.c_double(options["rtol"]), ctypes.c_double(options["min_step"]),
+            ctypes.c_int(setting.family == PROJECTED), _pointer(self.samples), _pointer(self.counts),
+            _pointer(self.clock),
+        )  # fmt: skip
+
+    def reached(self) -> np.ndarray:
+        """States (k, 2 n) at the times that were reached."""
+        return self.samples[: self.counts[3]]
+
+    def failure(self) -> Failed | None:
+        """How the integration ended before the last time."""
+        if self.status == 0:
+            return None
+        outcome, sentence = ENDS[self.status]
+        t = float(self.clock[0])
+        return Failed(outcome, t, sentence.format(t=t, steps=int(self.counts[0])))
+
+
+def _pointer(array: np.ndarray) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)
+
+
+ENGINE = CasADi()

@@ -1,0 +1,126 @@
+"""The C code of a scene, with the integrator of ``dop853.c`` compiled as one piece for this machine.
+
+The library is kept in the user's cache folder for its scene, the rate of its closures, CasADi's version, the
+compiler's command, the sources and the machine, so that a kept one needs neither CasADi nor compiler.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import os
+import platform
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterable
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines import kept
+from crosscheck.engines.compiled import dop853
+from crosscheck.engines.symbolic.generator import equations_of, origin
+from crosscheck.engines.symbolic.symbols import Symbol, bare, symbolic
+from mbref.scene import Scene
+
+FOLDER = "casadi"  # of the cache
+COMPILERS = ("cc", "gcc", "clang")
+FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-shared", "-fPIC", "-w")
+INTEGRATOR = Path(__file__).with_name("dop853.c")
+TIME_LIMIT = 500.0  # s of compiling; a second is usual
+WRAPPER = """
+static void {macro}(const double *y, double *result) {{
+  double memory[{work} + 1], found[N];
+  const double *arguments[1] = {{y}}; double *results[1] = {{found}};
+  {name}(arguments, results, 0, memory, 0);
+  for (int i = 0; i < N; i++) result[i] = found[i];
+}}
+"""
+
+
+class NoLibrary(Exception):
+    """The sentence says why there is none."""
+
+
+def why_not() -> str:
+    """Why no library can be compiled here, in a sentence; empty where nothing is missing."""
+    try:
+        _compiler()
+    except NoLibrary as reason:
+        return str(reason)
+    return ""
+
+
+@functools.lru_cache(maxsize=16)
+def library(scene: Scene, beta: float) -> ctypes.CDLL:
+    """The integrator compiled with the rates and the projection of a state; raises NoLibrary."""
+    made_of = _origin(scene, beta)
+    path = kept.kept(FOLDER, made_of, ".so")
+    path = path or kept.keep(FOLDER, made_of, ".so", lambda target: _compile(_source(scene, beta), target))
+    return ctypes.CDLL(str(path))
+
+
+def _origin(scene: Scene, beta: float) -> str:
+    sources = (Path(__file__).read_text(), INTEGRATOR.read_text())
+    command = (_compiler(), *FLAGS, platform.node())
+    return origin(scene, repr(beta), metadata.version("casadi"), *command, *sources)
+
+
+def _compiler() -> str:
+    names = (os.environ["CC"],) if os.environ.get("CC") else COMPILERS
+    found = next(filter(None, map(shutil.which, names)), None)
+    if found is None:
+        raise NoLibrary(f"no C compiler is installed ({', '.join(names)})")
+    return found
+
+
+def _source(scene: Scene, beta: float) -> str:
+    """The C code: tableau, rates, projection and integrator."""
+    import casadi
+
+    equations, arithmetic = equations_of(scene), symbolic(casadi.sin, casadi.cos)
+    symbols = casadi.SX.sym("y", 2 * equations.n)
+    y = [Symbol(entry) for entry in casadi.vertsplit(symbols)]
+    q, v = y[: equations.n], y[equations.n :]
+    found: dict[str, Iterable[Any]] = {
+        "rates": [*v, *equations.accelerations(q, v, arithmetic, beta)],
+        "settled": np.concatenate(equations.settled(q, v, arithmetic)),
+    }
+    code, parts = casadi.CodeGenerator("code.c"), [_tableau(), f"#define N {len(y)}\n"]
+    for macro, (name, outputs) in zip(("RATES", "SETTLED"), found.items(), strict=True):
+        function = casadi.Function(name, [symbols], [casadi.vertcat(*bare(outputs))], {"cse": True})
+        code.add(function)
+        parts.append(WRAPPER.format(macro=macro, name=name, work=function.sz_w()))
+    settle = "#define SETTLE(y) SETTLED(y, y)\n"
+    return "".join([code.dump(), *parts, settle, INTEGRATOR.read_text()])
+
+
+def _tableau() -> str:
+    """DOP853's coefficients as C arrays."""
+    stages = dop853.STAGES
+    arrays = {"B": dop853.B, "E3": dop853.ERROR3, "E5": dop853.ERROR5}
+    text = "".join(f"static const double {name}[{stages}] = {_c(array)};\n" for name, array in arrays.items())
+    rows = ", ".join(_c(row) for row in dop853.A)
+    return f"#define STAGES {stages}\n{text}static const double A[{stages}][{stages}] = {{{rows}}};\n"
+
+
+def _c(array: np.ndarray) -> str:
+    return "{" + ", ".join(repr(float(number)) for number in array) + "}"
+
+
+def _compile(text: str, target: Path) -> None:
+    """Compiles a C source; raises NoLibrary with the compiler's words."""
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder, "code.c")
+        source.write_text(text)
+        command = [_compiler(), *FLAGS, str(source), "-o", str(target), "-lm"]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=TIME_LIMIT)
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise NoLibrary(f"the C compiler could not be run: {error}") from error
+    if done.returncode != 0:
+        said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip())
+        raise NoLibrary(f"the C compiler failed: {said}")

@@ -1,0 +1,103 @@
+"""heyoka: Taylor series of a mechanism's equations in joint coordinates, compiled by heyoka.
+
+The order is the one that heyoka chooses for a tolerance; samples are its dense output.  Closure errors are
+neither fed back nor projected.  A compiled integrator is kept in the user's cache folder for its scene,
+tolerance, heyoka's version and the machine.
+"""
+
+from __future__ import annotations
+
+import functools
+import pickle
+import platform
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engine import Setting
+from crosscheck.engines import kept
+from crosscheck.engines.sampling import Failed
+from crosscheck.engines.symbolic.generator import RTOL, Generator, equations_of, origin, sweep
+from crosscheck.engines.symbolic.symbols import Symbol, bare, symbolic
+from mbref.scene import Scene
+from mbref.trajectory import Cost, Outcome, Trajectory
+
+FOLDER = "heyoka"  # of the cache
+FAMILY = "taylor"
+FAMILIES = {FAMILY: "Taylor series of the order that heyoka chooses, closures not stabilised"}
+RTOLS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12)
+MOST_STEPS = 10**6
+
+
+class Heyoka(Generator):
+    """heyoka (PyPI ``heyoka``)."""
+
+    name = package = "heyoka"
+    families, options = FAMILIES, RTOL
+
+    def prepare(self, families: Sequence[str]) -> None:
+        import heyoka  # noqa: F401
+
+    def settings(self, scene: Scene) -> Sequence[Setting]:
+        """One family, by tolerance."""
+        return sweep(FAMILY, RTOLS)
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        """Simulate; raises ValueError for a family it does not have."""
+        self._known(setting)
+        began, equations = time.process_time(), equations_of(scene)
+        integrator = _integrator(scene, setting.options["rtol"])
+        integrator.time, integrator.state[:] = 0.0, equations.start
+        built, began = time.process_time() - began, time.process_time()
+        states, ending, steps = _propagated(integrator, times, equations.start)
+        seconds = time.process_time() - began
+        good = int(np.isfinite(states).all(axis=1).cumprod().sum())
+        t, failure = float(integrator.time), None
+        if good < len(times):
+            failure = Failed(Outcome.STEP_FAILED, t, f"the integrator ended at {t:.6g} s with {ending}")
+        return self._trajectory(scene, times, setting, states[:good], failure, Cost(seconds, built, steps))
+
+
+def _propagated(integrator: Any, times: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, str, int]:
+    """States (k, 2 n) at the times that were reached, how the integrator ended, and its steps."""
+    grid = np.array(times if times[0] == 0.0 else [0.0, *times], dtype=float)
+    if len(grid) == 1:
+        return start[None], "", 0
+    longest = float(np.diff(grid).max())
+    outcome, *_, steps, _, states = integrator.propagate_grid(grid, max_delta_t=longest, max_steps=MOST_STEPS)
+    return states[len(grid) - len(times) :], outcome.name, int(steps)
+
+
+@functools.lru_cache(maxsize=16)
+def _integrator(scene: Scene, rtol: float) -> Any:
+    """The compiled integrator of a scene, from the cache or made anew."""
+    import heyoka
+
+    made_of = origin(scene, repr(rtol), heyoka.__version__, platform.node(), Path(__file__).read_text())
+    if path := kept.kept(FOLDER, made_of, ".pickle"):
+        return pickle.loads(path.read_bytes())
+    found = _made(scene, rtol)
+    kept.keep(FOLDER, made_of, ".pickle", lambda target: _write(target, found))
+    return found
+
+
+def _write(target: Path, integrator: Any) -> None:
+    target.write_bytes(pickle.dumps(integrator))
+
+
+def _made(scene: Scene, rtol: float) -> Any:
+    import heyoka
+
+    equations, arithmetic = equations_of(scene), symbolic(heyoka.sin, heyoka.cos)
+    symbols = heyoka.make_vars(*(f"y{i}" for i in range(2 * equations.n)))
+    y = [Symbol(symbol) for symbol in symbols]
+    q, v = y[: equations.n], y[equations.n :]
+    accelerations = bare(equations.accelerations(q, v, arithmetic, 0.0))
+    rates = [*symbols[equations.n :], *map(heyoka.expression, accelerations)]
+    return heyoka.taylor_adaptive(list(zip(symbols, rates, strict=True)), list(equations.start), tol=rtol)
+
+
+ENGINE = Heyoka()

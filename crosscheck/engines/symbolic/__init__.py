@@ -1,0 +1,1 @@
+"""A mechanism's equations in joint coordinates as symbols, for engines that make code of them."""

@@ -1,0 +1,110 @@
+"""Links in motion, in any arithmetic: place, rotation, velocities and accelerations of q̈ = 0."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.spanning_tree import TURN
+from crosscheck.engines.symbolic.symbols import NOTHING, Arithmetic
+
+Vector = np.ndarray  # (3,) of numbers or symbols
+
+
+@dataclass(frozen=True)
+class Turned:
+    """The last turns about one axis: the rotation before them, the axis, and the sum of their angles."""
+
+    before: np.ndarray
+    axis: np.ndarray
+    angle: Any
+
+    def further(self, axis: np.ndarray, angle: Any) -> Turned | None:
+        """With another turn about the same axis; None where that is another one."""
+        along = float(axis @ self.axis)
+        if abs(along) < 1 - NOTHING:
+            return None
+        return Turned(self.before, self.axis, self.angle + math.copysign(1.0, along) * angle)
+
+
+@dataclass
+class Frame:
+    """A link in motion: the point that was at ``reference`` is at ``origin``, turned by ``rotation``.
+
+    ``columns`` are the coordinates that move it: place, whether it turns, axis, and a point of the axis.
+    The accelerations are those of q̈ = 0.
+    """
+
+    reference: np.ndarray
+    origin: Vector
+    rotation: np.ndarray
+    velocity: Vector
+    spin: Vector
+    acceleration: Vector
+    spin_rate: Vector
+    columns: list[tuple[int, bool, Vector, Vector]] = field(default_factory=list)
+    turned: Turned | None = None
+
+    def arm(self, point: np.ndarray) -> Vector:
+        """From the origin to a point of the link, given by its place (3,) at t = 0."""
+        return self.rotation @ (point - self.reference)
+
+    def moved(self, arm: Vector, reference: np.ndarray) -> Frame:
+        """The same link with another origin."""
+        turned = cross(self.spin, arm)
+        return Frame(
+            reference, self.origin + arm, self.rotation, self.velocity + turned, self.spin,
+            self.acceleration + cross(self.spin_rate, arm) + cross(self.spin, turned), self.spin_rate,
+            list(self.columns), self.turned,
+        )  # fmt: skip
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """a × b of symbols too, which `rotations.cross` does not take."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def turn(axis: np.ndarray, angle: Any, arithmetic: Arithmetic) -> np.ndarray:
+    """The rotation (3, 3) about a unit vector of numbers; entries that never change are numbers."""
+    k = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    s, c, still = arithmetic.sin(angle), arithmetic.cos(angle), np.outer(axis, axis)
+    entries = [
+        _sum((still[i, j], 1.0), (float(i == j) - still[i, j], c), (k[i, j], s))
+        for i in range(3) for j in range(3)
+    ]  # fmt: skip
+    return np.array(entries, dtype=object).reshape(3, 3)
+
+
+def _sum(*terms: tuple[float, Any]) -> Any:
+    return sum((float(factor) * value for factor, value in terms if factor != 0.0), 0.0)
+
+
+def moved_by(
+    frame: Frame, kind: str, axis: np.ndarray, place: int, state: tuple[Any, Any], arithmetic: Arithmetic
+) -> Frame:
+    """The frame after an elementary motion of coordinate and rate ``state``."""
+    along, (q, v) = frame.rotation @ axis, state
+    if kind == TURN:
+        rate = cross(frame.spin, along) * v
+        turned = frame.turned.further(axis, q) if frame.turned else None
+        turned = turned or Turned(frame.rotation, axis, q)
+        rotation = turned.before @ turn(turned.axis, turned.angle, arithmetic)
+        return Frame(
+            frame.reference, frame.origin, rotation, frame.velocity, frame.spin + along * v,
+            frame.acceleration, frame.spin_rate + rate, [*frame.columns, (place, True, along, frame.origin)],
+            turned,
+        )  # fmt: skip
+    slid = frame.moved(along * q, frame.reference)
+    slid.velocity = slid.velocity + along * v
+    slid.acceleration = slid.acceleration + 2.0 * cross(frame.spin, along) * v
+    slid.columns.append((place, False, along, frame.origin))
+    return slid
+
+
+def velocity_of(frame: Frame, column: tuple[int, bool, Vector, Vector], point: Vector) -> Vector:
+    """The velocity of a point of the link by one coordinate's rate."""
+    _, turns, axis, origin = column
+    return cross(axis, point - origin) if turns else axis

@@ -1,0 +1,115 @@
+"""Engines that generate code from the symbolic equations of a scene; making the code is construction."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engine import Cannot, Engine, Owner, Setting, Supports
+from crosscheck.engines.initial_velocities import lacks_mass
+from crosscheck.engines.kept import hashed
+from crosscheck.engines.sampling import Counts, Failed, Sample, run_through
+from crosscheck.engines.symbolic.equations import TreeEquations
+from crosscheck.engines.tree_reactions import joint_reactions
+from mbref import rotations
+from mbref.scene import Scene
+from mbref.trajectory import Cost, Trajectory
+
+JOINTS = ("fixed", "revolute", "universal", "spherical", "translational", "cylindrical", "planar")
+RTOL = {"rtol": "relative tolerance"}
+
+
+@functools.lru_cache(maxsize=4)
+def equations_of(scene: Scene) -> TreeEquations:
+    """The equations of a scene; raises ValueError where they are not derived."""
+    return TreeEquations(scene)
+
+
+def origin(scene: Scene, *parts: str) -> str:
+    """Hash of a scene, of the sources that derive its equations, and of further parts."""
+    sources = sorted(Path(__file__).parent.glob("*.py"))
+    return hashed(scene.model_dump_json(warnings=False), *(path.read_text() for path in sources), *parts)
+
+
+class Generator(Engine):
+    """A generator of code for trees of slides and turns whose loops points close, moved by gravity and
+    moments."""
+
+    supports = Supports(joints=JOINTS, loads=("moment",))
+
+    def version(self) -> str:
+        """Version of the generator; raises ImportError when it is not installed."""
+        return metadata.version(self.package)
+
+    def refuses(self, scene: Scene) -> Cannot | None:
+        """Scenes without masses, and those whose equations are not derived."""
+        if found := lacks_mass(scene):
+            return found
+        try:
+            equations_of(scene)
+        except ValueError as reason:
+            return Cannot(Owner.ADAPTER, f"its equations in joint coordinates are not derived: {reason}")
+        return None
+
+    def serves(self, scene: Scene, family: str) -> bool:
+        """Every family serves every scene that is not refused."""
+        return family in self.families
+
+    def _known(self, setting: Setting) -> None:
+        if setting.family not in self.families:
+            raise ValueError(f"{self.name} has no family {setting.family!r}")
+
+    def _trajectory(
+        self, scene: Scene, times: np.ndarray, setting: Setting, states: np.ndarray, failure: Failed | None,
+        cost: Cost,
+    ) -> Trajectory:  # fmt: skip
+        """The bodies and joints at the states (k, 2 n) reached; ``failure`` is the end of the others."""
+        labels = {"engine": self.name, "version": self.version(), "method": setting.family,
+                  "settings": dict(setting.options)}  # fmt: skip
+        reached = iter(states)
+        current = np.zeros(0)
+
+        def advance(_: float, target: float) -> None:
+            pass
+
+        def sample(t: float) -> Sample:
+            nonlocal current
+            if (found := next(reached, None)) is None:
+                raise failure or ValueError(f"{self.name} gave no state at {t:.6g} s")
+            current = found
+            return _sample(scene, current)
+
+        counts = Counts(cost.steps, cost.rejected, cost.rhs)
+        found = run_through(scene, times, advance, sample, counts, cost.build_seconds, labels)
+        return replace(found, cost=cost)
+
+
+def _sample(scene: Scene, y: np.ndarray) -> Sample:
+    """Poses, velocities and accelerations; reactions where the joints are the scene's own."""
+    equations = equations_of(scene)
+    motion, closing = equations.link_motion(y)
+    own, tree = list(equations.tree.own), equations.tree
+    start = np.array([body.orientation for body in scene.body], dtype=float)
+    reactions: Mapping[str, Any] = {}
+    if equations.has_own_joints:
+        reactions = joint_reactions(scene, tree, motion, closing)
+    return Sample(
+        position=motion.position[own],
+        orientation=rotations.multiply(rotations.from_matrix(motion.rotation[own]), start),
+        velocity=motion.velocity[own],
+        angular_velocity=motion.angular_velocity[own],
+        acceleration=motion.acceleration[own],
+        angular_acceleration=motion.angular_acceleration[own],
+        reactions=dict(reactions),
+    )
+
+
+def sweep(family: str, rtols: Sequence[float], **options: float) -> list[Setting]:
+    """A family at these relative tolerances."""
+    return [Setting(family, {"rtol": rtol, **options}) for rtol in rtols]

@@ -1,0 +1,177 @@
+"""Engines of generated code, CasADi and heyoka / truths, refusals, and files that are kept.
+
+Runs are in child processes: CasADi and OpenSim do not share one.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from crosscheck.engine import ON_REQUEST, Owner, Setting, default_engines, engine
+from crosscheck.engines import kept
+from crosscheck.engines.casadi import library
+from crosscheck.engines.symbolic.equations import TreeEquations
+from crosscheck.engines.symbolic.symbols import NUMBERS
+from crosscheck.judge.metrics import measure
+from crosscheck.judge.truth import truth_for
+from crosscheck.processes.pool import run_isolated
+from mbref.scenes import SCENES
+from mbref.trajectory import Outcome, Trajectory
+
+ERROR = 1e-8
+SETTINGS = {
+    "casadi": [
+        Setting("projected, compiled", {"rtol": 1e-10, "min_step": 1e-9}),
+        Setting("dop853, compiled", {"rtol": 1e-10, "min_step": 1e-9, "beta": 0.1}),
+    ],
+    "heyoka": [Setting("taylor", {"rtol": 1e-12})],
+}
+RUNS = [(name, setting) for name, settings in SETTINGS.items() for setting in settings]
+
+
+def needs(name: str) -> None:
+    """Skips where the engine's package, or CasADi's compiler, is missing."""
+    if find_spec(name) is None:
+        pytest.skip(f"{name} is not installed (extra generators)")
+    if name == "casadi" and (reason := library.why_not()):
+        pytest.skip(reason)
+
+
+def run_of(name: str, scene_name: str, times: np.ndarray, setting: Setting) -> Trajectory:
+    needs(name)
+    return run_isolated(name, SCENES[scene_name](), times, setting, 60.0)
+
+
+@pytest.mark.parametrize("name", ["planar_slider_crank_equal", "spatial_slider_crank", "four_bar_gravity"])
+def test_joint_coordinates_and_truth_agree(name: str):
+    scene = SCENES[name]()
+    equations, end = TreeEquations(scene), 0.1 * scene.duration
+
+    def rates(_: float, y: np.ndarray) -> np.ndarray:
+        q, v = np.split(y, 2)
+        return np.concatenate((v, equations.accelerations(q, v, NUMBERS, 0.0).astype(float)))
+
+    found = solve_ivp(rates, (0, end), equations.start, "DOP853", rtol=1e-9, atol=1e-9).y[:, -1]
+    motion, exact = equations.link_motion(found)[0], truth_for(scene).poses(np.array([end]))
+    off = np.abs(motion.position[list(equations.tree.own)] - exact.position[0]).max()
+    assert off < 1e-7, f"{name}: off by {off:.1e}"
+
+
+def test_one_step_onto_the_closures_leaves_the_square_of_their_errors():
+    equations = TreeEquations(SCENES["spatial_slider_crank"]())
+    left = []
+    for size in (1e-3, 1e-4):
+        q, v = np.split(equations.start, 2)
+        settled, rates = equations.settled(q + size, v, NUMBERS)
+        violation, _, _ = equations._closures(equations.frames(settled, rates, NUMBERS))
+        left.append(np.abs(violation.astype(float)).max())
+    assert left[0] < 1e-5 and left[1] < 0.02 * left[0], left
+
+
+@pytest.mark.parametrize(("name", "setting"), RUNS, ids=str)
+def test_generated_code_and_truth_agree(name: str, setting: Setting) -> None:
+    scene = SCENES["spatial_slider_crank_gravity"]()
+    run = run_of(name, scene.name, np.linspace(0, scene.duration, 5), setting)
+    assert run.outcome is Outcome.COMPLETED, run.message
+    found = measure(scene, run, truth_for(scene))
+    for metric in ("error", "velocity_error", "reaction_error"):
+        assert found[metric] < ERROR, f"{metric}: off by {found[metric]:.1e}, allowed {ERROR:.0e}"
+
+
+@pytest.mark.parametrize("name", ON_REQUEST)
+def test_samples_need_not_begin_at_the_start(name: str) -> None:
+    times, setting = np.array([0.1, 0.25]), SETTINGS[name][0]
+    run = run_of(name, "planar_slider_crank_gravity", times, setting)
+    whole = run_of(name, "planar_slider_crank_gravity", np.array([0.0, *times]), setting)
+    assert run.outcome is Outcome.COMPLETED and np.array_equal(run.times, times), run.message
+    assert np.abs(run.position - whole.position[1:]).max() < ERROR
+    start = run_of(name, "planar_slider_crank_gravity", np.array([0.0]), setting)
+    assert np.allclose(start.position[0], whole.position[0], atol=1e-15), "a run that ends where it starts"
+
+
+@pytest.mark.parametrize("name", ON_REQUEST)
+def test_sweeps_have_every_family_coarse_to_fine(name: str) -> None:
+    needs(name)
+    simulator, scene = engine(name), SCENES["planar_slider_crank_gravity"]()
+    assert simulator.cannot(scene) is None
+    if name == "heyoka":  # CasADi's sweep runs its code, and that not beside OpenSim
+        rtols = [setting.options["rtol"] for setting in simulator.settings_of(scene, "taylor")]
+        assert rtols == sorted(rtols, reverse=True) and len(rtols) > 3, rtols
+    assert all(simulator.serves(scene, family) for family in simulator.families)
+    with pytest.raises(ValueError, match="no family 'best'"):
+        simulator.run(scene, np.array([0.0]), Setting("best", {"rtol": 1e-6}))
+
+
+@pytest.mark.parametrize("name", ON_REQUEST)
+@pytest.mark.parametrize(("scene", "reason"), [
+    ("four_bar", "driver"), ("flyball_governor", "'spring'"), ("heavy_top", "ball joints"),
+    ("five_bar_gravity", "depend on each other"),
+])  # fmt: skip
+def test_scenes_whose_equations_are_not_derived_are_refused(name: str, scene: str, reason: str) -> None:
+    found = engine(name).cannot(SCENES[scene]())
+    assert found is not None and found.owner is Owner.ADAPTER and reason in found.reason, found
+
+
+def test_nothing_runs_unasked() -> None:
+    assert not set(ON_REQUEST) & set(default_engines())
+
+
+def test_scenes_are_refused_where_there_is_no_c_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", "no-such-compiler")
+    found = engine("casadi").cannot(SCENES["planar_slider_crank_gravity"]())
+    assert found is not None and found.reason == "no C compiler is installed (no-such-compiler)", found
+
+
+def test_a_compiler_that_fails_is_quoted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    compiler = tmp_path / "cc"
+    compiler.write_text("#!/bin/sh\necho 'error: out of luck' >&2\nexit 1\n")
+    compiler.chmod(0o755)
+    monkeypatch.setenv("CC", str(compiler))
+    with pytest.raises(library.NoLibrary, match=r"the C compiler failed: .*out of luck"):
+        library._compile("int main;", tmp_path / "code.so")
+
+
+def test_a_file_is_made_once_and_a_damaged_one_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert kept.kept("folder", "origin", ".txt") is None
+    path = kept.keep("folder", "origin", ".txt", lambda target: target.write_text("whole"))
+    assert kept.kept("folder", "origin", ".txt") == path and kept.kept("folder", "other", ".txt") is None
+    path.write_text("damaged")
+    assert kept.kept("folder", "origin", ".txt") is None
+
+
+def test_the_oldest_files_are_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(kept, "MOST", 2)
+    paths = [
+        kept.keep("folder", f"origin{k}", ".txt", lambda target, k=k: target.write_text(str(k)))
+        for k in range(3)
+    ]
+    assert not paths[0].exists() and paths[1].exists() and paths[2].exists()
+
+
+def test_a_kept_library_serves_another_process_without_compiling(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    needs("casadi")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    code = (
+        "from crosscheck.engines.casadi import library; from mbref.scenes import SCENES; "
+        "library.library(SCENES['planar_slider_crank_gravity'](), 0.0); "
+        "import sys; print('casadi' in sys.modules)"
+    )
+    told = [
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        ).stdout.strip()
+        for _ in range(2)
+    ]
+    assert told == ["True", "False"], "whether CasADi was loaded"
+    assert len(list((tmp_path / "mbref" / "casadi").iterdir())) == 1
