@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-MOST = 500  # files of a folder; the oldest beyond them are removed
+MOST = 64e6  # bytes of a folder; the oldest files beyond them are removed
 
 
 def hashed(*parts: str) -> str:
@@ -63,5 +63,8 @@ def _remove_oldest(folder: Path, suffix: str) -> None:
     """Other processes may remove the same ones."""
     with contextlib.suppress(OSError):
         paths = sorted(folder.glob(f"*{suffix}"), key=lambda path: path.stat().st_mtime)
-        for path in paths[:-MOST]:
-            path.unlink(missing_ok=True)
+        left = sum(path.stat().st_size for path in paths)
+        for path in paths[:-1]:
+            if left > MOST:
+                left -= path.stat().st_size
+                path.unlink()

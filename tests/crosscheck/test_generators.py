@@ -149,7 +149,7 @@ def test_a_file_is_made_once_and_a_damaged_one_anew(tmp_path: Path, monkeypatch:
 
 def test_the_oldest_files_are_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(kept, "MOST", 2)
+    monkeypatch.setattr(kept, "MOST", 2)  # bytes, of one each
     paths = [
         kept.keep("folder", f"origin{k}", ".txt", lambda target, k=k: target.write_text(str(k)))
         for k in range(3)
