@@ -147,9 +147,10 @@ def _report(arguments: argparse.Namespace) -> int:
 
 def _report_options(arguments: argparse.Namespace) -> list[str]:
     sections = [option for name in arguments.section or () for option in ("--section", name)]
+    engines = [option for name in arguments.engine or () for option in ("--engine", name)]
     limits = ["--depth", arguments.depth, "--reference-time", f"{arguments.reference_time:g}"]
     limits += ["--render", arguments.render] if arguments.render else []
-    return [*arguments.scene, "--out", arguments.out, *limits, *sections]
+    return [*arguments.scene, "--out", arguments.out, *engines, *limits, *sections]
 
 
 def _diff(arguments: argparse.Namespace) -> int:

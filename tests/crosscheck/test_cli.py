@@ -430,8 +430,23 @@ def test_report_command_and_the_program_it_starts(monkeypatch):
             return self
 
     monkeypatch.setattr(subprocess, "Popen", Program)
-    assert main(["report", "my.toml", "--quick", "--out", "x", "--section", "speed"]) == 130
-    asked = ["my.toml", "--out", "x", "--depth", "quick", "--reference-time", "20", "--section", "speed"]
+    assert (
+        main(["report", "my.toml", "--engine", "casadi", "--quick", "--out", "x", "--section", "speed"])
+        == 130
+    )
+    asked = [
+        "my.toml",
+        "--out",
+        "x",
+        "--engine",
+        "casadi",
+        "--depth",
+        "quick",
+        "--reference-time",
+        "20",
+        "--section",
+        "speed",
+    ]
     assert started[1][1:] == ["-m", "reports", *asked], started
 
 
