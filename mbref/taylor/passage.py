@@ -36,6 +36,7 @@ CLOCK = 3e-16  # of the time: its rounding, over which drivers and variables mov
 DEEPEST = 0.2  # of a step's first pivot: its last is not less, so that the next is not the worse for it
 SHORTEST = 0.05  # the same, of a step that crosses: refused, it would be tried again from nearer
 VANISHING = log(0.2)  # of a determinant over its values at both ends, that falls and rises linearly
+VANISHED = -30.0  # the same logarithm at its least, of a step that begins far from where it crosses
 LONG, MOST_PARTS = 0.5, 8  # that a variable moves in a part of a step, and the most parts
 STEEPEST = 1.5  # that a pivot falls and rises in a step, over the most that a variable moves
 GOLDEN, SECTIONS = 0.6180339887498949, 70  # of the search for the least determinant
@@ -139,13 +140,16 @@ def has_crossed(h, pivot, memory):
     if changes_sign(h, min(int(moved / LONG) + 1, MOST_PARTS), memory):
         return True
     turns = turns_back(memory.series.terms, memory)
-    if far or brief or (keeps_signs(memory) and not is_near(pivot, progress)) or turns:
+    if brief or (keeps_signs(memory) and not is_near(pivot, progress)) or turns:
         return False
     _, behind = overlap(memory.series.terms, memory)
     _, before = overlap(memory.series.past, memory)
-    between = size_at(h * progress.past_pivot / (progress.past_pivot + pivot), memory)
+    between = size_at(h * progress.past_pivot / (progress.past_pivot + pivot), memory) - min(before, behind)
+    vanishes = between < VANISHING
+    if vanishes and far:
+        vanishes = size_at(least_between(h, memory), memory) < VANISHED + min(before, behind)
     evaluate_series(h, memory)
-    return between < VANISHING + min(before, behind)
+    return vanishes
 
 
 @kernel

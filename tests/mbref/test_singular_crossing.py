@@ -11,6 +11,7 @@ from crosscheck.judge.truth import closed_form
 from crosscheck.study import stability
 from mbref import rotations
 from mbref.scene import GROUND, Body, Fixed, Revolute, Scene, Translational
+from mbref.scenes import find_scene
 from mbref.scenes.five_bar import five_bar, five_bar_gravity
 from mbref.scenes.four_bar import four_bar, four_bar_gravity, parallelogram
 from mbref.scenes.planar_slider_crank import planar_slider_crank_heavy, slider_crank
@@ -133,6 +134,16 @@ def test_a_motion_that_turns_back_before_the_flat_position_is_followed(loop, dis
     scene = RHOMBI[loop][1](-distance)
     assert error_of(scene, 1.5, code=code) < 1e-8
     assert "passed" not in simulate(scene, "alf-dual+projection", [1.5], Limits(code=code)).message
+
+
+@pytest.mark.parametrize("method", ["alf-dual+projection", "taylor"])
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-11])
+def test_two_loops_that_cross_at_once_are_recorded(method, rtol):
+    """The sign of the determinant stays; of the ten crossings a run had recorded six."""
+    run = simulate(find_scene("four_bar_chain[2]"), method, np.linspace(0.0, 10.0, 3), Limits(rtol=rtol))
+    times = np.array([crossing.time for crossing in run.crossings])
+    assert run.outcome.name == "COMPLETED" and len(times) == 10
+    assert np.abs(times[2:] - times[:-2] - (times[2] - times[0])).max() < 1e-4, "the motion is periodic"
 
 
 @pytest.mark.parametrize("method", ["alf-dual+projection", "taylor"])
