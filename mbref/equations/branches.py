@@ -122,17 +122,14 @@ def passage_of(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Passage 
     )
 
 
-def velocities_along_branch(
-    model: Model, q: np.ndarray, v: np.ndarray, given: np.ndarray
-) -> np.ndarray | None:
-    """The velocities (n,) of a branch at q (7 nb,), t = 0, that agree with the given entries (n,) of v (n,).
+def velocities_along(model: Model, q: np.ndarray, v: np.ndarray, given: np.ndarray) -> list[np.ndarray]:
+    """Velocities (n,) of the branches at q (7 nb,), t = 0, that agree with the given entries (n,) of v (n,).
 
-    Of several branches the one with the least kinetic energy; None where second order tells none.
+    Those of the least kinetic energy come first; there are none where second order tells none.
     """
     found = second_order(model, 0.0, q, v)
     along = [_as_given((found.kernel @ a) * found.scale, v, given) for a in _lines(found)[0]]
-    along = [w for w in along if w is not None]
-    return min(along, key=lambda w: w @ (model.mass * w)) if along else None
+    return sorted((w for w in along if w is not None), key=lambda w: float(w @ (model.mass * w)))
 
 
 def _as_given(u: np.ndarray, v: np.ndarray, given: np.ndarray) -> np.ndarray | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mbref import rotations
-from mbref.equations.branches import MOST_ROWS, passage_of, velocities_along_branch
+from mbref.equations.branches import MOST_ROWS, passage_of, velocities_along
 from mbref.equations.model import Model, displaced
 from mbref.equations.units import row_lengths
 from mbref.linear_algebra.minimum_norm import MinimumNorm
@@ -18,6 +18,8 @@ LARGE = 40  # rows; above, dense singular values take longer than sparse factors
 GROSS = 0.05  # of the scene's length, or of its speed: a larger inconsistency is a fault
 MOST_ITERATIONS = 30
 OPEN_WEIGHT, REPEATS = 1e-4, 5  # weight of open velocities beside given ones, and how often it is compensated
+BESIDE = 1e-13  # of velocities, by which those of another branch miss Φ_q v = ν beside a singular position
+BESIDE_RANK = 1e-9  # singular values below which they are not corrected
 BRANCH = (
     "initial velocities that the scene leaves open at a singular position are those of the branch with the "
     "least kinetic energy"
@@ -61,7 +63,19 @@ def _along_branch(model: Model, q: np.ndarray, v: np.ndarray) -> np.ndarray | No
     passage = passage_of(model, 0.0, q, v) if model.closed_loops and model.m <= MOST_ROWS else None
     if passage is None or passage.fits:
         return None
-    return velocities_along_branch(model, q, v, given_velocities(model, q)[1])
+    along = velocities_along(model, q, v, given_velocities(model, q)[1])
+    return _best_met(model, q, along) if along else None
+
+
+def _best_met(model: Model, q: np.ndarray, along: list[np.ndarray]) -> np.ndarray:
+    """Of velocities (6 nb,) along branches the first, where all meet Φ_q v = ν; else those that meet it best,
+    as one branch does beside a singular position.  They are corrected as far as rounding allows."""
+    terms = model.terms(0.0, q, along[0])
+    jacobian, nu = _unit_rows(terms.jacobian, terms.nu)
+    off = np.array([np.abs(jacobian @ w - nu).max() / np.abs(w).max() for w in along])
+    best = int(np.argmin(off)) if off.max() > BESIDE else 0
+    change = np.linalg.lstsq(jacobian, nu - jacobian @ along[best], rcond=BESIDE_RANK)[0]
+    return along[best] + change
 
 
 def _fault(model: Model, row: int, what: str) -> SceneError:

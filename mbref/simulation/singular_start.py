@@ -13,8 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from mbref.equations.branches import MOST_ROWS, passage_of, tangents
+from mbref.equations.units import row_lengths
 from mbref.simulation.run import Run
 
+BESIDE = 1e-6  # least singular value of unit rows
+MET = 1e-13  # of the largest velocity
 STILL = 1e-12  # of a force along a branch over the largest: a body that nothing moves stays at rest
 
 
@@ -32,7 +35,9 @@ def leaving(run: Run) -> Leaving | None:
     if begins_at_rest(run):
         acceleration = leaving_acceleration(run)
         return None if acceleration is None else Leaving(run.start.q, run.start.v, acceleration)
-    passage = passage_of(run.model, 0.0, run.start.q, run.start.v) if begins_in_motion(run) else None
+    if not (begins_in_motion(run) or begins_beside(run)):
+        return None
+    passage = passage_of(run.model, 0.0, run.start.q, run.start.v)
     if passage is None or not (passage.fits and passage.is_simple):
         return None
     return Leaving(run.start.q, run.start.v, np.zeros_like(run.start.v))
@@ -64,6 +69,16 @@ def begins_in_motion(run: Run) -> bool:
     if not np.any(run.start.v) or not run.model.closed_loops or run.ranks.rank == run.memory.pivots.size:
         return False
     return freedoms_of_first_order(run) > (0 if run.scene.driver else 1)
+
+
+def begins_beside(run: Run) -> bool:
+    """Whether a run begins so near to a singular position that rounding of the start turns its velocities,
+    with velocities that meet Φ_q v = ν to rounding: those of no branch beside a gap do not."""
+    if not np.any(run.start.v) or not run.ranks.least < BESIDE:
+        return False
+    terms = run.model.terms(0.0, run.start.q, run.start.v)
+    off = (terms.jacobian @ run.start.v - terms.nu) / row_lengths(terms.jacobian)
+    return bool(np.abs(off).max() <= MET * np.abs(run.start.v).max())
 
 
 def leaving_acceleration(run: Run) -> np.ndarray | None:
