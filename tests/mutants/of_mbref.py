@@ -98,7 +98,12 @@ DEFECTS = (
         "np.where(side == 1, -1.0, -1.0)",
         BY_HAND,
     ),
-    Defect("mbref/equations/joint_reactions.py", "- np.cross(arm, force)", "+ np.cross(arm, force)", BY_HAND),
+    Defect(
+        "mbref/equations/joint_reactions.py",
+        "- rotations.cross(arm, force)",
+        "+ rotations.cross(arm, force)",
+        BY_HAND,
+    ),
     Defect(
         "mbref/formulations/lm1.py",
         "system.acceleration[j] = b[j] * root[j]",
