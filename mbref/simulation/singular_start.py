@@ -66,15 +66,15 @@ def begins_at_rest(run: Run) -> bool:
 def begins_in_motion(run: Run) -> bool:
     """Whether a run begins closed loops in motion, with dependent rows that leave two freedoms of first order
     or more: time is one of them where drivers prescribe the motion."""
-    if not np.any(run.start.v) or not run.model.closed_loops or run.ranks.rank == run.memory.pivots.size:
+    if run.ranks.rank == run.memory.pivots.size or not np.any(run.start.v):
         return False
-    return freedoms_of_first_order(run) > (0 if run.scene.driver else 1)
+    return freedoms_of_first_order(run) > (0 if run.scene.driver else 1) and run.model.closed_loops > 0
 
 
 def begins_beside(run: Run) -> bool:
     """Whether a run begins so near to a singular position that rounding of the start turns its velocities,
     with velocities that meet Φ_q v = ν to rounding: those of no branch beside a gap do not."""
-    if not np.any(run.start.v) or not run.ranks.least < BESIDE:
+    if not run.ranks.least < BESIDE or not np.any(run.start.v):
         return False
     terms = run.model.terms(0.0, run.start.q, run.start.v)
     off = (terms.jacobian @ run.start.v - terms.nu) / row_lengths(terms.jacobian)
