@@ -50,6 +50,11 @@ def keep(name: str, origin: str, suffix: str, make: Callable[[Path], None]) -> P
     return path
 
 
+def made_once(name: str, origin: str, suffix: str, make: Callable[[Path], None]) -> Path:
+    """The file of an origin in a folder of the cache, which ``make`` writes where there is none."""
+    return kept(name, origin, suffix) or keep(name, origin, suffix, make)
+
+
 def _folder(name: str) -> Path:
     root = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return root / "mbref" / name

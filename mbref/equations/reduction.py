@@ -1,8 +1,8 @@
 """Reduction: the primitives, rows and columns of a scene that a run needs, found once for scenes that agree.
 
-What is left out of a run depends on the scene's numbers.  A scene of equal structure is asked for the same
-answers (``evidence``): where all are the same, every decision would be, and the reduction is that of the
-scene before.
+The numbers of a scene decide which primitives, rows and columns a run leaves out.  A scene of equal structure
+is asked for the same answers (``evidence``): where all are the same, every decision would be, and the
+reduction is that of the scene before.
 """
 
 from __future__ import annotations

@@ -104,7 +104,7 @@ class Tried(NamedTuple):
 
 
 class Asked:
-    """What was asked of a scene's numbers to find the rows that hold columns."""
+    """The questions about a scene's numbers by which rows that hold columns were found."""
 
     def __init__(self) -> None:
         self.read: list[RandomStates] = []  # at which the Jacobian was read

@@ -92,7 +92,7 @@ class Run:
             raise SceneError(missing_masses(self.scene))
 
     def _reduce(self) -> Reduction | None:
-        """What the method needs of the equations; None where it needs them all.  Corrects the start."""
+        """The part of the equations that the method needs; None for all of them.  Corrects the start."""
         if not (self.method.formulation.linear_algebra.sparse or self.method.stabilisation.projects):
             return None
         self.start = without_rounding(self.model, self.start)

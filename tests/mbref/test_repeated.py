@@ -125,7 +125,7 @@ NUMBERS_DECIDE = {
 
 @pytest.mark.parametrize("scenes", NUMBERS_DECIDE.values(), ids=NUMBERS_DECIDE.keys())
 def test_numbers_that_decide_what_takes_part_are_asked(scenes):
-    """In every order, each scene gets what it needs, whatever was needed before."""
+    """In every order, each scene has its own reduction, whichever reductions are known."""
     expected = [alone(scene) for scene in scenes]
     for order in permutations(range(len(scenes))):
         forget()

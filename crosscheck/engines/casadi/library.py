@@ -8,10 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import os
 import platform
-import shutil
-import subprocess
 import tempfile
 from collections.abc import Iterable
 from importlib import metadata
@@ -22,15 +19,14 @@ import numpy as np
 
 from crosscheck.engines import kept
 from crosscheck.engines.compiled import dop853
+from crosscheck.engines.compiler import C, NoLibrary
 from crosscheck.engines.symbolic.generator import equations_of, origin
 from crosscheck.engines.symbolic.symbols import Symbol, bare, symbolic
 from mbref.scene import Scene
 
 FOLDER = "casadi"  # of the cache
-COMPILERS = ("cc", "gcc", "clang")
 FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-shared", "-fPIC", "-w")
 INTEGRATOR = Path(__file__).with_name("dop853.c")
-TIME_LIMIT = 500.0  # s of compiling; a second is usual
 WRAPPER = """
 static void {macro}(const double *y, double *result) {{
   double memory[{work} + 1], found[N];
@@ -41,14 +37,10 @@ static void {macro}(const double *y, double *result) {{
 """
 
 
-class NoLibrary(Exception):
-    """The sentence says why there is none."""
-
-
 def why_not() -> str:
     """Why no library can be compiled here, in a sentence; empty where nothing is missing."""
     try:
-        _compiler()
+        C.path()
     except NoLibrary as reason:
         return str(reason)
     return ""
@@ -58,23 +50,14 @@ def why_not() -> str:
 def library(scene: Scene, beta: float) -> ctypes.CDLL:
     """The integrator compiled with the rates and the projection of a state; raises NoLibrary."""
     made_of = _origin(scene, beta)
-    path = kept.kept(FOLDER, made_of, ".so")
-    path = path or kept.keep(FOLDER, made_of, ".so", lambda target: _compile(_source(scene, beta), target))
+    path = kept.made_once(FOLDER, made_of, ".so", lambda target: _compile(_source(scene, beta), target))
     return ctypes.CDLL(str(path))
 
 
 def _origin(scene: Scene, beta: float) -> str:
     sources = (Path(__file__).read_text(), INTEGRATOR.read_text())
-    command = (_compiler(), *FLAGS, platform.node())
+    command = (C.path(), *FLAGS, platform.node())
     return origin(scene, repr(beta), metadata.version("casadi"), *command, *sources)
-
-
-def _compiler() -> str:
-    names = (os.environ["CC"],) if os.environ.get("CC") else COMPILERS
-    found = next(filter(None, map(shutil.which, names)), None)
-    if found is None:
-        raise NoLibrary(f"no C compiler is installed ({', '.join(names)})")
-    return found
 
 
 def _source(scene: Scene, beta: float) -> str:
@@ -116,11 +99,4 @@ def _compile(text: str, target: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder, "code.c")
         source.write_text(text)
-        command = [_compiler(), *FLAGS, str(source), "-o", str(target), "-lm"]
-        try:
-            done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=TIME_LIMIT)
-        except (OSError, subprocess.TimeoutExpired) as error:
-            raise NoLibrary(f"the C compiler could not be run: {error}") from error
-    if done.returncode != 0:
-        said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip())
-        raise NoLibrary(f"the C compiler failed: {said}")
+        C.run([C.path(), *FLAGS, str(source), "-o", str(target), "-lm"])

@@ -77,11 +77,8 @@ def _integrator(scene: Scene, rtol: float) -> Any:
     import heyoka
 
     made_of = origin(scene, repr(rtol), heyoka.__version__, platform.node(), Path(__file__).read_text())
-    if path := kept.kept(FOLDER, made_of, ".pickle"):
-        return pickle.loads(path.read_bytes())
-    found = _made(scene, rtol)
-    kept.keep(FOLDER, made_of, ".pickle", lambda target: _write(target, found))
-    return found
+    path = kept.made_once(FOLDER, made_of, ".pickle", lambda target: _write(target, _made(scene, rtol)))
+    return pickle.loads(path.read_bytes())
 
 
 def _write(target: Path, integrator: Any) -> None:

@@ -8,16 +8,13 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import os
-import shutil
-import subprocess
 from pathlib import Path
 
 from crosscheck.engines import kept
+from crosscheck.engines.compiler import CXX, NoLibrary
 
 FOLDER = "pinocchio"  # of the cache
 SOURCE = Path(__file__).with_name("rates.cpp")
-COMPILERS = ("c++", "g++", "clang++")
 FLAGS = (
     "-std=c++17", "-O2", "-DNDEBUG", "-shared", "-fPIC", "-Wno-deprecated-declarations",
     "-DPINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION", "-DBOOST_MPL_LIMIT_LIST_SIZE=30",
@@ -25,11 +22,6 @@ FLAGS = (
     "-DBOOST_FUSION_INVOKE_MAX_ARITY=12",
 )  # fmt: skip
 EIGEN = Path("/usr/include/eigen3")  # of the system, beside that of the prefix
-TIME_LIMIT = 500.0  # s of compiling; half a minute is usual
-
-
-class NoLibrary(Exception):
-    """The sentence says why there is none."""
 
 
 def why_not() -> str:
@@ -68,17 +60,9 @@ def _eigen(prefix: Path) -> Path:
     raise NoLibrary("the headers of Eigen are not installed (package cmeel-eigen)")
 
 
-def _compiler() -> str:
-    names = (os.environ["CXX"],) if os.environ.get("CXX") else COMPILERS
-    found = next(filter(None, map(shutil.which, names)), None)
-    if found is None:
-        raise NoLibrary(f"no C++ compiler is installed ({', '.join(names)})")
-    return found
-
-
 def _command(target: Path) -> list[str]:
     """The compiler's command line; raises NoLibrary where something is missing."""
-    compiler, prefix = _compiler(), _prefix()
+    compiler, prefix = CXX.path(), _prefix()
     headers = [f"-isystem{folder}" for folder in (prefix / "include", _eigen(prefix))]
     linked = [path for path in (prefix / "lib").glob("libpinocchio_default.*") if path.is_file()]
     if not linked:
@@ -106,11 +90,4 @@ def _compiled() -> Path:
 
 
 def _compile(target: Path) -> None:
-    command = _command(target)
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=TIME_LIMIT)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise NoLibrary(f"the C++ compiler could not be run: {error}") from error
-    if done.returncode != 0:
-        said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip())
-        raise NoLibrary(f"the C++ compiler failed: {said}")
+    CXX.run(_command(target))
