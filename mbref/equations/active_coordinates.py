@@ -53,9 +53,15 @@ def at_start(model: Model, q: np.ndarray, v: np.ndarray) -> Terms:
 def patterns(model: Model, terms: Terms) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which entries (m, 12) of the Jacobian are other than zero at one of k states; which rows (m,) ask for a
     motion, and on which columns (n,) a force acts."""
-    entries = (terms.jacobian != 0).any(axis=0) & (model.entry_columns < model.n)
-    rows = ((terms.gamma != 0) | (terms.phi != 0) | (terms.nu != 0)).any(axis=0)
-    return entries, rows, (terms.force != 0).any(axis=0)
+    entries, rows, columns = (found.any(axis=0) for found in nonzero(model, terms))
+    return entries, rows, columns
+
+
+def nonzero(model: Model, terms: Terms) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """``patterns`` of each of k states: entries (k, m, 12), rows (k, m) and columns (k, n)."""
+    entries = (terms.jacobian != 0) & (model.entry_columns < model.n)
+    rows = (terms.gamma != 0) | (terms.phi != 0) | (terms.nu != 0)
+    return entries, rows, terms.force != 0
 
 
 def _reached(

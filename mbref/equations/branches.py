@@ -63,7 +63,7 @@ class SingularPosition(NamedTuple):
     sentence: str
 
 
-class Passage(NamedTuple):
+class Fit(NamedTuple):
     """Whether velocities at a singular position fit a branch to second order, and one alone."""
 
     fits: bool
@@ -109,15 +109,15 @@ def tangents(model: Model, q: np.ndarray) -> np.ndarray:
     return np.array(along) if along else np.zeros((0, model.n))
 
 
-def passage_of(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Passage | None:
-    """How velocities v (n,) stand to the branches at q (7 nb,), t (s); None where no branches meet."""
+def fit_to_branches(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Fit | None:
+    """How velocities v (n,) fit the branches at q (7 nb,), t (s); None where no branches meet."""
     found = second_order(model, t, q, v)
     if not _is_singular(found):
         return None
     a = _direction(found, v)
     rank = np.linalg.matrix_rank(2.0 * found.forms @ a, tol=SAME)
-    return Passage(
-        fits=bool(np.abs(_values(found.forms, a)).max() < SAME),
+    return Fit(
+        fits=_fits(found, a),
         is_simple=bool(rank == min(len(found.forms), len(a) - 1)),
     )
 
@@ -125,9 +125,12 @@ def passage_of(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Passage 
 def velocities_along(model: Model, q: np.ndarray, v: np.ndarray, given: np.ndarray) -> list[np.ndarray]:
     """Velocities (n,) of the branches at q (7 nb,), t = 0, that agree with the given entries (n,) of v (n,).
 
-    Those of the least kinetic energy come first; there are none where second order tells none.
+    Those of the least kinetic energy come first; there are none where v fits a branch itself, or where second
+    order tells none.
     """
     found = second_order(model, 0.0, q, v)
+    if not _is_singular(found) or _fits(found, _direction(found, v)):
+        return []
     along = [_as_given((found.kernel @ a) * found.scale, v, given) for a in _lines(found)[0]]
     return sorted((w for w in along if w is not None), key=lambda w: float(w @ (model.mass * w)))
 
@@ -202,6 +205,11 @@ def _is_singular(found: SecondOrder) -> bool:
     return found.kernel.shape[1] >= 2 and len(found.forms) > 0
 
 
+def _fits(found: SecondOrder, a: np.ndarray) -> bool:
+    """Whether all forms are zero along a direction (d,)."""
+    return bool(np.abs(_values(found.forms, a)).max() < SAME)
+
+
 def _lines(found: SecondOrder) -> tuple[list[np.ndarray], str]:
     """Isolated directions (d,) on which all forms are zero; and CONE, MULTIPLE or nothing of the others."""
     if not _is_singular(found):
@@ -210,7 +218,7 @@ def _lines(found: SecondOrder) -> tuple[list[np.ndarray], str]:
     if several is None:
         return [], CONE
     roots, multiple = several
-    return [a for a in roots if np.abs(_values(found.forms, a)).max() < SAME], MULTIPLE * multiple
+    return [a for a in roots if _fits(found, a)], MULTIPLE * multiple
 
 
 def _roots(form: np.ndarray) -> list[np.ndarray]:

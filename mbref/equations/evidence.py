@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from mbref.equations.active_coordinates import nonzero
 from mbref.equations.initial_state import Start
 from mbref.equations.model import Model, Terms, all_displaced
 from mbref.equations.random_states import RandomStates
@@ -30,7 +31,7 @@ class Evidence:
         joined = zip(at_rest, *read, *asked.read, strict=True)
         self._states = RandomStates(*map(np.concatenate, joined))
         self._rounds, self._split = (len(read), len(asked.read)), 1 + sum(len(s.part) for s in read)
-        self._inside, self._entries = model.entry_columns < model.n, entries
+        self._entries = entries
         self._trials, self._shared = Trials(model, asked), asked.shared
         self._found = self._answers(model, start)
 
@@ -41,7 +42,7 @@ class Evidence:
     def _answers(self, model: Model, start: Start) -> bytes:
         terms = self._terms(model, start)
         answers = [start.v != 0, start.q != 0, model.mass > 0]
-        answers += [*self._of_active(terms), *self._of_held(terms)]
+        answers += [*self._of_active(model, terms), *self._of_held(terms)]
         answers.append(are_redundant(model, terms.jacobian[0], self._shared))
         return b"".join(answer.tobytes() for answer in answers)
 
@@ -52,13 +53,10 @@ class Evidence:
         q[0], v[0] = start.q, start.v
         return model.along(part * model.scene.duration, q, v)
 
-    def _of_active(self, terms: Terms) -> list[np.ndarray]:
+    def _of_active(self, model: Model, terms: Terms) -> list[np.ndarray]:
         """Which entries, rows and columns are other than zero at the start or in each round of states."""
-        ask = (terms.gamma != 0) | (terms.phi != 0) | (terms.nu != 0)
-        entries = (terms.jacobian != 0) & self._inside
         return [
-            found[0] | _of_rounds(found[1 : self._split], self._rounds[0])
-            for found in (entries, ask, terms.force != 0)
+            found[0] | _of_rounds(found[1 : self._split], self._rounds[0]) for found in nonzero(model, terms)
         ]
 
     def _of_held(self, terms: Terms) -> list[np.ndarray]:

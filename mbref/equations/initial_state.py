@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mbref import rotations
-from mbref.equations.branches import MOST_ROWS, passage_of, velocities_along
+from mbref.equations.branches import MOST_ROWS, velocities_along
 from mbref.equations.model import Model, displaced
 from mbref.equations.units import row_lengths
 from mbref.linear_algebra.minimum_norm import MinimumNorm
@@ -18,7 +18,7 @@ LARGE = 40  # rows; above, dense singular values take longer than sparse factors
 GROSS = 0.05  # of the scene's length, or of its speed: a larger inconsistency is a fault
 MOST_ITERATIONS = 30
 OPEN_WEIGHT, REPEATS = 1e-4, 5  # weight of open velocities beside given ones, and how often it is compensated
-BESIDE = 1e-13  # of velocities, by which those of another branch miss Φ_q v = ν beside a singular position
+MET = 1e-13  # of the largest velocity: those of another branch miss Φ_q v = ν by more
 BESIDE_RANK = 1e-9  # singular values below which they are not corrected
 BRANCH = (
     "initial velocities that the scene leaves open at a singular position are those of the branch with the "
@@ -60,22 +60,27 @@ def consistent_start(model: Model) -> Start:
 def _along_branch(model: Model, q: np.ndarray, v: np.ndarray) -> np.ndarray | None:
     """Velocities (6 nb,) along a branch of a singular start that agree with those that the scene gives; None
     where v (6 nb,) are, or where second order tells no such branch."""
-    passage = passage_of(model, 0.0, q, v) if model.closed_loops and model.m <= MOST_ROWS else None
-    if passage is None or passage.fits:
+    if not model.closed_loops or model.m > MOST_ROWS:
         return None
     along = velocities_along(model, q, v, given_velocities(model, q)[1])
     return _best_met(model, q, along) if along else None
 
 
+def rate_violation(model: Model, q: np.ndarray, v: np.ndarray) -> float:
+    """The largest |Φ_q v - ν| of unit rows at t = 0, over the largest of the velocities v (6 nb,)."""
+    terms = model.terms(0.0, q, v)
+    jacobian, nu = _unit_rows(terms.jacobian, terms.nu)
+    return float(np.abs(jacobian @ v - nu).max() / np.abs(v).max())
+
+
 def _best_met(model: Model, q: np.ndarray, along: list[np.ndarray]) -> np.ndarray:
     """Of velocities (6 nb,) along branches the first, where all meet Φ_q v = ν; else those that meet it best,
     as one branch does beside a singular position.  They are corrected as far as rounding allows."""
-    terms = model.terms(0.0, q, along[0])
+    off = [rate_violation(model, q, w) for w in along]
+    best = along[int(np.argmin(off)) if max(off) > MET else 0]
+    terms = model.terms(0.0, q, best)
     jacobian, nu = _unit_rows(terms.jacobian, terms.nu)
-    off = np.array([np.abs(jacobian @ w - nu).max() / np.abs(w).max() for w in along])
-    best = int(np.argmin(off)) if off.max() > BESIDE else 0
-    change = np.linalg.lstsq(jacobian, nu - jacobian @ along[best], rcond=BESIDE_RANK)[0]
-    return along[best] + change
+    return best + np.linalg.lstsq(jacobian, nu - jacobian @ best, rcond=BESIDE_RANK)[0]
 
 
 def _fault(model: Model, row: int, what: str) -> SceneError:

@@ -12,12 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mbref.equations.branches import MOST_ROWS, passage_of, tangents
-from mbref.equations.units import row_lengths
+from mbref.equations.branches import MOST_ROWS, fit_to_branches, tangents
+from mbref.equations.initial_state import MET, rate_violation
 from mbref.simulation.run import Run
 
 BESIDE = 1e-6  # least singular value of unit rows
-MET = 1e-13  # of the largest velocity
 STILL = 1e-12  # of a force along a branch over the largest: a body that nothing moves stays at rest
 
 
@@ -37,16 +36,16 @@ def leaving(run: Run) -> Leaving | None:
         return None if acceleration is None else Leaving(run.start.q, run.start.v, acceleration)
     if not (begins_in_motion(run) or begins_beside(run)):
         return None
-    passage = passage_of(run.model, 0.0, run.start.q, run.start.v)
-    if passage is None or not (passage.fits and passage.is_simple):
+    fit = fit_to_branches(run.model, 0.0, run.start.q, run.start.v)
+    if fit is None or not (fit.fits and fit.is_simple):
         return None
     return Leaving(run.start.q, run.start.v, np.zeros_like(run.start.v))
 
 
 def fits_no_branch(run: Run) -> bool:
     """Whether a run begins on a singular position with velocities that agree with no branch there."""
-    passage = passage_of(run.model, 0.0, run.start.q, run.start.v) if begins_in_motion(run) else None
-    return passage is not None and not passage.fits
+    fit = fit_to_branches(run.model, 0.0, run.start.q, run.start.v) if begins_in_motion(run) else None
+    return fit is not None and not fit.fits
 
 
 def freedoms_of_first_order(run: Run) -> int:
@@ -76,9 +75,7 @@ def begins_beside(run: Run) -> bool:
     with velocities that meet Φ_q v = ν to rounding: those of no branch beside a gap do not."""
     if not run.ranks.least < BESIDE or not np.any(run.start.v):
         return False
-    terms = run.model.terms(0.0, run.start.q, run.start.v)
-    off = (terms.jacobian @ run.start.v - terms.nu) / row_lengths(terms.jacobian)
-    return bool(np.abs(off).max() <= MET * np.abs(run.start.v).max())
+    return rate_violation(run.model, run.start.q, run.start.v) <= MET
 
 
 def leaving_acceleration(run: Run) -> np.ndarray | None:

@@ -98,8 +98,7 @@ class PassingRun(SeriesRun):
     def _misses(self, q: np.ndarray, v: np.ndarray, ahead: float) -> bool:
         """Whether the series, a time ahead (s) of its beginning, misses coordinates and velocities."""
         there = self._state_at(-ahead)
-        moved, changed = np.abs(displacement(q, there[0])).max(), np.abs(there[1] - v).max()
-        return bool(moved > OFF * max(1.0, self.model.length) or changed > OFF * np.abs(v).max())
+        return self._is_off(displacement(q, there[0]), there[1] - v, v, OFF)
 
     def _put_samples_before(self, ahead: float, way: Leaving) -> None:
         """The samples from a singular position at t = 0 until a time (s) about which the series begins."""

@@ -143,11 +143,14 @@ class SeriesRun(Run):
         state = self.memory.state
         q, v = state.coordinates.copy(), state.velocities.copy()
         look_along(0.0, self._packed_taylor.argument)
-        moved, changed = np.abs(state.coordinates - q).max(), np.abs(state.velocities - v).max()
-        allowed = OFF if self.has_freedom else FASTER
-        off = moved > OFF * max(1.0, self.model.length) or changed > allowed * np.abs(v).max()
+        moved, changed = state.coordinates - q, state.velocities - v
         state.coordinates[:], state.velocities[:] = q, v
-        return bool(off)
+        return self._is_off(moved, changed, v, OFF if self.has_freedom else FASTER)
+
+    def _is_off(self, moved: np.ndarray, changed: np.ndarray, v: np.ndarray, allowed: float) -> bool:
+        """Whether a state has moved, or its velocities v have changed, by more than rounding explains."""
+        far = np.abs(moved).max() > OFF * max(1.0, self.model.length)
+        return bool(far or np.abs(changed).max() > allowed * np.abs(v).max())
 
     def step_on(self) -> int:
         """As many steps as are taken at a time: PAUSED after them, DONE at the end, or why there are none."""
