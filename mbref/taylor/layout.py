@@ -159,6 +159,8 @@ class Progress(NamedTuple):
     rank: int = 0  # of the constraint rows
     order: int = 0  # of the series
     tolerance: float = 0.0  # of the last terms of the series
+    farthest: float = 0.0  # m by which the series may miss the coordinates of the start
+    freedoms: int = 0  # at the start, by singular values of the constraint rows
     violation: float = 0.0  # the largest before the last correction
     crossed: int = 0  # whether the last attempt crossed a singular position
     end: float = 0.0  # time of the last step's end

@@ -11,8 +11,8 @@ from mbref.simulation.singular_crossing import WINDOW, relative_pivot
 from mbref.simulation.stepping import DONE, PAUSED, TOO_MANY_STEPS
 from mbref.taylor.layout import TaylorMemory
 from mbref.taylor.passage import AHEAD, find_crossing, least_pivot
-from mbref.taylor.samples import evaluate_series, find_poses, project_state, put_state
-from mbref.taylor.stepping import keep_terms, put_terms, step
+from mbref.taylor.samples import project_state, put_state_at, put_terms
+from mbref.taylor.stepping import keep_terms, step
 
 LEAVE = 1.5  # windows: the pivot from which on steps of the run are taken again
 CLEAR = 3.0  # of the pivot of ``AHEAD``: the same for a run in series
@@ -95,11 +95,3 @@ def look_along(h, memory):
     memory.progress.cut = memory.progress.order
     put_state_at(h, memory)
     return OK
-
-
-@kernel
-def put_state_at(h, memory):
-    """Coordinates and velocities of all bodies at a distance h (s) from the step's beginning."""
-    evaluate_series(h, memory)
-    find_poses(memory)
-    put_state(memory)

@@ -14,7 +14,8 @@ from mbref.simulation.singular_start import Leaving
 from mbref.simulation.stepping import DONE, PAUSED, UNDECIDED
 from mbref.taylor.moment import Moment, moment_of
 from mbref.taylor.passing import look_along, pass_on, place_crossing
-from mbref.taylor.series_run import OFF, SeriesRun
+from mbref.taylor.series_run import SeriesRun
+from mbref.taylor.start import OFF
 
 BEHIND = 3e-3  # lengths or rad behind a crossing where another branch is entered
 CORRECTIONS = 6  # of the state there
@@ -98,7 +99,9 @@ class PassingRun(SeriesRun):
     def _misses(self, q: np.ndarray, v: np.ndarray, ahead: float) -> bool:
         """Whether the series, a time ahead (s) of its beginning, misses coordinates and velocities."""
         there = self._state_at(-ahead)
-        return self._is_off(displacement(q, there[0]), there[1] - v, v, OFF)
+        moved, changed = displacement(q, there[0]), there[1] - v
+        is_far = np.abs(moved).max() > self.taylor.progress.farthest
+        return bool(is_far or np.abs(changed).max() > OFF * np.abs(v).max())
 
     def _put_samples_before(self, ahead: float, way: Leaving) -> None:
         """The samples from a singular position at t = 0 until a time (s) about which the series begins."""

@@ -66,17 +66,21 @@ class CrossingRun(Run):
 class TaylorRun(SeriesRun):
     """One simulation by Taylor series, which near singular positions give way to exact ones."""
 
+    def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
+        super().__init__(scene, method, times, limits)
+        self._passage = Passage(self)
+
     def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
         """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
-        before, began, passage = self.making, time.process_time(), Passage(self)
-        status = passage.leave_start()
+        before, began = self.making, time.process_time()
+        status = self._passage.leave_start()
         if status == PAUSED:
             status = self.expand(self.times[-1])
             status = PAUSED if status == OK else status
         while status == PAUSED:
             status = self.step_on()
             if status == SINGULAR_AHEAD:
-                status = passage()
+                status = self._passage()
                 if status == PAUSED and self.expand(self.times[-1]) != OK:
                     status = UNDECIDED
             self.specialise_where_it_pays(status)
@@ -91,6 +95,8 @@ class Passage:
     def __init__(self, run: Run):
         self._run = run
         self._made: PassingRun | None = None
+        self._way = leaving(run) if run.times[-1] > 0.0 else None
+        self._fits_no_branch = self._way is None and fits_no_branch(run)
 
     def __call__(self) -> int:
         """Take the run's state and time over one, and its samples: PAUSED, DONE or why that cannot be."""
@@ -100,9 +106,9 @@ class Passage:
     def leave_start(self) -> int:
         """Leave a singular position at t = 0: PAUSED, also where there is none, DONE at the end, else why the
         motion cannot be followed."""
-        way = leaving(self._run) if self._run.times[-1] > 0.0 else None
+        way = self._way
         if way is None:
-            return UNDECIDED if fits_no_branch(self._run) else PAUSED
+            return UNDECIDED if self._fits_no_branch else PAUSED
         series = self._series()
         return self._followed(series, moment_of(self._run), lambda: series.leave(way))
 

@@ -104,6 +104,24 @@ def put_state(memory):
 
 
 @kernel
+def put_state_at(h, memory):
+    """Coordinates and velocities of all bodies at a distance h (s) from the step's beginning."""
+    evaluate_series(h, memory)
+    find_poses(memory)
+    put_state(memory)
+
+
+@kernel
+def put_terms(series, memory):
+    """Coordinates and velocities of all bodies where a series begins."""
+    state = memory.state
+    for i in range(memory.solver.order.shape[0]):
+        state[0, i], state[1, i] = series[0, i], series[1, i]
+    find_poses(memory)
+    put_state(memory)
+
+
+@kernel
 def rows_times(vector, equations, out):
     """Φ_q times a vector (n,)."""
     bodies, blocks = equations.scene.row_bodies, equations.system.blocks
@@ -149,9 +167,7 @@ def take_sample(h, length, memory):
     """
     run, samples, k = memory.run, memory.run.loop.samples, memory.run.loop.clock.sample
     system, watch = run.equations.system, run.watch
-    evaluate_series(h, memory)
-    find_poses(memory)
-    put_state(memory)
+    put_state_at(h, memory)
     copy(system.acceleration, samples.accelerations[k])
     project_state(run.loop.times[k], run)
     put_angles(h, memory)

@@ -8,28 +8,25 @@ from dataclasses import replace
 
 import numpy as np
 
-from mbref.kernels.layout import OK, SINGULAR
+from mbref.kernels.layout import OK
 from mbref.kernels.named_memory import allocate, packed, record
 from mbref.method import Method
 from mbref.scene import Scene
 from mbref.simulation.limits import AUTO, GENERIC, SPECIALISED, Limits
 from mbref.simulation.run import Run
-from mbref.simulation.stepping import PAUSED, UNDECIDED
+from mbref.simulation.stepping import PAUSED
 from mbref.taylor.lanes import filled
 from mbref.taylor.layout import Progress, Rows, SceneCode, Series, Solver, TaylorMemory
 from mbref.taylor.natural import NaturalCoordinates
-from mbref.taylor.passage import ROOT
 from mbref.taylor.passing import hand_over, look_along, pass_on, place_crossing
 from mbref.taylor.polynomials import polynomials_of
 from mbref.taylor.scene_code import NAME, code_of
+from mbref.taylor.start import OFF
 from mbref.taylor.stepping import advance_series, enter
 
 SHARE = 0.05  # of rtol + atol: the tolerance of a step
 KERNELS_OF_SERIES = (enter, advance_series, hand_over, pass_on, place_crossing, look_along)
 ROUNDING = 1e-16  # of a singular value
-OFF = 2e-7  # lengths or rad, and fastest velocities, by which a series may miss the start
-BESIDE = 1e-7  # pivot of unit rows below which rounding turns a free motion by 1e-2
-FASTER = 0.05  # the same of velocities that drivers prescribe
 LEAST_ORDER, MOST_ORDER = 4, 30
 CHEAPEST = {GENERIC: (6.0, 1.2), SPECIALISED: (8.0, 1.6)}  # order: at a tolerance of 1, and more per digit
 
@@ -61,7 +58,10 @@ class SeriesRun(Run):
         moving[self.part.active.velocities] = True
         self.natural = NaturalCoordinates(self.model, self.start, moving)
         self.taylor = self._taylor_memory(order)
-        self.taylor.progress.order, self.taylor.progress.tolerance = order, tolerance
+        progress = self.taylor.progress
+        progress.order, progress.tolerance = order, tolerance
+        progress.farthest = OFF * max(1.0, self.model.length)
+        progress.freedoms = self.part.active.velocities.size - self.ranks.rank
         self._packed_taylor = packed(self.taylor)
         self.wants_code = limits.code == AUTO
         if limits.code == SPECIALISED:
@@ -111,46 +111,8 @@ class SeriesRun(Run):
 
     def expand(self, until: float) -> int:
         """Expand at the present time and state, for steps until a time (s): OK or why that cannot be."""
-        self.taylor.angles[:] = self.memory.equations.angles[self.taylor.polynomials.torsions.slot]
-        self.taylor.progress.end = until
-        status = int(enter(self._packed_taylor.argument))
-        return status if self.memory.loop.clock["time"] > 0.0 else self._judged_start(status)
-
-    def _judged_start(self, status: int) -> int:
-        """UNDECIDED in place of OK, or of a rank that rounding changes, where rounding hides the motion."""
-        if status == SINGULAR and self.memory.equations.system.settings.nearly_dependent:
-            return UNDECIDED
-        return UNDECIDED if status == OK and (self._hides_rank() or self._misses_state()) else status
-
-    def _hides_rank(self) -> bool:
-        """Whether rounding hides the freedoms of a start at which rows are nearly dependent.
-
-        Natural coordinates count others then, or the motion could go over to another branch.
-        """
-        if not self.memory.equations.system.settings.nearly_dependent:
-            return False
-        beside = BESIDE if self.memory.state.velocities.any() else ROOT
-        if self.has_freedom and self.least_pivot() < beside:
-            return True
-        return self.part.active.velocities.size - self.ranks.rank != self.freedoms
-
-    def _misses_state(self) -> bool:
-        """Whether the series misses the state in memory.
-
-        Numbers were taken for rounding then, or rounding over the distance from a singular position turns
-        velocities; drivers that prescribe them hold the motion all the same.
-        """
-        state = self.memory.state
-        q, v = state.coordinates.copy(), state.velocities.copy()
-        look_along(0.0, self._packed_taylor.argument)
-        moved, changed = state.coordinates - q, state.velocities - v
-        state.coordinates[:], state.velocities[:] = q, v
-        return self._is_off(moved, changed, v, OFF if self.has_freedom else FASTER)
-
-    def _is_off(self, moved: np.ndarray, changed: np.ndarray, v: np.ndarray, allowed: float) -> bool:
-        """Whether a state has moved, or its velocities v have changed, by more than rounding explains."""
-        far = np.abs(moved).max() > OFF * max(1.0, self.model.length)
-        return bool(far or np.abs(changed).max() > allowed * np.abs(v).max())
+        self.taylor.progress["end"] = until
+        return int(enter(self._packed_taylor.argument))
 
     def step_on(self) -> int:
         """As many steps as are taken at a time: PAUSED after them, DONE at the end, or why there are none."""

@@ -45,14 +45,14 @@ from mbref.taylor.samples import (
     LOST_MOTION,
     NOISE,
     evaluate_series,
-    find_poses,
     put_angles,
-    put_state,
+    put_terms,
     take_sample,
     take_sample_of_series,
 )
 from mbref.taylor.series import expand
 from mbref.taylor.solver import factorise_anew
+from mbref.taylor.start import judged_start
 
 ROUNDING = 1e-12  # of rows
 LOST_ROWS = 100.0  # tolerances by which rows may be off
@@ -233,12 +233,15 @@ def step(memory):
 @entry(INT(Named(TaylorMemory)))
 def enter(memory):
     """Choose the partition at the present state and expand there: OK or why that cannot be."""
-    t = memory.run.loop.clock.time
+    t, slot = memory.run.loop.clock.time, memory.polynomials.torsions.slot
+    for s in range(slot.shape[0]):
+        memory.angles[s] = memory.run.equations.angles[slot[s]]
     read_variables(t, memory)
     expand_drivers(t, memory)
     memory.progress.rank = choose(memory)
     memory.solver.first[:] = 1e300
-    return expand_from(t, memory)
+    status = expand_from(t, memory)
+    return status if t > 0.0 else judged_start(status, memory)
 
 
 @entry(INT(Named(TaylorMemory)))
@@ -255,13 +258,3 @@ def advance_series(memory):
         if clock.time >= memory.progress.end:
             return DONE
     return PAUSED
-
-
-@kernel
-def put_terms(series, memory):
-    """Coordinates and velocities of all bodies where a series begins."""
-    state = memory.state
-    for i in range(memory.solver.order.shape[0]):
-        state[0, i], state[1, i] = series[0, i], series[1, i]
-    find_poses(memory)
-    put_state(memory)
