@@ -6,8 +6,10 @@ polynomial is one from pairs of keys, in ascending order, to coefficients.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from typing import TypeVar
 
+Key = TypeVar("Key", bound=Hashable)
 Expression = dict[int, float]
 Polynomial = dict[tuple[int, int], float]
 
@@ -52,6 +54,13 @@ def plus(polynomial: Polynomial, factor: float, expression: Expression) -> Polyn
     return total
 
 
+def significant(equation: dict[Key, float], constant: Key) -> dict[Key, float]:
+    """Without coefficients that are the rounding of zero; the constant alone where all others vanish."""
+    largest = max((abs(c) for key, c in equation.items() if key != constant), default=0.0)
+    small = ROUNDING if largest > VANISHING else VANISHING
+    return {key: c for key, c in equation.items() if abs(c) > small or key == constant}
+
+
 def degree(polynomial: Polynomial) -> int:
     """0 of a constant, 1 of an expression, 2 else."""
     return max(((i != ONE) + (j != ONE) for i, j in polynomial), default=0)
@@ -85,8 +94,8 @@ class Elimination:
 
     def add(self, equation: Expression) -> None:
         """Take in an equation, expression = 0, with coefficients of about one."""
-        reduced = {k: v for k, v in self(equation).items() if abs(v) > VANISHING}
-        variables = [k for k in reduced if k != ONE]
+        reduced = significant(self(equation), ONE)
+        variables = [k for k, v in reduced.items() if k != ONE and abs(v) > VANISHING]
         able = [k for k in variables if self._may_go(k, len(variables) - 1)]
         if able:
             self._eliminate(max(able, key=lambda k: (round(abs(reduced[k]), 9), k)), reduced)

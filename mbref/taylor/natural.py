@@ -20,7 +20,6 @@ from mbref.equations.model import Model
 from mbref.kernels.scene_layout import DISTANCE, DOT1, DOT2, POINT
 from mbref.taylor.expressions import (
     ONE,
-    VANISHING,
     Elimination,
     Expression,
     Polynomial,
@@ -30,6 +29,7 @@ from mbref.taylor.expressions import (
     independent,
     plus,
     product_sum,
+    significant,
 )
 from mbref.taylor.images import Images, image_forms
 from mbref.taylor.loads import COSINE, SINE, VALUE
@@ -184,7 +184,7 @@ class NaturalCoordinates:
                     total[key] = total.get(key, 0.0) + value
             else:
                 total[i, j] = total.get((i, j), 0.0) + coefficient
-        return {key: c for key, c in total.items() if abs(c) > VANISHING or key == (ONE, ONE)}
+        return significant(total, (ONE, ONE))
 
 
 def _difference(first: Triple, second: Triple) -> Triple:

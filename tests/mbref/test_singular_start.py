@@ -75,9 +75,9 @@ def test_a_run_that_ends_where_the_series_begins():
 @pytest.mark.parametrize("linkage", [four_bar, five_bar])
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_driven_loops_that_start_beside_the_flat_position(linkage, side, method):
-    """Nearly half of them had been undecided, and others 2e-9 off."""
+    """Nearly half of them had been undecided, and others off by their distance, taken for rounding."""
     for distance in (1.6e-7, 1e-7, 4e-8, 1.6e-8, 6.3e-9, 1.6e-9, 1e-9, 4e-10, 1e-11):
         scene = linkage(math.pi + side * distance)
         run = simulate(scene, method, np.linspace(0.0, 0.05, 6), Limits(rtol=1e-9))
         assert run.outcome.name == "COMPLETED", f"{distance}: {run.message}"
-        assert measure(scene, run, truth_for(scene))["error"] < 1e-9, distance
+        assert measure(scene, run, truth_for(scene))["error"] < 1e-11, distance
