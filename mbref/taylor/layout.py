@@ -184,6 +184,23 @@ class SceneCode(NamedTuple):
     expand: int = 0  # address of the function that finds all orders
 
 
+class Instant(NamedTuple):
+    """When a snapshot was taken."""
+
+    time: float = 0.0  # s
+    sample: int = 0  # the next one to take
+    crossings: int = 0  # singular positions passed so far
+
+
+class Snapshot(NamedTuple):
+    """The state of a run at an instant."""
+
+    instant: Instant
+    coordinates: Annotated[Vector, "7*nb"]
+    velocities: Annotated[Vector, "n"]
+    angles: Annotated[Vector, "angles"]
+
+
 class TaylorMemory(NamedTuple):
     """All that the kernels of the method share."""
 
@@ -194,6 +211,9 @@ class TaylorMemory(NamedTuple):
     solver: Solver
     progress: Progress
     code: SceneCode
+    began: Snapshot  # from where the last passage is smooth
+    crossing: Snapshot  # the last singular position passed
+    landing: Annotated[Matrix, 2, "lanes"]  # values and rates of the variables where a passage ended
     state: Annotated[Matrix, 3, "lanes"]  # variables and their two derivatives at some time
     pose: Annotated[Matrix, 3, "12*nb"]
     angles: Annotated[Vector, "torsions"]  # rad, unwrapped, at the time of expansion

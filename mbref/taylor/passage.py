@@ -9,7 +9,7 @@
 - Near a singular position rounding moves the state along the vanishing direction by its ratio to the pivot,
   and turns the velocity by as much again.  A motion that comes nearer than LEAST and does not cross is lost.
   Rounding of the lengths may open a gap that a motion meets before it turns back nearer than ROOT: that is
-  lost too.  Whether another one is determined, its twin tells (``mbref.taylor.run``).
+  lost too.  Whether another one is determined, its twin tells (``mbref.taylor.twin``).
 """
 
 from __future__ import annotations

@@ -8,17 +8,38 @@ from mbref.kernels.layout import MEMORY, OK
 from mbref.kernels.named_memory import Named
 from mbref.linear_algebra.vectors import copy
 from mbref.simulation.singular_crossing import WINDOW, relative_pivot
-from mbref.simulation.stepping import DONE, PAUSED, TOO_MANY_STEPS
+from mbref.simulation.stepping import DONE, PAUSED, TOO_MANY_STEPS, UNDECIDED
 from mbref.taylor.layout import TaylorMemory
 from mbref.taylor.passage import AHEAD, find_crossing, least_pivot
 from mbref.taylor.samples import project_state, put_state_at, put_terms
-from mbref.taylor.stepping import keep_terms, step
+from mbref.taylor.snapshots import take_snapshot
+from mbref.taylor.start import freedoms
+from mbref.taylor.stepping import begin, keep_terms, step
+from mbref.taylor.twin import twin_agrees
 
 LEAVE = 1.5  # windows: the pivot from which on steps of the run are taken again
 CLEAR = 3.0  # of the pivot of ``AHEAD``: the same for a run in series
 
 
-@entry(INT(MEMORY, MEMORY))
+@entry(INT(MEMORY, Named(TaylorMemory)))
+def take_over(source, memory):
+    """Take the state of a run, where a passage begins, over into the series: OK."""
+    hand_over(source, memory.run)
+    times = memory.run.loop.times
+    memory.run.watch.reference_pivot = source.watch.reference_pivot
+    memory.progress.end = times[times.shape[0] - 1]
+    take_snapshot(memory.run, memory.began)
+    return OK
+
+
+@entry(INT(Named(TaylorMemory)))
+def begin_here(memory):
+    """Have the passage begin at the present state: OK."""
+    take_snapshot(memory.run, memory.began)
+    return OK
+
+
+@kernel
 def hand_over(source, target):
     """State, time, samples and counts of a run to another of the same scene."""
     copy_state(source.state, target.state)
@@ -31,7 +52,6 @@ def hand_over(source, target):
         copy(source.loop.samples.multipliers[k], target.loop.samples.multipliers[k])
     theirs.time, theirs.sample, theirs.passage = mine.time, mine.sample, mine.passage
     copy_counts(source.equations.system.counts, target.equations.system.counts)
-    return OK
 
 
 @kernel
@@ -43,12 +63,28 @@ def copy_counts(source, target):
 
 
 @entry(INT(Named(TaylorMemory)))
+def cross(memory):
+    """Begin a series at the present state, and step over the first singular position (``pass_on``)."""
+    progress = memory.progress
+    progress.past_pivot, progress.clearance, progress.is_clear = 1.0, 0.0, 0
+    status = begin(memory)
+    progress.entered = least_pivot(memory)
+    return step_on(memory) if status == OK else status
+
+
+@entry(INT(Named(TaylorMemory)))
 def pass_on(memory):
     """Step over the next singular position, or clear of all of them: PAUSED; DONE at the end.
 
     ``progress.is_clear`` says whether steps of the run go on from here: the series is as clear as they need,
     and no nearer to a singular position than a step ago.
     """
+    return step_on(memory)
+
+
+@kernel
+def step_on(memory):
+    """The steps of ``pass_on``; ``crossing`` is the singular position that the last one passed."""
     clock, counts, progress = memory.run.loop.clock, memory.run.equations.system.counts, memory.progress
     passed = counts.crossings
     while counts.steps < memory.run.control.most_steps:
@@ -56,6 +92,8 @@ def pass_on(memory):
         if status != OK:
             put_terms(memory.series.past, memory)
             return status
+        if counts.crossings != passed:
+            keep_crossing(memory)
         if clock.time >= progress.end:
             return DONE
         before = progress.clearance
@@ -64,6 +102,18 @@ def pass_on(memory):
         if progress.is_clear or counts.crossings != passed:
             return PAUSED
     return TOO_MANY_STEPS
+
+
+@kernel
+def keep_crossing(memory):
+    """Keep where the last step crossed; the state in memory stays behind it."""
+    run, length = memory.run, memory.run.loop.clock.length
+    h = find_crossing(length, memory)
+    copy_state(run.state, run.previous)
+    put_state_at(h, memory)
+    take_snapshot(run, memory.crossing)
+    copy_state(run.previous, run.state)
+    memory.crossing.instant.time -= length - h
 
 
 @kernel
@@ -79,13 +129,19 @@ def clearance(memory):
     return min(relative_pivot(run.watch) / (LEAVE * WINDOW), least_pivot(memory) / ahead)
 
 
-@entry(FLOAT(Named(TaylorMemory)))
-def place_crossing(memory):
-    """Put the state where the last step crossed into memory; how long (s) before the step's end that is."""
-    length = memory.run.loop.clock.length
-    h = find_crossing(length, memory)
-    put_state_at(h, memory)
-    return length - h
+@entry(INT(INT, MEMORY, Named(TaylorMemory)))
+def give_back(status, target, memory):
+    """Hand the run back where the passage ended with a status: PAUSED, DONE, or why it cannot go on.
+
+    UNDECIDED where a twin of the passage ends elsewhere.
+    """
+    hand_over(memory.run, target)
+    if status == TOO_MANY_STEPS:
+        return status
+    if status != PAUSED and status != DONE:
+        return UNDECIDED
+    is_determined = freedoms(memory) == 0 or twin_agrees(target.control.rtol, memory)
+    return status if is_determined else UNDECIDED
 
 
 @entry(INT(FLOAT, Named(TaylorMemory)))

@@ -6,14 +6,15 @@ import numpy as np
 
 from mbref.equations.branches import SMOOTH, Passed, SingularPosition, singular_position
 from mbref.equations.model import displaced, displacement
+from mbref.kernels.compilation import Entry
 from mbref.kernels.layout import OK
 from mbref.method import Method
 from mbref.scene import Scene
 from mbref.simulation.limits import Limits
+from mbref.simulation.run import Run
 from mbref.simulation.singular_start import Leaving
 from mbref.simulation.stepping import DONE, PAUSED, UNDECIDED
-from mbref.taylor.moment import Moment, moment_of
-from mbref.taylor.passing import look_along, pass_on, place_crossing
+from mbref.taylor.passing import begin_here, cross, give_back, look_along, pass_on, take_over
 from mbref.taylor.series_run import SeriesRun
 from mbref.taylor.start import OFF
 
@@ -22,48 +23,43 @@ CORRECTIONS = 6  # of the state there
 
 
 class PassingRun(SeriesRun):
-    """The series of a passage; ``crossings`` are those of the last one.
-
-    ``began`` is the moment from which the last passage is smooth, where it took another branch.
-    """
+    """The series of passages, made for the first one; ``crossings`` are those of the last one."""
 
     def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
         super().__init__(scene, method, times, limits)
         self.taylor.progress.passing = True
-        self.began: Moment | None = None
+
+    def take_over(self, run: Run) -> None:
+        """Go on from the state and time of a run of the same scene, as a passage begins."""
+        self.crossings = []
+        take_over(run.packed.argument, self._packed_taylor.argument)
+
+    def give_back(self, status: int, run: Run) -> int:
+        """Have the run go on where the passage ended with a status: PAUSED, DONE, or why that cannot be."""
+        return int(give_back(status, run.packed.argument, self._packed_taylor.argument))
 
     def cross(self) -> int:
         """Pass a singular position from the state and time in memory: PAUSED, DONE or why that cannot be."""
-        progress = self.taylor.progress
-        self.crossings, self.began = [], None
-        progress["past_pivot"], progress["clearance"], progress["is_clear"] = 1.0, 0.0, 0
-        status = self.expand(self.times[-1])
-        self.taylor.progress.entered = self.least_pivot()
-        status = PAUSED if status == OK else status
-        while status == PAUSED and not progress["is_clear"]:
-            status = self._pass_on()
+        return self._go_on(self._recorded(cross))
+
+    def _go_on(self, status: int) -> int:
+        """Pass further singular positions where the passage is PAUSED and not clear of them."""
+        while status == PAUSED and not self.taylor.progress["is_clear"]:
+            status = self._recorded(pass_on)
         return status
 
-    def _pass_on(self) -> int:
-        """The steps over the next crossing, which is recorded, or those that lead clear of it."""
+    def _recorded(self, passing: Entry) -> int:
+        """The status of steps that may pass a singular position, which is recorded."""
         counts = self.memory.equations.system.counts
         passed = int(counts["crossings"])
-        status = int(pass_on(self._packed_taylor.argument))
+        status = int(passing(self._packed_taylor.argument))
         if status not in (PAUSED, DONE) or counts["crossings"] == passed:
             return status
-        taken = dict(self.limits.branches).get(passed + 1, SMOOTH)
-        crossing = self._placed(taken)
+        taken, found = dict(self.limits.branches).get(passed + 1, SMOOTH), self.taylor.crossing
+        q, v = found.coordinates.copy(), found.velocities.copy()
+        crossing = Passed(float(found.instant["time"]), q, v, taken)
         self.crossings.append(crossing)
         return status if taken == SMOOTH else self._take_branch(singular_position(self.model, crossing))
-
-    def _placed(self, taken: int) -> Passed:
-        """The crossing of the last step; the state in memory stays behind it."""
-        state, clock = self.memory.state, self.memory.loop.clock
-        behind = state.coordinates.copy(), state.velocities.copy()
-        t = float(clock.time) - float(place_crossing(self._packed_taylor.argument))
-        q, v = state.coordinates.copy(), state.velocities.copy()
-        state.coordinates[:], state.velocities[:] = behind
-        return Passed(t, q, v, taken)
 
     def _take_branch(self, crossing: SingularPosition) -> int:
         """Go on along another branch than the smooth one: PAUSED, or why that cannot be.
@@ -92,9 +88,7 @@ class PassingRun(SeriesRun):
         if status == PAUSED:
             self._put_samples_before(ahead, way)
         self.taylor.progress.entered = self.least_pivot()
-        while status == PAUSED and not self.taylor.progress["is_clear"]:
-            status = self._pass_on()
-        return status
+        return self._go_on(status)
 
     def _misses(self, q: np.ndarray, v: np.ndarray, ahead: float) -> bool:
         """Whether the series, a time ahead (s) of its beginning, misses coordinates and velocities."""
@@ -116,7 +110,7 @@ class PassingRun(SeriesRun):
             self._put_sample(k, q, v, acceleration)
             clock.sample = k + 1
         self._state_at(0.0)
-        self.began = moment_of(self)
+        begin_here(self._packed_taylor.argument)
 
     def _put_sample(self, k: int, q: np.ndarray, v: np.ndarray, acceleration: np.ndarray) -> None:
         """Sample k; multipliers balance the forces as well as they can, at rest along the branch alone."""
@@ -144,7 +138,7 @@ class PassingRun(SeriesRun):
             v = here[1] + velocities - there[1]
         progress = self.taylor.progress
         progress["past_pivot"], progress["clearance"], progress["is_clear"] = 0.0, 0.0, 0
-        self.began = moment_of(self)
+        begin_here(self._packed_taylor.argument)
         return PAUSED
 
     def _time_in_which(self, velocities: np.ndarray) -> float:

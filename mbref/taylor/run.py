@@ -1,8 +1,7 @@
 """Runs whose singular positions are passed by Taylor series: of a method in steps, or in series itself.
 
-The state before a singular position is known to the run's tolerance alone, and the passage may magnify its
-error.  So, unless drivers prescribe the whole motion, the series are followed twice: a twin begins with
-velocities changed by the tolerance.  Where both end apart, the motion is not determined.
+Unless drivers prescribe the whole motion, the series are followed twice (``mbref.taylor.twin``): where both
+end apart, the motion is not determined.
 """
 
 from __future__ import annotations
@@ -19,18 +18,12 @@ from mbref.scene import Scene
 from mbref.simulation.limits import GENERIC, Limits
 from mbref.simulation.run import Run
 from mbref.simulation.singular_start import fits_no_branch, leaving
-from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, TOO_MANY_STEPS, UNDECIDED
-from mbref.taylor.moment import Moment, enter, moment_of
-from mbref.taylor.passing import hand_over
+from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, UNDECIDED
 from mbref.taylor.passing_run import PassingRun
 from mbref.taylor.series_run import SeriesRun
 
 TOLERANCE = 1e-13  # of the series that pass singular positions
 SERIES = "taylor[order=16]"  # of them: lower orders magnify rounding less
-LEAST_CHANGE = 1e-9  # of the velocities of a twin
-MAGNIFIED, APART = 100.0, 1e-2  # lengths by which twins end apart: over the change, and whatever it is
-CLOSER = 0.1  # the same, over as many singular positions as the twin did not count
-FASTER = 10.0  # the same of velocities, over the fastest
 
 
 class CrossingRun(Run):
@@ -101,30 +94,23 @@ class Passage:
     def __call__(self) -> int:
         """Take the run's state and time over one, and its samples: PAUSED, DONE or why that cannot be."""
         series = self._series()
-        return self._followed(series, moment_of(self._run), series.cross)
+        series.take_over(self._run)
+        return self._given_back(series.cross(), series)
 
     def leave_start(self) -> int:
         """Leave a singular position at t = 0: PAUSED, also where there is none, DONE at the end, else why the
         motion cannot be followed."""
-        way = self._way
-        if way is None:
+        if self._way is None:
             return UNDECIDED if self._fits_no_branch else PAUSED
         series = self._series()
-        return self._followed(series, moment_of(self._run), lambda: series.leave(way))
+        series.take_over(self._run)
+        return self._given_back(series.leave(self._way), series)
 
-    def _followed(self, series: PassingRun, before: Moment, follow: Callable[[], int]) -> int:
-        """Hand the run over to series and back, which follow its motion from a moment on."""
-        run = self._run
-        mine, theirs = run.packed.argument, series.packed.argument
-        hand_over(mine, theirs)
-        series.memory.watch["reference_pivot"] = run.memory.watch["reference_pivot"]
-        status = follow()
-        hand_over(theirs, mine)
-        if status not in (PAUSED, DONE):
-            return status if status == TOO_MANY_STEPS else UNDECIDED
-        if not self._is_determined(series.began or before, series):
-            return UNDECIDED
-        run.crossings += series.crossings
+    def _given_back(self, status: int, series: PassingRun) -> int:
+        """PAUSED or DONE where the run goes on behind a passage that ended with a status, else why not."""
+        status = series.give_back(status, self._run)
+        if status in (PAUSED, DONE):
+            self._run.crossings += series.crossings
         return status
 
     def _series(self) -> PassingRun:
@@ -134,22 +120,3 @@ class Passage:
             self._made = PassingRun(run.scene, Method.parse(SERIES), run.times, limits)
             run.making += time.process_time() - began
         return self._made
-
-    def _is_determined(self, before: Moment, series: PassingRun) -> bool:
-        """Whether a twin comes to the same place as the run.
-
-        Nearer, where it counts another number of singular positions: a step may pass two.
-        """
-        if not series.has_freedom:
-            return True
-        change = max(self._run.memory.control.rtol, LEAST_CHANGE)
-        landing, clock = series.landing, self._run.memory.loop.clock
-        passed = self._run.memory.equations.system.counts["crossings"]
-        enter(before._replace(velocities=before.velocities * (1.0 + change)), series)
-        if series.follow(clock["time"]) != DONE:
-            return False
-        same = series.memory.equations.system.counts["crossings"] == passed
-        near, speed = min(MAGNIFIED * change, APART), np.abs(landing[1]).max(initial=0.0)
-        near *= 1.0 if same else CLOSER
-        places, rates = np.abs(series.landing - landing).max(axis=1, initial=0.0)
-        return bool(places <= near and rates <= FASTER * near * speed)

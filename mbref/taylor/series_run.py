@@ -8,24 +8,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from mbref.kernels.layout import OK
 from mbref.kernels.named_memory import allocate, packed, record
 from mbref.method import Method
 from mbref.scene import Scene
 from mbref.simulation.limits import AUTO, GENERIC, SPECIALISED, Limits
 from mbref.simulation.run import Run
-from mbref.simulation.stepping import PAUSED
 from mbref.taylor.lanes import filled
-from mbref.taylor.layout import Progress, Rows, SceneCode, Series, Solver, TaylorMemory
+from mbref.taylor.layout import Progress, Rows, SceneCode, Series, Snapshot, Solver, TaylorMemory
 from mbref.taylor.natural import NaturalCoordinates
-from mbref.taylor.passing import hand_over, look_along, pass_on, place_crossing
+from mbref.taylor.passing import begin_here, cross, give_back, look_along, pass_on, take_over
 from mbref.taylor.polynomials import polynomials_of
 from mbref.taylor.scene_code import NAME, code_of
 from mbref.taylor.start import OFF
 from mbref.taylor.stepping import advance_series, enter
 
 SHARE = 0.05  # of rtol + atol: the tolerance of a step
-KERNELS_OF_SERIES = (enter, advance_series, hand_over, pass_on, place_crossing, look_along)
+KERNELS_OF_SERIES = (enter, advance_series, take_over, begin_here, cross, pass_on, give_back, look_along)
 ROUNDING = 1e-16  # of a singular value
 LEAST_ORDER, MOST_ORDER = 4, 30
 CHEAPEST = {GENERIC: (6.0, 1.2), SPECIALISED: (8.0, 1.6)}  # order: at a tolerance of 1, and more per digit
@@ -96,6 +94,9 @@ class SeriesRun(Run):
             solver=solver_of(polynomials.rows, sizes),
             progress=record(Progress()),
             code=record(SceneCode()),
+            began=allocate(Snapshot, self.model.sizes),
+            crossing=allocate(Snapshot, self.model.sizes),
+            landing=np.zeros((2, sizes["lanes"])),
             state=np.zeros((3, sizes["lanes"])),
             pose=np.zeros((3, 12 * self.model.nb)),
             angles=np.zeros(polynomials.torsions.slot.size),
@@ -118,31 +119,9 @@ class SeriesRun(Run):
         """As many steps as are taken at a time: PAUSED after them, DONE at the end, or why there are none."""
         return int(advance_series(self._packed_taylor.argument))
 
-    def follow(self, until: float) -> int:
-        """The steps from the state and time in memory to a time (s): DONE or why that cannot be."""
-        status = self.expand(until)
-        while status in (OK, PAUSED):
-            status = self.step_on()
-        return status
-
     def least_pivot(self) -> float:
         """The least pivot of the rows where the series begins; 1 without rows."""
         return float(np.abs(self.taylor.solver.last[: int(self.taylor.progress.rank)]).min(initial=1.0))
-
-    @property
-    def has_freedom(self) -> bool:
-        """Whether the rows leave a motion to the forces."""
-        return self.freedoms > 0
-
-    @property
-    def freedoms(self) -> int:
-        """Variables that the rows leave to the forces."""
-        return len(self.natural.kept) - int(self.taylor.progress.rank)
-
-    @property
-    def landing(self) -> np.ndarray:
-        """Values and rates (2, nz) of the variables where the last series begins."""
-        return self.taylor.series.terms[:2, : len(self.natural.kept)].copy()
 
 
 def solver_of(rows: Rows, sizes: Mapping[str, int]) -> Solver:

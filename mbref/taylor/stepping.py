@@ -230,8 +230,8 @@ def step(memory):
     return OK
 
 
-@entry(INT(Named(TaylorMemory)))
-def enter(memory):
+@kernel
+def begin(memory):
     """Choose the partition at the present state and expand there: OK or why that cannot be."""
     t, slot = memory.run.loop.clock.time, memory.polynomials.torsions.slot
     for s in range(slot.shape[0]):
@@ -242,6 +242,12 @@ def enter(memory):
     memory.solver.first[:] = 1e300
     status = expand_from(t, memory)
     return status if t > 0.0 else judged_start(status, memory)
+
+
+@entry(INT(Named(TaylorMemory)))
+def enter(memory):
+    """Begin a series at the present state: OK or why that cannot be."""
+    return begin(memory)
 
 
 @entry(INT(Named(TaylorMemory)))
