@@ -24,7 +24,8 @@ from mbref import __version__, rotations
 from mbref.integrators import INTEGRATORS
 from mbref.integrators.dop853 import STAGES, Stages
 from mbref.kernels.layout import OK, Clock, Control
-from mbref.kernels.named_memory import Address, Vector, allocate, packed, record
+from mbref.kernels.named_memory import Address, Vector, allocate, packed
+from mbref.kernels.records import record
 from mbref.linear_algebra.vectors import copy
 from mbref.scene import Scene
 from mbref.trajectory import Cost, Outcome, Trajectory

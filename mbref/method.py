@@ -17,7 +17,8 @@ from mbref.formulations.base import Formulation
 from mbref.integrators import INTEGRATORS
 from mbref.integrators.base import Integrator
 from mbref.kernels.layout import Settings
-from mbref.kernels.named_memory import Packed, packed, record
+from mbref.kernels.named_memory import Packed, packed
+from mbref.kernels.records import record
 from mbref.scene_fields import meant
 from mbref.stabilisation import STABILISATIONS
 from mbref.stabilisation.base import Stabilisation

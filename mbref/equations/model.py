@@ -22,7 +22,8 @@ from mbref.equations.random_states import RandomStates
 from mbref.equations.units import body_lengths, metric_root
 from mbref.kernels.layout import Counts, Equations, Frames, Settings, System
 from mbref.kernels.lent_memory import copied, fill, lent, shapes_of, take_back
-from mbref.kernels.named_memory import allocate, record
+from mbref.kernels.named_memory import allocate
+from mbref.kernels.records import record
 from mbref.kernels.scene_layout import Bodies, SceneData
 from mbref.scene import (
     GROUND,

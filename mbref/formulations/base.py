@@ -11,7 +11,8 @@ import numpy as np
 
 from mbref.kernels.compilation import Exchangeable
 from mbref.kernels.layout import Counts, Settings, SparseFactor, System
-from mbref.kernels.named_memory import Packed, allocate, packed, record
+from mbref.kernels.named_memory import Packed, allocate, packed
+from mbref.kernels.records import record
 from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from mbref.kernels.named_memory import Packed, packed
+from mbref.kernels.records import Numbers
 
 MOST_KEYS, MOST_OF_A_KEY, MOST_BYTES = 64, 4, 1 << 20  # kept for later; larger memory is not kept
 
@@ -39,7 +40,7 @@ def _places(values: Any) -> Iterator[tuple[int, int]]:
     elif isinstance(values, tuple):
         for value in values:
             yield from _places(value)
-    elif isinstance(values, np.ndarray | np.record) and values.nbytes:
+    elif isinstance(values, np.ndarray | Numbers) and values.nbytes:
         yield int(values.__array_interface__["data"][0]), values.nbytes
 
 
@@ -79,7 +80,7 @@ def fill(target: Any, source: Any) -> None:
             mine[...] = theirs
 
 
-def write(record: np.record, values: Any) -> None:
+def write(record: Numbers, values: Any) -> None:
     """Have a record hold these numbers."""
     for name, value in zip(values._fields, values, strict=True):
         record[name] = value

@@ -31,6 +31,7 @@ from numba.np.numpy_support import from_dtype
 
 from mbref.kernels.compilation import INDEX_TABLE, INDICES, MATRIX, PLAIN, UNSIGNED, VECTOR
 from mbref.kernels.dimensions import Shapes, check_sizes, size_of
+from mbref.kernels.records import Numbers, dtype_of, is_record, numbers_of, record
 
 Vector = Annotated[np.ndarray, VECTOR]  # float64 (k,)
 Matrix = Annotated[np.ndarray, MATRIX]  # float64 (k, l)
@@ -78,20 +79,6 @@ class Field(typing.NamedTuple):
     dtype: np.dtype | None  # of an array's entries, or of a record
 
 
-def is_record(schema: type) -> bool:
-    """Whether all fields of a NamedTuple are numbers."""
-    return all(hint in (int, float) for hint in typing.get_type_hints(schema).values())
-
-
-@functools.cache
-def dtype_of(record: type) -> np.dtype:
-    """The NumPy structure of a record; TypeError for a field name that NumPy has taken."""
-    hints = typing.get_type_hints(record)
-    if taken := [name for name in hints if hasattr(np.record, name)]:
-        raise TypeError(f"{record.__name__}: NumPy's records have attributes called {', '.join(taken)}")
-    return np.dtype([(name, "i8" if hint is int else "f8") for name, hint in hints.items()])
-
-
 @functools.cache
 def fields_of(schema: type) -> Mapping[str, Field]:
     """Fields of a schema by name, in the order of its table."""
@@ -102,7 +89,7 @@ def fields_of(schema: type) -> Mapping[str, Field]:
         if shape:
             dtype = np.dtype(str(kind.dtype))
         elif isinstance(kind, types.Record):
-            dtype = np.dtype((np.record, dtype_of(hint)))
+            dtype = numbers_of(hint)
         fields[name] = Field(name, f"{schema.__name__}.{name}", kind, shape, row, nested, dtype)
         row += rows_of(nested) if nested else 1
     return fields
@@ -167,22 +154,12 @@ def stacked(schema: type, rows: Sequence[Any], sizes: Mapping[str, int] | None =
     return schema(**columns)
 
 
-def record(values: Any) -> np.record:
-    """The numbers of a record in memory of their own, to be read and written by name."""
-    return np.array([values], dtype=_kind_of_record(type(values)))[0]
-
-
-@functools.cache
-def _kind_of_record(schema: type) -> np.dtype:
-    return np.dtype((np.record, dtype_of(schema)))
-
-
 class Packed:
     """A schema or a record ready for kernels, which take ``argument``.  Keep it while they run."""
 
     def __init__(self, values: Any):
         self.values = values
-        if isinstance(values, np.record):
+        if isinstance(values, Numbers):
             self.address = _address(values)
         else:
             words, shapes = _words(values)
@@ -249,7 +226,7 @@ def _address_of_other(field: Field, value: Any) -> int:
     return 0 if is_nothing else int(value.address)
 
 
-def _address(values: np.ndarray | np.record) -> int:
+def _address(values: np.ndarray | Numbers) -> int:
     """Where an array or record begins; the buffer tells it faster, of arrays that may be written to."""
     if isinstance(values, np.ndarray) and values.size and values.flags.writeable:
         return addressof(first_byte(values))

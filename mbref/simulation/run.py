@@ -31,7 +31,8 @@ from mbref.kernels.layout import (
     Watch,
 )
 from mbref.kernels.lent_memory import Lent, lent, shapes_of, take_back, write
-from mbref.kernels.named_memory import allocate, packed, record
+from mbref.kernels.named_memory import allocate, packed
+from mbref.kernels.records import record
 from mbref.kernels.scene_layout import SceneData
 from mbref.linear_algebra.symbolic_factorisation import empty_factor
 from mbref.method import Method
@@ -235,9 +236,11 @@ class Run:
 
     def _judge_pace(self, status: int) -> int:
         """CREEPING instead of PAUSED where at the pace of the last steps the end is out of all reach."""
+        if status != PAUSED:
+            return status
         now, steps = float(self.memory.loop.clock.time), int(self.memory.equations.system.counts.steps)
         before, taken = self._judged[0], steps - self._judged[1]
-        if status != PAUSED or taken < PACE_STEPS:
+        if taken < PACE_STEPS:
             return status
         self._judged = now, steps
         creeps = taken * (self.times[-1] - now) > OUT_OF_REACH * self.limits.most_steps * (now - before)

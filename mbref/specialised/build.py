@@ -22,7 +22,8 @@ from mbref.equations.static_constraints import add_static_multipliers
 from mbref.kernels.compilation import CACHE, PLAIN
 from mbref.kernels.layout import OK, Active, Addresses, SparseFactor, State, System
 from mbref.kernels.machine_code import Code, code_at, processor
-from mbref.kernels.named_memory import Packed, allocate, packed, record
+from mbref.kernels.named_memory import Packed, allocate, packed
+from mbref.kernels.records import Numbers, record
 from mbref.linear_algebra.sparse_cholesky import find_squared_pivots
 from mbref.method import Method
 from mbref.specialised.assembly import Piece, text_of
@@ -103,7 +104,7 @@ def with_numbers(values: Any) -> Any:
         return with_numbers(values.values)
     if isinstance(values, SimpleNamespace):
         return SimpleNamespace(**{name: with_numbers(value) for name, value in vars(values).items()})
-    if isinstance(values, np.record):
+    if isinstance(values, Numbers):
         return SimpleNamespace(**{name: values[name].item() for name in values.dtype.names})
     if isinstance(values, np.ndarray):
         return numbers(values) if values.dtype == float else values

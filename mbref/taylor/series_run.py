@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mbref.kernels.named_memory import allocate, packed, record
+from mbref.kernels.named_memory import allocate, packed
+from mbref.kernels.records import record
 from mbref.method import Method
 from mbref.scene import Scene
 from mbref.simulation.limits import AUTO, GENERIC, SPECIALISED, Limits

@@ -16,9 +16,9 @@ from mbref.kernels.named_memory import (
     allocate,
     opener,
     packed,
-    record,
     stacked,
 )
+from mbref.kernels.records import record
 
 TWICE = FLOAT(FLOAT)
 
