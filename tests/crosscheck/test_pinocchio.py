@@ -22,15 +22,17 @@ from tests.crosscheck.tree_scenes import driven, every_joint
 
 pinocchio = pytest.importorskip("pinocchio")
 
-PAPER = {  # scene: duration (s), measured error (m, rad)
+# Scene: duration (s), measured error (m, rad), the larger of two processors'.  Singular positions magnify their
+# rounding: 1.3e-12 and 2.8e-10 for the equal crank, 1.1e-14 and 4.8e-13 for the five-bar.
+PAPER = {
     "planar_slider_crank": (0.08, 9e-13),
-    "planar_slider_crank_equal": (0.1, 1.3e-12),
+    "planar_slider_crank_equal": (0.1, 2.8e-10),
     "planar_slider_crank_gravity": (0.2, 4e-12),
     "spatial_slider_crank": (0.02, 2.2e-12),
     "spatial_slider_crank_driven": (0.1, 5.1e-13),
     "four_bar": (0.1, ROUNDING),
     "four_bar_quarter": (0.1, 2.4e-13),
-    "five_bar": (0.1, 1.1e-14),
+    "five_bar": (0.1, 4.8e-13),
     "four_bar_gravity": (0.5, 5.1e-12),
     "five_bar_gravity": (0.5, 4.8e-12),
 }

@@ -53,9 +53,12 @@ def test_every_hard_mechanism_is_within_its_bound(name):
 
 @pytest.mark.parametrize("move", [natural_motion, tree_motion])
 def test_given_rates_near_a_singular_position_are_kept(move):
-    """Taken in double precision, the rule's velocities let the crank start off by a part of 1e-13."""
+    """Taken in double precision, the rule's velocities let the crank start off by 1e-16 rad/s.
+
+    Extended precision leaves up to 1e-18 rad/s of rounding, depending on the processor.
+    """
     motion = move(HARD["start_near_singular"](), [0.0], EXTENDED, seconds=SECONDS)
-    assert np.abs(motion.angular_velocity[0, 0] - EXTENDED.array([0.0, 0.0, 1e-3])).max() < 1e-18
+    assert np.abs(motion.angular_velocity[0, 0] - EXTENDED.array([0.0, 0.0, 1e-3])).max() < 1e-17
 
 
 def test_start_velocities_obey_the_rule():
