@@ -22,7 +22,7 @@ from tests.crosscheck.tree_scenes import driven, every_joint
 
 pinocchio = pytest.importorskip("pinocchio")
 
-# Scene: duration (s), measured error (m, rad), the larger of two processors'.  Singular positions magnify their
+# Scene: duration (s), measured error (m, rad), the larger of two processors: singular positions magnify their
 # rounding: 1.3e-12 and 2.8e-10 for the equal crank, 1.1e-14 and 4.8e-13 for the five-bar.
 PAPER = {
     "planar_slider_crank": (0.08, 9e-13),
