@@ -78,7 +78,7 @@ class PassingRun(SeriesRun):
     def leave(self, way: Leaving) -> int:
         """Go on from a singular position at t = 0: PAUSED, DONE or why that cannot be."""
         q, v, acceleration = way
-        moves, self.crossings = np.any(v), []
+        moves = np.any(v)
         ahead = self._time_in_which(v) if moves else self._time_in_which(0.5 * acceleration) ** 0.5
         ahead = min(ahead, 0.5 * float(self.times[-1]))
         moved = displaced(q, ahead * v + 0.5 * ahead**2 * acceleration), v + ahead * acceleration
