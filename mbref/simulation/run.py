@@ -76,8 +76,7 @@ class Run:
 
     def give_back(self) -> None:
         """Leave the memory to the next run; this one cannot be read any more."""
-        if self.specialised is None:
-            take_back(self._lent)
+        take_back(self._lent)
         self.model.give_back()
 
     def _check_freedoms(self) -> None:

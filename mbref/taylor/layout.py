@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
+from mbref.kernels.compilation import FLOAT, INT
 from mbref.kernels.layout import Memory
-from mbref.kernels.named_memory import Indices, Matrix, Vector
+from mbref.kernels.named_memory import Indices, Kernel, Matrix, Named, Vector
 
 
 class Readings(NamedTuple):
@@ -177,6 +178,14 @@ class Progress(NamedTuple):
     cut: int = 0  # the last order of the series that an attempt takes
 
 
+class SeriesKernels(NamedTuple):
+    """The kernels that several others call, by address: a copy in each would be cold where it is called."""
+
+    begin: Annotated[Kernel, BEGIN]
+    expand: Annotated[Kernel, EXPAND]
+    step: Annotated[Kernel, STEP]
+
+
 class SceneCode(NamedTuple):
     """Machine code of the scene's own, for one order of the series; 0 for none."""
 
@@ -210,6 +219,7 @@ class TaylorMemory(NamedTuple):
     series: Series
     solver: Solver
     progress: Progress
+    kernels: SeriesKernels
     code: SceneCode
     began: Snapshot  # from where the last passage is smooth
     crossing: Snapshot  # the last singular position passed
@@ -217,3 +227,8 @@ class TaylorMemory(NamedTuple):
     state: Annotated[Matrix, 3, "lanes"]  # variables and their two derivatives at some time
     pose: Annotated[Matrix, 3, "12*nb"]
     angles: Annotated[Vector, "torsions"]  # rad, unwrapped, at the time of expansion
+
+
+SERIES = Named(TaylorMemory)
+BEGIN = STEP = INT(SERIES)
+EXPAND = INT(FLOAT, SERIES)  # t

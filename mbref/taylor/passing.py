@@ -5,23 +5,22 @@ from __future__ import annotations
 from mbref.equations.coordinates import copy_state
 from mbref.kernels.compilation import FLOAT, INT, entry, kernel
 from mbref.kernels.layout import MEMORY, OK
-from mbref.kernels.named_memory import Named
 from mbref.linear_algebra.vectors import copy
 from mbref.simulation.singular_crossing import WINDOW, relative_pivot
 from mbref.simulation.stepping import DONE, PAUSED, TOO_MANY_STEPS, UNDECIDED
-from mbref.taylor.layout import TaylorMemory
+from mbref.taylor.layout import SERIES
 from mbref.taylor.passage import AHEAD, find_crossing, least_pivot
 from mbref.taylor.samples import project_state, put_state_at, put_terms
 from mbref.taylor.snapshots import take_snapshot
 from mbref.taylor.start import freedoms
-from mbref.taylor.stepping import begin, keep_terms, step
+from mbref.taylor.stepping import keep_terms
 from mbref.taylor.twin import twin_agrees
 
 LEAVE = 1.5  # windows: the pivot from which on steps of the run are taken again
 CLEAR = 3.0  # of the pivot of ``AHEAD``: the same for a run in series
 
 
-@entry(INT(MEMORY, Named(TaylorMemory)))
+@entry(INT(MEMORY, SERIES))
 def take_over(source, memory):
     """Take the state of a run, where a passage begins, over into the series: OK."""
     hand_over(source, memory.run)
@@ -32,7 +31,7 @@ def take_over(source, memory):
     return OK
 
 
-@entry(INT(Named(TaylorMemory)))
+@entry(INT(SERIES))
 def begin_here(memory):
     """Have the passage begin at the present state: OK."""
     take_snapshot(memory.run, memory.began)
@@ -62,17 +61,17 @@ def copy_counts(source, target):
     target.crossings = source.crossings
 
 
-@entry(INT(Named(TaylorMemory)))
+@entry(INT(SERIES))
 def cross(memory):
     """Begin a series at the present state, and step over the first singular position (``pass_on``)."""
     progress = memory.progress
     progress.past_pivot, progress.clearance, progress.is_clear = 1.0, 0.0, 0
-    status = begin(memory)
+    status = memory.kernels.begin(memory)
     progress.entered = least_pivot(memory)
     return step_on(memory) if status == OK else status
 
 
-@entry(INT(Named(TaylorMemory)))
+@entry(INT(SERIES))
 def pass_on(memory):
     """Step over the next singular position, or clear of all of them: PAUSED; DONE at the end.
 
@@ -88,7 +87,7 @@ def step_on(memory):
     clock, counts, progress = memory.run.loop.clock, memory.run.equations.system.counts, memory.progress
     passed = counts.crossings
     while counts.steps < memory.run.control.most_steps:
-        status = step(memory)
+        status = memory.kernels.step(memory)
         if status != OK:
             put_terms(memory.series.past, memory)
             return status
@@ -129,7 +128,7 @@ def clearance(memory):
     return min(relative_pivot(run.watch) / (LEAVE * WINDOW), least_pivot(memory) / ahead)
 
 
-@entry(INT(INT, MEMORY, Named(TaylorMemory)))
+@entry(INT(INT, MEMORY, SERIES))
 def give_back(status, target, memory):
     """Hand the run back where the passage ended with a status: PAUSED, DONE, or why it cannot go on.
 
@@ -144,7 +143,7 @@ def give_back(status, target, memory):
     return status if is_determined else UNDECIDED
 
 
-@entry(INT(FLOAT, Named(TaylorMemory)))
+@entry(INT(FLOAT, SERIES))
 def look_along(h, memory):
     """Put the state at a distance h (s) from where the series now begins into memory."""
     keep_terms(memory.series)

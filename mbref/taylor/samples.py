@@ -7,7 +7,7 @@ from numpy import sqrt
 from mbref.equations.coordinates import contract, copy_state
 from mbref.equations.evaluation import assemble_system
 from mbref.kernels.compilation import inlined, kernel
-from mbref.kernels.layout import NOT_CONVERGED, OK
+from mbref.kernels.layout import GUARD_FAILED, NOT_CONVERGED, OK
 from mbref.linear_algebra.vectors import copy, larger
 from mbref.simulation.samples import take_sample as record_sample
 from mbref.taylor.lanes import LANES, load, store
@@ -157,6 +157,25 @@ def project_state(t, run):
 
 
 @kernel
+def accelerate(t, run):
+    """Accelerations and multipliers at the state in memory by the formulation: OK or why there are none."""
+    loop, kernels = run.loop, run.kernels
+    y, y_rate = loop.y[: loop.clock.y_size], loop.y_rate[: loop.clock.y_size]
+    contract(run.state.coordinates, run.state.velocities, run.active, y)
+    status = kernels.rates_with_outputs(t, y, y_rate, run)
+    return kernels.fallback_rates(t, y, y_rate, run) if status == GUARD_FAILED else status
+
+
+@kernel
+def balance_forces(t, acceleration, run):
+    """Multipliers that balance the forces at accelerations (n,), which the formulation finds again from
+    their rows: OK or why there are none."""
+    assemble_system(t, run.state.coordinates, run.state.velocities, run.equations)
+    rows_times(acceleration, run.equations, run.equations.system.rhs)
+    return run.kernels.accelerate(run.equations.system)
+
+
+@kernel
 def take_sample(h, length, memory):
     """Record state, accelerations and multipliers at a distance h (s) into a step: OK or why there are none.
 
@@ -172,12 +191,12 @@ def take_sample(h, length, memory):
     project_state(run.loop.times[k], run)
     put_angles(h, memory)
     beside = watch.smallest_pivot < BESIDE * watch.reference_pivot
-    if beside and memory.progress.passing:
-        put_state(memory)
-    assemble_system(run.loop.times[k], run.state.coordinates, run.state.velocities, run.equations)
     if beside:
-        rows_times(samples.accelerations[k], run.equations, system.rhs)
-    status = run.kernels.accelerate(system)
+        if memory.progress.passing:
+            put_state(memory)
+        status = balance_forces(run.loop.times[k], samples.accelerations[k], run)
+    else:
+        status = accelerate(run.loop.times[k], run)
     if status == OK and not explained(system.acceleration, samples.accelerations[k], length, memory.progress):
         status = NOT_CONVERGED
     if status == OK:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Mapping
 from dataclasses import replace
@@ -14,17 +15,30 @@ from mbref.method import Method
 from mbref.scene import Scene
 from mbref.simulation.limits import AUTO, GENERIC, SPECIALISED, Limits
 from mbref.simulation.run import Run
+from mbref.specialised import Untraceable
 from mbref.taylor.lanes import filled
-from mbref.taylor.layout import Progress, Rows, SceneCode, Series, Snapshot, Solver, TaylorMemory
+from mbref.taylor.layout import (
+    Progress,
+    Rows,
+    SceneCode,
+    Series,
+    SeriesKernels,
+    Snapshot,
+    Solver,
+    TaylorMemory,
+)
 from mbref.taylor.natural import NaturalCoordinates
 from mbref.taylor.passing import begin_here, cross, give_back, look_along, pass_on, take_over
 from mbref.taylor.polynomials import polynomials_of
 from mbref.taylor.scene_code import NAME, code_of
 from mbref.taylor.start import OFF
-from mbref.taylor.stepping import advance_series, enter
+from mbref.taylor.stepping import advance_series, begin, enter, expand_from, step
 
 SHARE = 0.05  # of rtol + atol: the tolerance of a step
-KERNELS_OF_SERIES = (enter, advance_series, take_over, begin_here, cross, pass_on, give_back, look_along)
+CALLED = SeriesKernels(begin=begin, expand=expand_from, step=step)
+KERNELS_OF_SERIES = (
+    *CALLED, enter, advance_series, take_over, begin_here, cross, pass_on, give_back, look_along,
+)  # fmt: skip
 ROUNDING = 1e-16  # of a singular value
 LEAST_ORDER, MOST_ORDER = 4, 30
 CHEAPEST = {GENERIC: (6.0, 1.2), SPECIALISED: (8.0, 1.6)}  # order: at a tolerance of 1, and more per digit
@@ -94,6 +108,7 @@ class SeriesRun(Run):
             series=series,
             solver=solver_of(polynomials.rows, sizes),
             progress=record(Progress()),
+            kernels=SeriesKernels(*(kernel.pointer for kernel in CALLED)),
             code=record(SceneCode()),
             began=allocate(Snapshot, self.model.sizes),
             crossing=allocate(Snapshot, self.model.sizes),
@@ -104,12 +119,19 @@ class SeriesRun(Run):
         )
 
     def _specialise(self) -> None:
-        """Expand by code of the scene's own from now on, made or loaded; raises Untraceable."""
+        """Expand, and take samples, by code of the scene's own from now on, made or loaded.
+
+        Raises Untraceable where the series cannot have any.
+        """
         began = time.process_time()
         self._code = code_of(self.taylor)
         code = self.taylor.code
         code.expand, code.order = self._code.address(NAME), self.taylor.progress.order
         self.making += time.process_time() - began
+        with contextlib.suppress(Untraceable):  # then samples are taken by the general kernels
+            super()._specialise()
+            self.taylor = self.taylor._replace(run=self.memory)
+            self._packed_taylor = packed(self.taylor)
 
     def expand(self, until: float) -> int:
         """Expand at the present time and state, for steps until a time (s): OK or why that cannot be."""

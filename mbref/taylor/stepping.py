@@ -10,9 +10,8 @@ from __future__ import annotations
 
 from numpy import exp, isfinite, log
 
-from mbref.kernels.compilation import INT, entry, kernel
+from mbref.kernels.compilation import INT, entry, exchangeable, kernel
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, OK
-from mbref.kernels.named_memory import Named
 from mbref.linear_algebra.vectors import copy, larger
 from mbref.simulation.stepping import (
     DONE,
@@ -25,7 +24,7 @@ from mbref.simulation.stepping import (
 )
 from mbref.taylor.correction import correct, violation
 from mbref.taylor.lanes import LANES, load, store
-from mbref.taylor.layout import TaylorMemory
+from mbref.taylor.layout import BEGIN, EXPAND, SERIES, STEP
 from mbref.taylor.loads import ANGLE, TORSION_SERIES, expand_drivers
 from mbref.taylor.partition import choose
 from mbref.taylor.passage import (
@@ -62,7 +61,7 @@ NEARLY = 0.2  # of a step's first pivot: a step that ends nearer to a singular p
 OVER = 1.25  # its length then, over the distance
 
 
-@kernel
+@exchangeable(EXPAND)
 def expand_from(t, memory):
     """Correct the state at time t and expand it: OK or why it cannot be."""
     expand_drivers(t, memory)
@@ -147,7 +146,7 @@ def attempt(h, last, memory):
     put_angles(h, memory)
     order = progress.order
     progress.order = 2 if last else order
-    status = expand_from(memory.run.loop.clock.time + h, memory)
+    status = memory.kernels.expand(memory.run.loop.clock.time + h, memory)
     progress.order = order
     return judge(h, last, memory) if status == OK else status
 
@@ -192,7 +191,7 @@ def least_term(h, memory):
     return best
 
 
-@kernel
+@exchangeable(STEP)
 def step(memory):
     """One step, as many attempts as it takes, and the samples on its way."""
     loop, control, counts = memory.run.loop, memory.run.control, memory.run.equations.system.counts
@@ -230,7 +229,7 @@ def step(memory):
     return OK
 
 
-@kernel
+@exchangeable(BEGIN)
 def begin(memory):
     """Choose the partition at the present state and expand there: OK or why that cannot be."""
     t, slot = memory.run.loop.clock.time, memory.polynomials.torsions.slot
@@ -240,24 +239,24 @@ def begin(memory):
     expand_drivers(t, memory)
     memory.progress.rank = choose(memory)
     memory.solver.first[:] = 1e300
-    status = expand_from(t, memory)
+    status = memory.kernels.expand(t, memory)
     return status if t > 0.0 else judged_start(status, memory)
 
 
-@entry(INT(Named(TaylorMemory)))
+@entry(INT(SERIES))
 def enter(memory):
     """Begin a series at the present state: OK or why that cannot be."""
-    return begin(memory)
+    return memory.kernels.begin(memory)
 
 
-@entry(INT(Named(TaylorMemory)))
+@entry(INT(SERIES))
 def advance_series(memory):
     """Advance until the end, a failure, or the number of steps per call; says which."""
     clock, counts = memory.run.loop.clock, memory.run.equations.system.counts
     for _ in range(int(memory.run.control.steps_per_call)):
         if counts.steps >= memory.run.control.most_steps:
             return TOO_MANY_STEPS
-        status = step(memory)
+        status = memory.kernels.step(memory)
         if status != OK:
             put_terms(memory.series.past, memory)
             return status

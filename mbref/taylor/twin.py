@@ -11,7 +11,6 @@ from mbref.kernels.layout import OK
 from mbref.linear_algebra.vectors import copy, larger
 from mbref.taylor.passage import size_of
 from mbref.taylor.snapshots import return_to_snapshot
-from mbref.taylor.stepping import begin, step
 
 LEAST_CHANGE = 1e-9  # of the velocities of a twin
 MAGNIFIED, APART = 100.0, 1e-2  # lengths by which twins end apart: over the change, and whatever it is
@@ -49,7 +48,7 @@ def follow_twin(change, until, memory):
     for i in range(run.state.velocities.shape[0]):
         run.state.velocities[i] *= 1.0 + change
     memory.progress.end = until
-    status = begin(memory)
+    status = memory.kernels.begin(memory)
     while status == OK and clock.time < until and counts.steps < run.control.most_steps:
-        status = step(memory)
+        status = memory.kernels.step(memory)
     return status == OK and clock.time >= until

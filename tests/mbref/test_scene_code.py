@@ -55,7 +55,20 @@ def test_runs_agree_with_the_kernels(name):
     )
     assert generic.outcome == own.outcome and len(own.times) == len(times), own.message
     assert np.abs(generic.position - own.position).max() < 1e-9
+    for mine, theirs in ((own.acceleration, generic.acceleration), *_reactions(own, generic)):
+        assert np.abs(mine - theirs).max() <= 1e-6 * max(1.0, np.abs(theirs).max())
     assert abs(generic.cost.steps - own.cost.steps) <= 0.05 * generic.cost.steps
+
+
+def _reactions(one, other):
+    """The reactions of each joint in two runs; none without masses."""
+    return [(one.reactions[joint], other.reactions[joint]) for joint in one.reactions or ()]
+
+
+def test_samples_are_taken_by_code_of_the_scene():
+    run = TaylorRun(SCENES["spatial_slider_crank"](), TAYLOR, np.array([0.1]), Limits(code="specialised"))
+    assert run.taylor.run is run.memory
+    assert run.memory.code.addresses.rates and run.memory.code.addresses.project
 
 
 def test_auto_takes_the_code_where_many_steps_are_ahead():
