@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
 
 from mbref.kernels.compilation import Exchangeable
 
@@ -36,6 +37,7 @@ class Integrator:
     options: Mapping[str, float] = field(default_factory=dict)
     holds_constraints: bool = False  # its own steps end on the constraints: it goes without stabilisation
     integrates: bool = True  # otherwise only where drivers leave no freedom
+    largest_turn: float = inf  # rad that a body may turn in a step, where the stabilisation allows more
 
     def highest_order(self, options: Mapping[str, float]) -> int:
         """The order the options allow; ValueError unless ``max_order`` is a whole number up to ``order``."""

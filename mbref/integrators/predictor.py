@@ -21,6 +21,7 @@ from mbref.linear_algebra.vectors import larger
 NODES = 3
 NEARNESS = 2e-2  # of the step: how far both polynomials may differ; the prediction is much nearer
 ROUNDING = 1e-9  # m or rad; a coordinate that moves less is at rest but for rounding
+LARGEST_TURN = 0.4  # rad: inside longer steps pivots are looked at, which costs more than shorter ones
 ORDER = 3  # of the estimate as a part of the step
 
 
@@ -57,4 +58,6 @@ def step(rates, t, h, y, y_rate, y_new, memory):
     return off / (NEARNESS * max(moved, ROUNDING))
 
 
-PREDICTOR = Integrator("predictor", ORDER, step, propose, Scratch, adaptive=True, integrates=False)
+PREDICTOR = Integrator(
+    "predictor", ORDER, step, propose, Scratch, adaptive=True, integrates=False, largest_turn=LARGEST_TURN
+)

@@ -169,6 +169,7 @@ class Run:
         span = float(self.times[-1]) or 1.0
         options, largest_step = self.method.options_of(integrator), limits.largest_step or span
         turn = UNWRAPPED if self.model.has_angles else self.method.stabilisation.largest_turn
+        turn = min(turn, integrator.largest_turn)
         return Control(
             order=integrator.highest_order(options),
             fixed_step=0.0 if integrator.adaptive else min(options["step"], largest_step),
