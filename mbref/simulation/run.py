@@ -13,7 +13,7 @@ from mbref.equations.active_coordinates import without_rounding
 from mbref.equations.branches import Passed
 from mbref.equations.degrees_of_freedom import undriven_freedoms
 from mbref.equations.evaluation import evaluate_along
-from mbref.equations.initial_state import consistent_start
+from mbref.equations.initial_state import Start, consistent_start
 from mbref.equations.model import Model
 from mbref.equations.reduction import Reduction, reduction_of
 from mbref.equations.static_constraints import at_rest
@@ -56,12 +56,9 @@ class Run:
 
     def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
         self.scene, self.method, self.times, self.limits = scene, method, times, limits
-        self.model = Model(scene)
-        self._check_freedoms()
-        self.start = consistent_start(self.model)
-        reduction = self._reduce()
+        self.model, self.start, self.reduction = self._posed()
         prepare(method)  # so that the run alone is timed
-        self._lent = self._lend_memory(reduction)
+        self._lent = self._lend_memory()
         self.memory, self.packed = self._lent.values, self._lent.packed
         if method.stabilisation.projects:
             self.part = Part(self.memory.active, self.memory.factor)
@@ -79,10 +76,24 @@ class Run:
         take_back(self._lent)
         self.model.give_back()
 
-    def _check_freedoms(self) -> None:
+    def _posed(self) -> tuple[Model, Start, Reduction | None]:
+        """The scene as a model, its consistent start, and the part of the equations that the method needs.
+
+        None stands for all equations.
+        """
+        model = Model(self.scene)
+        self._check_freedoms(model)
+        start = consistent_start(model)
+        if not (self.method.formulation.linear_algebra.sparse or self.method.stabilisation.projects):
+            return model, start, None
+        start = without_rounding(model, start)
+        reduction = reduction_of(model, start)
+        return model, at_rest(start, reduction.held), reduction
+
+    def _check_freedoms(self, model: Model) -> None:
         """SceneError where bodies without mass, or a method that does not integrate, leave a freedom."""
         integrates = self.method.integrator.integrates
-        freedoms = undriven_freedoms(self.scene) if self.model.kinematic or not integrates else 0
+        freedoms = undriven_freedoms(self.scene) if model.kinematic or not integrates else 0
         if freedoms > 0 and not integrates:
             fault = (
                 f"driver: {freedoms} degrees of freedom are left; a kinematic analysis prescribes them all"
@@ -91,22 +102,13 @@ class Run:
         if freedoms > 0:
             raise SceneError(missing_masses(self.scene))
 
-    def _reduce(self) -> Reduction | None:
-        """The part of the equations that the method needs; None for all of them.  Corrects the start."""
-        if not (self.method.formulation.linear_algebra.sparse or self.method.stabilisation.projects):
-            return None
-        self.start = without_rounding(self.model, self.start)
-        reduction = reduction_of(self.model, self.start)
-        self.start = at_rest(self.start, reduction.held)
-        return reduction
-
-    def _lend_memory(self, reduction: Reduction | None) -> Lent:
+    def _lend_memory(self) -> Lent:
         """Memory with the numbers of this run."""
-        model, method = self.model, self.method
+        model, method, reduction = self.model, self.method, self.reduction
         sparse = reduction is not None and method.formulation.linear_algebra.sparse
         data = reduction.scene(model.data) if reduction and sparse else model.data
         key = (Memory, *self._identity(), reduction, self.times.size, *model.sizes.values(), shapes_of(data))
-        memory = lent(key, lambda: self._allocate(data, reduction))
+        memory = lent(key, lambda: self._allocate(data))
         equations = memory.values.equations
         model.put_numbers(equations, data)
         write(equations.system.settings, method.settings(self.limits.rank_tolerance))
@@ -122,11 +124,11 @@ class Run:
         options = (tuple(self.method.options_of(part).items()) for part in self.method.parts)
         return self._kernels(stabilisation), schemas, numbers, *options
 
-    def _allocate(self, data: SceneData, reduction: Reduction | None) -> Memory:
+    def _allocate(self, data: SceneData) -> Memory:
         """Memory of the method for the data of a scene, ready but for numbers."""
         model, method = self.model, self.method
         formulation, stabilisation, integrator = method.parts
-        factor, active = self._factor(reduction)
+        factor, active = self._factor()
         pivots = factor.symbolic.row.size
         algebra = formulation.linear_algebra
         sizes = {**model.sizes, "k": self.times.size, "dense_rows": algebra.rows(model.m), "pivots": pivots}
@@ -157,8 +159,9 @@ class Run:
             integrator=packed(allocate(integrator.schema, sizes)),
         )
 
-    def _factor(self, reduction: Reduction | None) -> tuple[SparseFactor, Active]:
+    def _factor(self) -> tuple[SparseFactor, Active]:
         """The factor, and the entries of y, which are all where the method does not project."""
+        reduction = self.reduction
         factor = empty_factor() if reduction is None else reduction.factor()
         if reduction is None or not self.method.stabilisation.projects:
             return factor, Active(np.arange(7 * self.model.nb), np.arange(self.model.n))

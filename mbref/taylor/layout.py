@@ -86,7 +86,6 @@ class Springs(NamedTuple):
     stiffness: Annotated[Vector, "springs"]
     damping: Annotated[Vector, "springs"]
     natural: Annotated[Vector, "springs"]
-    series: Annotated[Matrix, "7*springs", "orders"]  # vector (3), length, inverse, rate, pull
 
 
 class Torsions(NamedTuple):
@@ -98,7 +97,6 @@ class Torsions(NamedTuple):
     damping: Annotated[Vector, "torsions"]
     natural: Annotated[Vector, "torsions"]
     slot: Annotated[Indices, "torsions"]  # of the unwrapped angle among the model's
-    series: Annotated[Matrix, "15*torsions", "orders"]  # directions (9), cosine, sine, angle, three moments
 
 
 class Polynomials(NamedTuple):
@@ -120,6 +118,8 @@ class Series(NamedTuple):
     past: Annotated[Matrix, "orders", "lanes"]  # about the time of the step's beginning
     past_angles: Annotated[Matrix, "torsions", "orders"]
     driven: Annotated[Vector, "orders"]  # of one driver
+    springs: Annotated[Matrix, "7*springs", "orders"]  # vector (3), length, inverse, rate, pull
+    torsions: Annotated[Matrix, "15*torsions", "orders"]  # directions (9), cosine, sine, angle, three moments
     left: Annotated[Matrix, "orders", "slots"]  # factors of the products, one order later
     right: Annotated[Matrix, "orders", "slots"]
     sums: Annotated[Matrix, "orders", "lanes"]  # of products of known orders, and minus the forces

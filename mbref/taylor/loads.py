@@ -63,7 +63,7 @@ def grow_springs(k, memory):
     """Order k of the springs' vectors, lengths and inverses; order k - 1 of their rates."""
     springs, variables = memory.polynomials.springs, memory.series.terms
     for s in range(springs.stiffness.shape[0]):
-        of = springs.series[SPRING_SERIES * s : SPRING_SERIES * (s + 1)]
+        of = memory.series.springs[SPRING_SERIES * s : SPRING_SERIES * (s + 1)]
         square = 0.0
         for c in range(3):
             grow_form(springs.constant[s, c], springs.form[3 * s + c], k, variables, of[c])
@@ -88,7 +88,7 @@ def add_springs(k, memory):
     """Order k of their forces: -(stiffness (1 - natural / l) + damping l' / l) times the vector."""
     springs, sums, nz = memory.polynomials.springs, memory.series.sums, memory.solver.order.shape[0]
     for s in range(springs.stiffness.shape[0]):
-        of = springs.series[SPRING_SERIES * s : SPRING_SERIES * (s + 1)]
+        of = memory.series.springs[SPRING_SERIES * s : SPRING_SERIES * (s + 1)]
         pull = springs.damping[s] * product(of[RATE], of[INVERSE], k)
         pull -= springs.stiffness[s] * springs.natural[s] * of[INVERSE, k]
         of[PULL, k] = pull + springs.stiffness[s] if k == 0 else pull
@@ -103,7 +103,7 @@ def grow_torsions(k, memory):
     """Order k of directions, cosine and sine; of the angle, whose rate is C S' - S C'."""
     torsions, variables = memory.polynomials.torsions, memory.series.terms
     for s in range(torsions.stiffness.shape[0]):
-        of = torsions.series[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
+        of = memory.series.torsions[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
         for c in range(9):
             grow_form(torsions.constant[s, c], torsions.form[9 * s + c], k, variables, of[c])
         cosine, sine = 0.0, 0.0
@@ -126,7 +126,7 @@ def add_torsions(k, memory):
     """Order k of their forces: -(stiffness (θ - natural) + damping θ') times C δS - S δC."""
     torsions, sums, nz = memory.polynomials.torsions, memory.series.sums, memory.solver.order.shape[0]
     for s in range(torsions.stiffness.shape[0]):
-        of = torsions.series[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
+        of = memory.series.torsions[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
         angle = of[ANGLE, k] - torsions.natural[s] if k == 0 else of[ANGLE, k]
         of[MOMENT, k] = torsions.stiffness[s] * angle + torsions.damping[s] * (k + 1) * of[ANGLE, k + 1]
         of[MOMENT_COS, k] = product(of[MOMENT], of[COS], k)

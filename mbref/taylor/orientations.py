@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -32,11 +33,16 @@ class Orientation:
     basis: np.ndarray | None = None
     frame: np.ndarray | None = None
 
+    @functools.cached_property
+    def _inverse(self) -> np.ndarray:
+        """The inverse of the basis (3, 3)."""
+        return np.asarray(np.linalg.inv(self.basis))
+
     def image(self, w: np.ndarray) -> Triple:
         """R w of a direction w (3,) that is fixed in the bodies."""
         if self.basis is None:
             return tuple(_of({ONE: w[c]}) for c in range(3))
-        parts = np.linalg.solve(self.basis.T, w)
+        parts = w @ self._inverse
         if self.frame is None:
             return tuple(_of({self.variables[3 * k + c]: parts[k] for k in range(3)}) for c in range(3))
         (x, y, z), (cosine, sine) = self.frame, self.variables

@@ -2,32 +2,50 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from mbref.equations.branches import SMOOTH, Passed, SingularPosition, singular_position
-from mbref.equations.model import displaced, displacement
+from mbref.equations.initial_state import Start
+from mbref.equations.model import Model, displaced, displacement
+from mbref.equations.reduction import Reduction
 from mbref.kernels.compilation import Entry
 from mbref.kernels.layout import OK
 from mbref.method import Method
-from mbref.scene import Scene
-from mbref.simulation.limits import Limits
+from mbref.simulation.limits import GENERIC
 from mbref.simulation.run import Run
 from mbref.simulation.singular_start import Leaving
 from mbref.simulation.stepping import DONE, PAUSED, UNDECIDED
+from mbref.taylor.layout import Polynomials
+from mbref.taylor.natural import NaturalCoordinates
 from mbref.taylor.passing import begin_here, cross, give_back, look_along, pass_on, take_over
 from mbref.taylor.series_run import SeriesRun
 from mbref.taylor.start import OFF
 
+TOLERANCE = 1e-13  # of the series
+SERIES = "taylor[order=16]"  # lower orders magnify rounding less
 BEHIND = 3e-3  # lengths or rad behind a crossing where another branch is entered
 CORRECTIONS = 6  # of the state there
 
 
 class PassingRun(SeriesRun):
-    """The series of passages, made for the first one; ``crossings`` are those of the last one."""
+    """The series of passages of a run, made for the first one; ``crossings`` are those of the last one."""
 
-    def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
-        super().__init__(scene, method, times, limits)
+    def __init__(self, run: Run):
+        self._run = run
+        limits = replace(run.limits, rtol=TOLERANCE, atol=TOLERANCE, code=GENERIC)
+        super().__init__(run.scene, Method.parse(SERIES), run.times, limits)
         self.taylor.progress.passing = True
+
+    def _posed(self) -> tuple[Model, Start, Reduction | None]:
+        """Those of the run, all but its memory."""
+        return self._run.model, self._run.start, self._run.reduction
+
+    def _equations(self) -> tuple[NaturalCoordinates, Polynomials]:
+        """Those of a run that is in series itself."""
+        run = self._run
+        return (run.natural, run.polynomials) if isinstance(run, SeriesRun) else super()._equations()
 
     def take_over(self, run: Run) -> None:
         """Go on from the state and time of a run of the same scene, as a passage begins."""

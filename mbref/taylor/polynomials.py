@@ -11,12 +11,12 @@ from mbref.kernels.scene_layout import FORCE, MOMENT, SPRING, TORSION_SPRING
 from mbref.taylor.expressions import ONE, Expression, cleaned
 from mbref.taylor.lanes import LANES, filled
 from mbref.taylor.layout import Given, Inertia, Polynomials, Poses, Products, Rows, Springs, Torsions
-from mbref.taylor.loads import SPRING_SERIES, TORSION_SERIES, VALUE
+from mbref.taylor.loads import VALUE
 from mbref.taylor.natural import NaturalCoordinates
 
 
-def polynomials_of(of: NaturalCoordinates, orders: int) -> Polynomials:
-    """The polynomials of a scene, for series of so many orders."""
+def polynomials_of(of: NaturalCoordinates) -> Polynomials:
+    """The polynomials of a scene."""
     multipliers = len(of.kept)
     lane = {v: i for i, v in enumerate(of.kept)}
     lane |= {v: multipliers + len(of.rows) + g for g, v in enumerate(of.given)}
@@ -28,8 +28,8 @@ def polynomials_of(of: NaturalCoordinates, orders: int) -> Polynomials:
         inertia=_inertia(of, forms, lanes),
         poses=_poses(of, forms),
         given=_given(of),
-        springs=_springs(of, forms, orders),
-        torsions=_torsions(of, forms, orders),
+        springs=_springs(of, forms),
+        torsions=_torsions(of, forms),
     )
 
 
@@ -164,7 +164,7 @@ def _given(of: NaturalCoordinates) -> Given:
     return Given(*_columns(rows, 2))
 
 
-def _springs(of: NaturalCoordinates, forms: Forms, orders: int) -> Springs:
+def _springs(of: NaturalCoordinates, forms: Forms) -> Springs:
     loads, rows = of.model.data.loads, []
     for k in np.flatnonzero(loads.kind == SPRING):
         one, other = (
@@ -180,11 +180,10 @@ def _springs(of: NaturalCoordinates, forms: Forms, orders: int) -> Springs:
                 loads.natural[k] / of.length,
             )
         )
-    constant, form, *numbers = _stacked(rows, 3, forms.d)
-    return Springs(constant, form, *numbers, np.zeros((SPRING_SERIES * len(rows), orders)))
+    return Springs(*_stacked(rows, 3, forms.d))
 
 
-def _torsions(of: NaturalCoordinates, forms: Forms, orders: int) -> Torsions:
+def _torsions(of: NaturalCoordinates, forms: Forms) -> Torsions:
     loads, rows = of.model.data.loads, []
     for k in np.flatnonzero(loads.kind == TORSION_SPRING):
         first, second = int(loads.first[k]), int(loads.second[k])
@@ -194,8 +193,7 @@ def _torsions(of: NaturalCoordinates, forms: Forms, orders: int) -> Torsions:
         stiffness, damping = (c[k] / of.length**2 for c in (loads.stiffness, loads.damping))
         rows.append((constant, form, stiffness, damping, loads.natural[k], loads.angle[k]))
     constant, form, stiffness, damping, natural, slot = _stacked([*rows], 9, forms.d, 4)
-    series = np.zeros((TORSION_SERIES * len(rows), orders))
-    return Torsions(constant, form, stiffness, damping, natural, slot.astype(np.int64), series)
+    return Torsions(constant, form, stiffness, damping, natural, slot.astype(np.int64))
 
 
 def _stacked(rows: Sequence[tuple], width: int, d: int, numbers: int = 3) -> list[np.ndarray]:

@@ -8,22 +8,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
 from mbref.kernels.layout import NOT_CONVERGED, OK
 from mbref.method import Method
 from mbref.scene import Scene
-from mbref.simulation.limits import GENERIC, Limits
+from mbref.simulation.limits import Limits
 from mbref.simulation.run import Run
 from mbref.simulation.singular_start import fits_no_branch, leaving
 from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, UNDECIDED
 from mbref.taylor.passing_run import PassingRun
 from mbref.taylor.series_run import SeriesRun
-
-TOLERANCE = 1e-13  # of the series that pass singular positions
-SERIES = "taylor[order=16]"  # of them: lower orders magnify rounding less
 
 
 class CrossingRun(Run):
@@ -116,7 +112,6 @@ class Passage:
     def _series(self) -> PassingRun:
         if self._made is None:
             began, run = time.process_time(), self._run
-            limits = replace(run.limits, rtol=TOLERANCE, atol=TOLERANCE, code=GENERIC)
-            self._made = PassingRun(run.scene, Method.parse(SERIES), run.times, limits)
+            self._made = PassingRun(run)
             run.making += time.process_time() - began
         return self._made

@@ -18,6 +18,7 @@ from mbref.simulation.run import Run
 from mbref.specialised import Untraceable
 from mbref.taylor.lanes import filled
 from mbref.taylor.layout import (
+    Polynomials,
     Progress,
     Rows,
     SceneCode,
@@ -35,7 +36,7 @@ from mbref.taylor.start import OFF
 from mbref.taylor.stepping import advance_series, begin, enter, expand_from, step
 
 SHARE = 0.05  # of rtol + atol: the tolerance of a step
-CALLED = SeriesKernels(begin=begin, expand=expand_from, step=step)
+CALLED = (begin, expand_from, step)  # the SeriesKernels
 KERNELS_OF_SERIES = (
     *CALLED, enter, advance_series, take_over, begin_here, cross, pass_on, give_back, look_along,
 )  # fmt: skip
@@ -67,9 +68,7 @@ class SeriesRun(Run):
         tolerance = SHARE * (control.rtol + control.atol)
         code = SPECIALISED if limits.code == SPECIALISED else GENERIC
         order = order_of(tolerance, method.options_of(method.integrator)["order"], code)
-        moving = np.zeros(self.model.n, dtype=bool)
-        moving[self.part.active.velocities] = True
-        self.natural = NaturalCoordinates(self.model, self.start, moving)
+        self.natural, self.polynomials = self._equations()
         self.taylor = self._taylor_memory(order)
         progress = self.taylor.progress
         progress.order, progress.tolerance = order, tolerance
@@ -86,15 +85,21 @@ class SeriesRun(Run):
         if settings.nearly_dependent:
             settings.rank_tolerance = (least * max(rounding, ROUNDING)) ** 0.5
 
+    def _equations(self) -> tuple[NaturalCoordinates, Polynomials]:
+        """The scene in natural coordinates, and its equations in them."""
+        moving = np.zeros(self.model.n, dtype=bool)
+        moving[self.part.active.velocities] = True
+        natural = NaturalCoordinates(self.model, self.start, moving)
+        return natural, polynomials_of(natural)
+
     def _taylor_memory(self, order: int) -> TaylorMemory:
-        natural = self.natural
+        natural, polynomials = self.natural, self.polynomials
         orders, nz, ng, nr = order + 1, len(natural.kept), len(natural.given), len(natural.rows)
-        polynomials = polynomials_of(natural, orders)
         sizes = {
             "orders": orders, "nz": nz, "ng": ng, "nr": nr, "nb": self.model.nb,
             "lanes": filled(max(1, nz + nr + ng)), "slots": polynomials.products.left.size,
             "twofold": polynomials.rows.row.size, "wide": filled(nz),
-            "torsions": polynomials.torsions.slot.size,
+            "springs": polynomials.springs.natural.size, "torsions": polynomials.torsions.slot.size,
         }  # fmt: skip
         series = allocate(Series, sizes)
         grown = np.arange(1.0, orders + 1) * np.arange(2.0, orders + 2)

@@ -109,10 +109,10 @@ def remember_series(memory):
     """Keep the series of the step's beginning, and the pivots there."""
     remember_pivots(memory)
     keep_terms(memory.series)
-    series, torsions = memory.series, memory.polynomials.torsions
+    series = memory.series
     for s in range(series.past_angles.shape[0]):
         for k in range(memory.progress.order + 1):
-            series.past_angles[s, k] = torsions.series[TORSION_SERIES * s + ANGLE, k]
+            series.past_angles[s, k] = series.torsions[TORSION_SERIES * s + ANGLE, k]
 
 
 @kernel
