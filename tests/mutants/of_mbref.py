@@ -179,7 +179,7 @@ DEFECTS = (
     ),
     Defect(
         TS,
-        "if beside and memory.progress.passing:",
+        "if memory.progress.passing:",
         "if False:",
         "tests/mbref/test_singular_crossing.py::test_accelerations_and_reactions_beside_a_crossing",
     ),
