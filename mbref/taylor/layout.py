@@ -168,7 +168,7 @@ class Progress(NamedTuple):
     choice: int = 0  # of the partition, counted
     past_choice: int = 0  # where the step began
     past_pivot: float = 1.0  # the least of G where the step began
-    approaching: int = 1  # whether it is less than where the step before began
+    approaching: int = 1  # whether it is less than where the step before began, which did not cross
     largest_pivot: float = 0.1  # that the least one has been, of rows of length one about
     passing: int = 0  # whether singular positions are passed, or run up to
     clearance: float = 0.0  # from singular positions, over that at which a passage ends

@@ -51,10 +51,10 @@ FALLEN = 0.5  # of the pivot where a passage began: a larger one has not come ne
 
 @kernel
 def remember_pivots(memory):
-    """Keep the pivots where a step begins, and whether they fall."""
-    before = memory.progress.past_pivot
+    """Keep the pivots where a step begins, and whether they fall towards a singular position."""
+    progress, before = memory.progress, memory.progress.past_pivot
     remember_pivots_here(memory)
-    memory.progress.approaching = memory.progress.past_pivot <= before
+    progress.approaching = progress.past_pivot <= before and not progress.crossed
 
 
 @kernel
