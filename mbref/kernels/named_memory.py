@@ -155,15 +155,18 @@ def stacked(schema: type, rows: Sequence[Any], sizes: Mapping[str, int] | None =
 
 
 class Packed:
-    """A schema or a record ready for kernels, which take ``argument``.  Keep it while they run."""
+    """A schema or a record ready for kernels, which take ``argument``.  Keep it while they run.
 
-    def __init__(self, values: Any):
+    ``part`` is a schema in it that is packed already, which saves time.
+    """
+
+    def __init__(self, values: Any, part: Packed | None = None):
         self.values = values
         if isinstance(values, Numbers):
             self.address = _address(values)
         else:
-            words, shapes = _words(values)
-            check_sizes(tuple(shapes))
+            words, self.shapes = _words(values, part)
+            check_sizes(tuple(self.shapes))
             self.table = np.array(words, dtype=np.int64)
             self.address = self.table.ctypes.data
             self._numba_type_ = _kind(type(values))  # of this argument, read by numba's dispatcher
@@ -176,18 +179,21 @@ def _kind(schema: type) -> Named:
     return Named(schema)
 
 
-def packed(values: Any) -> Packed:
+def packed(values: Any, part: Packed | None = None) -> Packed:
     """A schema or record for kernels; TypeError names the field that does not fit its declaration."""
-    return Packed(values)
+    return Packed(values, part)
 
 
-def _words(values: Any) -> tuple[list[int], list[Shapes]]:
+def _words(values: Any, part: Packed | None = None) -> tuple[list[int], list[Shapes]]:
     """The table of a schema, WORDS a field: address, rows and columns; and the shapes of its arrays."""
-    words, shapes = [], []
+    if part is not None and values is part.values:
+        return part.table.tolist(), part.shapes
+    words: list[int] = []
+    shapes: list[Shapes] = []
     for field, value in zip(fields_of(type(values)).values(), values, strict=True):
         if field.schema:
             _check_schema(field, value)
-            more, others = _words(value)
+            more, others = _words(value, part)
             words += more
             shapes += others
         elif field.shape:

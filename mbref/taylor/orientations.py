@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mbref import rotations
 from mbref.equations.model import Model
-from mbref.taylor.expressions import ONE, ROUNDING, Expression, Polynomial, combination, product_sum
+from mbref.taylor.expressions import ONE, ROUNDING, Expression, Polynomial, cleaned, product_sum
 from mbref.taylor.images import Images, image_forms
 
 PARALLEL = 1e-9  # sine of an angle between the images of one axis
@@ -41,16 +42,18 @@ class Orientation:
     def image(self, w: np.ndarray) -> Triple:
         """R w of a direction w (3,) that is fixed in the bodies."""
         if self.basis is None:
-            return tuple(_of({ONE: w[c]}) for c in range(3))
-        parts = w @ self._inverse
+            return tuple({ONE: c} if c else {} for c in w.tolist())
+        a, b, c = (w @ self._inverse).tolist()
         if self.frame is None:
-            return tuple(_of({self.variables[3 * k + c]: parts[k] for k in range(3)}) for c in range(3))
-        (x, y, z), (cosine, sine) = self.frame, self.variables
-        columns = (parts[2] * z, parts[0] * x + parts[1] * y, parts[0] * y - parts[1] * x)
-        return tuple(
-            _of(dict(zip((ONE, cosine, sine), entries, strict=True)))
-            for entries in zip(*columns, strict=True)
-        )
+            x, y, z = self.variables[:3], self.variables[3:6], self.variables[6:]
+            images = ({i: a, j: b, k: c} for i, j, k in zip(x, y, z, strict=True))
+        else:
+            cosine, sine = self.variables
+            images = (
+                {ONE: c * z, cosine: a * x + b * y, sine: a * y - b * x}
+                for x, y, z in zip(*self.frame.tolist(), strict=True)
+            )
+        return tuple(map(cleaned, images))
 
     def rows(self) -> Iterator[Polynomial]:
         """R is a rotation."""
@@ -63,10 +66,6 @@ class Orientation:
                 square = {ONE: -float(self.basis[i] @ self.basis[j])}
                 pairs = [*zip(images[i], images[j], strict=True), (square, {ONE: 1.0})]
                 yield product_sum(pairs, 0.5 if i == j else 1.0)
-
-
-def _of(coefficients: dict[int, float]) -> Expression:
-    return combination((1.0, coefficients))
 
 
 FIXED = Orientation()
@@ -126,9 +125,8 @@ class Orientations:
         while grown:
             grown = False
             for (one, a), (other, b) in itertools.chain(shared, (pair[::-1] for pair in shared)):
-                if any(np.linalg.norm(np.cross(a, axis)) < PARALLEL for axis in known.get(one, ())) or (
-                    len(known.get(one, ())) > 1
-                ):
+                axes = known.get(one, ())
+                if len(axes) > 1 or any(map(functools.partial(_are_parallel, a), axes)):
                     grown |= _keep(known, other, b)
         return known
 
@@ -154,7 +152,7 @@ class Orientations:
         arm = next(d for d in across if np.linalg.norm(d) > APART)
         arm = arm / np.linalg.norm(arm)
         return Orientation(
-            self._variables(group, frame[:2], [arm]), np.array([arm, np.cross(axis, arm), axis]), frame
+            self._variables(group, frame[:2], [arm]), np.array([arm, rotations.cross(axis, arm), axis]), frame
         )
 
     def _frame(self, axis: np.ndarray) -> np.ndarray:
@@ -164,7 +162,7 @@ class Orientations:
         first = next((x for x in along if abs(x @ axis) < PARALLEL), np.eye(3)[np.argmin(np.abs(axis))])
         first = first - axis * (axis @ first)
         first = first / np.linalg.norm(first)
-        return np.array([first, np.cross(axis, first), axis])
+        return np.array([first, rotations.cross(axis, first), axis])
 
     def _free(self, group: int) -> Orientation:
         basis = _basis(self._directions(group))
@@ -198,10 +196,14 @@ class Orientations:
             yield from self._axes[b].T
 
 
+def _are_parallel(one: np.ndarray, other: np.ndarray) -> bool:
+    return bool(np.linalg.norm(rotations.cross(one, other)) < PARALLEL)
+
+
 def _keep(known: dict[int, list[np.ndarray]], group: int, axis: np.ndarray) -> bool:
     """Whether an axis is new to an orientation, which then has it."""
     axes = known.setdefault(group, [])
-    if len(axes) > 1 or any(np.linalg.norm(np.cross(axis, other)) < PARALLEL for other in axes):
+    if len(axes) > 1 or any(map(functools.partial(_are_parallel, axis), axes)):
         return False
     axes.append(axis)
     return True
@@ -211,9 +213,9 @@ def _basis(directions: Iterable[np.ndarray]) -> np.ndarray:
     """The first two directions that are well apart and the one across both, unit vectors, in rows."""
     chosen: list[np.ndarray] = []
     for unit in directions:
-        if not chosen or np.linalg.norm(np.cross(chosen[0], unit)) > APART:
+        if not chosen or np.linalg.norm(rotations.cross(chosen[0], unit)) > APART:
             chosen.append(unit)
         if len(chosen) == 2:
             break
-    across = np.cross(*chosen)
+    across = rotations.cross(*chosen)
     return np.array([*chosen, across / np.linalg.norm(across)])

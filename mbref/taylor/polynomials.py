@@ -7,12 +7,14 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from mbref import rotations
 from mbref.kernels.scene_layout import FORCE, MOMENT, SPRING, TORSION_SPRING
 from mbref.taylor.expressions import ONE, Expression, cleaned
 from mbref.taylor.lanes import LANES, filled
 from mbref.taylor.layout import Given, Inertia, Polynomials, Poses, Products, Rows, Springs, Torsions
 from mbref.taylor.loads import VALUE
 from mbref.taylor.natural import NaturalCoordinates
+from mbref.taylor.orientations import Triple
 
 
 def polynomials_of(of: NaturalCoordinates) -> Polynomials:
@@ -39,6 +41,7 @@ class Forms:
     def __init__(self, of: NaturalCoordinates):
         self.of, self.d = of, len(of.kept)
         self._place = {v: i for i, v in enumerate(of.kept)}
+        self._axes: dict[int, Sequence[Triple]] = {}
 
     def __call__(self, expressions: Sequence[Expression]) -> tuple[np.ndarray, np.ndarray]:
         """Constants (k,) and coefficients (k, d)."""
@@ -55,13 +58,19 @@ class Forms:
         """The same of variables, whether kept or eliminated."""
         return self([{v: 1.0} for v in variables])
 
+    def axes(self, body: int) -> Sequence[Triple]:
+        """The directions of a body's three principal axes."""
+        if body not in self._axes:
+            self._axes[body] = [self.of.direction(body, axis) for axis in np.eye(3)]
+        return self._axes[body]
+
     def mass(self) -> np.ndarray:
         """M (d, d) with ½ ż M ż the kinetic energy in the unit of length squared."""
         of, bodies = self.of, self.of.model.data.bodies
         total = np.zeros((self.d, self.d))
         for b in range(of.nb):
             _, centre = self.variables(of.centres[b])
-            _, axes = self([e for axis in np.eye(3) for e in of.direction(b, axis)])
+            _, axes = self([component for image in self.axes(b) for component in image])
             principal = bodies.inertia[b] / of.length**2
             total += bodies.mass[b] * centre.T @ centre
             total += axes.T @ (np.repeat(principal.sum() / 2 - principal, 3)[:, None] * axes)
@@ -125,7 +134,7 @@ def _inertia(of: NaturalCoordinates, forms: Forms, lanes: int) -> Inertia:
         _, point = forms(of.point(int(loads.first[k]), loads.point_first[k]))
         force += (loads.force[k] / of.length) @ point
     for k in np.flatnonzero(loads.kind == MOMENT):
-        constant, matrix = _moment(of, forms, int(loads.first[k]), loads.force[k] / of.length**2)
+        constant, matrix = _moment(forms, int(loads.first[k]), loads.force[k] / of.length**2)
         force, linear = force + constant, linear + matrix
     terms: list[list[tuple]] = [[(j, row[j]) for j in np.flatnonzero(row)] for row in linear]
     slots, start = _slots([*terms, *[[]] * (lanes - forms.d)], (0, 0.0))
@@ -135,22 +144,20 @@ def _inertia(of: NaturalCoordinates, forms: Forms, lanes: int) -> Inertia:
     return Inertia(mass, force, *_columns(slots, 1), start)
 
 
-def _moment(
-    of: NaturalCoordinates, forms: Forms, body: int, moment: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _moment(forms: Forms, body: int, moment: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Constant (d,) and linear (d, d) force of a moment: ½ Σ (moment × R e) · δ(R e) over three axes."""
     constant, matrix = np.zeros(forms.d), np.zeros((forms.d, forms.d))
-    for axis in np.eye(3):
-        at_rest, moving = forms(of.direction(body, axis))
-        constant += 0.5 * np.cross(moment, at_rest) @ moving
-        matrix += 0.5 * moving.T @ np.cross(moment, moving.T).T
+    for image in forms.axes(body):
+        at_rest, moving = forms(image)
+        constant += 0.5 * rotations.cross(moment, at_rest) @ moving
+        matrix += 0.5 * moving.T @ rotations.cross(moment, moving.T).T
     return constant, matrix
 
 
 def _poses(of: NaturalCoordinates, forms: Forms) -> Poses:
     places = []
     for b in range(of.nb):
-        columns = [of.direction(b, axis) for axis in np.eye(3)]
+        columns = forms.axes(b)
         centre = [{k: of.length * v for k, v in of.eliminate({c: 1.0}).items()} for c in of.centres[b]]
         places += [*centre, *(columns[j][i] for i in range(3) for j in range(3))]
     constant, matrix = forms([cleaned(expression) for expression in places])

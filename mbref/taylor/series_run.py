@@ -74,7 +74,7 @@ class SeriesRun(Run):
         progress.order, progress.tolerance = order, tolerance
         progress.farthest = OFF * max(1.0, self.model.length)
         progress.freedoms = self.part.active.velocities.size - self.ranks.rank
-        self._packed_taylor = packed(self.taylor)
+        self._packed_taylor = packed(self.taylor, self.packed)
         self.wants_code = limits.code == AUTO
         if limits.code == SPECIALISED:
             self._specialise()
@@ -136,7 +136,7 @@ class SeriesRun(Run):
         with contextlib.suppress(Untraceable):  # then samples are taken by the general kernels
             super()._specialise()
             self.taylor = self.taylor._replace(run=self.memory)
-            self._packed_taylor = packed(self.taylor)
+            self._packed_taylor = packed(self.taylor, self.packed)
 
     def expand(self, until: float) -> int:
         """Expand at the present time and state, for steps until a time (s): OK or why that cannot be."""
