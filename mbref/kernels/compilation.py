@@ -24,7 +24,7 @@ import numba
 from numba import cfunc, f8, i8, njit, types, u4
 
 import mbref
-from mbref.kernels.disk_cache import kept_in
+from mbref.kernels.disk_cache import folder_of, kept_in
 
 # No fastmath: the same bits with and without the JIT.  Without numba's runtime (``_nrt``, undocumented there)
 # no kernel can allocate, and none counts references to its arrays, which takes time.
@@ -122,8 +122,9 @@ class Exchangeable:
     @property
     def is_kept(self) -> bool:
         """Whether the cache of this machine has the compiled kernel, or none is needed."""
-        module = self.function.__module__.rpartition(".")[2]
-        return PLAIN or any(CACHE.rglob(f"{module}.{self.function.__name__}-*.nbc"))
+        source = Path(self.function.__code__.co_filename)
+        kept = folder_of(CACHE, source).glob(f"{source.stem}.{self.function.__name__}-*.nbc")
+        return PLAIN or any(kept)
 
     def _say_compiling(self) -> None:
         if not self.is_kept:

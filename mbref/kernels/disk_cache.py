@@ -21,6 +21,11 @@ from numba.core.runtime import rtsys
 from mbref.kernels import checked_file
 
 
+def folder_of(cache: Path, source: Path) -> Path:
+    """Where the kernels of a source file are kept: in a folder named after that of the file."""
+    return cache / source.parent.name
+
+
 @contextlib.contextmanager
 def kept_in(folder: Path) -> Iterator[None]:
     """Functions decorated meanwhile are cached below this folder, which is touched when one is compiled."""
@@ -72,7 +77,7 @@ class _Place:
         return cls(source)
 
     def get_cache_path(self) -> str:
-        return str(self.folder / Path(self._source).parent.name)
+        return str(folder_of(self.folder, Path(self._source)))
 
     def get_source_stamp(self) -> str:
         return _digest(self._source)
