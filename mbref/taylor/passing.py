@@ -65,7 +65,7 @@ def copy_counts(source, target):
 def cross(memory):
     """Begin a series at the present state, and step over the first singular position (``pass_on``)."""
     progress = memory.progress
-    progress.past_pivot, progress.clearance, progress.is_clear, progress.crossed = 1.0, 0.0, 0, 0
+    progress.past_pivot, progress.clearance, progress.is_clear = 1.0, 0.0, 0
     status = memory.kernels.begin(memory)
     progress.entered = least_pivot(memory)
     return step_on(memory) if status == OK else status

@@ -62,20 +62,20 @@ class PassingRun(SeriesRun):
 
     def _go_on(self, status: int) -> int:
         """Pass further singular positions where the passage is PAUSED and not clear of them."""
-        while status == PAUSED and not self.taylor.progress["is_clear"]:
+        while status == PAUSED and not self.taylor.progress.is_clear:
             status = self._recorded(pass_on)
         return status
 
     def _recorded(self, passing: Entry) -> int:
         """The status of steps that may pass a singular position, which is recorded."""
         counts = self.memory.equations.system.counts
-        passed = int(counts["crossings"])
+        passed = int(counts.crossings)
         status = int(passing(self._packed_taylor.argument))
-        if status not in (PAUSED, DONE) or counts["crossings"] == passed:
+        if status not in (PAUSED, DONE) or counts.crossings == passed:
             return status
         taken, found = dict(self.limits.branches).get(passed + 1, SMOOTH), self.taylor.crossing
         q, v = found.coordinates.copy(), found.velocities.copy()
-        crossing = Passed(float(found.instant["time"]), q, v, taken)
+        crossing = Passed(float(found.instant.time), q, v, taken)
         self.crossings.append(crossing)
         return status if taken == SMOOTH else self._take_branch(singular_position(self.model, crossing))
 
@@ -155,7 +155,7 @@ class PassingRun(SeriesRun):
             q = displaced(here[0], displacement(there[0], start.coordinates))
             v = here[1] + velocities - there[1]
         progress = self.taylor.progress
-        progress["past_pivot"], progress["clearance"], progress["is_clear"] = 0.0, 0.0, 0
+        progress["past_pivot"], progress["clearance"], progress.is_clear = 0.0, 0.0, 0
         begin_here(self._packed_taylor.argument)
         return PAUSED
 

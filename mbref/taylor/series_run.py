@@ -140,7 +140,7 @@ class SeriesRun(Run):
 
     def expand(self, until: float) -> int:
         """Expand at the present time and state, for steps until a time (s): OK or why that cannot be."""
-        self.taylor.progress["end"] = until
+        self.taylor.progress.end = until
         return int(enter(self._packed_taylor.argument))
 
     def step_on(self) -> int:

@@ -237,7 +237,7 @@ def begin(memory):
         memory.angles[s] = memory.run.equations.angles[slot[s]]
     read_variables(t, memory)
     expand_drivers(t, memory)
-    memory.progress.rank = choose(memory)
+    memory.progress.rank, memory.progress.crossed = choose(memory), 0
     memory.solver.first[:] = 1e300
     status = memory.kernels.expand(t, memory)
     return status if t > 0.0 else judged_start(status, memory)
