@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbref.equations.diagnosis import rank_of, scaled_jacobian
-from mbref.equations.initial_state import consistent_start, solve_positions
+from mbref.equations.diagnosis import rank_at_start, rank_of, scaled_jacobian
+from mbref.equations.initial_state import Start, consistent_start, solve_positions
 from mbref.equations.model import Model, displaced
 from mbref.scene import Scene
 
@@ -15,16 +15,20 @@ RANK_TOLERANCE = 1e-10  # relative, of least-squares solutions: redundant rows a
 
 def undriven_freedoms(scene: Scene) -> int:
     """Degrees of freedom that no driver prescribes; counted beside the start where that is singular."""
-    freedoms = scene.counts().degrees_of_freedom
-    if freedoms == 0 or not scene.driver:
-        return freedoms
     model = Model(scene)
-    return model.n - rank_of(scaled_jacobian(model, *perturbed_state(model)))
+    return freedoms_left(model, consistent_start(model))
 
 
-def perturbed_state(model: Model) -> tuple[float, np.ndarray]:
+def freedoms_left(model: Model, start: Start) -> int:
+    """``undriven_freedoms`` of a scene as a model with its start."""
+    freedoms = model.n - rank_at_start(model, start)
+    if freedoms == 0 or not model.scene.driver:
+        return freedoms
+    return model.n - rank_of(scaled_jacobian(model, *perturbed_state(model, start)))
+
+
+def perturbed_state(model: Model, start: Start) -> tuple[float, np.ndarray]:
     """Time and coordinates (7 nb,) when the fastest body has turned by PERTURBATION."""
-    start = consistent_start(model)
     q, v = start.q, start.v
     terms = model.terms(0.0, q, v)
     acceleration = _least(terms.jacobian, terms.gamma)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mbref.equations.initial_state import LARGE, consistent_start
+from mbref.equations.initial_state import LARGE, Start, consistent_start
 from mbref.equations.model import Model
 from mbref.equations.units import row_lengths
 from mbref.linear_algebra.redundancy import Redundancy
@@ -44,9 +44,14 @@ class Diagnosis:
 def counts(scene: Scene) -> Counts:
     """Counts of a scene at its corrected initial positions."""
     model = Model(scene)
+    return _counts(model, rank_at_start(model, consistent_start(model)))
+
+
+def rank_at_start(model: Model, start: Start) -> int:
+    """The rank of Φ_q at the corrected initial positions."""
     if model.m > LARGE:
-        return _counts(model, _redundancy(model).rank)
-    return _counts(model, rank_of(_jacobian_at_start(model)))
+        return _redundancy(model, start).rank
+    return rank_of(scaled_jacobian(model, 0.0, start.q))
 
 
 def diagnose(scene: Scene) -> Diagnosis:
@@ -56,12 +61,13 @@ def diagnose(scene: Scene) -> Diagnosis:
     vector of Φ_q (Wojtyra, J. Theor. Appl. Mech. 43, 2005).
     """
     model = Model(scene)
+    start = consistent_start(model)
     if model.m > LARGE:
-        found = _redundancy(model)
+        found = _redundancy(model, start)
         rank, shared = found.rank, found.shares > UNIQUE_SHARE
         smallest, largest = found.singular_values()
     else:
-        jacobian = _jacobian_at_start(model)
+        jacobian = scaled_jacobian(model, 0.0, start.q)
         left, values, _ = np.linalg.svd(jacobian)
         rank = rank_of(jacobian)
         shared = np.linalg.norm(left[:, rank:], axis=1) > UNIQUE_TOLERANCE
@@ -78,13 +84,9 @@ def _counts(model: Model, rank: int) -> Counts:
     return Counts(model.n, model.m, by_joint, rank, model.m - rank, model.n - rank)
 
 
-def _redundancy(model: Model) -> Redundancy:
-    terms = model.blocks(0.0, consistent_start(model).q, np.zeros(model.n))
+def _redundancy(model: Model, start: Start) -> Redundancy:
+    terms = model.blocks(0.0, start.q, np.zeros(model.n))
     return Redundancy(model.sparse(terms.jacobian))
-
-
-def _jacobian_at_start(model: Model) -> np.ndarray:
-    return scaled_jacobian(model, 0.0, consistent_start(model).q)
 
 
 def scaled_jacobian(model: Model, t: float, q: np.ndarray) -> np.ndarray:

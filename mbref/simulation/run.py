@@ -11,7 +11,7 @@ import numpy as np
 
 from mbref.equations.active_coordinates import without_rounding
 from mbref.equations.branches import Passed
-from mbref.equations.degrees_of_freedom import undriven_freedoms
+from mbref.equations.degrees_of_freedom import freedoms_left
 from mbref.equations.evaluation import evaluate_along
 from mbref.equations.initial_state import Start, consistent_start
 from mbref.equations.model import Model
@@ -82,18 +82,18 @@ class Run:
         None stands for all equations.
         """
         model = Model(self.scene)
-        self._check_freedoms(model)
         start = consistent_start(model)
+        self._check_freedoms(model, start)
         if not (self.method.formulation.linear_algebra.sparse or self.method.stabilisation.projects):
             return model, start, None
         start = without_rounding(model, start)
         reduction = reduction_of(model, start)
         return model, at_rest(start, reduction.held), reduction
 
-    def _check_freedoms(self, model: Model) -> None:
+    def _check_freedoms(self, model: Model, start: Start) -> None:
         """SceneError where bodies without mass, or a method that does not integrate, leave a freedom."""
         integrates = self.method.integrator.integrates
-        freedoms = undriven_freedoms(self.scene) if model.kinematic or not integrates else 0
+        freedoms = freedoms_left(model, start) if model.kinematic or not integrates else 0
         if freedoms > 0 and not integrates:
             fault = (
                 f"driver: {freedoms} degrees of freedom are left; a kinematic analysis prescribes them all"
