@@ -8,6 +8,7 @@ from crosscheck.judge.truth import truth_for
 from mbref.equations.degrees_of_freedom import undriven_freedoms
 from mbref.equations.initial_state import corrected_positions, displaced
 from mbref.equations.model import Model
+from mbref.integrators.predictor import LARGEST_TURN
 from mbref.method import MethodError
 from mbref.scene import SceneError
 from mbref.scenes import SCENES
@@ -40,6 +41,16 @@ def test_kinematic_analysis_by_code_of_its_own_and_any_samples(name, samples):
     assert trajectory.outcome.name == "COMPLETED", trajectory.message
     assert trajectory.cost.steps < max(100, 2 * samples), f"{trajectory.cost.steps} steps"
     assert measure(scene, trajectory, truth_for(scene))["error"] < 1e-12
+
+
+def test_a_body_turns_by_little_in_a_step_of_a_kinematic_analysis():
+    """Inside longer steps pivots would be looked at; a limit of the user's goes before the method's."""
+    scene = SCENES["spatial_slider_crank_driven"]()
+    steps = [
+        simulate(scene, "kinematic", [0.2], Limits(largest_turn=turn)).cost.steps
+        for turn in (0.0, LARGEST_TURN, 2.5)
+    ]
+    assert steps[0] == steps[1] > steps[2]
 
 
 def test_kinematic_analysis_of_a_modelled_ground_without_masses():
