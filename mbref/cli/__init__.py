@@ -1,5 +1,8 @@
 """The command line of mbref."""
 
-from mbref.cli.commands import main
+from mbref.imports import without_collection
+
+with without_collection():
+    from mbref.cli.commands import main
 
 __all__ = ["main"]

@@ -80,10 +80,33 @@ def allocating(function: Callable) -> Callable:
 
 
 def _compiled(function: Callable, **options: bool) -> Callable:
-    """A closure is not kept on disk, where numba would not find it again."""
-    options.setdefault("cache", function.__closure__ is None)
-    with kept_in(CACHE):
-        return njit(**{**OPTIONS, **options})(function)
+    return function if PLAIN else Helper(function, {**OPTIONS, **options})
+
+
+class Helper:
+    """A kernel that other kernels call: numba's dispatcher, made when a kernel is compiled with it.
+
+    Of several hundred helpers a run from the cache asks for few; dispatchers of all take 0.1 s.
+    """
+
+    def __init__(self, function: Callable, options: dict[str, bool]):
+        self.function, self._options = function, options
+        functools.update_wrapper(self, function)
+
+    def __call__(self, *arguments: object) -> object:
+        return self._dispatcher(*arguments)
+
+    @property
+    def _numba_type_(self) -> types.Type:
+        """The type by which numba compiles calls of this kernel."""
+        return self._dispatcher._numba_type_
+
+    @functools.cached_property
+    def _dispatcher(self) -> Callable:
+        """A closure is not kept on disk, where numba would not find it again."""
+        kept = self._options["cache"] and self.function.__closure__ is None
+        with kept_in(CACHE):
+            return njit(**{**self._options, "cache": kept})(self.function)
 
 
 class Exchangeable:

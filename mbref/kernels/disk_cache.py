@@ -2,7 +2,8 @@
 
 numba trusts the bytes of its own files: machine code that is damaged ends the process with a signal.  While
 one of our functions is decorated, our cache takes the place of numba's, with a locator, which says where
-files lie, and a file, which stores and loads; other users of numba keep theirs.
+files lie, a file, which stores and loads, and a library, which holds the machine code that was loaded; other
+users of numba keep theirs.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from llvmlite import binding as llvm
 from numba.core import caching, ccallback, dispatcher
+from numba.core.codegen import JITCodeLibrary
 from numba.core.runtime import rtsys
 
 from mbref.kernels import checked_file
@@ -50,9 +53,8 @@ class _Cache(caching.FunctionCache):
         """The compiled function of this signature, or None.
 
         numba first imports all operations that it can compile, SciPy's linear algebra among them.  Loading
-        needs its runtime alone; a compilation imports them itself.
+        needs none of them; a compilation imports them itself.
         """
-        rtsys.initialize(target_context)
         return self._load_overload(sig, target_context)
 
 
@@ -60,8 +62,49 @@ class _Cache(caching.FunctionCache):
 def _cache_in(folder: Path) -> type[_Cache]:
     """The cache of functions below this folder."""
     place = type("Place", (_Place,), {"folder": folder})
-    rules = type("Rules", (caching.CompileResultCacheImpl,), {"_locator_classes": [place]})
+    rules = type("Rules", (_Rules,), {"_locator_classes": [place]})
     return type("Cache", (_Cache,), {"_impl_class": rules})
+
+
+class _Rules(caching.CompileResultCacheImpl):
+    """numba's rules of what is kept of a compiled function, and how the function is made of it again."""
+
+    def rebuild(self, target_context: Any, payload: Any) -> Any:
+        """The compiled function, whose library is of our class."""
+        codegen, code = target_context.codegen(), payload[0][2][0]
+        if b"NRT_" in code:
+            rtsys.initialize(target_context)
+        before, codegen._library_class = codegen._library_class, _Loaded
+        try:
+            return super().rebuild(target_context, payload)
+        finally:
+            codegen._library_class = before
+
+
+class _Loaded(JITCodeLibrary):
+    """Machine code from the cache.  Its bitcode is parsed only when another kernel is linked with it: of the
+    time to load a kernel that takes half.
+    """
+
+    @classmethod
+    def _unserialize(cls, codegen: Any, state: Any) -> _Loaded:
+        name, _, (code, bitcode) = state
+        self = cls(codegen, name)
+        self._code, self._bitcode = code, bitcode
+        self.enable_object_caching()
+        self._set_compiled_object(code)
+        self._finalize_final_module()
+        return self
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """The address of a function; 0 where the code does not name it."""
+        named = name.encode() + b"\0" in self._code
+        return self._codegen._engine.get_function_address(name) if named else 0
+
+    def _get_module_for_linking(self) -> Any:
+        if self._shared_module is None:
+            self._shared_module = llvm.parse_bitcode(self._bitcode)
+        return self._shared_module
 
 
 class _Place:

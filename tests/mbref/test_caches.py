@@ -192,6 +192,17 @@ def test_compiled_code_is_found_again(tmp_path: Path):
     assert {file: file.stat().st_mtime_ns for file in kept(cache, "*.nbc")} == before != {}
 
 
+def test_a_new_kernel_is_compiled_with_a_kept_one(tmp_path: Path):
+    """Its bitcode is read at that moment: a kernel that is merely called needs machine code alone."""
+    cache = tmp_path / "cache"
+    ran(SMALL_KERNEL, tmp_path, cache)
+    (file,) = kept(cache, "*.shifted*.nbc")
+    file.unlink()
+    assert kept(cache, "*.twice*.nbc")
+    assert ran(SMALL_KERNEL, tmp_path, cache)[0] == "7.0\n"
+    assert file.exists()
+
+
 @pytest.mark.parametrize("program", ["mbref", "crosscheck"])
 def test_help_touches_no_cache(program, tmp_path: Path):
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
