@@ -12,6 +12,7 @@ from mbref.equations.model import Model, displaced, displacement
 from mbref.equations.reduction import Reduction
 from mbref.kernels.compilation import Entry
 from mbref.kernels.layout import OK
+from mbref.kernels.lent_memory import take_back
 from mbref.method import Method
 from mbref.simulation.limits import GENERIC
 from mbref.simulation.run import Run
@@ -52,7 +53,11 @@ class PassingRun(SeriesRun):
         self.crossings = []
         take_over(run.packed.argument, self._packed_taylor.argument)
 
-    def give_back(self, status: int, run: Run) -> int:
+    def give_back(self) -> None:
+        """Leave the memory to the next run; the model is the run's."""
+        take_back(self._lent)
+
+    def hand_over(self, status: int, run: Run) -> int:
         """Have the run go on where the passage ended with a status: PAUSED, DONE, or why that cannot be."""
         return int(give_back(status, run.packed.argument, self._packed_taylor.argument))
 

@@ -29,6 +29,11 @@ class CrossingRun(Run):
         super().__init__(scene, method, times, limits)
         self._passage = Passage(self)
 
+    def give_back(self) -> None:
+        """Leave the memory to the next run, that of the passages too."""
+        self._passage.give_back()
+        super().give_back()
+
     def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
         """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
         status = self._passage.leave_start()
@@ -58,6 +63,11 @@ class TaylorRun(SeriesRun):
     def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
         super().__init__(scene, method, times, limits)
         self._passage = Passage(self)
+
+    def give_back(self) -> None:
+        """Leave the memory to the next run, that of the passages too."""
+        self._passage.give_back()
+        super().give_back()
 
     def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
         """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
@@ -104,10 +114,15 @@ class Passage:
 
     def _given_back(self, status: int, series: PassingRun) -> int:
         """PAUSED or DONE where the run goes on behind a passage that ended with a status, else why not."""
-        status = series.give_back(status, self._run)
+        status = series.hand_over(status, self._run)
         if status in (PAUSED, DONE):
             self._run.crossings += series.crossings
         return status
+
+    def give_back(self) -> None:
+        """Leave the memory of the series, if any were made, to the next run."""
+        if self._made is not None:
+            self._made.give_back()
 
     def _series(self) -> PassingRun:
         if self._made is None:

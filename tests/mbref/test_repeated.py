@@ -17,11 +17,15 @@ from mbref.scene import Body, Force, Revolute, Scene, Spring, Translational
 from mbref.scenes import SCENES
 from mbref.simulation.run import Run
 from mbref.simulation.simulate import Limits, simulate
+from mbref.simulation.stepping import DONE
+from mbref.taylor.passing_run import PassingRun
+from mbref.taylor.run import CrossingRun
 from mbref.variation import Variation, variants
 
 TIMES = np.linspace(0.0, 0.02, 4)
 METHODS = ("alf-dual+projection", "mpi-svd+baumgarte", "lm2+projection", "lm1+partitioning", "taylor")
 CRANK, SPATIAL = SCENES["planar_slider_crank"](), SCENES["spatial_slider_crank"]()
+FIVE_BAR = SCENES["five_bar"]()
 X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 
@@ -65,7 +69,7 @@ def known(scene: Scene) -> int:
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("scene", [CRANK, SPATIAL, SCENES["five_bar"]()], ids=lambda scene: scene.name)
+@pytest.mark.parametrize("scene", [CRANK, SPATIAL, FIVE_BAR], ids=lambda scene: scene.name)
 def test_variants_in_a_row_and_alone_agree(scene, method):
     varied = [Variation("body[0].mass", 0.5, 2.0), Variation("gravity[1]", -10.0, 10.0)]
     scenes = list(variants(scene, varied, 4))
@@ -151,6 +155,26 @@ def test_memory_in_use_is_not_lent():
     one.give_back()
     third = Run(CRANK, method, TIMES, limits)
     assert third.memory is one.memory and third.memory is not other.memory
+
+
+def test_memory_of_passages_is_lent_again():
+    def passed() -> tuple[CrossingRun, PassingRun]:
+        run = CrossingRun(FIVE_BAR, Method.parse(METHODS[0]), np.array([0.1]), Limits())
+        assert run.advance(None)[0] == DONE and run.crossings
+        return run, run._passage._series()
+
+    one, first = passed()
+    one.give_back()
+    other, second = passed()
+    assert second is not first and second.memory is first.memory
+    assert other.memory is one.memory is not second.memory
+
+
+@pytest.mark.parametrize("method", [METHODS[0], "taylor"])
+def test_a_repeated_passage_has_the_same_bits(method):
+    runs = [simulate(FIVE_BAR, method, [0.05, 0.1]) for _ in range(3)]
+    assert runs[0].crossings
+    assert results(runs[0]) == results(runs[1]) == results(runs[2])
 
 
 def test_what_is_kept_is_bounded():
