@@ -7,6 +7,7 @@ from mbref.kernels.layout import NOT_CONVERGED, OK
 from mbref.linear_algebra.vectors import larger
 from mbref.taylor.lanes import LANES, gathered, load, store
 from mbref.taylor.passage import least_pivot
+from mbref.taylor.scene_code import close_by_code, violation_by_code
 from mbref.taylor.solver import factorise, solution
 
 SMALL = 1e-6  # a violation whose correction leaves its square
@@ -16,8 +17,21 @@ CORRECTIONS = 8
 @kernel
 def violation(memory):
     """Φ of every row at the first coefficients; the largest."""
+    solver, code, largest = memory.solver, memory.code, 0.0
+    if code.violation != 0:
+        violation_by_code(code.violation, memory.series.terms, solver.phi)
+    else:
+        violation_in_loops(memory)
+    for r in range(solver.order.shape[0], solver.order.shape[0] + solver.row.shape[0]):
+        largest = larger(largest, solver.phi[r])
+    return largest
+
+
+@inlined
+def violation_in_loops(memory):
+    """Φ of every row at the first coefficients."""
     rows, products, terms = memory.polynomials.rows, memory.polynomials.products, memory.series.terms
-    phi, nz, largest = memory.solver.phi, memory.solver.order.shape[0], 0.0
+    phi, nz = memory.solver.phi, memory.solver.order.shape[0]
     for block in range(products.start.shape[0] - 1):
         total = load(rows.constant, block * LANES)
         for c in range(products.start[block], products.start[block + 1], LANES):
@@ -26,9 +40,6 @@ def violation(memory):
         store(total, phi, block * LANES)
     for e in range(rows.linear_row.shape[0]):
         phi[nz + rows.linear_row[e]] += rows.linear_weight[e] * terms[0, rows.linear_lane[e]]
-    for r in range(nz, memory.solver.order.shape[0] + memory.solver.row.shape[0]):
-        largest = larger(largest, phi[r])
-    return largest
 
 
 @inlined
@@ -63,6 +74,27 @@ def subtract_violation(order, memory):
         store(load(terms, order * lanes + j) + change, terms, order * lanes + j)
 
 
+@inlined
+def close(memory):
+    """Take Φ away from the variables, by code of the scene's own where it has any."""
+    solver, code, terms = memory.solver, memory.code, memory.series.terms
+    if code.close != 0:
+        close_by_code(code.close, terms, solver.phi, solver.response, solver.change)
+    else:
+        subtract_violation(0, memory)
+
+
+@inlined
+def close_rate(memory):
+    """Take Φ' away from the rates, by code of the scene's own where it has any."""
+    solver, code, terms = memory.solver, memory.code, memory.series.terms
+    if code.close_rate != 0:
+        close_by_code(code.close_rate, terms, solver.phi, solver.response, solver.change)
+    else:
+        violation_rate(memory)
+        subtract_violation(1, memory)
+
+
 @kernel
 def changes_factor(left, memory):
     """Whether the last correction, which took a violation away, has changed the factor.
@@ -88,13 +120,12 @@ def correct(memory):
         status = factorise(memory)
         if status != OK:
             return status
-        subtract_violation(0, memory)
+        close(memory)
         if left <= SMALL:
             break
     if not left <= SMALL:
         return NOT_CONVERGED
     if changes_factor(left, memory):
         status = factorise(memory)
-    violation_rate(memory)
-    subtract_violation(1, memory)
+    close_rate(memory)
     return status

@@ -1,6 +1,6 @@
 """The memory of a Taylor method: a scene's polynomials, their series, and the matrix that solves each order.
 
-Sizes: nz variables (filled up: wide), nr rows, ng functions that drivers prescribe, nb bodies, orders of a
+Sizes: nz variables, nr rows, ng functions that drivers prescribe, nb bodies, orders of a
 series from 0 on.  A coefficient of the series is a row of ``lanes`` numbers: variables, multipliers,
 functions, filled up with zeros.  Variables and lengths are in units of the scene's length.
 """
@@ -54,7 +54,9 @@ class Products(NamedTuple):
 class Inertia(NamedTuple):
     """Mass matrix, constant force, and the force of constant moments, linear in the variables."""
 
-    mass: Annotated[Matrix, "nz", "wide"]
+    mass: Annotated[Matrix, "nz", "lanes"]
+    coupled: Annotated[Indices, "couplings"]  # variables with an inertia in common with one, itself included
+    first: Annotated[Indices, "nz + 1"]  # place in ``coupled`` where those of a variable begin
     force: Annotated[Vector, "lanes"]
     source: Annotated[Indices, "moments"]  # lanes, of which each block of lanes has its blocks
     weight: Annotated[Vector, "moments"]
@@ -144,10 +146,13 @@ class Solver(NamedTuple):
     past_gradient: Annotated[Matrix, "nr", "nz"]  # G where the step began
     product: Annotated[Matrix, "nr", "nr"]  # of gradients at both ends of a step
     place: Annotated[Indices, "twofold"]  # in the tableau, of the products of rows
-    linear: Annotated[Matrix, "nr + 1", "wide"]  # the part of the tableau that depends on no variable
-    tableau: Annotated[Matrix, "nr + 1", "wide"]  # of rows and variables; the last row takes functions
-    reduced: Annotated[Matrix, "nz", "wide"]  # mass matrix, in the rows of the independent variables
-    forces: Annotated[Matrix, "nz", "lanes"]  # that the motion leaves at dependent variables
+    linear: Annotated[Matrix, "nr + 1", "lanes"]  # the part of the tableau that depends on no variable
+    tableau: Annotated[Matrix, "nr + 1", "lanes"]  # [G 1] of the rows; the last one takes functions
+    particular: Annotated[Matrix, "nz", "lanes"]  # N, in the lanes of multipliers
+    null_space: Annotated[Matrix, "nz", "lanes"]  # Tᵀ, a row for each independent variable
+    momentum: Annotated[Matrix, "nz", "lanes"]  # Tᵀ M
+    reduced: Annotated[Matrix, "nz", "nz"]  # Tᵀ M T
+    forces: Annotated[Matrix, "nz", "lanes"]  # left at a variable by the motion due to one right-hand side
     response: Annotated[Matrix, "lanes", "lanes"]
     rhs: Annotated[Vector, "lanes"]
     phi: Annotated[Vector, "lanes"]  # in the lanes of the multipliers
@@ -167,6 +172,9 @@ class Progress(NamedTuple):
     end: float = 0.0  # time of the last step's end
     choice: int = 0  # of the partition, counted
     past_choice: int = 0  # where the step began
+    kept_pivot: float = (
+        0.0  # the least of G just before the last choice; minus infinity if a sign had changed
+    )
     past_pivot: float = 1.0  # the least of G where the step began
     approaching: int = 1  # whether it is less than where the step before began, which did not cross
     largest_pivot: float = 0.1  # that the least one has been, of rows of length one about
@@ -187,10 +195,14 @@ class SeriesKernels(NamedTuple):
 
 
 class SceneCode(NamedTuple):
-    """Machine code of the scene's own, for one order of the series; 0 for none."""
+    """Addresses of machine code of the scene's own, for a rank of its rows; 0 for none."""
 
-    order: int = 0
-    expand: int = 0  # address of the function that finds all orders
+    rank: int = 0
+    expand: int = 0  # finds all orders
+    factorise: int = 0  # finds pivots and response
+    violation: int = 0  # finds Φ
+    close: int = 0  # takes Φ away
+    close_rate: int = 0  # takes Φ' away
 
 
 class Instant(NamedTuple):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from numpy import inf
+
 from mbref.kernels.compilation import kernel
 
 
@@ -60,3 +62,22 @@ def choose(memory):
         rank += 1
     memory.progress.choice += 1
     return rank
+
+
+@kernel
+def keep_pivot(memory):
+    """Keep the least pivot of rows and variables that are no longer used; minus infinity where one has
+    another sign than where the step began."""
+    solver, least = memory.solver, inf
+    for k in range(memory.progress.rank):
+        same = solver.last[k] * solver.past[k] > 0.0
+        least = min(least, abs(solver.last[k]) if same else -inf)
+    memory.progress.kept_pivot = least
+
+
+@kernel
+def kept_pivot(memory):
+    """The least pivot of the rows and variables where the step began, just before others were chosen;
+    minus infinity if a sign had changed, or others were chosen more than once or never."""
+    progress = memory.progress
+    return progress.kept_pivot if progress.choice == progress.past_choice + 1 else -inf

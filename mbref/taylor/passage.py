@@ -21,7 +21,7 @@ from mbref.kernels.layout import OK
 from mbref.linear_algebra.elimination import determinant
 from mbref.linear_algebra.vectors import copy, larger
 from mbref.simulation.stepping import SINGULAR_AHEAD, STEP_TOO_SMALL, UNDECIDED
-from mbref.taylor.partition import put_gradient
+from mbref.taylor.partition import kept_pivot, put_gradient
 from mbref.taylor.samples import evaluate_series
 from mbref.taylor.turning import pivot_of_turning, turns_back
 
@@ -134,7 +134,7 @@ def has_crossed(h, pivot, memory):
     """
     progress, moved = memory.progress, moved_in(h, memory)
     brief = progress.past_pivot + pivot > STEEPEST * moved
-    if brief and keeps_signs(memory):
+    if (brief and keeps_signs(memory)) or progress.past_pivot + kept_pivot(memory) > STEEPEST * moved:
         return False
     far = progress.passing and progress.past_pivot >= BEFORE * progress.largest_pivot
     if changes_sign(h, min(int(moved / LONG) + 1, MOST_PARTS), memory):

@@ -139,9 +139,11 @@ def _inertia(of: NaturalCoordinates, forms: Forms, lanes: int) -> Inertia:
     terms: list[list[tuple]] = [[(j, row[j]) for j in np.flatnonzero(row)] for row in linear]
     slots, start = _slots([*terms, *[[]] * (lanes - forms.d)], (0, 0.0))
     force = np.concatenate([force, np.zeros(lanes - forms.d)])
-    mass = np.zeros((forms.d, filled(forms.d)))
+    mass = np.zeros((forms.d, lanes))
     mass[:, : forms.d] = forms.mass()
-    return Inertia(mass, force, *_columns(slots, 1), start)
+    coupling, coupled = map(np.ascontiguousarray, np.nonzero(mass))
+    first = np.searchsorted(coupling, np.arange(forms.d + 1))
+    return Inertia(mass, coupled, first, force, *_columns(slots, 1), start)
 
 
 def _moment(forms: Forms, body: int, moment: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

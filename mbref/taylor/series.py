@@ -11,7 +11,7 @@ from __future__ import annotations
 from mbref.kernels.compilation import inlined, kernel
 from mbref.taylor.lanes import LANES, gathered, load, store
 from mbref.taylor.loads import add_loads, start_loads
-from mbref.taylor.scene_code import call
+from mbref.taylor.scene_code import expand_by_code
 from mbref.taylor.solver import solution
 
 
@@ -105,8 +105,12 @@ def expand_with_springs(last, memory):
 def expand(memory):
     """All orders of the variables from the first two, which are consistent."""
     springs, torsions = memory.polynomials.springs, memory.polynomials.torsions
-    if memory.code.order == memory.progress.order:
-        call(memory.code.expand, memory.series.terms, memory.solver.response)
+    if memory.code.expand != 0:
+        series, solver = memory.series, memory.solver
+        expand_by_code(
+            memory.code.expand, series.terms, solver.response, series.left, series.right, series.scale,
+            series.growth, solver.rhs, memory.progress.order - 2,
+        )  # fmt: skip
         return
     start_sums(memory)
     if springs.damping.shape[0] + torsions.damping.shape[0] == 0:

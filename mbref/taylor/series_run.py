@@ -31,7 +31,7 @@ from mbref.taylor.layout import (
 from mbref.taylor.natural import NaturalCoordinates
 from mbref.taylor.passing import begin_here, cross, give_back, look_along, pass_on, take_over
 from mbref.taylor.polynomials import polynomials_of
-from mbref.taylor.scene_code import NAME, code_of
+from mbref.taylor.scene_code import code_of, functions_of, rank_of
 from mbref.taylor.start import OFF
 from mbref.taylor.stepping import advance_series, begin, enter, expand_from, step
 
@@ -98,7 +98,7 @@ class SeriesRun(Run):
         sizes = {
             "orders": orders, "nz": nz, "ng": ng, "nr": nr, "nb": self.model.nb,
             "lanes": filled(max(1, nz + nr + ng)), "slots": polynomials.products.left.size,
-            "twofold": polynomials.rows.row.size, "wide": filled(nz),
+            "twofold": polynomials.rows.row.size,
             "springs": polynomials.springs.natural.size, "torsions": polynomials.torsions.slot.size,
         }  # fmt: skip
         series = allocate(Series, sizes)
@@ -131,7 +131,9 @@ class SeriesRun(Run):
         began = time.process_time()
         self._code = code_of(self.taylor)
         code = self.taylor.code
-        code.expand, code.order = self._code.address(NAME), self.taylor.progress.order
+        code.rank = rank_of(self.taylor)
+        for name in functions_of(self.taylor):
+            code[name] = self._code.address(name)
         self.making += time.process_time() - began
         with contextlib.suppress(Untraceable):  # then samples are taken by the general kernels
             super()._specialise()
@@ -153,13 +155,14 @@ class SeriesRun(Run):
 
 
 def solver_of(rows: Rows, sizes: Mapping[str, int]) -> Solver:
-    """The memory of the linear system, whose tableau has the rows' linear terms and places for the others."""
+    """The memory of the linear system, with the constant part of its tableau and the places of products."""
     solver, nr, nz = allocate(Solver, sizes), sizes["nr"], sizes["nz"]
     of_variables = rows.linear_lane < nz
     places = rows.linear_row[of_variables], rows.linear_lane[of_variables]
     np.add.at(solver.linear, places, rows.linear_weight[of_variables])
-    outside = nr * sizes["wide"]
-    solver.place[:] = np.where(rows.lane < nz, rows.row * sizes["wide"] + rows.lane, outside)
+    solver.linear[np.arange(nr), nz + np.arange(nr)] = 1.0
+    outside = nr * sizes["lanes"]
+    solver.place[:] = np.where(rows.lane < nz, rows.row * sizes["lanes"] + rows.lane, outside)
     return solver
 
 

@@ -1,9 +1,9 @@
 """The linear system of each order: M z + Gᵀ λ = f, G z = b, reduced to the motions that the rows allow.
 
-All variables are z = N b + T u of the independent ones u.  N and T come from one exchange of rows and
-dependent variables in a tableau of G (R. A. Wehage and E. J. Haug, J. Mech. Design 104, 1982), u from the
-reduced mass matrix Tᵀ M T: a mass matrix that is singular but for the motions that the rows allow does no
-harm.  Rows that depend on others have no multiplier.
+All variables are z = N b + T u of the independent ones u.  N and T come from Gauss–Jordan elimination of the
+tableau [G 1] by rows and dependent variables (R. A. Wehage and E. J. Haug, J. Mech. Design 104, 1982), u from
+the reduced mass matrix Tᵀ M T: a mass matrix that is singular but for the motions that the rows allow does no
+harm.  Rows that depend on others have no multiplier.  The inverse is symmetric.
 """
 
 from __future__ import annotations
@@ -11,29 +11,43 @@ from __future__ import annotations
 from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.layout import OK, SINGULAR
 from mbref.taylor.lanes import LANES, load, store
-from mbref.taylor.partition import choose
+from mbref.taylor.partition import choose, keep_pivot
+from mbref.taylor.scene_code import factorise_by_code
 
 KEPT = 0.5  # a pivot over its first below which rows and variables are chosen again
 WITHOUT_INERTIA = 1e-13  # of the largest inertia of a variable
 
 
 @inlined
-def exchange(memory):
-    """Exchange the independent rows of G, at the first coefficients, and their dependent variables.
-
-    Behind it a row of the tableau tells its dependent variable: by the right-hand sides of rows, in the lanes
-    of their variables, and by minus the independent variables.
-    """
+def put_rows(memory):
+    """The tableau [G 1] at the first coefficients: a row has a one in the lane of its multiplier."""
     solver, rows, terms = memory.solver, memory.polynomials.rows, memory.series.terms
-    tableau, place = solver.tableau.reshape(-1), solver.place
+    tableau, linear, place = solver.tableau.reshape(-1), solver.linear, solver.place
+    weight, other = rows.weight, rows.other
     for j in range(0, tableau.shape[0], LANES):
-        store(load(solver.linear, j), tableau, j)
+        store(load(linear, j), tableau, j)
     for e in range(place.shape[0]):
-        tableau[place[e]] += rows.weight[e] * terms[0, rows.other[e]]
-    for k in range(memory.progress.rank):
-        r, c = solver.row[k], solver.order[k]
-        solver.last[k] = solver.tableau[r, c]
-        exchange_one(r, c, memory.progress.rank, solver)
+        tableau[place[e]] += weight[e] * terms[0, other[e]]
+
+
+@inlined
+def exchange(memory):
+    """Gauss–Jordan elimination of the independent rows by their dependent variables.
+
+    Behind it a row of the tableau has N in the lanes of multipliers and -T in those of independent variables.
+    """
+    solver, rank = memory.solver, memory.progress.rank
+    tableau, row, order, last = solver.tableau, solver.row, solver.order, solver.last
+    put_rows(memory)
+    for k in range(rank):
+        r, c = row[k], order[k]
+        last[k] = tableau[r, c]
+        multiply_row(tableau, r, 1.0 / tableau[r, c])
+        for p in range(rank):
+            i = row[p]
+            entry = tableau[i, c]
+            if i != r and entry != 0.0:
+                subtract_multiple(tableau, i, entry, r)
 
 
 @inlined
@@ -54,132 +68,140 @@ def subtract_multiple(matrix, i, factor, k):
 
 
 @inlined
-def exchange_one(r, c, rank, solver):
-    """Exchange a row of the tableau and a variable: the row over its pivot, then none of it in the others.
-
-    Their entries in the variable's lane become minus themselves over the pivot: e - e (1 + 1 / pivot).
-    """
-    tableau = solver.tableau
-    factor = 1.0 / tableau[r, c]
-    tableau[r, c] += 1.0
-    multiply_row(tableau, r, factor)
+def split(memory):
+    """N in rows of all variables and T in rows of the independent ones, from the tableau."""
+    solver, rank, variable = memory.solver, memory.progress.rank, memory.series.variable
+    tableau, row, order, lanes = solver.tableau, solver.row, solver.order, solver.tableau.shape[1]
+    particular, null_space = solver.particular, solver.null_space
     for k in range(rank):
-        i = solver.row[k]
-        entry = tableau[i, c]
-        if i != r and entry != 0.0:
-            subtract_multiple(tableau, i, entry, r)
-    tableau[r, c] = factor
-
-
-@inlined
-def spread(memory):
-    """N in the rows of the dependent variables' response and Tᵀ in those of the independent ones."""
-    solver, rank, response = memory.solver, memory.progress.rank, memory.solver.response
-    tableau, nz, lanes = solver.tableau, solver.order.shape[0], solver.response.shape[1]
-    zero = 0.0 * load(solver.linear, 0)
-    for place in range(0, (nz + solver.row.shape[0]) * lanes, LANES):
-        store(zero, response, place)
-    for k in range(rank):
-        r, i = solver.row[k], solver.order[k]
-        for p in range(rank):
-            response[i, nz + solver.row[p]] = tableau[r, solver.order[p]]
-        for p in range(rank, nz):
-            response[solver.order[p], i] = -tableau[r, solver.order[p]]
-    for p in range(rank, nz):
-        response[solver.order[p], solver.order[p]] = 1.0
+        for j in range(0, lanes, LANES):
+            eliminated = load(tableau, row[k] * lanes + j)
+            store(eliminated - load(variable, j) * eliminated, particular, order[k] * lanes + j)
+        for q in range(rank, order.shape[0]):
+            null_space[q - rank, order[k]] = -tableau[row[k], order[q]]
+    for q in range(rank, order.shape[0]):
+        for j in range(0, lanes, LANES):
+            store(0.0 * load(variable, j), particular, order[q] * lanes + j)
+        for p in range(rank, order.shape[0]):
+            null_space[q - rank, order[p]] = 1.0 if p == q else 0.0
 
 
 @inlined
 def reduce_inertia(memory):
-    """Tᵀ M T in ``reduced``, in lanes of variables, and -Tᵀ M N beside Tᵀ in the rows of the response."""
+    """Tᵀ M T in ``reduced``, and Tᵀ and -Tᵀ M N in the independent variables' rows of the response."""
     solver, mass, rank = memory.solver, memory.polynomials.inertia.mass, memory.progress.rank
-    reduced, wide = solver.reduced, mass.shape[1]
-    for q in range(rank, solver.order.shape[0]):
-        i = solver.order[q]
-        for j in range(0, wide, LANES):
-            pushed = load(mass, i * wide + j)
-            for k in range(rank):
-                pushed = pushed - solver.tableau[solver.row[k], i] * load(mass, solver.order[k] * wide + j)
-            store(pushed, reduced, i * wide + j)
-        reduce_row(i, memory)
+    null_space, momentum, order, nz = solver.null_space, solver.momentum, solver.order, solver.order.shape[0]
+    for f in range(nz - rank):
+        put_combination(f, null_space, mass, nz, momentum)
+        for g in range(nz - rank):
+            total = 0.0
+            for i in range(nz):
+                total += momentum[f, i] * null_space[g, i]
+            solver.reduced[f, g] = total
+        put_free_motion(f, order[rank + f], nz, solver)
 
 
 @inlined
-def reduce_row(i, memory):
-    """Subtract the dependent variables' share from a row of Tᵀ M, and put it into the response."""
-    solver, rank, wide = memory.solver, memory.progress.rank, memory.solver.reduced.shape[1]
-    reduced, change, nz = solver.reduced, solver.change, solver.order.shape[0]
-    for j in range(0, wide, LANES):
-        shared = 0.0 * load(reduced, i * wide + j)
-        for k in range(rank):
-            shared = shared + reduced[i, solver.order[k]] * load(solver.tableau, solver.row[k] * wide + j)
-        store(shared, change, j)
-    for k in range(rank):
-        solver.response[i, nz + solver.row[k]] = -change[solver.order[k]]
-    for j in range(0, wide, LANES):
-        store(load(reduced, i * wide + j) - load(change, j), reduced, i * wide + j)
+def put_combination(f, factors, matrix, rows, out):
+    """The combination of the rows of a matrix by the factors in row f, into row f of ``out``."""
+    lanes = matrix.shape[1]
+    for j in range(0, lanes, LANES):
+        total = factors[f, 0] * load(matrix, j)
+        for i in range(1, rows):
+            total = total + factors[f, i] * load(matrix, i * lanes + j)
+        store(total, out, f * lanes + j)
+
+
+@inlined
+def put_free_motion(f, variable, nz, solver):
+    """Row f of Tᵀ - Tᵀ M N into the response of its independent variable."""
+    null_space, particular, momentum, response = (
+        solver.null_space, solver.particular, solver.momentum, solver.response,
+    )  # fmt: skip
+    lanes = response.shape[1]
+    for j in range(0, lanes, LANES):
+        total = load(null_space, f * lanes + j)
+        for i in range(nz):
+            total = total - momentum[f, i] * load(particular, i * lanes + j)
+        store(total, response, variable * lanes + j)
 
 
 @inlined
 def solve_reduced(memory):
     """The response of the independent variables, by Gauss–Jordan elimination of the reduced mass matrix."""
     solver, rank = memory.solver, memory.progress.rank
-    reduced, response, nz = solver.reduced, solver.response, solver.order.shape[0]
-    for p in range(rank, nz):
-        c = solver.order[p]
-        solver.last[p] = reduced[c, c]
-        factor = 1.0 / reduced[c, c]
-        multiply_row(response, c, factor)
-        multiply_row(reduced, c, factor)
-        for q in range(rank, nz):
-            i = solver.order[q]
-            entry = reduced[i, c]
-            if i != c and entry != 0.0:
-                subtract_multiple(response, i, entry, c)
-                subtract_multiple(reduced, i, entry, c)
+    reduced, response, order, last = solver.reduced, solver.response, solver.order, solver.last
+    for f in range(order.shape[0] - rank):
+        last[rank + f] = reduced[f, f]
+        factor = 1.0 / reduced[f, f]
+        multiply_row(response, order[rank + f], factor)
+        multiply_numbers(reduced, f, factor)
+        for g in range(order.shape[0] - rank):
+            entry = reduced[g, f]
+            if g != f and entry != 0.0:
+                subtract_multiple(response, order[rank + g], entry, order[rank + f])
+                subtract_numbers(reduced, g, entry, f)
+
+
+@inlined
+def multiply_numbers(matrix, f, factor):
+    """Multiply row f of a matrix without blocks by a factor."""
+    for g in range(matrix.shape[1]):
+        matrix[f, g] *= factor
+
+
+@inlined
+def subtract_numbers(matrix, g, factor, f):
+    """Subtract row f of a matrix without blocks, times a factor, from row g."""
+    for e in range(matrix.shape[1]):
+        matrix[g, e] -= factor * matrix[f, e]
 
 
 @inlined
 def put_dependent(memory):
     """The response of the dependent variables: N, and T of the independent ones'."""
-    solver, rank, nz = memory.solver, memory.progress.rank, memory.solver.order.shape[0]
-    response, tableau, lanes = solver.response, solver.tableau, solver.response.shape[1]
+    solver, rank = memory.solver, memory.progress.rank
+    response, particular, null_space, order = (
+        solver.response, solver.particular, solver.null_space, solver.order,
+    )  # fmt: skip
+    lanes, nz = response.shape[1], order.shape[0]
     for k in range(rank):
-        r, i = solver.row[k], solver.order[k]
+        i = order[k]
         for j in range(0, lanes, LANES):
-            total = load(response, i * lanes + j)
-            for q in range(rank, nz):
-                total = total - tableau[r, solver.order[q]] * load(response, solver.order[q] * lanes + j)
+            total = load(particular, i * lanes + j)
+            for f in range(nz - rank):
+                total = total + null_space[f, i] * load(response, order[rank + f] * lanes + j)
             store(total, response, i * lanes + j)
 
 
 @inlined
 def put_multipliers(memory):
     """The response of the multipliers: Nᵀ of the forces that the dependent variables' motion leaves."""
-    solver, rank, nz = memory.solver, memory.progress.rank, memory.solver.order.shape[0]
-    response, forces, lanes = solver.response, solver.forces, solver.response.shape[1]
+    solver, rank, response = memory.solver, memory.progress.rank, memory.solver.response
+    particular, forces, order = solver.particular, solver.forces, solver.order
+    nz, lanes = order.shape[0], response.shape[1]
     for k in range(rank):
-        put_force(k, solver.order[k], memory)
-    for p in range(rank):
-        e = nz + solver.row[p]
+        put_force(order[k], memory)
+    for e in range(nz, nz + solver.row.shape[0]):
         for j in range(0, lanes, LANES):
-            total = load(response, e * lanes + j)
+            total = 0.0 * load(response, 0)
             for k in range(rank):
-                total = total + solver.tableau[solver.row[k], solver.order[p]] * load(forces, k * lanes + j)
+                total = total + particular[order[k], e] * load(forces, order[k] * lanes + j)
             store(total, response, e * lanes + j)
 
 
 @inlined
-def put_force(k, i, memory):
+def put_force(i, memory):
     """The force left at a variable: the one on the right-hand side minus that of its inertia."""
-    solver, mass, lanes = memory.solver, memory.polynomials.inertia.mass, memory.solver.response.shape[1]
+    solver, inertia, lanes = memory.solver, memory.polynomials.inertia, memory.solver.response.shape[1]
+    response, forces, mass, coupled = solver.response, solver.forces, inertia.mass, inertia.coupled
+    first, end = inertia.first[i], inertia.first[i + 1]
     for j in range(0, lanes, LANES):
-        left = 0.0 * load(mass, 0)
-        for other in range(solver.order.shape[0]):
-            if mass[i, other] != 0.0:
-                left = left - mass[i, other] * load(solver.response, other * lanes + j)
-        store(left, solver.forces, k * lanes + j)
-    solver.forces[k, i] += 1.0
+        left = 0.0 * load(forces, 0)
+        for e in range(first, end):
+            left = left - mass[i, coupled[e]] * load(response, coupled[e] * lanes + j)
+        store(left, forces, i * lanes + j)
+    forces[i, i] += 1.0
 
 
 @inlined
@@ -191,33 +213,50 @@ def is_sharp(solver):
     return True
 
 
+@inlined
+def respond(memory):
+    """The pivots and the response at the first coefficients, by code of the scene's own where it serves."""
+    solver, code = memory.solver, memory.code
+    if code.factorise != 0 and code.rank == memory.progress.rank:
+        factorise_by_code(
+            code.factorise, memory.series.terms, solver.tableau, solver.particular, solver.null_space,
+            solver.response, solver.last, solver.row, solver.order,
+        )  # fmt: skip
+    else:
+        respond_in_loops(memory)
+    if memory.polynomials.given.driver.shape[0] > 0:
+        add_functions(memory.polynomials.given.driver.shape[0], memory)
+
+
 @kernel
-def eliminate_all(memory):
-    """The exchange of rows and dependent variables, and the response of the independent ones."""
+def respond_in_loops(memory):
+    """The pivots and the response by elimination of the rows, then of the reduced mass matrix."""
     exchange(memory)
-    spread(memory)
+    split(memory)
     reduce_inertia(memory)
     solve_reduced(memory)
+    put_dependent(memory)
+    put_multipliers(memory)
 
 
 @kernel
 def factorise(memory):
     """The response at the first coefficients; SINGULAR where rows or inertia have another rank."""
     memory.run.equations.system.counts.factorisations += 1
-    eliminate_all(memory)
+    respond(memory)
     if not is_sharp(memory.solver):
+        keep_pivot(memory)
         if choose(memory) != memory.progress.rank:
             return SINGULAR
         factorise_anew(memory)
-    put_response(memory)
     return inertia_left(memory)
 
 
 @kernel
 def factorise_anew(memory):
-    """The pivots of a partition that has just been chosen, and the response of its independent variables."""
+    """The response by a partition that has just been chosen, whose pivots are the first."""
     solver = memory.solver
-    eliminate_all(memory)
+    respond(memory)
     for k in range(solver.first.shape[0]):
         solver.first[k] = abs(solver.last[k])
 
@@ -232,16 +271,6 @@ def inertia_left(memory):
         if not solver.first[k] > WITHOUT_INERTIA * largest:
             return SINGULAR
     return OK
-
-
-@inlined
-def put_response(memory):
-    """The response of all variables and multipliers, and to the functions prescribed."""
-    functions = memory.polynomials.given.driver.shape[0]
-    put_dependent(memory)
-    put_multipliers(memory)
-    if functions > 0:
-        add_functions(functions, memory)
 
 
 @kernel

@@ -1,0 +1,103 @@
+"""Machine code of a scene's corrections: ``mbref.taylor.correction`` for one scene, without loops."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from llvmlite import ir
+
+from mbref.taylor.instructions import Blocks, Instructions, constant
+from mbref.taylor.lanes import LANES
+from mbref.taylor.layout import TaylorMemory
+
+POINTERS = {"violation": 2, "close": 4, "close_rate": 4}  # terms, phi; response, change
+
+
+class Correction:
+    """Violations of the rows, and the least changes of variables and rates that take them away."""
+
+    def __init__(self, taylor: TaylorMemory, write: Instructions):
+        self._taylor, self._write = taylor, write
+        self._nz, nr = taylor.solver.order.size, taylor.solver.row.size
+        self._lanes = taylor.series.terms.shape[1]
+        self._of_variables = range(-(-self._nz // LANES))  # blocks
+        self._of_rows = range(self._nz // LANES, -(-(self._nz + nr) // LANES))
+        self._rows = range(self._nz, self._nz + nr)
+        self._terms, self._phi = write.pointers[:2]
+
+    def violation(self) -> None:
+        """Write Φ of all rows at the variables."""
+        terms = self._write.row(self._terms, 0, self._lanes)
+        constants = self._taylor.polynomials.rows.constant
+        for b in self._of_rows:
+            parts = [constant(self._masked(b, constants[b * LANES : (b + 1) * LANES]))]
+            for weights, left, right in self._products(b):
+                one = self._write.times(weights, self._write.gathered(terms, left))
+                parts.append(self._write.product(one, self._write.gathered(terms, right)))
+            parts += self._linear(b, terms)
+            self._write.store([self._write.total(parts)], self._phi, b * LANES)
+
+    def close(self) -> None:
+        """Change the variables so that Φ vanishes."""
+        self._subtract(0)
+
+    def close_rate(self) -> None:
+        """Change the rates so that Φ' vanishes."""
+        terms, rates = (self._write.row(self._terms, k * self._lanes, self._lanes) for k in (0, 1))
+        for b in self._of_rows:
+            parts = []
+            for weights, left, right in self._products(b):
+                for one, other in ((terms, rates), (rates, terms)):
+                    factor = self._write.times(weights, self._write.gathered(one, left))
+                    parts.append(self._write.product(factor, self._write.gathered(other, right)))
+            parts += self._linear(b, rates)
+            total = self._write.total(parts) if parts else constant([0.0] * LANES)
+            self._write.store([total], self._phi, b * LANES)
+        self._subtract(1)
+
+    def _subtract(self, order: int) -> None:
+        write, (response, change) = self._write, self._write.pointers[2:]
+        factors = [write.minus(write.everywhere(write.number(self._phi, e))) for e in self._rows]
+        for b in self._of_variables:
+            parts = [
+                write.product(factor, write.block(response, e * self._lanes + b * LANES))
+                for e, factor in zip(self._rows, factors, strict=True)
+            ]
+            variables = [float(lane < self._nz) for lane in range(b * LANES, (b + 1) * LANES)]
+            total = write.times(np.array(variables), write.total(parts)) if parts else constant([0.0] * LANES)
+            place = order * self._lanes + b * LANES
+            write.store([write.total([write.block(self._terms, place), total])], self._terms, place)
+            write.store([total], change, b * LANES)
+
+    def _products(self, block: int) -> Iterator[tuple[np.ndarray, list[int], list[int]]]:
+        """Weights and lanes of both factors of the products in a block of rows."""
+        products = self._taylor.polynomials.products
+        for c in range(products.start[block], products.start[block + 1], LANES):
+            weights = self._masked(block, products.weight[c : c + LANES])
+            if weights.any():
+                left, right = (
+                    np.where(weights, lanes[c : c + LANES], -1).tolist()
+                    for lanes in (products.left, products.right)
+                )
+                yield weights, left, right
+
+    def _linear(self, block: int, row: Blocks) -> list[ir.Value]:
+        """The linear terms in a block of rows, one of each row at a time."""
+        rows, parts = self._taylor.polynomials.rows, []
+        terms = [np.flatnonzero(rows.linear_row + self._nz == lane) for lane in self._lanes_of(block)]
+        for level in range(max(map(len, terms))):
+            weights, lanes = np.zeros(LANES), [-1] * LANES
+            for k, places in enumerate(terms):
+                if level < len(places):
+                    weights[k] = rows.linear_weight[places[level]]
+                    lanes[k] = int(rows.linear_lane[places[level]])
+            parts.append(self._write.times(weights, self._write.gathered(row, lanes)))
+        return parts
+
+    def _masked(self, block: int, numbers: np.ndarray) -> np.ndarray:
+        """Numbers of a block, those of other lanes than rows' zero."""
+        return np.where([lane in self._rows for lane in self._lanes_of(block)], numbers, 0.0)
+
+    def _lanes_of(self, block: int) -> range:
+        return range(block * LANES, (block + 1) * LANES)

@@ -1,0 +1,212 @@
+"""Machine code of a scene's linear system: ``mbref.taylor.solver`` for one scene, without loops.
+
+Rows and dependent variables are chosen while a motion runs: only the elimination has them, in memory; behind
+it all places are known.  The mass matrix and the rows' coefficients stand in the code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from llvmlite import ir
+
+from mbref.taylor.instructions import Blocks, Instructions, constant
+from mbref.taylor.lanes import LANES
+from mbref.taylor.layout import TaylorMemory
+
+Row = dict[int, ir.Value]
+"""The blocks of a row that are not known to be zero, by their number."""
+POINTERS = 6, 2  # terms, tableau, particular, null_space, response, last; row, order
+
+
+class Elimination:
+    """The response at the first coefficients, for a rank of the rows."""
+
+    def __init__(self, taylor: TaylorMemory, rank: int, write: Instructions):
+        self._taylor, self._write = taylor, write
+        self._rank, self._nz = rank, taylor.solver.order.size
+        self._nr, self._lanes = taylor.solver.row.size, taylor.series.terms.shape[1]
+        self._of_variables = range(-(-self._nz // LANES))  # blocks
+        self._of_rows = range(self._nz // LANES, -(-(self._nz + self._nr) // LANES))
+        (self._terms, self._tableau, self._particular, self._null_space, self._response, self._last,
+         row, order) = write.pointers  # fmt: skip
+        self._rows = [write.multiplied(write.number(row, k), self._lanes) for k in range(self._rank)]
+        self._columns = [write.number(order, k) for k in range(self._nz)]
+
+    def put(self) -> None:
+        """Write the pivots and the response."""
+        for r in range(self._nr):
+            self._write.store(self._gradient(r), self._tableau, r * self._lanes)
+        for k in range(self._rank):
+            self._eliminate(k)
+        self._split()
+        self._put_response()
+
+    # --- N and T ------------------------------------------------------------------------------------------
+    def _gradient(self, r: int) -> Blocks:
+        """Row r of [G 1]."""
+        linear, variables = self._taylor.solver.linear[r], self._write.row(self._terms, 0, self._lanes)
+        blocks = []
+        for block in range(self._lanes // LANES):
+            parts = [constant(linear[block * LANES : (block + 1) * LANES])]
+            for weights, lanes in self._levels(r, block):
+                parts.append(self._write.times(weights, self._write.gathered(variables, lanes)))
+            blocks.append(self._write.total(parts))
+        return blocks
+
+    def _levels(self, r: int, block: int) -> Iterator[tuple[np.ndarray, list[int]]]:
+        """Weights and lanes of the products in a block of row r, of each variable one at a time."""
+        rows, variables = (
+            self._taylor.polynomials.rows,
+            range(block * LANES, min((block + 1) * LANES, self._nz)),
+        )
+        terms = [np.flatnonzero((rows.row == r) & (rows.lane == variable)) for variable in variables]
+        for level in range(max(map(len, terms), default=0)):
+            weights, lanes = np.zeros(LANES), [-1] * LANES
+            for k, places in enumerate(terms):
+                if level < len(places):
+                    weights[k], lanes[k] = rows.weight[places[level]], int(rows.other[places[level]])
+            yield weights, lanes
+
+    def _eliminate(self, k: int) -> None:
+        """Take the k-th dependent variable out of all other rows, first out of the one that is next."""
+        write, column = self._write, self._columns[k]
+        pivot = write.number(self._tableau, self._rows[k], column)
+        write.put(pivot, self._last, k)
+        factor = write.everywhere(write.inverse(pivot))
+        row = [write.product(factor, block) for block in write.row(self._tableau, self._rows[k], self._lanes)]
+        write.store(row, self._tableau, self._rows[k])
+        for p in [*range(k + 1, self._rank), *range(k)]:
+            entry = write.everywhere(write.number(self._tableau, self._rows[p], column))
+            others = write.row(self._tableau, self._rows[p], self._lanes)
+            left = [
+                write.difference(other, write.product(entry, block))
+                for other, block in zip(others, row, strict=True)
+            ]
+            write.store(left, self._tableau, self._rows[p])
+
+    def _split(self) -> None:
+        """N and T in memory, by their variables; the numbers of T one by one."""
+        write, free = self._write, self._columns[self._rank :]
+        for k, column in enumerate(self._columns[: self._rank]):
+            place = write.multiplied(column, self._lanes)
+            for block in self._of_rows:
+                (eliminated,) = write.row(self._tableau, write.plus(self._rows[k], block * LANES), LANES)
+                kept = [float(lane >= self._nz) for lane in range(block * LANES, (block + 1) * LANES)]
+                eliminated = write.times(np.array(kept), eliminated)
+                write.store([eliminated], self._particular, write.plus(place, block * LANES))
+            for f, other in enumerate(free):
+                entry = write.number(self._tableau, self._rows[k], other)
+                write.put(write.minus(entry), self._null_space, f * self._lanes, column)
+        zero = constant([0.0] * LANES)
+        for f, column in enumerate(free):
+            place = write.multiplied(column, self._lanes)
+            for block in self._of_rows:
+                write.store([zero], self._particular, write.plus(place, block * LANES))
+            for g, other in enumerate(free):
+                write.put(ir.DoubleType()(float(f == g)), self._null_space, f * self._lanes, other)
+
+    # --- the response -------------------------------------------------------------------------------------
+    def _put_response(self) -> None:
+        particular = [self._row(self._particular, i, self._of_rows) for i in range(self._nz)]
+        free = self._free_motions(particular)
+        rows = []
+        for i in range(self._nz):
+            row = particular[i]
+            for f, motion in enumerate(free):
+                share = self._write.everywhere(self._write.number(self._null_space, f * self._lanes + i))
+                row = self._sum(row, self._times(share, motion))
+            rows.append(row)
+        forces = [self._force(i, rows) for i in range(self._nz)]
+        for i, row in enumerate(rows):
+            self._store(row, i)
+        for e in range(self._nz, self._nz + self._nr):
+            parts = [
+                self._times(
+                    self._write.everywhere(self._write.number(self._particular, i * self._lanes + e)), force
+                )
+                for i, force in enumerate(forces)
+            ]
+            self._store(self._sum(*parts), e)
+
+    def _free_motions(self, particular: list[Row]) -> list[Row]:
+        """The response of the independent variables, by the reduced mass matrix."""
+        free = range(self._nz - self._rank)
+        motions = [self._row(self._null_space, f, self._of_variables) for f in free]
+        momenta = [self._momentum(f, motions[f]) for f in free]
+        reduced = [[self._inner(momenta[f], motions[g]) for g in free] for f in free]
+        solved = [self._without_rows(momenta[f], motions[f], particular) for f in free]
+        for f in free:
+            self._write.put(reduced[f][f], self._last, self._rank + f)
+            factor = self._write.inverse(reduced[f][f])
+            solved[f] = self._times(self._write.everywhere(factor), solved[f])
+            reduced[f] = [self._write.product(factor, number) for number in reduced[f]]
+            for g in free:
+                if g != f:
+                    entry = self._write.minus(reduced[g][f])
+                    solved[g] = self._sum(solved[g], self._times(self._write.everywhere(entry), solved[f]))
+                    reduced[g] = [
+                        self._write.total([number, self._write.product(entry, other)])
+                        for number, other in zip(reduced[g], reduced[f], strict=True)
+                    ]
+        return solved
+
+    def _momentum(self, f: int, motion: Row) -> Row:
+        """M times a motion, whose variables are in memory, too."""
+        mass = self._taylor.polynomials.inertia.mass
+        row = {}
+        for block in self._of_variables:
+            lanes = slice(block * LANES, (block + 1) * LANES)
+            diagonal = np.zeros(LANES)
+            own = mass[lanes, lanes].diagonal()
+            diagonal[: own.size] = own
+            parts = [self._write.times(diagonal, motion[block])]
+            for i in range(self._nz):
+                coupled = mass[i, lanes].copy()
+                if i // LANES == block:
+                    coupled[i % LANES] = 0.0
+                if coupled.any():
+                    number = self._write.number(self._null_space, f * self._lanes + i)
+                    parts.append(self._write.times(coupled, self._write.everywhere(number)))
+            row[block] = self._write.total(parts)
+        return row
+
+    def _inner(self, momentum: Row, motion: Row) -> ir.Value:
+        parts = [self._write.product(momentum[block], motion[block]) for block in self._of_variables]
+        return self._write.added_up(self._write.total(parts))
+
+    def _without_rows(self, momentum: Row, motion: Row, particular: list[Row]) -> Row:
+        """A motion in the lanes of variables, and minus its momentum times N in those of multipliers."""
+        blocks = [momentum[block] for block in self._of_variables]
+        parts = [
+            self._times(self._write.minus(self._write.repeated(blocks, i)), row)
+            for i, row in enumerate(particular)
+        ]
+        return self._sum(motion, *parts)
+
+    def _force(self, i: int, rows: list[Row]) -> Row:
+        """The force that is left at a variable by the inertia of all others."""
+        mass = self._taylor.polynomials.inertia.mass[i]
+        one = np.zeros(LANES)
+        one[i % LANES] = 1.0
+        parts = [self._times(constant([-mass[j]] * LANES), rows[j]) for j in np.flatnonzero(mass[: self._nz])]
+        return self._sum({i // LANES: constant(one)}, *parts)
+
+    # --- rows ---------------------------------------------------------------------------------------------
+    def _row(self, pointer: ir.Value, k: int, blocks: range) -> Row:
+        return {
+            block: self._write.row(pointer, k * self._lanes + block * LANES, LANES)[0] for block in blocks
+        }
+
+    def _times(self, factor: ir.Value, row: Row) -> Row:
+        return {block: self._write.product(factor, value) for block, value in row.items()}
+
+    def _sum(self, *rows: Row) -> Row:
+        blocks = sorted(set().union(*rows))
+        return {block: self._write.total([row[block] for row in rows if block in row]) for block in blocks}
+
+    def _store(self, row: Row, k: int) -> None:
+        zero = constant([0.0] * LANES)
+        blocks = [row.get(block, zero) for block in range(self._lanes // LANES)]
+        self._write.store(blocks, self._response, k * self._lanes)
