@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from mbref import __version__
-from mbref.equations.branches import singular_position
 from mbref.equations.initial_state import Start
 from mbref.equations.joint_reactions import Balance
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR
 from mbref.motion import Motion
+from mbref.simulation.crossings import Crossings
 from mbref.simulation.dead_position import is_at_dead_position
 from mbref.simulation.ranks import Ranks
 from mbref.simulation.remedies import remedy
@@ -111,28 +109,11 @@ def cost_of(seconds: float, built: float, counts: Sequence[int]) -> Cost:
     return Cost(seconds, built, *map(int, counts[:5]))
 
 
-def _crossings(run: Run) -> tuple[Crossing, ...] | None:
-    """The singular positions passed, in the scene's frames; None for a method that does not look for them."""
+def _crossings(run: Run) -> Sequence[Crossing] | None:
+    """The singular positions passed; None for a method that does not look for them."""
     if not run.method.stabilisation.projects:
         return None
-    found = []
-    for passed in run.crossings:
-        crossing = singular_position(run.model, passed)
-        v = crossing.velocities.reshape(len(crossing.velocities), -1, 6)
-        q = np.broadcast_to(crossing.coordinates.reshape(-1, 7), (len(v), v.shape[1], 7))
-        motion = run.model.motion(q, v, np.zeros_like(v))
-        found.append(
-            Crossing(
-                crossing.time,
-                motion["position"][0],
-                motion["orientation"][0],
-                motion["velocity"],
-                motion["angular_velocity"],
-                crossing.taken,
-                crossing.sentence,
-            )
-        )
-    return tuple(found)
+    return Crossings(run.model, run.crossings) if run.crossings else ()
 
 
 def _message(run: Run, status: int) -> str:

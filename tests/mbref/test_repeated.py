@@ -17,6 +17,7 @@ from mbref.scenes import SCENES
 from mbref.simulation.run import Run
 from mbref.simulation.simulate import Limits, simulate
 from mbref.simulation.stepping import DONE
+from mbref.taylor import geometry
 from mbref.taylor.passing_run import PassingRun
 from mbref.taylor.run import CrossingRun
 from mbref.variation import Variation, variants
@@ -38,6 +39,7 @@ def nothing_known() -> Iterator[None]:
 def forget() -> None:
     reduction._known.clear()
     lent_memory._kept.clear()
+    geometry._known.clear()
 
 
 def simulated(scene: Scene, method: str = METHODS[0]) -> list:
@@ -92,6 +94,19 @@ def test_another_reduction_is_found_where_numbers_decide_so(name):
 def test_variants_share_a_reduction():
     scenes = variants(CRANK, [Variation("joint[B].anchor[0]", 0.304, 1e-4, normal=True)], 20)
     assert {known(scene) for scene in scenes} == {1}
+
+
+def test_scenes_that_differ_in_masses_and_loads_share_a_geometry():
+    """And those that differ in places do not: a moment and a mass vary, then the length of the crank."""
+    varied = [Variation("body[0].mass", 0.5, 2.0), Variation("load[0].moment[2]", 50.0, 150.0)]
+    length = [Variation("joint[B].anchor[0]", 0.304, 1e-4, normal=True)]
+    for variations, known in ((varied, 1), (length, 1 + 4)):
+        scenes = list(variants(CRANK, variations, 4))
+        repeated = [simulated(scene, "taylor") for scene in scenes]
+        assert len(geometry._known) == known
+        kept = dict(geometry._known)
+        assert [alone(scene, "taylor") for scene in scenes] == repeated
+        geometry._known.update(kept)
 
 
 def test_memory_in_use_is_not_lent():
