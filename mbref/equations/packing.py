@@ -99,7 +99,8 @@ class Packs:
 
     def _all(self, array: np.ndarray) -> np.ndarray:
         """An array that is the same for all scenes."""
-        return np.broadcast_to(array, (len(self.scenes), *array.shape))
+        many = len(self.scenes) > 1
+        return np.broadcast_to(array, (len(self.scenes), *array.shape)) if many else array[None]
 
     def _rows(self, rows: Iterable[Any], width: int) -> np.ndarray:
         """Rows of numbers (s, …, width) of entries, of one scene after another."""
