@@ -3,9 +3,11 @@
     python benchmarks/ensemble.py [COUNT]
 
 The first table is of CPU time of simulations one after another in this process: construction of a run,
-stepping, and the rest, which is samples, reactions and the trajectory; the least of REPEATS rounds, in which
-scenes take turns.  The second is of wall time of whole ensembles after the processes have started, with the
-passing of scenes and trajectories between them; the median of as many rounds.
+stepping, and the rest, which is samples and the trajectory; the least of REPEATS rounds, in which scenes take
+turns.  The second is of the same simulations together, as an ensemble gives them to a process, on the general
+kernels and by code that takes the numbers in which the scenes differ, which is made before.  The third is of
+wall time of whole ensembles after the processes have started, with the passing of scenes and trajectories
+between them; the median of as many rounds.
 """
 
 from __future__ import annotations
@@ -13,18 +15,20 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack
 from statistics import median
 
 import numpy as np
 
+from mbref.method import DEFAULT
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.simulation.ensemble import ensemble
+from mbref.simulation.ensemble import MOST_AT_ONCE, ensemble
 from mbref.simulation.processes import processes
 from mbref.simulation.simulate import Limits, simulate
+from mbref.simulation.together import STEPS_WORTH_SHARED_CODE, run_all
 from mbref.variation import Variation, variants
 
 REPEATS = 5
@@ -40,30 +44,59 @@ TIMES = np.linspace(0, END, 6)
 
 def main(count: int) -> None:
     """Measure and print."""
-    _show_parts(count)
+    scenes = {name: list(variants(SCENES[name](), varied, count)) for name, varied in VARIED.items()}
+    _show_parts(scenes)
+    _show_together(scenes)
     workers = sorted({1, os.cpu_count() or 1})
     print(f"{'simulations of ' + f'{END:g} s per second':32}" + "".join(f"{n:>6} processes" for n in workers))
-    for name, varied in VARIED.items():
-        scenes = list(variants(SCENES[name](), varied, count))
+    for name, varied in scenes.items():
         with ExitStack() as stack:
             pools = {n: stack.enter_context(processes(n)) for n in workers}
             for pool in pools.values():
-                _seconds(scenes[:8], pool)
-            rounds = [[_seconds(scenes, pool) for pool in pools.values()] for _ in range(REPEATS)]
+                _seconds(varied[:8], pool)
+            rounds = [[_seconds(varied, pool) for pool in pools.values()] for _ in range(REPEATS)]
         rates = [count / median(seconds) for seconds in zip(*rounds, strict=True)]
         print(f"{name:32}" + "".join(f"{rate:>16.0f}" for rate in rates))
 
 
-def _show_parts(count: int) -> None:
-    """Milliseconds of a simulation in one process, by part."""
-    scenes = {name: list(variants(SCENES[name](), varied, count)) for name, varied in VARIED.items()}
+def _show_parts(scenes: Mapping[str, Sequence[Scene]]) -> None:
+    """Milliseconds of a simulation alone in one process, by part."""
     rounds = [{name: _parts(each) for name, each in scenes.items()} for _ in range(REPEATS)]
     heads = ("construction", "stepping", "rest", "all", "a second")
-    print(f"{'ms a simulation, one process':32}" + "".join(f"{head:>14}" for head in heads))
-    for name in scenes:
-        built, stepping, whole = (1e3 / count * min(found[name][k] for found in rounds) for k in range(3))
-        parts = built, stepping, whole - built - stepping, whole
-        print(f"{name:32}" + "".join(f"{part:>14.3f}" for part in parts) + f"{1e3 / whole:>14.0f}")
+    print(f"{'ms a simulation, alone':32}" + "".join(f"{head:>14}" for head in heads))
+    for name, each in scenes.items():
+        built, stepping, whole = (1e3 / len(each) * min(found[name][k] for found in rounds) for k in range(3))
+        _show(name, (built, stepping, whole - built - stepping, whole), 1e3 / whole)
+
+
+def _show_together(scenes: Mapping[str, Sequence[Scene]]) -> None:
+    """Milliseconds of a simulation together with others in one process: all, and stepping alone."""
+    rounds = [
+        {
+            name: [*_together(each, 0), *_together(each, STEPS_WORTH_SHARED_CODE)]
+            for name, each in scenes.items()
+        }
+        for _ in range(REPEATS)
+    ]
+    heads = ("stepping", "all", "by code", "all", "a second")
+    print(f"{'ms a simulation, together':32}" + "".join(f"{head:>14}" for head in heads))
+    for name, each in scenes.items():
+        found = [1e3 / len(each) * min(numbers[name][k] for numbers in rounds) for k in range(4)]
+        _show(name, found, 1e3 / found[-1])
+
+
+def _show(name: str, milliseconds: Sequence[float], rate: float) -> None:
+    print(f"{name:32}" + "".join(f"{part:>14.3f}" for part in milliseconds) + f"{rate:>14.0f}")
+
+
+def _together(scenes: Sequence[Scene], others: int) -> tuple[float, float]:
+    """Seconds of CPU time of stepping, and of all, with so many steps of other scenes by the same code."""
+    began, stepping = time.process_time(), 0.0
+    for first in range(0, len(scenes), MOST_AT_ONCE):
+        given = scenes[first : first + MOST_AT_ONCE]
+        runs = run_all(given, DEFAULT, TIMES, LIMITS, others).motions(given)
+        stepping += sum(run.cost.seconds for _, run in runs)
+    return stepping, time.process_time() - began
 
 
 def _parts(scenes: Sequence[Scene]) -> tuple[float, float, float]:

@@ -5,6 +5,7 @@ mpi-svd+projection            lm1+baumgarte[alpha=10,beta=10]            lm1+non
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,6 +24,7 @@ from mbref.scene_fields import meant
 from mbref.stabilisation import STABILISATIONS
 from mbref.stabilisation.base import Stabilisation
 
+MOST_NAMES = 256  # whose methods are remembered
 DEFAULT = "alf-dual+projection/dop853"
 SHORT = {
     "kinematic": "alf-dual+projection/predictor",  # Newton–Raphson on Eqs. 1 to 3: integrators/predictor.py
@@ -74,6 +76,7 @@ class Method:
         return packed(record(part.numbers(**self.options_of(part)))) if part.options else None
 
     @staticmethod
+    @functools.lru_cache(maxsize=MOST_NAMES)
     def parse(name: str) -> Method:
         """The method of a name, or of one of SHORT with options; raises MethodError with the known names."""
         short, bracket, rest = name.strip().partition("[")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -140,7 +140,7 @@ class Trajectory:
     t_end: float = 0.0
     message: str = ""
     cost: Cost = field(default_factory=Cost)
-    crossings: tuple[Crossing, ...] | None = None
+    crossings: Sequence[Crossing] | None = None
     open_reactions: Mapping[str, np.ndarray] | None = None
 
     def __repr__(self) -> str:

@@ -115,7 +115,7 @@ def _summary(model: Model, motion: Motion, values: np.ndarray) -> AlongMotion:
         end=float(times[-1]), moves=bool(np.ptp(motion.position, axis=0).any()),
         rank=rank, redundant=model.m - rank,
         by_rounding=tuple(small[small > RANK_TOLERANCE].tolist()),
-        nearest=float(nearest[at]), nearest_time=float(times[at]), crossings=motion.crossings or (),
+        nearest=float(nearest[at]), nearest_time=float(times[at]), crossings=tuple(motion.crossings or ()),
         shaky=_is_shaky(model, motion), stopped="" if motion.outcome is Outcome.COMPLETED else motion.message,
     )  # fmt: skip
 

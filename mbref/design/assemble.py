@@ -11,7 +11,8 @@ import numpy as np
 from mbref import rotations
 from mbref.design.placed import placed
 from mbref.equations.initial_state import solve_positions
-from mbref.equations.model import FRAME, Model
+from mbref.equations.model import Model
+from mbref.equations.packing import FRAME, Packs
 from mbref.scene import GROUND, Scene, SceneError
 
 Point = tuple[float, float, float]
@@ -30,19 +31,19 @@ class Assembled:
     lengths: dict[str, tuple[float, float]]
 
 
-class _Reshaped(Model):
-    """A model whose bodies have some of their points (world, t = 0) elsewhere, by body and point."""
+class _Reshaped(Packs):
+    """A scene whose bodies have some of their points (world, t = 0) elsewhere, by body and point."""
 
     def __init__(self, scene: Scene, elsewhere: Mapping[tuple[str, Point], np.ndarray]):
         self._elsewhere = elsewhere
-        super().__init__(scene)
+        super().__init__([scene])
 
     def points(self, bodies: np.ndarray, points: np.ndarray) -> np.ndarray:
         names = [body.name for body in self.bodies]
         names.append(FRAME if GROUND in names else GROUND)
-        pairs = zip(bodies.tolist(), points.tolist(), strict=True)
+        pairs = zip(bodies.tolist(), points.reshape(-1, 3).tolist(), strict=True)
         moved = [self._elsewhere.get((names[b], (x, y, z)), np.array([x, y, z])) for b, (x, y, z) in pairs]
-        return super().points(bodies, np.array(moved).reshape(-1, 3))
+        return super().points(bodies, np.array(moved).reshape(points.shape))
 
 
 def assemble(scene: Scene, lengths: Mapping[tuple[str, str], float]) -> Assembled:
@@ -56,7 +57,8 @@ def assemble(scene: Scene, lengths: Mapping[tuple[str, str], float]) -> Assemble
     shifts = _shifts(scene, lengths, pairs)
     q = Model(scene).start()
     for share in np.linspace(0.0, 1.0, SHARES + 1)[1:]:
-        model = _Reshaped(scene, {key: np.array(key[1]) + share * shift for key, shift in shifts.items()})
+        elsewhere = {key: np.array(key[1]) + share * shift for key, shift in shifts.items()}
+        model = Model(scene, _Reshaped(scene, elsewhere))
         q, phi = solve_positions(model, 0.0, q)
         if np.abs(phi).max(initial=0.0) > CLOSED * max(1.0, model.length):
             raise SceneError([_open(model, phi, share)])

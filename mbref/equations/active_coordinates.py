@@ -58,7 +58,7 @@ def patterns(model: Model, terms: Terms) -> tuple[np.ndarray, np.ndarray, np.nda
 
 
 def nonzero(model: Model, terms: Terms) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """``patterns`` of each of k states: entries (k, m, 12), rows (k, m) and columns (k, n)."""
+    """``patterns`` of each state: entries (…, m, 12), rows (…, m) and columns (…, n)."""
     entries = (terms.jacobian != 0) & (model.entry_columns < model.n)
     rows = (terms.gamma != 0) | (terms.phi != 0) | (terms.nu != 0)
     return entries, rows, terms.force != 0
@@ -81,11 +81,18 @@ def _reached(
 
 def without_rounding(model: Model, start: Start) -> Start:
     """The start with zero for the roundings of zero in its coordinates, and in velocities not given."""
-    q, v, small = start.q.reshape(-1, 7), start.v, np.full((model.nb, 7), STILL)
-    small[:, :3] *= model.length
-    given, _ = given_velocities(model, start.q)
+    v, (given, _) = start.v, given_velocities(model, start.q)
     still = (np.abs(v) < STILL * np.max(np.abs(v), initial=0.0)) & (given == 0)
-    return replace(start, q=np.where(np.abs(q) < small, 0.0, q).ravel(), v=np.where(still, 0.0, v))
+    q = places_without_rounding(start.q, np.array(model.length))
+    return replace(start, q=q, v=np.where(still, 0.0, v))
+
+
+def places_without_rounding(q: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """Coordinates (…, 7 nb) of scenes of a length (…,) in m, with zero for roundings of zero."""
+    poses = q.reshape(*length.shape, -1, 7)
+    small = np.full(poses.shape, STILL)
+    small[..., :3] *= length[..., None, None]
+    return np.where(np.abs(poses) < small, 0.0, poses).reshape(q.shape)
 
 
 def active_coordinates(q: np.ndarray, velocities: np.ndarray) -> np.ndarray:

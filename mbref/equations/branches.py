@@ -166,20 +166,23 @@ def second_order(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Second
 
 def _forms(model: Model, t: float, q: np.ndarray, directions: np.ndarray, null: np.ndarray) -> np.ndarray:
     """wᵀ γ as quadratic forms (c, d, d) of d directions (n + 1, d), for c left null vectors (c, m)."""
-    d, at_rest = directions.shape[1], model.blocks(t, q, np.zeros(model.n)).gamma
-
-    def rate(u: np.ndarray) -> np.ndarray:
-        """Second order along u (n + 1,): γ₂ + t' γ₁ + t'² γ₀."""
-        there, back = (model.blocks(t, q, sign * u[:-1]).gamma for sign in (1.0, -1.0))
-        even, odd = (there + back) / 2 - at_rest, (there - back) / 2
-        return even + u[-1] * odd + u[-1] ** 2 * at_rest
-
+    d = directions.shape[1]
+    i, j = np.tril_indices(d)
+    one, other = directions.T[i], directions.T[j]
+    sums, differences = np.split(_rates(model, t, q, np.concatenate([one + other, one - other])), 2)
     forms = np.zeros((len(null), d, d))
-    for i in range(d):
-        for j in range(i + 1):
-            one, other = directions[:, i], directions[:, j]
-            forms[:, i, j] = forms[:, j, i] = null @ (rate(one + other) - rate(one - other)) / 4
+    forms[:, i, j] = forms[:, j, i] = null @ (sums - differences).T / 4
     return forms
+
+
+def _rates(model: Model, t: float, q: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """Second order (k, m) along directions u (k, n + 1): γ₂ + t' γ₁ + t'² γ₀."""
+    count, v, time = len(directions), directions[:, :-1], directions[:, -1:]
+    velocities = np.concatenate([v, -v, np.zeros((1, model.n))])
+    states = len(velocities)
+    gamma = model.along(np.full(states, t), np.tile(q, (states, 1)), velocities).gamma
+    there, back, at_rest = gamma[:count], gamma[count:-1], gamma[-1]
+    return (there + back) / 2 - at_rest + time * (there - back) / 2 + time**2 * at_rest
 
 
 def _independent(forms: np.ndarray) -> np.ndarray:

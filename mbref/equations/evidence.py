@@ -11,8 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from mbref.equations.active_coordinates import nonzero
+from mbref.equations.coordinates import displace_all
 from mbref.equations.initial_state import Start
-from mbref.equations.model import Model, Terms, all_displaced
+from mbref.equations.model import Model, Terms
 from mbref.equations.random_states import RandomStates
 from mbref.equations.static_constraints import MOST, ROUNDING, SMALL, Asked, are_redundant
 
@@ -33,42 +34,67 @@ class Evidence:
         self._rounds, self._split = (len(read), len(asked.read)), 1 + sum(len(s.part) for s in read)
         self._entries = entries
         self._trials, self._shared = Trials(model, asked), asked.shared
-        self._found = self._answers(model, start)
+        (self._found,) = self._of_one(model, start)
 
     def agrees(self, model: Model, start: Start) -> bool:
         """Whether a scene of the same structure gives the same answers."""
-        return self._answers(model, start) == self._found
+        return self._of_one(model, start) == [self._found]
 
-    def _answers(self, model: Model, start: Start) -> bytes:
-        terms = self._terms(model, start)
-        answers = [start.v != 0, start.q != 0, model.mass > 0]
-        answers += [*self._of_active(model, terms), *self._of_held(terms)]
-        answers.append(are_redundant(model, terms.jacobian[0], self._shared))
-        return b"".join(answer.tobytes() for answer in answers)
+    def which_agree(
+        self, model: Model, q: np.ndarray, v: np.ndarray, mass: np.ndarray, terms: Terms
+    ) -> np.ndarray:
+        """Which of s scenes of the structure of a model give the same answers.
 
-    def _terms(self, model: Model, start: Start) -> Terms:
-        """The terms at the start, then at all states that were read."""
+        From their starts q (s, 7 nb) and v (s, 6 nb), masses (s, 6 nb) and terms (s, k, …) at ``states``.
+        """
+        return np.array([found == self._found for found in self._answers(model, q, v, mass, terms)])
+
+    def states(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The k states read about the starts q (s, 7 nb), v (s, 6 nb) of s scenes, the start first: times as
+        parts of the duration (k,), coordinates (s, k, 7 nb) and velocities (s, k, 6 nb)."""
         part, displacement, velocity = self._states
-        q, v = all_displaced(start.q, displacement), velocity.copy()
-        q[0], v[0] = start.q, start.v
-        return model.along(part * model.scene.duration, q, v)
+        places = np.repeat(q, len(part), axis=0)
+        displace_all(places, np.tile(displacement, (len(q), 1)), np.zeros(q.shape[1]))
+        places = places.reshape(len(q), len(part), q.shape[1])
+        velocities = np.tile(velocity, (len(q), 1, 1))
+        places[:, 0], velocities[:, 0] = q, v
+        return part, places, velocities
+
+    def _of_one(self, model: Model, start: Start) -> list[bytes]:
+        q, v = start.q[None], start.v[None]
+        part, places, velocities = self.states(q, v)
+        found = model.along(part * model.scene.duration, places[0], velocities[0])
+        terms = Terms(*(value[None] for value in vars(found).values()))
+        return self._answers(model, q, v, model.mass[None], terms)
+
+    def _answers(
+        self, model: Model, q: np.ndarray, v: np.ndarray, mass: np.ndarray, terms: Terms
+    ) -> list[bytes]:
+        """The answers of each of s scenes."""
+        answers = [v != 0, q != 0, mass > 0]
+        answers += [*self._of_active(model, terms), *self._of_held(terms)]
+        answers.append(are_redundant(model, terms.jacobian[:, 0], self._shared))
+        rows = np.concatenate([answer.reshape(len(q), -1) for answer in answers], axis=1)
+        return [row.tobytes() for row in rows]
 
     def _of_active(self, model: Model, terms: Terms) -> list[np.ndarray]:
         """Which entries, rows and columns are other than zero at the start or in each round of states."""
         return [
-            found[0] | _of_rounds(found[1 : self._split], self._rounds[0]) for found in nonzero(model, terms)
+            found[:, :1] | _of_rounds(found[:, 1 : self._split], self._rounds[0])
+            for found in nonzero(model, terms)
         ]
 
     def _of_held(self, terms: Terms) -> list[np.ndarray]:
         """Which active entries and rows are other than zero in each round, and which rows could hold."""
-        samples, rounds = terms.jacobian[self._split :], self._rounds[1]
+        samples, rounds = terms.jacobian[:, self._split :], self._rounds[1]
         left = _of_rounds((samples != 0) & self._entries, rounds)
-        return [left, _of_rounds(terms.nu[self._split :] != 0, rounds), *self._trials.answers(samples)]
+        return [left, _of_rounds(terms.nu[:, self._split :] != 0, rounds), *self._trials.answers(samples)]
 
 
 def _of_rounds(found: np.ndarray, rounds: int) -> np.ndarray:
-    """Whether something is so at one of the states of a round, which have as many each."""
-    return found.reshape(rounds, len(found) // max(rounds, 1), *found.shape[1:]).any(axis=1)
+    """Whether something is so at one of the states (s, k, …) of a round, which have as many each."""
+    scenes, states = found.shape[:2]
+    return found.reshape(scenes, rounds, states // max(rounds, 1), *found.shape[2:]).any(axis=2)
 
 
 class Trials:
@@ -89,13 +115,14 @@ class Trials:
         self._one, self._other = np.array(pairs, dtype=int).reshape(-1, 2).T
 
     def answers(self, samples: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Which rows have a constant length, and which pairs are perpendicular, in blocks (k, m, 12)."""
+        """Which rows have a constant length, and which pairs are perpendicular, in blocks (s, k, m, 12)."""
         places = self._sample[:, :, None], self._row[:, None, None], self._entry[:, None, :]
-        numbers = samples[places] * self._has_entry[:, None, :]
+        numbers = samples[:, *places] * self._has_entry[:, None, :]
         lengths = np.sqrt((numbers * numbers).sum(axis=-1))
-        least, most = lengths.min(axis=1, initial=np.inf), lengths.max(axis=1, initial=0.0)
+        least, most = lengths.min(axis=2, initial=np.inf), lengths.max(axis=2, initial=0.0)
         units = numbers / np.where(lengths > 0.0, lengths, 1.0)[..., None]
-        cosines = np.abs((units[self._one] * units[self._other]).sum(axis=-1)).max(axis=1, initial=0.0)
+        products = units[:, self._one] * units[:, self._other]
+        cosines = np.abs(products.sum(axis=-1)).max(axis=2, initial=0.0)
         return (least > SMALL) & (most - least <= ROUNDING * most), cosines < ROUNDING
 
 

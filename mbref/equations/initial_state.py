@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -106,17 +107,22 @@ def corrected_positions(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]
     return q, before
 
 
+def is_met(violation: Any, length: Any) -> Any:
+    """Whether the largest |Φ| of a scene of a length (m) is rounding; of numbers or of arrays."""
+    return violation <= 1e-14 * np.maximum(1.0, length)
+
+
 def solve_positions(model: Model, t: float, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Newton–Raphson on Φ(q, t) = 0 from q (7 nb,); the coordinates reached and Φ (m,) there.
 
     With the pseudo-inverse, so that redundant rows and a singular start do no harm; the change is least
     in the metric of M.
     """
-    v, enough, phi = np.zeros(model.n), 1e-14 * max(1.0, model.length), np.zeros(model.m)
+    v, phi = np.zeros(model.n), np.zeros(model.m)
     for _ in range(MOST_ITERATIONS):
         terms = model.blocks(t, q, v)
         phi = terms.phi
-        if np.max(np.abs(phi), initial=0.0) <= enough:
+        if is_met(np.max(np.abs(phi), initial=0.0), model.length):
             break
         x = _least_change(model, terms.jacobian, -phi)
         if np.max(np.abs(x)) < 1e-15:

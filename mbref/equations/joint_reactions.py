@@ -1,9 +1,13 @@
-"""Joint reactions from Lagrange multipliers: -Φ_qᵀ λ of a joint's rows, moved to its anchor."""
+"""Joint reactions from Lagrange multipliers: -Φ_qᵀ λ of a joint's rows, moved to its anchor.
+
+They are found when the first of them is asked for: to find them all takes longer than a short run.
+"""
 
 from __future__ import annotations
 
 import functools
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,21 +15,90 @@ from mbref import rotations
 from mbref.equations.model import Model
 from mbref.equations.structure import MOST_KEPT, Structure
 from mbref.equations.units import row_lengths
+from mbref.scene import Scene
 
 MOST_ROWS = 120  # singular values of more rows at every sample take longer than the run
 OPEN = 1e-6  # singular value, to the largest, of a combination of unit rows that counts as vanished
 SHARE = 1e-6  # weight of a joint in such a combination below which it takes no part
 
 
+class Balance:
+    """The samples of a run at which forces and reactions balance: times (k,) in s, q (k, nb, 7), λ (k, m)."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        times: np.ndarray,
+        q: np.ndarray,
+        multipliers: np.ndarray,
+        model: Model | None = None,
+    ):
+        self._scene, self._times, self._q, self._multipliers = scene, times, q, multipliers
+        self._model = model
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the model, which another process makes when it needs it."""
+        found = {**vars(self), "_model": None}
+        found.pop("_blocks", None)
+        return found
+
+    @functools.cached_property
+    def _blocks(self) -> tuple[Model, np.ndarray]:
+        """The model and Φ_q as blocks (k, m, 12)."""
+        model = self._model or Model(self._scene)
+        blocks = model.blocks_along(self._times, self._q)
+        model.give_back()
+        return model, blocks
+
+    def reactions(self) -> OfJoints | None:
+        """Per joint its reaction (k, 6), see ``reactions``; None where the scene has no masses."""
+        return OfJoints(self._scene, self._reactions) if self._scene.has_mass() else None
+
+    def open_dimensions(self) -> OfJoints | None:
+        """Per joint ``open_dimensions`` (k,); None where they are not found."""
+        found = self._scene.has_mass() and self._multipliers.shape[1] <= MOST_ROWS
+        return OfJoints(self._scene, self._open_dimensions) if found else None
+
+    def _reactions(self) -> dict[str, np.ndarray]:
+        model, blocks = self._blocks
+        return reactions(model, self._q, blocks, self._multipliers)
+
+    def _open_dimensions(self) -> dict[str, np.ndarray]:
+        return open_dimensions(*self._blocks)
+
+
+class OfJoints(Mapping[str, np.ndarray]):
+    """Arrays by the names of a scene's joints, found when the first of them is asked for."""
+
+    def __init__(self, scene: Scene, find: Callable[[], dict[str, np.ndarray]]):
+        self._names, self._find = tuple(joint.name for joint in scene.joint), find
+
+    @functools.cached_property
+    def _found(self) -> dict[str, np.ndarray]:
+        return self._find()
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self._names:
+            raise KeyError(name)
+        return self._found[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __repr__(self) -> str:
+        return repr(self._found)
+
+
 def reactions(
     model: Model, q: np.ndarray, blocks: np.ndarray, multipliers: np.ndarray
-) -> dict[str, np.ndarray] | None:
+) -> dict[str, np.ndarray]:
     """Per joint force (N) and moment (N m) (k, 6) on its second body at the anchor, world axes.
 
-    From q (k, nb, 7), the blocks (k, m, 12) of Φ_q and λ (k, m); None where the scene has no masses.
+    From q (k, nb, 7), the blocks (k, m, 12) of Φ_q and λ (k, m).
     """
-    if model.kinematic:
-        return None
     names = tuple(joint.name for joint in model.scene.joint)
     if not names:
         return {}
@@ -40,15 +113,13 @@ def reactions(
     return {name: found[:, j] for j, name in enumerate(names)}
 
 
-def open_dimensions(model: Model, blocks: np.ndarray) -> dict[str, np.ndarray] | None:
+def open_dimensions(model: Model, blocks: np.ndarray) -> dict[str, np.ndarray]:
     """Per joint the dimensions (k,) of its reaction that equilibrium does not determine at each sample.
 
     Redundant rows leave reactions open always, a singular position where the motion passes it: there a
     combination of rows vanishes, a left null vector of Φ_q (Wojtyra, J. Theor. Appl. Mech. 43, 2005).  From
-    the blocks (k, m, 12) of Φ_q; None where the scene has no masses, or more than MOST_ROWS rows.
+    the blocks (k, m, 12) of Φ_q.
     """
-    if model.kinematic or model.m > MOST_ROWS:
-        return None
     jacobian = model.dense(blocks)
     left, values, _ = np.linalg.svd(jacobian / row_lengths(jacobian)[..., None])
     rank = np.sum(values > OPEN * values.max(axis=1, initial=0.0)[:, None], axis=1)

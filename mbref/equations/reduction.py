@@ -42,11 +42,12 @@ class Reduction:
         """Memory of the factor."""
         return sparse_factor(self.symbolic, self.static)
 
-    def scene(self, data: SceneData) -> SceneData:
-        """The data of a scene without the primitives that have no entry."""
-        if self.primitives.size == data.primitives.kind.size:
+    def scene(self, data: SceneData, axis: int = 0) -> SceneData:
+        """The data of a scene without the primitives that have no entry; ``axis`` counts them."""
+        if self.primitives.size == data.primitives.kind.shape[axis]:
             return data
-        return data._replace(primitives=Primitives(*(column[self.primitives] for column in data.primitives)))
+        kept = (np.take(column, self.primitives, axis=axis) for column in data.primitives)
+        return data._replace(primitives=Primitives(*kept))
 
 
 def reduction_of(model: Model, start: Start) -> Reduction:

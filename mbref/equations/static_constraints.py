@@ -174,15 +174,19 @@ def _columns_of(model: Model, entries: np.ndarray, rows: np.ndarray) -> np.ndarr
 
 
 def are_redundant(model: Model, blocks: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Which of these rows of the Jacobian whose blocks (m, 12) are given are redundant."""
-    return _null_shares(model, blocks, rows) > REDUNDANT if rows.size else np.zeros(0, dtype=bool)
+    """Which (…, r) of r rows are redundant in Jacobians whose blocks (…, m, 12) are given."""
+    if not rows.size:
+        return np.zeros((*blocks.shape[:-2], 0), dtype=bool)
+    return _null_shares(model, blocks, rows) > REDUNDANT
 
 
 def _null_shares(model: Model, blocks: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Share of each row in the left null space of the Jacobian whose blocks (m, 12) are given."""
+    """Share (…, r) of r rows in the left null space of Jacobians whose blocks (…, m, 12) are given."""
     if model.m <= LARGE:
         return dense_null_shares(model.dense(blocks), rows)
-    return null_shares(MinimumNorm(model.sparse(blocks), np.ones(model.n)), rows)
+    every = blocks.reshape(-1, *blocks.shape[-2:])
+    found = [null_shares(MinimumNorm(model.sparse(one), np.ones(model.n)), rows) for one in every]
+    return np.array(found).reshape(*blocks.shape[:-2], rows.size)
 
 
 class _Rows:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -94,7 +95,7 @@ class Formulation:
     numbers: type = NoOptions  # the method's own numbers, a record with their defaults
     feedback: Callable[[Mapping[str, float]], tuple[float, float]] | None = None  # gains of Φ' and Φ in γ
 
-    @property
+    @cached_property
     def options(self) -> Mapping[str, float]:
         """Names and defaults of the method's numbers."""
         return self.numbers()._asdict()

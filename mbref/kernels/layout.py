@@ -266,9 +266,10 @@ class Addresses(NamedTuple):
 
 
 class SpecialisedCode(NamedTuple):
-    """Machine code made for the scene, and the results of its projection."""
+    """Machine code made for the scene, the numbers that it takes, and the results of its projection."""
 
     addresses: Addresses
+    numbers: Annotated[Vector, "numbers"]  # of code for many scenes: those in which they differ
     y: Annotated[Vector, "14*nb"]  # after one Newton step
     outputs: Annotated[Vector, "m + 1"]  # the largest |Φ| before the step, and the squared pivots
 

@@ -7,13 +7,11 @@ the next.
 
 from __future__ import annotations
 
-import ctypes
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable
 from typing import Any
 
-import numpy as np
-
-from mbref.kernels.named_memory import Packed, packed
+from mbref.kernels.copying import Bytes, copy_rows, table_of
+from mbref.kernels.named_memory import packed
 from mbref.kernels.records import Numbers
 
 MOST_KEYS, MOST_OF_A_KEY, MOST_BYTES = 64, 4, 1 << 20  # kept for later; larger memory is not kept
@@ -24,24 +22,13 @@ class Lent:
 
     def __init__(self, values: Any, key: Hashable):
         self.values, self.key, self.packed = values, key, packed(values)
-        self._first = [(address, ctypes.string_at(address, size)) for address, size in set(_places(values))]
-        self.size = sum(len(first) for _, first in self._first)  # bytes in arrays and records
+        self._first = Bytes(values)
+        self.size = self._first.size  # bytes in arrays and records
+        self._table = table_of(self._first.copies)
 
     def restore(self) -> None:
         """Have all arrays and records as they were made."""
-        for address, first in self._first:
-            ctypes.memmove(address, first, len(first))
-
-
-def _places(values: Any) -> Iterator[tuple[int, int]]:
-    """Address and size of each array and record of a schema, and of the packed schemas in it."""
-    if isinstance(values, Packed):
-        yield from _places(values.values)
-    elif isinstance(values, tuple):
-        for value in values:
-            yield from _places(value)
-    elif isinstance(values, np.ndarray | Numbers) and values.nbytes:
-        yield int(values.__array_interface__["data"][0]), values.nbytes
+        copy_rows(self._table, 0)
 
 
 _kept: dict[Hashable, list[Lent]] = {}

@@ -17,7 +17,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import typing
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 import numpy as np
@@ -142,16 +142,6 @@ def _maker(field: Field, hint: Any, sizes: Mapping[str, int]) -> Callable[[], An
 def _hints(schema: type) -> tuple[Any, ...]:
     """The types of a schema's fields."""
     return tuple(typing.get_type_hints(schema).values())
-
-
-def stacked(schema: type, rows: Sequence[Any], sizes: Mapping[str, int] | None = None) -> Any:
-    """A schema of arrays from one instance for each of their rows; ``sizes`` are of further dimensions."""
-    columns = {}
-    for k, field in enumerate(fields_of(schema).values()):
-        width = [size_of(part, sizes or {}) for part in field.shape[1:]]
-        values = [row[k] for row in rows]
-        columns[field.name] = np.array(values, dtype=field.dtype).reshape(len(rows), *width)
-    return schema(**columns)
 
 
 class Packed:

@@ -17,11 +17,12 @@ if TYPE_CHECKING:
 
 
 def dense_null_shares(matrix: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """``null_shares`` of a small matrix (m, n), whose rows may be zero."""
-    lengths = np.linalg.norm(matrix, axis=1, keepdims=True)
+    """``null_shares`` (…, r) of small matrices (…, m, n), whose rows may be zero."""
+    lengths = np.linalg.norm(matrix, axis=-1, keepdims=True)
     d = matrix / np.where(lengths > 0, lengths, 1.0)
-    unit = np.eye(matrix.shape[0])
-    return np.sum((np.linalg.solve(ALPHA * d @ d.T + unit, unit[:, rows])) ** 2, axis=0)
+    unit = np.eye(matrix.shape[-2])
+    inverse = np.linalg.solve(ALPHA * (d @ d.swapaxes(-1, -2)) + unit, unit[:, rows])
+    return np.sum(inverse**2, axis=-2)
 
 
 def null_shares(solution: MinimumNorm, rows: np.ndarray) -> np.ndarray:

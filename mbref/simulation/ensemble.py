@@ -1,10 +1,14 @@
-"""Ensembles: many scenes by one method, spread over processes; results are streamed, stored and resumed."""
+"""Ensembles: many scenes by one method, spread over processes; results are streamed, stored and resumed.
+
+Processes are given several runs at a time: runs of scenes of one shape are set up together (``together``).
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import os
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
 from dataclasses import asdict
 from pathlib import Path
@@ -17,10 +21,14 @@ from mbref import __version__, records
 from mbref.method import DEFAULT, Method
 from mbref.scene import Scene
 from mbref.simulation.processes import processes
-from mbref.simulation.simulate import Limits, checked_times, prepare, simulate
+from mbref.simulation.simulate import Limits, checked_times, prepare
+from mbref.simulation.together import Ended, run_all
 from mbref.trajectory import Outcome, Trajectory
 
-AHEAD = 64  # runs handed to the executor before the first of them has to end
+AHEAD = (
+    64  # runs handed to the executor, or as many as keep every core busy twice, before the first has to end
+)
+MOST_AT_ONCE, SECONDS = 64, 0.05  # runs that a process is given at a time, and the wall time they may take
 
 
 def ensemble(
@@ -48,57 +56,128 @@ def ensemble(
         return
     known = records.opened(path)  # before anything is compiled or run for it
     prepare(Method.parse(method))  # once, not in every process at the same time
-    pending: dict[Future[Trajectory], Job] = {}
-    done: SimpleQueue[Future[Trajectory]] = SimpleQueue()
-    run: Callable[..., Trajectory] = simulate
+    work = Work(executor, method, times, limits)
     try:
         for place, scene in enumerate(scenes):
             key = _key(scene, times, method, limits) if path else ""
             if key in known:
                 yield place, Trajectory.from_record(scene.name, known[key])
                 continue
-            future = executor.submit(run, scene, method, times, limits)
-            pending[future] = Job(place, key, scene, method, limits)
-            future.add_done_callback(done.put)
-            while len(pending) >= AHEAD:
-                yield _ended(done.get(), pending, path)
-        while pending:
-            yield _ended(done.get(), pending, path)
+            work.add(Job(place, key, scene))
+            while work.is_full() or work.has_ended():
+                yield from _handed_out(work, path)
+        work.hand_over()
+        while work.pending:
+            yield from _handed_out(work, path)
     finally:
-        for future in pending:
-            future.cancel()
+        work.cancel()
 
 
 class Job(NamedTuple):
-    """A run that has been handed to the executor."""
+    """A run that is wanted."""
 
     place: int
     key: str
     scene: Scene
-    method: str
-    limits: Limits
 
 
-def _ended(
-    future: Future[Trajectory], pending: dict[Future[Trajectory], Job], path: str | Path | None
-) -> tuple[int, Trajectory]:
-    """A result, stored and taken off the pending ones."""
-    job = pending.pop(future)
-    try:
-        run = future.result()
-    except BrokenExecutor:
-        return job.place, _crashed(job)
-    if path:
-        records.append(path, {"key": job.key, **run.to_record()})
-    return job.place, run
+class Work:
+    """Runs that the executor has been given, some at a time; runs of a killed process are tried one by one.
+
+    ``error`` is the exception of the first scene that cannot be simulated.
+    """
+
+    def __init__(self, executor: Executor, method: str, times: np.ndarray, limits: Limits):
+        self.pending: dict[Future[Ended], list[Job]] = {}
+        self._executor, self._method, self._times, self._limits = executor, method, times, limits
+        self._done: SimpleQueue[Future[Ended]] = SimpleQueue()
+        self._waiting: list[Job] = []
+        self._at_once = 0  # runs that are given at a time; 0 before the first has told how long it takes
+        self._cores = os.cpu_count() or 1
+        self._steps = 0  # of runs that have ended
+        self.error: Exception | None = None
+
+    def add(self, job: Job) -> None:
+        """Hand a run over, alone or once as many wait as are given at a time."""
+        self._waiting.append(job)
+        if len(self._waiting) >= self._at_once or not self.pending:
+            self.hand_over()
+
+    def hand_over(self) -> None:
+        """Hand over those that wait."""
+        if self._waiting:
+            self._submit(self._waiting)
+            self._waiting = []
+
+    def _submit(self, jobs: list[Job]) -> None:
+        scenes = [job.scene for job in jobs]
+        arguments = self._method, self._times, self._limits, self._steps
+        future = self._executor.submit(run_all, scenes, *arguments)
+        self.pending[future] = jobs
+        future.add_done_callback(self._done.put)
+
+    def has_ended(self) -> bool:
+        """Whether there are results."""
+        return not self._done.empty()
+
+    def is_full(self) -> bool:
+        """Whether a result is to be waited for before more is handed over."""
+        given = sum(map(len, self.pending.values()))
+        if not self._at_once:
+            return given >= self._cores
+        return given >= max(AHEAD, 2 * self._cores * self._at_once)
+
+    def ended(self) -> list[tuple[Job, Trajectory]]:
+        """The runs that end next, each with its trajectory."""
+        future = self._done.get()
+        jobs = self.pending.pop(future)
+        try:
+            found = future.result()
+        except BrokenExecutor:
+            return self._without_process(jobs)
+        self._at_once = max(1, min(MOST_AT_ONCE, int(SECONDS * len(jobs) / max(found.seconds, 1e-9))))
+        self.error = found.error
+        runs: list[tuple[Job, Trajectory]] = [
+            (jobs[place], run) for place, run in found.motions([job.scene for job in jobs])
+        ]
+        self._steps += sum(run.cost.steps for _, run in runs)
+        return runs
+
+    def _without_process(self, jobs: list[Job]) -> list[tuple[Job, Trajectory]]:
+        """Runs whose process was killed: one alone has crashed, several are handed over one by one."""
+        crashed = []
+        for job in jobs:
+            try:
+                if len(jobs) == 1:
+                    raise BrokenExecutor
+                self._submit([job])
+            except BrokenExecutor:
+                crashed.append((job, self._crashed(job)))
+        return crashed
+
+    def _crashed(self, job: Job) -> Trajectory:
+        return Trajectory.failed(
+            scene=job.scene.name, engine="mbref", version=__version__, method=str(Method.parse(self._method)),
+            settings=asdict(self._limits), bodies=tuple(body.name for body in job.scene.body),
+            outcome=Outcome.CRASHED, message="its process was killed",
+        )  # fmt: skip
+
+    def cancel(self) -> None:
+        """Take back all that has not begun."""
+        for future in self.pending:
+            future.cancel()
 
 
-def _crashed(job: Job) -> Trajectory:
-    return Trajectory.failed(
-        scene=job.scene.name, engine="mbref", version=__version__, method=str(Method.parse(job.method)),
-        settings=asdict(job.limits), bodies=tuple(body.name for body in job.scene.body),
-        outcome=Outcome.CRASHED, message="its process was killed",
-    )  # fmt: skip
+def _handed_out(work: Work, path: str | Path | None) -> Iterator[tuple[int, Trajectory]]:
+    """The runs that end next by their places, all stored first but those whose process was killed."""
+    found = work.ended()
+    for job, run in found:
+        if path and run.outcome is not Outcome.CRASHED:
+            records.append(path, {"key": job.key, **run.to_record()})
+    for job, run in found:
+        yield job.place, run
+    if work.error:
+        raise work.error
 
 
 def _key(scene: Scene, times: np.ndarray, method: str, limits: Limits) -> str:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
+from typing import Any
 
 from mbref import __version__
-from mbref.equations.branches import singular_position
-from mbref.equations.joint_reactions import open_dimensions, reactions
+from mbref.equations.initial_state import Start
+from mbref.equations.joint_reactions import Balance
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR
 from mbref.motion import Motion
+from mbref.simulation.crossings import Crossings
 from mbref.simulation.dead_position import is_at_dead_position
+from mbref.simulation.ranks import Ranks
 from mbref.simulation.remedies import remedy
 from mbref.simulation.run import Run
 from mbref.simulation.singular_start import begins_at_rest, fits_no_branch
@@ -66,60 +69,51 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion
     reached, nb = int(loop.clock.sample), run.model.nb
     q, v, a, multipliers = (sample[:reached].copy() for sample in loop.samples)
     q, v, a = q.reshape(reached, nb, 7), v.reshape(reached, nb, 6), a.reshape(reached, nb, 6)
-    blocks = model.blocks_along(run.times[:reached], q)
+    times = run.times[:reached]
     return Motion(
         mechanism=run.scene,
-        scene=run.scene.name,
-        engine="mbref",
-        version=__version__,
-        method=str(run.method),
-        settings={
-            **vars(run.limits),
-            "branches": [list(pair) for pair in dict(run.limits.branches).items()],
-        },
-        times=run.times[:reached],
-        bodies=tuple(body.name for body in run.scene.body),
+        **facts_of(run),
+        times=times,
         **model.motion(q, v, a),
-        reactions=reactions(model, q, blocks, multipliers),
-        open_reactions=open_dimensions(model, blocks),
+        **reactions_of(Balance(run.scene, times, q, multipliers, model)),
         outcome=OUTCOMES[status],
         t_end=float(loop.clock.time),
         message=_message(run, status),
         crossings=_crossings(run),
-        cost=Cost(
-            seconds,
-            built,
-            int(counts.steps),
-            int(counts.rejected),
-            int(counts.evaluations),
-            int(counts.factorisations),
-            int(counts.newton),
-        ),
+        cost=cost_of(seconds, built, tuple(counts)),
     )
 
 
-def _crossings(run: Run) -> tuple[Crossing, ...] | None:
-    """The singular positions passed, in the scene's frames; None for a method that does not look for them."""
+def facts_of(run: Run) -> dict[str, Any]:
+    """The fields of a Motion that runs of one method and limits share, whose scenes are of one shape."""
+    return {
+        "scene": run.scene.name,
+        "engine": "mbref",
+        "version": __version__,
+        "method": str(run.method),
+        "settings": {
+            **vars(run.limits),
+            "branches": [list(pair) for pair in dict(run.limits.branches).items()],
+        },
+        "bodies": tuple(body.name for body in run.scene.body),
+    }
+
+
+def reactions_of(balance: Balance) -> dict[str, Any]:
+    """The fields of a Motion that its reactions fill."""
+    return {"reactions": balance.reactions(), "open_reactions": balance.open_dimensions()}
+
+
+def cost_of(seconds: float, built: float, counts: Sequence[int]) -> Cost:
+    """The cost of a run, from ``layout.Counts`` in their order, without the crossings."""
+    return Cost(seconds, built, *map(int, counts[:5]))
+
+
+def _crossings(run: Run) -> Sequence[Crossing] | None:
+    """The singular positions passed; None for a method that does not look for them."""
     if not run.method.stabilisation.projects:
         return None
-    found = []
-    for passed in run.crossings:
-        crossing = singular_position(run.model, passed)
-        v = crossing.velocities.reshape(len(crossing.velocities), -1, 6)
-        q = np.broadcast_to(crossing.coordinates.reshape(-1, 7), (len(v), v.shape[1], 7))
-        motion = run.model.motion(q, v, np.zeros_like(v))
-        found.append(
-            Crossing(
-                crossing.time,
-                motion["position"][0],
-                motion["orientation"][0],
-                motion["velocity"],
-                motion["angular_velocity"],
-                crossing.taken,
-                crossing.sentence,
-            )
-        )
-    return tuple(found)
+    return Crossings(run.model, run.crossings) if run.crossings else ()
 
 
 def _message(run: Run, status: int) -> str:
@@ -130,12 +124,20 @@ def _message(run: Run, status: int) -> str:
         return REST_POSITION
     if status == UNDECIDED and run.memory.loop.clock.time == 0.0 and fits_no_branch(run):
         return NO_BRANCH
-    rounded = REDUNDANT.format(run.ranks.next) if run.ranks.next > ROUNDING else ""
     if status != DONE:
-        return "; ".join(filter(None, (_cause(run, status), rounded, _remedy(run, status))))
+        return "; ".join(filter(None, (_cause(run, status), _rounded(run.ranks), _remedy(run, status))))
     crossings = int(run.memory.equations.system.counts.crossings)
     passed = f"singular positions passed: {crossings}" if crossings else ""
-    return "; ".join(filter(None, (run.start.report(), rounded, passed)))
+    return "; ".join(filter(None, (report_of(run.start, run.ranks), passed)))
+
+
+def report_of(start: Start, ranks: Ranks) -> str:
+    """The correction of the start, and rows that depend on others but for rounding."""
+    return "; ".join(filter(None, (start.report(), _rounded(ranks))))
+
+
+def _rounded(ranks: Ranks) -> str:
+    return REDUNDANT.format(ranks.next) if ranks.next > ROUNDING else ""
 
 
 def _remedy(run: Run, status: int) -> str:

@@ -26,11 +26,26 @@ NO_RANKS = Ranks(0, 1.0, 0.0)
 
 def ranks_at(model: Model, q: np.ndarray, symbolic: Symbolic, tolerance: float) -> Ranks:
     """Those of the rows that take part, at q (7 nb,); rank 0 where there are too many."""
+    blocks = model.blocks(0.0, q, np.zeros(model.n)).jacobian[None]
+    (found,) = all_ranks(model, blocks, model.data.metric_root[None], symbolic, tolerance)
+    return found
+
+
+def all_ranks(
+    model: Model, blocks: np.ndarray, metric_root: np.ndarray, symbolic: Symbolic, tolerance: float
+) -> list[Ranks]:
+    """``ranks_at`` of s scenes of the structure of a model.
+
+    From Φ_q as blocks (s, m, 12) and the inverse roots (s, n) of their metrics.
+    """
     rows, columns = symbolic.row.astype(int), symbolic.column.astype(int)
     if rows.size > MOST_ROWS or not rows.size:
-        return NO_RANKS
-    jacobian = model.terms(0.0, q, np.zeros(model.n)).jacobian[np.ix_(rows, columns)]
-    jacobian *= model.data.metric_root[columns]
-    values = np.linalg.svd(jacobian / row_lengths(jacobian)[:, None], compute_uv=False)
+        return [NO_RANKS] * len(blocks)
+    jacobian = model.dense(blocks)[:, rows[:, None], columns] * metric_root[:, None, columns]
+    every = np.linalg.svd(jacobian / row_lengths(jacobian)[..., None], compute_uv=False)
+    return [_ranks(values, tolerance) for values in every]
+
+
+def _ranks(values: np.ndarray, tolerance: float) -> Ranks:
     rank = int((values > tolerance).sum())
     return Ranks(rank, float(values[rank - 1]) if rank else 1.0, float(np.append(values, 0.0)[rank]))

@@ -21,7 +21,6 @@ from mbref.kernels.compilation import Exchangeable
 from mbref.kernels.layout import (
     NOT_CONVERGED,
     Active,
-    Control,
     Kernels,
     Loop,
     Memory,
@@ -37,18 +36,17 @@ from mbref.kernels.scene_layout import SceneData
 from mbref.linear_algebra.symbolic_factorisation import empty_factor
 from mbref.method import Method
 from mbref.scene import Scene, SceneError
+from mbref.simulation.control import control_of
 from mbref.simulation.limits import AUTO, SPECIALISED, Limits
 from mbref.simulation.ranks import NO_RANKS, ranks_at
 from mbref.simulation.stepping import CREEPING, PAUSED, SINGULAR_AHEAD, UNDECIDED, advance_to_end
-from mbref.specialised import Part, Specialised, Untraceable, specialise, with_specialised_code
+from mbref.specialised import Part, Specialised, Untraceable, Varied, specialise, with_specialised_code
 from mbref.stabilisation.base import Stabilisation
 
-STEPS_PER_CALL = 5_000  # between returns to Python, where an interrupt is heard and progress is told
 OUT_OF_REACH, PACE_STEPS = 100.0, 20_000  # limits of steps that the end is away, at the pace of so many
 NEARLY = 1e-5  # least singular value below which rows are nearly dependent
 MOST_COMPARED = 60  # rows whose gradients at both ends of a step are compared
 STEPS_WORTH_CODE = 20_000  # steps ahead from which on specialised code saves more than it takes to make
-UNWRAPPED = 1.0  # rad that a body may turn in a step where torsion springs unwrap: two turn less than π apart
 
 
 class Run:
@@ -57,16 +55,19 @@ class Run:
     def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
         self.scene, self.method, self.times, self.limits = scene, method, times, limits
         self.model, self.start, self.reduction = self._posed()
+        self._control = control_of(self.model, method, times, limits)
         prepare(method)  # so that the run alone is timed
         self._lent = self._lend_memory()
         self.memory, self.packed = self._lent.values, self._lent.packed
         if method.stabilisation.projects:
             self.part = Part(self.memory.active, self.memory.factor)
-        self._enter()
+        self.put_start()
+        self.enter_state()
         self.specialised: Specialised | None = None
         self.wants_code = limits.code == AUTO
         self.crossings: list[Passed] = []
         self.making = 0.0  # s of CPU time spent on specialised code
+        self.built = 0.0  # and on all else before the first step
         self._judged = 0.0, 0  # time (s) and steps when the pace was last judged
         if limits.code == SPECIALISED:
             self._specialise()
@@ -102,19 +103,31 @@ class Run:
         if freedoms > 0:
             raise SceneError(missing_masses(self.scene))
 
+    def begin_again(self) -> None:
+        """Have the memory that this run was given, with its numbers and its start."""
+        self._lent.restore()
+        self._put_numbers(self.memory, self.reduced(self.model.data))
+        self.put_start()
+
+    def reduced(self, data: SceneData, axis: int = 0) -> SceneData:
+        """The data of a scene with the primitives that the run needs; ``axis`` counts them."""
+        sparse = self.method.formulation.linear_algebra.sparse
+        return self.reduction.scene(data, axis) if self.reduction and sparse else data
+
     def _lend_memory(self) -> Lent:
         """Memory with the numbers of this run."""
-        model, method, reduction = self.model, self.method, self.reduction
-        sparse = reduction is not None and method.formulation.linear_algebra.sparse
-        data = reduction.scene(model.data) if reduction and sparse else model.data
+        model, reduction, data = self.model, self.reduction, self.reduced(self.model.data)
         key = (Memory, *self._identity(), reduction, self.times.size, *model.sizes.values(), shapes_of(data))
         memory = lent(key, lambda: self._allocate(data))
-        equations = memory.values.equations
-        model.put_numbers(equations, data)
-        write(equations.system.settings, method.settings(self.limits.rank_tolerance))
-        write(memory.values.control, self._control())
-        memory.values.loop.times[:] = self.times
+        self._put_numbers(memory.values, data)
         return memory
+
+    def _put_numbers(self, memory: Memory, data: SceneData) -> None:
+        """Have memory hold the numbers of the scene, the method and the limits."""
+        self.model.put_numbers(memory.equations, data)
+        write(memory.equations.system.settings, self.method.settings(self.limits.rank_tolerance))
+        write(memory.control, self._control)
+        memory.loop.times[:] = self.times
 
     def _identity(self) -> tuple[Any, ...]:
         """All of the method that is in its memory: kernels, schemas and options."""
@@ -122,7 +135,7 @@ class Run:
         schemas = formulation.linear_algebra, stabilisation.memory, integrator.schema
         numbers = formulation.numbers, stabilisation.numbers
         options = (tuple(self.method.options_of(part).items()) for part in self.method.parts)
-        return self._kernels(stabilisation), schemas, numbers, *options
+        return self._kernels_on(stabilisation), schemas, numbers, *options
 
     def _allocate(self, data: SceneData) -> Memory:
         """Memory of the method for the data of a scene, ready but for numbers."""
@@ -132,6 +145,7 @@ class Run:
         pivots = factor.symbolic.row.size
         algebra = formulation.linear_algebra
         sizes = {**model.sizes, "k": self.times.size, "dense_rows": algebra.rows(model.m), "pivots": pivots}
+        sizes["numbers"] = 0
         compared = pivots <= MOST_COMPARED
         sizes["compared_rows"] = pivots if compared else 0
         sizes["compared_entries"] = factor.d.size if compared else 0
@@ -148,11 +162,11 @@ class Run:
             previous=allocate(State, sizes),
             active=active,
             factor=factor,
-            control=record(self._control()),
+            control=record(self._control),
             watch=record(Watch()),
             pivots=np.ones(pivots),
             loop=allocate(Loop, sizes),
-            kernels=self._kernels(stabilisation),
+            kernels=self._kernels_on(stabilisation),
             code=allocate(SpecialisedCode, sizes),
             chart=packed(allocate(stabilisation.memory, sizes)) if stabilisation.memory else None,
             chart_options=method.packed_options(stabilisation),
@@ -167,29 +181,7 @@ class Run:
             return factor, Active(np.arange(7 * self.model.nb), np.arange(self.model.n))
         return factor, reduction.active
 
-    def _control(self) -> Control:
-        limits, integrator = self.limits, self.method.integrator
-        span = float(self.times[-1]) or 1.0
-        options, largest_step = self.method.options_of(integrator), limits.largest_step or span
-        turn = UNWRAPPED if self.model.has_angles else self.method.stabilisation.largest_turn
-        turn = min(turn, integrator.largest_turn)
-        return Control(
-            order=integrator.highest_order(options),
-            fixed_step=0.0 if integrator.adaptive else min(options["step"], largest_step),
-            smallest_step=limits.smallest_step or 1e-12 * span,
-            largest_step=largest_step,
-            largest_turn=limits.largest_turn or turn,
-            violation=limits.violation * max(1.0, self.model.length),
-            most_steps=limits.most_steps,
-            steps_per_call=STEPS_PER_CALL,
-            forced_step=limits.forced_step,
-            first_step=limits.first_step,
-            rtol=limits.rtol,
-            atol=limits.rtol if limits.atol is None else limits.atol,
-            closed_loops=self.model.closed_loops,
-        )
-
-    def _kernels(self, chart: Stabilisation) -> Kernels:
+    def _kernels_on(self, chart: Stabilisation) -> Kernels:
         """The kernels of the method on this chart."""
         integrator = self.method.integrator
         kernels = Kernels(
@@ -203,7 +195,8 @@ class Run:
         )
         return Kernels(*(kernel.pointer if kernel else None for kernel in kernels))
 
-    def _enter(self) -> None:
+    def put_start(self) -> None:
+        """Have memory hold the start and its ranks."""
         memory = self.memory
         memory.state.coordinates[:] = self.start.q
         memory.state.velocities[:] = self.start.v
@@ -216,7 +209,6 @@ class Run:
             settings.independent = self.ranks.rank == memory.pivots.size
             settings.nearly_dependent = self.ranks.least < NEARLY
             settings.rounding *= min(1.0, self.model.length)
-        self.enter_state()
 
     def enter_state(self) -> None:
         """Start from the time of the clock and the state in memory."""
@@ -275,16 +267,30 @@ class Run:
     def _specialise(self) -> None:
         """Go on with code specialised for the scene, made or loaded; raises Untraceable."""
         began = time.process_time()
+        self.memory = self.with_code(self.model, self.start)
+        self.packed = packed(self.memory)
+        self.making += time.process_time() - began
+
+    def with_code(self, model: Model, start: Start, varied: Varied | None = None) -> Memory:
+        """Memory of this run with code specialised for a scene of its structure.
+
+        Or for all that differ from it in the numbers ``varied``; raises Untraceable.
+        """
         stabilisation = self.method.stabilisation
         if not stabilisation.projects:
             raise Untraceable(f"{stabilisation.name} has no specialised code")
-        rank_tolerance = self.limits.rank_tolerance
-        self.specialised = specialise(self.model, self.method, rank_tolerance, self.start, self.part)
-        code = self.memory.code._replace(addresses=record(self.specialised.addresses))
-        kernels = self._kernels(with_specialised_code(stabilisation))
-        self.memory = self.memory._replace(code=code, kernels=kernels)
-        self.packed = packed(self.memory)
-        self.making += time.process_time() - began
+        tolerance, general = self.limits.rank_tolerance, self._lent.values
+        self.specialised = specialise(model, self.method, tolerance, start, self.part, varied)
+        code = general.code._replace(addresses=record(self.specialised.addresses))
+        if varied:
+            code = code._replace(numbers=varied.numbers[0].copy())
+        return general._replace(code=code, kernels=self._kernels_on(with_specialised_code(stabilisation)))
+
+    @property
+    def memory_of_kernels(self) -> Memory:
+        """Memory of this run on the general kernels."""
+        memory: Memory = self._lent.values
+        return memory
 
 
 def missing_masses(scene: Scene) -> list[str]:

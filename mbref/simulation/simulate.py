@@ -54,19 +54,30 @@ def simulate(
         raise MethodError(
             f"branches: {method} does not look for singular positions; +projection and taylor do"
         )
+    run = begun(scene, method, times, limits)
+    motion = completed(run, progress)
+    run.give_back()
+    return motion
+
+
+def begun(scene: Scene, method: Method, times: np.ndarray, limits: Limits) -> Run:
+    """The run of a scene, ready to be advanced."""
     began = time.process_time()
     try:
         run = kind_of(method)(scene, method, times, limits)
     except Untraceable as reason:
         raise MethodError(f"no machine code for {scene.name!r} by {method}: {reason}") from None
-    built = time.process_time() - began - run.making
+    run.built = time.process_time() - began - run.making
+    return run
+
+
+def completed(run: Run, progress: Callable[[float], None] | None = None) -> Motion:
+    """The motion of a run, advanced to its end."""
     status, seconds = run.advance(progress)
     status = compare_with_default(run, status)
     if status == DONE:
         _check_branches(run)
-    motion = trajectory_of(run, status, seconds, built + run.making)
-    run.give_back()
-    return motion
+    return trajectory_of(run, status, seconds, run.built + run.making)
 
 
 def _check_branches(run: Run) -> None:

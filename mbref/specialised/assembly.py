@@ -1,6 +1,7 @@
 """LLVM IR of a record, in a straight line.
 
-A record becomes a function ``i64 f(double t, double* y, double* angles, double* out, double* more)`` of the
+A record becomes a function ``i64 f(double t, double* y, double* angles, double* numbers, double* out,
+double* more)`` of the
 operations that its results need; it returns 0 when all its guards held.  A sum may take a product in before
 it is rounded (``contract``); no other operation is rounded differently from the kernel's.
 """
@@ -14,7 +15,7 @@ from mbref.specialised.tracing import COMPARISONS, Record, Scalar, Untraceable, 
 
 MOST_OPERATIONS = 20_000  # what LLVM compiles in a second
 BINARY = ("fadd", "fsub", "fmul", "fdiv")
-VECTORS, RESULTS = ("y", "angles"), ("out", "more")
+VECTORS, RESULTS = ("y", "angles", "numbers"), ("out", "more")
 CALLS = {
     "sin": "sin", "cos": "cos", "atan2": "atan2", "sqrt": "llvm.sqrt.f64", "fabs": "llvm.fabs.f64",
     "floor": "llvm.floor.f64",

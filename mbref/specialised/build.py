@@ -7,7 +7,6 @@ the active rows and columns, and one Newton step of the projection.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -28,6 +27,7 @@ from mbref.linear_algebra.sparse_cholesky import find_squared_pivots
 from mbref.method import Method
 from mbref.specialised.assembly import Piece, text_of
 from mbref.specialised.tracing import Record, Untraceable, inputs, numbers, plain
+from mbref.specialised.varied import Varied, arrays_of
 from mbref.stabilisation.projection import REPEATED, project_velocities, whole_newton_step
 
 MOST_ROWS = 60  # the record of more would be too long (assembly.MOST_OPERATIONS)
@@ -52,13 +52,17 @@ class Specialised:
 class RecordingState:
     """The start as recording scalars, and memory for the kernels to run on."""
 
-    def __init__(self, model: Model, method: Method, rank_tolerance: float, start: Start, part: Part):
+    def __init__(
+        self, model: Model, method: Method, rank_tolerance: float, start: Start, part: Part,
+        varied: Varied | None = None,
+    ):  # fmt: skip
         self.active, self.record, self.formulation = part.active, Record(), method.formulation
         algebra, (q, v) = method.formulation.linear_algebra, part.active
         sizes = {**model.sizes, "dense_rows": algebra.rows(model.m)}
         rows, columns = part.factor.symbolic.row.size, v.size
         equations = model.equations(
             sizes,
+            varied.data if varied else None,
             settings=record(method.settings(rank_tolerance)),
             options=method.packed_options(method.formulation),
             scratch=packed(algebra.scratch(rows, columns, part.factor)),
@@ -66,11 +70,13 @@ class RecordingState:
         self.memory = with_numbers(
             SimpleNamespace(
                 equations=equations,
-                state=allocate(State, sizes)._replace(coordinates=start.q, velocities=start.v),
+                state=allocate(State, sizes)._replace(coordinates=start.q.copy(), velocities=start.v.copy()),
                 factor=part.factor,
                 chart=allocate(method.stabilisation.memory, sizes),
             )
         )
+        if varied:
+            varied.put_inputs(self.record, self.memory)
         (self.t,) = inputs(self.record, "t", np.zeros(1))
         scalars = inputs(self.record, "y", np.concatenate([start.q[q], start.v[v]]))
         state = self.memory.state
@@ -139,8 +145,17 @@ def project_piece(state: RecordingState) -> Piece:
     return Piece("project", state.record, y, [violation, *memory.factor.squared_pivots])
 
 
-def specialise(model: Model, method: Method, rank_tolerance: float, start: Start, part: Part) -> Specialised:
+def specialise(
+    model: Model,
+    method: Method,
+    rank_tolerance: float,
+    start: Start,
+    part: Part,
+    varied: Varied | None = None,
+) -> Specialised:
     """The code of a scene from its start, recorded and compiled, or as kept from an earlier run.
+
+    It takes the numbers that are ``varied``, so that it serves all scenes that differ in them alone.
 
     Raises Untraceable where the formulation chooses pivots at run time, the scene is too large, or there is
     no JIT.
@@ -151,7 +166,7 @@ def specialise(model: Model, method: Method, rank_tolerance: float, start: Start
         raise Untraceable(f"{method.formulation.name} chooses pivots at every evaluation")
     if part.factor.symbolic.row.size > MOST_ROWS:
         raise Untraceable(f"{part.factor.symbolic.row.size} rows are active, more than {MOST_ROWS}")
-    arguments = (model, method, rank_tolerance, start, part)
+    arguments = (model, method, rank_tolerance, start, part, varied)
     path = CACHE / "scenes" / f"{_key(*arguments)}.code"
     code = code_at(path, lambda: text_of(_pieces(*arguments)))
     return Specialised(Addresses(*map(code.address, Addresses._fields)), code)
@@ -161,18 +176,12 @@ def _pieces(*arguments: Any) -> list[Piece]:
     return [rates_piece(RecordingState(*arguments)), project_piece(RecordingState(*arguments))]
 
 
-def _key(model: Model, method: Method, rank_tolerance: float, start: Start, part: Part) -> str:
+def _key(
+    model: Model, method: Method, rank_tolerance: float, start: Start, part: Part, varied: Varied | None
+) -> str:
     digest = hashlib.sha256(f"{method} {rank_tolerance} {processor()}".encode())
     factor = part.factor
-    for array in _arrays((model.data, start.q, start.v, part.active, factor.symbolic, factor.static)):
+    numbers = varied.constants() if varied else (model.data, start.q, start.v)
+    for array in arrays_of((*numbers, part.active, factor.symbolic, factor.static)):
         digest.update(str(array.shape).encode() + array.tobytes())
     return digest.hexdigest()[:32]
-
-
-def _arrays(values: Any) -> Iterator[np.ndarray]:
-    """All arrays of nested tuples."""
-    for value in values:
-        if isinstance(value, np.ndarray):
-            yield value
-        else:
-            yield from _arrays(value)

@@ -22,19 +22,19 @@ from mbref.stabilisation.projection import FACTOR_FAILED, newton_loop, project, 
 
 
 @intrinsic
-def call(typingctx, address, t, y, angles, out, more):
+def call(typingctx, address, t, y, angles, numbers, out, more):
     """Call a piece of machine code; 0 when its guards held."""
 
     def generate(context, builder, signature, arguments):
         double, pointer = ir.DoubleType(), ir.DoubleType().as_pointer()
-        kind = ir.FunctionType(ir.IntType(64), [double, *[pointer] * 4])
+        kind = ir.FunctionType(ir.IntType(64), [double, *[pointer] * 5])
         data = [
             context.make_array(array)(context, builder, value).data
             for array, value in zip(signature.args[2:], arguments[2:], strict=True)
         ]
         return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), [arguments[1], *data])
 
-    return i8(address, t, y, angles, out, more), generate
+    return i8(address, t, y, angles, numbers, out, more), generate
 
 
 @kernel
@@ -43,7 +43,8 @@ def evaluate_by_code(t, y, y_rate, memory):
     system, angles = memory.equations.system, memory.equations.angles
     system.counts.evaluations += 1
     system.counts.factorisations += 1
-    status = call(memory.code.addresses.rates, t, y, angles, y_rate, system.multipliers)
+    code = memory.code
+    status = call(code.addresses.rates, t, y, angles, code.numbers, y_rate, system.multipliers)
     return OK if status == OK else GUARD_FAILED
 
 
@@ -67,9 +68,9 @@ def rates_with_outputs(t, y, y_rate, memory):
 @inlined
 def newton_step_by_code(t, y, before, memory):
     """One Newton step of the projection of y by specialised code; the largest |Φ| before it."""
-    code, size = memory.code, memory.loop.clock.y_size
+    code, size, angles = memory.code, memory.loop.clock.y_size, memory.equations.angles
     memory.equations.system.counts.factorisations += 1
-    if call(code.addresses.project, t, y, memory.equations.angles, code.y, code.outputs) != OK:
+    if call(code.addresses.project, t, y, angles, code.numbers, code.y, code.outputs) != OK:
         return FACTOR_FAILED
     copy(code.y[:size], y[:size])
     return code.outputs[0]

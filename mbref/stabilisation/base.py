@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from mbref.kernels.compilation import Exchangeable
@@ -38,7 +39,7 @@ class Stabilisation:
     projects: bool = False  # every accepted state meets the constraints, and only active coordinates are in y
     largest_turn: float = 1.0  # rad that a body may turn in an adaptive step unless the user says
 
-    @property
+    @cached_property
     def options(self) -> Mapping[str, float]:
         """Names and defaults of the method's numbers."""
         return self.numbers()._asdict()

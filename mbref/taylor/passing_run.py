@@ -19,8 +19,8 @@ from mbref.simulation.run import Run
 from mbref.simulation.singular_start import Leaving
 from mbref.simulation.stepping import DONE, PAUSED, UNDECIDED
 from mbref.taylor.layout import Polynomials
-from mbref.taylor.natural import NaturalCoordinates
 from mbref.taylor.passing import begin_here, cross, give_back, look_along, pass_on, take_over
+from mbref.taylor.polynomials import Geometry
 from mbref.taylor.series_run import SeriesRun
 from mbref.taylor.start import OFF
 
@@ -43,10 +43,10 @@ class PassingRun(SeriesRun):
         """Those of the run, all but its memory."""
         return self._run.model, self._run.start, self._run.reduction
 
-    def _equations(self) -> tuple[NaturalCoordinates, Polynomials]:
+    def _equations(self) -> tuple[Geometry, Polynomials]:
         """Those of a run that is in series itself."""
         run = self._run
-        return (run.natural, run.polynomials) if isinstance(run, SeriesRun) else super()._equations()
+        return (run.geometry, run.polynomials) if isinstance(run, SeriesRun) else super()._equations()
 
     def take_over(self, run: Run) -> None:
         """Go on from the state and time of a run of the same scene, as a passage begins."""

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from mbref import rotations
-from mbref.kernels.scene_layout import FORCE, MOMENT, SPRING, TORSION_SPRING
+from mbref.equations.model import Model
+from mbref.kernels.scene_layout import FORCE, MOMENT, SPRING, TORSION_SPRING, Bodies, Loads
 from mbref.taylor.expressions import ONE, Expression, cleaned
 from mbref.taylor.lanes import LANES, filled
 from mbref.taylor.layout import Given, Inertia, Polynomials, Poses, Products, Rows, Springs, Torsions
@@ -17,22 +18,29 @@ from mbref.taylor.natural import NaturalCoordinates
 from mbref.taylor.orientations import Triple
 
 
-def polynomials_of(of: NaturalCoordinates) -> Polynomials:
-    """The polynomials of a scene."""
-    multipliers = len(of.kept)
-    lane = {v: i for i, v in enumerate(of.kept)}
-    lane |= {v: multipliers + len(of.rows) + g for g, v in enumerate(of.given)}
-    lanes = filled(max(1, len(lane) + len(of.rows)))
-    forms = Forms(of)
-    return Polynomials(
-        rows=_rows(of, lane, lanes),
-        products=_products(of, lane, lanes),
-        inertia=_inertia(of, forms, lanes),
-        poses=_poses(of, forms),
-        given=_given(of),
-        springs=_springs(of, forms),
-        torsions=_torsions(of, forms),
-    )
+class Geometry:
+    """The equations of a scene in natural coordinates, but for masses and loads, which may be any."""
+
+    def __init__(self, of: NaturalCoordinates):
+        self.natural, self.readings, self._forms = of, of.images.of(of.kept), Forms(of)
+        multipliers = len(of.kept)
+        lane = {v: i for i, v in enumerate(of.kept)}
+        lane |= {v: multipliers + len(of.rows) + g for g, v in enumerate(of.given)}
+        self._lanes = filled(max(1, len(lane) + len(of.rows)))
+        self._rows, self._products = _rows(of, lane, self._lanes), _products(of, lane, self._lanes)
+        self._poses, self._given = _poses(of, self._forms), _given(of)
+
+    def polynomials(self, model: Model) -> Polynomials:
+        """The polynomials of a scene of this geometry."""
+        return Polynomials(
+            rows=self._rows,
+            products=self._products,
+            inertia=_inertia(model, self._forms, self._lanes),
+            poses=self._poses,
+            given=self._given,
+            springs=_springs(model.data.loads, self._forms),
+            torsions=_torsions(model.data.loads, self._forms),
+        )
 
 
 class Forms:
@@ -42,6 +50,8 @@ class Forms:
         self.of, self.d = of, len(of.kept)
         self._place = {v: i for i, v in enumerate(of.kept)}
         self._axes: dict[int, Sequence[Triple]] = {}
+        self._centres: dict[int, np.ndarray] = {}
+        self._of_axes: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     def __call__(self, expressions: Sequence[Expression]) -> tuple[np.ndarray, np.ndarray]:
         """Constants (k,) and coefficients (k, d)."""
@@ -64,14 +74,24 @@ class Forms:
             self._axes[body] = [self.of.direction(body, axis) for axis in np.eye(3)]
         return self._axes[body]
 
-    def mass(self) -> np.ndarray:
+    def centre(self, body: int) -> np.ndarray:
+        """Coefficients (3, d) of a body's centre of mass."""
+        if body not in self._centres:
+            self._centres[body] = self.variables(self.of.centres[body])[1]
+        return self._centres[body]
+
+    def of_axes(self, body: int) -> tuple[np.ndarray, np.ndarray]:
+        """Constants (9,) and coefficients (9, d) of the directions of a body's principal axes."""
+        if body not in self._of_axes:
+            self._of_axes[body] = self([component for image in self.axes(body) for component in image])
+        return self._of_axes[body]
+
+    def mass(self, bodies: Bodies) -> np.ndarray:
         """M (d, d) with ½ ż M ż the kinetic energy in the unit of length squared."""
-        of, bodies = self.of, self.of.model.data.bodies
         total = np.zeros((self.d, self.d))
-        for b in range(of.nb):
-            _, centre = self.variables(of.centres[b])
-            _, axes = self([component for image in self.axes(b) for component in image])
-            principal = bodies.inertia[b] / of.length**2
+        for b in range(self.of.nb):
+            centre, (_, axes) = self.centre(b), self.of_axes(b)
+            principal = bodies.inertia[b] / self.of.length**2
             total += bodies.mass[b] * centre.T @ centre
             total += axes.T @ (np.repeat(principal.sum() / 2 - principal, 3)[:, None] * axes)
         return total
@@ -123,13 +143,12 @@ def _slots(terms: Sequence[Sequence[tuple]], nothing: tuple) -> tuple[list[tuple
     return slots, np.array(start)
 
 
-def _inertia(of: NaturalCoordinates, forms: Forms, lanes: int) -> Inertia:
+def _inertia(model: Model, forms: Forms, lanes: int) -> Inertia:
     """The mass matrix; gravity, forces and moments that are constant."""
-    model, loads = of.model, of.model.data.loads
+    of, loads = forms.of, model.data.loads
     force, linear = np.zeros(forms.d), np.zeros((forms.d, forms.d))
     for b in range(of.nb):
-        _, centre = forms.variables(of.centres[b])
-        force += model.data.bodies.mass[b] * (model.data.gravity / of.length) @ centre
+        force += model.data.bodies.mass[b] * (model.data.gravity / of.length) @ forms.centre(b)
     for k in np.flatnonzero((loads.kind == FORCE) & (loads.first < of.nb)):
         _, point = forms(of.point(int(loads.first[k]), loads.point_first[k]))
         force += (loads.force[k] / of.length) @ point
@@ -140,7 +159,7 @@ def _inertia(of: NaturalCoordinates, forms: Forms, lanes: int) -> Inertia:
     slots, start = _slots([*terms, *[[]] * (lanes - forms.d)], (0, 0.0))
     force = np.concatenate([force, np.zeros(lanes - forms.d)])
     mass = np.zeros((forms.d, lanes))
-    mass[:, : forms.d] = forms.mass()
+    mass[:, : forms.d] = forms.mass(model.data.bodies)
     coupling, coupled = map(np.ascontiguousarray, np.nonzero(mass))
     first = np.searchsorted(coupling, np.arange(forms.d + 1))
     return Inertia(mass, coupled, first, force, *_columns(slots, 1), start)
@@ -149,8 +168,8 @@ def _inertia(of: NaturalCoordinates, forms: Forms, lanes: int) -> Inertia:
 def _moment(forms: Forms, body: int, moment: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Constant (d,) and linear (d, d) force of a moment: ½ Σ (moment × R e) · δ(R e) over three axes."""
     constant, matrix = np.zeros(forms.d), np.zeros((forms.d, forms.d))
-    for image in forms.axes(body):
-        at_rest, moving = forms(image)
+    all_at_rest, all_moving = (each.reshape(3, 3, -1) for each in forms.of_axes(body))
+    for at_rest, moving in zip(all_at_rest[..., 0], all_moving, strict=True):
         constant += 0.5 * rotations.cross(moment, at_rest) @ moving
         matrix += 0.5 * moving.T @ rotations.cross(moment, moving.T).T
     return constant, matrix
@@ -173,8 +192,8 @@ def _given(of: NaturalCoordinates) -> Given:
     return Given(*_columns(rows, 2))
 
 
-def _springs(of: NaturalCoordinates, forms: Forms) -> Springs:
-    loads, rows = of.model.data.loads, []
+def _springs(loads: Loads, forms: Forms) -> Springs:
+    of, rows = forms.of, []
     for k in np.flatnonzero(loads.kind == SPRING):
         one, other = (
             forms(of.point(int(body[k]), point[k]))
@@ -192,8 +211,8 @@ def _springs(of: NaturalCoordinates, forms: Forms) -> Springs:
     return Springs(*_stacked(rows, 3, forms.d))
 
 
-def _torsions(of: NaturalCoordinates, forms: Forms) -> Torsions:
-    loads, rows = of.model.data.loads, []
+def _torsions(loads: Loads, forms: Forms) -> Torsions:
+    of, rows = forms.of, []
     for k in np.flatnonzero(loads.kind == TORSION_SPRING):
         first, second = int(loads.first[k]), int(loads.second[k])
         images = (of.direction(first, loads.x_first[k]), of.direction(first, loads.y_first[k]),

@@ -16,6 +16,7 @@ from mbref.scene import Scene
 from mbref.simulation.limits import AUTO, GENERIC, SPECIALISED, Limits
 from mbref.simulation.run import Run
 from mbref.specialised import Untraceable
+from mbref.taylor.geometry import geometry_of
 from mbref.taylor.lanes import filled
 from mbref.taylor.layout import (
     Polynomials,
@@ -28,9 +29,8 @@ from mbref.taylor.layout import (
     Solver,
     TaylorMemory,
 )
-from mbref.taylor.natural import NaturalCoordinates
 from mbref.taylor.passing import begin_here, cross, give_back, look_along, pass_on, take_over
-from mbref.taylor.polynomials import polynomials_of
+from mbref.taylor.polynomials import Geometry
 from mbref.taylor.scene_code import code_of, functions_of, rank_of
 from mbref.taylor.start import OFF
 from mbref.taylor.stepping import advance_series, begin, enter, expand_from, step
@@ -68,7 +68,7 @@ class SeriesRun(Run):
         tolerance = SHARE * (control.rtol + control.atol)
         code = SPECIALISED if limits.code == SPECIALISED else GENERIC
         order = order_of(tolerance, method.options_of(method.integrator)["order"], code)
-        self.natural, self.polynomials = self._equations()
+        self.geometry, self.polynomials = self._equations()
         self.taylor = self._taylor_memory(order)
         progress = self.taylor.progress
         progress.order, progress.tolerance = order, tolerance
@@ -85,15 +85,15 @@ class SeriesRun(Run):
         if settings.nearly_dependent:
             settings.rank_tolerance = (least * max(rounding, ROUNDING)) ** 0.5
 
-    def _equations(self) -> tuple[NaturalCoordinates, Polynomials]:
+    def _equations(self) -> tuple[Geometry, Polynomials]:
         """The scene in natural coordinates, and its equations in them."""
         moving = np.zeros(self.model.n, dtype=bool)
         moving[self.part.active.velocities] = True
-        natural = NaturalCoordinates(self.model, self.start, moving)
-        return natural, polynomials_of(natural)
+        geometry = geometry_of(self.model, self.start, moving)
+        return geometry, geometry.polynomials(self.model)
 
     def _taylor_memory(self, order: int) -> TaylorMemory:
-        natural, polynomials = self.natural, self.polynomials
+        natural, polynomials = self.geometry.natural, self.polynomials
         orders, nz, ng, nr = order + 1, len(natural.kept), len(natural.given), len(natural.rows)
         sizes = {
             "orders": orders, "nz": nz, "ng": ng, "nr": nr, "nb": self.model.nb,
@@ -109,7 +109,7 @@ class SeriesRun(Run):
         return TaylorMemory(
             run=self.memory,
             polynomials=polynomials,
-            readings=natural.images.of(natural.kept),
+            readings=self.geometry.readings,
             series=series,
             solver=solver_of(polynomials.rows, sizes),
             progress=record(Progress()),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import signal
+from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 
@@ -12,12 +13,13 @@ import numpy as np
 import pytest
 
 from mbref.cli import main
-from mbref.scene import SceneError
+from mbref.scene import Scene, SceneError
 from mbref.scenes import SCENES
 from mbref.scenes.spatial_slider_crank import OFFSET, RADIUS, ROD
 from mbref.simulation.ensemble import ensemble
 from mbref.simulation.processes import processes
 from mbref.simulation.simulate import Limits, simulate
+from mbref.simulation.together import run_all
 from mbref.variation import Variation, variants
 
 TIMES = np.array([0.0, 0.004, 0.01])
@@ -61,11 +63,11 @@ def test_variants_and_closed_form_of_the_varied_lengths_agree():
 def test_interrupted_and_uninterrupted_ensembles_agree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     scenes, path, ran = list(variants(DRIVEN, VARY, 6)), tmp_path / "runs.jsonl", []
 
-    def counted(scene, *arguments):
-        ran.append(scenes.index(scene))
-        return simulate(scene, *arguments)
+    def counted(given, *arguments):
+        ran.extend(map(scenes.index, given))
+        return run_all(given, *arguments)
 
-    monkeypatch.setattr("mbref.simulation.ensemble.simulate", counted)
+    monkeypatch.setattr("mbref.simulation.ensemble.run_all", counted)
     with ThreadPoolExecutor(1) as one:
         whole = dict(ensemble(scenes, TIMES, METHOD, LIMITS, one))
         ran.clear()
@@ -173,23 +175,46 @@ def _arguments(k: int) -> tuple:
     return (signal.SIGKILL,) if k == 2 else (2, k)
 
 
+class Fragile(Executor):
+    """One process here that is killed by calls of which ``kills`` says so, from their scenes."""
+
+    def __init__(self, kills: Callable[[Sequence[Scene]], bool]):
+        self.kills, self.calls = kills, []
+
+    def submit(self, function, /, scenes, *arguments):
+        self.calls.append(len(scenes))
+        future: Future = Future()
+        if self.kills(scenes):
+            future.set_exception(BrokenExecutor())
+        else:
+            future.set_result(function(scenes, *arguments))
+        return future
+
+
 def test_a_killed_run_is_told_and_not_stored(tmp_path: Path):
-    class Killed(Executor):
-        """Breaks at the second call."""
-
-        calls = 0
-
-        def submit(self, function, /, *arguments):
-            self.calls += 1
-            future: Future = Future()
-            if self.calls == 2:
-                future.set_exception(BrokenExecutor())
-            else:
-                future.set_result(function(*arguments))
-            return future
-
     scenes, path = list(variants(DRIVEN, VARY, 3)), tmp_path / "runs.jsonl"
-    runs = dict(ensemble(scenes, TIMES, METHOD, LIMITS, Killed(), path))
+    runs = dict(ensemble(scenes, TIMES, METHOD, LIMITS, Fragile(lambda given: scenes[1] in given), path))
     assert [runs[k].outcome.name for k in range(3)] == ["COMPLETED", "CRASHED", "COMPLETED"]
     assert runs[1].message == "its process was killed" and runs[1].bodies == runs[0].bodies
     assert len(path.read_text().splitlines()) == 2
+
+
+def test_runs_are_given_several_at_a_time_and_tried_one_by_one_where_a_process_is_killed():
+    scenes = list(variants(DRIVEN, VARY, 60))
+    executor = Fragile(lambda given: scenes[50] in given)
+    runs = dict(ensemble(scenes, TIMES, METHOD, Limits(rtol=1e-3), executor))
+    crashed = [k for k in range(60) if runs[k].outcome.name == "CRASHED"]
+    assert (sorted(runs), crashed) == (list(range(60)), [50])
+    assert max(executor.calls) > 5, executor.calls
+    assert sum(executor.calls) > 60, "none was tried again"
+
+
+def test_runs_before_a_faulty_scene_are_handed_out():
+    scenes = list(variants(DRIVEN, VARY, 30))
+    scenes[25] = scenes[25].with_(driver=(), body=tuple(
+        body.model_copy(update={"mass": None, "inertia": None}) for body in DRIVEN.body
+    ))  # fmt: skip
+    found: list[int] = []
+    with ThreadPoolExecutor(1) as one, pytest.raises(SceneError):
+        found.extend(k for k, _ in ensemble(scenes, TIMES, METHOD, Limits(rtol=1e-3), one))
+    assert set(range(25)) <= set(found) and 25 not in found, found

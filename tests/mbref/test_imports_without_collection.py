@@ -1,10 +1,12 @@
-"""Imports by the command line leave the garbage collector as it was."""
+"""Imports by the command line leave the garbage collector and the packages installed as they were."""
 
 import gc
+import subprocess
+import sys
 
 import pytest
 
-from mbref.imports import without_collection
+from mbref.imports import without_collection, without_packages
 
 
 @pytest.fixture(autouse=True)
@@ -34,3 +36,20 @@ def test_a_failed_import_leaves_the_collector_on():
     with pytest.raises(ModuleNotFoundError), without_collection():
         import mbref.no_such_module  # noqa: F401
     assert gc.isenabled()
+
+
+def test_hidden_packages_are_found_again():
+    with without_packages("wave", "gc"):
+        with pytest.raises(ModuleNotFoundError):
+            import wave
+        import gc  # which was imported before
+    import wave
+
+    assert wave and gc
+
+
+def test_numba_comes_without_packages_that_kernels_do_not_need():
+    """In a fresh process; coverage is installed here."""
+    program = "import sys, mbref.kernels.compilation; print('coverage' in sys.modules); import coverage"
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert ran.stdout == "False\n", ran.stdout

@@ -16,7 +16,6 @@ from mbref.kernels.named_memory import (
     allocate,
     opener,
     packed,
-    stacked,
 )
 from mbref.kernels.records import record
 
@@ -97,11 +96,6 @@ def test_kernels_read_and_write_every_kind_of_field():
 def test_a_packing_mistake_names_the_field(field, value, fault):
     with pytest.raises(TypeError, match=fault):
         packed(whole(**{field: value}))
-
-
-def test_rows_are_stacked_into_arrays():
-    both = stacked(Rows, [Rows(1.0, [1, 2]), Rows(2.0, [3, 4])], {"n": 1})
-    assert both.phi.tolist() == [1.0, 2.0] and both.blocks.tolist() == [[1.0, 2.0], [3.0, 4.0]]
 
 
 def test_a_record_cannot_have_a_name_that_numpy_has_taken():

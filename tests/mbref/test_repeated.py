@@ -12,21 +12,20 @@ from crosscheck.conformance.random_mechanisms import random_mechanism
 from mbref.equations import reduction
 from mbref.kernels import lent_memory
 from mbref.method import Method
-from mbref.motion import Motion
-from mbref.scene import Body, Force, Revolute, Scene, Spring, Translational
+from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.simulation.run import Run
 from mbref.simulation.simulate import Limits, simulate
 from mbref.simulation.stepping import DONE
+from mbref.taylor import geometry
 from mbref.taylor.passing_run import PassingRun
 from mbref.taylor.run import CrossingRun
 from mbref.variation import Variation, variants
+from tests.mbref.scenes_of_one_structure import CRANK, NUMBERS_DECIDE, SPATIAL, results
 
 TIMES = np.linspace(0.0, 0.02, 4)
 METHODS = ("alf-dual+projection", "mpi-svd+baumgarte", "lm2+projection", "lm1+partitioning", "taylor")
-CRANK, SPATIAL = SCENES["planar_slider_crank"](), SCENES["spatial_slider_crank"]()
 FIVE_BAR = SCENES["five_bar"]()
-X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 
 @pytest.fixture(autouse=True)
@@ -40,16 +39,7 @@ def nothing_known() -> Iterator[None]:
 def forget() -> None:
     reduction._known.clear()
     lent_memory._kept.clear()
-
-
-def results(run: Motion) -> list:
-    """All numbers of a run, as bytes."""
-    arrays = [getattr(run, key) for key in ("position", "orientation", "velocity", "angular_velocity")]
-    arrays += [run.acceleration, run.angular_acceleration]
-    for table in (run.reactions, run.open_reactions):
-        arrays += [table[name] for name in sorted(table)]
-    cost = [run.cost.steps, run.cost.rhs, run.cost.factorisations, run.cost.newton]
-    return [run.outcome.name, run.message, run.t_end, cost, *(array.tobytes() for array in arrays)]
+    geometry._known.clear()
 
 
 def simulated(scene: Scene, method: str = METHODS[0]) -> list:
@@ -86,47 +76,6 @@ def test_random_mechanisms_in_a_row_and_alone_agree():
     assert [simulated(scene) for scene in scenes * 2] == expected * 2
 
 
-def crank_with(force: tuple[float, float, float], **changes) -> Scene:
-    """The planar slider-crank with a force on its rod; a force across the plane bends it out of the plane."""
-    place = CRANK.body[1].position
-    return CRANK.with_(
-        load=(*CRANK.load, Force(body=CRANK.body[1].name, point=place, force=force)), **changes
-    )
-
-
-def rail(point: tuple[float, float, float], stiffness: float = 20.0, inertia: float = 0.02) -> Scene:
-    """A slide on an arm, pulled by a spring at a point that may turn both out of their plane."""
-    body = {"mass": 1.0, "position": (0.3, 0.0, 0.0)}
-    return Scene(
-        name="rail", duration=0.5,
-        body=(
-            Body(name="arm", mass=1.0, inertia=(0.01, 0.02, 0.02), position=(0.1, 0.0, 0.0)),
-            Body(name="slide", inertia=(inertia, inertia, inertia), **body),
-        ),
-        joint=(
-            Revolute(name="pin", bodies=("ground", "arm"), anchor=(0.0, 0.0, 0.0), axis=Z),
-            Translational(name="guide", bodies=("arm", "slide"), anchor=(0.3, 0.0, 0.0), axis=X),
-        ),
-        load=(
-            Spring(bodies=("ground", "slide"), points=((0.3, 0.5, point[2]), (0.3, 0.0, 0.0)),
-                   stiffness=stiffness, natural_length=0.3),
-            Force(body="slide", point=(0.3, 0.0, 0.0), force=point),
-        ),
-    )  # fmt: skip
-
-
-NUMBERS_DECIDE = {
-    "a force out of the plane": [crank_with((0.0, 1.0, 0.0)), crank_with((0.0, 1.0, 0.5))],
-    "gravity out of the plane": [CRANK.with_(gravity=(0.0, g, h)) for g, h in ((-9.8, 0.0), (-9.8, 1.0))],
-    "motion at the start": [
-        SPATIAL.with_(body=tuple(b.model_copy(update={"angular_velocity": None}) for b in SPATIAL.body)),
-        SPATIAL.with_("body[crank].angular_velocity", (0.0, 3.0, 0.0)),
-    ],
-    "a spring out of the plane": [rail((0.0, 0.0, 0.0)), rail((0.0, 0.0, 0.2))],
-    "no moment of inertia": [rail((0.0, 0.0, 0.2)), rail((0.0, 0.0, 0.2), inertia=0.0)],
-}
-
-
 @pytest.mark.parametrize("scenes", NUMBERS_DECIDE.values(), ids=NUMBERS_DECIDE.keys())
 def test_numbers_that_decide_what_takes_part_are_asked(scenes):
     """In every order, each scene has its own reduction, whichever reductions are known."""
@@ -145,6 +94,19 @@ def test_another_reduction_is_found_where_numbers_decide_so(name):
 def test_variants_share_a_reduction():
     scenes = variants(CRANK, [Variation("joint[B].anchor[0]", 0.304, 1e-4, normal=True)], 20)
     assert {known(scene) for scene in scenes} == {1}
+
+
+def test_scenes_that_differ_in_masses_and_loads_share_a_geometry():
+    """And those that differ in places do not: a moment and a mass vary, then the length of the crank."""
+    varied = [Variation("body[0].mass", 0.5, 2.0), Variation("load[0].moment[2]", 50.0, 150.0)]
+    length = [Variation("joint[B].anchor[0]", 0.304, 1e-4, normal=True)]
+    for variations, known in ((varied, 1), (length, 1 + 4)):
+        scenes = list(variants(CRANK, variations, 4))
+        repeated = [simulated(scene, "taylor") for scene in scenes]
+        assert len(geometry._known) == known
+        kept = dict(geometry._known)
+        assert [alone(scene, "taylor") for scene in scenes] == repeated
+        geometry._known.update(kept)
 
 
 def test_memory_in_use_is_not_lent():

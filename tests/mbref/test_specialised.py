@@ -23,7 +23,7 @@ from mbref.specialised.build import RecordingState
 from mbref.specialised.tracing import Record, Scalar, Untraceable, inputs, plain
 
 PAPER = ("spatial_slider_crank", "planar_slider_crank", "four_bar", "five_bar")
-CALL = ctypes.CFUNCTYPE(ctypes.c_longlong, ctypes.c_double, *[ctypes.c_void_p] * 4)
+CALL = ctypes.CFUNCTYPE(ctypes.c_longlong, ctypes.c_double, *[ctypes.c_void_p] * 5)
 
 
 def runs(scene, method, end=0.02, **limits):
@@ -70,7 +70,7 @@ def test_rates_of_the_code_are_those_of_the_kernels(name, formulation):
     for scale in (0.0, 1e-4, 1e-3, 1e-3, 1e-2):
         y = run.memory.loop.y[:size] + scale * rng.normal(size=size)
         ours, angles, multipliers = np.zeros(size), np.zeros(1), np.zeros(run.model.m)
-        data = [x.ctypes.data for x in (y, angles, ours, multipliers)]
+        data = [x.ctypes.data for x in (y, angles, run.memory.code.numbers, ours, multipliers)]
         held = code(scale, *data) == OK
         theirs = np.zeros(size)
         assert kernel(scale, y, theirs, generic.packed.argument) == OK
@@ -249,7 +249,7 @@ def traced(folder, function, *samples):
 
     def call(*arguments):
         y, out = np.array(arguments, dtype=float), np.zeros(1)
-        status = CALL(code.address("f"))(0.0, *(x.ctypes.data for x in (y, y, out, out)))
+        status = CALL(code.address("f"))(0.0, *(x.ctypes.data for x in (y, y, y, out, out)))
         return status, out[0]
 
     return call, piece

@@ -1,0 +1,43 @@
+"""Control: the limits of the stepping loop, from those of the user, the method and the scene."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mbref.equations.model import Model
+from mbref.kernels.layout import Control
+from mbref.method import Method
+from mbref.simulation.limits import Limits
+
+STEPS_PER_CALL = 5_000  # between returns to Python, where an interrupt is heard and progress is told
+UNWRAPPED = 1.0  # rad that a body may turn in a step where torsion springs unwrap: two turn less than π apart
+
+
+def control_of(model: Model, method: Method, times: np.ndarray, limits: Limits) -> Control:
+    """The limits of a run that ends at the last of the times (k,), s."""
+    integrator, span = method.integrator, float(times[-1]) or 1.0
+    options, largest_step = method.options_of(integrator), limits.largest_step or span
+    turn = UNWRAPPED if model.has_angles else method.stabilisation.largest_turn
+    turn = min(turn, integrator.largest_turn)
+    return Control(
+        order=integrator.highest_order(options),
+        fixed_step=0.0 if integrator.adaptive else min(options["step"], largest_step),
+        smallest_step=limits.smallest_step or 1e-12 * span,
+        largest_step=largest_step,
+        largest_turn=limits.largest_turn or turn,
+        violation=largest_violation(limits, model.length),
+        most_steps=limits.most_steps,
+        steps_per_call=STEPS_PER_CALL,
+        forced_step=limits.forced_step,
+        first_step=limits.first_step,
+        rtol=limits.rtol,
+        atol=limits.rtol if limits.atol is None else limits.atol,
+        closed_loops=model.closed_loops,
+    )
+
+
+def largest_violation(limits: Limits, length: Any) -> Any:
+    """The largest |Φ| (m or rad) of scenes of a length (m); of a number or an array."""
+    return limits.violation * np.maximum(1.0, length)

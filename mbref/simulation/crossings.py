@@ -1,0 +1,60 @@
+"""Crossings: the singular positions that a run passed; their branches are found when one asks for them."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from mbref.equations.branches import Passed, singular_position
+from mbref.equations.model import Model
+from mbref.trajectory import Crossing
+
+
+class Crossings(Sequence[Crossing]):
+    """Those of a run of a model, found when the first of them is asked for, which takes longer than to pass
+    them."""
+
+    def __init__(self, model: Model, passed: Sequence[Passed]):
+        self._model, self._passed = model, passed
+
+    @functools.cached_property
+    def _found(self) -> tuple[Crossing, ...]:
+        found = tuple(_crossing(self._model, passed) for passed in self._passed)
+        self._model.give_back()
+        return found
+
+    def __len__(self) -> int:
+        return len(self._passed)
+
+    def __getitem__(self, place: Any) -> Any:
+        return self._found[place]
+
+    def __iter__(self) -> Iterator[Crossing]:
+        return iter(self._found)
+
+    def __repr__(self) -> str:
+        return repr(self._found)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """To another process they go as a tuple."""
+        return tuple, (list(self._found),)
+
+
+def _crossing(model: Model, passed: Passed) -> Crossing:
+    """A singular position in the scene's frames."""
+    crossing = singular_position(model, passed)
+    v = crossing.velocities.reshape(len(crossing.velocities), -1, 6)
+    q = np.broadcast_to(crossing.coordinates.reshape(-1, 7), (len(v), v.shape[1], 7))
+    motion = model.motion(q, v, np.zeros_like(v))
+    return Crossing(
+        crossing.time,
+        motion["position"][0],
+        motion["orientation"][0],
+        motion["velocity"],
+        motion["angular_velocity"],
+        crossing.taken,
+        crossing.sentence,
+    )

@@ -1,0 +1,138 @@
+"""Many scenes by one method in one process: those of one shape follow the first of them (``followers``)."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mbref.equations.packing import shape_of
+from mbref.method import Method
+from mbref.motion import Motion
+from mbref.scene import Scene
+from mbref.simulation.followers import Followed, follow, may_lead
+from mbref.simulation.limits import GENERIC, SPECIALISED, Limits
+from mbref.simulation.run import Run
+from mbref.simulation.simulate import begun, completed, kind_of, simulate
+from mbref.taylor.check import DROPS
+from mbref.taylor.run import CrossingRun
+
+STEPS_WORTH_SHARED_CODE = 5_000  # steps from which on code for many scenes saves more than it takes to make
+FEW = 0.5  # of the scenes of a shape, that follow a run: the others are left to runs of their own
+
+
+@dataclass
+class Ended:
+    """Runs of several scenes, by their places, and the exceptions of those that cannot be simulated.
+
+    ``followed`` has the places of those that were to follow a run, and how they ended.
+    """
+
+    alone: dict[int, Motion] = field(default_factory=dict)
+    followed: list[tuple[list[int], Followed]] = field(default_factory=list)
+    errors: dict[int, Exception] = field(default_factory=dict)
+    seconds: float = 0.0  # of wall time
+
+    @property
+    def error(self) -> Exception | None:
+        """The exception of the first scene that cannot be simulated."""
+        return self.errors[min(self.errors)] if self.errors else None
+
+    def motions(self, scenes: Sequence[Scene]) -> Iterator[tuple[int, Motion]]:
+        """Place and motion of every run."""
+        yield from self.alone.items()
+        for places, followed in self.followed:
+            for k, motion in followed.motions([scenes[place] for place in places]):
+                yield places[k], motion
+
+
+def simulate_all(
+    scenes: Sequence[Scene], method: Method | str, times: np.ndarray, limits: Limits
+) -> list[Motion]:
+    """The motions of the scenes, as ``simulate`` gives them one by one; raises its errors.
+
+    Where many steps are ahead, they are those of machine code, equal but for rounding.
+    """
+    ended = run_all(scenes, method, times, limits)
+    if ended.error:
+        raise ended.error
+    found = dict(ended.motions(scenes))
+    return [found[place] for place in range(len(scenes))]
+
+
+def run_all(
+    scenes: Sequence[Scene], method: Method | str, times: np.ndarray, limits: Limits, others: int = 0
+) -> Ended:
+    """The runs of the scenes; so many steps of ``others`` of their shape could be by the same code."""
+    began = time.perf_counter()
+    method = Method.parse(method) if isinstance(method, str) else method
+    runs = _Runs(scenes, method, times, limits, others)
+    for places in _by_shape(scenes):
+        if len(places) > 1 and _can_lead(method, limits):
+            runs.one_behind_the_other(places)
+        else:
+            runs.alone(places)
+    runs.ended.seconds = time.perf_counter() - began
+    return runs.ended
+
+
+def _by_shape(scenes: Sequence[Scene]) -> Sequence[list[int]]:
+    """The places of scenes of one shape."""
+    groups: dict[object, list[int]] = {}
+    for place, scene in enumerate(scenes):
+        groups.setdefault(shape_of(scene), []).append(place)
+    return list(groups.values())
+
+
+def _can_lead(method: Method, limits: Limits) -> bool:
+    """Whether runs of a method can be followed: those in steps that projection holds to their motion."""
+    held = limits.rank_tolerance <= DROPS and not limits.branches and limits.code != SPECIALISED
+    return kind_of(method) is CrossingRun and method.integrator.integrates and held
+
+
+class _Runs:
+    """Runs of scenes, those of one shape behind the first run that may lead and that they can follow."""
+
+    def __init__(
+        self, scenes: Sequence[Scene], method: Method, times: np.ndarray, limits: Limits, others: int
+    ):
+        self.ended, self._scenes, self._arguments = Ended(), scenes, (method, times, limits)
+        self._others = others if limits.code != GENERIC else -math.inf
+
+    def alone(self, places: Iterable[int]) -> None:
+        """Run the scenes at these places one by one."""
+        for place in places:
+            try:
+                self.ended.alone[place] = simulate(self._scenes[place], *self._arguments)
+            except Exception as error:  # told behind the runs that went well
+                self.ended.errors[place] = error
+
+    def one_behind_the_other(self, places: list[int]) -> None:
+        """Run scenes of one shape at these places."""
+        while places:
+            try:
+                run = begun(self._scenes[places[0]], *self._arguments)
+                self.ended.alone[places[0]] = completed(run)
+            except Exception as error:
+                self.ended.errors[places[0]] = error
+                places = places[1:]
+                continue
+            places = self._led(run, places[1:])
+            run.give_back()
+
+    def _led(self, run: Run, places: list[int]) -> list[int]:
+        """The places of scenes that are left once others have followed a run."""
+        if not places or not may_lead(run):
+            return places
+        steps = self._others + int(run.memory.equations.system.counts.steps) * len(places)
+        followed = follow(run, [self._scenes[place] for place in places], steps >= STEPS_WORTH_SHARED_CODE)
+        self.ended.followed.append((places, followed))
+        have_followed = set(followed.places)
+        left = [place for k, place in enumerate(places) if k not in have_followed]
+        if len(left) <= FEW * len(places):
+            return left
+        self.alone(left)
+        return []

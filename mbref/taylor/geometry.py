@@ -1,0 +1,35 @@
+"""Geometries that are known: natural coordinates are found once for scenes that differ in masses and loads.
+
+To find them takes longer than a short run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+
+import numpy as np
+
+from mbref.equations.initial_state import Start
+from mbref.equations.model import Model
+from mbref.taylor.natural import NaturalCoordinates
+from mbref.taylor.polynomials import Geometry
+
+MOST_KEPT = 64  # geometries
+
+_known: dict[Hashable, Geometry] = {}
+
+
+def geometry_of(model: Model, start: Start, moving: np.ndarray) -> Geometry:
+    """The geometry of a scene at its start, of which these velocities (n,) can be other than zero."""
+    key = _key(model, start, moving)
+    if key not in _known:
+        if len(_known) >= MOST_KEPT:
+            _known.pop(next(iter(_known)), None)
+        _known[key] = Geometry(NaturalCoordinates(model, start, moving))
+    return _known[key]
+
+
+def _key(model: Model, start: Start, moving: np.ndarray) -> Hashable:
+    """All numbers that have a part in the geometry, and the joints that have one."""
+    numbers = (start.q, moving, model.start(), model.principal, *model.data.primitives)
+    return model.structure, model.joints, model.length, *(array.tobytes() for array in numbers)

@@ -1,0 +1,61 @@
+"""Scenes of one structure whose numbers decide which rows and columns take part, and results to compare."""
+
+from __future__ import annotations
+
+from mbref.motion import Motion
+from mbref.scene import Body, Force, Revolute, Scene, Spring, Translational
+from mbref.scenes import SCENES
+
+CRANK, SPATIAL = SCENES["planar_slider_crank"](), SCENES["spatial_slider_crank"]()
+X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def results(run: Motion) -> list:
+    """All numbers of a run, as bytes."""
+    arrays = [getattr(run, key) for key in ("position", "orientation", "velocity", "angular_velocity")]
+    arrays += [run.acceleration, run.angular_acceleration]
+    for table in (run.reactions, run.open_reactions):
+        arrays += [table[name] for name in sorted(table)]
+    cost = [run.cost.steps, run.cost.rhs, run.cost.factorisations, run.cost.newton]
+    return [run.outcome.name, run.message, run.t_end, cost, *(array.tobytes() for array in arrays)]
+
+
+def crank_with(force: tuple[float, float, float], **changes) -> Scene:
+    """The planar slider-crank with a force on its rod; a force across the plane bends it out of the plane."""
+    place = CRANK.body[1].position
+    return CRANK.with_(
+        load=(*CRANK.load, Force(body=CRANK.body[1].name, point=place, force=force)), **changes
+    )
+
+
+def rail(point: tuple[float, float, float], stiffness: float = 20.0, inertia: float = 0.02) -> Scene:
+    """A slide on an arm, pulled by a spring at a point that may turn both out of their plane."""
+    body = {"mass": 1.0, "position": (0.3, 0.0, 0.0)}
+    return Scene(
+        name="rail", duration=0.5,
+        body=(
+            Body(name="arm", mass=1.0, inertia=(0.01, 0.02, 0.02), position=(0.1, 0.0, 0.0)),
+            Body(name="slide", inertia=(inertia, inertia, inertia), **body),
+        ),
+        joint=(
+            Revolute(name="pin", bodies=("ground", "arm"), anchor=(0.0, 0.0, 0.0), axis=Z),
+            Translational(name="guide", bodies=("arm", "slide"), anchor=(0.3, 0.0, 0.0), axis=X),
+        ),
+        load=(
+            Spring(bodies=("ground", "slide"), points=((0.3, 0.5, point[2]), (0.3, 0.0, 0.0)),
+                   stiffness=stiffness, natural_length=0.3),
+            Force(body="slide", point=(0.3, 0.0, 0.0), force=point),
+        ),
+    )  # fmt: skip
+
+
+NUMBERS_DECIDE = {
+    "a force out of the plane": [crank_with((0.0, 1.0, 0.0)), crank_with((0.0, 1.0, 0.5))],
+    "gravity out of the plane": [CRANK.with_(gravity=(0.0, g, h)) for g, h in ((-9.8, 0.0), (-9.8, 1.0))],
+    "motion at the start": [
+        SPATIAL.with_(body=tuple(b.model_copy(update={"angular_velocity": None}) for b in SPATIAL.body)),
+        SPATIAL.with_("body[crank].angular_velocity", (0.0, 3.0, 0.0)),
+    ],
+    "a spring out of the plane": [rail((0.0, 0.0, 0.0)), rail((0.0, 0.0, 0.2))],
+    "no moment of inertia": [rail((0.0, 0.0, 0.2)), rail((0.0, 0.0, 0.2), inertia=0.0)],
+}

@@ -1,0 +1,179 @@
+"""Many runs in one memory / runs of their own: the same bits, messages and outcomes, whatever happens."""
+
+from __future__ import annotations
+
+import pickle
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from crosscheck.conformance.random_mechanisms import random_mechanism
+from mbref.equations.packing import shape_of
+from mbref.kernels import machine_code
+from mbref.scene import Scene, SceneError, Spring
+from mbref.scenes import SCENES
+from mbref.simulation.simulate import Limits, simulate
+from mbref.simulation.together import STEPS_WORTH_SHARED_CODE, run_all, simulate_all
+from mbref.variation import Variation, variants
+from tests.mbref.scenes_of_one_structure import CRANK, NUMBERS_DECIDE, results
+
+METHOD, TIMES = "alf-dual+projection", np.linspace(0.0, 0.05, 4)
+LIMITS = Limits(rtol=1e-6)
+DRIVEN = SCENES["spatial_slider_crank_driven"]()
+LENGTH = Variation("joint[B].anchor[0]", 0.304, 1e-3, normal=True)
+MASS = Variation("body[crank].mass", 0.5, 2.0)
+
+
+def agree(scenes: list[Scene], times=TIMES, limits=LIMITS, method=METHOD) -> list:
+    """The results of runs together, which are those of runs alone."""
+    together = simulate_all(scenes, method, times, limits)
+    alone = [simulate(scene, method, times, limits) for scene in scenes]
+    assert [results(run) for run in together] == [results(run) for run in alone]
+    assert all(run.mechanism is scene for run, scene in zip(together, scenes, strict=True))
+    return together
+
+
+def followers(scenes: list[Scene], times=TIMES, limits=LIMITS) -> int:
+    """How many runs followed another."""
+    ended = run_all(scenes, METHOD, times, limits)
+    return sum(len(followed.places) for _, followed in ended.followed)
+
+
+@pytest.mark.parametrize(
+    "name", ["planar_slider_crank", "spatial_slider_crank", "heavy_top", "flyball_governor"]
+)
+def test_variants_together_and_alone_agree(name):
+    body = SCENES[name]().body[0].name
+    varied = [Variation(f"body[{body}].mass", 0.5, 2.0), Variation("gravity[1]", -10.0, 10.0)]
+    scenes = list(variants(SCENES[name](), varied, 12))
+    runs = agree(scenes)
+    assert followers(scenes) == 11
+    assert len({run.position.tobytes() for run in runs}) == 12, "the variants are to differ"
+
+
+def test_varied_lengths_and_a_driver_together_and_alone_agree():
+    scenes = list(variants(DRIVEN, [Variation("joint[B].anchor[0]", 0.1, 1e-3, normal=True)], 12))
+    agree(scenes)
+    assert followers(scenes) >= 8
+
+
+def test_runs_that_pass_singular_positions_and_others_agree():
+    """Some of the cranks are stopped before they reach the position in which rod and crank are in line."""
+    scenes = list(
+        variants(SCENES["planar_slider_crank_equal"](), [Variation("gravity[0]", -400.0, 400.0)], 10)
+    )
+    runs = agree(scenes, np.linspace(0.0, 0.1, 5))
+    passed = [len(run.crossings) for run in runs]
+    assert 0 in passed and max(passed) > 0, passed
+
+
+def test_runs_that_fail_and_others_agree():
+    scenes = list(variants(CRANK, [MASS, LENGTH], 12))
+    steps = [simulate(scene, METHOD, TIMES, LIMITS).cost.steps for scene in scenes]
+    runs = agree(scenes, limits=Limits(rtol=1e-6, most_steps=int(np.median(steps))))
+    assert {run.outcome.name for run in runs} == {"COMPLETED", "STEP_FAILED"}
+
+
+def test_random_mechanisms_and_their_variants_agree():
+    scenes = []
+    for seed in range(8):
+        scene = random_mechanism(seed)
+        scenes += variants(
+            scene, [Variation("body[0].position[0]", *(scene.body[0].position[0] + d for d in (0.0, 0.1)))], 3
+        )
+    order = np.random.default_rng(0).permutation(len(scenes))
+    agree([scenes[k] for k in order], np.linspace(0.0, 0.02, 3))
+
+
+@pytest.mark.parametrize("scenes", NUMBERS_DECIDE.values(), ids=NUMBERS_DECIDE.keys())
+def test_numbers_that_decide_what_takes_part_are_asked(scenes):
+    for order in permutations(range(len(scenes))):
+        agree([scenes[k] for k in order * 2])
+
+
+def test_springs_and_products_of_inertia_together_and_alone_agree():
+    points = ((0.3, 0.2, 0.0), CRANK.body[1].position)
+    spring = Spring(bodies=("ground", "rod"), points=points, stiffness=50.0, natural_length=0.1)
+    sprung = CRANK.with_(load=(*CRANK.load, spring))
+    turned = sprung.with_("body[rod].inertia", ((1e-3, 0.0, 2e-4), (0.0, 5e-3, 0.0), (2e-4, 0.0, 5e-3)))
+    varied = [Variation("load[1].stiffness", 10.0, 90.0), LENGTH]
+    scenes = list(variants(sprung, varied, 6))
+    agree([*scenes, *variants(turned, varied, 6)])
+    assert followers(scenes) == 5
+
+
+@pytest.mark.parametrize(
+    "method", ["mpi-svd+baumgarte", "taylor", "mpi-qr+projection", "lm2+projection/rk4[step=1e-4]"]
+)
+def test_other_methods_together_and_alone_agree(method):
+    agree(list(variants(CRANK, [MASS, LENGTH], 3)), np.linspace(0.0, 0.01, 3), method=method)
+
+
+MOMENT, FALL = Variation("load[0].moment[2]", 50.0, 150.0), Variation("gravity[1]", -10.0, 10.0)
+SPEED, PIN = Variation("driver[0].polynomial[1]", 100.0, 200.0), Variation("joint[B].anchor[0]", 0.09, 0.11)
+STIFF, WEIGHT = Variation("load[0].stiffness", 7e3, 9e3), Variation("gravity[2]", -10.0, -9.0)
+SHARED_CODE = [
+    (CRANK, [MASS, LENGTH, FALL, MOMENT]),
+    (DRIVEN, [SPEED, PIN]),
+    (SCENES["flyball_governor"](), [STIFF, WEIGHT]),
+]
+
+
+@pytest.mark.parametrize(("scene", "varied"), SHARED_CODE, ids=lambda each: getattr(each, "name", ""))
+def test_code_for_all_variants_and_runs_alone_agree(scene, varied):
+    """One piece of code serves both halves of the scenes, which were drawn apart."""
+    scenes, limits = list(variants(scene, varied, 40)), Limits(rtol=1e-10)
+    machine_code._loaded.clear()
+    found = {}
+    for half in (range(20), range(20, 40)):
+        ended = run_all([scenes[k] for k in half], METHOD, TIMES, limits, STEPS_WORTH_SHARED_CODE)
+        assert sum(len(followed.places) for _, followed in ended.followed) >= 15
+        found.update((half[k], run) for k, run in ended.motions([scenes[k] for k in half]))
+    assert len(machine_code._loaded) == 1, list(machine_code._loaded)
+    for k, each in enumerate(scenes):
+        alone, scale = simulate(each, METHOD, TIMES, limits), np.abs(found[k].velocity).max()
+        off = (
+            np.abs(found[k].position - alone.position).max(),
+            np.abs(found[k].velocity - alone.velocity).max(),
+        )
+        assert off[0] < 1e-9 and off[1] < 1e-8 * scale, f"variant {k}: {off}"
+        assert (found[k].outcome, found[k].message) == (alone.outcome, alone.message)
+
+
+def test_code_is_made_where_many_steps_are_ahead_and_not_forbidden():
+    scenes = list(variants(CRANK, [MASS], 6))
+    for others, code, made in ((0, "auto", 0), (10**6, "generic", 0), (10**6, "auto", 1)):
+        machine_code._loaded.clear()
+        run_all(scenes, METHOD, TIMES, Limits(rtol=1e-6, code=code), others)
+        assert len(machine_code._loaded) == made, (others, code)
+
+
+def test_runs_and_their_reactions_pass_between_processes():
+    run, *_ = simulate_all(list(variants(CRANK, [MASS], 4)), METHOD, TIMES, LIMITS)[1:]
+    sent = pickle.loads(pickle.dumps(run))
+    assert results(sent) == results(run)
+
+
+def test_scenes_of_one_shape_differ_in_numbers_alone():
+    assert len({shape_of(scene) for scene in variants(CRANK, [MASS, LENGTH], 5)}) == 1
+    others = [
+        CRANK, DRIVEN, CRANK.with_(ground="body"), CRANK.with_(load=()),
+        CRANK.with_("body[rod].inertia", ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))),
+        DRIVEN.with_("driver[0].polynomial", (0.0, 1.0, 2.0)),
+    ]  # fmt: skip
+    assert len({shape_of(scene) for scene in others}) == len(others)
+
+
+def test_the_first_scene_that_cannot_be_simulated_is_told():
+    scenes = list(variants(CRANK, [MASS], 4))
+    scenes[2] = (
+        scenes[2]
+        .with_("joint[B].axis", (1.0, 0.0, 0.3))
+        .with_("body[crank].angular_velocity", (5.0, 0.0, 0.0))
+    )
+    with pytest.raises(SceneError) as together:
+        simulate_all(scenes, METHOD, TIMES, LIMITS)
+    with pytest.raises(SceneError) as alone:
+        simulate(scenes[2], METHOD, TIMES, LIMITS)
+    assert together.value.faults == alone.value.faults
