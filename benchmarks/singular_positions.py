@@ -1,6 +1,6 @@
 """Singular positions: how many runs of a sweep end right, honestly failed, or falsely completed.
 
-    python benchmarks/singular_positions.py [SWEEP …] [--count N] [--method NAME] [--rtol X]
+    python benchmarks/singular_positions.py [SWEEP …] [--count N] [--method NAME] [--code KIND] [--rtol X]
 
 Sweeps: light and cart_poles (inertias of 1e-11 … 1e-4 kg m²), turning (parallelograms that turn back before
 the flat position), gaps (slider-cranks whose rod is longer than the crank by 1e-1 … 1e-12 m), driven (rhombi
@@ -118,21 +118,21 @@ SWEEPS = {
 }  # fmt: skip
 
 
-def outcome_of(scene: Scene, end: float, method: str, rtol: float) -> tuple[str, float]:
+def outcome_of(scene: Scene, end: float, method: str, limits: Limits) -> tuple[str, float]:
     """The outcome, and the error of the samples reached: of poses where a truth is known, else of energy."""
-    trajectory = simulate(scene, method, np.linspace(0.0, end, 21), Limits(rtol=rtol, most_steps=100_000))
+    trajectory = simulate(scene, method, np.linspace(0.0, end, 21), limits)
     truth = truth_for(scene)
     found = measure(scene, trajectory, truth)
     error = found["error"] if truth else found["energy_drift"]
     return trajectory.outcome.label, math.nan if error is None else float(error)
 
 
-def report(name: str, runs: Iterator[tuple[Scene, float]], method: str, rtol: float) -> None:
+def report(name: str, runs: Iterator[tuple[Scene, float]], method: str, limits: Limits) -> None:
     """Print one row."""
-    allowed, false, worst, failed, hidden = max(1e3 * rtol, 1e-6), 0, 0.0, Counter(), 0
+    allowed, false, worst, failed, hidden = max(1e3 * limits.rtol, 1e-6), 0, 0.0, Counter(), 0
     total = 0
     for scene, end in runs:
-        label, error = outcome_of(scene, end, method, rtol)
+        label, error = outcome_of(scene, end, method, limits)
         total += 1
         if label != "COMPLETED":
             is_hidden = name == "turning" and not turning_is_determined(scene)
@@ -155,11 +155,13 @@ def main() -> None:
     parser.add_argument("sweep", nargs="*", metavar="SWEEP", default=list(SWEEPS))
     parser.add_argument("--count", type=int)
     parser.add_argument("--method", default="alf-dual+projection")
+    parser.add_argument("--code", default="auto", help="generic, specialised or auto, the default")
     parser.add_argument("--rtol", type=float, default=1e-9)
     given = parser.parse_args()
+    limits = Limits(rtol=given.rtol, most_steps=100_000, code=given.code)
     for name in given.sweep:
         make, count = SWEEPS[name]
-        report(name, make(given.count or count), given.method, given.rtol)
+        report(name, make(given.count or count), given.method, limits)
 
 
 if __name__ == "__main__":
