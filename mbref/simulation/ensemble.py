@@ -100,7 +100,7 @@ class Work:
         self.error: Exception | None = None
 
     def add(self, job: Job) -> None:
-        """Hand a run over once as many wait as are given at a time, or for too long while none is under way."""
+        """Hand a run over once as many wait as are given at a time, or for too long while none runs."""
         now = time.monotonic()
         self._since = self._since if self._waiting else now
         self._waiting.append(job)
