@@ -140,25 +140,26 @@ class Packs:
         self.length = np.where(self.length > 0.0, self.length, 1.0)
         return body_lengths(self.nb, np.array(ends, dtype=int), anchors, self._centres)
 
-    def _primitives(self, joints: Sequence[Joint]) -> tuple[Structure, Primitives]:
-        """The structure of the constraint rows, and the primitives of all joints and drivers."""
+    def _structured(self, joints: Sequence[Joint]) -> tuple[Structure, np.ndarray]:
+        """The structure of the rows of all joints and drivers, and numbers (s, p, 16) as ``_of_joint``."""
         driven = {driver.joint: k for k, driver in enumerate(self.scenes[0].driver)}
         found = _once(partial(_of_joint, driven=driven), joints)
-        structure = structure_of(
-            self.nb,
-            tuple(
-                (p.kind, joint.name, *map(self.index.__getitem__, joint.bodies),
-                 driven[joint.name] if p.driven else -1)
-                for joint, (primitives, _) in zip(self.joints, found, strict=False)
-                for p in primitives
-            ),
-        )  # fmt: skip
+        places = []
+        for joint, (primitives, _) in zip(self.joints, found, strict=False):  # of the first scene
+            first, second = (self.index[name] for name in joint.bodies)
+            for p in primitives:
+                places.append((p.kind, joint.name, first, second, driven[joint.name] if p.driven else -1))
         numbers = np.concatenate([numbers for _, numbers in found] or [np.zeros((0, 16))])
-        numbers = numbers.reshape(len(self.scenes), structure.kind.size, 16)
-        vectors = numbers[..., :15].reshape(len(self.scenes), -1, 5, 3).swapaxes(1, 2)
-        shape = len(self.scenes), 3, structure.kind.size, 3
-        directions = self.directions(structure.of_directions, vectors[:, 2:].reshape(shape[0], -1, 3))
-        first, turning, second = directions.reshape(shape).swapaxes(0, 1)
+        structure = structure_of(self.nb, tuple(places))
+        return structure, numbers.reshape(len(self.scenes), len(places), 16)
+
+    def _primitives(self, joints: Sequence[Joint]) -> tuple[Structure, Primitives]:
+        """The structure of the constraint rows, and the primitives of all joints and drivers."""
+        structure, numbers = self._structured(joints)
+        scenes, p = numbers.shape[:2]
+        vectors = numbers[..., :15].reshape(scenes, p, 5, 3).swapaxes(1, 2)
+        directions = self.directions(structure.of_directions, vectors[:, 2:].reshape(scenes, 3 * p, 3))
+        first, turning, second = directions.reshape(scenes, 3, p, 3).swapaxes(0, 1)
         return structure, Primitives(
             kind=self._all(structure.kind),
             first=self._all(structure.first),

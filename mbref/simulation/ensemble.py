@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import time
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
 from dataclasses import asdict
@@ -92,15 +93,19 @@ class Work:
         self._executor, self._method, self._times, self._limits = executor, method, times, limits
         self._done: SimpleQueue[Future[Ended]] = SimpleQueue()
         self._waiting: list[Job] = []
+        self._since = 0.0  # s, when the first of them began to wait
         self._at_once = 0  # runs that are given at a time; 0 before the first has told how long it takes
         self._cores = os.cpu_count() or 1
         self._steps = 0  # of runs that have ended
         self.error: Exception | None = None
 
     def add(self, job: Job) -> None:
-        """Hand a run over, alone or once as many wait as are given at a time."""
+        """Hand a run over once as many wait as are given at a time, or for too long while none runs."""
+        now = time.monotonic()
+        self._since = self._since if self._waiting else now
         self._waiting.append(job)
-        if len(self._waiting) >= self._at_once or not self.pending:
+        is_idle = not self.pending and now - self._since >= SECONDS
+        if len(self._waiting) >= self._at_once or is_idle:
             self.hand_over()
 
     def hand_over(self) -> None:
@@ -135,7 +140,7 @@ class Work:
             found = future.result()
         except BrokenExecutor:
             return self._without_process(jobs)
-        self._at_once = max(1, min(MOST_AT_ONCE, int(SECONDS * len(jobs) / max(found.seconds, 1e-9))))
+        self._at_once = int(max(1, min(MOST_AT_ONCE, SECONDS * len(jobs) / max(found.seconds, 1e-9))))
         self.error = found.error
         runs: list[tuple[Job, Trajectory]] = [
             (jobs[place], run) for place, run in found.motions([job.scene for job in jobs])

@@ -128,7 +128,12 @@ class _Runs:
         if not places or not may_lead(run):
             return places
         steps = self._others + int(run.memory.equations.system.counts.steps) * len(places)
-        followed = follow(run, [self._scenes[place] for place in places], steps >= STEPS_WORTH_SHARED_CODE)
+        by_code = steps >= STEPS_WORTH_SHARED_CODE
+        try:
+            followed = follow(run, [self._scenes[place] for place in places], by_code)
+        except np.linalg.LinAlgError:  # which the numbers of one scene have caused
+            self.alone(places)
+            return []
         self.ended.followed.append((places, followed))
         have_followed = set(followed.places)
         left = [place for k, place in enumerate(places) if k not in have_followed]

@@ -199,14 +199,32 @@ def test_a_killed_run_is_told_and_not_stored(tmp_path: Path):
     assert len(path.read_text().splitlines()) == 2
 
 
-def test_runs_are_given_several_at_a_time_and_tried_one_by_one_where_a_process_is_killed():
+def test_runs_are_given_several_at_a_time_and_tried_one_by_one_where_a_process_is_killed(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """However long a run takes, as many as may be are given at a time."""
+    monkeypatch.setattr("mbref.simulation.ensemble.SECONDS", np.inf)
     scenes = list(variants(DRIVEN, VARY, 60))
     executor = Fragile(lambda given: scenes[50] in given)
     runs = dict(ensemble(scenes, TIMES, METHOD, Limits(rtol=1e-3), executor))
     crashed = [k for k in range(60) if runs[k].outcome.name == "CRASHED"]
     assert (sorted(runs), crashed) == (list(range(60)), [50])
-    assert max(executor.calls) > 5, executor.calls
+    assert max(executor.calls) > 50, executor.calls
     assert sum(executor.calls) > 60, "none was tried again"
+
+
+def test_scenes_that_come_slowly_do_not_wait_for_others(monkeypatch: pytest.MonkeyPatch):
+    """With no time to wait, each is run before the next one is drawn."""
+    monkeypatch.setattr("mbref.simulation.ensemble.SECONDS", 0.0)
+    executor, drawn = Fragile(lambda given: False), []
+
+    def drawing():
+        for scene in variants(DRIVEN, VARY, 6):
+            drawn.append((len(drawn), sum(executor.calls)))
+            yield scene
+
+    assert len(dict(ensemble(drawing(), TIMES, METHOD, Limits(rtol=1e-3), executor))) == 6
+    assert drawn == [(k, k) for k in range(6)]
 
 
 def test_runs_before_a_faulty_scene_are_handed_out():

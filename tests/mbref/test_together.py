@@ -149,6 +149,16 @@ def test_code_is_made_where_many_steps_are_ahead_and_not_forbidden():
         assert len(machine_code._loaded) == made, (others, code)
 
 
+def test_scenes_whose_numbers_defy_an_array_operation_run_alone(monkeypatch: pytest.MonkeyPatch):
+    def fails(*arguments):
+        raise np.linalg.LinAlgError("SVD did not converge")
+
+    monkeypatch.setattr("mbref.simulation.followers.all_ranks", fails)
+    scenes = list(variants(CRANK, [MASS], 3))
+    agree(scenes)
+    assert followers(scenes) == 0
+
+
 def test_runs_and_their_reactions_pass_between_processes():
     run, *_ = simulate_all(list(variants(CRANK, [MASS], 4)), METHOD, TIMES, LIMITS)[1:]
     sent = pickle.loads(pickle.dumps(run))
