@@ -76,6 +76,8 @@ class Model:
             metric_root=metric_root(self.mass, lengths),
             bodies=bodies,
             primitives=primitives,
+            moving=np.arange(primitives.kind.size),
+            resting=np.zeros(0, dtype=np.int64),
             row_bodies=self.structure.row_bodies,
             drivers=packed_drivers(scene.driver),
             loads=packed_loads(self),

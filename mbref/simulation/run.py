@@ -34,7 +34,7 @@ from mbref.kernels.lent_memory import Lent, lent, shapes_of, take_back, write
 from mbref.kernels.named_memory import allocate, packed
 from mbref.kernels.records import record
 from mbref.kernels.scene_layout import SceneData
-from mbref.linear_algebra.symbolic_factorisation import empty_factor
+from mbref.linear_algebra.symbolic_factorisation import empty_factor, no_static_rows
 from mbref.method import Method
 from mbref.scene import Scene, SceneError
 from mbref.simulation.limits import AUTO, SPECIALISED, Limits
@@ -106,7 +106,8 @@ class Run:
         """Memory with the numbers of this run."""
         model, method, reduction = self.model, self.method, self.reduction
         sparse = reduction is not None and method.formulation.linear_algebra.sparse
-        data = reduction.scene(model.data) if reduction and sparse else model.data
+        all_move = not method.stabilisation.projects  # others read the gradients of all rows
+        data = reduction.scene(model.data, all_move) if reduction and sparse else model.data
         key = (Memory, *self._identity(), reduction, self.times.size, *model.sizes.values(), shapes_of(data))
         memory = lent(key, lambda: self._allocate(data))
         equations = memory.values.equations
@@ -136,11 +137,13 @@ class Run:
         sizes["compared_rows"] = pivots if compared else 0
         sizes["compared_entries"] = factor.d.size if compared else 0
         sizes["compared_columns"] = factor.root.size if compared else 0
+        static = no_static_rows() if data.resting.size else factor.static  # else their multipliers come last
+        at_every_state = factor._replace(static=static)
         equations = model.equations(
             sizes,
             data,
             options=formulation.packed_options(method.options_of(formulation)),
-            scratch=packed(algebra.scratch(model.m, model.n, factor)),
+            scratch=packed(algebra.scratch(model.m, model.n, at_every_state)),
         )
         return Memory(
             equations=equations,
