@@ -103,3 +103,12 @@ def find_squared_pivots(factor):
     first, l, diagonal, squares = factor.symbolic.l_start, factor.l, factor.diagonal, factor.squared_pivots
     for k in range(diagonal.shape[0]):
         squares[k] = 1.0 / (l[first[k]] * diagonal[k])
+
+
+@inlined
+def least_squared_pivot(factor):
+    """The least square of a pivot of unit rows; 1 without rows."""
+    first, l, diagonal, most = factor.symbolic.l_start, factor.l, factor.diagonal, 1.0
+    for k in range(diagonal.shape[0]):
+        most = max(most, l[first[k]] * diagonal[k])
+    return 1.0 / most

@@ -210,13 +210,16 @@ class Run:
         memory = self.memory
         memory.state.coordinates[:] = self.start.q
         memory.state.velocities[:] = self.start.v
-        self.ranks = NO_RANKS
+        self.ranks, settings, tolerance = (
+            NO_RANKS,
+            memory.equations.system.settings,
+            self.limits.rank_tolerance,
+        )
+        ranks = ranks_at(self.model, self.start.q, memory.factor, tolerance)
+        settings.independent = ranks.rank == memory.pivots.size
         if self.method.stabilisation.projects:
-            tolerance = self.limits.rank_tolerance
-            self.ranks = ranks_at(self.model, self.start.q, self.part.factor.symbolic, tolerance)
-            memory.watch.generic_rank = self.ranks.rank
-            settings = memory.equations.system.settings
-            settings.independent = self.ranks.rank == memory.pivots.size
+            self.ranks = ranks
+            memory.watch.generic_rank = ranks.rank
             settings.nearly_dependent = self.ranks.least < NEARLY
             settings.rounding *= min(1.0, self.model.length)
         self.enter_state()
