@@ -122,7 +122,6 @@ def _mixed(reached: set[int], axes: Sequence[int]) -> set[int]:
         reached = found
 
 
-def active_primitives(model: Model, entries: np.ndarray) -> np.ndarray:
-    """The primitives, by number, that have a row with an entry (m, 12)."""
-    rows = np.flatnonzero(entries.any(axis=1))
+def primitives_of(model: Model, rows: np.ndarray) -> np.ndarray:
+    """The primitives, by number, that have one of these rows."""
     return np.unique(np.searchsorted(model.structure.row, rows, side="right") - 1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mbref.equations.loads import forces
 from mbref.equations.primitives import constraints
+from mbref.equations.static_multipliers import add_static_multipliers
 from mbref.kernels.compilation import INT, MATRIX, VECTOR, entry, inlined, kernel
 from mbref.kernels.layout import EQUATIONS
 from mbref.linear_algebra.vectors import copy
@@ -68,10 +69,10 @@ def assemble_jacobian(equations, dense):
 
 @inlined
 def evaluate(t, q, v, equations):
-    """Φ, Φ_q (blocks), ν, γ and g at (t, q, v)."""
+    """Φ, Φ_q (blocks), ν, γ and g at (t, q, v), of the rows that bear on moving coordinates."""
     set_poses(q, equations.frames)
     set_velocities(v, equations.frames)
-    constraints(t, equations)
+    constraints(t, equations.scene.moving, equations)
     forces(equations)
 
 
@@ -105,6 +106,14 @@ def right_hand_side(v, equations):
         for row in range(rhs.shape[0]):
             rhs[row] -= velocity_gain * rows.phi_rate[row]
             rhs[row] -= position_gain * rows.phi[row]
+
+
+@kernel
+def add_resting_rows(t, static, equations):
+    """Φ_q of resting rows where ``evaluate`` was last, and the multipliers of rows that hold columns."""
+    if equations.scene.resting.shape[0] > 0:
+        constraints(t, equations.scene.resting, equations)
+        add_static_multipliers(static, equations.system)
 
 
 @inlined

@@ -92,6 +92,8 @@ class Packs:
             metric_root=metric_root(self.mass, lengths),
             bodies=bodies,
             primitives=primitives,
+            moving=self._all(np.arange(primitives.kind.shape[1])),
+            resting=self._all(np.zeros(0, dtype=np.int64)),
             row_bodies=self._all(self.structure.row_bodies),
             drivers=self._drivers(),
             loads=self._loads(),

@@ -181,10 +181,11 @@ def distance(p, equations):
 
 
 @inlined
-def constraints(t, equations):
-    """Φ, Φ_q, ν and γ of every row at the state in ``equations.frames``."""
+def constraints(t, primitives, equations):
+    """Φ, Φ_q, ν and γ of the rows of these primitives, by number, at the state in ``equations.frames``."""
     kinds = equations.scene.primitives.kind
-    for p in range(kinds.shape[0]):
+    for k in range(primitives.shape[0]):
+        p = primitives[k]
         if kinds[p] == POINT:
             point(p, equations)
         elif kinds[p] == DOT1:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mbref.equations.active_coordinates import active_coordinates, active_entries, active_primitives
+from mbref.equations.active_coordinates import active_coordinates, active_entries, primitives_of
 from mbref.equations.evidence import Evidence
 from mbref.equations.initial_state import Start
 from mbref.equations.model import Model
@@ -29,9 +29,13 @@ _known: dict[Structure, list[Reduction]] = {}
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """Primitives, by number, with an entry; columns that rows hold at rest; the others, and their factor."""
+    """Primitives, by number, with an entry; columns that rows hold at rest; the others, and their factor.
+
+    ``resting`` says which of the primitives have rows that hold columns, and no others.
+    """
 
     primitives: np.ndarray
+    resting: np.ndarray
     held: list[int]
     active: Active
     symbolic: Symbolic
@@ -42,12 +46,18 @@ class Reduction:
         """Memory of the factor."""
         return sparse_factor(self.symbolic, self.static)
 
-    def scene(self, data: SceneData, axis: int = 0) -> SceneData:
-        """The data of a scene without the primitives that have no entry; ``axis`` counts them."""
-        if self.primitives.size == data.primitives.kind.shape[axis]:
-            return data
+    def scene(self, data: SceneData, all_move: bool, axis: int = 0) -> SceneData:
+        """The data of a scene without the primitives that have no entry, which ``axis`` counts; all others
+        move where asked."""
+        resting = np.zeros_like(self.resting) if all_move else self.resting
         kept = (np.take(column, self.primitives, axis=axis) for column in data.primitives)
-        return data._replace(primitives=Primitives(*kept))
+        scenes = data.row_bodies.shape[:axis]
+        moving, still = (np.flatnonzero(chosen) for chosen in (~resting, resting))
+        return data._replace(
+            primitives=Primitives(*kept),
+            moving=np.broadcast_to(moving, (*scenes, moving.size)),
+            resting=np.broadcast_to(still, (*scenes, still.size)),
+        )
 
 
 def reduction_of(model: Model, start: Start) -> Reduction:
@@ -70,8 +80,10 @@ def _found(model: Model, start: Start) -> Reduction:
     held, left = held_by_rows(model, start, moving, entries, asked)
     symbolic, static = reduced_pattern(moving, left, model.entry_columns, held)
     velocities = symbolic.column.astype(np.int64)
+    primitives = primitives_of(model, np.flatnonzero(left.any(axis=1)))
     return Reduction(
-        primitives=active_primitives(model, left),
+        primitives=primitives,
+        resting=~np.isin(primitives, primitives_of(model, symbolic.row)),
         held=columns_held(held),
         active=Active(active_coordinates(start.q, velocities), velocities),
         symbolic=symbolic,

@@ -23,7 +23,6 @@ import numpy as np
 from mbref.equations.initial_state import LARGE, Start
 from mbref.equations.model import Model
 from mbref.equations.random_states import RandomStates, random_states
-from mbref.kernels.compilation import inlined
 from mbref.kernels.layout import StaticRows, Symbolic
 from mbref.linear_algebra.minimum_norm import MinimumNorm
 from mbref.linear_algebra.redundancy import dense_null_shares, null_shares
@@ -261,21 +260,3 @@ def _perpendicular(rows: Sequence[Sequence[Sequence[float]]]) -> list[int]:
 def _largest_cosine(one: Sequence[Sequence[float]], other: Sequence[Sequence[float]]) -> float:
     """Between unit vectors, of any state."""
     return max(abs(sum(x * y for x, y in zip(a, b, strict=True))) for a, b in zip(one, other, strict=True))
-
-
-@inlined
-def add_static_multipliers(static, system):
-    """Multipliers of the statically determined rows: they balance the forces on columns without q̈."""
-    blocks, multipliers, force = system.blocks.reshape(-1), system.multipliers, system.force
-    start, entry, column, first, other = (
-        static.start, static.entry, static.column, static.other_start, static.other,
-    )  # fmt: skip
-    for k in range(static.row.shape[0]):
-        value, square = 0.0, 0.0
-        for p in range(start[k], start[k + 1]):
-            balance, own = force[column[p]], blocks[entry[p]]
-            for o in range(first[p], first[p + 1]):
-                balance -= blocks[other[o]] * multipliers[other[o] // 12]
-            value += own * balance
-            square += own * own
-        multipliers[static.row[k]] = value / square

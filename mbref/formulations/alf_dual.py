@@ -6,24 +6,25 @@ By the Woodbury identity its iterates are those of Eqs. 17 to 19.  But α enters
 multiplying Φ_qᵀ Φ_q beside M, so that a large α costs no digits and few iterations are needed; no rank
 is decided.  Regularised rows are those of unit length in the metric of M.  The iteration is
 ``linear_algebra.minimum_norm`` with b = γ - Φ_q q̈_0, on a sparse factor of S + I/α; it stops when the next
-change would be ≤ epsilon, relative to the larger of 1 and the acceleration.  Small inertias make small
-singular values, for which it begins again with a larger α where rows are known to be independent: those of
-redundant rows, off the constraints, are no rows' own.  Rows that are nearly dependent at the start, as those
-of two hinges that are tilted a little, make smaller ones yet, which conjugate directions find.
+change would be ≤ epsilon, relative to the larger of 1 and the acceleration.  Rows that are known to be
+independent, and are clearly so, need no 1/α: then the first iteration is exact, and is LM2's solution.  Small
+inertias make small singular values, for which it begins again with a larger α where rows are independent:
+those of redundant rows, off the constraints, are no rows' own.  Rows that are nearly dependent at the start,
+as those of two hinges that are tilted a little, make smaller ones yet, which conjugate directions find.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from mbref.equations.static_constraints import add_static_multipliers
+from mbref.equations.static_multipliers import add_static_multipliers
 from mbref.formulations.alf import feedback
 from mbref.formulations.base import Formulation, Sparse
 from mbref.kernels.compilation import exchangeable, kernel
-from mbref.kernels.layout import ACCELERATE, NOT_CONVERGED, SINGULAR, SparseFactor
+from mbref.kernels.layout import ACCELERATE, NOT_CONVERGED, OK, SINGULAR, SparseFactor
 from mbref.kernels.named_memory import opener
-from mbref.linear_algebra.minimum_norm import go_on_by_conjugate_directions, solve_to_tolerance
-from mbref.linear_algebra.sparse_cholesky import regularised_factor, subtract_product
+from mbref.linear_algebra.minimum_norm import NEVER, go_on_by_conjugate_directions, solve_to_tolerance
+from mbref.linear_algebra.sparse_cholesky import least_squared_pivot, regularised_factor, subtract_product
 
 
 class Options(NamedTuple):
@@ -37,12 +38,42 @@ class Options(NamedTuple):
 
 
 STRONGER, LARGEST_ALPHA = 1e3, 1e16  # factor of the next α; from there on 1/α is rounding beside S
+INFINITE = 1e300  # α without 1/α
+CLEAR, WIDE = 1e-4, 0.08  # squares of pivots: of clearly independent rows, and where one iteration is enough
 REDUNDANT_ALPHA = 1e15  # the largest with which a matrix of redundant rows stays positive
 options_of, factor_of = opener(Options), opener(SparseFactor)
 
 
 @exchangeable(ACCELERATE)
 def accelerate(system):
+    settings, factor = system.settings, factor_of(system.scratch)
+    if not (settings.independent and not settings.nearly_dependent and solve_exactly(system)):
+        status = iterate(system)
+        if status != OK:
+            return status
+    add_static_multipliers(factor.static, system)
+    return OK
+
+
+@kernel
+def solve_exactly(system):
+    """The solution for independent rows, without 1/α; False where they are not clearly so.
+
+    Rows that are nearer to dependent need a second iteration, which takes the rounding of the first away.
+    """
+    factor = factor_of(system.scratch)
+    if not start(INFINITE, system):
+        return False
+    pivot = least_squared_pivot(factor)
+    if pivot > CLEAR:
+        iterations = 1 if pivot > WIDE else 2
+        solve_to_tolerance(factor, NEVER, iterations, system.acceleration, system.multipliers)
+    return pivot > CLEAR
+
+
+@kernel
+def iterate(system):
+    """The iteration, with a larger α where that is needed: OK, SINGULAR or NOT_CONVERGED."""
     options, factor = options_of(system.options), factor_of(system.scratch)
     alpha, status = options.alpha, iterate_with(options.alpha, system)
     if system.settings.nearly_dependent:
@@ -52,7 +83,6 @@ def accelerate(system):
         status = iterate_with(alpha, system)
     if status == SINGULAR and alpha > options.alpha:  # of redundant rows, by rounding
         status = iterate_with(REDUNDANT_ALPHA, system)
-    add_static_multipliers(factor.static, system)
     return status
 
 
@@ -60,22 +90,31 @@ def accelerate(system):
 def iterate_with(alpha, system):
     """The iteration from q̈_0 on with 1/α beside S: OK, SINGULAR or NOT_CONVERGED."""
     options, factor = options_of(system.options), factor_of(system.scratch)
+    if not start(alpha, system):
+        return SINGULAR
+    return solve_to_tolerance(
+        factor, options.epsilon, int(options.iterations), system.acceleration, system.multipliers
+    )
+
+
+@kernel
+def start(alpha, system):
+    """The factor of S + I/α, q̈_0 and b = γ - Φ_q q̈_0; False where S + I/α or M is singular."""
+    factor = factor_of(system.scratch)
     row, column, root, x = factor.symbolic.row, factor.symbolic.column, factor.root, factor.change
     system.counts.factorisations += 1
     if not regularised_factor(factor, system.blocks.reshape(-1), system.inverse_root, alpha):
-        return SINGULAR
+        return False
     for j in range(column.shape[0]):
         k = column[j]
         if not system.mass[k] > 0.0:
-            return SINGULAR
+            return False
         x[j] = root[j] * system.force[k]
         system.acceleration[k] = root[j] * x[j]
     for i in range(row.shape[0]):
         factor.residual[i] = system.rhs[row[i]]
     subtract_product(factor, x, factor.residual)
-    return solve_to_tolerance(
-        factor, options.epsilon, int(options.iterations), system.acceleration, system.multipliers
-    )
+    return True
 
 
 ALF_DUAL = Formulation(

@@ -196,6 +196,8 @@ class Clock(NamedTuple):
     length: float = 0.0  # s, of the last step
     suggested: float = 0.0  # s, that length before sample times cut it
     ratio: float = 0.0  # error of the last step over its tolerance
+    past_length: float = 0.0  # s, of the step before the last
+    past_ratio: float = 0.0  # its error over its tolerance
     share: float = 1.0  # of rtol and atol: the tolerance of a step (``simulation.stepping.share``)
     y_size: int = 0  # length of y
     sample: int = 0  # the next one to take

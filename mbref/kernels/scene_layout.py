@@ -72,6 +72,8 @@ class SceneData(NamedTuple):
     metric_root: Annotated[Vector, "n"]  # inverse roots of the projection's metric
     bodies: Bodies
     primitives: Primitives
+    moving: Annotated[Indices, "moving"]  # primitives that are evaluated at every state
+    resting: Annotated[Indices, "resting"]  # those that only give multipliers
     row_bodies: Annotated[IndexTable, "m", 2]  # the two bodies of each row
     drivers: Drivers
     loads: Loads

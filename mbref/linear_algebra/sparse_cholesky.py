@@ -10,14 +10,21 @@ from mbref.kernels.compilation import inlined
 
 
 @inlined
-def assemble(factor, numbers, inverse_root, alpha):
-    """M^(-1/2) and D from M^(-1/2) (n,) and the flat constraint Jacobian, and S + I/α into L."""
-    symbolic, d, l, diagonal, root = factor.symbolic, factor.d, factor.l, factor.diagonal, factor.root
+def assemble_gradients(factor, numbers, inverse_root):
+    """M^(-1/2) and D from M^(-1/2) (n,) and the flat constraint Jacobian."""
+    symbolic, d, root = factor.symbolic, factor.d, factor.root
     entry, d_column, column = symbolic.d_entry, symbolic.d_column, symbolic.column
     for j in range(column.shape[0]):
         root[j] = inverse_root[column[j]]
     for k in range(entry.shape[0]):
         d[k] = numbers[entry[k]] * root[d_column[k]]
+
+
+@inlined
+def assemble(factor, numbers, inverse_root, alpha):
+    """M^(-1/2) and D from M^(-1/2) (n,) and the flat constraint Jacobian, and S + I/α into L."""
+    symbolic, d, l, diagonal = factor.symbolic, factor.d, factor.l, factor.diagonal
+    assemble_gradients(factor, numbers, inverse_root)
     l[:] = 0.0
     start, target = symbolic.s_start, symbolic.s_target
     left, right, first = symbolic.s_left, symbolic.s_right, symbolic.l_start
@@ -103,3 +110,12 @@ def find_squared_pivots(factor):
     first, l, diagonal, squares = factor.symbolic.l_start, factor.l, factor.diagonal, factor.squared_pivots
     for k in range(diagonal.shape[0]):
         squares[k] = 1.0 / (l[first[k]] * diagonal[k])
+
+
+@inlined
+def least_squared_pivot(factor):
+    """The least square of a pivot of unit rows; 1 without rows."""
+    first, l, diagonal, most = factor.symbolic.l_start, factor.l, factor.diagonal, 1.0
+    for k in range(diagonal.shape[0]):
+        most = max(most, l[first[k]] * diagonal[k])
+    return 1.0 / most

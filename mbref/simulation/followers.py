@@ -160,7 +160,7 @@ class Runs:
         run, (packs, q, v, starts, _, fit) = self._run, self._group
         if not fit:
             return None
-        data = row_of(run.reduced(packs.data, axis=1), fit)
+        data = row_of(run.reduced(packs.data, axis=1, all_move=True), fit)
         varied = Varied(data, packs.mass[fit], packs.inverse_root[fit], q[fit], v[fit])
         model = Model(packs.scenes[fit[0]], packs, fit[0])
         start = replace(starts[fit[0]], q=q[fit[0]], v=v[fit[0]])

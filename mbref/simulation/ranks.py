@@ -1,4 +1,4 @@
-"""Ranks: how many constraint rows of a run are independent at its start, by singular values."""
+"""Ranks: how many constraint rows of a run are independent at its start, by singular values or pivots."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ import numpy as np
 
 from mbref.equations.model import Model
 from mbref.equations.units import row_lengths
-from mbref.kernels.layout import Symbolic
+from mbref.kernels.layout import SparseFactor, Symbolic
+from mbref.kernels.named_memory import packed
+from mbref.linear_algebra.minimum_norm import factorise_once
+from mbref.stabilisation.projection import INDEPENDENT
 
-MOST_ROWS = 120  # rows whose rank is found
+MOST_ROWS = 120  # rows whose singular values are found
 
 
 class Ranks(NamedTuple):
@@ -24,17 +27,20 @@ class Ranks(NamedTuple):
 NO_RANKS = Ranks(0, 1.0, 0.0)
 
 
-def ranks_at(model: Model, q: np.ndarray, symbolic: Symbolic, tolerance: float) -> Ranks:
-    """Those of the rows that take part, at q (7 nb,); rank 0 where there are too many."""
+def ranks_at(model: Model, q: np.ndarray, factor: SparseFactor, tolerance: float) -> Ranks:
+    """Those of the rows of a factor, at q (7 nb,); of too many only whether pivots say that none depends."""
+    size = factor.symbolic.row.size
+    if size > MOST_ROWS:
+        return NO_RANKS._replace(rank=size if are_clear(model, q, factor) else 0)
     blocks = model.blocks(0.0, q, np.zeros(model.n)).jacobian[None]
-    (found,) = all_ranks(model, blocks, model.data.metric_root[None], symbolic, tolerance)
+    (found,) = all_ranks(model, blocks, model.data.metric_root[None], factor.symbolic, tolerance)
     return found
 
 
 def all_ranks(
     model: Model, blocks: np.ndarray, metric_root: np.ndarray, symbolic: Symbolic, tolerance: float
 ) -> list[Ranks]:
-    """``ranks_at`` of s scenes of the structure of a model.
+    """``ranks_at`` of s scenes of the structure of a model; no ranks where there are too many rows.
 
     From Φ_q as blocks (s, m, 12) and the inverse roots (s, n) of their metrics.
     """
@@ -49,3 +55,11 @@ def all_ranks(
 def _ranks(values: np.ndarray, tolerance: float) -> Ranks:
     rank = int((values > tolerance).sum())
     return Ranks(rank, float(values[rank - 1]) if rank else 1.0, float(np.append(values, 0.0)[rank]))
+
+
+def are_clear(model: Model, q: np.ndarray, factor: SparseFactor) -> bool:
+    """Whether all pivots of the factor at q (7 nb,) are those of independent rows."""
+    blocks = model.blocks(0.0, q, np.zeros(model.n)).jacobian
+    positive = factorise_once(blocks.reshape(-1), model.data.metric_root, packed(factor).argument)
+    squares = 1.0 / (factor.l[factor.symbolic.l_start[:-1]] * factor.diagonal)
+    return bool(positive and squares.min() > INDEPENDENT)

@@ -33,7 +33,7 @@ from mbref.kernels.lent_memory import Lent, lent, shapes_of, take_back, write
 from mbref.kernels.named_memory import allocate, packed
 from mbref.kernels.records import record
 from mbref.kernels.scene_layout import SceneData
-from mbref.linear_algebra.symbolic_factorisation import empty_factor
+from mbref.linear_algebra.symbolic_factorisation import empty_factor, no_static_rows
 from mbref.method import Method
 from mbref.scene import Scene, SceneError
 from mbref.simulation.control import control_of
@@ -109,10 +109,12 @@ class Run:
         self._put_numbers(self.memory, self.reduced(self.model.data))
         self.put_start()
 
-    def reduced(self, data: SceneData, axis: int = 0) -> SceneData:
-        """The data of a scene with the primitives that the run needs; ``axis`` counts them."""
+    def reduced(self, data: SceneData, axis: int = 0, all_move: bool = False) -> SceneData:
+        """The data of a scene with the primitives that the run needs, which ``axis`` counts; where asked all
+        of them are evaluated at every state."""
         sparse = self.method.formulation.linear_algebra.sparse
-        return self.reduction.scene(data, axis) if self.reduction and sparse else data
+        all_move = all_move or not self.method.stabilisation.projects  # others read the gradients of all rows
+        return self.reduction.scene(data, all_move, axis) if self.reduction and sparse else data
 
     def _lend_memory(self) -> Lent:
         """Memory with the numbers of this run."""
@@ -150,11 +152,13 @@ class Run:
         sizes["compared_rows"] = pivots if compared else 0
         sizes["compared_entries"] = factor.d.size if compared else 0
         sizes["compared_columns"] = factor.root.size if compared else 0
+        static = no_static_rows() if data.resting.size else factor.static  # else their multipliers come last
+        at_every_state = factor._replace(static=static)
         equations = model.equations(
             sizes,
             data,
             options=formulation.packed_options(method.options_of(formulation)),
-            scratch=packed(algebra.scratch(model.m, model.n, factor)),
+            scratch=packed(algebra.scratch(model.m, model.n, at_every_state)),
         )
         return Memory(
             equations=equations,
@@ -200,13 +204,12 @@ class Run:
         memory = self.memory
         memory.state.coordinates[:] = self.start.q
         memory.state.velocities[:] = self.start.v
-        self.ranks = NO_RANKS
+        self.ranks, settings = NO_RANKS, memory.equations.system.settings
+        ranks = ranks_at(self.model, self.start.q, memory.factor, self.limits.rank_tolerance)
+        settings.independent = ranks.rank == memory.pivots.size
         if self.method.stabilisation.projects:
-            tolerance = self.limits.rank_tolerance
-            self.ranks = ranks_at(self.model, self.start.q, self.part.factor.symbolic, tolerance)
-            memory.watch.generic_rank = self.ranks.rank
-            settings = memory.equations.system.settings
-            settings.independent = self.ranks.rank == memory.pivots.size
+            self.ranks = ranks
+            memory.watch.generic_rank = ranks.rank
             settings.nearly_dependent = self.ranks.least < NEARLY
             settings.rounding *= min(1.0, self.model.length)
 

@@ -17,7 +17,7 @@ from mbref.equations.evaluation import evaluate
 from mbref.equations.loads import remember_angles
 from mbref.kernels.compilation import kernel
 from mbref.linear_algebra.elimination import determinant
-from mbref.linear_algebra.sparse_cholesky import assemble, find_squared_pivots
+from mbref.linear_algebra.sparse_cholesky import assemble_gradients, find_squared_pivots
 from mbref.linear_algebra.vectors import copy
 from mbref.stabilisation.projection import ALPHA, factorise_constraints
 
@@ -105,7 +105,9 @@ def has_passed(y, memory):
     if changes_much(history.pivots[before], history.pivots[now]):
         pieces = max(pieces, FINE)
     pieces = min(pieces, inside.shape[0] - 1)
-    if pieces == 1 and least_sum(history.pivots[before], history.pivots[now]) >= STEEP * turn:
+    can_turn = memory.loop.gradients.row.shape[0] > 0
+    can_turn = can_turn and least_sum(history.pivots[before], history.pivots[now]) < STEEP * turn
+    if pieces == 1 and not can_turn:
         return False
     copy(history.pivots[before], inside[0])
     copy(history.pivots[now], inside[pieces])
@@ -130,12 +132,12 @@ def least_sum(before, now):
 
 @kernel
 def remember_gradient(before, memory):
-    """Keep D of a row of the history."""
+    """Keep D of a row of the history, where there is room."""
     loop = memory.loop
-    start = loop.y_new[: loop.clock.y_size]
-    copy(loop.history.y[before, : loop.clock.y_size], start)
-    put_gradient(loop.history.time[before], start, memory)
     if loop.gradients.row.shape[0] > 0:
+        start = loop.y_new[: loop.clock.y_size]
+        copy(loop.history.y[before, : loop.clock.y_size], start)
+        put_gradient(loop.history.time[before], start, memory)
         copy(memory.factor.d, loop.gradients.start)
 
 
@@ -161,24 +163,25 @@ def put_gradient(t, y, memory):
     state, equations = memory.state, memory.equations
     expand(y, memory.active, state)
     evaluate(t, state.coordinates, state.velocities, equations)
-    assemble(memory.factor, equations.system.blocks.reshape(-1), equations.scene.metric_root, ALPHA)
+    assemble_gradients(memory.factor, equations.system.blocks.reshape(-1), equations.scene.metric_root)
 
 
 @kernel
 def put_product(factor, gradients):
-    """D D₀ᵀ + I/α, D₀ being where the step began."""
+    """D D₀ᵀ and a part 1/α of the squares of D on its diagonal, D₀ being where the step began."""
     start, column, row = factor.symbolic.d_start, factor.symbolic.d_column, gradients.row
     size = factor.diagonal.shape[0]
     for i in range(size):
-        row[:] = 0.0
+        row[:], square = 0.0, 0.0
         for p in range(start[i], start[i + 1]):
             row[column[p]] = factor.d[p]
+            square += factor.d[p] * factor.d[p]
         for j in range(size):
             value = 0.0
             for p in range(start[j], start[j + 1]):
                 value += row[column[p]] * gradients.start[p]
             gradients.product[i, j] = value
-        gradients.product[i, i] += factor.diagonal[i] / ALPHA
+        gradients.product[i, i] += (square if square > 0.0 else 1.0) / ALPHA
 
 
 @kernel

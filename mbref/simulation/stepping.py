@@ -174,6 +174,7 @@ def accept_step(now, h, suggested, ratio, memory):
     if status == OK or status == CHANGED:  # noqa: SIM109 - no containers in kernels
         counts.steps += 1
         copy(loop.y_new, loop.y)
+        clock.past_length, clock.past_ratio = clock.length, clock.ratio
         clock.time, clock.length, clock.suggested, clock.ratio = now, h, suggested, ratio
         if status == CHANGED:
             clock.restart = counts.steps

@@ -17,7 +17,7 @@ from mbref.equations.coordinates import coordinate_rates
 from mbref.equations.evaluation import assemble_system
 from mbref.equations.initial_state import Start
 from mbref.equations.model import Model
-from mbref.equations.static_constraints import add_static_multipliers
+from mbref.equations.static_multipliers import add_static_multipliers
 from mbref.kernels.compilation import CACHE, PLAIN
 from mbref.kernels.layout import OK, Active, Addresses, SparseFactor, State, System
 from mbref.kernels.machine_code import Code, code_at, processor

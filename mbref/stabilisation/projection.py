@@ -16,14 +16,14 @@ from typing import Annotated, NamedTuple
 from numpy import sqrt
 
 from mbref.equations.coordinates import contract, displace, expand
-from mbref.equations.evaluation import evaluate, violation_rate
+from mbref.equations.evaluation import add_resting_rows, evaluate, violation_rate
 from mbref.kernels.compilation import exchangeable, inlined, kernel
-from mbref.kernels.layout import ACCEPT, ENTER, NOT_CONVERGED, OK, SINGULAR
+from mbref.kernels.layout import ACCEPT, ENTER, NOT_CONVERGED, OK, RATES, SINGULAR
 from mbref.kernels.named_memory import Vector, opener
 from mbref.linear_algebra.minimum_norm import NEVER, solve_fixed_iterations
 from mbref.linear_algebra.sparse_cholesky import find_squared_pivots, regularised_factor
 from mbref.linear_algebra.vectors import flush_denormals, largest, sort
-from mbref.stabilisation.all_coordinates import rates
+from mbref.stabilisation.all_coordinates import accelerate, rates
 from mbref.stabilisation.base import Stabilisation
 
 ALPHA = 1e10  # of the iteration
@@ -214,7 +214,15 @@ def accept(t, y, memory):
     return project(t, y, memory)
 
 
+@exchangeable(RATES)
+def whole_rates(t, y, y_rate, memory):
+    """``rates``, with the multipliers of all rows."""
+    status = accelerate(t, y, y_rate, memory)
+    add_resting_rows(t, memory.factor.static, memory.equations)
+    return status
+
+
 PROJECTION = Stabilisation(
-    "projection", "Bayo & Ledesma 1996", enter, rates, rates, rates, accept, memory=Scratch, projects=True,
-    largest_turn=LARGEST_TURN,
+    "projection", "Bayo & Ledesma 1996", enter, rates, whole_rates, whole_rates, accept, memory=Scratch,
+    projects=True, largest_turn=LARGEST_TURN,
 )  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 from numpy import sqrt
 
 from mbref.equations.coordinates import contract, copy_state
-from mbref.equations.evaluation import assemble_system
+from mbref.equations.evaluation import add_resting_rows, assemble_system
 from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.layout import GUARD_FAILED, NOT_CONVERGED, OK
 from mbref.linear_algebra.vectors import copy, larger
@@ -172,7 +172,9 @@ def balance_forces(t, acceleration, run):
     their rows: OK or why there are none."""
     assemble_system(t, run.state.coordinates, run.state.velocities, run.equations)
     rows_times(acceleration, run.equations, run.equations.system.rhs)
-    return run.kernels.accelerate(run.equations.system)
+    status = run.kernels.accelerate(run.equations.system)
+    add_resting_rows(t, run.factor.static, run.equations)
+    return status
 
 
 @kernel

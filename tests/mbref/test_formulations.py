@@ -7,8 +7,11 @@ from mbref.equations.initial_state import consistent_start
 from mbref.equations.model import Model
 from mbref.formulations import FORMULATIONS
 from mbref.kernels.layout import NOT_CONVERGED, OK, SINGULAR
+from mbref.method import Method
 from mbref.scenes import SCENES
-from mbref.simulation.simulate import simulate
+from mbref.simulation.run import Run
+from mbref.simulation.simulate import Limits, simulate
+from mbref.trajectory import Outcome
 
 
 def system(m, n, redundant, seed=20031):
@@ -149,3 +152,20 @@ def unchanged(formulation, system, acceleration, reaction, what):
     for name, new, old in (("acceleration", found, acceleration), ("reaction", now, reaction)):
         change = np.max(np.abs(new - old)) / max(1.0, np.max(np.abs(old)))
         assert change < 1e-9, f"{formulation.name}, {what}: {name} changed by {change:.1e}"
+
+
+def test_rows_known_to_be_independent_need_one_iteration_and_no_alpha():
+    scene, times = SCENES["spatial_slider_crank_gravity"](), [0.0, 0.01]
+    plain = simulate(scene, "alf-dual+projection", times, Limits(rtol=1e-10))
+    weak = simulate(scene, "alf-dual[alpha=10,iterations=1]+projection", times, Limits(rtol=1e-10))
+    assert weak.outcome is Outcome.COMPLETED, weak.message
+    assert np.array_equal(weak.acceleration, plain.acceleration)
+    dense = simulate(scene, "lm2+projection", times, Limits(rtol=1e-10))
+    size = np.abs(dense.acceleration).max()
+    assert np.abs(plain.acceleration - dense.acceleration).max() < 1e-8 * size
+
+
+@pytest.mark.parametrize(("name", "independent"), [("bennett", False), ("spatial_slider_crank", True)])
+def test_alpha_is_left_out_for_independent_rows_alone(name, independent):
+    run = Run(SCENES[name](), Method.parse("alf-dual+projection"), np.array([0.1]), Limits())
+    assert run.memory.equations.system.settings.independent == independent

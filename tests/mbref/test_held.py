@@ -190,3 +190,24 @@ def test_a_driver_that_works_against_what_would_be_held_is_not_passed_over(code)
     )  # fmt: skip
     run = simulate(scene, METHOD, [0.0, 0.2], Limits(code=code))
     assert run.outcome.name != "COMPLETED", "the driver cannot turn what is welded"
+
+
+def test_primitives_that_only_hold_columns_are_evaluated_at_samples():
+    scene, times = find_scene("spatial_slider_crank_gravity"), np.linspace(0.0, 0.1, 4)
+    run = Run(scene, Method.parse(METHOD), times, Limits())
+    resting = run.memory.equations.scene.resting
+    assert resting.size == 4, "the directions of the revolute and of the translational joint hold columns"
+    found, dense = (
+        simulate(scene, f"{f}+projection", times, Limits(rtol=1e-11)) for f in ("alf-dual", "lm2")
+    )
+    for joint in scene.joint:
+        ours, theirs = found.reactions[joint.name], dense.reactions[joint.name]
+        assert np.abs(ours - theirs).max() < 1e-8 * np.abs(theirs).max(), joint.name
+
+
+@pytest.mark.parametrize("formulation", ["alf-dual", "lm2"])
+@pytest.mark.parametrize("stabilisation", ["none", "partitioning"])
+def test_all_primitives_are_evaluated_where_all_gradients_are_read(formulation, stabilisation):
+    scene = find_scene("spatial_slider_crank_gravity")
+    run = Run(scene, Method.parse(f"{formulation}+{stabilisation}"), np.array([0.1]), Limits())
+    assert run.memory.equations.scene.resting.size == 0

@@ -304,3 +304,29 @@ def test_short_first_steps_do_not_make_a_run_long():
     scene = next(scene for scene in stability.scenes() if scene.name == "speed[1e+07]")
     run = simulate(scene, times=[scene.duration], limits=Limits(most_steps=2000))
     assert run.outcome.label == "COMPLETED"
+
+
+def proposed(ratios, lengths):
+    """The step that DOP853 proposes after two steps of these lengths (s) and error ratios."""
+    run = CrossingRun(PENDULUM, Method.parse("alf-dual+projection"), np.array([1.0]), Limits())
+    memory = run.memory
+    clock, y = memory.loop.clock, memory.loop.y[: memory.loop.clock.y_size]
+    memory.equations.system.counts.steps = 2
+    (clock.past_length, clock.length), (clock.past_ratio, clock.ratio) = lengths, ratios
+    propose = run.method.integrator.propose.callable
+    return propose(clock.length, clock.length, clock.ratio, y, np.zeros(y.size), run.packed.argument)
+
+
+def test_steps_of_growing_errors_are_shortened_by_their_trend():
+    steady, growing = proposed((0.5, 0.5), (0.1, 0.1)), proposed((0.5 / 2**8, 0.5), (0.1, 0.1))
+    assert abs(growing - 0.5 * steady) < 1e-12 * steady, (growing, steady)
+    longer = proposed((0.5 / 2**8, 0.5), (0.05, 0.1))
+    assert abs(longer - steady) < 1e-12 * steady, "a longer step explains its larger error"
+    assert proposed((0.5, 0.5 / 2**8), (0.1, 0.1)) > steady, "falling errors do not shorten a step"
+    assert proposed((1e-300, 1.0), (0.1, 0.1)) > 0.1 * steady, "a step without error tells no trend for long"
+
+
+def test_few_steps_of_a_crank_that_spins_up_are_refused():
+    scene, times = SCENES["planar_slider_crank"](), [0.2]
+    run = ran(scene, "alf-dual+projection", times, rtol=1e-7)
+    assert run.cost.rejected < 0.1 * run.cost.steps, (run.cost.rejected, run.cost.steps)

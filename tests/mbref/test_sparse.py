@@ -22,7 +22,10 @@ from mbref.linear_algebra.sparse_cholesky import (
     times_transpose,
 )
 from mbref.linear_algebra.symbolic_factorisation import _of_pattern, sparse_factor, symbolic_factorisation
+from mbref.method import Method
 from mbref.scenes import find_scene
+from mbref.simulation.ranks import MOST_ROWS, are_clear
+from mbref.simulation.run import Run
 from mbref.simulation.simulate import Limits, simulate
 
 
@@ -231,3 +234,18 @@ def test_shares_of_redundant_rows_dense_and_sparse():
     dense = dense_null_shares(matrix, rows)
     assert np.allclose(dense, sparse, atol=1e-6)
     assert dense[5] < 1e-12 and np.allclose(dense[[0, 2]], 0.5)
+
+
+@pytest.mark.parametrize("stabilisation", ["projection", "none"])
+def test_pivots_tell_that_many_rows_are_independent(stabilisation):
+    run = Run(
+        find_scene("four_bar_chain[25]"), Method.parse(f"alf-dual+{stabilisation}"), np.array([0.1]), Limits()
+    )
+    rows = run.memory.pivots.size
+    assert rows > MOST_ROWS, "so few rows are told by singular values"
+    assert run.memory.equations.system.settings.independent
+
+
+def test_pivots_tell_that_rows_are_redundant():
+    run = Run(find_scene("bennett"), Method.parse("alf-dual+projection"), np.array([0.1]), Limits())
+    assert not are_clear(run.model, run.start.q, run.memory.factor)

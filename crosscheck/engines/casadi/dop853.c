@@ -27,6 +27,15 @@ static double growth(double ratio) {
   return factor < SHRINK ? SHRINK : factor > GROW ? GROW : factor;
 }
 
+/* the factor, 1 at most, by which the trend of errors shortens the step after one of length h */
+static double trend(double h, double ratio, double *last) {
+  double length = last[0], before = last[1];
+  last[0] = h, last[1] = ratio;
+  if (!(ratio > 0.0 && before > 0.0)) return 1.0;
+  double factor = h / length * pow(before / ratio, 0.125);
+  return factor < SHRINK ? SHRINK : factor < 1.0 ? factor : 1.0;
+}
+
 /* the new state of a step; its error over the tolerance, or -1 */
 static double attempt(double h, double rtol, int settles, const double *y, double slopes[STAGES][N], double *new) {
   for (int s = 1; s < STAGES; s++) {
@@ -84,7 +93,8 @@ static double jump(double left, double shortest, double rtol, int settles, const
    the last step begins or ends at reached. */
 int integrate(const double *start, const double *times, int64_t count, double rtol, double shortest, int settles,
               double *samples, int64_t *counts, double *reached) {
-  double y[N], new[N], slopes[STAGES][N], t = 0.0, next = 0.0, end = times[count - 1];
+  double y[N], new[N], slopes[STAGES][N], last[2] = {0.0, 0.0}, t = 0.0, next = 0.0,
+         end = times[count - 1];
   memcpy(y, start, sizeof y);
   memset(counts, 0, 4 * sizeof *counts);
   for (int64_t k = 0; k < count; k++) {
@@ -102,7 +112,7 @@ int integrate(const double *start, const double *times, int64_t count, double rt
         double ratio = attempt(h, rtol, settles, y, slopes, new);
         counts[2] += STAGES - 1;
         if (ratio >= 0.0 && ratio <= 1.0) {
-          double grown = h * growth(ratio);
+          double grown = h * growth(ratio) * trend(h, ratio, last);
           next = h < wanted ? largest(grown, next) : grown;
           t = h == left ? times[k] : t + h;
           break;
@@ -114,6 +124,7 @@ int integrate(const double *start, const double *times, int64_t count, double rt
           h = jump(left, shortest, rtol, settles, y, slopes, new);
           counts[2] += (JUMPS + 1) * (STAGES - 1);
           if (h == 0.0) return NOT_FINITE;
+          last[1] = 0.0;
           t = h == left ? times[k] : t + h;
           break;
         }

@@ -1,0 +1,23 @@
+"""Multipliers of statically determined rows, which ``static_constraints`` eliminates."""
+
+from __future__ import annotations
+
+from mbref.kernels.compilation import inlined
+
+
+@inlined
+def add_static_multipliers(static, system):
+    """Multipliers of the statically determined rows: they balance the forces on columns without q̈."""
+    blocks, multipliers, force = system.blocks.reshape(-1), system.multipliers, system.force
+    start, entry, column, first, other = (
+        static.start, static.entry, static.column, static.other_start, static.other,
+    )  # fmt: skip
+    for k in range(static.row.shape[0]):
+        value, square = 0.0, 0.0
+        for p in range(start[k], start[k + 1]):
+            balance, own = force[column[p]], blocks[entry[p]]
+            for o in range(first[p], first[p + 1]):
+                balance -= blocks[other[o]] * multipliers[other[o] // 12]
+            value += own * balance
+            square += own * own
+        multipliers[static.row[k]] = value / square
