@@ -223,7 +223,7 @@ class Run:
         """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
         before, began, status = self.making, time.process_time(), PAUSED
         while status == PAUSED:
-            status = advance_to_end(self.packed.argument)
+            status = self.take_steps()
             if status == SINGULAR_AHEAD or self._fails_at_start(status):
                 status = self.pass_singular_position(status)
             status = self._judge_pace(status)
@@ -231,6 +231,10 @@ class Run:
             if progress is not None:
                 progress(float(self.memory.loop.clock.time))
         return status, time.process_time() - began - (self.making - before)
+
+    def take_steps(self) -> int:
+        """As many steps as are taken at a time: PAUSED after them, DONE at the end, or why there are none."""
+        return int(advance_to_end(self.packed.argument))
 
     def _judge_pace(self, status: int) -> int:
         """CREEPING instead of PAUSED where at the pace of the last steps the end is out of all reach."""

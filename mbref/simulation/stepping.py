@@ -104,6 +104,12 @@ def step_within(interval, h):
 @entry(INT(MEMORY))
 def advance_to_end(memory):
     """Advance until the last sample time, a failure, or the number of steps per call; says which."""
+    return advance_steps(memory)
+
+
+@kernel
+def advance_steps(memory):
+    """The steps of ``advance_to_end``."""
     loop, clock, counts = memory.loop, memory.loop.clock, memory.equations.system.counts
     taken, times = 0, memory.loop.times
     while True:

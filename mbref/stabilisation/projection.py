@@ -52,6 +52,12 @@ scratch_of = opener(Scratch)
 @exchangeable(ENTER)
 def enter(t, y, memory):
     """The active entries of ``memory.state`` into y; their number."""
+    return put_active(t, y, memory)
+
+
+@kernel
+def put_active(t, y, memory):
+    """The active entries of ``memory.state`` into y, the pivots watched; their number."""
     state, active = memory.state, memory.active
     evaluate(t, state.coordinates, state.velocities, memory.equations)
     if factorise_constraints(memory):

@@ -143,7 +143,7 @@ class Solver(NamedTuple):
     first: Annotated[Vector, "nz"]  # pivots when they were chosen: of G, then of the reduced mass matrix
     last: Annotated[Vector, "nz"]  # pivots of the last factorisation
     past: Annotated[Vector, "nz"]  # pivots where the step began
-    past_gradient: Annotated[Matrix, "nr", "nz"]  # G where the step began
+    past_gradient: Annotated[Matrix, "nz", "nr"]  # Gᵀ of the independent rows where the step began
     product: Annotated[Matrix, "nr", "nr"]  # of gradients at both ends of a step
     place: Annotated[Indices, "twofold"]  # in the tableau, of the products of rows
     linear: Annotated[Matrix, "nr + 1", "lanes"]  # the part of the tableau that depends on no variable
@@ -184,6 +184,13 @@ class Progress(NamedTuple):
     left: float = 0.0  # of the violation, where the step began; known after an attempt failed
     entered: float = 0.0  # the least pivot where the series began
     cut: int = 0  # the last order of the series that an attempt takes
+    usual: float = 0.0  # the tolerance of steps that pass no singular position
+    usual_order: int = 0  # the order of their series
+    exact: float = 0.0  # the tolerance of steps that pass one
+    exact_order: int = 0
+    change: float = 0.0  # of velocities, relative, that a passage may not magnify
+    passed: int = 0  # singular positions in ``Crossings``
+    leaving: int = 0  # whether the series comes from a singular position that it has passed
 
 
 class SeriesKernels(NamedTuple):
@@ -222,6 +229,21 @@ class Snapshot(NamedTuple):
     angles: Annotated[Vector, "angles"]
 
 
+class Crossings(NamedTuple):
+    """Singular positions that brief passages have passed: times (s) and states, the first ``passed`` rows."""
+
+    time: Annotated[Vector, "kept"]
+    coordinates: Annotated[Matrix, "kept", "7*nb"]
+    velocities: Annotated[Matrix, "kept", "n"]
+
+
+class Beginning(NamedTuple):
+    """Where a brief passage begins: values and rates of the variables, and angles of torsion springs."""
+
+    terms: Annotated[Matrix, 2, "lanes"]
+    angles: Annotated[Vector, "torsions"]
+
+
 class TaylorMemory(NamedTuple):
     """All that the kernels of the method share."""
 
@@ -235,6 +257,9 @@ class TaylorMemory(NamedTuple):
     code: SceneCode
     began: Snapshot  # from where the last passage is smooth
     crossing: Snapshot  # the last singular position passed
+    beginning: Beginning
+    crossings: Crossings
+    parting: Annotated[Indices, "parting"]  # numbers of the singular positions left along another branch
     landing: Annotated[Matrix, 2, "lanes"]  # values and rates of the variables where a passage ended
     state: Annotated[Matrix, 3, "lanes"]  # variables and their two derivatives at some time
     pose: Annotated[Matrix, 3, "12*nb"]

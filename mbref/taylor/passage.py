@@ -14,14 +14,14 @@
 
 from __future__ import annotations
 
-from numpy import exp, log
+from numpy import log
 
 from mbref.kernels.compilation import kernel
 from mbref.kernels.layout import OK
-from mbref.linear_algebra.elimination import determinant
 from mbref.linear_algebra.vectors import copy, larger
 from mbref.simulation.stepping import SINGULAR_AHEAD, STEP_TOO_SMALL, UNDECIDED
-from mbref.taylor.partition import kept_pivot, put_gradient
+from mbref.taylor.crossing import changes_sign, least_between, overlap, size_at
+from mbref.taylor.partition import kept_pivot
 from mbref.taylor.samples import evaluate_series
 from mbref.taylor.turning import pivot_of_turning, turns_back
 
@@ -39,11 +39,8 @@ VANISHING = log(0.2)  # of a determinant over its values at both ends, that fall
 VANISHED = -30.0  # the same logarithm at its least, of a step that begins far from where it crosses
 LONG, MOST_PARTS = 0.5, 8  # that a variable moves in a part of a step, and the most parts
 STEEPEST = 1.5  # that a pivot falls and rises in a step, over the most that a variable moves
-GOLDEN, SECTIONS = 0.6180339887498949, 70  # of the search for the least determinant
-SECANTS = 12  # of the search for its change of sign, behind which it halves
 LEFT = 2.0  # of the violation that corrections leave, of rows that depend on others: it is no gap's
 CREPT = 1e-6  # pivot over its largest below which a crossing is rounding's, unless the series began there
-LOST_ROW = 1e-6  # of the largest pivot: formulations may take a row with less for one that depends on others
 LEAST = 1e-9  # pivot over its largest below which the branch depends on rounding
 ROOT = 2.5e-8  # pivot, of unit rows, at the root of the gaps that rounding of the lengths may open
 FALLEN = 0.5  # of the pivot where a passage began: a larger one has not come near
@@ -55,6 +52,7 @@ def remember_pivots(memory):
     progress, before = memory.progress, memory.progress.past_pivot
     remember_pivots_here(memory)
     progress.approaching = progress.past_pivot <= before and not progress.crossed
+    progress.leaving = progress.leaving and progress.past_pivot < AHEAD * progress.largest_pivot
 
 
 @kernel
@@ -101,26 +99,10 @@ def is_near(pivot, progress):
 
 
 @kernel
-def remember_gradient(memory):
-    """Keep G where the step began."""
-    solver = memory.solver
-    put_gradient(memory.series.past, memory)
-    copy(solver.work.reshape(-1), solver.past_gradient.reshape(-1))
-
-
-@kernel
-def overlap(y, memory):
-    """Whether det(G Gᵀ₀) of the independent rows is negative, and its logarithm: G at variables y[0]."""
-    solver, rank = memory.solver, memory.progress.rank
-    product, past, work = solver.product, solver.past_gradient, solver.work
-    put_gradient(y, memory)
-    for i in range(rank):
-        for j in range(rank):
-            value = 0.0
-            for c in range(work.shape[1]):
-                value += work[solver.row[i], c] * past[solver.row[j], c]
-            product[i, j] = value
-    return determinant(product, rank)
+def comes_near(pivot, progress):
+    """Whether a step of a loose tolerance ends near a singular position, unless it leaves one."""
+    leaves = progress.leaving and pivot > progress.past_pivot
+    return pivot < AHEAD * progress.largest_pivot and not leaves
 
 
 @kernel
@@ -153,116 +135,11 @@ def has_crossed(h, pivot, memory):
 
 
 @kernel
-def changes_sign(h, parts, memory):
-    """Whether the determinant of the gradients at both ends of a step of h seconds is negative.
-
-    A long step is looked at in parts, because rows that turn by a right angle change the sign too.  The
-    gradient where the step began is kept.
-    """
-    series, changes = memory.series, False
-    remember_gradient(memory)
-    for part in range(1, parts):
-        evaluate_series(h * part / parts, memory)
-        negative, _ = overlap(memory.state, memory)
-        changes = changes or negative
-        copy(memory.solver.work.reshape(-1), memory.solver.past_gradient.reshape(-1))
-    negative, _ = overlap(series.terms, memory)
-    if parts > 1:
-        evaluate_series(h, memory)
-        remember_gradient(memory)
-    return changes or negative
-
-
-@kernel
 def size_of(series, k, variables):
     """The largest coefficient of order k."""
     size = 0.0
     for i in range(variables):
         size = larger(size, series[k, i])
-    return size
-
-
-@kernel
-def find_crossing(h, memory):
-    """The time (s, from its beginning) at which a step of h seconds that crossed met the singular position.
-
-    The determinant vanishes there, with a change of sign unless branches of several loops cross at once.
-    """
-    change = sign_change(h, memory)
-    return change if change >= 0.0 else least_between(h, memory)
-
-
-@kernel
-def is_at_crossing(at, h, memory):
-    """Whether the rows leave a motion free to the formulation, beyond that of the series, at a time (s) of a
-    step of h seconds that crossed: pivots fall linearly."""
-    progress = memory.progress
-    if not progress.crossed:
-        return False
-    crossing = find_crossing(h, memory)
-    return abs(at - crossing) * progress.past_pivot <= LOST_ROW * progress.largest_pivot * crossing
-
-
-@kernel
-def sign_change(h, memory):
-    """The time (s) at which the determinant changes its sign inside a step of h seconds; -1 if it does not.
-
-    By the Illinois algorithm (M. Dowell and P. Jarratt, BIT 11, 1971); where that is slow, because several
-    loops are flat at once and the root is a multiple one, by halving.
-    """
-    evaluate_series(0.0, memory)
-    _, unit = overlap(memory.state, memory)
-    start, end, side = 0.0, h, 0
-    before, after = value_at(start, unit, memory), value_at(end, unit, memory)
-    if not before * after < 0.0:
-        return -1.0
-    for k in range(SECTIONS):
-        middle = (start * after - end * before) / (after - before) if k < SECANTS else 0.5 * (start + end)
-        if not start < middle < end:
-            break
-        value = value_at(middle, unit, memory)
-        if value * after > 0.0:
-            end, after = middle, value
-            before = 0.5 * before if side == 1 else before
-            side = 1
-        else:
-            start, before = middle, value
-            after = 0.5 * after if side == -1 else after
-            side = -1
-    return end if abs(after) < abs(before) else start
-
-
-@kernel
-def value_at(h, unit, memory):
-    """The determinant at a distance h (s) from the step's beginning, over one of a logarithm."""
-    evaluate_series(h, memory)
-    negative, size = overlap(memory.state, memory)
-    return -exp(size - unit) if negative else exp(size - unit)
-
-
-@kernel
-def least_between(h, memory):
-    """The time (s) inside a step of h seconds at which the determinant is least, by golden section."""
-    start, end = 0.0, h
-    one, other = h - GOLDEN * h, GOLDEN * h
-    before, after = size_at(one, memory), size_at(other, memory)
-    for _ in range(SECTIONS):
-        if before < after:
-            end, other, after = other, one, before
-            one = end - GOLDEN * (end - start)
-            before = size_at(one, memory)
-        else:
-            start, one, before = one, other, after
-            other = start + GOLDEN * (end - start)
-            after = size_at(other, memory)
-    return 0.5 * (start + end)
-
-
-@kernel
-def size_at(h, memory):
-    """The logarithm of the determinant's size at a distance h (s) from the step's beginning."""
-    evaluate_series(h, memory)
-    _, size = overlap(memory.state, memory)
     return size
 
 
@@ -307,8 +184,7 @@ def judge_branch(h, last, memory):
     progress, pivot = memory.progress, least_pivot(memory)
     progress.crossed = has_crossed(h, pivot, memory)
     if not progress.passing:
-        ahead = progress.crossed or pivot < AHEAD * progress.largest_pivot
-        return SINGULAR_AHEAD if ahead else OK
+        return SINGULAR_AHEAD if progress.crossed or comes_near(pivot, progress) else OK
     if not (progress.crossed or is_near(pivot, progress)):
         return OK
     turned = turns_back(memory.series.terms, memory)

@@ -2,33 +2,118 @@
 
 from __future__ import annotations
 
-from mbref.equations.coordinates import copy_state
+from mbref.equations.coordinates import copy_state, expand
 from mbref.kernels.compilation import FLOAT, INT, entry, kernel
 from mbref.kernels.layout import MEMORY, OK
 from mbref.linear_algebra.vectors import copy
 from mbref.simulation.singular_crossing import WINDOW, relative_pivot
-from mbref.simulation.stepping import DONE, PAUSED, TOO_MANY_STEPS, UNDECIDED
+from mbref.simulation.stepping import (
+    DONE,
+    PAUSED,
+    SINGULAR_AHEAD,
+    TOO_MANY_STEPS,
+    UNDECIDED,
+    advance_steps,
+    share,
+)
+from mbref.stabilisation.projection import put_active
+from mbref.taylor.brief import crosses, may_be_brief, parts_at, pass_briefly, step_exactly, step_usually
+from mbref.taylor.crossing import find_crossing
 from mbref.taylor.layout import SERIES
-from mbref.taylor.passage import AHEAD, find_crossing, least_pivot
+from mbref.taylor.passage import AHEAD, least_pivot
 from mbref.taylor.samples import project_state, put_state_at, put_terms
 from mbref.taylor.snapshots import take_snapshot
 from mbref.taylor.start import freedoms
 from mbref.taylor.stepping import keep_terms
-from mbref.taylor.twin import twin_agrees
+from mbref.taylor.twin import LEAST_CHANGE, twin_agrees
 
 LEAVE = 1.5  # windows: the pivot from which on steps of the run are taken again
 CLEAR = 3.0  # of the pivot of ``AHEAD``: the same for a run in series
+SHARE = 0.05  # of rtol + atol: the tolerance of a step that is clear of singular positions
+CLEARLY = 2.0  # the clearance from which on steps of a run do not take a pivot that rises for one that fell
+MOST_STEPS = 20  # behind a brief passage, until steps of the run go on
 
 
 @entry(INT(MEMORY, SERIES))
 def take_over(source, memory):
     """Take the state of a run, where a passage begins, over into the series: OK."""
+    take(source, memory)
+    return OK
+
+
+@kernel
+def take(source, memory):
+    """The state, time and samples of a run, and where its passage begins."""
     hand_over(source, memory.run)
     times = memory.run.loop.times
     memory.run.watch.reference_pivot = source.watch.reference_pivot
     memory.progress.end = times[times.shape[0] - 1]
     take_snapshot(memory.run, memory.began)
-    return OK
+
+
+@entry(INT(INT, MEMORY, SERIES))
+def advance_over(status, source, memory):
+    """Advance a run in steps, by brief passages over singular positions, from where it is PAUSED, or has one
+    ahead: DONE at the end, or why it ended.
+
+    PAUSED after the number of steps or of singular positions per call, SINGULAR_AHEAD, the run as it was,
+    where a passage cannot be brief.
+    """
+    while True:
+        if status == SINGULAR_AHEAD:
+            status = pass_over(source, memory)
+        if status != PAUSED or memory.progress.passed == memory.crossings.time.shape[0]:
+            return status
+        status = advance_steps(source)
+        if status != SINGULAR_AHEAD:
+            return status
+
+
+@kernel
+def pass_over(source, memory):
+    """Take a run in steps over the singular position ahead, and clear of it: PAUSED; DONE at the end.
+
+    Of a run by projection, whose state is in y, and into which the state behind is put.
+    SINGULAR_AHEAD, the run as it was, where the passage cannot be a brief one.
+    """
+    control, progress, clock = source.control, memory.progress, source.loop.clock
+    counts, passed = source.equations.system.counts, progress.passed
+    expand(source.loop.y, source.active, source.state)
+    take(source, memory)
+    progress.usual = SHARE * (control.rtol + control.atol) * share(clock.length, source)
+    progress.change, status = max(control.rtol, LEAST_CHANGE), SINGULAR_AHEAD
+    step_exactly(memory)
+    is_open = not parts_at(counts.crossings + 1, memory) and memory.kernels.begin(memory) == OK
+    if is_open and may_be_brief(memory) and crosses(memory):
+        step_usually(memory)
+        status = step_clear(memory)
+        step_exactly(memory)
+    if status == SINGULAR_AHEAD:
+        progress.passed = passed
+    else:
+        hand_over(memory.run, source)
+    if status == PAUSED:
+        clock.y_size = put_active(clock.time, source.loop.y, source)
+        clock.restart = counts.steps
+    return status
+
+
+@kernel
+def step_clear(memory):
+    """Step on until steps of the run go on: PAUSED; DONE at the end, else SINGULAR_AHEAD."""
+    clock, progress, counts = memory.run.loop.clock, memory.progress, memory.run.equations.system.counts
+    progress.clearance, progress.is_clear = 0.0, 0
+    for _ in range(MOST_STEPS):
+        if clock.time >= progress.end:
+            return DONE
+        if progress.is_clear and progress.clearance >= CLEARLY:
+            return PAUSED
+        status = memory.kernels.step(memory)
+        if status == OK:
+            judge_clearance(memory)
+        elif status != SINGULAR_AHEAD or parts_at(counts.crossings + 1, memory) or not pass_briefly(memory):
+            return SINGULAR_AHEAD
+    return SINGULAR_AHEAD
 
 
 @entry(INT(SERIES))
@@ -95,9 +180,7 @@ def step_on(memory):
             keep_crossing(memory)
         if clock.time >= progress.end:
             return DONE
-        before = progress.clearance
-        progress.clearance = clearance(memory)
-        progress.is_clear = progress.clearance >= max(before, 1.0) and clock.time >= clock.passage
+        judge_clearance(memory)
         if progress.is_clear or counts.crossings != passed:
             return PAUSED
     return TOO_MANY_STEPS
@@ -113,6 +196,15 @@ def keep_crossing(memory):
     take_snapshot(run, memory.crossing)
     copy_state(run.previous, run.state)
     memory.crossing.instant.time -= length - h
+
+
+@kernel
+def judge_clearance(memory):
+    """Find whether steps of the run may go on."""
+    progress, clock = memory.progress, memory.run.loop.clock
+    before = progress.clearance
+    progress.clearance = clearance(memory)
+    progress.is_clear = progress.clearance >= max(before, 1.0) and clock.time >= clock.passage
 
 
 @kernel
@@ -146,7 +238,7 @@ def give_back(status, target, memory):
 @entry(INT(FLOAT, SERIES))
 def look_along(h, memory):
     """Put the state at a distance h (s) from where the series now begins into memory."""
-    keep_terms(memory.series)
+    keep_terms(memory)
     memory.progress.cut = memory.progress.order
     put_state_at(h, memory)
     return OK

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 
 import numpy as np
@@ -14,17 +15,17 @@ from mbref.kernels.compilation import Entry
 from mbref.kernels.layout import OK
 from mbref.kernels.lent_memory import take_back
 from mbref.method import Method
-from mbref.simulation.limits import GENERIC
+from mbref.simulation.limits import GENERIC, SPECIALISED
 from mbref.simulation.run import Run
 from mbref.simulation.singular_start import Leaving
 from mbref.simulation.stepping import DONE, PAUSED, UNDECIDED
+from mbref.specialised import Untraceable
 from mbref.taylor.layout import Polynomials
-from mbref.taylor.passing import begin_here, cross, give_back, look_along, pass_on, take_over
+from mbref.taylor.passing import advance_over, begin_here, cross, give_back, look_along, pass_on, take_over
 from mbref.taylor.polynomials import Geometry
-from mbref.taylor.series_run import SeriesRun
+from mbref.taylor.series_run import EXACT, SeriesRun
 from mbref.taylor.start import OFF
 
-TOLERANCE = 1e-13  # of the series
 SERIES = "taylor[order=16]"  # lower orders magnify rounding less
 BEHIND = 3e-3  # lengths or rad behind a crossing where another branch is entered
 CORRECTIONS = 6  # of the state there
@@ -35,9 +36,12 @@ class PassingRun(SeriesRun):
 
     def __init__(self, run: Run):
         self._run = run
-        limits = replace(run.limits, rtol=TOLERANCE, atol=TOLERANCE, code=GENERIC)
+        limits = replace(run.limits, rtol=EXACT, atol=EXACT, code=GENERIC)
         super().__init__(run.scene, Method.parse(SERIES), run.times, limits)
         self.taylor.progress.passing = True
+        if run.limits.code == SPECIALISED:
+            with contextlib.suppress(Untraceable):  # then the series are by the kernels
+                self._put_code()
 
     def _posed(self) -> tuple[Model, Start, Reduction | None]:
         """Those of the run, all but its memory."""
@@ -47,6 +51,13 @@ class PassingRun(SeriesRun):
         """Those of a run that is in series itself."""
         run = self._run
         return (run.geometry, run.polynomials) if isinstance(run, SeriesRun) else super()._equations()
+
+    def advance_over(self, status: int, run: Run) -> int:
+        """Advance a run in steps that is PAUSED, or has a singular position ahead, by brief passages: as the
+        steps alone do, and SINGULAR_AHEAD only where a passage cannot be brief."""
+        status = int(advance_over(status, run.packed.argument, self._packed_taylor.argument))
+        self.crossings = self.recorded()
+        return status
 
     def take_over(self, run: Run) -> None:
         """Go on from the state and time of a run of the same scene, as a passage begins."""
@@ -83,6 +94,13 @@ class PassingRun(SeriesRun):
         crossing = Passed(float(found.instant.time), q, v, taken)
         self.crossings.append(crossing)
         return status if taken == SMOOTH else self._take_branch(singular_position(self.model, crossing))
+
+    def leave_along_branch(self, crossing: Passed) -> int:
+        """Go on from a singular position just passed along another branch than the smooth one: PAUSED, DONE
+        or why that cannot be."""
+        status = self._take_branch(singular_position(self.model, crossing))
+        self.taylor.progress.entered = self.least_pivot()
+        return self._go_on(status)
 
     def _take_branch(self, crossing: SingularPosition) -> int:
         """Go on along another branch than the smooth one: PAUSED, or why that cannot be.

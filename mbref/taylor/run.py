@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from mbref.equations.branches import SMOOTH
 from mbref.kernels.layout import NOT_CONVERGED, OK
 from mbref.method import Method
 from mbref.scene import Scene
@@ -41,6 +42,10 @@ class CrossingRun(Run):
             self.enter_state()
         return super().advance(progress) if status == PAUSED else (status, 0.0)
 
+    def take_steps(self) -> int:
+        """As those of every run, brief passages among them once there are series for them."""
+        return self._passage.advance_over(PAUSED) if self._passage.is_made else super().take_steps()
+
     def pass_singular_position(self, status: int) -> int:
         """PAUSED behind it, DONE at the end, else why the motion cannot be followed.
 
@@ -48,6 +53,10 @@ class CrossingRun(Run):
         the elimination of the series.
         """
         why, memory = status, self.memory
+        if status == SINGULAR_AHEAD and not self._passage.is_made:
+            status = self._passage.advance_over(status)
+            if status != SINGULAR_AHEAD:
+                return status
         y, (coordinates, velocities) = memory.loop.y, memory.active
         memory.state.coordinates[coordinates] = y[: coordinates.size]
         memory.state.velocities[velocities] = y[coordinates.size : memory.loop.clock.y_size]
@@ -78,14 +87,20 @@ class TaylorRun(SeriesRun):
             status = PAUSED if status == OK else status
         while status == PAUSED:
             status = self.step_on()
-            if status == SINGULAR_AHEAD:
-                status = self._passage()
+            self.crossings += self.recorded()
+            if status == SINGULAR_AHEAD or self._parts():
+                status = self._passage() if status == SINGULAR_AHEAD else self._passage.take_branch()
                 if status == PAUSED and self.expand(self.times[-1]) != OK:
                     status = UNDECIDED
             self.specialise_where_it_pays(status)
             if progress is not None:
                 progress(float(self.memory.loop.clock.time))
         return status, time.process_time() - began - (self.making - before)
+
+    def _parts(self) -> bool:
+        """Whether the last singular position passed is to be left along another branch, not yet taken."""
+        asked = dict(self.limits.branches).get(len(self.crossings), SMOOTH)
+        return bool(self.crossings) and self.crossings[-1].taken != asked
 
 
 class Passage:
@@ -102,6 +117,25 @@ class Passage:
         series = self._series()
         series.take_over(self._run)
         return self._given_back(series.cross(), series)
+
+    @property
+    def is_made(self) -> bool:
+        """Whether there are series."""
+        return self._made is not None
+
+    def advance_over(self, status: int) -> int:
+        """Advance the run in steps that has a status, by brief passages too."""
+        series = self._series()
+        status = series.advance_over(status, self._run)
+        self._run.crossings += series.crossings
+        return status
+
+    def take_branch(self) -> int:
+        """Take the run along the branch asked for at the last singular position that it has passed."""
+        series, asked = self._series(), dict(self._run.limits.branches)[len(self._run.crossings)]
+        self._run.crossings[-1] = self._run.crossings[-1]._replace(taken=asked)
+        series.take_over(self._run)
+        return self._given_back(series.leave_along_branch(self._run.crossings[-1]), series)
 
     def leave_start(self) -> int:
         """Leave a singular position at t = 0: PAUSED, also where there is none, DONE at the end, else why the

@@ -6,9 +6,11 @@ import contextlib
 import time
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import repeat
 
 import numpy as np
 
+from mbref.equations.branches import SMOOTH, Passed
 from mbref.kernels.named_memory import allocate, packed
 from mbref.kernels.records import record
 from mbref.method import Method
@@ -16,9 +18,12 @@ from mbref.scene import Scene
 from mbref.simulation.limits import AUTO, GENERIC, SPECIALISED, Limits
 from mbref.simulation.run import Run
 from mbref.specialised import Untraceable
+from mbref.taylor.advance import advance_series, enter
 from mbref.taylor.geometry import geometry_of
 from mbref.taylor.lanes import filled
 from mbref.taylor.layout import (
+    Beginning,
+    Crossings,
     Polynomials,
     Progress,
     Rows,
@@ -29,16 +34,28 @@ from mbref.taylor.layout import (
     Solver,
     TaylorMemory,
 )
-from mbref.taylor.passing import begin_here, cross, give_back, look_along, pass_on, take_over
+from mbref.taylor.passing import (
+    SHARE,
+    advance_over,
+    begin_here,
+    cross,
+    give_back,
+    look_along,
+    pass_on,
+    take_over,
+)
 from mbref.taylor.polynomials import Geometry
 from mbref.taylor.scene_code import code_of, functions_of, rank_of
 from mbref.taylor.start import OFF
-from mbref.taylor.stepping import advance_series, begin, enter, expand_from, step
+from mbref.taylor.stepping import begin, expand_from, step
+from mbref.taylor.twin import LEAST_CHANGE
 
-SHARE = 0.05  # of rtol + atol: the tolerance of a step
+EXACT, EXACT_ORDER = 1e-13, 16  # rtol and atol of steps that pass singular positions, and their least order
+KEPT = 16  # singular positions that are passed in a call
 CALLED = (begin, expand_from, step)  # the SeriesKernels
 KERNELS_OF_SERIES = (
-    *CALLED, enter, advance_series, take_over, begin_here, cross, pass_on, give_back, look_along,
+    *CALLED, enter, advance_series, advance_over, take_over, begin_here, cross, pass_on, give_back,
+    look_along,
 )  # fmt: skip
 ROUNDING = 1e-16  # of a singular value
 LEAST_ORDER, MOST_ORDER = 4, 30
@@ -69,9 +86,13 @@ class SeriesRun(Run):
         code = SPECIALISED if limits.code == SPECIALISED else GENERIC
         order = order_of(tolerance, method.options_of(method.integrator)["order"], code)
         self.geometry, self.polynomials = self._equations()
-        self.taylor = self._taylor_memory(order)
+        exact_order = max(order, EXACT_ORDER) if self.model.closed_loops else order
+        self.taylor = self._taylor_memory(exact_order)
         progress = self.taylor.progress
         progress.order, progress.tolerance = order, tolerance
+        progress.usual_order, progress.usual = order, tolerance
+        progress.exact_order, progress.exact = exact_order, SHARE * (EXACT + EXACT)
+        progress.change = max(control.rtol, LEAST_CHANGE)
         progress.farthest = OFF * max(1.0, self.model.length)
         progress.freedoms = self.part.active.velocities.size - self.ranks.rank
         self._packed_taylor = packed(self.taylor, self.packed)
@@ -98,7 +119,7 @@ class SeriesRun(Run):
         sizes = {
             "orders": orders, "nz": nz, "ng": ng, "nr": nr, "nb": self.model.nb,
             "lanes": filled(max(1, nz + nr + ng)), "slots": polynomials.products.left.size,
-            "twofold": polynomials.rows.row.size,
+            "twofold": polynomials.rows.row.size, "kept": KEPT,
             "springs": polynomials.springs.natural.size, "torsions": polynomials.torsions.slot.size,
         }  # fmt: skip
         series = allocate(Series, sizes)
@@ -117,6 +138,11 @@ class SeriesRun(Run):
             code=record(SceneCode()),
             began=allocate(Snapshot, self.model.sizes),
             crossing=allocate(Snapshot, self.model.sizes),
+            beginning=allocate(Beginning, sizes),
+            parting=np.array(
+                [k for k, taken in dict(self.limits.branches).items() if taken != SMOOTH], np.int64
+            ),
+            crossings=allocate(Crossings, {**sizes, **self.model.sizes}),
             landing=np.zeros((2, sizes["lanes"])),
             state=np.zeros((3, sizes["lanes"])),
             pose=np.zeros((3, 12 * self.model.nb)),
@@ -129,16 +155,19 @@ class SeriesRun(Run):
         Raises Untraceable where the series cannot have any.
         """
         began = time.process_time()
-        self._code = code_of(self.taylor)
-        code = self.taylor.code
-        code.rank = rank_of(self.taylor)
-        for name in functions_of(self.taylor):
-            code[name] = self._code.address(name)
+        self._put_code()
         self.making += time.process_time() - began
         with contextlib.suppress(Untraceable):  # then samples are taken by the general kernels
             super()._specialise()
             self.taylor = self.taylor._replace(run=self.memory)
             self._packed_taylor = packed(self.taylor, self.packed)
+
+    def _put_code(self) -> None:
+        """Have the series made by code of the scene's own from now on; raises Untraceable without any."""
+        self._code, code = code_of(self.taylor), self.taylor.code
+        code.rank = rank_of(self.taylor)
+        for name in functions_of(self.taylor):
+            code[name] = self._code.address(name)
 
     def expand(self, until: float) -> int:
         """Expand at the present time and state, for steps until a time (s): OK or why that cannot be."""
@@ -148,6 +177,15 @@ class SeriesRun(Run):
     def step_on(self) -> int:
         """As many steps as are taken at a time: PAUSED after them, DONE at the end, or why there are none."""
         return int(advance_series(self._packed_taylor.argument))
+
+    def recorded(self) -> list[Passed]:
+        """The singular positions that brief passages have passed since they were last asked for."""
+        progress = self.taylor.progress
+        passed, progress.passed = int(progress.passed), 0
+        if not passed:
+            return []
+        times, coordinates, velocities = (found[:passed].copy() for found in self.taylor.crossings)
+        return list(map(Passed, times.tolist(), coordinates, velocities, repeat(SMOOTH)))
 
     def least_pivot(self) -> float:
         """The least pivot of the rows where the series begins; 1 without rows."""

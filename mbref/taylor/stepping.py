@@ -10,21 +10,19 @@ from __future__ import annotations
 
 from numpy import exp, isfinite, log
 
-from mbref.kernels.compilation import INT, entry, exchangeable, kernel
+from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, OK
 from mbref.linear_algebra.vectors import copy, larger
 from mbref.simulation.stepping import (
-    DONE,
-    PAUSED,
     SINGULAR_AHEAD,
     STEP_TOO_SMALL,
-    TOO_MANY_STEPS,
     UNDECIDED,
     share,
 )
 from mbref.taylor.correction import correct, violation
+from mbref.taylor.crossing import is_at_crossing
 from mbref.taylor.lanes import LANES, load, store
-from mbref.taylor.layout import BEGIN, EXPAND, SERIES, STEP
+from mbref.taylor.layout import BEGIN, EXPAND, STEP
 from mbref.taylor.loads import ANGLE, TORSION_SERIES, expand_drivers
 from mbref.taylor.partition import choose
 from mbref.taylor.passage import (
@@ -32,7 +30,6 @@ from mbref.taylor.passage import (
     distance_ahead,
     exactness,
     exactness_across,
-    is_at_crossing,
     judge_branch,
     least_pivot,
     remember_pivots,
@@ -45,7 +42,6 @@ from mbref.taylor.samples import (
     NOISE,
     evaluate_series,
     put_angles,
-    put_terms,
     take_sample,
     take_sample_of_series,
 )
@@ -98,9 +94,10 @@ def longest_step(tolerance, memory):
 
 
 @kernel
-def keep_terms(series):
+def keep_terms(memory):
     """The terms, which are looked along from now on."""
-    for j in range(0, series.terms.shape[0] * series.terms.shape[1], LANES):
+    series = memory.series
+    for j in range(0, (memory.progress.order + 1) * series.terms.shape[1], LANES):
         store(load(series.terms, j), series.past, j)
 
 
@@ -108,7 +105,7 @@ def keep_terms(series):
 def remember_series(memory):
     """Keep the series of the step's beginning, and the pivots there."""
     remember_pivots(memory)
-    keep_terms(memory.series)
+    keep_terms(memory)
     series = memory.series
     for s in range(series.past_angles.shape[0]):
         for k in range(memory.progress.order + 1):
@@ -237,29 +234,7 @@ def begin(memory):
         memory.angles[s] = memory.run.equations.angles[slot[s]]
     read_variables(t, memory)
     expand_drivers(t, memory)
-    memory.progress.rank, memory.progress.crossed = choose(memory), 0
-    memory.solver.first[:] = 1e300
+    memory.progress.rank, memory.progress.crossed, memory.progress.leaving = choose(memory), 0, 0
+    factorise_anew(memory)
     status = memory.kernels.expand(t, memory)
     return status if t > 0.0 else judged_start(status, memory)
-
-
-@entry(INT(SERIES))
-def enter(memory):
-    """Begin a series at the present state: OK or why that cannot be."""
-    return memory.kernels.begin(memory)
-
-
-@entry(INT(SERIES))
-def advance_series(memory):
-    """Advance until the end, a failure, or the number of steps per call; says which."""
-    clock, counts = memory.run.loop.clock, memory.run.equations.system.counts
-    for _ in range(int(memory.run.control.steps_per_call)):
-        if counts.steps >= memory.run.control.most_steps:
-            return TOO_MANY_STEPS
-        status = memory.kernels.step(memory)
-        if status != OK:
-            put_terms(memory.series.past, memory)
-            return status
-        if clock.time >= memory.progress.end:
-            return DONE
-    return PAUSED

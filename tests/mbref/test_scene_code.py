@@ -48,6 +48,7 @@ def test_terms_of_random_mechanisms_are_those_of_the_kernels(seed):
     "name", (*MECHANISMS[:4], "four_bar", "planar_slider_crank_equal", "four_bar_gravity")
 )
 def test_runs_agree_with_the_kernels(name):
+    """In steps too, but for one a crossing: behind it they are as long as rounding lets them be."""
     times = np.linspace(0.0, 0.2, 5)
     generic, own = (
         simulate(SCENES[name](), ORDER_16, times, Limits(rtol=1e-11, code=code))
@@ -57,7 +58,7 @@ def test_runs_agree_with_the_kernels(name):
     assert np.abs(generic.position - own.position).max() < 1e-9
     for mine, theirs in ((own.acceleration, generic.acceleration), *_reactions(own, generic)):
         assert np.abs(mine - theirs).max() <= 1e-6 * max(1.0, np.abs(theirs).max())
-    assert abs(generic.cost.steps - own.cost.steps) <= 0.05 * generic.cost.steps
+    assert abs(generic.cost.steps - own.cost.steps) <= 0.05 * generic.cost.steps + len(generic.crossings)
 
 
 def _reactions(one, other):

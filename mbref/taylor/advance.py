@@ -1,0 +1,42 @@
+"""The entries of a run in series: where it begins, and the steps that it takes in one call."""
+
+from __future__ import annotations
+
+from mbref.kernels.compilation import INT, entry
+from mbref.kernels.layout import OK
+from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, TOO_MANY_STEPS
+from mbref.taylor.brief import parts_at, pass_briefly
+from mbref.taylor.layout import SERIES
+from mbref.taylor.samples import put_terms
+
+
+@entry(INT(SERIES))
+def enter(memory):
+    """Begin a series at the present state: OK or why that cannot be."""
+    return memory.kernels.begin(memory)
+
+
+@entry(INT(SERIES))
+def advance_series(memory):
+    """Advance until the end, a failure, or the number of steps or of singular positions per call; says which.
+
+    SINGULAR_AHEAD where a passage cannot be brief.
+    """
+    clock, counts = memory.run.loop.clock, memory.run.equations.system.counts
+    for _ in range(int(memory.run.control.steps_per_call)):
+        if counts.steps >= memory.run.control.most_steps:
+            return TOO_MANY_STEPS
+        status = memory.kernels.step(memory)
+        if status == SINGULAR_AHEAD and pass_briefly(memory):
+            status = OK
+        if status != OK:
+            put_terms(memory.series.past, memory)
+            return status
+        passed = memory.progress.passed
+        if passed and parts_at(counts.crossings, memory):
+            return PAUSED
+        if clock.time >= memory.progress.end:
+            return DONE
+        if passed == memory.crossings.time.shape[0]:
+            return PAUSED
+    return PAUSED

@@ -1,0 +1,162 @@
+"""Brief passages: few exact steps over a singular position, on a motion whose speed tells it determined.
+
+A mechanism of one freedom without drivers moves along a curve.  In the arc length σ of the metric of M,
+σ'' = Q(σ) - c(σ) σ' with c ≥ 0: loads and dampers do not depend on time.  By Liouville's formula a motion
+that begins faster by a part ε, with v = σ', is ahead by δσ = ε v₀² v ∫ W / v² dt, W = exp(-∫ c dt) ≤ 1, and
+its variables by ε x' T (v₀ / v_least)² at most after a time T.  Where that is small beside the distance at
+which twins disagree, no twin is needed (``mbref.taylor.twin``); where it is not, or the exact steps do not
+cross, the series is as it was, and a longer passage judges (``mbref.taylor.passing``).
+"""
+
+from __future__ import annotations
+
+from mbref.kernels.compilation import kernel
+from mbref.kernels.layout import OK
+from mbref.linear_algebra.vectors import copy
+from mbref.taylor.crossing import find_crossing
+from mbref.taylor.passage import least_pivot, size_of
+from mbref.taylor.samples import evaluate_series, put_angles, put_state_at
+from mbref.taylor.start import freedoms, judged_start
+from mbref.taylor.stepping import return_to_start
+from mbref.taylor.twin import APART, CLOSER, MAGNIFIED
+
+SLOWEST = 0.25  # of the kinetic energy where the passage began: it does not fall below
+MOST_STEPS = 6  # of a brief passage
+
+
+@kernel
+def step_exactly(memory):
+    """Have the next steps be exact ones, which pass singular positions."""
+    progress = memory.progress
+    progress.passing, progress.tolerance, progress.order = 1, progress.exact, progress.exact_order
+    progress.past_pivot = 1.0
+
+
+@kernel
+def step_usually(memory):
+    """Have the next steps be usual ones, which run up to singular positions."""
+    progress = memory.progress
+    progress.passing, progress.tolerance, progress.order = 0, progress.usual, progress.usual_order
+
+
+@kernel
+def may_be_brief(memory):
+    """Whether the motion has no freedom, or one and no drivers."""
+    undriven = memory.run.equations.scene.drivers.polynomial.shape[0] == 0
+    return freedoms(memory) <= undriven
+
+
+@kernel
+def parts_at(crossing, memory):
+    """Whether another branch than the smooth one is asked for at a singular position, counted from 1."""
+    for number in memory.parting:  # noqa: SIM110 - no generators in kernels
+        if number == crossing:
+            return True
+    return False
+
+
+@kernel
+def pass_briefly(memory):
+    """Whether the singular position ahead of where the last step began is passed; else all is as it was."""
+    clock, counts, progress = memory.run.loop.clock, memory.run.equations.system.counts, memory.progress
+    if not may_be_brief(memory) or progress.passed == memory.crossings.time.shape[0]:
+        return False
+    time, sample, passage = clock.time, clock.sample, clock.passage
+    steps, crossings = counts.steps, counts.crossings
+    keep_beginning(memory)
+    return_to_start(memory)
+    step_exactly(memory)
+    status = memory.kernels.expand(time, memory)
+    if time == 0.0:
+        status = judged_start(status, memory)
+    passed = status == OK and crosses(memory)
+    step_usually(memory)
+    if not passed:
+        clock.time, clock.sample, clock.passage = time, sample, passage
+        counts.steps, counts.crossings = steps, crossings
+        return_to_beginning(memory)
+    return passed
+
+
+@kernel
+def keep_beginning(memory):
+    """Keep the variables where the last step began, and the angles there, which are those of the run."""
+    beginning, past = memory.beginning, memory.series.past
+    for order in range(2):
+        copy(past[order], beginning.terms[order])
+    put_angles(0.0, memory)
+    copy(memory.angles, beginning.angles)
+
+
+@kernel
+def return_to_beginning(memory):
+    """Have the last step begin again where ``keep_beginning`` found it."""
+    beginning, slot = memory.beginning, memory.polynomials.torsions.slot
+    for order in range(2):
+        copy(beginning.terms[order], memory.series.past[order])
+    for s in range(slot.shape[0]):
+        memory.run.equations.angles[slot[s]] = beginning.angles[s]
+
+
+@kernel
+def crosses(memory):
+    """Whether few exact steps cross a singular position, which is recorded, on a determined motion."""
+    clock, counts, progress = memory.run.loop.clock, memory.run.equations.system.counts, memory.progress
+    began, crossings, least = clock.time, counts.crossings, SLOWEST * energy(memory.series.terms, memory)
+    progress.entered = least_pivot(memory)
+    for _ in range(MOST_STEPS):
+        if clock.time >= progress.end or memory.kernels.step(memory) != OK:
+            return False
+        if not keeps_moving(least, memory):
+            return False
+        if counts.crossings != crossings:
+            is_certain = magnifies_little(clock.time - began, memory)
+            if is_certain:
+                record_crossing(memory)
+            progress.leaving = is_certain
+            return is_certain
+    return False
+
+
+@kernel
+def energy(rates, memory):
+    """x'ᵀ M x' of the rates in row 1: twice the kinetic energy, lengths in units of the scene's."""
+    mass, total = memory.polynomials.inertia.mass, 0.0
+    for i in range(mass.shape[0]):
+        for j in range(mass.shape[0]):
+            total += rates[1, i] * mass[i, j] * rates[1, j]
+    return total
+
+
+@kernel
+def keeps_moving(least, memory):
+    """Whether a motion that has a freedom is as fast as energies of ``least`` in the middle and at the end of
+    the last step, in which an exact series bends but little."""
+    if freedoms(memory) == 0:
+        return True
+    evaluate_series(0.5 * memory.run.loop.clock.length, memory)
+    return energy(memory.state, memory) >= least and energy(memory.series.terms, memory) >= least
+
+
+@kernel
+def magnifies_little(duration, memory):
+    """Whether a motion that does not get slow in a passage of a duration (s) keeps twins together."""
+    progress = memory.progress
+    if freedoms(memory) == 0:
+        return True
+    speed = size_of(memory.series.terms, 1, memory.solver.order.shape[0])
+    near = CLOSER * min(MAGNIFIED * progress.change, APART)
+    return progress.change * speed * duration / SLOWEST <= near
+
+
+@kernel
+def record_crossing(memory):
+    """Record time and state where the last step crossed."""
+    run, crossings, k = memory.run, memory.crossings, memory.progress.passed
+    length = run.loop.clock.length
+    h = find_crossing(length, memory)
+    put_state_at(h, memory)
+    crossings.time[k] = run.loop.clock.time - (length - h)
+    copy(run.state.coordinates, crossings.coordinates[k])
+    copy(run.state.velocities, crossings.velocities[k])
+    memory.progress.passed = k + 1

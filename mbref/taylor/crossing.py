@@ -1,0 +1,158 @@
+"""Where a step crosses a singular position: determinants of the constraint gradients at both its ends.
+
+det(G Gᵀ₀) changes its sign where branches cross, G₀ being the gradient where the step began.
+"""
+
+from __future__ import annotations
+
+from numpy import exp
+
+from mbref.kernels.compilation import kernel
+from mbref.linear_algebra.elimination import determinant
+from mbref.taylor.partition import put_gradient
+from mbref.taylor.samples import evaluate_series
+
+GOLDEN, SECTIONS = 0.6180339887498949, 70  # of the search for the least determinant
+SECANTS = 12  # of the search for its change of sign, behind which it halves
+CLOSE = 1e-12  # of a step, by which two estimates of the change differ at its end
+LOST_ROW = 1e-6  # of the largest pivot: formulations may take a row with less for one that depends on others
+
+
+@kernel
+def remember_gradient(memory):
+    """Keep G where the step began."""
+    put_gradient(memory.series.past, memory)
+    keep_gradient(memory)
+
+
+@kernel
+def keep_gradient(memory):
+    """Keep Gᵀ of the independent rows of the gradient in ``work``."""
+    solver = memory.solver
+    for i in range(memory.progress.rank):
+        for c in range(solver.work.shape[1]):
+            solver.past_gradient[c, i] = solver.work[solver.row[i], c]
+
+
+@kernel
+def overlap(y, memory):
+    """Whether det(G Gᵀ₀) of the independent rows is negative, and its logarithm: G at variables y[0]."""
+    solver, rank = memory.solver, memory.progress.rank
+    product, past, work = solver.product, solver.past_gradient, solver.work
+    put_gradient(y, memory)
+    for i in range(rank):
+        for j in range(rank):
+            product[i, j] = 0.0
+        for c in range(work.shape[1]):
+            entry = work[solver.row[i], c]
+            if entry != 0.0:
+                for j in range(rank):
+                    product[i, j] += entry * past[c, j]
+    return determinant(product, rank)
+
+
+@kernel
+def changes_sign(h, parts, memory):
+    """Whether the determinant of the gradients at both ends of a step of h seconds is negative.
+
+    A long step is looked at in parts, because rows that turn by a right angle change the sign too.  The
+    gradient where the step began is kept.
+    """
+    series, changes = memory.series, False
+    remember_gradient(memory)
+    for part in range(1, parts):
+        evaluate_series(h * part / parts, memory)
+        negative, _ = overlap(memory.state, memory)
+        changes = changes or negative
+        keep_gradient(memory)
+    negative, _ = overlap(series.terms, memory)
+    if parts > 1:
+        evaluate_series(h, memory)
+        remember_gradient(memory)
+    return changes or negative
+
+
+@kernel
+def find_crossing(h, memory):
+    """The time (s, from its beginning) at which a step of h seconds that crossed met the singular position.
+
+    The determinant vanishes there, with a change of sign unless branches of several loops cross at once.
+    """
+    change = sign_change(h, memory)
+    return change if change >= 0.0 else least_between(h, memory)
+
+
+@kernel
+def is_at_crossing(at, h, memory):
+    """Whether the rows leave a motion free to the formulation, beyond that of the series, at a time (s) of a
+    step of h seconds that crossed: pivots fall linearly."""
+    progress = memory.progress
+    if not progress.crossed:
+        return False
+    crossing = find_crossing(h, memory)
+    return abs(at - crossing) * progress.past_pivot <= LOST_ROW * progress.largest_pivot * crossing
+
+
+@kernel
+def sign_change(h, memory):
+    """The time (s) at which the determinant changes its sign inside a step of h seconds; -1 if it does not.
+
+    By the Illinois algorithm (M. Dowell and P. Jarratt, BIT 11, 1971); where that is slow, because several
+    loops are flat at once and the root is a multiple one, by halving.  It ends where estimates differ by
+    less than CLOSE of the step.
+    """
+    evaluate_series(0.0, memory)
+    _, unit = overlap(memory.state, memory)
+    start, end, side, last = 0.0, h, 0, -h
+    before, after = 1.0, value_at(end, unit, memory)
+    if not after < 0.0:
+        return -1.0
+    for k in range(SECTIONS):
+        middle = (start * after - end * before) / (after - before) if k < SECANTS else 0.5 * (start + end)
+        if not start < middle < end or abs(middle - last) <= CLOSE * h:
+            break
+        last = middle
+        value = value_at(middle, unit, memory)
+        if value * after > 0.0:
+            end, after = middle, value
+            before = 0.5 * before if side == 1 else before
+            side = 1
+        else:
+            start, before = middle, value
+            after = 0.5 * after if side == -1 else after
+            side = -1
+    return end if abs(after) < abs(before) else start
+
+
+@kernel
+def value_at(h, unit, memory):
+    """The determinant at a distance h (s) from the step's beginning, over one of a logarithm."""
+    evaluate_series(h, memory)
+    negative, size = overlap(memory.state, memory)
+    return -exp(size - unit) if negative else exp(size - unit)
+
+
+@kernel
+def least_between(h, memory):
+    """The time (s) inside a step of h seconds at which the determinant is least, by golden section."""
+    start, end = 0.0, h
+    one, other = h - GOLDEN * h, GOLDEN * h
+    before, after = size_at(one, memory), size_at(other, memory)
+    for _ in range(SECTIONS):
+        if before < after:
+            end, other, after = other, one, before
+            one = end - GOLDEN * (end - start)
+            before = size_at(one, memory)
+        else:
+            start, one, before = one, other, after
+            other = start + GOLDEN * (end - start)
+            after = size_at(other, memory)
+    return 0.5 * (start + end)
+
+
+@kernel
+def size_at(h, memory):
+    """The logarithm of the determinant's size at a distance h (s) from the step's beginning."""
+    evaluate_series(h, memory)
+    _, size = overlap(memory.state, memory)
+    return size
