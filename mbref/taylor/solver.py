@@ -238,10 +238,23 @@ def inertia_left(memory):
 def put_response(memory):
     """The response of all variables and multipliers, and to the functions prescribed."""
     functions = memory.polynomials.given.driver.shape[0]
-    put_dependent(memory)
-    put_multipliers(memory)
+    if memory.progress.rank == memory.solver.order.shape[0]:
+        put_inverse(memory)
+    else:
+        put_dependent(memory)
+        put_multipliers(memory)
     if functions > 0:
         add_functions(functions, memory)
+
+
+@inlined
+def put_inverse(memory):
+    """The response of the variables to rows that determine all of them, so that no force moves any."""
+    solver, rank, nz = memory.solver, memory.progress.rank, memory.solver.order.shape[0]
+    for p in range(rank):
+        e, c = nz + solver.row[p], solver.order[p]
+        for k in range(rank):
+            solver.response[e, solver.order[k]] = solver.tableau[solver.row[k], c]
 
 
 @kernel
