@@ -176,6 +176,7 @@ class Progress(NamedTuple):
     left: float = 0.0  # of the violation, where the step began; known after an attempt failed
     entered: float = 0.0  # the least pivot where the series began
     cut: int = 0  # the last order of the series that an attempt takes
+    passed: int = 0  # singular positions in ``Crossings``
 
 
 class SeriesKernels(NamedTuple):
@@ -210,6 +211,14 @@ class Snapshot(NamedTuple):
     angles: Annotated[Vector, "angles"]
 
 
+class Crossings(NamedTuple):
+    """Singular positions passed since they were last asked for: times (s) and states, the first rows."""
+
+    time: Annotated[Vector, "kept"]
+    coordinates: Annotated[Matrix, "kept", "7*nb"]
+    velocities: Annotated[Matrix, "kept", "n"]
+
+
 class TaylorMemory(NamedTuple):
     """All that the kernels of the method share."""
 
@@ -223,6 +232,7 @@ class TaylorMemory(NamedTuple):
     code: SceneCode
     began: Snapshot  # from where the last passage is smooth
     crossing: Snapshot  # the last singular position passed
+    crossings: Crossings
     landing: Annotated[Matrix, 2, "lanes"]  # values and rates of the variables where a passage ended
     state: Annotated[Matrix, 3, "lanes"]  # variables and their two derivatives at some time
     pose: Annotated[Matrix, 3, "12*nb"]

@@ -6,9 +6,11 @@ import contextlib
 import time
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import repeat
 
 import numpy as np
 
+from mbref.equations.branches import SMOOTH, Passed
 from mbref.kernels.named_memory import allocate, packed
 from mbref.kernels.records import record
 from mbref.method import Method
@@ -16,8 +18,10 @@ from mbref.scene import Scene
 from mbref.simulation.limits import AUTO, GENERIC, SPECIALISED, Limits
 from mbref.simulation.run import Run
 from mbref.specialised import Untraceable
+from mbref.taylor.driven import follow_drivers
 from mbref.taylor.lanes import filled
 from mbref.taylor.layout import (
+    Crossings,
     Polynomials,
     Progress,
     Rows,
@@ -36,9 +40,11 @@ from mbref.taylor.start import OFF
 from mbref.taylor.stepping import advance_series, begin, enter, expand_from, step
 
 SHARE = 0.05  # of rtol + atol: the tolerance of a step
+KEPT = 16  # singular positions that are passed in a call
 CALLED = (begin, expand_from, step)  # the SeriesKernels
 KERNELS_OF_SERIES = (
-    *CALLED, enter, advance_series, take_over, begin_here, cross, pass_on, give_back, look_along,
+    *CALLED, enter, advance_series, follow_drivers, take_over, begin_here, cross, pass_on, give_back,
+    look_along,
 )  # fmt: skip
 ROUNDING = 1e-16  # of a singular value
 LEAST_ORDER, MOST_ORDER = 4, 30
@@ -64,10 +70,8 @@ class SeriesRun(Run):
         self.memory.equations.system.settings.independent = True  # at samples, where states are exact
         self._decide_rank()
         prepare_series()
-        control = self.memory.control
-        tolerance = SHARE * (control.rtol + control.atol)
-        code = SPECIALISED if limits.code == SPECIALISED else GENERIC
-        order = order_of(tolerance, method.options_of(method.integrator)["order"], code)
+        self.is_driven = self.ranks.rank == self.part.active.velocities.size and not self.model.has_angles
+        tolerance, order = self._tolerance_and_order(limits)
         self.natural, self.polynomials = self._equations()
         self.taylor = self._taylor_memory(order)
         progress = self.taylor.progress
@@ -79,6 +83,13 @@ class SeriesRun(Run):
         if limits.code == SPECIALISED:
             self._specialise()
 
+    def _tolerance_and_order(self, limits: Limits) -> tuple[float, int]:
+        """Of the steps of the series."""
+        control, method = self.memory.control, self.method
+        tolerance = SHARE * (control.rtol + control.atol)
+        code = SPECIALISED if limits.code == SPECIALISED else GENERIC
+        return tolerance, order_of(tolerance, method.options_of(method.integrator)["order"], code)
+
     def _decide_rank(self) -> None:
         """Have the elimination count as many rows as independent as singular values do at the start."""
         settings, (_, least, rounding) = self.memory.equations.system.settings, self.ranks
@@ -89,7 +100,7 @@ class SeriesRun(Run):
         """The scene in natural coordinates, and its equations in them."""
         moving = np.zeros(self.model.n, dtype=bool)
         moving[self.part.active.velocities] = True
-        natural = NaturalCoordinates(self.model, self.start, moving)
+        natural = NaturalCoordinates(self.model, self.start, moving, self.is_driven)
         return natural, polynomials_of(natural)
 
     def _taylor_memory(self, order: int) -> TaylorMemory:
@@ -117,6 +128,7 @@ class SeriesRun(Run):
             code=record(SceneCode()),
             began=allocate(Snapshot, self.model.sizes),
             crossing=allocate(Snapshot, self.model.sizes),
+            crossings=allocate(Crossings, {**self.model.sizes, "kept": KEPT}),
             landing=np.zeros((2, sizes["lanes"])),
             state=np.zeros((3, sizes["lanes"])),
             pose=np.zeros((3, 12 * self.model.nb)),
@@ -146,6 +158,15 @@ class SeriesRun(Run):
     def step_on(self) -> int:
         """As many steps as are taken at a time: PAUSED after them, DONE at the end, or why there are none."""
         return int(advance_series(self._packed_taylor.argument))
+
+    def recorded(self) -> list[Passed]:
+        """The singular positions passed since they were last asked for, along smooth branches."""
+        progress = self.taylor.progress
+        passed, progress.passed = int(progress.passed), 0
+        if not passed:
+            return []
+        times, coordinates, velocities = (found[:passed].copy() for found in self.taylor.crossings)
+        return list(map(Passed, times.tolist(), coordinates, velocities, repeat(SMOOTH)))
 
     def least_pivot(self) -> float:
         """The least pivot of the rows where the series begins; 1 without rows."""

@@ -57,7 +57,8 @@ def test_runs_agree_with_the_kernels(name):
     assert np.abs(generic.position - own.position).max() < 1e-9
     for mine, theirs in ((own.acceleration, generic.acceleration), *_reactions(own, generic)):
         assert np.abs(mine - theirs).max() <= 1e-6 * max(1.0, np.abs(theirs).max())
-    assert abs(generic.cost.steps - own.cost.steps) <= 0.05 * generic.cost.steps
+    apart = abs(generic.cost.steps - own.cost.steps)  # behind a singular position rounding tells how far
+    assert apart <= max(0.05 * generic.cost.steps, len(generic.crossings or ()))
 
 
 def _reactions(one, other):
@@ -89,7 +90,11 @@ def test_one_process_loads_the_code_of_a_scene_once():
         TaylorRun(SCENES["four_bar"](), TAYLOR, np.array([0.1]), Limits(code="specialised")) for _ in "ab"
     )
     assert first.taylor.code.expand == again.taylor.code.expand != 0
-    finer = TaylorRun(SCENES["four_bar"](), TAYLOR, np.array([0.1]), Limits(rtol=1e-12, code="specialised"))
+    finer = TaylorRun(SCENES["four_bar"](), ORDER_16, np.array([0.1]), Limits(code="specialised"))
+    assert finer.taylor.code.expand == first.taylor.code.expand
+    finer = TaylorRun(
+        SCENES["four_bar"](), Method.parse("taylor[order=24]"), np.array([0.1]), Limits(code="specialised")
+    )
     assert finer.taylor.code.expand != first.taylor.code.expand, "another order has its own"
 
 
