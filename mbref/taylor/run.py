@@ -68,14 +68,14 @@ class TaylorRun(SeriesRun):
     def _tolerance_and_order(self, limits: Limits) -> tuple[float, int]:
         """Of the steps of the series: of strides where drivers alone are followed over singular positions."""
         wanted = self.method.options_of(self.method.integrator)["order"]
-        self._strides = self.is_driven and not limits.branches and (wanted == 0 or wanted >= LEAST_ORDER)
-        if not self._strides:
+        self.strides = self.is_driven and not limits.branches and (wanted == 0 or wanted >= LEAST_ORDER)
+        if not self.strides:
             return super()._tolerance_and_order(limits)
         return LOOSE, order_of(LOOSE, wanted or ORDER, GENERIC)
 
     def step_on(self) -> int:
         """As many steps as are taken at a time: PAUSED after them, DONE at the end, or why there are none."""
-        if not self._strides:
+        if not self.strides:
             return super().step_on()
         status = int(follow_drivers(self._packed_taylor.argument))
         self.crossings += self.recorded()

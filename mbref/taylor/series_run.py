@@ -63,7 +63,12 @@ def order_of(tolerance: float, wanted: float, code: str) -> int:
 
 
 class SeriesRun(Run):
-    """The steps of one simulation in Taylor series; the memory of the general kernels takes its samples."""
+    """The steps of one simulation in Taylor series; the memory of the general kernels takes its samples.
+
+    ``strides`` says whether drivers alone are followed (``mbref.taylor.driven``).
+    """
+
+    strides = False
 
     def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
         super().__init__(scene, method, times, replace(limits, code=GENERIC))
@@ -100,7 +105,7 @@ class SeriesRun(Run):
         """The scene in natural coordinates, and its equations in them."""
         moving = np.zeros(self.model.n, dtype=bool)
         moving[self.part.active.velocities] = True
-        natural = NaturalCoordinates(self.model, self.start, moving, self.is_driven)
+        natural = NaturalCoordinates(self.model, self.start, moving, self.strides)
         return natural, polynomials_of(natural)
 
     def _taylor_memory(self, order: int) -> TaylorMemory:
