@@ -41,7 +41,10 @@ class Elimination:
         for k in range(self._rank):
             self._eliminate(k)
         self._split()
-        self._put_response()
+        if self._rank == self._nz:
+            self._put_inverse()
+        else:
+            self._put_response()
 
     # --- N and T ------------------------------------------------------------------------------------------
     def _gradient(self, r: int) -> Blocks:
@@ -130,6 +133,19 @@ class Elimination:
             ]
             self._store(self._sum(*parts), e)
 
+    def _put_inverse(self) -> None:
+        """Rows that determine all variables: no force moves any, and multipliers are not asked for."""
+        for i in range(self._nz):
+            self._store({}, i)
+        for e in range(self._nz, self._nz + self._nr):
+            parts = [
+                self._times(
+                    self._write.everywhere(self._write.number(self._particular, i * self._lanes + e)), one
+                )
+                for i, one in enumerate(map(self._one, range(self._nz)))
+            ]
+            self._store(self._sum(*parts), e)
+
     def _free_motions(self, particular: list[Row]) -> list[Row]:
         """The response of the independent variables, by the reduced mass matrix."""
         free = range(self._nz - self._rank)
@@ -188,10 +204,12 @@ class Elimination:
     def _force(self, i: int, rows: list[Row]) -> Row:
         """The force that is left at a variable by the inertia of all others."""
         mass = self._taylor.polynomials.inertia.mass[i]
-        one = np.zeros(LANES)
-        one[i % LANES] = 1.0
         parts = [self._times(constant([-mass[j]] * LANES), rows[j]) for j in np.flatnonzero(mass[: self._nz])]
-        return self._sum({i // LANES: constant(one)}, *parts)
+        return self._sum(self._one(i), *parts)
+
+    def _one(self, i: int) -> Row:
+        """One in a variable's lane."""
+        return {i // LANES: constant([float(lane == i % LANES) for lane in range(LANES)])}
 
     # --- rows ---------------------------------------------------------------------------------------------
     def _row(self, pointer: ir.Value, k: int, blocks: range) -> Row:

@@ -19,13 +19,16 @@ MOST_KEPT = 64  # geometries
 _known: dict[Hashable, Geometry] = {}
 
 
-def geometry_of(model: Model, start: Start, moving: np.ndarray) -> Geometry:
-    """The geometry of a scene at its start, of which these velocities (n,) can be other than zero."""
-    key = _key(model, start, moving)
+def geometry_of(model: Model, start: Start, moving: np.ndarray, driven: bool) -> Geometry:
+    """The geometry of a scene at its start, of which these velocities (n,) can be other than zero.
+
+    ``driven``: for kinematics alone, because drivers prescribe the whole motion.
+    """
+    key = driven, _key(model, start, moving)
     if key not in _known:
         if len(_known) >= MOST_KEPT:
             _known.pop(next(iter(_known)), None)
-        _known[key] = Geometry(NaturalCoordinates(model, start, moving))
+        _known[key] = Geometry(NaturalCoordinates(model, start, moving, driven))
     return _known[key]
 
 

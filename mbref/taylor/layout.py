@@ -230,7 +230,7 @@ class Snapshot(NamedTuple):
 
 
 class Crossings(NamedTuple):
-    """Singular positions that brief passages have passed: times (s) and states, the first ``passed`` rows."""
+    """Singular positions passed since they were last asked for: times (s) and states, the first rows."""
 
     time: Annotated[Vector, "kept"]
     coordinates: Annotated[Matrix, "kept", "7*nb"]

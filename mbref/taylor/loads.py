@@ -162,9 +162,12 @@ def expand_drivers(t, memory):
 def expand_angle(driven, functions, g):
     """The cosine and the sine of a series, into lanes g and g + 1."""
     functions[0, g], functions[0, g + 1] = cos(driven[0]), sin(driven[0])
+    last = driven.shape[0] - 1
+    while last > 1 and driven[last] == 0.0:
+        last -= 1
     for k in range(1, driven.shape[0]):
         cosine, sine = 0.0, 0.0
-        for i in range(1, k + 1):
+        for i in range(1, min(k, last) + 1):
             cosine -= i * driven[i] * functions[k - i, g + 1]
             sine += i * driven[i] * functions[k - i, g]
         functions[k, g], functions[k, g + 1] = cosine / k, sine / k
@@ -182,6 +185,8 @@ def expand_driver(t, d, drivers, series):
             power *= t
             binomial *= (i + 1.0) / (i + 1.0 - k)
         series[k] = value
+    if drivers.amplitude[d] == 0.0:
+        return
     frequency, argument = drivers.frequency[d], drivers.frequency[d] * t + drivers.phase[d]
     sine, cosine = drivers.amplitude[d] * sin(argument), drivers.amplitude[d] * cos(argument)
     for k in range(size):

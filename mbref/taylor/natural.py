@@ -37,17 +37,19 @@ from mbref.taylor.orientations import Orientations, Triple
 
 MOST_TERMS = 40  # of an equation that eliminates a position
 MOST_FACTORS = 1  # further variables of an equation that eliminates a direction
+MOST_KINEMATIC = 4  # the same, where the equations serve kinematics alone
 
 
 class NaturalCoordinates:
     """The variables of a model from a start, lengths in the unit ``length`` (m), and the rows between them.
 
     ``moving`` (n,) says which velocities can be other than zero.  ``kept`` are the variables left, ``given``
-    those that drivers prescribe: (driver, VALUE, COSINE or SINE) each.
+    those that drivers prescribe: (driver, VALUE, COSINE or SINE) each.  Where drivers prescribe the whole
+    motion (``driven``), no forces are needed: equations eliminate more, and driven cranks have linear rows.
     """
 
-    def __init__(self, model: Model, start: Start, moving: np.ndarray):
-        self.model, self.nb = model, model.nb
+    def __init__(self, model: Model, start: Start, moving: np.ndarray, driven: bool = False):
+        self.model, self.nb, self.driven = model, model.nb, driven
         self.length = 2.0 ** round(np.log2(model.length))
         poses = start.q.reshape(-1, 7)
         self.place = poses[:, :3] / self.length
@@ -66,7 +68,8 @@ class NaturalCoordinates:
 
     # --- variables ----------------------------------------------------------------------------------------
     def _may_go(self, variable: int, others: int) -> bool:
-        most = MOST_TERMS if variable in self._positions else MOST_FACTORS
+        of_directions = MOST_KINEMATIC if self.driven else MOST_FACTORS
+        most = MOST_TERMS if variable in self._positions else of_directions
         return others <= most and variable not in self.given
 
     def _products_of(self, variable: int) -> int:
@@ -91,10 +94,16 @@ class NaturalCoordinates:
         for equation in self._linear_equations():
             self.eliminate.add(equation)
         self.eliminate.settle()
-        rows = [row for orientation in self.orientations.numbered.values() for row in orientation.rows()]
-        primitives = self.model.data.primitives
+        rows, turned, primitives = [], set(), self.model.data.primitives
         for p in np.flatnonzero(primitives.kind != POINT):
-            rows += self._driven(p) if primitives.driver[p] >= 0 else [self._undriven(p)]
+            number = self._turned(p)
+            if number is not None and number not in turned:
+                turned.add(number)
+                rows += self._turning(p)
+            else:
+                rows += self._driven(p) if primitives.driver[p] >= 0 else [self._undriven(p)]
+        free = (o for number, o in self.orientations.numbered.items() if number not in turned)
+        rows = [row for orientation in free for row in orientation.rows()] + rows
         before = -1
         while before != len(self.eliminate.expressed):
             before, rows = len(self.eliminate.expressed), [self._reduced(row) for row in rows]
@@ -142,6 +151,31 @@ class NaturalCoordinates:
         if table.kind[p] == DOT1:
             return self.direction(int(table.second[p]), table.direction_second[p])
         return _difference(*self._ends(p)[::-1])
+
+    def _turned(self, p: int) -> int | None:
+        """The orientation that a driver turns about an axis at rest, from directions at rest; else None."""
+        table = self.model.data.primitives
+        if not self.driven or table.driver[p] < 0 or table.kind[p] != DOT1:
+            return None
+        body = int(table.first[p])
+        at_rest = (self.direction(body, w[p]) for w in (table.direction_first, table.turning_first))
+        if any(set(component) - {ONE} for image in at_rest for component in image):
+            return None
+        number = self.orientations.number(int(table.second[p]))
+        return number if self.orientations.numbered[number].frame is not None else None
+
+    def _turning(self, p: int) -> list[Polynomial]:
+        """Rows of first degree of a driven direction, cos ψ x + sin ψ y: the rotation needs no others."""
+        table = self.model.data.primitives
+        cosine, sine = self._prescribed(int(table.driver[p]), (COSINE, SINE))
+        x, y = (
+            self.direction(int(table.first[p]), w[p]) for w in (table.direction_first, table.turning_first)
+        )
+        rows = []
+        for a, b, d in zip(x, y, self._other_side(p), strict=True):
+            along = {cosine: a.get(ONE, 0.0), sine: b.get(ONE, 0.0)}
+            rows.append(plus(plus({}, 1.0, d), -1.0, along))
+        return rows
 
     def _driven(self, p: int) -> list[Polynomial]:
         """A displacement along an axis, or an angle: the second body's direction stays perpendicular to

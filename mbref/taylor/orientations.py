@@ -86,7 +86,11 @@ class Orientations:
 
     def __getitem__(self, body: int) -> Orientation:
         """Of a body, or of the fixed frame (index nb)."""
-        return self.numbered[self.group[body]] if body < self.nb else FIXED
+        return self.numbered[self.number(body)]
+
+    def number(self, body: int) -> int:
+        """The number of the orientation of a body, or of the fixed frame (index nb)."""
+        return self.group[body] if body < self.nb else -1
 
     def world(self, body: int, local: np.ndarray) -> np.ndarray:
         """A direction (3,) in the principal frame of a body in world axes at the start."""

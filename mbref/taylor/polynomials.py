@@ -126,6 +126,8 @@ def _products(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Produ
             if i != ONE:
                 one, other, twice = lane[i], lane[j], 2.0 if i == j else 1.0
                 terms[nz + r].append((one, other, coefficient))
+                if of.driven:
+                    continue
                 for target, factor in dict.fromkeys([(one, other), (other, one)]):
                     if target < nz:
                         terms[target].append((nz + r, factor, twice * coefficient))

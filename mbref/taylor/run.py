@@ -15,12 +15,13 @@ from mbref.equations.branches import SMOOTH
 from mbref.kernels.layout import NOT_CONVERGED, OK
 from mbref.method import Method
 from mbref.scene import Scene
-from mbref.simulation.limits import Limits
+from mbref.simulation.limits import GENERIC, Limits
 from mbref.simulation.run import Run
 from mbref.simulation.singular_start import fits_no_branch, leaving
 from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, UNDECIDED
+from mbref.taylor.driven import LEAST_ORDER, LOOSE, ORDER, follow_drivers
 from mbref.taylor.passing_run import PassingRun
-from mbref.taylor.series_run import SeriesRun
+from mbref.taylor.series_run import SeriesRun, order_of
 
 
 class CrossingRun(Run):
@@ -72,6 +73,20 @@ class TaylorRun(SeriesRun):
     def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
         super().__init__(scene, method, times, limits)
         self._passage = Passage(self)
+
+    def _tolerance_and_order(self, limits: Limits) -> tuple[float, int]:
+        """Of the steps of the series: of strides where drivers alone are followed over singular positions."""
+        wanted = self.method.options_of(self.method.integrator)["order"]
+        self.strides = self.is_driven and not limits.branches and (wanted == 0 or wanted >= LEAST_ORDER)
+        if not self.strides:
+            return super()._tolerance_and_order(limits)
+        return LOOSE, order_of(LOOSE, wanted or ORDER, GENERIC)
+
+    def step_on(self) -> int:
+        """As many steps as are taken at a time: PAUSED after them, DONE at the end, or why there are none."""
+        if not self.strides:
+            return super().step_on()
+        return int(follow_drivers(self._packed_taylor.argument))
 
     def give_back(self) -> None:
         """Leave the memory to the next run, that of the passages too."""

@@ -19,6 +19,7 @@ from mbref.simulation.limits import AUTO, GENERIC, SPECIALISED, Limits
 from mbref.simulation.run import Run
 from mbref.specialised import Untraceable
 from mbref.taylor.advance import advance_series, enter
+from mbref.taylor.driven import follow_drivers
 from mbref.taylor.geometry import geometry_of
 from mbref.taylor.lanes import filled
 from mbref.taylor.layout import (
@@ -54,8 +55,8 @@ EXACT, EXACT_ORDER = 1e-13, 16  # rtol and atol of steps that pass singular posi
 KEPT = 16  # singular positions that are passed in a call
 CALLED = (begin, expand_from, step)  # the SeriesKernels
 KERNELS_OF_SERIES = (
-    *CALLED, enter, advance_series, advance_over, take_over, begin_here, cross, pass_on, give_back,
-    look_along,
+    *CALLED, enter, advance_series, follow_drivers, advance_over, take_over, begin_here, cross, pass_on,
+    give_back, look_along,
 )  # fmt: skip
 ROUNDING = 1e-16  # of a singular value
 LEAST_ORDER, MOST_ORDER = 4, 30
@@ -74,17 +75,20 @@ def order_of(tolerance: float, wanted: float, code: str) -> int:
 
 
 class SeriesRun(Run):
-    """The steps of one simulation in Taylor series; the memory of the general kernels takes its samples."""
+    """The steps of one simulation in Taylor series; the memory of the general kernels takes its samples.
+
+    ``strides`` says whether drivers alone are followed (``mbref.taylor.driven``).
+    """
+
+    strides = False
 
     def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
         super().__init__(scene, method, times, replace(limits, code=GENERIC))
         self.memory.equations.system.settings.independent = True  # at samples, where states are exact
         self._decide_rank()
         prepare_series()
-        control = self.memory.control
-        tolerance = SHARE * (control.rtol + control.atol)
-        code = SPECIALISED if limits.code == SPECIALISED else GENERIC
-        order = order_of(tolerance, method.options_of(method.integrator)["order"], code)
+        self.is_driven = self.ranks.rank == self.part.active.velocities.size and not self.model.has_angles
+        tolerance, order = self._tolerance_and_order(limits)
         self.geometry, self.polynomials = self._equations()
         exact_order = max(order, EXACT_ORDER) if self.model.closed_loops else order
         self.taylor = self._taylor_memory(exact_order)
@@ -92,13 +96,20 @@ class SeriesRun(Run):
         progress.order, progress.tolerance = order, tolerance
         progress.usual_order, progress.usual = order, tolerance
         progress.exact_order, progress.exact = exact_order, SHARE * (EXACT + EXACT)
-        progress.change = max(control.rtol, LEAST_CHANGE)
+        progress.change = max(self.memory.control.rtol, LEAST_CHANGE)
         progress.farthest = OFF * max(1.0, self.model.length)
         progress.freedoms = self.part.active.velocities.size - self.ranks.rank
         self._packed_taylor = packed(self.taylor, self.packed)
         self.wants_code = limits.code == AUTO
         if limits.code == SPECIALISED:
             self._specialise()
+
+    def _tolerance_and_order(self, limits: Limits) -> tuple[float, int]:
+        """Of the steps of the series."""
+        control, method = self.memory.control, self.method
+        tolerance = SHARE * (control.rtol + control.atol)
+        code = SPECIALISED if limits.code == SPECIALISED else GENERIC
+        return tolerance, order_of(tolerance, method.options_of(method.integrator)["order"], code)
 
     def _decide_rank(self) -> None:
         """Have the elimination count as many rows as independent as singular values do at the start."""
@@ -110,7 +121,7 @@ class SeriesRun(Run):
         """The scene in natural coordinates, and its equations in them."""
         moving = np.zeros(self.model.n, dtype=bool)
         moving[self.part.active.velocities] = True
-        geometry = geometry_of(self.model, self.start, moving)
+        geometry = geometry_of(self.model, self.start, moving, self.strides)
         return geometry, geometry.polynomials(self.model)
 
     def _taylor_memory(self, order: int) -> TaylorMemory:
@@ -179,7 +190,7 @@ class SeriesRun(Run):
         return int(advance_series(self._packed_taylor.argument))
 
     def recorded(self) -> list[Passed]:
-        """The singular positions that brief passages have passed since they were last asked for."""
+        """The singular positions passed since they were last asked for, along smooth branches."""
         progress = self.taylor.progress
         passed, progress.passed = int(progress.passed), 0
         if not passed:

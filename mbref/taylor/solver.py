@@ -228,15 +228,30 @@ def respond(memory):
         add_functions(memory.polynomials.given.driver.shape[0], memory)
 
 
+@inlined
+def put_inverse(solver):
+    """The response of the variables to rows that determine all of them, so that no force moves any."""
+    response, particular, nz = solver.response, solver.particular, solver.order.shape[0]
+    zero, lanes = 0.0 * load(response, 0), response.shape[1]
+    for j in range(0, (nz + solver.row.shape[0]) * lanes, LANES):
+        store(zero, response, j)
+    for e in range(nz, nz + solver.row.shape[0]):
+        for i in range(nz):
+            response[e, i] = particular[i, e]
+
+
 @kernel
 def respond_in_loops(memory):
     """The pivots and the response by elimination of the rows, then of the reduced mass matrix."""
     exchange(memory)
     split(memory)
-    reduce_inertia(memory)
-    solve_reduced(memory)
-    put_dependent(memory)
-    put_multipliers(memory)
+    if memory.progress.rank == memory.solver.order.shape[0]:
+        put_inverse(memory.solver)
+    else:
+        reduce_inertia(memory)
+        solve_reduced(memory)
+        put_dependent(memory)
+        put_multipliers(memory)
 
 
 @kernel

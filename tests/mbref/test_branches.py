@@ -51,7 +51,7 @@ def test_the_fold_of_a_driven_rhombus(method):
     fold = simulate(four_bar(), method, times, Limits(branches={2: 2}))
     assert fold.outcome.label == "COMPLETED" and [c.taken for c in fold.crossings] == [1, 2]
     behind = times > fold.crossings[1].time
-    assert np.array_equal(fold.position[~behind], smooth.position[~behind])
+    assert np.abs(fold.position[~behind] - smooth.position[~behind]).max() < 1e-13
     angle = math.pi / 2 - RATE * times[behind]
     tip = 0.25 * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     assert np.abs(fold["crank"].position[behind] - tip).max() < 1e-12

@@ -58,7 +58,8 @@ def test_runs_agree_with_the_kernels(name):
     assert np.abs(generic.position - own.position).max() < 1e-9
     for mine, theirs in ((own.acceleration, generic.acceleration), *_reactions(own, generic)):
         assert np.abs(mine - theirs).max() <= 1e-6 * max(1.0, np.abs(theirs).max())
-    assert abs(generic.cost.steps - own.cost.steps) <= 0.05 * generic.cost.steps + len(generic.crossings)
+    apart = abs(generic.cost.steps - own.cost.steps)  # behind a singular position rounding tells how far
+    assert apart <= max(0.05 * generic.cost.steps, len(generic.crossings or ()))
 
 
 def _reactions(one, other):

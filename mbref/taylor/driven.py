@@ -1,0 +1,241 @@
+"""Motions that drivers prescribe, followed by series through singular positions.
+
+Where no freedom is left, a step ends where the rows say, whatever the series lost: errors do not add up, and
+a series of a loose tolerance serves as a prediction.  G has as many independent rows as variables: its
+determinant, the product of the pivots, changes its sign where branches cross.  A stride that may come to a
+singular position is taken again by exact steps, which judge it (``mbref.taylor.passage``).
+"""
+
+from __future__ import annotations
+
+from numpy import exp, isfinite, log
+
+from mbref.kernels.compilation import INT, entry, kernel
+from mbref.kernels.layout import OK
+from mbref.linear_algebra.elimination import determinant
+from mbref.linear_algebra.vectors import larger
+from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED
+from mbref.taylor.brief import record_crossing
+from mbref.taylor.lanes import LANES, load, store
+from mbref.taylor.layout import SERIES
+from mbref.taylor.partition import put_gradient
+from mbref.taylor.passage import (
+    AHEAD,
+    LONG,
+    MOST_PARTS,
+    STEEPEST,
+    VANISHING,
+    is_near,
+    keeps_signs,
+    least_pivot,
+    moved_in,
+    size_of,
+)
+from mbref.taylor.samples import LOST_MOTION, evaluate_series, put_terms, take_sample
+from mbref.taylor.stepping import LOST_ROWS, SHORTER, remember_series, return_to_start
+
+LOOSE, EXACT = 3e-7, 1e-13  # tolerances of series, far from singular positions and near one
+KEEPING = 1e-4  # tolerance of strides' corrections, which keep a factor at which the next series is predicted
+ORDER, LEAST_ORDER = 16, 12  # of the series, unless another one is asked for; the least that passes
+
+
+@entry(INT(SERIES))
+def follow_drivers(memory):
+    """Advance to the end, or by a number of steps or of singular positions: DONE, PAUSED, or why the motion
+    cannot be followed."""
+    clock, counts, control = memory.run.loop.clock, memory.run.equations.system.counts, memory.run.control
+    progress, kept = memory.progress, memory.crossings.time.shape[0]
+    if counts.steps == 0:
+        progress.entered, progress.tolerance = least_pivot(memory), KEEPING
+    for _ in range(int(control.steps_per_call)):
+        if counts.steps >= control.most_steps:
+            return TOO_MANY_STEPS
+        status = step_exactly(memory) if progress.passing else stride(memory)
+        if status != OK and status != SINGULAR_AHEAD:
+            put_terms(memory.series.past, memory)
+            return status
+        if clock.time >= progress.end:
+            return DONE
+        if progress.passed == kept:
+            return PAUSED
+    return PAUSED
+
+
+@kernel
+def step_exactly(memory):
+    """One step near a singular position: OK, or UNDECIDED where the motion cannot be followed.
+
+    Strides go on behind it.
+    """
+    progress = memory.progress
+    if memory.kernels.step(memory) != OK:
+        return UNDECIDED
+    if progress.crossed:
+        record_crossing(memory)
+    pivot = least_pivot(memory)
+    is_behind = progress.crossed or pivot >= progress.past_pivot
+    if is_behind and pivot >= AHEAD * progress.largest_pivot:
+        progress.passing, progress.tolerance, progress.crossed = 0, KEEPING, 0
+        progress.past_pivot = 0.0
+    return OK
+
+
+@kernel
+def stride(memory):
+    """One step of a loose tolerance, and the samples on its way: OK or why there is none.
+
+    SINGULAR_AHEAD, ready for exact steps, where it may come to a singular position.
+    """
+    control, counts, clock, progress = (
+        memory.run.control, memory.run.equations.system.counts, memory.run.loop.clock, memory.progress,
+    )  # fmt: skip
+    fall = (progress.past_pivot - least_pivot(memory)) / max(clock.length, control.smallest_step)
+    remember_series(memory)
+    left = progress.end - clock.time
+    h = min(reach(memory), left)
+    if h * fall > progress.past_pivot:
+        return begin_exactly(memory)
+    while True:
+        status = land(h, h >= left, memory)
+        if status == OK:
+            return put_samples(h, left, memory)
+        if status == SINGULAR_AHEAD:
+            return begin_exactly(memory)
+        counts.rejected += 1
+        h *= SHORTER
+        return_to_start(memory)
+        if not h >= control.smallest_step:
+            return status
+
+
+@kernel
+def put_samples(h, left, memory):
+    """Take the samples of a stride of h seconds, and end it: OK or why a sample cannot be taken."""
+    loop, progress = memory.run.loop, memory.progress
+    clock, times = loop.clock, loop.times
+    now = progress.end if h >= left else clock.time + h
+    while clock.sample < times.shape[0] and times[clock.sample] <= now:
+        status = take_sample(times[clock.sample] - clock.time, h, memory)
+        if status != OK:
+            return status
+    memory.run.equations.system.counts.steps += 1
+    clock.time, clock.length = now, h
+    return OK
+
+
+@kernel
+def reach(memory):
+    """The longest stride (s) and, in ``cut``, the order of the series that it takes.
+
+    It is as long as its last two terms, as large as the tolerance, allow.  Behind a singular position terms
+    of high order are rounding, which grows with the order, so that fewer reach farther.
+    """
+    progress, control = memory.progress, memory.run.control
+    best, progress.cut = 0.0, progress.order
+    for quarters in range(4, 1, -1):
+        order = progress.order * quarters // 4
+        longest = log(control.largest_step)
+        for k in range(order - 1, order + 1):
+            size = size_of(memory.series.past, k, memory.solver.order.shape[0])
+            if size > 0.0:
+                longest = min(longest, log(LOOSE / size) / k)
+        if longest > best or quarters == 4:
+            best, progress.cut = longest, order
+    h = exp(best)
+    first = control.first_step
+    return min(h, first) if memory.run.equations.system.counts.steps == 0 and first > 0.0 else h
+
+
+@kernel
+def land(h, last, memory):
+    """Correct where a stride of h seconds ends, judge it and expand there: OK or why it cannot end there."""
+    progress, terms, state = memory.progress, memory.series.terms, memory.state
+    evaluate_series(h, memory)
+    lanes, variable = terms.shape[1], memory.series.variable
+    for j in range(0, lanes, LANES):
+        store(load(variable, j) * load(state, j), terms, j)
+        store(load(variable, j) * load(state, lanes + j), terms, lanes + j)
+    order = progress.order
+    progress.order = 2 if last else order
+    status = memory.kernels.expand(memory.run.loop.clock.time + h, memory)
+    progress.order = order
+    if status != OK:
+        return status
+    if may_have_crossed(h, memory):
+        return SINGULAR_AHEAD
+    is_kept = progress.violation <= LOST_ROWS * LOOSE and goes_on(h, memory)
+    return OK if is_kept else STEP_TOO_SMALL
+
+
+@kernel
+def goes_on(h, memory):
+    """Whether the new series has the second derivatives of the old one, to the tolerance."""
+    progress, state, terms, off = memory.progress, memory.state, memory.series.terms, 0.0
+    for i in range(memory.solver.order.shape[0]):
+        off = larger(off, (2.0 * terms[2, i] - state[2, i]) * h * h)
+    return isfinite(off) and off <= LOST_MOTION * progress.order * progress.order * LOOSE
+
+
+@kernel
+def begin_exactly(memory):
+    """Expand again where the stride began, now for exact steps: SINGULAR_AHEAD, or why that cannot be."""
+    progress = memory.progress
+    return_to_start(memory)
+    progress.passing, progress.tolerance, progress.crossed = 1, EXACT, 0
+    status = memory.kernels.expand(memory.run.loop.clock.time, memory)
+    return SINGULAR_AHEAD if status == OK else status
+
+
+@kernel
+def may_have_crossed(h, memory):
+    """Whether a stride of h seconds ends near a singular position, or may have passed one.
+
+    Pivots whose signs stay have vanished twice or never, and twice takes a way that is long beside them: else
+    determinants tell.
+    """
+    progress, pivot, moved = memory.progress, least_pivot(memory), moved_in(h, memory)
+    if not pivot >= AHEAD * progress.largest_pivot:
+        return True
+    kept, brief = keeps_signs(memory), progress.past_pivot + pivot > STEEPEST * moved
+    if brief and kept:
+        return False
+    looked_at = not (brief or (kept and not is_near(pivot, progress)))
+    changes = changes_sign(h, min(int(moved / LONG) + 1, MOST_PARTS), memory)
+    changes = changes or (looked_at and vanishes(h, pivot, memory))
+    evaluate_series(h, memory)
+    return changes
+
+
+@kernel
+def changes_sign(h, parts, memory):
+    """Whether the determinant changes its sign between the ends of parts of a stride of h seconds."""
+    negative, _ = determinant_of(memory.series.past, memory)
+    behind, _ = determinant_of(memory.series.terms, memory)
+    changes = negative != behind
+    for part in range(1, parts):
+        evaluate_series(h * part / parts, memory)
+        here, _ = determinant_of(memory.state, memory)
+        changes = changes or negative != here
+    return changes
+
+
+@kernel
+def vanishes(h, pivot, memory):
+    """Whether the determinant vanishes where a least pivot does that falls and rises linearly."""
+    past = memory.progress.past_pivot
+    _, before = determinant_of(memory.series.past, memory)
+    _, behind = determinant_of(memory.series.terms, memory)
+    evaluate_series(h * past / (past + pivot), memory)
+    _, between = determinant_of(memory.state, memory)
+    return between - min(before, behind) < VANISHING
+
+
+@kernel
+def determinant_of(y, memory):
+    """The determinant of G at variables y[0]: whether it is negative, and the logarithm of its size."""
+    solver, rank = memory.solver, memory.progress.rank
+    put_gradient(y, memory)
+    for i in range(rank):
+        for j in range(rank):
+            solver.product[i, j] = solver.work[solver.row[i], j]
+    return determinant(solver.product, rank)

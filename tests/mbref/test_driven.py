@@ -1,0 +1,155 @@
+"""Motions that drivers prescribe, by Taylor series: against closed forms, over many singular positions and
+beside some."""
+
+import math
+
+import numpy as np
+import pytest
+
+from crosscheck.judge.metrics import measure
+from crosscheck.judge.truth import truth_for
+from mbref.method import Method
+from mbref.scene import Body, Driver, Revolute, Scene, Sine, Spherical, Universal
+from mbref.scenes import SCENES
+from mbref.scenes.links import CRANK_RATE, about_z, link, midpoint
+from mbref.simulation.simulate import Limits, simulate
+from mbref.taylor.run import TaylorRun
+
+LINKAGES = ("four_bar", "five_bar")
+ROUNDING = 1e-12  # of positions, over the scene's length
+Z = (0.0, 0.0, 1.0)
+
+
+def flat_times(end):
+    """Times (s) at which a parallelogram driven from π/2 is flat."""
+    return [(k + 0.5) * math.pi / CRANK_RATE for k in range(int(end * CRANK_RATE / math.pi + 0.5))]
+
+
+def error(scene, run):
+    assert run.outcome.name == "COMPLETED", run.message
+    return measure(scene, run, truth_for(scene))["error"]
+
+
+@pytest.mark.parametrize("code", ["generic", "specialised"])
+@pytest.mark.parametrize("name", LINKAGES)
+def test_every_singular_position_is_recorded_at_its_time(name, code):
+    scene = SCENES[name]()
+    run = simulate(scene, "taylor", np.linspace(0.0, 1.0, 9), Limits(code=code))
+    assert error(scene, run) < ROUNDING
+    times = [crossing.time for crossing in run.crossings]
+    assert len(times) == len(flat_times(1.0)) == 40
+    assert np.abs(np.array(times) - flat_times(1.0)).max() < 1e-9 / CRANK_RATE
+
+
+@pytest.mark.parametrize("name", LINKAGES)
+def test_singular_positions_are_those_of_the_kinematic_analysis(name):
+    scene = SCENES[name]()
+    runs = [simulate(scene, method, [0.1]) for method in ("taylor", "kinematic")]
+    assert len(runs[0].crossings) == len(runs[1].crossings) == 4
+    for one, other in zip(*(run.crossings for run in runs), strict=True):
+        assert np.abs(np.array(one.position) - other.position).max() < 1e-9
+        assert np.abs(np.array(one.velocity) - other.velocity).max() < 1e-6 * CRANK_RATE
+
+
+def test_another_branch_is_taken_where_it_is_asked_for():
+    scene = SCENES["four_bar"]()
+    runs = [simulate(scene, m, [0.05], Limits(branches=((2, 2),))) for m in ("taylor", "kinematic")]
+    smooth = simulate(scene, "taylor", [0.05])
+    assert np.abs(runs[0].position - runs[1].position).max() < 1e-7
+    assert np.abs(runs[0].position - smooth.position).max() > 0.1
+
+
+def test_the_tolerance_changes_nothing_where_drivers_prescribe_the_motion():
+    scene, times = SCENES["spatial_slider_crank_driven"](), np.linspace(0.0, 0.2, 5)
+    rough, fine = (simulate(scene, "taylor", times, Limits(rtol=rtol)) for rtol in (1e-3, 1e-11))
+    assert np.array_equal(rough.position, fine.position) and rough.cost.steps == fine.cost.steps
+    assert error(scene, rough) < ROUNDING
+
+
+def test_an_order_that_is_asked_for_is_kept():
+    scene = SCENES["four_bar"]()
+    steps = {}
+    for order in (10, 12, 24):
+        run = simulate(scene, f"taylor[order={order}]", np.linspace(0.0, 0.05, 3))
+        assert error(scene, run) < ROUNDING
+        steps[order] = run.cost.steps
+    assert steps[10] > steps[12] > steps[24]
+
+
+def natural(name):
+    run = TaylorRun(SCENES[name](), Method.parse("taylor"), np.array([0.01]), Limits())
+    return run.natural
+
+
+@pytest.mark.parametrize("name", LINKAGES)
+def test_two_links_are_left_of_a_driven_linkage(name):
+    driven, free = natural(name), natural(f"{name}_gravity")
+    assert len(driven.kept) == 4 < len(free.kept)
+    prescribed = [row for row in driven.rows if set(driven.given) & {v for pair in row for v in pair}]
+    assert len(prescribed) == 2
+    assert all(len(row) == 2 and all(i == -1 for i, _ in row) for row in prescribed), prescribed
+
+
+@pytest.mark.parametrize("bodies", [("ground", "bar"), ("bar", "ground")])
+def test_a_crank_that_swings(bodies):
+    """Its angle is 2 t + 0.3 sin 5 t, from the ground or to it."""
+    bar = Body(name="bar", position=(1.0, 0.0, 0.0))
+    hinge = Revolute(name="H", bodies=bodies, anchor=(0, 0, 0), axis=Z)
+    swing = Sine(amplitude=0.3, frequency=5.0)
+    driver = Driver(joint="H", polynomial=(0.0, 2.0), sine=swing)
+    scene = Scene(name="swing", body=(bar,), joint=(hinge,), driver=(driver,))
+    times = np.linspace(0.0, 3.0, 7)
+    run = simulate(scene, "taylor", times)
+    angle = (2.0 * times + 0.3 * np.sin(5.0 * times)) * (1.0 if bodies[0] == "ground" else -1.0)
+    assert run.outcome.name == "COMPLETED", run.message
+    place = np.column_stack([np.cos(angle), np.sin(angle)])
+    assert np.abs(run.position[:, 0, :2] - place).max() < 1e-11
+    rate = 2.0 + 1.5 * np.cos(5.0 * times)
+    assert np.abs(np.abs(run.angular_velocity[:, 0, 2]) - np.abs(rate)).max() < 1e-10
+
+
+def elbow(crank, sign):
+    """Where coupler and rocker, both 0.5 m, meet, of a crank's end (k, 2) and a ground link of 0.5 m."""
+    apart = np.array([0.5, 0.0]) - crank
+    half = np.linalg.norm(apart, axis=-1, keepdims=True) / 2.0
+    across = np.stack([-apart[..., 1], apart[..., 0]], axis=-1) / (2.0 * half)
+    return crank + apart / 2.0 + sign * np.sqrt(0.25 - half**2) * across
+
+
+def crank_rocker(gap):
+    """A rhombus whose crank is shorter by a gap (m): it turns, and its branches miss each other."""
+    length, theta = 0.5 - gap, math.pi / 2
+    crank = np.array([length * math.cos(theta), length * math.sin(theta)])
+    b, c = (*crank, 0.0), (*elbow(crank, 1.0), 0.0)
+    d, a = (0.5, 0.0, 0.0), (0.0, 0.0, 0.0)
+    turned = [math.atan2(*(np.subtract(end, begin)[[1, 0]])) for begin, end in ((a, b), (b, c), (d, c))]
+    across = (-math.sin(turned[1]), math.cos(turned[1]), 0.0)
+    return Scene(
+        name="crank_rocker",
+        body=(
+            link("crank", a, b, about_z(turned[0]), length),
+            link("coupler", b, c, about_z(turned[1]), 0.5),
+            link("rocker", d, c, about_z(turned[2]), 0.5),
+        ),
+        joint=(
+            Revolute(name="A", bodies=("ground", "crank"), anchor=a, axis=Z),
+            Universal(name="B", bodies=("crank", "coupler"), anchor=b, axes=(Z, across)),
+            Spherical(name="C", bodies=("coupler", "rocker"), anchor=c),
+            Revolute(name="D", bodies=("ground", "rocker"), anchor=d, axis=Z),
+        ),
+        driver=(Driver(joint="A", polynomial=(0.0, -CRANK_RATE)),),
+    )
+
+
+@pytest.mark.parametrize("gap", [0.1, 1e-2, 1e-3, 1e-5, 1e-7])
+def test_branches_that_miss_each_other_by_a_gap_are_told_apart(gap):
+    scene, times = crank_rocker(gap), np.linspace(0.0, 0.1, 23)
+    run = simulate(scene, "taylor", times)
+    assert run.outcome.name == "COMPLETED", run.message
+    angle = math.pi / 2 - CRANK_RATE * times
+    crank = (0.5 - gap) * np.column_stack([np.cos(angle), np.sin(angle)])
+    end = elbow(crank, 1.0)
+    rocker = [midpoint((0.5, 0.0, 0.0), (*place, 0.0))[:2] for place in end]
+    off = np.linalg.norm(run.position[:, 2, :2] - rocker, axis=-1).max()
+    assert off < 1e-13 / math.sqrt(gap) * 1e3, off
+    assert not run.crossings
