@@ -78,7 +78,7 @@ def test_an_order_that_is_asked_for_is_kept():
 
 def natural(name):
     run = TaylorRun(SCENES[name](), Method.parse("taylor"), np.array([0.01]), Limits())
-    return run.natural
+    return run.geometry.natural
 
 
 @pytest.mark.parametrize("name", LINKAGES)

@@ -87,11 +87,10 @@ def test_auto_takes_the_code_where_many_steps_are_ahead():
 
 
 def test_one_process_loads_the_code_of_a_scene_once():
-    first, again = (
-        TaylorRun(SCENES["four_bar"](), TAYLOR, np.array([0.1]), Limits(code="specialised")) for _ in "ab"
-    )
+    crank = SCENES["planar_slider_crank"]()
+    first, again = (TaylorRun(crank, TAYLOR, np.array([0.1]), Limits(code="specialised")) for _ in "ab")
     assert first.taylor.code.expand == again.taylor.code.expand != 0
-    finer = TaylorRun(SCENES["four_bar"](), TAYLOR, np.array([0.1]), Limits(rtol=1e-12, code="specialised"))
+    finer = TaylorRun(crank, TAYLOR, np.array([0.1]), Limits(rtol=1e-12, code="specialised"))
     assert finer.taylor.progress.order > first.taylor.progress.order
     assert finer.taylor.code.expand == first.taylor.code.expand, "one code serves all orders"
 
@@ -111,12 +110,12 @@ def test_springs_are_left_to_the_kernels_and_long_eliminations_too():
 def test_every_order_is_that_of_the_kernels(order):
     method = Method.parse(f"taylor[order={order}]")
     generic, own = (
-        TaylorRun(SCENES["spatial_slider_crank"](), method, np.array([0.1]), Limits(code=code))
+        TaylorRun(SCENES["spatial_slider_crank_gravity"](), method, np.array([0.1]), Limits(code=code))
         for code in ("generic", "specialised")
     )
     assert own.expand(0.1) == generic.expand(0.1) == OK
-    found, expected = own.taylor.series.terms, generic.taylor.series.terms
-    assert len(found) == order + 1
+    found, expected = (run.taylor.series.terms[: order + 1] for run in (own, generic))
+    assert np.abs(expected[order]).max() > 0.0
     size = np.abs(expected).max(axis=1, keepdims=True)
     assert (np.abs(found - expected) <= 1e-9 * size).all()
 
