@@ -23,7 +23,7 @@ from crosscheck.judge.truth.one_dof import Path, initial_rate
 from mbref import __version__, rotations
 from mbref.integrators import INTEGRATORS
 from mbref.integrators.dop853 import STAGES, Stages
-from mbref.kernels.layout import OK, Clock, Control
+from mbref.kernels.layout import OK, Clock, Control, Counts
 from mbref.kernels.named_memory import Address, Vector, allocate, packed
 from mbref.kernels.records import record
 from mbref.linear_algebra.vectors import copy
@@ -35,14 +35,27 @@ STEPS, REJECTED, EVALUATIONS = range(3)
 
 
 class Stepping(NamedTuple):
-    """The stepping loop as far as the integrator reads it: the share of the tolerance, which stays 1."""
+    """The stepping loop as the integrator reads it: the last steps, and the share of the tolerance, 1."""
 
     clock: Clock
+
+
+class Counting(NamedTuple):
+    """The counts as the step control reads them."""
+
+    counts: Counts
+
+
+class Counted(NamedTuple):
+    """The system, of which the step control reads the counts."""
+
+    system: Counting
 
 
 class OneDegreeOfFreedom(NamedTuple):
     """Memory of the equation and of the integrator."""
 
+    equations: Counted
     control: Control
     loop: Stepping
     integrator: Address
@@ -61,8 +74,10 @@ def compiled(rates: Callable) -> Callable:
     @njit(**AS_MBREF)
     def integrate(times, samples, start, memory, counts):
         """From sample to sample: y(t) into the rows of ``samples``."""
-        y, rate, new = memory.y, memory.rate, memory.new
+        y, rate, new, clock = memory.y, memory.rate, memory.new, memory.loop.clock
+        taken = memory.equations.system.counts
         copy(start, y)
+        taken.steps = 0
         t, h, suggested, ratio = 0.0, 0.0, 0.0, 0.0
         for k in range(times.shape[0]):
             while t < times[k]:
@@ -81,6 +96,9 @@ def compiled(rates: Callable) -> Callable:
                     counts[REJECTED] += 1
                     suggested = propose(h, suggested, ratio, y, rate, memory)
                 counts[STEPS] += 1
+                taken.steps += 1
+                clock.past_length, clock.past_ratio = clock.length, clock.ratio
+                clock.length, clock.ratio = h, ratio
                 copy(new, y)
                 t = times[k] if h == left else t + h
             copy(y, samples[k])
@@ -147,7 +165,7 @@ def _integrated(
     memory = packed(
         allocate(
             OneDegreeOfFreedom, {}, control=record(control), loop=allocate(Stepping, {}), numbers=numbers,
-            integrator=packed(allocate(Stages, {"nb": 1})),
+            equations=allocate(Counted, {}), integrator=packed(allocate(Stages, {"nb": 1})),
         )
     )  # fmt: skip
     start, samples, counts = (

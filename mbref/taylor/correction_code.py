@@ -52,8 +52,7 @@ class Correction:
                     factor = self._write.times(weights, self._write.gathered(one, left))
                     parts.append(self._write.product(factor, self._write.gathered(other, right)))
             parts += self._linear(b, rates)
-            total = self._write.total(parts) if parts else constant([0.0] * LANES)
-            self._write.store([total], self._phi, b * LANES)
+            self._write.store([self._write.total(parts)], self._phi, b * LANES)
         self._subtract(1)
 
     def _subtract(self, order: int) -> None:
@@ -65,7 +64,7 @@ class Correction:
                 for e, factor in zip(self._rows, factors, strict=True)
             ]
             variables = [float(lane < self._nz) for lane in range(b * LANES, (b + 1) * LANES)]
-            total = write.times(np.array(variables), write.total(parts)) if parts else constant([0.0] * LANES)
+            total = write.times(np.array(variables), write.total(parts))
             place = order * self._lanes + b * LANES
             write.store([write.total([write.block(self._terms, place), total])], self._terms, place)
             write.store([total], change, b * LANES)

@@ -137,7 +137,8 @@ class Instructions:
         return self._builder.fmul(one, other, flags=FUSED)
 
     def total(self, blocks: Sequence[ir.Value]) -> ir.Value:
-        """The sum of blocks, added up in several chains."""
+        """The sum of blocks, zero without any, added up in several chains."""
+        blocks = blocks or [constant([0.0] * LANES)]
         chains = [functools.reduce(self._sum, blocks[k::CHAINS]) for k in range(min(CHAINS, len(blocks)))]
         while len(chains) > 1:
             chains = [functools.reduce(self._sum, chains[k : k + 2]) for k in range(0, len(chains), 2)]

@@ -145,8 +145,7 @@ class Orders:
                 parts.append(constant(-force[b * LANES : (b + 1) * LANES]))
             parts = [write.total(parts)] if parts else []
             parts += [product for c in slots if c in newest for product in newest[c]]
-            total = write.total(parts) if parts else constant([0.0] * LANES)
-            sums.append(write.product(write.block(self._scale, place, b * LANES), total))
+            sums.append(write.product(write.block(self._scale, place, b * LANES), write.total(parts)))
         return self._respond(place, sums)
 
     def _linear_forces(self, place: ir.Value, block: int) -> list[ir.Value]:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import mbref.equations.model
+import mbref.equations.packing
 from crosscheck.cli.request import find_certifiable
 from crosscheck.conformance.closed_forms import CLOSED_FORMS, free_fall, pendulum
 from crosscheck.conformance.features import BODY, JOINTS, feature_scenes, massless, undetermined
@@ -458,10 +458,13 @@ def plant_in_b(monkeypatch):
 
 
 def plant_in_mbref(monkeypatch):
-    right = mbref.equations.model._principal_axes
-    monkeypatch.setattr(
-        mbref.equations.model, "_principal_axes", lambda body: (heavier(right(body)[0]), right(body)[1])
-    )
+    right = mbref.equations.packing._principal_axes
+
+    def wrong(body):
+        inertia, axes = right(body)
+        return heavier(np.array(inertia)), axes
+
+    monkeypatch.setattr(mbref.equations.packing, "_principal_axes", wrong)
 
 
 @pytest.mark.parametrize("plant", [plant_in_a, plant_in_b, plant_in_mbref])

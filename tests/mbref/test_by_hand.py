@@ -12,6 +12,7 @@ from mbref.cli.run import show
 from mbref.equations.joint_reactions import reactions
 from mbref.equations.model import Model
 from mbref.formulations import FORMULATIONS
+from mbref.linear_algebra.elimination import determinant
 from mbref.scene import (
     Body,
     Driver,
@@ -25,7 +26,6 @@ from mbref.scene import (
     Translational,
 )
 from mbref.stabilisation import STABILISATIONS
-from mbref.taylor.passage import determinant
 from mbref.trajectory import Cost, Outcome, Trajectory
 
 SINE = Sine(amplitude=0.3, frequency=2.0, phase=0.4)

@@ -234,14 +234,14 @@ def test_adams_forgets_its_past_where_coordinates_change_or_jump(method, name, e
     memory.control.steps_per_call = 1
     counts, clock, chart = memory.equations.system.counts, memory.loop.clock, memory.chart.values
     order = getattr(chart, "column_order", np.zeros(0))
-    before, mismatches, changes, orders = [0, order.copy()], [], 0, []
+    before, mismatches, changes, orders = [0, order.copy(), 0], [], 0, []
 
     def watch(t):
         nonlocal changes
-        now = [run.passed, order.copy()]
+        now = [run.passed + int(counts.crossings), order.copy(), int(clock.restart)]
         changed = now[0] != before[0] or np.any(now[1] != before[1])
         changes += changed
-        if changed != (clock.restart == counts.steps):
+        if changed != (now[2] != before[2]):
             mismatches.append(t)
         if clock.restart == counts.steps - 1 and counts.steps > 1:
             orders.append((int(past.progress.restart - clock.restart), int(past.progress.order)))
