@@ -16,7 +16,6 @@ from mbref.linear_algebra.elimination import determinant
 from mbref.linear_algebra.vectors import larger
 from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED
 from mbref.taylor.brief import record_crossing
-from mbref.taylor.lanes import LANES, load, store
 from mbref.taylor.layout import SERIES
 from mbref.taylor.partition import put_gradient
 from mbref.taylor.passage import (
@@ -32,7 +31,7 @@ from mbref.taylor.passage import (
     size_of,
 )
 from mbref.taylor.samples import LOST_MOTION, evaluate_series, put_terms, take_sample
-from mbref.taylor.stepping import LOST_ROWS, SHORTER, remember_series, return_to_start
+from mbref.taylor.stepping import LOST_ROWS, SHORTER, expand_at, remember_series, return_to_start
 
 LOOSE, EXACT = 3e-7, 1e-13  # tolerances of series, far from singular positions and near one
 KEEPING = 1e-4  # tolerance of strides' corrections, which keep a factor at which the next series is predicted
@@ -149,21 +148,12 @@ def reach(memory):
 @kernel
 def land(h, last, memory):
     """Correct where a stride of h seconds ends, judge it and expand there: OK or why it cannot end there."""
-    progress, terms, state = memory.progress, memory.series.terms, memory.state
-    evaluate_series(h, memory)
-    lanes, variable = terms.shape[1], memory.series.variable
-    for j in range(0, lanes, LANES):
-        store(load(variable, j) * load(state, j), terms, j)
-        store(load(variable, j) * load(state, lanes + j), terms, lanes + j)
-    order = progress.order
-    progress.order = 2 if last else order
-    status = memory.kernels.expand(memory.run.loop.clock.time + h, memory)
-    progress.order = order
+    status = expand_at(h, last, memory)
     if status != OK:
         return status
     if may_have_crossed(h, memory):
         return SINGULAR_AHEAD
-    is_kept = progress.violation <= LOST_ROWS * LOOSE and goes_on(h, memory)
+    is_kept = memory.progress.violation <= LOST_ROWS * LOOSE and goes_on(h, memory)
     return OK if is_kept else STEP_TOO_SMALL
 
 

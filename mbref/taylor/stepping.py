@@ -132,8 +132,8 @@ def judge(h, last, memory):
 
 
 @kernel
-def attempt(h, last, memory):
-    """Step to a distance h (s) and expand there, to the second order if it is the last step."""
+def expand_at(h, last, memory):
+    """Expand at a distance h (s), to the second order if it is the last step: OK or why it cannot be."""
     progress, terms, state = memory.progress, memory.series.terms, memory.state
     evaluate_series(h, memory)
     lanes, variable = terms.shape[1], memory.series.variable
@@ -145,6 +145,13 @@ def attempt(h, last, memory):
     progress.order = 2 if last else order
     status = memory.kernels.expand(memory.run.loop.clock.time + h, memory)
     progress.order = order
+    return status
+
+
+@kernel
+def attempt(h, last, memory):
+    """Step to a distance h (s), expand there, and judge the step."""
+    status = expand_at(h, last, memory)
     return judge(h, last, memory) if status == OK else status
 
 
