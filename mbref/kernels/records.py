@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import operator
 import typing
 from typing import Any
 
@@ -10,16 +11,9 @@ import numpy as np
 
 
 class Numbers(np.void):
-    """Numbers of a schema in memory of their own, by name: NumPy's record in a third of its time."""
+    """Numbers of a schema in memory of their own; a class of its own gives each schema's numbers by name."""
 
-    def __getattr__(self, name: str) -> Any:
-        try:
-            return self[name]
-        except ValueError:
-            raise AttributeError(name) from None
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        self[name] = value
+    __slots__ = ()
 
 
 def is_record(schema: type) -> bool:
@@ -39,7 +33,17 @@ def dtype_of(record: type) -> np.dtype:
 @functools.cache
 def numbers_of(schema: type) -> np.dtype:
     """The NumPy type of a record of numbers."""
-    return np.dtype((Numbers, dtype_of(schema)))
+    numbers = {name: _number(name) for name in dtype_of(schema).names or ()}
+    return np.dtype((type(schema.__name__, (Numbers,), {"__slots__": (), **numbers}), dtype_of(schema)))
+
+
+def _number(name: str) -> property:
+    """The number of a name: an attribute found by Python takes a third of the time of NumPy's own."""
+
+    def put(numbers: Numbers, value: Any) -> None:
+        numbers[name] = value
+
+    return property(operator.itemgetter(name), put)
 
 
 def record(values: Any) -> Numbers:
