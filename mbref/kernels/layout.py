@@ -112,8 +112,8 @@ class State(NamedTuple):
 class Active(NamedTuple):
     """Which entries of q and of v are integrated: y = (q[coordinates], v[velocities])."""
 
-    coordinates: Annotated[Indices, "active_coordinates"]
-    velocities: Annotated[Indices, "active_velocities"]
+    coordinates: Annotated[Unsigned, "active_coordinates"]
+    velocities: Annotated[Unsigned, "active_velocities"]
 
 
 class Symbolic(NamedTuple):
@@ -233,7 +233,6 @@ class Gradients(NamedTuple):
     """Constraint gradients at both ends of a step; without room where the scene has many rows."""
 
     start: Annotated[Vector, "compared_entries"]  # D of ``SparseFactor`` where the step began
-    row: Annotated[Vector, "compared_columns"]
     product: Annotated[Matrix, "compared_rows", "compared_rows"]
 
 
