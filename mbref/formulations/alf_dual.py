@@ -31,9 +31,7 @@ from mbref.linear_algebra.sparse_cholesky import (
     least_squared_pivot,
     solve,
     substitute_back,
-    subtract_product,
 )
-from mbref.linear_algebra.vectors import copy
 
 
 class Options(NamedTuple):
@@ -71,7 +69,7 @@ def solve_exactly(system):
     Rows that are nearer to dependent need a second iteration, which takes the rounding of the first away.
     """
     factor = factor_of(system.scratch)
-    row, column, step, total = factor.symbolic.row, factor.symbolic.column, factor.step, factor.total
+    row, column, step = factor.symbolic.row, factor.symbolic.column, factor.step
     if not start(INFINITE, system):
         return False
     pivot = least_squared_pivot(factor)
@@ -79,16 +77,14 @@ def solve_exactly(system):
         return False
     substitute_back(factor, step)
     add_transpose(factor, step, factor.change)
-    copy(step, total)
+    for i in range(row.shape[0]):
+        system.multipliers[row[i]] = -step[i]
     if not pivot > WIDE:
         find_residual(factor.change, system)
-        copy(factor.residual, step)
         solve(factor, step)
         add_transpose(factor, step, factor.change)
         for i in range(row.shape[0]):
-            total[i] += step[i]
-    for i in range(row.shape[0]):
-        system.multipliers[row[i]] = -total[i]
+            system.multipliers[row[i]] -= step[i]
     for j in range(column.shape[0]):
         system.acceleration[column[j]] = factor.root[j] * factor.change[j]
     return True
@@ -137,18 +133,22 @@ def start(alpha, system):
         x[j] = root[j] * system.force[k]
         system.acceleration[k] = root[j] * x[j]
     find_residual(x, system)
-    copy(factor.residual, factor.step)
     return factorise(factor, alpha, factor.step)
 
 
 @inlined
 def find_residual(x, system):
-    """γ - D x, with x (c,) = M^(1/2) q̈."""
+    """γ - D x into ``factor.residual`` and ``factor.step``, with x (c,) = M^(1/2) q̈.
+
+    No copy of a vector follows, which would wait for the numbers stored last.
+    """
     factor = factor_of(system.scratch)
-    row = factor.symbolic.row
+    row, start, column, d = factor.symbolic.row, factor.symbolic.d_start, factor.symbolic.d_column, factor.d
     for i in range(row.shape[0]):
-        factor.residual[i] = system.rhs[row[i]]
-    subtract_product(factor, x, factor.residual)
+        value = system.rhs[row[i]]
+        for p in range(start[i], start[i + 1]):
+            value -= d[p] * x[column[p]]
+        factor.residual[i], factor.step[i] = value, value
 
 
 ALF_DUAL = Formulation(
