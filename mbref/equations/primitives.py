@@ -54,28 +54,45 @@ def driver_value(drivers, d, t):
 
 @kernel
 def point(p, equations):
-    """Two body-fixed points coincide: three rows."""
-    primitives, frames = equations.scene.primitives, equations.frames
-    rows, blocks, a = equations.rows, equations.system.blocks, frames.rotation
-    i, j, row = primitives.first[p], primitives.second[p], primitives.row[p]
+    """Two body-fixed points coincide: three rows, whose ν stays zero.
+
+    Constant entries of Φ_q are written at the first evaluation only, into zeros.
+    """
+    primitives, rows, blocks = equations.scene.primitives, equations.rows, equations.system.blocks
+    row = primitives.row[p]
+    if blocks[row, 0] != 1.0:
+        put_translations(row, blocks)
     s_i, s_j = vector(primitives.point_first, p), vector(primitives.point_second, p)
-    w_i, w_j = vector(frames.angular_velocity, i), vector(frames.angular_velocity, j)
-    gap = subtract(
-        add(vector(frames.position, i), to_world(a, i, s_i)),
-        add(vector(frames.position, j), to_world(a, j, s_j)),
-    )
-    turning = subtract(
-        to_world(a, j, cross(w_j, cross(w_j, s_j))), to_world(a, i, cross(w_i, cross(w_i, s_i)))
-    )
+    place_i, turning_i = place_of(primitives.first[p], s_i, 1.0, row, 3, equations)
+    place_j, turning_j = place_of(primitives.second[p], s_j, -1.0, row, 9, equations)
+    gap, turning = subtract(place_i, place_j), subtract(turning_j, turning_i)
     for k in range(3):
-        world = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
         rows.phi[row + k] = gap[k]
-        rows.nu[row + k] = 0.0
         rows.gamma[row + k] = turning[k]
-        put(blocks, row + k, 0, world)
-        put(blocks, row + k, 3, cross(s_i, to_body(a, i, world)))
-        put_negative(blocks, row + k, 6, world)
-        put_negative(blocks, row + k, 9, cross(s_j, to_body(a, j, world)))
+
+
+@kernel
+def place_of(b, s, sign, row, column, equations):
+    """World place of a body-fixed point, and its acceleration without q̈; ± s × Aᵀ into three rows of Φ_q.
+
+    Entries of the fixed frame, which nobody reads, are left out.
+    """
+    frames, blocks = equations.frames, equations.system.blocks
+    if b == frames.position.shape[0] - 1:
+        return s, NOTHING
+    a, w = frames.rotation, vector(frames.angular_velocity, b)
+    for k in range(3):
+        along = a[b, 3 * k], a[b, 3 * k + 1], a[b, 3 * k + 2]  # a world axis in the body's frame
+        put(blocks, row + k, column, scale(sign, cross(s, along)))
+    return add(vector(frames.position, b), to_world(a, b, s)), to_world(a, b, cross(w, cross(w, s)))
+
+
+@kernel
+def put_translations(row, blocks):
+    """The entries that no state changes, in the three rows of a point: those of both bodies' positions."""
+    for k in range(3):
+        blocks[row + k, k] = 1.0
+        blocks[row + k, 6 + k] = -1.0
 
 
 @kernel

@@ -20,7 +20,7 @@ from mbref.equations.static_constraints import Asked, columns_held, held_by_rows
 from mbref.equations.structure import Structure
 from mbref.kernels.layout import Active, SparseFactor, StaticRows, Symbolic
 from mbref.kernels.scene_layout import Primitives, SceneData
-from mbref.linear_algebra.symbolic_factorisation import sparse_factor
+from mbref.linear_algebra.symbolic_factorisation import sparse_factor, unsigned
 
 MOST_STRUCTURES, MOST_OF_ONE = 64, 8  # whose reductions are kept
 
@@ -85,7 +85,7 @@ def _found(model: Model, start: Start) -> Reduction:
         primitives=primitives,
         resting=~np.isin(primitives, primitives_of(model, symbolic.row)),
         held=columns_held(held),
-        active=Active(active_coordinates(start.q, velocities), velocities),
+        active=Active(unsigned(active_coordinates(start.q, velocities)), symbolic.column),
         symbolic=symbolic,
         static=static,
         evidence=Evidence(model, start, read, entries, asked),

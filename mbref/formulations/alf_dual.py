@@ -20,11 +20,18 @@ from typing import NamedTuple
 from mbref.equations.static_multipliers import add_static_multipliers
 from mbref.formulations.alf import feedback
 from mbref.formulations.base import Formulation, Sparse
-from mbref.kernels.compilation import exchangeable, kernel
+from mbref.kernels.compilation import exchangeable, inlined, kernel
 from mbref.kernels.layout import ACCELERATE, NOT_CONVERGED, OK, SINGULAR, SparseFactor
 from mbref.kernels.named_memory import opener
-from mbref.linear_algebra.minimum_norm import NEVER, go_on_by_conjugate_directions, solve_to_tolerance
-from mbref.linear_algebra.sparse_cholesky import least_squared_pivot, regularised_factor, subtract_product
+from mbref.linear_algebra.minimum_norm import go_on_by_conjugate_directions, solve_to_tolerance
+from mbref.linear_algebra.sparse_cholesky import (
+    add_transpose,
+    assemble_gradients,
+    factorise,
+    least_squared_pivot,
+    solve,
+    substitute_back,
+)
 
 
 class Options(NamedTuple):
@@ -62,13 +69,25 @@ def solve_exactly(system):
     Rows that are nearer to dependent need a second iteration, which takes the rounding of the first away.
     """
     factor = factor_of(system.scratch)
+    row, column, step = factor.symbolic.row, factor.symbolic.column, factor.step
     if not start(INFINITE, system):
         return False
     pivot = least_squared_pivot(factor)
-    if pivot > CLEAR:
-        iterations = 1 if pivot > WIDE else 2
-        solve_to_tolerance(factor, NEVER, iterations, system.acceleration, system.multipliers)
-    return pivot > CLEAR
+    if not pivot > CLEAR:
+        return False
+    substitute_back(factor, step)
+    add_transpose(factor, step, factor.change)
+    for i in range(row.shape[0]):
+        system.multipliers[row[i]] = -step[i]
+    if not pivot > WIDE:
+        find_residual(factor.change, system)
+        solve(factor, step)
+        add_transpose(factor, step, factor.change)
+        for i in range(row.shape[0]):
+            system.multipliers[row[i]] -= step[i]
+    for j in range(column.shape[0]):
+        system.acceleration[column[j]] = factor.root[j] * factor.change[j]
+    return True
 
 
 @kernel
@@ -99,22 +118,37 @@ def iterate_with(alpha, system):
 
 @kernel
 def start(alpha, system):
-    """The factor of S + I/α, q̈_0 and b = γ - Φ_q q̈_0; False where S + I/α or M is singular."""
+    """The factor of S + I/α, q̈_0, b = γ - Φ_q q̈_0 and L⁻¹ b; False where S + I/α or M is singular.
+
+    M^(1/2) q̈_0 stands in ``factor.change``, b in ``factor.residual``, L⁻¹ b in ``factor.step``.
+    """
     factor = factor_of(system.scratch)
-    row, column, root, x = factor.symbolic.row, factor.symbolic.column, factor.root, factor.change
+    column, root, x = factor.symbolic.column, factor.root, factor.change
     system.counts.factorisations += 1
-    if not regularised_factor(factor, system.blocks.reshape(-1), system.inverse_root, alpha):
-        return False
+    assemble_gradients(factor, system.blocks.reshape(-1), system.inverse_root)
     for j in range(column.shape[0]):
         k = column[j]
         if not system.mass[k] > 0.0:
             return False
         x[j] = root[j] * system.force[k]
         system.acceleration[k] = root[j] * x[j]
+    find_residual(x, system)
+    return factorise(factor, alpha, factor.step)
+
+
+@inlined
+def find_residual(x, system):
+    """γ - D x into ``factor.residual`` and ``factor.step``, with x (c,) = M^(1/2) q̈.
+
+    No copy of a vector follows, which would wait for the numbers stored last.
+    """
+    factor = factor_of(system.scratch)
+    row, start, column, d = factor.symbolic.row, factor.symbolic.d_start, factor.symbolic.d_column, factor.d
     for i in range(row.shape[0]):
-        factor.residual[i] = system.rhs[row[i]]
-    subtract_product(factor, x, factor.residual)
-    return True
+        value = system.rhs[row[i]]
+        for p in range(start[i], start[i + 1]):
+            value -= d[p] * x[column[p]]
+        factor.residual[i], factor.step[i] = value, value
 
 
 ALF_DUAL = Formulation(

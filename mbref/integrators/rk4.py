@@ -9,11 +9,10 @@ from mbref.integrators.one_step import propose
 from mbref.kernels.compilation import exchangeable
 from mbref.kernels.layout import OK, STEP
 from mbref.kernels.named_memory import Vector, opener
-from mbref.linear_algebra.vectors import copy
 
 
 class Stages(NamedTuple):
-    """The slope of a stage and the weighted sum of all slopes."""
+    """The slope of a stage and the weighted sum of those before."""
 
     slope: Annotated[Vector, "14*nb"]
     total: Annotated[Vector, "14*nb"]
@@ -26,20 +25,19 @@ stages_of = opener(Stages)
 def step(rates, t, h, y, y_rate, y_new, memory):
     n, stages = y.shape[0], stages_of(memory.integrator)
     k, total = stages.slope[:n], stages.total[:n]
-    copy(y_rate, k)
-    copy(y_rate, total)
+    for i in range(n):
+        y_new[i], total[i] = y[i] + 0.5 * h * y_rate[i], y_rate[i]
     for s in range(3):
-        part = h if s == 2 else 0.5 * h
-        for i in range(n):
-            y_new[i] = y[i] + part * k[i]
-        status = rates(t + part, y_new, k, memory)
+        status = rates(t + (h if s == 2 else 0.5 * h), y_new, k, memory)
         if status != OK:
             return -float(status)
-        weight = 1.0 if s == 2 else 2.0
-        for i in range(n):
-            total[i] += weight * k[i]
+        part = 0.5 * h if s == 0 else h
+        if s < 2:
+            for i in range(n):
+                y_new[i] = y[i] + part * k[i]
+                total[i] += 2.0 * k[i]
     for i in range(n):
-        y_new[i] = y[i] + h / 6.0 * total[i]
+        y_new[i] = y[i] + h / 6.0 * (total[i] + k[i])
     return 0.0
 
 

@@ -112,8 +112,8 @@ class State(NamedTuple):
 class Active(NamedTuple):
     """Which entries of q and of v are integrated: y = (q[coordinates], v[velocities])."""
 
-    coordinates: Annotated[Indices, "active_coordinates"]
-    velocities: Annotated[Indices, "active_velocities"]
+    coordinates: Annotated[Unsigned, "active_coordinates"]
+    velocities: Annotated[Unsigned, "active_velocities"]
 
 
 class Symbolic(NamedTuple):
@@ -124,13 +124,14 @@ class Symbolic(NamedTuple):
     d_start: Annotated[Unsigned, "r + 1"]  # where each row of D begins
     d_entry: Annotated[Unsigned, "nd"]  # place of each number of D among those of the constraint Jacobian
     d_column: Annotated[Unsigned, "nd"]
-    s_start: Annotated[Unsigned, "ns + 1"]  # where the products of each number of S begin
-    s_target: Annotated[Unsigned, "ns"]  # place of that number in L
+    s_start: Annotated[Unsigned, "nl + 1"]  # where the products in S of each number of L begin
     s_left: Annotated[Unsigned, "products"]  # the products: two numbers of D
     s_right: Annotated[Unsigned, "products"]
     l_start: Annotated[Unsigned, "r + 1"]  # where each column of L begins, its diagonal first
     l_row: Annotated[Unsigned, "nl"]
-    update: Annotated[Unsigned, "updates"]  # places in L that the elimination of each column changes
+    update_start: Annotated[Unsigned, "nl + 1"]  # where the products that each number of L loses begin
+    update_left: Annotated[Unsigned, "updates"]  # those products: a number of L and one of L Δ in one column
+    update_right: Annotated[Unsigned, "updates"]
 
 
 class StaticRows(NamedTuple):
@@ -151,6 +152,7 @@ class SparseFactor(NamedTuple):
     static: StaticRows
     d: Annotated[Vector, "nd"]
     l: Annotated[Vector, "nl"]
+    scaled: Annotated[Vector, "nl"]  # L Δ, below the diagonal
     diagonal: Annotated[Vector, "r"]  # S_ii (1 + 1/α)
     squared_pivots: Annotated[Vector, "r"]
     residual: Annotated[Vector, "r"]
@@ -231,7 +233,6 @@ class Gradients(NamedTuple):
     """Constraint gradients at both ends of a step; without room where the scene has many rows."""
 
     start: Annotated[Vector, "compared_entries"]  # D of ``SparseFactor`` where the step began
-    row: Annotated[Vector, "compared_columns"]
     product: Annotated[Matrix, "compared_rows", "compared_rows"]
 
 

@@ -75,9 +75,10 @@ def determinant(a, n):
         if not 1e-150 < product < 1e150:
             size, product = size + log(product), 1.0
         for i in range(k + 1, n):
-            factor = a[i, k] / a[k, k] if a[k, k] != 0.0 else 0.0
-            for j in range(k, n):
-                a[i, j] -= factor * a[k, j]
+            if a[i, k] != 0.0:  # so is the pivot, the largest of its column
+                factor = a[i, k] / a[k, k]
+                for j in range(k, n):
+                    a[i, j] -= factor * a[k, j]
     return negative, size + log(product)
 
 

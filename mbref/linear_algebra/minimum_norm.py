@@ -18,7 +18,14 @@ from numpy import sqrt
 from mbref.kernels.compilation import FLOAT, INT, VECTOR, entry, inlined, kernel
 from mbref.kernels.layout import NOT_CONVERGED, OK, SparseFactor
 from mbref.kernels.named_memory import Named, packed
-from mbref.linear_algebra.sparse_cholesky import regularised_factor, solve, subtract_product, times_transpose
+from mbref.linear_algebra.sparse_cholesky import (
+    regularised_factor,
+    solve,
+    substitute_back,
+    substitute_forward,
+    subtract_product,
+    times_transpose,
+)
 from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation
 from mbref.linear_algebra.vectors import copy
 
@@ -38,7 +45,8 @@ def solve_to_tolerance(factor, epsilon, most, target, multipliers):
     """Change ``target`` (n,) by the least that makes Φ_q target grow by the residual.
 
     Stops when the next change would be ≤ ``epsilon``, judged by how the changes shrink.  ``multipliers``
-    (m,) become the sums of -Δ in the rows that take part.  Returns OK; NOT_CONVERGED after ``most``.
+    (m,) become the sums of -Δ in the rows that take part.  Returns OK; NOT_CONVERGED after ``most``.  L⁻¹
+    times the residual stands in ``factor.step`` already, where ``factorise`` leaves it.
     """
     row, step, total = factor.symbolic.row, factor.step, factor.total
     total[:] = 0.0
@@ -46,7 +54,9 @@ def solve_to_tolerance(factor, epsilon, most, target, multipliers):
     for k in range(most):
         if k > 0:
             subtract_product(factor, factor.change, factor.residual)
-        last, change = change, iterate(factor, target)
+            copy(factor.residual, step)
+            substitute_forward(factor, step)
+        last, change = change, change_by_step(factor, target)
         for i in range(row.shape[0]):
             total[i] -= step[i]
         expected = min(expected, change * min(1.0, change / max(last, TINY)))
@@ -129,7 +139,14 @@ def solve_fixed_iterations(factor, iterations, target):
 def iterate(factor, target):
     """One iteration: target += M^(-1/2) x, x = Dᵀ (S + I/α)⁻¹ b; the size of that change."""
     copy(factor.residual, factor.step)
-    solve(factor, factor.step)
+    substitute_forward(factor, factor.step)
+    return change_by_step(factor, target)
+
+
+@inlined
+def change_by_step(factor, target):
+    """The rest of ``iterate``, L⁻¹ b being in ``factor.step``."""
+    substitute_back(factor, factor.step)
     times_transpose(factor, factor.step, factor.change)
     return add_scaled(factor, target)
 

@@ -21,61 +21,78 @@ def assemble_gradients(factor, numbers, inverse_root):
 
 
 @inlined
-def assemble(factor, numbers, inverse_root, alpha):
-    """M^(-1/2) and D from M^(-1/2) (n,) and the flat constraint Jacobian, and S + I/α into L."""
-    symbolic, d, l, diagonal = factor.symbolic, factor.d, factor.l, factor.diagonal
-    assemble_gradients(factor, numbers, inverse_root)
-    l[:] = 0.0
-    start, target = symbolic.s_start, symbolic.s_target
-    left, right, first = symbolic.s_left, symbolic.s_right, symbolic.l_start
-    for k in range(target.shape[0]):
-        value = 0.0
-        for p in range(start[k], start[k + 1]):
-            value += d[left[p]] * d[right[p]]
-        l[target[k]] = value
-    for k in range(diagonal.shape[0]):
-        value = l[first[k]] * (1.0 + 1.0 / alpha)
-        diagonal[k] = value if value > 0.0 else 1.0
-        l[first[k]] = diagonal[k]
+def product_of_rows(factor, entry):
+    """The number of S at an entry of L: the inner product of two rows of D."""
+    symbolic, d, value = factor.symbolic, factor.d, 0.0
+    start, left, right = symbolic.s_start, symbolic.s_left, symbolic.s_right
+    for p in range(start[entry], start[entry + 1]):
+        value += d[left[p]] * d[right[p]]
+    return value
 
 
 @inlined
-def factorise(factor):
-    """L of S + I/α in its place, 1/Δ instead of its unit diagonal; False where an entry of Δ is ≤ 0."""
-    first, update, l = factor.symbolic.l_start, factor.symbolic.update, factor.l
-    u = 0
+def eliminate(value, factor, entry):
+    """A number of S + I/α less what the columns of L before its own take from it."""
+    symbolic, l, scaled = factor.symbolic, factor.l, factor.scaled
+    start, left, right = symbolic.update_start, symbolic.update_left, symbolic.update_right
+    for p in range(start[entry], start[entry + 1]):
+        value -= l[left[p]] * scaled[right[p]]
+    return value
+
+
+@inlined
+def factorise(factor, alpha, b):
+    """L of S + I/α, with 1/Δ instead of its unit diagonal, and b := L⁻¹ b; False where an entry of Δ is ≤ 0.
+
+    Every number is found at once from its products, and b while the next column waits for its pivot.
+    """
+    first, row, l = factor.symbolic.l_start, factor.symbolic.l_row, factor.l
     for k in range(first.shape[0] - 1):
-        start, end = first[k], first[k + 1]
-        if not l[start] > 0.0:
+        start, value = first[k], product_of_rows(factor, first[k]) * (1.0 + 1.0 / alpha)
+        factor.diagonal[k] = value if value > 0.0 else 1.0
+        pivot = eliminate(factor.diagonal[k], factor, start)
+        if not pivot > 0.0:
             return False
-        inverse = 1.0 / l[start]
+        inverse, found = 1.0 / pivot, b[k]
         l[start] = inverse
-        for p in range(start + 1, end):
-            for other in range(p, end):
-                l[update[u]] -= l[p] * l[other] * inverse
-                u += 1
-        for p in range(start + 1, end):
-            l[p] *= inverse
+        for p in range(start + 1, first[k + 1]):
+            value = eliminate(product_of_rows(factor, p), factor, p)
+            factor.scaled[p] = value
+            l[p] = value * inverse
+            b[row[p]] -= l[p] * found
     return True
 
 
 @inlined
 def regularised_factor(factor, numbers, inverse_root, alpha):
-    """Assemble and factorise S + I/α; False where it is not positive definite."""
-    assemble(factor, numbers, inverse_root, alpha)
-    return factorise(factor)
+    """D, and the factor of S + I/α; False where that is not positive definite."""
+    assemble_gradients(factor, numbers, inverse_root)
+    factor.step[:] = 0.0
+    return factorise(factor, alpha, factor.step)
 
 
 @inlined
 def solve(factor, b):
     """b := (S + I/α)⁻¹ b."""
+    substitute_forward(factor, b)
+    substitute_back(factor, b)
+
+
+@inlined
+def substitute_forward(factor, b):
+    """b := L⁻¹ b, as ``factorise`` finds it."""
     first, row, l = factor.symbolic.l_start, factor.symbolic.l_row, factor.l
-    size = first.shape[0] - 1
-    for k in range(size):
+    for k in range(first.shape[0] - 1):
         value = b[k]
         for p in range(first[k] + 1, first[k + 1]):
             b[row[p]] -= l[p] * value
-    for k in range(size - 1, -1, -1):
+
+
+@inlined
+def substitute_back(factor, b):
+    """b := L⁻ᵀ Δ⁻¹ b."""
+    first, row, l = factor.symbolic.l_start, factor.symbolic.l_row, factor.l
+    for k in range(first.shape[0] - 2, -1, -1):
         value = b[k] * l[first[k]]
         for p in range(first[k + 1] - 1, first[k], -1):  # the entry found last is used last, also below
             value -= l[p] * b[row[p]]
@@ -96,8 +113,14 @@ def subtract_product(factor, x, b):
 @inlined
 def times_transpose(factor, b, x):
     """x := Dᵀ b."""
-    start, column, d = factor.symbolic.d_start, factor.symbolic.d_column, factor.d
     x[:] = 0.0
+    add_transpose(factor, b, x)
+
+
+@inlined
+def add_transpose(factor, b, x):
+    """x += Dᵀ b."""
+    start, column, d = factor.symbolic.d_start, factor.symbolic.d_column, factor.d
     for k in range(b.shape[0] - 1, -1, -1):
         value = b[k]
         for p in range(start[k], start[k + 1]):

@@ -65,21 +65,22 @@ def _made(*pattern: bytes) -> Symbolic:
     row, column, entry = _sorted_by(place[row], column, entry)
     l_key = np.repeat(np.arange(order.size), np.diff(l_start)) * order.size + l_row
     target, left, right = _products(row, column, l_key, order.size)
-    s_target, s_start = np.unique(target, return_index=True)
-    own = np.flatnonzero(active)
+    changed, update_left, update_right = _updates(l_start, l_row, l_key, order.size)
+    own, numbers = np.flatnonzero(active), np.arange(l_row.size + 1)
     return Symbolic(
         row=unsigned(kept[order]),
         column=unsigned(own),
         d_start=unsigned(np.searchsorted(row, np.arange(order.size + 1))),
         d_entry=unsigned(entry),
         d_column=unsigned(np.searchsorted(own, column)),
-        s_start=unsigned(np.append(s_start, target.size)),
-        s_target=unsigned(s_target),
+        s_start=unsigned(np.searchsorted(target, numbers)),
         s_left=unsigned(left),
         s_right=unsigned(right),
         l_start=unsigned(l_start),
         l_row=unsigned(l_row),
-        update=unsigned(_updates(l_start, l_row, l_key, order.size)),
+        update_start=unsigned(np.searchsorted(changed, numbers)),
+        update_left=unsigned(update_left),
+        update_right=unsigned(update_right),
     )
 
 
@@ -156,11 +157,16 @@ def _products(
     return tuple(_sorted_by(target, left, right))
 
 
-def _updates(l_start: np.ndarray, l_row: np.ndarray, l_key: np.ndarray, size: int) -> np.ndarray:
-    """For every column k, the positions of (i, j) for the rows j ≤ i below its diagonal, j outermost."""
-    keys = [np.zeros(0, dtype=np.int64)]
+def _updates(
+    l_start: np.ndarray, l_row: np.ndarray, l_key: np.ndarray, size: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions in L of numbers that lose a product, sorted, and of its two factors; early columns first."""
+    nothing = np.zeros(0, dtype=np.int64)
+    keys, pairs = [nothing], [(nothing, nothing)]
     for k in range(size):
-        below = l_row[l_start[k] + 1 : l_start[k + 1]]
+        below = np.arange(l_start[k] + 1, l_start[k + 1])
         first, second = np.triu_indices(below.size)
-        keys.append(below[first] * size + below[second])
-    return np.searchsorted(l_key, np.concatenate(keys))
+        keys.append(l_row[below[first]] * size + l_row[below[second]])
+        pairs.append((below[first], below[second]))
+    left, right = (np.concatenate(side) for side in zip(*pairs, strict=True))
+    return tuple(_sorted_by(np.searchsorted(l_key, np.concatenate(keys)), left, right))

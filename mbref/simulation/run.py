@@ -33,7 +33,7 @@ from mbref.kernels.lent_memory import Lent, lent, shapes_of, take_back, write
 from mbref.kernels.named_memory import allocate, packed
 from mbref.kernels.records import record
 from mbref.kernels.scene_layout import SceneData
-from mbref.linear_algebra.symbolic_factorisation import empty_factor, no_static_rows
+from mbref.linear_algebra.symbolic_factorisation import empty_factor, no_static_rows, unsigned
 from mbref.method import Method
 from mbref.scene import Scene, SceneError
 from mbref.simulation.control import control_of
@@ -151,7 +151,6 @@ class Run:
         compared = pivots <= MOST_COMPARED
         sizes["compared_rows"] = pivots if compared else 0
         sizes["compared_entries"] = factor.d.size if compared else 0
-        sizes["compared_columns"] = factor.root.size if compared else 0
         static = no_static_rows() if data.resting.size else factor.static  # else their multipliers come last
         at_every_state = factor._replace(static=static)
         equations = model.equations(
@@ -182,7 +181,7 @@ class Run:
         reduction = self.reduction
         factor = empty_factor() if reduction is None else reduction.factor()
         if reduction is None or not self.method.stabilisation.projects:
-            return factor, Active(np.arange(7 * self.model.nb), np.arange(self.model.n))
+            return factor, Active(unsigned(np.arange(7 * self.model.nb)), unsigned(np.arange(self.model.n)))
         return factor, reduction.active
 
     def _kernels_on(self, chart: Stabilisation) -> Kernels:

@@ -105,7 +105,7 @@ def has_passed(y, memory):
     if changes_much(history.pivots[before], history.pivots[now]):
         pieces = max(pieces, FINE)
     pieces = min(pieces, inside.shape[0] - 1)
-    can_turn = memory.loop.gradients.row.shape[0] > 0
+    can_turn = memory.loop.gradients.product.shape[0] > 0
     can_turn = can_turn and least_sum(history.pivots[before], history.pivots[now]) < STEEP * turn
     if pieces == 1 and not can_turn:
         return False
@@ -134,7 +134,7 @@ def least_sum(before, now):
 def remember_gradient(before, memory):
     """Keep D of a row of the history, where there is room."""
     loop = memory.loop
-    if loop.gradients.row.shape[0] > 0:
+    if loop.gradients.product.shape[0] > 0:
         start = loop.y_new[: loop.clock.y_size]
         copy(loop.history.y[before, : loop.clock.y_size], start)
         put_gradient(loop.history.time[before], start, memory)
@@ -149,7 +149,7 @@ def changes_sign(memory):
     drops by one in between.
     """
     factor, gradients = memory.factor, memory.loop.gradients
-    if gradients.row.shape[0] == 0:
+    if gradients.product.shape[0] == 0:
         return False
     put_product(factor, gradients)
     copy(factor.d, gradients.start)
@@ -168,20 +168,25 @@ def put_gradient(t, y, memory):
 
 @kernel
 def put_product(factor, gradients):
-    """D D₀ᵀ and a part 1/α of the squares of D on its diagonal, D₀ being where the step began."""
-    start, column, row = factor.symbolic.d_start, factor.symbolic.d_column, gradients.row
-    size = factor.diagonal.shape[0]
-    for i in range(size):
-        row[:], square = 0.0, 0.0
-        for p in range(start[i], start[i + 1]):
-            row[column[p]] = factor.d[p]
-            square += factor.d[p] * factor.d[p]
-        for j in range(size):
-            value = 0.0
-            for p in range(start[j], start[j + 1]):
-                value += row[column[p]] * gradients.start[p]
-            gradients.product[i, j] = value
-        gradients.product[i, i] += (square if square > 0.0 else 1.0) / ALPHA
+    """D D₀ᵀ and a part 1/α of the squares of D on its diagonal, D₀ being where the step began.
+
+    It has entries where S and its factor L have theirs, and from the products of the same numbers.
+    """
+    symbolic, d, d_0, product = factor.symbolic, factor.d, gradients.start, gradients.product
+    first, row, start, left, right = (
+        symbolic.l_start, symbolic.l_row, symbolic.s_start, symbolic.s_left, symbolic.s_right,
+    )  # fmt: skip
+    product[:] = 0.0
+    for k in range(factor.diagonal.shape[0]):
+        for entry in range(first[k], first[k + 1]):
+            lower, upper, square = 0.0, 0.0, 0.0
+            for p in range(start[entry], start[entry + 1]):
+                lower += d[left[p]] * d_0[right[p]]
+                upper += d[right[p]] * d_0[left[p]]
+                square += d[left[p]] * d[right[p]]
+            product[row[entry], k], product[k, row[entry]] = lower, upper
+            if row[entry] == k:
+                product[k, k] += (square if square > 0.0 else 1.0) / ALPHA
 
 
 @kernel

@@ -48,8 +48,8 @@ DEFECTS = (
     ),
     Defect(
         P,
-        "put(blocks, row + k, 3, cross(s_i, to_body(a, i, world)))",
-        "put(blocks, row + k, 3, cross(s_j, to_body(a, i, world)))",
+        "put(blocks, row + k, column, scale(sign, cross(s, along)))",
+        "put(blocks, row + k, column, scale(-sign, cross(s, along)))",
         f"{PRIMITIVES}::test_jacobian_and_difference_of_phi",
     ),
     Defect(
