@@ -74,10 +74,12 @@ def determinant(a, n):
         product *= max(abs(a[k, k]), 1e-150)
         if not 1e-150 < product < 1e150:
             size, product = size + log(product), 1.0
+        inverse = 1.0 / a[k, k] if a[k, k] != 0.0 else 0.0
         for i in range(k + 1, n):
-            factor = a[i, k] / a[k, k] if a[k, k] != 0.0 else 0.0
-            for j in range(k, n):
-                a[i, j] -= factor * a[k, j]
+            factor = a[i, k] * inverse
+            if factor != 0.0:
+                for j in range(k + 1, n):
+                    a[i, j] -= factor * a[k, j]
     return negative, size + log(product)
 
 

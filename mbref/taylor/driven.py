@@ -12,18 +12,18 @@ from numpy import exp, isfinite, log
 
 from mbref.kernels.compilation import INT, entry, kernel
 from mbref.kernels.layout import OK
-from mbref.linear_algebra.elimination import determinant
 from mbref.linear_algebra.vectors import larger
 from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED
 from mbref.taylor.brief import record_crossing
+from mbref.taylor.crossing import changes_sign
 from mbref.taylor.layout import SERIES
-from mbref.taylor.partition import put_gradient
 from mbref.taylor.passage import (
     AHEAD,
     LONG,
     MOST_PARTS,
     STEEPEST,
     VANISHING,
+    inside,
     is_near,
     keeps_signs,
     least_pivot,
@@ -191,41 +191,8 @@ def may_have_crossed(h, memory):
         return False
     looked_at = not (brief or (kept and not is_near(pivot, progress)))
     changes = changes_sign(h, min(int(moved / LONG) + 1, MOST_PARTS), memory)
-    changes = changes or (looked_at and vanishes(h, pivot, memory))
+    if looked_at and not changes:
+        between, ends = inside(h, pivot, memory)
+        changes = between - ends < VANISHING
     evaluate_series(h, memory)
     return changes
-
-
-@kernel
-def changes_sign(h, parts, memory):
-    """Whether the determinant changes its sign between the ends of parts of a stride of h seconds."""
-    negative, _ = determinant_of(memory.series.past, memory)
-    behind, _ = determinant_of(memory.series.terms, memory)
-    changes = negative != behind
-    for part in range(1, parts):
-        evaluate_series(h * part / parts, memory)
-        here, _ = determinant_of(memory.state, memory)
-        changes = changes or negative != here
-    return changes
-
-
-@kernel
-def vanishes(h, pivot, memory):
-    """Whether the determinant vanishes where a least pivot does that falls and rises linearly."""
-    past = memory.progress.past_pivot
-    _, before = determinant_of(memory.series.past, memory)
-    _, behind = determinant_of(memory.series.terms, memory)
-    evaluate_series(h * past / (past + pivot), memory)
-    _, between = determinant_of(memory.state, memory)
-    return between - min(before, behind) < VANISHING
-
-
-@kernel
-def determinant_of(y, memory):
-    """The determinant of G at variables y[0]: whether it is negative, and the logarithm of its size."""
-    solver, rank = memory.solver, memory.progress.rank
-    put_gradient(y, memory)
-    for i in range(rank):
-        for j in range(rank):
-            solver.product[i, j] = solver.work[solver.row[i], j]
-    return determinant(solver.product, rank)
