@@ -14,6 +14,7 @@ from mbref.kernels.compilation import INT, entry, kernel
 from mbref.kernels.layout import OK
 from mbref.linear_algebra.vectors import larger
 from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED
+from mbref.taylor.advance import begin_once
 from mbref.taylor.brief import record_crossing
 from mbref.taylor.crossing import changes_sign
 from mbref.taylor.layout import SERIES
@@ -40,10 +41,13 @@ ORDER, LEAST_ORDER = 16, 12  # of the series, unless another one is asked for; t
 
 @entry(INT(SERIES))
 def follow_drivers(memory):
-    """Advance to the end, or by a number of steps or of singular positions: DONE, PAUSED, or why the motion
-    cannot be followed."""
+    """Begin a series unless one has begun, and advance to the end, or by a number of steps or of singular
+    positions: DONE, PAUSED, or why the motion cannot be followed."""
     clock, counts, control = memory.run.loop.clock, memory.run.equations.system.counts, memory.run.control
     progress, kept = memory.progress, memory.crossings.time.shape[0]
+    status = begin_once(memory)
+    if status != OK:
+        return status
     if counts.steps == 0:
         progress.entered, progress.tolerance = least_pivot(memory), KEEPING
     for _ in range(int(control.steps_per_call)):
