@@ -22,6 +22,7 @@ from mbref.taylor.passage import (
     AHEAD,
     LONG,
     MOST_PARTS,
+    NEAR,
     STEEPEST,
     VANISHING,
     inside,
@@ -130,14 +131,14 @@ def put_samples(h, left, memory):
 def reach(memory):
     """The longest stride (s) and, in ``cut``, the order of the series that it takes.
 
-    It is as long as its last two terms, as large as the tolerance, allow.  Behind a singular position terms
-    of high order are rounding, which grows with the order, so that fewer reach farther.
+    It is as long as its last two terms, as large as the tolerance, allow.  Near a singular position terms of
+    high order are rounding, which grows with the order, so that fewer reach farther.
     """
     progress, control = memory.progress, memory.run.control
-    best, progress.cut = 0.0, progress.order
-    for quarters in range(4, 1, -1):
-        order = progress.order * quarters // 4
-        longest = log(control.largest_step)
+    best, progress.cut, largest = 0.0, progress.order, log(control.largest_step)
+    fewest = 2 if progress.past_pivot < NEAR * progress.largest_pivot else 4
+    for quarters in range(4, fewest - 1, -1):
+        order, longest = progress.order * quarters // 4, largest
         for k in range(order - 1, order + 1):
             size = size_of(memory.series.past, k, memory.solver.order.shape[0])
             if size > 0.0:
