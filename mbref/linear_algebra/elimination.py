@@ -74,10 +74,11 @@ def determinant(a, n):
         product *= max(abs(a[k, k]), 1e-150)
         if not 1e-150 < product < 1e150:
             size, product = size + log(product), 1.0
+        inverse = 1.0 / a[k, k] if abs(a[k, k]) > 1e-150 else 0.0
         for i in range(k + 1, n):
-            if a[i, k] != 0.0:  # so is the pivot, the largest of its column
-                factor = a[i, k] / a[k, k]
-                for j in range(k, n):
+            factor = a[i, k] * inverse
+            if factor != 0.0:
+                for j in range(k + 1, n):
                     a[i, j] -= factor * a[k, j]
     return negative, size + log(product)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbref.kernels.compilation import INT, entry
+from mbref.kernels.compilation import INT, entry, kernel
 from mbref.kernels.layout import OK
 from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, TOO_MANY_STEPS
 from mbref.taylor.brief import parts_at, pass_briefly
@@ -13,16 +13,30 @@ from mbref.taylor.samples import put_terms
 @entry(INT(SERIES))
 def enter(memory):
     """Begin a series at the present state: OK or why that cannot be."""
+    memory.progress.begun = 0
+    return begin_once(memory)
+
+
+@kernel
+def begin_once(memory):
+    """Begin a series at the present state unless one has begun: OK or why that cannot be."""
+    if memory.progress.begun:
+        return OK
+    memory.progress.begun = 1
     return memory.kernels.begin(memory)
 
 
 @entry(INT(SERIES))
 def advance_series(memory):
-    """Advance until the end, a failure, or the number of steps or of singular positions per call; says which.
+    """Begin a series unless one has begun, and advance until the end, a failure, or the number of steps or of
+    singular positions per call; says which.
 
     SINGULAR_AHEAD where a passage cannot be brief.
     """
     clock, counts = memory.run.loop.clock, memory.run.equations.system.counts
+    status = begin_once(memory)
+    if status != OK:
+        return status
     for _ in range(int(memory.run.control.steps_per_call)):
         if counts.steps >= memory.run.control.most_steps:
             return TOO_MANY_STEPS

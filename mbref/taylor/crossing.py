@@ -13,8 +13,8 @@ from mbref.taylor.partition import put_gradient
 from mbref.taylor.samples import evaluate_series
 
 GOLDEN, SECTIONS = 0.6180339887498949, 70  # of the search for the least determinant
-SECANTS = 12  # of the search for its change of sign, behind which it halves
-CLOSE = 1e-12  # of a step, by which two estimates of the change differ at its end
+INTERPOLATIONS, HALVINGS = 12, 45  # of the search for its change of sign
+CLOSE = 1e-13  # of a step, by which two estimates of the change would differ at its end
 LOST_ROW = 1e-6  # of the largest pivot: formulations may take a row with less for one that depends on others
 
 
@@ -97,31 +97,42 @@ def is_at_crossing(at, h, memory):
 def sign_change(h, memory):
     """The time (s) at which the determinant changes its sign inside a step of h seconds; -1 if it does not.
 
-    By the Illinois algorithm (M. Dowell and P. Jarratt, BIT 11, 1971); where that is slow, because several
-    loops are flat at once and the root is a multiple one, by halving.  It ends where estimates differ by
-    less than CLOSE of the step.
+    By inverse quadratic interpolation (R. P. Brent, Computer J. 14, 1971); where that is slow, because
+    several loops are flat at once and the root is a multiple one, by halving.  It ends where the estimate
+    that would follow differs by less than CLOSE of the step, changes going on to fall at their last ratio.
     """
-    evaluate_series(0.0, memory)
-    _, unit = overlap(memory.state, memory)
-    start, end, side, last = 0.0, h, 0, -h
+    _, unit = overlap(memory.series.past, memory)
+    start, end, middle, changed = 0.0, h, -h, h
     before, after = 1.0, value_at(end, unit, memory)
     if not after < 0.0:
         return -1.0
-    for k in range(SECTIONS):
-        middle = (start * after - end * before) / (after - before) if k < SECANTS else 0.5 * (start + end)
-        if not start < middle < end or abs(middle - last) <= CLOSE * h:
+    replaced, value_there = start, before
+    for k in range(INTERPOLATIONS + HALVINGS):
+        last, before_last = middle, changed
+        middle = 0.5 * (start + end)
+        if k < INTERPOLATIONS:
+            middle = interpolated(start, before, end, after, replaced, value_there)
+        changed = abs(middle - last)
+        if changed * min(1.0, changed / before_last) <= CLOSE * h:
             break
-        last = middle
         value = value_at(middle, unit, memory)
-        if value * after > 0.0:
-            end, after = middle, value
-            before = 0.5 * before if side == 1 else before
-            side = 1
+        if value < 0.0:
+            replaced, value_there, end, after = end, after, middle, value
         else:
-            start, before = middle, value
-            after = 0.5 * after if side == -1 else after
-            side = -1
-    return end if abs(after) < abs(before) else start
+            replaced, value_there, start, before = start, before, middle, value
+    return middle
+
+
+@kernel
+def interpolated(a, at_a, b, at_b, c, at_c):
+    """The place between a and b, where a function has values of different signs, at which it vanishes by
+    inverse quadratic interpolation through c, too; by linear interpolation where that is outside."""
+    place = (a * at_b - b * at_a) / (at_b - at_a)
+    if at_c in (at_a, at_b):
+        return place
+    of_a, of_b, of_c = at_b * at_c * (at_b - at_c), at_c * at_a * (at_c - at_a), at_a * at_b * (at_a - at_b)
+    quadratic = -(a * of_a + b * of_b + c * of_c) / ((at_a - at_b) * (at_b - at_c) * (at_c - at_a))
+    return quadratic if a < quadratic < b else place
 
 
 @kernel

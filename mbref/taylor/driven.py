@@ -12,18 +12,20 @@ from numpy import exp, isfinite, log
 
 from mbref.kernels.compilation import INT, entry, kernel
 from mbref.kernels.layout import OK
-from mbref.linear_algebra.elimination import determinant
 from mbref.linear_algebra.vectors import larger
 from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED
+from mbref.taylor.advance import begin_once
 from mbref.taylor.brief import record_crossing
+from mbref.taylor.crossing import changes_sign
 from mbref.taylor.layout import SERIES
-from mbref.taylor.partition import put_gradient
 from mbref.taylor.passage import (
     AHEAD,
     LONG,
     MOST_PARTS,
+    NEAR,
     STEEPEST,
     VANISHING,
+    inside,
     is_near,
     keeps_signs,
     least_pivot,
@@ -40,10 +42,13 @@ ORDER, LEAST_ORDER = 16, 12  # of the series, unless another one is asked for; t
 
 @entry(INT(SERIES))
 def follow_drivers(memory):
-    """Advance to the end, or by a number of steps or of singular positions: DONE, PAUSED, or why the motion
-    cannot be followed."""
+    """Begin a series unless one has begun, and advance to the end, or by a number of steps or of singular
+    positions: DONE, PAUSED, or why the motion cannot be followed."""
     clock, counts, control = memory.run.loop.clock, memory.run.equations.system.counts, memory.run.control
     progress, kept = memory.progress, memory.crossings.time.shape[0]
+    status = begin_once(memory)
+    if status != OK:
+        return status
     if counts.steps == 0:
         progress.entered, progress.tolerance = least_pivot(memory), KEEPING
     for _ in range(int(control.steps_per_call)):
@@ -126,14 +131,14 @@ def put_samples(h, left, memory):
 def reach(memory):
     """The longest stride (s) and, in ``cut``, the order of the series that it takes.
 
-    It is as long as its last two terms, as large as the tolerance, allow.  Behind a singular position terms
-    of high order are rounding, which grows with the order, so that fewer reach farther.
+    It is as long as its last two terms, as large as the tolerance, allow.  Near a singular position terms of
+    high order are rounding, which grows with the order, so that fewer reach farther.
     """
     progress, control = memory.progress, memory.run.control
-    best, progress.cut = 0.0, progress.order
-    for quarters in range(4, 1, -1):
-        order = progress.order * quarters // 4
-        longest = log(control.largest_step)
+    best, progress.cut, largest = 0.0, progress.order, log(control.largest_step)
+    fewest = 2 if progress.past_pivot < NEAR * progress.largest_pivot else 4
+    for quarters in range(4, fewest - 1, -1):
+        order, longest = progress.order * quarters // 4, largest
         for k in range(order - 1, order + 1):
             size = size_of(memory.series.past, k, memory.solver.order.shape[0])
             if size > 0.0:
@@ -191,41 +196,8 @@ def may_have_crossed(h, memory):
         return False
     looked_at = not (brief or (kept and not is_near(pivot, progress)))
     changes = changes_sign(h, min(int(moved / LONG) + 1, MOST_PARTS), memory)
-    changes = changes or (looked_at and vanishes(h, pivot, memory))
+    if looked_at and not changes:
+        between, ends = inside(h, pivot, memory)
+        changes = between - ends < VANISHING
     evaluate_series(h, memory)
     return changes
-
-
-@kernel
-def changes_sign(h, parts, memory):
-    """Whether the determinant changes its sign between the ends of parts of a stride of h seconds."""
-    negative, _ = determinant_of(memory.series.past, memory)
-    behind, _ = determinant_of(memory.series.terms, memory)
-    changes = negative != behind
-    for part in range(1, parts):
-        evaluate_series(h * part / parts, memory)
-        here, _ = determinant_of(memory.state, memory)
-        changes = changes or negative != here
-    return changes
-
-
-@kernel
-def vanishes(h, pivot, memory):
-    """Whether the determinant vanishes where a least pivot does that falls and rises linearly."""
-    past = memory.progress.past_pivot
-    _, before = determinant_of(memory.series.past, memory)
-    _, behind = determinant_of(memory.series.terms, memory)
-    evaluate_series(h * past / (past + pivot), memory)
-    _, between = determinant_of(memory.state, memory)
-    return between - min(before, behind) < VANISHING
-
-
-@kernel
-def determinant_of(y, memory):
-    """The determinant of G at variables y[0]: whether it is negative, and the logarithm of its size."""
-    solver, rank = memory.solver, memory.progress.rank
-    put_gradient(y, memory)
-    for i in range(rank):
-        for j in range(rank):
-            solver.product[i, j] = solver.work[solver.row[i], j]
-    return determinant(solver.product, rank)

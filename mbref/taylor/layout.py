@@ -189,6 +189,7 @@ class Progress(NamedTuple):
     exact: float = 0.0  # the tolerance of steps that pass one
     exact_order: int = 0
     change: float = 0.0  # of velocities, relative, that a passage may not magnify
+    begun: int = 0  # whether a series has been begun
     passed: int = 0  # singular positions in ``Crossings``
     leaving: int = 0  # whether the series comes from a singular position that it has passed
 

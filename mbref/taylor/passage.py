@@ -124,14 +124,22 @@ def has_crossed(h, pivot, memory):
     turns = turns_back(memory.series.terms, memory)
     if brief or (keeps_signs(memory) and not is_near(pivot, progress)) or turns:
         return False
-    _, behind = overlap(memory.series.terms, memory)
-    _, before = overlap(memory.series.past, memory)
-    between = size_at(h * progress.past_pivot / (progress.past_pivot + pivot), memory) - min(before, behind)
-    vanishes = between < VANISHING
+    between, ends = inside(h, pivot, memory)
+    vanishes = between - ends < VANISHING
     if vanishes and far:
-        vanishes = size_at(least_between(h, memory), memory) < VANISHED + min(before, behind)
+        vanishes = size_at(least_between(h, memory), memory) < VANISHED + ends
     evaluate_series(h, memory)
     return vanishes
+
+
+@kernel
+def inside(h, pivot, memory):
+    """The logarithms of the determinant where a least pivot vanishes that falls and rises linearly, and of
+    the lesser one at the ends of a step of h seconds."""
+    past = memory.progress.past_pivot
+    _, behind = overlap(memory.series.terms, memory)
+    _, before = overlap(memory.series.past, memory)
+    return size_at(h * past / (past + pivot), memory), min(before, behind)
 
 
 @kernel

@@ -53,11 +53,9 @@ class PassingRun(SeriesRun):
         return (run.geometry, run.polynomials) if isinstance(run, SeriesRun) else super()._equations()
 
     def advance_over(self, status: int, run: Run) -> int:
-        """Advance a run in steps that is PAUSED, or has a singular position ahead, by brief passages: as the
-        steps alone do, and SINGULAR_AHEAD only where a passage cannot be brief."""
-        status = int(advance_over(status, run.packed.argument, self._packed_taylor.argument))
-        self.crossings = self.recorded()
-        return status
+        """Advance a run in steps that is PAUSED, or has a singular position ahead, by brief passages, which
+        are recorded: as the steps alone do, and SINGULAR_AHEAD only where a passage cannot be brief."""
+        return int(advance_over(status, run.packed.argument, self._packed_taylor.argument))
 
     def take_over(self, run: Run) -> None:
         """Go on from the state and time of a run of the same scene, as a passage begins."""
@@ -172,7 +170,7 @@ class PassingRun(SeriesRun):
         (q, v), self.memory.loop.clock.time = moved, start.time + ahead
         for _ in range(CORRECTIONS):
             self.memory.state.coordinates[:], self.memory.state.velocities[:] = q, v
-            if (status := self.expand(self.times[-1])) != OK:
+            if (status := self.expand()) != OK:
                 return status
             there, here = self._state_at(-ahead), self._state_at(0.0)
             q = displaced(here[0], displacement(there[0], start.coordinates))

@@ -41,7 +41,9 @@ class CrossingRun(Run):
         status = self._passage.leave_start()
         if status == PAUSED and self.memory.loop.clock.time > 0.0:
             self.enter_state()
-        return super().advance(progress) if status == PAUSED else (status, 0.0)
+        status, seconds = super().advance(progress) if status == PAUSED else (status, 0.0)
+        self._passage.collect()
+        return status, seconds
 
     def take_steps(self) -> int:
         """As those of every run, brief passages among them once there are series for them."""
@@ -97,20 +99,24 @@ class TaylorRun(SeriesRun):
         """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
         before, began = self.making, time.process_time()
         status = self._passage.leave_start()
-        if status == PAUSED:
-            status = self.expand(self.times[-1])
-            status = PAUSED if status == OK else status
         while status == PAUSED:
             status = self.step_on()
-            self.crossings += self.recorded()
-            if status == SINGULAR_AHEAD or self._parts():
-                status = self._passage() if status == SINGULAR_AHEAD else self._passage.take_branch()
-                if status == PAUSED and self.expand(self.times[-1]) != OK:
-                    status = UNDECIDED
-            self.specialise_where_it_pays(status)
+            if status != DONE:
+                status = self._over(status)
+                self.specialise_where_it_pays(status)
             if progress is not None:
                 progress(float(self.memory.loop.clock.time))
-        return status, time.process_time() - began - (self.making - before)
+        seconds = time.process_time() - began - (self.making - before)
+        self.crossings += self.recorded()
+        return status, seconds
+
+    def _over(self, status: int) -> int:
+        """A status, or that behind the singular position ahead, or along another branch at the last one."""
+        self.crossings += self.recorded()
+        if status != SINGULAR_AHEAD and not self._parts():
+            return status
+        status = self._passage() if status == SINGULAR_AHEAD else self._passage.take_branch()
+        return UNDECIDED if status == PAUSED and self.expand() != OK else status
 
     def _parts(self) -> bool:
         """Whether the last singular position passed is to be left along another branch, not yet taken."""
@@ -140,10 +146,15 @@ class Passage:
 
     def advance_over(self, status: int) -> int:
         """Advance the run in steps that has a status, by brief passages too."""
-        series = self._series()
-        status = series.advance_over(status, self._run)
-        self._run.crossings += series.crossings
+        status = self._series().advance_over(status, self._run)
+        if status != DONE:
+            self.collect()
         return status
+
+    def collect(self) -> None:
+        """Have the run know the singular positions that brief passages have recorded."""
+        if self._made is not None:
+            self._run.crossings += self._made.recorded()
 
     def take_branch(self) -> int:
         """Take the run along the branch asked for at the last singular position that it has passed."""

@@ -97,6 +97,7 @@ class SeriesRun(Run):
         progress.usual_order, progress.usual = order, tolerance
         progress.exact_order, progress.exact = exact_order, SHARE * (EXACT + EXACT)
         progress.change = max(self.memory.control.rtol, LEAST_CHANGE)
+        progress.end = self.times[-1]
         progress.farthest = OFF * max(1.0, self.model.length)
         progress.freedoms = self.part.active.velocities.size - self.ranks.rank
         self._packed_taylor = packed(self.taylor, self.packed)
@@ -180,9 +181,9 @@ class SeriesRun(Run):
         for name in functions_of(self.taylor):
             code[name] = self._code.address(name)
 
-    def expand(self, until: float) -> int:
-        """Expand at the present time and state, for steps until a time (s): OK or why that cannot be."""
-        self.taylor.progress.end = until
+    def expand(self) -> int:
+        """Expand at the present time and state, for steps until the end: OK or why that cannot be."""
+        self.taylor.progress.end = self.times[-1]
         return int(enter(self._packed_taylor.argument))
 
     def step_on(self) -> int:
