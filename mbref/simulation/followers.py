@@ -15,27 +15,26 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbref.equations.active_coordinates import places_without_rounding, without_rounding
-from mbref.equations.evaluation import evaluate_along
-from mbref.equations.initial_state import LARGE, Start, consistent_start, is_met
+from mbref.equations.active_coordinates import without_rounding
+from mbref.equations.initial_state import LARGE, Start
 from mbref.equations.joint_reactions import Balance
-from mbref.equations.model import Model, Terms, motion_of
+from mbref.equations.model import Model, motion_of
 from mbref.equations.packing import Packs, row_of
 from mbref.equations.reduction import Reduction
 from mbref.equations.static_constraints import at_rest
-from mbref.kernels.copying import Bytes, copy_rows, rows_from, rows_to, table_of
-from mbref.kernels.layout import Counts, Equations, Memory
+from mbref.kernels.copying import Bytes, copy_rows, rows_from, table_of
+from mbref.kernels.layout import Counts, Memory
 from mbref.kernels.named_memory import packed
-from mbref.kernels.scene_layout import SceneData
 from mbref.motion import Motion
-from mbref.scene import Scene, SceneError
+from mbref.scene import Scene
 from mbref.simulation.control import STEPS_PER_CALL, largest_violation
+from mbref.simulation.evaluations import Evaluations, Rows, numbers_of
 from mbref.simulation.outcome import OUTCOMES, cost_of, facts_of, reactions_of, report_of
 from mbref.simulation.ranks import Ranks, all_ranks
 from mbref.simulation.run import NEARLY, Run
 from mbref.simulation.singular_start import begins_at_rest, begins_in_motion
 from mbref.simulation.stepping import DONE, advance_to_end
-from mbref.specialised import Untraceable, Varied, arrays_of
+from mbref.specialised import Untraceable, Varied
 
 
 def may_lead(run: Run) -> bool:
@@ -114,10 +113,13 @@ class Group(NamedTuple):
 
 def _group(run: Run, scenes: Sequence[Scene]) -> Group:
     """The scenes, of which those fit that give the run's answers and start as regularly."""
-    packs = Packs(scenes)
-    starts, q, v = _starts(run, packs)
-    terms = _terms_of_evidence(run, packs, q, v)
-    agree = _reduction(run).evidence.which_agree(run.model, q, v, packs.mass, terms)
+    packs, evidence = Packs(scenes), _reduction(run).evidence
+    evaluations = Evaluations(run.model, packs)
+    starts, q, v = _starts(run, packs, evaluations)
+    part, places, velocities = evidence.states(q, v)
+    durations = np.array([scene.duration for scene in scenes])
+    terms = evaluations.terms(np.arange(len(q)), durations[:, None] * part, places, velocities)
+    agree = evidence.which_agree(run.model, q, v, packs.mass, terms)
     symbolic, tolerance = run.part.factor.symbolic, run.limits.rank_tolerance
     ranks = all_ranks(run.model, terms.jacobian[:, 0], packs.data.metric_root, symbolic, tolerance)
     alike = [rank.rank == run.ranks.rank and rank.least >= NEARLY for rank in ranks]
@@ -177,7 +179,7 @@ class Runs:
         run, packs, memory = self._run, self._group.packs, self._memory
         length, rounding = packs.length, run.method.settings(0.0).rounding
         return [
-            *_numbers(memory.equations, run.reduced(packs.data, axis=1), packs),
+            *numbers_of(memory.equations, run.reduced(packs.data, axis=1), packs),
             (memory.state.coordinates, self._group.q),
             (memory.state.velocities, self._group.v),
             (memory.control, largest_violation(run.limits, length), "violation"),
@@ -228,77 +230,14 @@ class Runs:
         )
 
 
-class Rows:
-    """Arrays of which a row at a time is copied to memory, behind the bytes that it has else."""
-
-    def __init__(self, rows: Sequence[tuple[Any, ...]], before: Bytes | None = None):
-        self._kept = before, [(target, np.ascontiguousarray(of_all), *name) for target, of_all, *name in rows]
-        copies = before.copies if before else []
-        self._table = table_of([*copies, *(rows_to(*each) for each in self._kept[1])])
-
-    def copy(self, place: int) -> None:
-        """Have memory hold a row."""
-        copy_rows(self._table, place)
-
-
-def _numbers(equations: Equations, data: SceneData, packs: Packs) -> list[tuple[Any, ...]]:
-    """Arrays of memory of evaluations, and those of scenes whose rows belong there."""
-    system = equations.system
-    masses = (system.mass, packs.mass), (system.inverse_root, packs.inverse_root)
-    return [*zip(arrays_of(equations.scene), arrays_of(data), strict=True), *masses]
-
-
-def _starts(run: Run, packs: Packs) -> tuple[dict[int, Start], np.ndarray, np.ndarray]:
+def _starts(
+    run: Run, packs: Packs, evaluations: Evaluations
+) -> tuple[dict[int, Start], np.ndarray, np.ndarray]:
     """The consistent starts as ``Run`` finds them, by place where there is one; and the coordinates
     (s, 7 nb) and velocities (s, 6 nb) of all."""
-    q, v = packs.start(), np.zeros_like(packs.mass)
-    terms = _terms(run, packs, np.zeros((len(q), 1)), q[:, None], v[:, None])
-    off = np.abs(terms.phi[:, 0]).max(axis=1, initial=0.0)
-    met = is_met(off, packs.length) & ~terms.nu[:, 0].any(axis=1)
-    found: dict[int, Start] = {}
-    q = places_without_rounding(q, packs.length)
-    for k, scene in enumerate(packs.scenes):
-        if met[k] and not _moves(scene):
-            found[k] = Start(q[k], v[k], float(off[k]), 0.0)
-        elif start := _start_of(run, Model(scene, packs, k)):
-            found[k] = start
-            q[k], v[k] = start.q, start.v
+    q, v, held, found = packs.start(), np.zeros_like(packs.mass), _reduction(run).held, {}
+    for k, start in enumerate(evaluations.starts()):
+        if isinstance(start, Start):
+            found[k] = at_rest(without_rounding(start, float(packs.length[k])), held)
+            q[k], v[k] = found[k].q, found[k].v
     return found, q, v
-
-
-def _moves(scene: Scene) -> bool:
-    """Whether a body is given a velocity other than zero."""
-    given = ((*(body.velocity or ()), *(body.angular_velocity or ())) for body in scene.body)
-    return any(map(any, given))
-
-
-def _start_of(run: Run, model: Model) -> Start | None:
-    """The start of one scene as ``Run`` finds it; None where there is none."""
-    try:
-        start = without_rounding(model, consistent_start(model))
-    except SceneError:
-        return None
-    finally:
-        model.give_back()
-    return at_rest(start, _reduction(run).held)
-
-
-def _terms_of_evidence(run: Run, packs: Packs, q: np.ndarray, v: np.ndarray) -> Terms:
-    """The terms at the states that the choice of rows and columns has read."""
-    part, places, velocities = _reduction(run).evidence.states(q, v)
-    durations = np.array([scene.duration for scene in packs.scenes])
-    return _terms(run, packs, durations[:, None] * part, places, velocities)
-
-
-def _terms(run: Run, packs: Packs, times: np.ndarray, q: np.ndarray, v: np.ndarray) -> Terms:
-    """The terms of s scenes at k states each, with blocks (s, k, m, 12): at times (s, k), coordinates
-    (s, k, 7 nb) and velocities (s, k, 6 nb)."""
-    m, n, memory, shape = run.model.m, run.model.n, run.model.memory, times.shape
-    blocks, rows, forces = (np.empty((*shape, width)) for width in (12 * m, 3 * m, n))
-    numbers = Rows(_numbers(memory.values, packs.data, packs))
-    for k in range(len(times)):
-        numbers.copy(k)
-        evaluate_along(times[k], q[k], v[k], blocks[k], rows[k], forces[k], memory.packed.argument)
-    run.model.put_numbers(memory.values, run.model.data)
-    phi, nu, gamma = (rows[..., i * m : (i + 1) * m] for i in range(3))
-    return Terms(packs.mass, blocks.reshape(*shape, m, 12), phi, nu, gamma, forces)

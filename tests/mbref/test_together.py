@@ -55,7 +55,7 @@ def test_variants_together_and_alone_agree(name):
 def test_varied_lengths_and_a_driver_together_and_alone_agree():
     scenes = list(variants(DRIVEN, [Variation("joint[B].anchor[0]", 0.1, 1e-3, normal=True)], 12))
     agree(scenes)
-    assert followers(scenes) >= 8
+    assert followers(scenes) == 11, "roundings of zero in Φ and γ decide nothing"
 
 
 def test_runs_that_pass_singular_positions_and_others_agree():
