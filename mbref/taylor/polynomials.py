@@ -19,7 +19,10 @@ from mbref.taylor.orientations import Triple
 
 
 class Geometry:
-    """The equations of a scene in natural coordinates, but for masses and loads, which may be any."""
+    """The equations of a scene in natural coordinates, but for masses and loads, which may be any.
+
+    ``readings`` are those of the variables, ``tableau`` the ``linear`` and ``place`` of a ``layout.Solver``.
+    """
 
     def __init__(self, of: NaturalCoordinates):
         self.natural, self.readings, self._forms = of, of.images.of(of.kept), Forms(of)
@@ -29,6 +32,7 @@ class Geometry:
         self._lanes = filled(max(1, len(lane) + len(of.rows)))
         self._rows, self._products = _rows(of, lane, self._lanes), _products(of, lane, self._lanes)
         self._poses, self._given = _poses(of, self._forms), _given(of)
+        self.tableau = _tableau(self._rows, len(of.kept), len(of.rows), self._lanes)
 
     def polynomials(self, model: Model) -> Polynomials:
         """The polynomials of a scene of this geometry."""
@@ -108,6 +112,15 @@ def _rows(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Rows:
             else:
                 twofold += [(r, lane[i], lane[j], coefficient), (r, lane[j], lane[i], coefficient)]
     return Rows(*_columns(twofold, 3), *_columns(linear, 2), constant)
+
+
+def _tableau(rows: Rows, nz: int, nr: int, lanes: int) -> tuple[np.ndarray, np.ndarray]:
+    """The constant part of the tableau (nr + 1, lanes) of the rows, and the places of products in it."""
+    linear, of_variables = np.zeros((nr + 1, lanes)), rows.linear_lane < nz
+    places = rows.linear_row[of_variables], rows.linear_lane[of_variables]
+    np.add.at(linear, places, rows.linear_weight[of_variables])
+    linear[np.arange(nr), nz + np.arange(nr)] = 1.0
+    return linear, np.where(rows.lane < nz, rows.row * lanes + rows.lane, nr * lanes)
 
 
 def _columns(entries: Sequence[tuple[float, ...]], indices: int) -> list[np.ndarray]:

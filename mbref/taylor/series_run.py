@@ -11,6 +11,7 @@ from itertools import repeat
 import numpy as np
 
 from mbref.equations.branches import SMOOTH, Passed
+from mbref.kernels.lent_memory import Lent, copied, fill, lent, shapes_of, take_back
 from mbref.kernels.named_memory import allocate, packed
 from mbref.kernels.records import record
 from mbref.method import Method
@@ -27,7 +28,6 @@ from mbref.taylor.layout import (
     Crossings,
     Polynomials,
     Progress,
-    Rows,
     SceneCode,
     Series,
     SeriesKernels,
@@ -91,7 +91,8 @@ class SeriesRun(Run):
         tolerance, order = self._tolerance_and_order(limits)
         self.geometry, self.polynomials = self._equations()
         exact_order = max(order, EXACT_ORDER) if self.model.closed_loops else order
-        self.taylor = self._taylor_memory(exact_order)
+        self._lent_series = self._lend_series(exact_order)
+        self.taylor, self._packed_taylor = self._lent_series.values, self._lent_series.packed
         progress = self.taylor.progress
         progress.order, progress.tolerance = order, tolerance
         progress.usual_order, progress.usual = order, tolerance
@@ -99,7 +100,6 @@ class SeriesRun(Run):
         progress.change = max(self.memory.control.rtol, LEAST_CHANGE)
         progress.farthest = OFF * max(1.0, self.model.length)
         progress.freedoms = self.part.active.velocities.size - self.ranks.rank
-        self._packed_taylor = packed(self.taylor, self.packed)
         self.wants_code = limits.code == AUTO
         if limits.code == SPECIALISED:
             self._specialise()
@@ -124,15 +124,32 @@ class SeriesRun(Run):
         geometry = geometry_of(self.model, self.start, moving, self.strides)
         return geometry, geometry.polynomials(self.model)
 
-    def _taylor_memory(self, order: int) -> TaylorMemory:
-        natural, polynomials = self.geometry.natural, self.polynomials
-        orders, nz, ng, nr = order + 1, len(natural.kept), len(natural.given), len(natural.rows)
+    def give_back(self) -> None:
+        """Leave the memory to the next run; this one cannot be read any more."""
+        take_back(self._lent_series)
+        super().give_back()
+
+    def _lend_series(self, order: int) -> Lent:
+        """Memory of the series with the numbers of this run."""
+        natural, polynomials, readings = self.geometry.natural, self.polynomials, self.geometry.readings
+        nz, ng, nr = len(natural.kept), len(natural.given), len(natural.rows)
         sizes = {
-            "orders": orders, "nz": nz, "ng": ng, "nr": nr, "nb": self.model.nb,
+            "orders": order + 1, "nz": nz, "ng": ng, "nr": nr,
             "lanes": filled(max(1, nz + nr + ng)), "slots": polynomials.products.left.size,
             "twofold": polynomials.rows.row.size, "kept": KEPT,
             "springs": polynomials.springs.natural.size, "torsions": polynomials.torsions.slot.size,
+            **self.model.sizes,
         }  # fmt: skip
+        key = (TaylorMemory, *sizes.values(), shapes_of(polynomials), self.limits.branches)
+        memory = lent(key, lambda: self._allocate_series(sizes), self._lent)
+        fill(memory.values.polynomials, polynomials)
+        fill(memory.values.readings, readings)
+        memory.values.solver.linear[:], memory.values.solver.place[:] = self.geometry.tableau
+        return memory
+
+    def _allocate_series(self, sizes: Mapping[str, int]) -> TaylorMemory:
+        """Memory of the series, ready but for numbers."""
+        orders, nz, nr = sizes["orders"], sizes["nz"], sizes["nr"]
         series = allocate(Series, sizes)
         grown = np.arange(1.0, orders + 1) * np.arange(2.0, orders + 2)
         series.scale[:, :nz], series.scale[:, nz : nz + nr] = -1.0 / grown[:, None], -1.0
@@ -140,24 +157,24 @@ class SeriesRun(Run):
         series.variable[:nz] = 1.0
         return TaylorMemory(
             run=self.memory,
-            polynomials=polynomials,
-            readings=self.geometry.readings,
+            polynomials=copied(self.polynomials),
+            readings=copied(self.geometry.readings),
             series=series,
-            solver=solver_of(polynomials.rows, sizes),
+            solver=allocate(Solver, sizes),
             progress=record(Progress()),
             kernels=SeriesKernels(*(kernel.pointer for kernel in CALLED)),
             code=record(SceneCode()),
-            began=allocate(Snapshot, self.model.sizes),
-            crossing=allocate(Snapshot, self.model.sizes),
+            began=allocate(Snapshot, sizes),
+            crossing=allocate(Snapshot, sizes),
             beginning=allocate(Beginning, sizes),
             parting=np.array(
                 [k for k, taken in dict(self.limits.branches).items() if taken != SMOOTH], np.int64
             ),
-            crossings=allocate(Crossings, {**sizes, **self.model.sizes}),
+            crossings=allocate(Crossings, sizes),
             landing=np.zeros((2, sizes["lanes"])),
             state=np.zeros((3, sizes["lanes"])),
             pose=np.zeros((3, 12 * self.model.nb)),
-            angles=np.zeros(polynomials.torsions.slot.size),
+            angles=np.zeros(sizes["torsions"]),
         )
 
     def _specialise(self) -> None:
@@ -201,18 +218,6 @@ class SeriesRun(Run):
     def least_pivot(self) -> float:
         """The least pivot of the rows where the series begins; 1 without rows."""
         return float(np.abs(self.taylor.solver.last[: int(self.taylor.progress.rank)]).min(initial=1.0))
-
-
-def solver_of(rows: Rows, sizes: Mapping[str, int]) -> Solver:
-    """The memory of the linear system, with the constant part of its tableau and the places of products."""
-    solver, nr, nz = allocate(Solver, sizes), sizes["nr"], sizes["nz"]
-    of_variables = rows.linear_lane < nz
-    places = rows.linear_row[of_variables], rows.linear_lane[of_variables]
-    np.add.at(solver.linear, places, rows.linear_weight[of_variables])
-    solver.linear[np.arange(nr), nz + np.arange(nr)] = 1.0
-    outside = nr * sizes["lanes"]
-    solver.place[:] = np.where(rows.lane < nz, rows.row * sizes["lanes"] + rows.lane, outside)
-    return solver
 
 
 def prepare_series() -> None:
