@@ -11,8 +11,10 @@ from itertools import repeat
 import numpy as np
 
 from mbref.equations.branches import SMOOTH, Passed
+from mbref.equations.initial_state import Start
+from mbref.equations.model import Model
 from mbref.kernels.lent_memory import Lent, copied, fill, lent, shapes_of, take_back
-from mbref.kernels.named_memory import allocate, packed
+from mbref.kernels.named_memory import Packed, allocate, packed
 from mbref.kernels.records import record
 from mbref.method import Method
 from mbref.scene import Scene
@@ -119,10 +121,19 @@ class SeriesRun(Run):
 
     def _equations(self) -> tuple[Geometry, Polynomials]:
         """The scene in natural coordinates, and its equations in them."""
-        moving = np.zeros(self.model.n, dtype=bool)
+        return self.equations_of(self.model, self.start)
+
+    def equations_of(self, model: Model, start: Start) -> tuple[Geometry, Polynomials]:
+        """Those of a scene that differs from this one in numbers alone, from its start."""
+        moving = np.zeros(model.n, dtype=bool)
         moving[self.part.active.velocities] = True
-        geometry = geometry_of(self.model, self.start, moving, self.strides)
-        return geometry, geometry.polynomials(self.model)
+        geometry = geometry_of(model, start, moving, self.strides)
+        return geometry, geometry.polynomials(model)
+
+    @property
+    def packed_series(self) -> Packed:
+        """The memory of the series for kernels."""
+        return self._packed_taylor
 
     def give_back(self) -> None:
         """Leave the memory to the next run; this one cannot be read any more."""
@@ -131,7 +142,7 @@ class SeriesRun(Run):
 
     def _lend_series(self, order: int) -> Lent:
         """Memory of the series with the numbers of this run."""
-        natural, polynomials, readings = self.geometry.natural, self.polynomials, self.geometry.readings
+        natural, polynomials = self.geometry.natural, self.polynomials
         nz, ng, nr = len(natural.kept), len(natural.given), len(natural.rows)
         sizes = {
             "orders": order + 1, "nz": nz, "ng": ng, "nr": nr,
@@ -142,9 +153,7 @@ class SeriesRun(Run):
         }  # fmt: skip
         key = (TaylorMemory, *sizes.values(), shapes_of(polynomials), self.limits.branches)
         memory = lent(key, lambda: self._allocate_series(sizes), self._lent)
-        fill(memory.values.polynomials, polynomials)
-        fill(memory.values.readings, readings)
-        memory.values.solver.linear[:], memory.values.solver.place[:] = self.geometry.tableau
+        put_equations(memory.values, self.geometry, polynomials)
         return memory
 
     def _allocate_series(self, sizes: Mapping[str, int]) -> TaylorMemory:
@@ -218,6 +227,19 @@ class SeriesRun(Run):
     def least_pivot(self) -> float:
         """The least pivot of the rows where the series begins; 1 without rows."""
         return float(np.abs(self.taylor.solver.last[: int(self.taylor.progress.rank)]).min(initial=1.0))
+
+
+def have_room(memory: TaylorMemory, geometry: Geometry, polynomials: Polynomials) -> bool:
+    """Whether the equations of a scene fit into memory of series."""
+    mine = memory.polynomials, memory.readings, memory.solver.linear
+    return shapes_of(mine) == shapes_of((polynomials, geometry.readings, geometry.tableau[0]))
+
+
+def put_equations(memory: TaylorMemory, geometry: Geometry, polynomials: Polynomials) -> None:
+    """Have memory of series hold the equations of a scene."""
+    fill(memory.polynomials, polynomials)
+    fill(memory.readings, geometry.readings)
+    memory.solver.linear[:], memory.solver.place[:] = geometry.tableau
 
 
 def prepare_series() -> None:
