@@ -79,16 +79,22 @@ def reached(
         found = more
 
 
-def without_rounding(start: Start, length: float) -> Start:
-    """The start with zero for the roundings of zero in its coordinates, and in velocities not given.
+def without_rounding(starts: Sequence[Start], length: np.ndarray, held: Sequence[int] = ()) -> list[Start]:
+    """Starts with zero for the roundings of zero in their coordinates, and in velocities that are not given.
 
-    ``length`` is the scene's, in m.
+    Of s scenes of one structure and lengths (s,) in m; columns that are ``held`` are zero, too.
     """
-    size = np.abs(start.v)
-    still = (size < STILL * size.max(initial=0.0)) & (start.given == 0)
-    small = np.tile(np.repeat([STILL * length, STILL], [3, 4]), start.q.size // 7)
-    q = np.where(np.abs(start.q) < small, 0.0, start.q)
-    return replace(start, q=q, v=np.where(still, 0.0, start.v))
+    if not starts:
+        return []
+    q, v, given = (np.array([getattr(start, name) for start in starts]) for name in ("q", "v", "given"))
+    poses, size = q.reshape(len(q), -1, 7), np.abs(v)
+    small = np.full(poses.shape, STILL)
+    small[..., :3] *= length[:, None, None]
+    q = np.where(np.abs(poses) < small, 0.0, poses).reshape(q.shape)
+    still = (size < STILL * size.max(axis=1, keepdims=True, initial=0.0)) & (given == 0)
+    still[:, held] = True
+    v = np.where(still, 0.0, v)
+    return [replace(start, q=q[k], v=v[k]) for k, start in enumerate(starts)]
 
 
 def active_coordinates(q: np.ndarray, velocities: np.ndarray) -> np.ndarray:

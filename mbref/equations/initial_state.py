@@ -237,16 +237,18 @@ def given_velocities(bodies: Sequence[Sequence[Body]], q: np.ndarray) -> tuple[n
 
     From the coordinates (s, 7 nb).
     """
-    v, given = np.zeros((len(q), len(bodies[0]), 6)), np.zeros((len(q), len(bodies[0]), 6), dtype=bool)
+    shape = len(q), len(bodies[0]), 6
+    v, given = np.zeros(shape), np.zeros(shape, dtype=bool)
     for k, own in enumerate(bodies):
         for b, body in enumerate(own):
             if body.velocity is not None:
                 v[k, b, :3], given[k, b, :3] = body.velocity, True
             if body.angular_velocity is not None:
-                given[k, b, 3:] = True
-                if any(body.angular_velocity):
-                    to_body = rotations.conjugate(q[k, 7 * b + 3 : 7 * b + 7])
-                    v[k, b, 3:] = rotations.rotate(to_body, np.array(body.angular_velocity))
+                v[k, b, 3:], given[k, b, 3:] = body.angular_velocity, True
+    turning = v[..., 3:].any(axis=2)
+    if turning.any():
+        to_body = rotations.conjugate(q.reshape(*shape[:2], 7)[turning, 3:])
+        v[turning, 3:] = rotations.rotate(to_body, v[turning, 3:])
     return v.reshape(len(q), -1), given.reshape(len(q), -1)
 
 
@@ -268,8 +270,9 @@ def _velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float,
     off = np.abs(unit @ x - rhs)
     if off.max(initial=0.0) > GROSS * np.abs(x).max(initial=0.0):
         raise _fault(scenes.model, int(np.argmax(off)), "the driver contradicts the joints")
-    step, still_open = least_norm(open_[given], wanted - x[given], RANK_TOLERANCE)
-    x, open_ = x + open_ @ step, open_ @ still_open
+    if open_.size and wanted.size:
+        step, still_open = least_norm(open_[given], wanted - x[given], RANK_TOLERANCE)
+        x, open_ = x + open_ @ step, open_ @ still_open
     as_given = x.copy()
     as_given[given] = wanted
     residual = np.abs(scaled @ as_given - nu)

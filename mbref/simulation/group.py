@@ -12,7 +12,6 @@ from mbref.equations.initial_state import Start
 from mbref.equations.model import Model
 from mbref.equations.packing import Packs
 from mbref.equations.reduction import Reduction
-from mbref.equations.static_constraints import at_rest
 from mbref.kernels.layout import Memory
 from mbref.scene import Scene
 from mbref.simulation.control import largest_violation
@@ -74,9 +73,9 @@ def _starts(
 ) -> tuple[dict[int, Start], np.ndarray, np.ndarray]:
     """The consistent starts as ``Run`` finds them, by place where there is one; and the coordinates
     (s, 7 nb) and velocities (s, 6 nb) of all."""
-    q, v, held, found = packs.start(), np.zeros_like(packs.mass), _reduction(run).held, {}
-    for k, start in enumerate(evaluations.starts()):
-        if isinstance(start, Start):
-            found[k] = at_rest(without_rounding(start, float(packs.length[k])), held)
-            q[k], v[k] = found[k].q, found[k].v
-    return found, q, v
+    q, v = packs.start(), np.zeros_like(packs.mass)
+    found = {k: start for k, start in enumerate(evaluations.starts()) if isinstance(start, Start)}
+    rounded = without_rounding([*found.values()], packs.length[[*found]], _reduction(run).held)
+    for k, start in zip(found, rounded, strict=True):
+        q[k], v[k] = start.q, start.v
+    return dict(zip(found, rounded, strict=True)), q, v

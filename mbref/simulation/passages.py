@@ -17,7 +17,7 @@ from mbref.simulation.evaluations import Rows
 from mbref.simulation.group import Group
 from mbref.simulation.run import Run
 from mbref.taylor.passing_run import PassingRun
-from mbref.taylor.series_run import have_room, put_equations
+from mbref.taylor.series_run import put_equations, shapes_of_equations
 from mbref.taylor.start import OFF
 from mbref.trajectory import Crossing
 
@@ -35,6 +35,11 @@ class Passages:
         return PassingRun(self._run)
 
     @cached_property
+    def _room(self) -> Any:
+        """The shapes of the equations that the memory of the series takes."""
+        return shapes_of_equations(self._series.geometry, self._series.polynomials)
+
+    @cached_property
     def _begins(self) -> Rows:
         """The memory of the series as it begins, with the numbers of each scene."""
         memory: Any = self._series.taylor
@@ -48,7 +53,7 @@ class Passages:
         self._begins.copy(place)
         series.enter_state()
         equations = series.equations_of(model, self._group.starts[place])
-        if not have_room(series.taylor, *equations):
+        if self._room != shapes_of_equations(*equations):
             return None
         put_equations(series.taylor, *equations)
         self._models[place] = model

@@ -87,7 +87,7 @@ class Run:
         self._check_freedoms(model, start)
         if not (self.method.formulation.linear_algebra.sparse or self.method.stabilisation.projects):
             return model, start, None
-        start = without_rounding(start, model.length)
+        (start,) = without_rounding([start], np.array([model.length]))
         reduction = reduction_of(model, start)
         return model, at_rest(start, reduction.held), reduction
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import replace
 from itertools import repeat
 
@@ -151,7 +151,8 @@ class SeriesRun(Run):
             "springs": polynomials.springs.natural.size, "torsions": polynomials.torsions.slot.size,
             **self.model.sizes,
         }  # fmt: skip
-        key = (TaylorMemory, *sizes.values(), shapes_of(polynomials), self.limits.branches)
+        shapes = shapes_of_equations(self.geometry, polynomials)
+        key = (TaylorMemory, *sizes.values(), shapes, self.limits.branches)
         memory = lent(key, lambda: self._allocate_series(sizes), self._lent)
         put_equations(memory.values, self.geometry, polynomials)
         return memory
@@ -229,10 +230,9 @@ class SeriesRun(Run):
         return float(np.abs(self.taylor.solver.last[: int(self.taylor.progress.rank)]).min(initial=1.0))
 
 
-def have_room(memory: TaylorMemory, geometry: Geometry, polynomials: Polynomials) -> bool:
-    """Whether the equations of a scene fit into memory of series."""
-    mine = memory.polynomials, memory.readings, memory.solver.linear
-    return shapes_of(mine) == shapes_of((polynomials, geometry.readings, geometry.tableau[0]))
+def shapes_of_equations(geometry: Geometry, polynomials: Polynomials) -> Hashable:
+    """The shapes of the equations of a scene: all of them have room in memory that is made for one."""
+    return shapes_of((polynomials, geometry.readings, geometry.tableau))
 
 
 def put_equations(memory: TaylorMemory, geometry: Geometry, polynomials: Polynomials) -> None:
