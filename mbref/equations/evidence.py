@@ -96,15 +96,14 @@ class Evidence:
 
     def _answers(self, model: Model, q: np.ndarray, v: np.ndarray, mass: np.ndarray, terms: Terms) -> Answers:
         """The answers of each of s scenes."""
-        entries, rows, columns = (
-            found[:, :1] | _of_rounds(found[:, 1 : self._split], self._rounds[0])
-            for found in nonzero(model, terms)
-        )
+        shape = terms.phi.shape[:2]
+        found = np.concatenate([one.reshape(*shape, -1) for one in nonzero(model, terms)], axis=2)
+        found = found[:, :1] | _of_rounds(found[:, 1 : self._split], self._rounds[0])
+        entries, acting = found[..., : 12 * model.m], found[..., 12 * model.m :]
         redundant = are_redundant(model, terms.jacobian[:, 0], self._shared)
         decisive = [v != 0, q != 0, mass > 0, entries, *self._of_held(terms), redundant]
-        acting = np.concatenate([rows, columns], axis=2)
         joined = np.concatenate([answer.reshape(len(q), -1) for answer in decisive], axis=1)
-        return Answers(joined, entries, acting)
+        return Answers(joined, entries.reshape(*found.shape[:2], model.m, 12), acting)
 
     def _of_held(self, terms: Terms) -> list[np.ndarray]:
         """Which active entries and rows are other than zero in each round, and which rows could hold."""

@@ -247,8 +247,8 @@ def given_velocities(bodies: Sequence[Sequence[Body]], q: np.ndarray) -> tuple[n
                 v[k, b, 3:], given[k, b, 3:] = body.angular_velocity, True
     turning = v[..., 3:].any(axis=2)
     if turning.any():
-        to_body = rotations.conjugate(q.reshape(*shape[:2], 7)[turning, 3:])
-        v[turning, 3:] = rotations.rotate(to_body, v[turning, 3:])
+        to_body = rotations.to_matrix(q.reshape(*shape[:2], 7)[turning, 3:]).swapaxes(1, 2)
+        v[turning, 3:] = (to_body @ v[turning, 3:, None])[..., 0]
     return v.reshape(len(q), -1), given.reshape(len(q), -1)
 
 
