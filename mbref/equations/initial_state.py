@@ -96,19 +96,23 @@ def consistent_starts(scenes: Alike) -> list[Start | SceneError]:
     q, before, faults = _corrected(scenes, scenes.poses)
     v, given = given_velocities(scenes.bodies, q)
     terms, model = scenes.terms(np.arange(len(q)), q, v), scenes.model
-    jacobian = terms.jacobian if model.m > LARGE else model.dense(terms.jacobian)
-    rates = map(Rates, v, given, terms.nu, jacobian)
+    if not (v.any() or terms.nu.any()):
+        return [faults.get(k) or Start(q[k], v[k], float(before[k]), 0.0, v[k]) for k in range(len(q))]
+    scale = np.tile(np.repeat(np.stack([np.ones(len(q)), 1 / scenes.length], axis=1), 3, axis=1), model.nb)
+    jacobian = terms.jacobian if model.m > LARGE else model.dense(terms.jacobian) * scale[:, None]
+    rates = map(Rates, v, given, terms.nu, scale, jacobian)
     states = enumerate(zip(q, before.tolist(), rates, strict=True))
     return [faults.get(k) or _start(scenes, k, *state) for k, state in states]
 
 
 class Rates(NamedTuple):
-    """What the velocities (n,) of a scene are found from: those given, which those are, ν and Φ_q (m, n), of
-    which blocks (m, 12) where it is large."""
+    """What the velocities (n,) of a scene are found from: those given, which those are, ν, and Φ_q (m, n) of
+    velocities over their ``scale`` (n,), or blocks (m, 12) of Φ_q itself where it is large."""
 
     v: np.ndarray
     given: np.ndarray
     nu: np.ndarray
+    scale: np.ndarray
     jacobian: np.ndarray
 
 
@@ -259,13 +263,11 @@ def _velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float,
     Among the solutions those nearest to the given velocities (angular ones times the scene's length);
     velocities left open are least in the metric of M.
     """
-    v, given, nu, jacobian = rates
-    scale = np.tile(np.repeat([1.0, 1 / scenes.length[k]], 3), scenes.model.nb)
+    v, given, nu, scale, jacobian = rates
     wanted = v[given] / scale[given]
     if not (wanted.any() or nu.any()):
         return np.zeros(scenes.model.n), 0.0, not given.all()
-    scaled = jacobian * scale
-    unit, rhs = _unit_rows(scaled, nu)
+    unit, rhs = _unit_rows(jacobian, nu)
     x, open_ = least_norm(unit, rhs, RANK_TOLERANCE)
     off = np.abs(unit @ x - rhs)
     if off.max(initial=0.0) > GROSS * np.abs(x).max(initial=0.0):
@@ -275,7 +277,7 @@ def _velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float,
         x, open_ = x + open_ @ step, open_ @ still_open
     as_given = x.copy()
     as_given[given] = wanted
-    residual = np.abs(scaled @ as_given - nu)
+    residual = np.abs(jacobian @ as_given - nu)
     if np.abs(x[given] - wanted).max(initial=0.0) > GROSS * np.abs(wanted).max(initial=0.0):
         what = f"the initial velocities violate the constraint by {residual.max():.3g}"
         raise _fault(scenes.model, int(np.argmax(residual)), what)
@@ -289,8 +291,7 @@ def _sparse_velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray,
     """The same by sparse solutions: nearest to the given velocities first, then least where open."""
     from scipy.sparse import csr_array, vstack
 
-    model, mass, (v, given, nu, blocks) = scenes.model, scenes.mass[k], rates
-    scale = np.tile(np.repeat([1.0, 1 / scenes.length[k]], 3), model.nb)
+    model, mass, (v, given, nu, scale, blocks) = scenes.model, scenes.mass[k], rates
     jacobian = model.sparse(blocks)
     x = MinimumNorm(jacobian, scale**-2)(nu)
     off = np.abs(jacobian @ x - nu)
