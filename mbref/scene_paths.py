@@ -36,15 +36,23 @@ def _replaced(value: Any, steps: Sequence[str], change: Callable[[Any], Any], pa
     if isinstance(value, tuple):
         place = _place(value, step, path)
         return tuple(_replaced(v, rest, change, path) if i == place else v for i, v in enumerate(value))
-    if step not in getattr(type(value), "model_fields", {}):
+    fields = _fields_of(value)
+    if step not in fields:
         raise SceneError([f"{path}: the scene has no {step!r} there"])
-    fields = {field: getattr(value, field) for field in type(value).model_fields}
     return {**fields, step: _replaced(fields[step], rest, change, path)}
+
+
+def _fields_of(value: Any) -> Mapping[str, Any]:
+    """The fields of a table, a dictionary where one of them was changed before; none of a number."""
+    if isinstance(value, dict):
+        return value
+    return {field: getattr(value, field) for field in getattr(type(value), "model_fields", {})}
 
 
 def _place(entries: tuple[Any, ...], step: str, path: str) -> int:
     """The index that a step names: a number, or the name of the entry (a driver has its joint's)."""
-    names = [getattr(entry, "name", getattr(entry, "joint", None)) for entry in entries]
+    tables = map(_fields_of, entries)
+    names = [table.get("name", table.get("joint")) for table in tables]
     if step in names:
         return names.index(step)
     if step.isdigit() and int(step) < len(entries):

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mbref.equations.initial_state import Start, given_velocities
+from mbref.equations.initial_state import Start
 from mbref.equations.model import Model, Terms
 from mbref.equations.random_states import RandomStates, random_states
 
@@ -39,7 +39,7 @@ def active_entries(
             read.append(sample)
         others, rows, columns = patterns(model, model.at(q, sample))
         entries |= others
-        found, driven = _reached(model, entries, rows | start_rows, columns | start_columns)
+        found, driven = reached(model, entries, rows | start_rows, columns | start_columns)
         if np.array_equal(found, moving):
             return moving, entries & driven[:, None]
         moving = found
@@ -64,35 +64,37 @@ def nonzero(model: Model, terms: Terms) -> tuple[np.ndarray, np.ndarray, np.ndar
     return entries, rows, terms.force != 0
 
 
-def _reached(
+def reached(
     model: Model, entries: np.ndarray, rows: np.ndarray, columns: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Columns (n,) and rows (m,) of the blocks that have a driving row or column."""
     column = model.entry_columns
-    reached = np.append(columns, np.zeros(6, dtype=bool))
+    found = np.append(columns, np.zeros(6, dtype=bool))
     while True:
-        rows = rows | (entries & reached[column]).any(axis=1)
-        found = reached.copy()
-        found[column[entries & rows[:, None]]] = True
-        if np.array_equal(found, reached):
-            return reached[: model.n], rows
-        reached = found
+        rows = rows | (entries & found[column]).any(axis=1)
+        more = found.copy()
+        more[column[entries & rows[:, None]]] = True
+        if np.array_equal(more, found):
+            return found[: model.n], rows
+        found = more
 
 
-def without_rounding(model: Model, start: Start) -> Start:
-    """The start with zero for the roundings of zero in its coordinates, and in velocities not given."""
-    v, (given, _) = start.v, given_velocities(model, start.q)
-    still = (np.abs(v) < STILL * np.max(np.abs(v), initial=0.0)) & (given == 0)
-    q = places_without_rounding(start.q, np.array(model.length))
-    return replace(start, q=q, v=np.where(still, 0.0, v))
+def without_rounding(starts: Sequence[Start], length: np.ndarray, held: Sequence[int] = ()) -> list[Start]:
+    """Starts with zero for the roundings of zero in their coordinates, and in velocities that are not given.
 
-
-def places_without_rounding(q: np.ndarray, length: np.ndarray) -> np.ndarray:
-    """Coordinates (…, 7 nb) of scenes of a length (…,) in m, with zero for roundings of zero."""
-    poses = q.reshape(*length.shape, -1, 7)
+    Of s scenes of one structure and lengths (s,) in m; columns that are ``held`` are zero, too.
+    """
+    if not starts:
+        return []
+    q, v, given = (np.array([getattr(start, name) for start in starts]) for name in ("q", "v", "given"))
+    poses, size = q.reshape(len(q), -1, 7), np.abs(v)
     small = np.full(poses.shape, STILL)
-    small[..., :3] *= length[..., None, None]
-    return np.where(np.abs(poses) < small, 0.0, poses).reshape(q.shape)
+    small[..., :3] *= length[:, None, None]
+    q = np.where(np.abs(poses) < small, 0.0, poses).reshape(q.shape)
+    still = (size < STILL * size.max(axis=1, keepdims=True, initial=0.0)) & (given == 0)
+    still[:, held] = True
+    v = np.where(still, 0.0, v)
+    return [replace(start, q=q[k], v=v[k]) for k, start in enumerate(starts)]
 
 
 def active_coordinates(q: np.ndarray, velocities: np.ndarray) -> np.ndarray:

@@ -1,21 +1,32 @@
 """Evidence: the answers of a scene's numbers on which the choice of its primitives, rows and columns rests.
 
 Numbers decide only by whether they are zero, constant, perpendicular or redundant.  Scenes of one structure
-that give the same answers lead to the same choice.
+that give the same answers lead to the same choice.  Rows and columns that act on a block may differ, as
+roundings of zero do, where they reach the same.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from mbref.equations.active_coordinates import nonzero
+from mbref.equations.active_coordinates import nonzero, reached
 from mbref.equations.coordinates import displace_all
 from mbref.equations.initial_state import Start
 from mbref.equations.model import Model, Terms
 from mbref.equations.random_states import RandomStates
 from mbref.equations.static_constraints import MOST, ROUNDING, SMALL, Asked, are_redundant
+
+
+class Answers(NamedTuple):
+    """The answers of s scenes: those that decide, (s, …), among them the active entries of each round of
+    states, (s, rounds, m, 12); and rows and columns (s, rounds, m + n) on which something acts."""
+
+    decisive: np.ndarray
+    entries: np.ndarray
+    acting: np.ndarray
 
 
 class Evidence:
@@ -34,11 +45,12 @@ class Evidence:
         self._rounds, self._split = (len(read), len(asked.read)), 1 + sum(len(s.part) for s in read)
         self._entries = entries
         self._trials, self._shared = Trials(model, asked), asked.shared
-        (self._found,) = self._of_one(model, start)
+        self._moves, self._found = start.v != 0, self._of_one(model, start)
+        self._reached = self._reach(model, self._found.acting[0])
 
     def agrees(self, model: Model, start: Start) -> bool:
         """Whether a scene of the same structure gives the same answers."""
-        return self._of_one(model, start) == [self._found]
+        return bool(self._agree(model, self._of_one(model, start))[0])
 
     def which_agree(
         self, model: Model, q: np.ndarray, v: np.ndarray, mass: np.ndarray, terms: Terms
@@ -47,7 +59,7 @@ class Evidence:
 
         From their starts q (s, 7 nb) and v (s, 6 nb), masses (s, 6 nb) and terms (s, k, …) at ``states``.
         """
-        return np.array([found == self._found for found in self._answers(model, q, v, mass, terms)])
+        return self._agree(model, self._answers(model, q, v, mass, terms))
 
     def states(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The k states read about the starts q (s, 7 nb), v (s, 6 nb) of s scenes, the start first: times as
@@ -60,29 +72,38 @@ class Evidence:
         places[:, 0], velocities[:, 0] = q, v
         return part, places, velocities
 
-    def _of_one(self, model: Model, start: Start) -> list[bytes]:
+    def _agree(self, model: Model, answers: Answers) -> np.ndarray:
+        """Which of s scenes give the same answers, but for rows and columns that reach the same."""
+        same: np.ndarray = (answers.decisive == self._found.decisive).all(axis=1)
+        differ = (answers.acting != self._found.acting).any(axis=(1, 2))
+        for k in np.flatnonzero(same & differ):
+            same[k] = self._reach(model, answers.acting[k]) == self._reached
+        return same
+
+    def _reach(self, model: Model, acting: np.ndarray) -> list[bytes]:
+        """The columns and rows that are reached in each round, from those (rounds, m + n) that act there."""
+        entries = np.logical_or.accumulate(self._found.entries[0], axis=0)
+        rounds = zip(entries, acting, strict=True)
+        found = (reached(model, e, a[: model.m], a[model.m :] | self._moves) for e, a in rounds)
+        return [part.tobytes() for parts in found for part in parts]
+
+    def _of_one(self, model: Model, start: Start) -> Answers:
         q, v = start.q[None], start.v[None]
         part, places, velocities = self.states(q, v)
         found = model.along(part * model.scene.duration, places[0], velocities[0])
         terms = Terms(*(value[None] for value in vars(found).values()))
         return self._answers(model, q, v, model.mass[None], terms)
 
-    def _answers(
-        self, model: Model, q: np.ndarray, v: np.ndarray, mass: np.ndarray, terms: Terms
-    ) -> list[bytes]:
+    def _answers(self, model: Model, q: np.ndarray, v: np.ndarray, mass: np.ndarray, terms: Terms) -> Answers:
         """The answers of each of s scenes."""
-        answers = [v != 0, q != 0, mass > 0]
-        answers += [*self._of_active(model, terms), *self._of_held(terms)]
-        answers.append(are_redundant(model, terms.jacobian[:, 0], self._shared))
-        rows = np.concatenate([answer.reshape(len(q), -1) for answer in answers], axis=1)
-        return [row.tobytes() for row in rows]
-
-    def _of_active(self, model: Model, terms: Terms) -> list[np.ndarray]:
-        """Which entries, rows and columns are other than zero at the start or in each round of states."""
-        return [
-            found[:, :1] | _of_rounds(found[:, 1 : self._split], self._rounds[0])
-            for found in nonzero(model, terms)
-        ]
+        shape = terms.phi.shape[:2]
+        found = np.concatenate([one.reshape(*shape, -1) for one in nonzero(model, terms)], axis=2)
+        found = found[:, :1] | _of_rounds(found[:, 1 : self._split], self._rounds[0])
+        entries, acting = found[..., : 12 * model.m], found[..., 12 * model.m :]
+        redundant = are_redundant(model, terms.jacobian[:, 0], self._shared)
+        decisive = [v != 0, q != 0, mass > 0, entries, *self._of_held(terms), redundant]
+        joined = np.concatenate([answer.reshape(len(q), -1) for answer in decisive], axis=1)
+        return Answers(joined, entries.reshape(*found.shape[:2], model.m, 12), acting)
 
     def _of_held(self, terms: Terms) -> list[np.ndarray]:
         """Which active entries and rows are other than zero in each round, and which rows could hold."""

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mbref import rotations
 from mbref.equations.branches import MOST_ROWS, velocities_along
-from mbref.equations.model import Model, displaced
+from mbref.equations.coordinates import displace_all
+from mbref.equations.model import Model, Terms
 from mbref.equations.units import row_lengths
+from mbref.linear_algebra.clear_rank import least_norm
 from mbref.linear_algebra.minimum_norm import MinimumNorm
-from mbref.scene import SceneError
+from mbref.scene import Body, SceneError
 
 RANK_TOLERANCE = 1e-5  # singular values below it (relative) are left alone: rank may drop at the start
 LARGE = 40  # rows; above, dense singular values take longer than sparse factors
@@ -36,6 +39,7 @@ class Start:
     v: np.ndarray  # (6 nb,)
     position_violation: float  # largest |Φ| before correction (m or rad)
     velocity_violation: float  # largest |Φ_q v - ν| of fully given velocities before correction
+    given: np.ndarray  # (6 nb,) the velocities that the scene gives, zero elsewhere
     follows_branch: bool = False  # whether velocities that the scene leaves open are those of a branch
 
     def report(self) -> str:
@@ -49,21 +53,86 @@ class Start:
         return "; ".join(filter(None, (corrected, BRANCH if self.follows_branch else "")))
 
 
+class Alike(NamedTuple):
+    """s scenes of the structure of a model, as their consistent starts ask for them.
+
+    Coordinates (s, 7 nb) of their poses, masses (s, n), lengths (s,) in m, and the bodies of each.
+    ``terms``, with blocks (k, m, 12), are those of the scenes at places (k,), at coordinates (k, 7 nb) and
+    velocities (k, n); ``model_of`` is the model of the one at a place.
+    """
+
+    model: Model
+    poses: np.ndarray
+    mass: np.ndarray
+    length: np.ndarray
+    bodies: Sequence[Sequence[Body]]
+    terms: Callable[[np.ndarray, np.ndarray, np.ndarray], Terms]
+    model_of: Callable[[int], Model]
+
+
+def _alone(model: Model, t: float = 0.0) -> Alike:
+    """One scene, its terms at a time (s)."""
+    return Alike(
+        model=model,
+        poses=model.start()[None],
+        mass=model.mass[None],
+        length=np.array([model.length]),
+        bodies=[model.bodies],
+        terms=lambda places, q, v: model.along(np.full(1, t), q, v),
+        model_of=lambda place: model,
+    )
+
+
 def consistent_start(model: Model) -> Start:
     """The nearest consistent state; raises SceneError naming the joint that is grossly violated."""
-    q, position_violation = corrected_positions(model, model.start())
-    v, velocity_violation, leaves_open = _velocities(model, q)
-    along = _along_branch(model, q, v) if leaves_open and np.any(v) else None
+    (found,) = consistent_starts(_alone(model))
+    if isinstance(found, SceneError):
+        raise found
+    return found
+
+
+def consistent_starts(scenes: Alike) -> list[Start | SceneError]:
+    """The nearest consistent state of each scene, or an error naming the joint that is grossly violated."""
+    q, before, faults = _corrected(scenes, scenes.poses)
+    v, given = given_velocities(scenes.bodies, q)
+    terms, model = scenes.terms(np.arange(len(q)), q, v), scenes.model
+    if not (v.any() or terms.nu.any()):
+        return [faults.get(k) or Start(q[k], v[k], float(before[k]), 0.0, v[k]) for k in range(len(q))]
+    scale = np.tile(np.repeat(np.stack([np.ones(len(q)), 1 / scenes.length], axis=1), 3, axis=1), model.nb)
+    jacobian = terms.jacobian if model.m > LARGE else model.dense(terms.jacobian) * scale[:, None]
+    rates = map(Rates, v, given, terms.nu, scale, jacobian)
+    states = enumerate(zip(q, before.tolist(), rates, strict=True))
+    return [faults.get(k) or _start(scenes, k, *state) for k, state in states]
+
+
+class Rates(NamedTuple):
+    """What the velocities (n,) of a scene are found from: those given, which those are, ν, and Φ_q (m, n) of
+    velocities over their ``scale`` (n,), or blocks (m, 12) of Φ_q itself where it is large."""
+
+    v: np.ndarray
+    given: np.ndarray
+    nu: np.ndarray
+    scale: np.ndarray
+    jacobian: np.ndarray
+
+
+def _start(scenes: Alike, k: int, q: np.ndarray, before: float, rates: Rates) -> Start | SceneError:
+    """The start of one of the scenes from its corrected coordinates q."""
+    try:
+        v, off, is_open = (_sparse_velocities if scenes.model.m > LARGE else _velocities)(scenes, k, rates)
+    except SceneError as fault:
+        return fault
+    along = _along_branch(scenes.model_of(k), q, v, rates.given) if is_open and np.any(v) else None
     follows = along is not None
-    return Start(q, along if follows else v, position_violation, velocity_violation, follows)
+    return Start(q, along if follows else v, before, off, rates.v, follows)
 
 
-def _along_branch(model: Model, q: np.ndarray, v: np.ndarray) -> np.ndarray | None:
-    """Velocities (6 nb,) along a branch of a singular start that agree with those that the scene gives; None
-    where v (6 nb,) are, or where second order tells no such branch."""
+def _along_branch(model: Model, q: np.ndarray, v: np.ndarray, given: np.ndarray) -> np.ndarray | None:
+    """Velocities (6 nb,) along a branch of a singular start that agree with the given ones of v (6 nb,); None
+    where v are along one, or where second order tells no such branch."""
     if not model.closed_loops or model.m > MOST_ROWS:
         return None
-    along = velocities_along(model, q, v, given_velocities(model, q)[1])
+    along = velocities_along(model, q, v, given)
     return _best_met(model, q, along) if along else None
 
 
@@ -94,17 +163,27 @@ def corrected_positions(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]
 
     Raises SceneError naming the joint where q is grossly inconsistent or cannot be corrected.
     """
-    if not model.m:
-        return q, 0.0
-    phi = np.abs(model.blocks(0.0, q, np.zeros(model.n)).phi)
-    before, worst = float(phi.max()), int(np.argmax(phi))
-    if before > GROSS * max(1.0, model.length):
-        raise _fault(model, worst, f"the initial positions violate the constraint by {before:.3g}")
-    q, phi = solve_positions(model, 0.0, q)
-    left, worst = float(np.abs(phi).max()), int(np.argmax(np.abs(phi)))
-    if left > 1e-10:
-        raise _fault(model, worst, f"the initial positions cannot be corrected; {left:.3g} is left")
-    return q, before
+    corrected, before, faults = _corrected(_alone(model), q[None])
+    if faults:
+        raise faults[0]
+    return corrected[0], float(before[0])
+
+
+def _corrected(scenes: Alike, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[int, SceneError]]:
+    """Consistent coordinates near q (s, 7 nb), the largest |Φ| (s,) before, and errors by place."""
+    faults: dict[int, SceneError] = {}
+    if not scenes.model.m:
+        return q, np.zeros(len(q)), faults
+    most = GROSS * np.maximum(1.0, scenes.length)
+    q, before, left = _solved(scenes, q, most)
+    first, last = (np.abs(phi).max(axis=1) for phi in (before, left))
+    for k in np.flatnonzero(first > most).tolist():
+        what = f"the initial positions violate the constraint by {first[k]:.3g}"
+        faults[k] = _fault(scenes.model, int(np.argmax(np.abs(before[k]))), what)
+    for k in np.flatnonzero((last > 1e-10) & (first <= most)).tolist():
+        what = f"the initial positions cannot be corrected; {last[k]:.3g} is left"
+        faults[k] = _fault(scenes.model, int(np.argmax(np.abs(left[k]))), what)
+    return q, first, faults
 
 
 def is_met(violation: Any, length: Any) -> Any:
@@ -118,119 +197,123 @@ def solve_positions(model: Model, t: float, q: np.ndarray) -> tuple[np.ndarray, 
     With the pseudo-inverse, so that redundant rows and a singular start do no harm; the change is least
     in the metric of M.
     """
-    v, phi = np.zeros(model.n), np.zeros(model.m)
-    for _ in range(MOST_ITERATIONS):
-        terms = model.blocks(t, q, v)
-        phi = terms.phi
-        if is_met(np.max(np.abs(phi), initial=0.0), model.length):
-            break
-        x = _least_change(model, terms.jacobian, -phi)
-        if np.max(np.abs(x)) < 1e-15:
-            break
-        q = displaced(q, x)
-    return q, phi
+    found, _, phi = _solved(_alone(model, t), q[None], np.full(1, np.inf))
+    return found[0], phi[0]
 
 
-def _least_change(model: Model, blocks: np.ndarray, rhs: np.ndarray) -> np.ndarray:
-    """The change (6 nb,), least in the metric of M, by which Φ_q grows by rhs (m,)."""
-    mass = np.where(model.mass > 0, model.mass, 1.0)
+def _solved(scenes: Alike, q: np.ndarray, most: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """``solve_positions`` of each scene from q (s, 7 nb), unless the largest |Φ| exceeds ``most`` (s,): the
+    coordinates, and Φ (s, m) before and after."""
+    model, q, places = scenes.model, q.copy(), np.arange(len(q))
+    at_rest, phi = np.zeros((len(q), model.n)), np.zeros((len(q), model.m))
+    before = phi
+    for k in range(MOST_ITERATIONS):
+        terms = scenes.terms(places, q[places], at_rest[places])
+        off = np.abs(terms.phi).max(axis=1, initial=0.0)
+        phi[places], open_ = terms.phi, ~is_met(off, scenes.length[places])
+        if k == 0:
+            before, open_ = phi.copy(), open_ & (off <= most)
+        places = places[open_]
+        if not places.size:
+            break
+        x = _least_changes(scenes, places, terms.jacobian[open_], -terms.phi[open_])
+        moves = np.abs(x).max(axis=1) >= 1e-15
+        places, moved = places[moves], q[places[moves]]
+        displace_all(moved, x[moves], np.zeros(q.shape[1]))
+        q[places] = moved
+    return q, before, phi
+
+
+def _least_changes(scenes: Alike, places: np.ndarray, blocks: np.ndarray, rhs: np.ndarray) -> np.ndarray:
+    """The changes (k, n), least in the metric of M, by which Φ_q of blocks (k, m, 12) grows by rhs (k, m)."""
+    model, mass = scenes.model, scenes.mass[places]
+    mass = np.where(mass > 0, mass, 1.0)
     if model.m > LARGE:
-        return MinimumNorm(model.sparse(blocks), mass)(rhs)
+        rows = zip(blocks, mass, rhs, strict=True)
+        return np.array([MinimumNorm(model.sparse(block), own)(b) for block, own, b in rows])
     inverse_root = 1 / np.sqrt(mass)
-    return _least_norm(*_unit_rows(model.dense(blocks) * inverse_root, rhs)) * inverse_root
+    unit, rhs = _unit_rows(model.dense(blocks) * inverse_root[:, None], rhs)
+    return inverse_root * [least_norm(*each, RANK_TOLERANCE)[0] for each in zip(unit, rhs, strict=True)]
 
 
-def _least_norm(matrix: np.ndarray, rhs: np.ndarray) -> np.ndarray:
-    return np.linalg.lstsq(matrix, rhs, rcond=RANK_TOLERANCE)[0]
+def given_velocities(bodies: Sequence[Sequence[Body]], q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The velocities (s, 6 nb) that scenes give to their bodies (zero elsewhere) and which those are.
+
+    From the coordinates (s, 7 nb).
+    """
+    shape = len(q), len(bodies[0]), 6
+    v, given = np.zeros(shape), np.zeros(shape, dtype=bool)
+    for k, own in enumerate(bodies):
+        for b, body in enumerate(own):
+            if body.velocity is not None:
+                v[k, b, :3], given[k, b, :3] = body.velocity, True
+            if body.angular_velocity is not None:
+                v[k, b, 3:], given[k, b, 3:] = body.angular_velocity, True
+    turning = v[..., 3:].any(axis=2)
+    if turning.any():
+        to_body = rotations.to_matrix(q.reshape(*shape[:2], 7)[turning, 3:]).swapaxes(1, 2)
+        v[turning, 3:] = (to_body @ v[turning, 3:, None])[..., 0]
+    return v.reshape(len(q), -1), given.reshape(len(q), -1)
 
 
-def given_velocities(model: Model, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The velocities the scene gives (zero elsewhere) and which those are, both (6 nb,)."""
-    v, given = np.zeros((model.nb, 6)), np.zeros((model.nb, 6), dtype=bool)
-    for b, body in enumerate(model.bodies):
-        if body.velocity is not None:
-            v[b, :3], given[b, :3] = body.velocity, True
-        if body.angular_velocity is not None:
-            to_body = rotations.conjugate(q.reshape(-1, 7)[b, 3:])
-            turning = any(body.angular_velocity)
-            v[b, 3:] = rotations.rotate(to_body, np.array(body.angular_velocity)) if turning else 0.0
-            given[b, 3:] = True
-    return v.ravel(), given.ravel()
-
-
-def _velocities(model: Model, q: np.ndarray) -> tuple[np.ndarray, float, bool]:
-    """Velocities that meet Φ_q v = ν, how far the given ones were from that, and whether some may be open.
+def _velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float, bool]:
+    """Velocities of a scene that meet Φ_q v = ν, how far the given ones were from that, and whether some may
+    be open.
 
     Among the solutions those nearest to the given velocities (angular ones times the scene's length);
     velocities left open are least in the metric of M.
     """
-    v, given = given_velocities(model, q)
-    if model.m > LARGE:
-        return *_sparse_velocities(model, q, v, given), not given.all()
-    scale = np.tile(np.repeat([1.0, 1 / model.length], 3), model.nb)
+    v, given, nu, scale, jacobian = rates
     wanted = v[given] / scale[given]
-    terms = model.blocks(0.0, q, v)
-    if not (wanted.any() or terms.nu.any()):
-        return np.zeros(model.n), 0.0, not given.all()
-    terms = replace(terms, jacobian=model.dense(terms.jacobian))
-    jacobian, nu = _unit_rows(terms.jacobian * scale, terms.nu)
-    x, open_ = _solutions(jacobian, nu)
-    if np.max(np.abs(jacobian @ x - nu), initial=0.0) > GROSS * np.max(np.abs(x), initial=0.0):
-        worst = int(np.argmax(np.abs(jacobian @ x - nu)))
-        raise _fault(model, worst, "the driver contradicts the joints")
-    step, still_open = _solutions(open_[given], wanted - x[given])
-    x, open_ = x + open_ @ step, open_ @ still_open
+    if not (wanted.any() or nu.any()):
+        return np.zeros(scenes.model.n), 0.0, not given.all()
+    unit, rhs = _unit_rows(jacobian, nu)
+    x, open_ = least_norm(unit, rhs, RANK_TOLERANCE)
+    off = np.abs(unit @ x - rhs)
+    if off.max(initial=0.0) > GROSS * np.abs(x).max(initial=0.0):
+        raise _fault(scenes.model, int(np.argmax(off)), "the driver contradicts the joints")
+    if open_.size and wanted.size:
+        step, still_open = least_norm(open_[given], wanted - x[given], RANK_TOLERANCE)
+        x, open_ = x + open_ @ step, open_ @ still_open
     as_given = x.copy()
     as_given[given] = wanted
-    residual = np.abs(terms.jacobian @ (as_given * scale) - terms.nu)
-    if np.max(np.abs(x[given] - wanted), initial=0.0) > GROSS * np.max(np.abs(wanted), initial=0.0):
+    residual = np.abs(jacobian @ as_given - nu)
+    if np.abs(x[given] - wanted).max(initial=0.0) > GROSS * np.abs(wanted).max(initial=0.0):
         what = f"the initial velocities violate the constraint by {residual.max():.3g}"
-        raise _fault(model, int(np.argmax(residual)), what)
+        raise _fault(scenes.model, int(np.argmax(residual)), what)
     if open_.size:
-        weight = np.sqrt(model.mass) * scale
-        x = x - open_ @ _least_norm(weight[:, None] * open_, weight * x)
-    return x * scale, float(np.max(residual, initial=0.0)), bool(open_.size)
+        weight = np.sqrt(scenes.mass[k]) * scale
+        x = x - open_ @ np.linalg.lstsq(weight[:, None] * open_, weight * x, rcond=RANK_TOLERANCE)[0]
+    return x * scale, float(residual.max(initial=0.0)), bool(open_.size)
 
 
-def _sparse_velocities(
-    model: Model, q: np.ndarray, v: np.ndarray, given: np.ndarray
-) -> tuple[np.ndarray, float]:
+def _sparse_velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float, bool]:
     """The same by sparse solutions: nearest to the given velocities first, then least where open."""
     from scipy.sparse import csr_array, vstack
 
-    scale = np.tile(np.repeat([1.0, 1 / model.length], 3), model.nb)
-    terms = model.blocks(0.0, q, v)
-    jacobian, nu = model.sparse(terms.jacobian), terms.nu
+    model, mass, (v, given, nu, scale, blocks) = scenes.model, scenes.mass[k], rates
+    jacobian = model.sparse(blocks)
     x = MinimumNorm(jacobian, scale**-2)(nu)
-    if np.max(np.abs(jacobian @ x - nu)) > GROSS * np.max(np.abs(x / scale)):
-        worst = int(np.argmax(np.abs(jacobian @ x - nu)))
-        raise _fault(model, worst, "the driver contradicts the joints")
+    off = np.abs(jacobian @ x - nu)
+    if np.max(off) > GROSS * np.max(np.abs(x / scale)):
+        raise _fault(model, int(np.argmax(off)), "the driver contradicts the joints")
     nearest, x, aim = MinimumNorm(jacobian, np.where(given, 1.0, OPEN_WEIGHT) / scale**2), v, v
     for _ in range(REPEATS):
         x = aim + nearest(nu - jacobian @ aim)
         aim = aim + np.where(given, v - x, 0.0)
     chosen = np.flatnonzero(given)
     selection = csr_array((np.ones(chosen.size), (np.arange(chosen.size), chosen)), (chosen.size, model.n))
-    weight = np.where(model.mass > 0, model.mass, LEAST_WEIGHT * np.max(model.mass))
+    weight = np.where(mass > 0, mass, LEAST_WEIGHT * np.max(mass))
     x = MinimumNorm(csr_array(vstack([jacobian, selection])), weight)(np.append(nu, x[given]))
     residual = np.abs(jacobian @ np.where(given, v, x) - nu)
     miss, wanted = np.abs((x - v) / scale)[given], np.abs(v / scale)[given]
     if np.max(miss, initial=0.0) > GROSS * np.max(wanted, initial=0.0):
         what = f"the initial velocities violate the constraint by {residual.max():.3g}"
         raise _fault(model, int(np.argmax(residual)), what)
-    return x, float(np.max(residual, initial=0.0))
+    return x, float(np.max(residual, initial=0.0)), not given.all()
 
 
 def _unit_rows(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The same equations with rows of unit length, so that their rank does not depend on units."""
     lengths = row_lengths(matrix)
-    return matrix / lengths[:, None], rhs / lengths
-
-
-def _solutions(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The least-norm least-squares solution (n,), and an orthonormal basis (n, k) of the null space."""
-    if not matrix.size:
-        return np.zeros(matrix.shape[1]), np.eye(matrix.shape[1])
-    u, values, vt = np.linalg.svd(matrix)
-    rank = int(np.sum(values > RANK_TOLERANCE * values[0]))
-    return vt[:rank].T @ ((u[:, :rank].T @ rhs) / values[:rank]), vt[rank:].T
+    return matrix / lengths[..., None], rhs / lengths

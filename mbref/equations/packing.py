@@ -71,12 +71,13 @@ class Packs:
     For s scenes of nb bodies: ``mass`` (s, 6 nb), the diagonal of M, and ``inverse_root``, M^(-1/2), 1 where
     the mass is zero; ``principal`` and ``orientation`` (s, nb, 4) of principal frames, from the body's own
     and from the world; ``length`` (s,), the largest distance between two centres of mass and joint anchors at
-    t = 0 (m).
+    t = 0 (m).  ``listed`` has the bodies of each scene.
     """
 
     def __init__(self, scenes: Sequence[Scene]):
         self.scenes, self.kinematic = scenes, not scenes[0].has_mass()
         listed = [with_ground(scene) for scene in scenes]
+        self.listed = [bodies for bodies, _ in listed]
         self.bodies, self.joints = listed[0]
         self.nb = len(self.bodies)
         self.index = {body.name: b for b, body in enumerate(self.bodies)}

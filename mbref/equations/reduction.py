@@ -50,14 +50,12 @@ class Reduction:
         """The data of a scene without the primitives that have no entry, which ``axis`` counts; all others
         move where asked."""
         resting = np.zeros_like(self.resting) if all_move else self.resting
-        kept = (np.take(column, self.primitives, axis=axis) for column in data.primitives)
-        scenes = data.row_bodies.shape[:axis]
-        moving, still = (np.flatnonzero(chosen) for chosen in (~resting, resting))
-        return data._replace(
-            primitives=Primitives(*kept),
-            moving=np.broadcast_to(moving, (*scenes, moving.size)),
-            resting=np.broadcast_to(still, (*scenes, still.size)),
-        )
+        kept = (column.take(self.primitives, axis=axis) for column in data.primitives)
+        moving, still = np.flatnonzero(~resting), np.flatnonzero(resting)
+        if axis:
+            scenes = data.row_bodies.shape[:axis]
+            moving, still = (np.broadcast_to(one, (*scenes, one.size)) for one in (moving, still))
+        return data._replace(primitives=Primitives(*kept), moving=moving, resting=still)
 
 
 def reduction_of(model: Model, start: Start) -> Reduction:

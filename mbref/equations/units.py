@@ -8,8 +8,11 @@ at least the value of the body's mass at SPREAD of its length.
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
+MOST_KEPT = 64  # structures
 SPREAD = 0.5  # of a body's length; a slender rod's transverse moment is that of 0.58
 SMALLEST = 1e-9  # of the largest length; a shorter one is rounding
 
@@ -31,6 +34,13 @@ def row_lengths(matrix: np.ndarray) -> np.ndarray:
     return np.where(lengths > 0.0, lengths, 1.0)
 
 
+@functools.lru_cache(maxsize=MOST_KEPT)
+def _shares(nb: int, ends: bytes) -> np.ndarray:
+    """The share (e, nb) of an anchor among those on each body, from the bodies (e,) that they are on."""
+    on_body = np.frombuffer(ends, dtype=int)[:, None] == np.arange(nb)
+    return on_body / np.maximum(on_body.sum(axis=0), 1)
+
+
 def body_lengths(nb: int, ends: np.ndarray, anchors: np.ndarray, centres: np.ndarray) -> np.ndarray:
     """Length (…, nb) of every body (m); one with all anchors in its centre has the mean of the others, or 1.
 
@@ -38,8 +48,7 @@ def body_lengths(nb: int, ends: np.ndarray, anchors: np.ndarray, centres: np.nda
     the centres of mass (…, nb + 1, 3).
     """
     arms = np.linalg.norm(anchors - centres[..., ends, :], axis=-1)
-    on_body = ends[:, None] == np.arange(nb)
-    lengths = arms @ on_body / np.maximum(on_body.sum(axis=0), 1)
+    lengths = arms @ _shares(nb, ends.tobytes())
     has_arms = lengths > SMALLEST * lengths.max(axis=-1, keepdims=True, initial=0.0)
     count = has_arms.sum(axis=-1, keepdims=True)
     total = (lengths * has_arms).sum(axis=-1, keepdims=True)

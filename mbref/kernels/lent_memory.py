@@ -7,6 +7,7 @@ the next.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Hashable
 from typing import Any
 
@@ -18,12 +19,16 @@ MOST_KEYS, MOST_OF_A_KEY, MOST_BYTES = 64, 4, 1 << 20  # kept for later; larger 
 
 
 class Lent:
-    """Packed memory of a schema, and the bytes with which it begins."""
+    """Packed memory of a schema, and the bytes with which it begins.
 
-    def __init__(self, values: Any, key: Hashable):
-        self.values, self.key, self.packed = values, key, packed(values)
-        self._first = Bytes(values)
-        self.size = self._first.size  # bytes in arrays and records
+    ``part`` is other lent memory that is in it, and keeps its own bytes; ``number`` tells one from another.
+    """
+
+    def __init__(self, values: Any, key: Hashable, part: Lent | None = None):
+        self.values, self.key, self.number = values, key, next(_numbers)
+        self.packed = packed(values, part.packed if part else None)
+        self._first = Bytes(values if part is None else tuple(v for v in values if v is not part.values))
+        self.size = self._first.size + (part.size if part else 0)  # bytes in arrays and records
         self._table = table_of(self._first.copies)
 
     def restore(self) -> None:
@@ -32,17 +37,19 @@ class Lent:
 
 
 _kept: dict[Hashable, list[Lent]] = {}
+_numbers = itertools.count()
 
 
-def lent(key: Hashable, make: Callable[[], Any]) -> Lent:
-    """Memory of a key, which says all of what ``make`` makes: kept, or else made."""
+def lent(key: Hashable, make: Callable[[], Any], part: Lent | None = None) -> Lent:
+    """Memory of a key, which says all of what ``make`` makes, its part included: kept, or else made."""
+    key = (key, part.number) if part else key
     kept = _kept.get(key)
     try:
         memory = kept.pop() if kept else None
     except IndexError:  # another thread was faster
         memory = None
     if memory is None:
-        return Lent(make(), key)
+        return Lent(make(), key, part)
     memory.restore()
     return memory
 

@@ -46,6 +46,7 @@ def _compiled(path: Path, text: str) -> bytes:
     return data
 
 
+@functools.cache
 def processor() -> str:
     """The processor that the code is for."""
     return f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"

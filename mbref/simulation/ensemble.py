@@ -29,7 +29,7 @@ from mbref.trajectory import Outcome, Trajectory
 AHEAD = (
     64  # runs handed to the executor, or as many as keep every core busy twice, before the first has to end
 )
-MOST_AT_ONCE, SECONDS = 64, 0.05  # runs that a process is given at a time, and the wall time they may take
+MOST_AT_ONCE, SECONDS = 128, 0.05  # runs that a process is given at a time, and the wall time they may take
 
 
 def ensemble(

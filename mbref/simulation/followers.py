@@ -1,48 +1,49 @@
 """Followers: scenes that differ from that of a run in numbers alone, run one after another in its memory.
 
 All of them are set up at once, in arrays whose first axis counts them.  A follower must give the answers on
-which the run's choice of rows and columns rests, begin on no singular position and end without anything
-unusual, as the run itself; every other scene is left to a run of its own.  The results are those of runs of
-their own, to the bit, or but for rounding by code that takes the numbers in which the scenes differ.
+which the run's choice of rows and columns rests, begin on no singular position, pass those ahead briefly and
+end without anything unusual, as the run itself; every other scene is left to a run of its own.  The results
+are those of runs of their own, to the bit, or but for rounding by code that takes the numbers in which the
+scenes differ.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbref.equations.active_coordinates import places_without_rounding, without_rounding
-from mbref.equations.evaluation import evaluate_along
-from mbref.equations.initial_state import LARGE, Start, consistent_start, is_met
+from mbref.equations.initial_state import LARGE
 from mbref.equations.joint_reactions import Balance
-from mbref.equations.model import Model, Terms, motion_of
-from mbref.equations.packing import Packs, row_of
-from mbref.equations.reduction import Reduction
-from mbref.equations.static_constraints import at_rest
-from mbref.kernels.copying import Bytes, copy_rows, rows_from, rows_to, table_of
-from mbref.kernels.layout import Counts, Equations, Memory
+from mbref.equations.model import motion_of
+from mbref.equations.packing import row_of
+from mbref.kernels.compilation import Entry
+from mbref.kernels.copying import Bytes, copy_rows, rows_from, table_of
+from mbref.kernels.layout import Counts, Memory
 from mbref.kernels.named_memory import packed
-from mbref.kernels.scene_layout import SceneData
 from mbref.motion import Motion
-from mbref.scene import Scene, SceneError
-from mbref.simulation.control import STEPS_PER_CALL, largest_violation
+from mbref.scene import Scene
+from mbref.simulation.control import STEPS_PER_CALL
+from mbref.simulation.evaluations import Rows
+from mbref.simulation.group import Group, group_of
 from mbref.simulation.outcome import OUTCOMES, cost_of, facts_of, reactions_of, report_of
-from mbref.simulation.ranks import Ranks, all_ranks
+from mbref.simulation.passages import Passages
 from mbref.simulation.run import NEARLY, Run
 from mbref.simulation.singular_start import begins_at_rest, begins_in_motion
-from mbref.simulation.stepping import DONE, advance_to_end
-from mbref.specialised import Untraceable, Varied, arrays_of
+from mbref.simulation.stepping import DONE, SINGULAR_AHEAD, advance_to_end
+from mbref.specialised import Untraceable, Varied
+from mbref.taylor.passing import advance_over
+from mbref.taylor.run import CrossingRun
+from mbref.trajectory import Crossing
 
 
-def may_lead(run: Run) -> bool:
+def may_lead(run: CrossingRun) -> bool:
     """Whether a run that has ended was so ordinary that others may follow it."""
     counts = run.memory.equations.system.counts
     ordinary = run.reduction is not None and run.model.m <= LARGE and run.specialised is None
-    short = counts.steps <= STEPS_PER_CALL and not counts.crossings
+    short = counts.steps <= STEPS_PER_CALL and run.passes_briefly
     completed = run.memory.loop.clock.sample == run.times.size and not run.limits.branches
     return bool(ordinary and short and completed and run.ranks.least >= NEARLY)
 
@@ -51,7 +52,8 @@ class Followed(NamedTuple):
     """Runs that followed one: s completed ones, at k samples.
 
     ``places`` (s) among the scenes, poses (s, k, nb, …) as a Motion names them, coordinates (s, k, nb, 7),
-    multipliers (s, k, m), ``layout.Counts`` (s, 6), and the seconds of stepping (s) and construction.
+    multipliers (s, k, m), ``layout.Counts`` (s, 6), the seconds of stepping (s) and construction, and the
+    message and the singular positions passed of each.
     """
 
     places: list[int]
@@ -63,6 +65,7 @@ class Followed(NamedTuple):
     seconds: list[float]
     built: float
     messages: list[str]
+    crossings: list[Sequence[Crossing]]
     facts: dict[str, Any]
 
     def motions(self, scenes: Sequence[Scene]) -> Iterator[tuple[int, Motion]]:
@@ -81,7 +84,7 @@ class Followed(NamedTuple):
                     outcome=OUTCOMES[DONE],
                     t_end=float(self.times[-1]),
                     message=self.messages[k],
-                    crossings=(),
+                    crossings=self.crossings[k],
                     cost=cost_of(self.seconds[k], self.built, self.counts[k].tolist()),
                 ),
             )
@@ -93,41 +96,10 @@ def follow(run: Run, scenes: Sequence[Scene], by_code: bool = False) -> Followed
     ``by_code``: on machine code that takes the numbers in which they differ, where they can have it.
     """
     began = time.process_time()
-    group = _group(run, scenes)
+    group = group_of(run, scenes)
     ended = Runs(run, group, by_code)
     places = ended.run()
-    messages = [report_of(group.starts[k], group.ranks[k]) for k in places]
-    return ended.followed(places, messages, time.process_time() - began)
-
-
-class Group(NamedTuple):
-    """Scenes (s) of one shape, their coordinates (s, 7 nb) and velocities (s, 6 nb) at the start, consistent
-    starts by place, ranks there, and the places of those that fit to follow."""
-
-    packs: Packs
-    q: np.ndarray
-    v: np.ndarray
-    starts: dict[int, Start]
-    ranks: list[Ranks]
-    fit: list[int]
-
-
-def _group(run: Run, scenes: Sequence[Scene]) -> Group:
-    """The scenes, of which those fit that give the run's answers and start as regularly."""
-    packs = Packs(scenes)
-    starts, q, v = _starts(run, packs)
-    terms = _terms_of_evidence(run, packs, q, v)
-    agree = _reduction(run).evidence.which_agree(run.model, q, v, packs.mass, terms)
-    symbolic, tolerance = run.part.factor.symbolic, run.limits.rank_tolerance
-    ranks = all_ranks(run.model, terms.jacobian[:, 0], packs.data.metric_root, symbolic, tolerance)
-    alike = [rank.rank == run.ranks.rank and rank.least >= NEARLY for rank in ranks]
-    return Group(packs, q, v, starts, ranks, [k for k in starts if agree[k] and alike[k]])
-
-
-def _reduction(run: Run) -> Reduction:
-    """The reduction of a run that may lead others, which has one."""
-    assert run.reduction is not None
-    return run.reduction
+    return ended.followed(places, time.process_time() - began)
 
 
 class Runs:
@@ -138,7 +110,8 @@ class Runs:
         self._rank = self._begin()
         self._memory, values = (self._coded() if by_code else None) or (run.memory_of_kernels, [])
         self._packed, count, memory = packed(self._memory), len(group.q), self._memory
-        self._begins = Rows([*self._numbers(), *values], Bytes(memory))
+        self._passages = Passages(run, group)
+        self._begins = Rows([*group.numbers(run, memory), *values], Bytes(memory))
         self._samples = [np.empty((count, *each.shape)) for each in memory.loop.samples]
         self._counts = np.empty((count, len(Counts._fields)), dtype=np.int64)
         sources: list[Any] = [*memory.loop.samples, memory.equations.system.counts]
@@ -162,34 +135,20 @@ class Runs:
             return None
         data = row_of(run.reduced(packs.data, axis=1, all_move=True), fit)
         varied = Varied(data, packs.mass[fit], packs.inverse_root[fit], q[fit], v[fit])
-        model = Model(packs.scenes[fit[0]], packs, fit[0])
-        start = replace(starts[fit[0]], q=q[fit[0]], v=v[fit[0]])
         try:
-            memory = run.with_code(model, start, varied)
+            memory = run.with_code(self._group.model(fit[0]), starts[fit[0]], varied)
         except Untraceable:
             return None
         numbers = np.zeros((len(q), varied.numbers.shape[1]))
         numbers[fit] = varied.numbers
         return memory, [(memory.code.numbers, numbers)]
 
-    def _numbers(self) -> list[tuple[Any, ...]]:
-        """All numbers in which the runs differ."""
-        run, packs, memory = self._run, self._group.packs, self._memory
-        length, rounding = packs.length, run.method.settings(0.0).rounding
-        return [
-            *_numbers(memory.equations, run.reduced(packs.data, axis=1), packs),
-            (memory.state.coordinates, self._group.q),
-            (memory.state.velocities, self._group.v),
-            (memory.control, largest_violation(run.limits, length), "violation"),
-            (memory.equations.system.settings, rounding * np.minimum(1.0, length), "rounding"),
-        ]
-
     def _rows(self) -> list[np.ndarray]:
         """Arrays that take samples and counts."""
         return [*self._samples, self._counts]
 
     def run(self) -> list[int]:
-        """Run the scenes that fit; the places of those that completed without a singular position."""
+        """Run the scenes that fit; the places of those that completed, over brief passages alone."""
         memory, completed = self._memory, []
         clock: Any = memory.loop.clock
         enter = self._run.method.stabilisation.enter.callable
@@ -198,22 +157,33 @@ class Runs:
             clock.y_size = enter(clock.time, memory.loop.y, self._packed.argument)
             if memory.watch.generic_rank != self._rank:
                 continue
-            began = time.process_time()
-            status = advance_to_end(self._packed.argument)
-            self._seconds[k] = time.process_time() - began
+            status = self._timed(k, advance_to_end, self._packed.argument)
+            if status == SINGULAR_AHEAD and (series := self._passages.series_of(k)):
+                status = self._timed(k, advance_over, status, self._packed.argument, series.argument)
+                self._passages.record(k)
             if status == DONE:
                 copy_rows(self._ends, k)
                 completed.append(k)
+        self._passages.give_back()
         return completed
 
-    def followed(self, places: list[int], messages: list[str], seconds: float) -> Followed:
+    def _timed(self, place: int, kernel: Entry, *arguments: Any) -> object:
+        """The status of steps of the scene at a place, whose seconds are counted."""
+        began = time.process_time()
+        status = kernel(*arguments)
+        self._seconds[place] += time.process_time() - began
+        return status
+
+    def followed(self, places: list[int], seconds: float) -> Followed:
         """The runs at these places, which all took so many seconds of CPU time."""
         packs, nb = self._group.packs, self._run.model.nb
         shape = len(places), self._run.times.size, nb
         q, v, a, multipliers = (each[places] for each in self._samples)
         q, v, a = q.reshape(*shape, 7), v.reshape(*shape, 6), a.reshape(*shape, 6)
         principal = packs.principal[places][:, None] if packs.turns_frames else None
-        stepping = self._seconds[places]
+        stepping, crossings = self._seconds[places], [self._passages.crossings(k) for k in places]
+        starts = ((self._group.starts[k], self._group.ranks[k]) for k in places)
+        messages = [report_of(*start, len(c)) for start, c in zip(starts, crossings, strict=True)]
         return Followed(
             places=places,
             times=self._run.times,
@@ -224,81 +194,6 @@ class Runs:
             seconds=stepping.tolist(),
             built=(seconds - float(stepping.sum())) / max(1, len(places)),
             messages=messages,
+            crossings=crossings,
             facts=facts_of(self._run),
         )
-
-
-class Rows:
-    """Arrays of which a row at a time is copied to memory, behind the bytes that it has else."""
-
-    def __init__(self, rows: Sequence[tuple[Any, ...]], before: Bytes | None = None):
-        self._kept = before, [(target, np.ascontiguousarray(of_all), *name) for target, of_all, *name in rows]
-        copies = before.copies if before else []
-        self._table = table_of([*copies, *(rows_to(*each) for each in self._kept[1])])
-
-    def copy(self, place: int) -> None:
-        """Have memory hold a row."""
-        copy_rows(self._table, place)
-
-
-def _numbers(equations: Equations, data: SceneData, packs: Packs) -> list[tuple[Any, ...]]:
-    """Arrays of memory of evaluations, and those of scenes whose rows belong there."""
-    system = equations.system
-    masses = (system.mass, packs.mass), (system.inverse_root, packs.inverse_root)
-    return [*zip(arrays_of(equations.scene), arrays_of(data), strict=True), *masses]
-
-
-def _starts(run: Run, packs: Packs) -> tuple[dict[int, Start], np.ndarray, np.ndarray]:
-    """The consistent starts as ``Run`` finds them, by place where there is one; and the coordinates
-    (s, 7 nb) and velocities (s, 6 nb) of all."""
-    q, v = packs.start(), np.zeros_like(packs.mass)
-    terms = _terms(run, packs, np.zeros((len(q), 1)), q[:, None], v[:, None])
-    off = np.abs(terms.phi[:, 0]).max(axis=1, initial=0.0)
-    met = is_met(off, packs.length) & ~terms.nu[:, 0].any(axis=1)
-    found: dict[int, Start] = {}
-    q = places_without_rounding(q, packs.length)
-    for k, scene in enumerate(packs.scenes):
-        if met[k] and not _moves(scene):
-            found[k] = Start(q[k], v[k], float(off[k]), 0.0)
-        elif start := _start_of(run, Model(scene, packs, k)):
-            found[k] = start
-            q[k], v[k] = start.q, start.v
-    return found, q, v
-
-
-def _moves(scene: Scene) -> bool:
-    """Whether a body is given a velocity other than zero."""
-    given = ((*(body.velocity or ()), *(body.angular_velocity or ())) for body in scene.body)
-    return any(map(any, given))
-
-
-def _start_of(run: Run, model: Model) -> Start | None:
-    """The start of one scene as ``Run`` finds it; None where there is none."""
-    try:
-        start = without_rounding(model, consistent_start(model))
-    except SceneError:
-        return None
-    finally:
-        model.give_back()
-    return at_rest(start, _reduction(run).held)
-
-
-def _terms_of_evidence(run: Run, packs: Packs, q: np.ndarray, v: np.ndarray) -> Terms:
-    """The terms at the states that the choice of rows and columns has read."""
-    part, places, velocities = _reduction(run).evidence.states(q, v)
-    durations = np.array([scene.duration for scene in packs.scenes])
-    return _terms(run, packs, durations[:, None] * part, places, velocities)
-
-
-def _terms(run: Run, packs: Packs, times: np.ndarray, q: np.ndarray, v: np.ndarray) -> Terms:
-    """The terms of s scenes at k states each, with blocks (s, k, m, 12): at times (s, k), coordinates
-    (s, k, 7 nb) and velocities (s, k, 6 nb)."""
-    m, n, memory, shape = run.model.m, run.model.n, run.model.memory, times.shape
-    blocks, rows, forces = (np.empty((*shape, width)) for width in (12 * m, 3 * m, n))
-    numbers = Rows(_numbers(memory.values, packs.data, packs))
-    for k in range(len(times)):
-        numbers.copy(k)
-        evaluate_along(times[k], q[k], v[k], blocks[k], rows[k], forces[k], memory.packed.argument)
-    run.model.put_numbers(memory.values, run.model.data)
-    phi, nu, gamma = (rows[..., i * m : (i + 1) * m] for i in range(3))
-    return Terms(packs.mass, blocks.reshape(*shape, m, 12), phi, nu, gamma, forces)

@@ -126,14 +126,14 @@ def _message(run: Run, status: int) -> str:
         return NO_BRANCH
     if status != DONE:
         return "; ".join(filter(None, (_cause(run, status), _rounded(run.ranks), _remedy(run, status))))
-    crossings = int(run.memory.equations.system.counts.crossings)
+    return report_of(run.start, run.ranks, int(run.memory.equations.system.counts.crossings))
+
+
+def report_of(start: Start, ranks: Ranks, crossings: int) -> str:
+    """The correction of the start, rows that depend on others but for rounding, and how many singular
+    positions were passed."""
     passed = f"singular positions passed: {crossings}" if crossings else ""
-    return "; ".join(filter(None, (report_of(run.start, run.ranks), passed)))
-
-
-def report_of(start: Start, ranks: Ranks) -> str:
-    """The correction of the start, and rows that depend on others but for rounding."""
-    return "; ".join(filter(None, (start.report(), _rounded(ranks))))
+    return "; ".join(filter(None, (start.report(), _rounded(ranks), passed)))
 
 
 def _rounded(ranks: Ranks) -> str:

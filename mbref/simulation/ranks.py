@@ -54,7 +54,8 @@ def all_ranks(
 
 def _ranks(values: np.ndarray, tolerance: float) -> Ranks:
     rank = int((values > tolerance).sum())
-    return Ranks(rank, float(values[rank - 1]) if rank else 1.0, float(np.append(values, 0.0)[rank]))
+    least, rest = values[rank - 1] if rank else 1.0, values[rank] if rank < values.size else 0.0
+    return Ranks(rank, float(least), float(rest))
 
 
 def are_clear(model: Model, q: np.ndarray, factor: SparseFactor) -> bool:

@@ -38,7 +38,7 @@ from mbref.method import Method
 from mbref.scene import Scene, SceneError
 from mbref.simulation.control import control_of
 from mbref.simulation.limits import AUTO, SPECIALISED, Limits
-from mbref.simulation.ranks import NO_RANKS, ranks_at
+from mbref.simulation.ranks import NO_RANKS, Ranks, ranks_at
 from mbref.simulation.stepping import CREEPING, PAUSED, SINGULAR_AHEAD, UNDECIDED, advance_to_end
 from mbref.specialised import Part, Specialised, Untraceable, Varied, specialise, with_specialised_code
 from mbref.stabilisation.base import Stabilisation
@@ -87,7 +87,7 @@ class Run:
         self._check_freedoms(model, start)
         if not (self.method.formulation.linear_algebra.sparse or self.method.stabilisation.projects):
             return model, start, None
-        start = without_rounding(model, start)
+        (start,) = without_rounding([start], np.array([model.length]))
         reduction = reduction_of(model, start)
         return model, at_rest(start, reduction.held), reduction
 
@@ -204,13 +204,17 @@ class Run:
         memory.state.coordinates[:] = self.start.q
         memory.state.velocities[:] = self.start.v
         self.ranks, settings = NO_RANKS, memory.equations.system.settings
-        ranks = ranks_at(self.model, self.start.q, memory.factor, self.limits.rank_tolerance)
+        ranks = self._ranks_at_start()
         settings.independent = ranks.rank == memory.pivots.size
         if self.method.stabilisation.projects:
             self.ranks = ranks
             memory.watch.generic_rank = ranks.rank
             settings.nearly_dependent = self.ranks.least < NEARLY
             settings.rounding *= min(1.0, self.model.length)
+
+    def _ranks_at_start(self) -> Ranks:
+        """Of the constraint rows."""
+        return ranks_at(self.model, self.start.q, self.memory.factor, self.limits.rank_tolerance)
 
     def enter_state(self) -> None:
         """Start from the time of the clock and the state in memory."""

@@ -125,7 +125,7 @@ class _Runs:
 
     def _led(self, run: Run, places: list[int]) -> list[int]:
         """The places of scenes that are left once others have followed a run."""
-        if not places or not may_lead(run):
+        if not places or not isinstance(run, CrossingRun) or not may_lead(run):
             return places
         steps = self._others + int(run.memory.equations.system.counts.steps) * len(places)
         by_code = steps >= STEPS_WORTH_SHARED_CODE

@@ -16,6 +16,7 @@ from mbref.kernels.layout import OK
 from mbref.kernels.lent_memory import take_back
 from mbref.method import Method
 from mbref.simulation.limits import GENERIC, SPECIALISED
+from mbref.simulation.ranks import Ranks
 from mbref.simulation.run import Run
 from mbref.simulation.singular_start import Leaving
 from mbref.simulation.stepping import DONE, PAUSED, UNDECIDED
@@ -47,6 +48,10 @@ class PassingRun(SeriesRun):
         """Those of the run, all but its memory."""
         return self._run.model, self._run.start, self._run.reduction
 
+    def _ranks_at_start(self) -> Ranks:
+        """Those of the run."""
+        return self._run.ranks
+
     def _equations(self) -> tuple[Geometry, Polynomials]:
         """Those of a run that is in series itself."""
         run = self._run
@@ -64,6 +69,7 @@ class PassingRun(SeriesRun):
 
     def give_back(self) -> None:
         """Leave the memory to the next run; the model is the run's."""
+        take_back(self._lent_series)
         take_back(self._lent)
 
     def hand_over(self, status: int, run: Run) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -19,7 +20,10 @@ from mbref.taylor.orientations import Triple
 
 
 class Geometry:
-    """The equations of a scene in natural coordinates, but for masses and loads, which may be any."""
+    """The equations of a scene in natural coordinates, but for masses and loads, which may be any.
+
+    ``readings`` are those of the variables, ``tableau`` the ``linear`` and ``place`` of a ``layout.Solver``.
+    """
 
     def __init__(self, of: NaturalCoordinates):
         self.natural, self.readings, self._forms = of, of.images.of(of.kept), Forms(of)
@@ -29,17 +33,24 @@ class Geometry:
         self._lanes = filled(max(1, len(lane) + len(of.rows)))
         self._rows, self._products = _rows(of, lane, self._lanes), _products(of, lane, self._lanes)
         self._poses, self._given = _poses(of, self._forms), _given(of)
+        self.tableau = _tableau(self._rows, len(of.kept), len(of.rows), self._lanes)
+        self._without = Springs(*_stacked([], 3, len(of.kept))), _torsions_of([], len(of.kept))
 
     def polynomials(self, model: Model) -> Polynomials:
         """The polynomials of a scene of this geometry."""
+        (springs, torsions), loads = self._without, model.data.loads
+        if (loads.kind == SPRING).any():
+            springs = _springs(loads, self._forms)
+        if (loads.kind == TORSION_SPRING).any():
+            torsions = _torsions(loads, self._forms)
         return Polynomials(
             rows=self._rows,
             products=self._products,
             inertia=_inertia(model, self._forms, self._lanes),
             poses=self._poses,
             given=self._given,
-            springs=_springs(model.data.loads, self._forms),
-            torsions=_torsions(model.data.loads, self._forms),
+            springs=springs,
+            torsions=torsions,
         )
 
 
@@ -50,7 +61,6 @@ class Forms:
         self.of, self.d = of, len(of.kept)
         self._place = {v: i for i, v in enumerate(of.kept)}
         self._axes: dict[int, Sequence[Triple]] = {}
-        self._centres: dict[int, np.ndarray] = {}
         self._of_axes: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     def __call__(self, expressions: Sequence[Expression]) -> tuple[np.ndarray, np.ndarray]:
@@ -74,11 +84,18 @@ class Forms:
             self._axes[body] = [self.of.direction(body, axis) for axis in np.eye(3)]
         return self._axes[body]
 
-    def centre(self, body: int) -> np.ndarray:
-        """Coefficients (3, d) of a body's centre of mass."""
-        if body not in self._centres:
-            self._centres[body] = self.variables(self.of.centres[body])[1]
-        return self._centres[body]
+    @cached_property
+    def centres(self) -> np.ndarray:
+        """Coefficients (nb, 3, d) of the bodies' centres of mass."""
+        found = [self.variables(centre)[1] for centre in self.of.centres]
+        return np.array(found).reshape(self.of.nb, 3, self.d)
+
+    @cached_property
+    def _of_inertia(self) -> np.ndarray:
+        """The parts (4 nb, d, d) of M that a body's mass, and ∫ x² dm of its principal axes, have."""
+        images = [self.of_axes(b)[1].reshape(3, 3, self.d) for b in range(self.of.nb)]
+        forms = [form for b, axes in enumerate(images) for form in (self.centres[b], *axes)]
+        return np.array([form.T @ form for form in forms]).reshape(4 * self.of.nb, self.d, self.d)
 
     def of_axes(self, body: int) -> tuple[np.ndarray, np.ndarray]:
         """Constants (9,) and coefficients (9, d) of the directions of a body's principal axes."""
@@ -88,13 +105,10 @@ class Forms:
 
     def mass(self, bodies: Bodies) -> np.ndarray:
         """M (d, d) with ½ ż M ż the kinetic energy in the unit of length squared."""
-        total = np.zeros((self.d, self.d))
-        for b in range(self.of.nb):
-            centre, (_, axes) = self.centre(b), self.of_axes(b)
-            principal = bodies.inertia[b] / self.of.length**2
-            total += bodies.mass[b] * centre.T @ centre
-            total += axes.T @ (np.repeat(principal.sum() / 2 - principal, 3)[:, None] * axes)
-        return total
+        principal = bodies.inertia / self.of.length**2
+        along = principal.sum(axis=1, keepdims=True) / 2 - principal
+        weights = np.concatenate([bodies.mass[:, None], along], axis=1).reshape(-1, 1, 1)
+        return np.asarray((weights * self._of_inertia).sum(axis=0))
 
 
 def _rows(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Rows:
@@ -108,6 +122,15 @@ def _rows(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Rows:
             else:
                 twofold += [(r, lane[i], lane[j], coefficient), (r, lane[j], lane[i], coefficient)]
     return Rows(*_columns(twofold, 3), *_columns(linear, 2), constant)
+
+
+def _tableau(rows: Rows, nz: int, nr: int, lanes: int) -> tuple[np.ndarray, np.ndarray]:
+    """The constant part of the tableau (nr + 1, lanes) of the rows, and the places of products in it."""
+    linear, of_variables = np.zeros((nr + 1, lanes)), rows.linear_lane < nz
+    places = rows.linear_row[of_variables], rows.linear_lane[of_variables]
+    np.add.at(linear, places, rows.linear_weight[of_variables])
+    linear[np.arange(nr), nz + np.arange(nr)] = 1.0
+    return linear, np.where(rows.lane < nz, rows.row * lanes + rows.lane, nr * lanes)
 
 
 def _columns(entries: Sequence[tuple[float, ...]], indices: int) -> list[np.ndarray]:
@@ -148,17 +171,17 @@ def _slots(terms: Sequence[Sequence[tuple]], nothing: tuple) -> tuple[list[tuple
 def _inertia(model: Model, forms: Forms, lanes: int) -> Inertia:
     """The mass matrix; gravity, forces and moments that are constant."""
     of, loads = forms.of, model.data.loads
-    force, linear = np.zeros(forms.d), np.zeros((forms.d, forms.d))
-    for b in range(of.nb):
-        force += model.data.bodies.mass[b] * (model.data.gravity / of.length) @ forms.centre(b)
+    weight = model.data.bodies.mass[:, None] * (model.data.gravity / of.length)
+    force, linear = (weight[:, :, None] * forms.centres).sum(axis=(0, 1)), np.zeros((forms.d, forms.d))
     for k in np.flatnonzero((loads.kind == FORCE) & (loads.first < of.nb)):
         _, point = forms(of.point(int(loads.first[k]), loads.point_first[k]))
         force += (loads.force[k] / of.length) @ point
     for k in np.flatnonzero(loads.kind == MOMENT):
         constant, matrix = _moment(forms, int(loads.first[k]), loads.force[k] / of.length**2)
         force, linear = force + constant, linear + matrix
-    terms: list[list[tuple]] = [[(j, row[j]) for j in np.flatnonzero(row)] for row in linear]
-    slots, start = _slots([*terms, *[[]] * (lanes - forms.d)], (0, 0.0))
+    moved = linear if linear.any() else ()
+    terms: list[list[tuple]] = [[(j, row[j]) for j in np.flatnonzero(row)] for row in moved]
+    slots, start = _slots([*terms, *[[]] * (lanes - len(terms))], (0, 0.0))
     force = np.concatenate([force, np.zeros(lanes - forms.d)])
     mass = np.zeros((forms.d, lanes))
     mass[:, : forms.d] = forms.mass(model.data.bodies)
@@ -222,7 +245,11 @@ def _torsions(loads: Loads, forms: Forms) -> Torsions:
         constant, form = forms([e for image in images for e in image])
         stiffness, damping = (c[k] / of.length**2 for c in (loads.stiffness, loads.damping))
         rows.append((constant, form, stiffness, damping, loads.natural[k], loads.angle[k]))
-    constant, form, stiffness, damping, natural, slot = _stacked([*rows], 9, forms.d, 4)
+    return _torsions_of(rows, forms.d)
+
+
+def _torsions_of(rows: Sequence[tuple], d: int) -> Torsions:
+    constant, form, stiffness, damping, natural, slot = _stacked(rows, 9, d, 4)
     return Torsions(constant, form, stiffness, damping, natural, slot.astype(np.int64))
 
 

@@ -45,6 +45,11 @@ class CrossingRun(Run):
         self._passage.collect()
         return status, seconds
 
+    @property
+    def passes_briefly(self) -> bool:
+        """Whether all passages so far were brief."""
+        return self._passage.is_brief
+
     def take_steps(self) -> int:
         """As those of every run, brief passages among them once there are series for them."""
         return self._passage.advance_over(PAUSED) if self._passage.is_made else super().take_steps()
@@ -125,11 +130,15 @@ class TaylorRun(SeriesRun):
 
 
 class Passage:
-    """The way of a run over singular positions, by series that are made at the first."""
+    """The way of a run over singular positions, by series that are made at the first.
+
+    ``is_brief`` says whether all passages so far were brief ones.
+    """
 
     def __init__(self, run: Run):
         self._run = run
         self._made: PassingRun | None = None
+        self.is_brief = True
         self._way = leaving(run) if run.times[-1] > 0.0 else None
         self._fits_no_branch = self._way is None and fits_no_branch(run)
 
@@ -174,6 +183,7 @@ class Passage:
 
     def _given_back(self, status: int, series: PassingRun) -> int:
         """PAUSED or DONE where the run goes on behind a passage that ended with a status, else why not."""
+        self.is_brief = False
         status = series.hand_over(status, self._run)
         if status in (PAUSED, DONE):
             self._run.crossings += series.crossings

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import replace
 from itertools import repeat
 
 import numpy as np
 
 from mbref.equations.branches import SMOOTH, Passed
-from mbref.kernels.named_memory import allocate, packed
+from mbref.equations.initial_state import Start
+from mbref.equations.model import Model
+from mbref.kernels.lent_memory import Lent, copied, fill, lent, shapes_of, take_back
+from mbref.kernels.named_memory import Packed, allocate, packed
 from mbref.kernels.records import record
 from mbref.method import Method
 from mbref.scene import Scene
@@ -27,7 +30,6 @@ from mbref.taylor.layout import (
     Crossings,
     Polynomials,
     Progress,
-    Rows,
     SceneCode,
     Series,
     SeriesKernels,
@@ -91,7 +93,8 @@ class SeriesRun(Run):
         tolerance, order = self._tolerance_and_order(limits)
         self.geometry, self.polynomials = self._equations()
         exact_order = max(order, EXACT_ORDER) if self.model.closed_loops else order
-        self.taylor = self._taylor_memory(exact_order)
+        self._lent_series = self._lend_series(exact_order)
+        self.taylor, self._packed_taylor = self._lent_series.values, self._lent_series.packed
         progress = self.taylor.progress
         progress.order, progress.tolerance = order, tolerance
         progress.usual_order, progress.usual = order, tolerance
@@ -100,7 +103,6 @@ class SeriesRun(Run):
         progress.end = self.times[-1]
         progress.farthest = OFF * max(1.0, self.model.length)
         progress.freedoms = self.part.active.velocities.size - self.ranks.rank
-        self._packed_taylor = packed(self.taylor, self.packed)
         self.wants_code = limits.code == AUTO
         if limits.code == SPECIALISED:
             self._specialise()
@@ -120,20 +122,45 @@ class SeriesRun(Run):
 
     def _equations(self) -> tuple[Geometry, Polynomials]:
         """The scene in natural coordinates, and its equations in them."""
-        moving = np.zeros(self.model.n, dtype=bool)
-        moving[self.part.active.velocities] = True
-        geometry = geometry_of(self.model, self.start, moving, self.strides)
-        return geometry, geometry.polynomials(self.model)
+        return self.equations_of(self.model, self.start)
 
-    def _taylor_memory(self, order: int) -> TaylorMemory:
+    def equations_of(self, model: Model, start: Start) -> tuple[Geometry, Polynomials]:
+        """Those of a scene that differs from this one in numbers alone, from its start."""
+        moving = np.zeros(model.n, dtype=bool)
+        moving[self.part.active.velocities] = True
+        geometry = geometry_of(model, start, moving, self.strides)
+        return geometry, geometry.polynomials(model)
+
+    @property
+    def packed_series(self) -> Packed:
+        """The memory of the series for kernels."""
+        return self._packed_taylor
+
+    def give_back(self) -> None:
+        """Leave the memory to the next run; this one cannot be read any more."""
+        take_back(self._lent_series)
+        super().give_back()
+
+    def _lend_series(self, order: int) -> Lent:
+        """Memory of the series with the numbers of this run."""
         natural, polynomials = self.geometry.natural, self.polynomials
-        orders, nz, ng, nr = order + 1, len(natural.kept), len(natural.given), len(natural.rows)
+        nz, ng, nr = len(natural.kept), len(natural.given), len(natural.rows)
         sizes = {
-            "orders": orders, "nz": nz, "ng": ng, "nr": nr, "nb": self.model.nb,
+            "orders": order + 1, "nz": nz, "ng": ng, "nr": nr,
             "lanes": filled(max(1, nz + nr + ng)), "slots": polynomials.products.left.size,
             "twofold": polynomials.rows.row.size, "kept": KEPT,
             "springs": polynomials.springs.natural.size, "torsions": polynomials.torsions.slot.size,
+            **self.model.sizes,
         }  # fmt: skip
+        shapes = shapes_of_equations(self.geometry, polynomials)
+        key = (TaylorMemory, *sizes.values(), shapes, self.limits.branches)
+        memory = lent(key, lambda: self._allocate_series(sizes), self._lent)
+        put_equations(memory.values, self.geometry, polynomials)
+        return memory
+
+    def _allocate_series(self, sizes: Mapping[str, int]) -> TaylorMemory:
+        """Memory of the series, ready but for numbers."""
+        orders, nz, nr = sizes["orders"], sizes["nz"], sizes["nr"]
         series = allocate(Series, sizes)
         grown = np.arange(1.0, orders + 1) * np.arange(2.0, orders + 2)
         series.scale[:, :nz], series.scale[:, nz : nz + nr] = -1.0 / grown[:, None], -1.0
@@ -141,24 +168,24 @@ class SeriesRun(Run):
         series.variable[:nz] = 1.0
         return TaylorMemory(
             run=self.memory,
-            polynomials=polynomials,
-            readings=self.geometry.readings,
+            polynomials=copied(self.polynomials),
+            readings=copied(self.geometry.readings),
             series=series,
-            solver=solver_of(polynomials.rows, sizes),
+            solver=allocate(Solver, sizes),
             progress=record(Progress()),
             kernels=SeriesKernels(*(kernel.pointer for kernel in CALLED)),
             code=record(SceneCode()),
-            began=allocate(Snapshot, self.model.sizes),
-            crossing=allocate(Snapshot, self.model.sizes),
+            began=allocate(Snapshot, sizes),
+            crossing=allocate(Snapshot, sizes),
             beginning=allocate(Beginning, sizes),
             parting=np.array(
                 [k for k, taken in dict(self.limits.branches).items() if taken != SMOOTH], np.int64
             ),
-            crossings=allocate(Crossings, {**sizes, **self.model.sizes}),
+            crossings=allocate(Crossings, sizes),
             landing=np.zeros((2, sizes["lanes"])),
             state=np.zeros((3, sizes["lanes"])),
             pose=np.zeros((3, 12 * self.model.nb)),
-            angles=np.zeros(polynomials.torsions.slot.size),
+            angles=np.zeros(sizes["torsions"]),
         )
 
     def _specialise(self) -> None:
@@ -204,16 +231,16 @@ class SeriesRun(Run):
         return float(np.abs(self.taylor.solver.last[: int(self.taylor.progress.rank)]).min(initial=1.0))
 
 
-def solver_of(rows: Rows, sizes: Mapping[str, int]) -> Solver:
-    """The memory of the linear system, with the constant part of its tableau and the places of products."""
-    solver, nr, nz = allocate(Solver, sizes), sizes["nr"], sizes["nz"]
-    of_variables = rows.linear_lane < nz
-    places = rows.linear_row[of_variables], rows.linear_lane[of_variables]
-    np.add.at(solver.linear, places, rows.linear_weight[of_variables])
-    solver.linear[np.arange(nr), nz + np.arange(nr)] = 1.0
-    outside = nr * sizes["lanes"]
-    solver.place[:] = np.where(rows.lane < nz, rows.row * sizes["lanes"] + rows.lane, outside)
-    return solver
+def shapes_of_equations(geometry: Geometry, polynomials: Polynomials) -> Hashable:
+    """The shapes of the equations of a scene: all of them have room in memory that is made for one."""
+    return shapes_of((polynomials, geometry.readings, geometry.tableau))
+
+
+def put_equations(memory: TaylorMemory, geometry: Geometry, polynomials: Polynomials) -> None:
+    """Have memory of series hold the equations of a scene."""
+    fill(memory.polynomials, polynomials)
+    fill(memory.readings, geometry.readings)
+    memory.solver.linear[:], memory.solver.place[:] = geometry.tableau
 
 
 def prepare_series() -> None:

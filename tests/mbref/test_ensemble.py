@@ -121,6 +121,12 @@ def test_drawn_numbers_and_their_distributions_agree():
     assert next(variants(DRIVEN, VARY, 1, seed=4)) != scenes[0]
 
 
+def test_several_numbers_of_one_entry_vary():
+    varied = [Variation("body[slider].mass", 2.0, 3.0), Variation("body[slider].position[2]", 0.1, 0.2)]
+    (scene,) = variants(DRIVEN, varied, 1)
+    assert 2.0 <= scene.body[2].mass <= 3.0 and 0.1 <= scene.body[2].position[2] <= 0.2
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [

@@ -6,8 +6,8 @@ import pytest
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from mbref.equations.degrees_of_freedom import undriven_freedoms
-from mbref.equations.initial_state import corrected_positions, displaced
-from mbref.equations.model import Model
+from mbref.equations.initial_state import corrected_positions
+from mbref.equations.model import Model, displaced
 from mbref.integrators.predictor import LARGEST_TURN
 from mbref.method import MethodError
 from mbref.scene import SceneError

@@ -129,6 +129,7 @@ def test_memory_of_passages_is_lent_again():
     one.give_back()
     other, second = passed()
     assert second is not first and second.memory is first.memory
+    assert second.taylor is first.taylor
     assert other.memory is one.memory is not second.memory
 
 

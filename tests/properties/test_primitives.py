@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mbref.equations.initial_state import displaced
-from mbref.equations.model import Model
+from mbref.equations.model import Model, displaced
 from mbref.scene import JOINT_TYPES
 from tests.strategies import DRIVABLE, one_joint_scenes, states
 

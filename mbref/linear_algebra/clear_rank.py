@@ -1,0 +1,97 @@
+"""Solutions of least norm, and the null space, of dense equations: by QR where the rank is clear.
+
+Aᵀ P = Q R with column pivoting.  The rank is clear where the last pivot that counts is CLEAR at least, of
+rows of length one, and all that is left behind it is rounding.  Elsewhere, and where equations contradict
+each other, singular values decide, which take four times as long.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+import numpy as np
+
+from mbref.kernels.compilation import FLOAT, INT, entry, kernel
+from mbref.kernels.lent_memory import lent, take_back
+from mbref.kernels.named_memory import Indices, Matrix, Named, Vector, allocate
+from mbref.linear_algebra.orthogonal_factorisations import apply_reflectors, minimum_norm, qr_pivoted
+
+CLEAR, ROUNDING = 1e-3, 1e-11  # of the longest row: a pivot that counts, and one that does not
+MET = 1e-13  # of the largest entry of a solution: residual of a row that agrees with the others
+UNCLEAR = -1
+
+
+class Scratch(NamedTuple):
+    """The factors of ``qr_pivoted``, the solution and an orthonormal basis of the null space as rows."""
+
+    transposed: Annotated[Matrix, "n", "m"]
+    order: Annotated[Indices, "m"]
+    tau: Annotated[Vector, "m"]
+    work: Annotated[Vector, "m"]
+    norms: Annotated[Matrix, 2, "m"]
+    b: Annotated[Vector, "m"]
+    x: Annotated[Vector, "n"]
+    solution: Annotated[Vector, "n"]
+    basis: Annotated[Matrix, "n", "n"]
+
+
+@kernel
+def largest_left(rank, transposed):
+    """The largest entry that is left behind the rank."""
+    largest = 0.0
+    for i in range(rank, transposed.shape[0]):
+        for j in range(rank, transposed.shape[1]):
+            largest = max(largest, abs(transposed[i, j]))
+    return largest
+
+
+@entry(INT(FLOAT, Named(Scratch)))
+def solve_clearly(tolerance, scratch):
+    """The rank, once the solution and, in the first rows, the basis are found; UNCLEAR without them.
+
+    A pivot counts that exceeds ``tolerance`` of the longest row.
+    """
+    rank, n = qr_pivoted(tolerance, scratch), scratch.x.shape[0]
+    if rank > 0 and abs(scratch.transposed[rank - 1, rank - 1]) < CLEAR:
+        return UNCLEAR
+    if largest_left(rank, scratch.transposed) > ROUNDING:
+        return UNCLEAR
+    minimum_norm(rank, scratch)
+    for i in range(n):
+        scratch.solution[i] = scratch.x[i]
+    for k in range(rank, n):
+        scratch.x[:] = 0.0
+        scratch.x[k] = 1.0
+        apply_reflectors(rank, scratch)
+        for i in range(n):
+            scratch.basis[k - rank, i] = scratch.x[i]
+    return rank
+
+
+def least_norm(matrix: np.ndarray, rhs: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """The solution x (n,) of A x = b, of least squares and least norm, and an orthonormal basis (n, k) of the
+    null space.
+
+    The rows of A (m, n) are of length one at most; singular values below ``tolerance`` of the largest are
+    taken for zero.
+    """
+    m, n = matrix.shape
+    if not matrix.size:
+        return np.zeros(n), np.eye(n)
+    memory = lent((Scratch, m, n), lambda: allocate(Scratch, {"m": m, "n": n}))
+    scratch = memory.values
+    scratch.transposed[:], scratch.b[:] = matrix.T, rhs
+    rank = int(solve_clearly(tolerance, memory.packed.argument))
+    x, basis = scratch.solution.copy(), scratch.basis[: n - rank].T.copy()
+    take_back(memory)
+    if rank == UNCLEAR or np.abs(matrix @ x - rhs).max() > MET * max(1.0, np.abs(x).max()):
+        return _by_singular_values(matrix, rhs, tolerance)
+    return x, basis
+
+
+def _by_singular_values(
+    matrix: np.ndarray, rhs: np.ndarray, tolerance: float
+) -> tuple[np.ndarray, np.ndarray]:
+    u, values, vt = np.linalg.svd(matrix)
+    rank = int(np.sum(values > tolerance * values[0]))
+    return vt[:rank].T @ ((u[:, :rank].T @ rhs) / values[:rank]), vt[rank:].T

@@ -1,0 +1,81 @@
+"""Groups of scenes of one shape that may follow a run: their starts, and the numbers that memory takes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mbref.equations.active_coordinates import without_rounding
+from mbref.equations.initial_state import Start
+from mbref.equations.model import Model
+from mbref.equations.packing import Packs
+from mbref.equations.reduction import Reduction
+from mbref.kernels.layout import Memory
+from mbref.scene import Scene
+from mbref.simulation.control import largest_violation
+from mbref.simulation.evaluations import Evaluations, numbers_of
+from mbref.simulation.ranks import Ranks, all_ranks
+from mbref.simulation.run import NEARLY, Run
+
+
+class Group(NamedTuple):
+    """Scenes (s) of one shape, their coordinates (s, 7 nb) and velocities (s, 6 nb) at the start, consistent
+    starts by place, ranks there, and the places of those that fit to follow."""
+
+    packs: Packs
+    q: np.ndarray
+    v: np.ndarray
+    starts: dict[int, Start]
+    ranks: list[Ranks]
+    fit: list[int]
+
+    def model(self, place: int) -> Model:
+        """The model of the scene at a place."""
+        return Model(self.packs.scenes[place], self.packs, place)
+
+    def numbers(self, run: Run, memory: Memory) -> list[tuple[Any, ...]]:
+        """Where memory of a run has the numbers in which the scenes differ, and those of all of them."""
+        length, rounding = self.packs.length, run.method.settings(0.0).rounding
+        return [
+            *numbers_of(memory.equations, run.reduced(self.packs.data, axis=1), self.packs),
+            (memory.state.coordinates, self.q),
+            (memory.state.velocities, self.v),
+            (memory.control, largest_violation(run.limits, length), "violation"),
+            (memory.equations.system.settings, rounding * np.minimum(1.0, length), "rounding"),
+        ]
+
+
+def group_of(run: Run, scenes: Sequence[Scene]) -> Group:
+    """The scenes, of which those fit that give the run's answers and start as regularly."""
+    packs, evidence = Packs(scenes), _reduction(run).evidence
+    evaluations = Evaluations(run.model, packs)
+    starts, q, v = _starts(run, packs, evaluations)
+    part, places, velocities = evidence.states(q, v)
+    durations = np.array([scene.duration for scene in scenes])
+    terms = evaluations.terms(np.arange(len(q)), durations[:, None] * part, places, velocities)
+    agree = evidence.which_agree(run.model, q, v, packs.mass, terms)
+    symbolic, tolerance = run.part.factor.symbolic, run.limits.rank_tolerance
+    ranks = all_ranks(run.model, terms.jacobian[:, 0], packs.data.metric_root, symbolic, tolerance)
+    alike = [rank.rank == run.ranks.rank and rank.least >= NEARLY for rank in ranks]
+    return Group(packs, q, v, starts, ranks, [k for k in starts if agree[k] and alike[k]])
+
+
+def _reduction(run: Run) -> Reduction:
+    """The reduction of a run that may lead others, which has one."""
+    assert run.reduction is not None
+    return run.reduction
+
+
+def _starts(
+    run: Run, packs: Packs, evaluations: Evaluations
+) -> tuple[dict[int, Start], np.ndarray, np.ndarray]:
+    """The consistent starts as ``Run`` finds them, by place where there is one; and the coordinates
+    (s, 7 nb) and velocities (s, 6 nb) of all."""
+    q, v = packs.start(), np.zeros_like(packs.mass)
+    found = {k: start for k, start in enumerate(evaluations.starts()) if isinstance(start, Start)}
+    rounded = without_rounding([*found.values()], packs.length[[*found]], _reduction(run).held)
+    for k, start in zip(found, rounded, strict=True):
+        q[k], v[k] = start.q, start.v
+    return dict(zip(found, rounded, strict=True)), q, v
