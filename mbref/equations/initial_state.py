@@ -16,7 +16,8 @@ from mbref.scene import SceneError
 
 RANK_TOLERANCE = 1e-5  # singular values below it (relative) are left alone: rank may drop at the start
 LARGE = 40  # rows; above, dense singular values take longer than sparse factors
-GROSS = 0.05  # of the scene's length, or of its speed: a larger inconsistency is a fault
+GROSS = 0.05  # of the scene's length, or of given velocities: a larger inconsistency is a fault
+CONTRADICTED = 1e-3  # of the speed by which drivers may miss the joints: rounded rates leave less
 MOST_ITERATIONS = 30
 OPEN_WEIGHT, REPEATS = 1e-4, 5  # weight of open velocities beside given ones, and how often it is compensated
 MET = 1e-13  # of the largest velocity: those of another branch miss Φ_q v = ν by more
@@ -85,8 +86,15 @@ def _best_met(model: Model, q: np.ndarray, along: list[np.ndarray]) -> np.ndarra
 
 
 def _fault(model: Model, row: int, what: str) -> SceneError:
-    name = model.row_joint[row]
-    return SceneError([f"joint[{name}]: {what} at joint {name!r}"])
+    return SceneError([f"joint[{model.row_joint[row]}]: {what}"])
+
+
+def _contradiction(model: Model, row: int) -> SceneError:
+    """The fault of drivers whose velocities at t = 0 no motion has; ``row`` is missed most."""
+    names = [driver.joint for driver in model.scene.driver]
+    who = f"the drivers of {', '.join(names)} contradict" if len(names) > 1 else "contradicts"
+    where = f"at t = 0, most of all at joint {model.row_joint[row]!r}"
+    return SceneError([f"driver[{names[0]}]: {who} the joints {where}"])
 
 
 def corrected_positions(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]:
@@ -99,11 +107,11 @@ def corrected_positions(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]
     phi = np.abs(model.blocks(0.0, q, np.zeros(model.n)).phi)
     before, worst = float(phi.max()), int(np.argmax(phi))
     if before > GROSS * max(1.0, model.length):
-        raise _fault(model, worst, f"the initial positions violate the constraint by {before:.3g}")
+        raise _fault(model, worst, f"positions given to bodies violate it by {before:.3g} m or rad")
     q, phi = solve_positions(model, 0.0, q)
     left, worst = float(np.abs(phi).max()), int(np.argmax(np.abs(phi)))
     if left > 1e-10:
-        raise _fault(model, worst, f"the initial positions cannot be corrected; {left:.3g} is left")
+        raise _fault(model, worst, f"no positions nearby meet it; {left:.3g} m or rad are left")
     return q, before
 
 
@@ -175,16 +183,15 @@ def _velocities(model: Model, q: np.ndarray) -> tuple[np.ndarray, float, bool]:
     terms = replace(terms, jacobian=model.dense(terms.jacobian))
     jacobian, nu = _unit_rows(terms.jacobian * scale, terms.nu)
     x, open_ = _solutions(jacobian, nu)
-    if np.max(np.abs(jacobian @ x - nu), initial=0.0) > GROSS * np.max(np.abs(x), initial=0.0):
-        worst = int(np.argmax(np.abs(jacobian @ x - nu)))
-        raise _fault(model, worst, "the driver contradicts the joints")
+    if np.max(np.abs(jacobian @ x - nu), initial=0.0) > CONTRADICTED * np.max(np.abs(x), initial=0.0):
+        raise _contradiction(model, int(np.argmax(np.abs(jacobian @ x - nu))))
     step, still_open = _solutions(open_[given], wanted - x[given])
     x, open_ = x + open_ @ step, open_ @ still_open
     as_given = x.copy()
     as_given[given] = wanted
     residual = np.abs(terms.jacobian @ (as_given * scale) - terms.nu)
     if np.max(np.abs(x[given] - wanted), initial=0.0) > GROSS * np.max(np.abs(wanted), initial=0.0):
-        what = f"the initial velocities violate the constraint by {residual.max():.3g}"
+        what = f"velocities given to bodies violate it by {residual.max():.3g} m/s or rad/s"
         raise _fault(model, int(np.argmax(residual)), what)
     if open_.size:
         weight = np.sqrt(model.mass) * scale
@@ -202,9 +209,8 @@ def _sparse_velocities(
     terms = model.blocks(0.0, q, v)
     jacobian, nu = model.sparse(terms.jacobian), terms.nu
     x = MinimumNorm(jacobian, scale**-2)(nu)
-    if np.max(np.abs(jacobian @ x - nu)) > GROSS * np.max(np.abs(x / scale)):
-        worst = int(np.argmax(np.abs(jacobian @ x - nu)))
-        raise _fault(model, worst, "the driver contradicts the joints")
+    if np.max(np.abs(jacobian @ x - nu)) > CONTRADICTED * np.max(np.abs(x / scale)):
+        raise _contradiction(model, int(np.argmax(np.abs(jacobian @ x - nu))))
     nearest, x, aim = MinimumNorm(jacobian, np.where(given, 1.0, OPEN_WEIGHT) / scale**2), v, v
     for _ in range(REPEATS):
         x = aim + nearest(nu - jacobian @ aim)
@@ -216,7 +222,7 @@ def _sparse_velocities(
     residual = np.abs(jacobian @ np.where(given, v, x) - nu)
     miss, wanted = np.abs((x - v) / scale)[given], np.abs(v / scale)[given]
     if np.max(miss, initial=0.0) > GROSS * np.max(wanted, initial=0.0):
-        what = f"the initial velocities violate the constraint by {residual.max():.3g}"
+        what = f"velocities given to bodies violate it by {residual.max():.3g} m/s or rad/s"
         raise _fault(model, int(np.argmax(residual)), what)
     return x, float(np.max(residual, initial=0.0))
 

@@ -146,17 +146,29 @@ def test_singular_positions_along_the_motion_are_found():
 
 
 def test_a_motion_that_ends_early_says_why():
-    """A four-bar of revolute joints, one of them askew, holds its own driver."""
-    scene = find_scene("four_bar")
-    corner = scene.joint_named("B")
-    askew = {"name": "B", "type": "revolute", "bodies": corner.bodies, "anchor": corner.anchor_pair[0],
-             "axis": (0.0, 0.1, 1.0)}  # fmt: skip
-    at_rest = [body.model_copy(update={"velocity": None, "angular_velocity": None}) for body in scene.body]
-    joints = [askew if joint.name == "B" else joint for joint in scene.joint]
-    stuck = scene.with_(body=at_rest, joint=joints)
-    found = along_motion(stuck.with_(duration=0.01))
+    """A four-bar of revolute joints, one of them a little askew, holds its own driver."""
+    scene = find_scene("four_bar").with_(duration=0.01)
+    found = along_motion(askew(scene, 0.003))
     assert found.end < 0.01 and found.stopped, found
-    assert along_motion(scene.with_(duration=0.01)).stopped == ""
+    assert along_motion(scene).stopped == ""
+
+
+def test_a_driver_of_a_locked_loop_is_told_at_the_start():
+    with pytest.raises(
+        SceneError, match=r"driver\[A\]: contradicts the joints at t = 0, most of all at joint"
+    ):
+        along_motion(askew(find_scene("four_bar"), 0.1))
+
+
+def askew(scene, tilt):
+    """The four-bar at rest with a revolute joint B whose axis is tilted by a slope."""
+    corner = scene.joint_named("B")
+    revolute = {"name": "B", "type": "revolute", "bodies": corner.bodies, "anchor": corner.anchor_pair[0],
+                "axis": (0.0, tilt, 1.0)}  # fmt: skip
+    at_rest = [body.model_copy(update={"velocity": None, "angular_velocity": None}) for body in scene.body]
+    return scene.with_(
+        body=at_rest, joint=[revolute if joint.name == "B" else joint for joint in scene.joint]
+    )
 
 
 def test_rounded_axes_are_told_as_rounding():
