@@ -202,7 +202,9 @@ class Scene(Entry):
             raise SceneError([f"{path}: cannot be read: {error.strerror}"]) from None
         except tomllib.TOMLDecodeError as error:
             raise SceneError([f"{path}: is not TOML: {error}{toml_hint(text, str(error))}"]) from None
-        except ValueError as error:  # no UTF-8, or a number of thousands of digits
+        except UnicodeDecodeError as error:
+            raise SceneError([f"{path}: is no text in UTF-8 (at byte {error.start})"]) from None
+        except ValueError as error:  # a number of thousands of digits
             raise SceneError([f"{path}: is not TOML: {error}"]) from None
         except RecursionError:
             raise SceneError([f"{path}: is nested too deeply"]) from None

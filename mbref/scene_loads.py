@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal, get_args
 
-from pydantic import Discriminator
+from pydantic import Discriminator, ValidationInfo, field_validator
 
 from mbref.scene_fields import Entry, Name, NotNegative, Pair, Real, Vector, VectorPair
 
@@ -50,6 +50,14 @@ class Spring(LoadEntry):
     stiffness: NotNegative
     damping: NotNegative = 0.0
     natural_length: NotNegative
+
+    @field_validator("natural_length")
+    @classmethod
+    def _force_has_a_direction(cls, length: float, info: ValidationInfo) -> float:
+        start, stop = info.data.get("points", (None, None))
+        if length and start is not None and start == stop and info.data.get("stiffness"):
+            raise ValueError("must be 0 between coincident points, where its force would have no direction")
+        return length
 
 
 class TorsionSpring(LoadEntry):

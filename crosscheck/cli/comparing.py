@@ -19,7 +19,7 @@ from crosscheck.cli.running import (
 from crosscheck.study import sweep
 from crosscheck.study.command import command
 from crosscheck.study.comparison import Wanted, collected, scouted
-from crosscheck.study.grid import TIME_LIMIT, Case, Record, key, study
+from crosscheck.study.grid import Case, Record, key, study
 from crosscheck.study.progress import shown
 from crosscheck.study.record_view import public
 from crosscheck.study.timings import REPEATS, with_timings
@@ -58,7 +58,7 @@ def tune(arguments: argparse.Namespace) -> int:
     scene = request.lasting(scene, None, arguments.duration)
     times = request.sample_times(scene, None, sweep.QUICK_SAMPLES)
     scouted([scene], [name])
-    limit = arguments.time_limit or TIME_LIMIT
+    limit = arguments.time_limit
     planned = request.plan([scene], [name], Choice(is_quick=False), [times], limit, notice)
     cases = [case._replace(reference_time=arguments.reference_time) for case in planned]
     records, reached = tuned(cases, arguments.error, _studied)

@@ -101,7 +101,7 @@ def add_limits(parser: argparse.ArgumentParser, time_limit: float | None = TIME_
     default = f"{time_limit:g}" if time_limit else f"{QUICK_LIMIT:g} at quick depth, {TIME_LIMIT:g} else"
     parser.add_argument(
         "--time-limit", type=positive, default=time_limit, metavar="T",
-        help=f"CPU time a run may take, or wait (s); default: {default}",
+        help=f"CPU seconds a run may take, and seconds it may wait without computing; default: {default}",
     )  # fmt: skip
     add_reference_time(parser)
     parser.add_argument("--json", action="store_true", help="print records as JSON on standard output")

@@ -63,8 +63,9 @@ def parser() -> argparse.ArgumentParser:
 
 def _add(commands: Commands, name: str, about: str, example: str) -> argparse.ArgumentParser:
     return commands.add_parser(
-        name, help=about, description=about, epilog=f"example: {example}", allow_abbrev=False
-    )
+        name, help=about, description=fill(about, 79), epilog=f"example:\n  {example}", allow_abbrev=False,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
 
 
 def _add_certify(commands: Commands) -> None:
@@ -108,7 +109,7 @@ def _add_tune(commands: Commands) -> None:
     parser.add_argument("scene", metavar="SCENE", help="a built-in scene or a .toml file")
     parser.add_argument("--error", type=positive, default=1e-6, metavar="E", help="default: %(default)g")
     parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
-    add_limits(parser, None)
+    add_limits(parser)
 
 
 def _add_verify(commands: Commands) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck.judge import joint_residuals
-from crosscheck.judge.tolerances import CONTRADICTION, RANK
+from crosscheck.judge.tolerances import CONTRADICTED, CONTRADICTION, RANK
 from mbref import rotations
 from mbref.scene import Scene, SceneError
 
@@ -100,8 +100,8 @@ def initial_twists(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
 
     Among those, the nearest to the velocities the scene gives (least squares, angular ones times the
     scene's length); velocities left free have the least mass-weighted norm (unit masses where the scene
-    has none).  Raises SceneError naming the joint when drivers or given velocities contradict the joints
-    by more than 5 % of the velocities' scale.
+    has none).  Raises SceneError naming the joint when given velocities contradict the joints by more than
+    5 % of the velocities' scale, or drivers by more than 0.1 %.
     """
     pose = initial_poses(scene)
     scale = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))
@@ -109,13 +109,13 @@ def initial_twists(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     j, b = jacobian(scene, 0.0, *pose)
     j = j * scale
     x, free = _solve(j, b)
-    _refuse(scene, "its driver contradicts the joints", j @ x - b, x)
+    _refuse(scene, "drivers contradict it", j @ x - b, x, CONTRADICTED)
     step, still_free = _solve(free[given], wanted - x[given])
     x, free = x + free @ step, free @ still_free
     if np.abs(x[given] - wanted).max(initial=0.0) > CONTRADICTION * np.abs(wanted).max(initial=0.0):
         as_given = x.copy()
         as_given[given] = wanted
-        _refuse(scene, "the given velocities contradict it", j @ as_given - b, as_given)
+        _refuse(scene, "the given velocities contradict it", j @ as_given - b, as_given, CONTRADICTION)
     if free.size:
         weight = _root_of_mass(scene) * scale
         x = x - free @ np.linalg.lstsq(weight @ free, weight @ x, rcond=None)[0]
@@ -165,11 +165,11 @@ def _solve(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return vt[:rank].T @ ((u[:, :rank].T @ rhs) / s[:rank]), vt[rank:].T
 
 
-def _refuse(scene: Scene, why: str, residual: np.ndarray, x: np.ndarray) -> None:
-    """SceneError naming the joint with the largest residual, if that is gross beside the velocities."""
+def _refuse(scene: Scene, why: str, residual: np.ndarray, x: np.ndarray, most: float) -> None:
+    """SceneError naming the joint with the largest residual, if that is above ``most`` of the velocities."""
     names = [name for name, rows in length_rows(scene).items() for _ in rows]
     scale = np.abs(x).max(initial=0.0)
-    if names and np.abs(residual).max() > CONTRADICTION * scale:
+    if names and np.abs(residual).max() > most * scale:
         name = names[int(np.abs(residual).argmax())]
         index = [joint.name for joint in scene.joint].index(name)
         size = np.abs(residual).max()

@@ -78,7 +78,7 @@ def compare(scene: Scene, first: Trajectory, second: Trajectory) -> Comparison:
     if not samples or not np.array_equal(first.times[:samples], second.times[:samples]):
         raise ValueError("runs are compared at common times")
     chosen = np.unique(np.linspace(0, samples - 1, min(samples, SAMPLES)).round().astype(int))
-    scale = _largest(scene, first)
+    scale = largest_reaction(scene, first)
     tables = [_at_sample(scene, first, second, int(k), scale) for k in chosen]
     joints = {
         name: Reaction(*(max(found) for found in zip(*(joints[name] for joints, _ in tables), strict=True)))
@@ -119,7 +119,7 @@ def resultants(scene: Scene, run: Trajectory, sample: int) -> np.ndarray:
     return total
 
 
-def _largest(scene: Scene, run: Trajectory) -> float:
+def largest_reaction(scene: Scene, run: Trajectory) -> float:
     """The largest reaction of a run, N; no less than what moves the masses by LEAST."""
     units = np.repeat([1.0, scene_length(scene)], 3)
     sizes = [

@@ -30,6 +30,9 @@ CONTRADICTION = 0.05
 """Part of the velocity scale by which given velocities may miss the joints and still be corrected: more
 is not a rounded number but another motion than the one meant."""
 
+CONTRADICTED = 1e-3
+"""Part of the velocity scale by which drivers may miss the joints and one another: rounding leaves less."""
+
 TRUTH_DRIVEN = 1e-13
 """Accuracy of closed forms: a few roundings of double precision in poses, times the angle's size."""
 

@@ -271,12 +271,11 @@ def _defaults_in_short(groups: Sequence[Judged]) -> str:
     good = [name for name, found in at_defaults.items() if found is Grade.RIGHT]
     if not at_defaults:
         return "no library has defaults for it"
+    if len(at_defaults) == 1:
+        only = f"with its library's defaults {title(*at_defaults)} is"
+        return f"{only}, too" if good else f"{only} not"
     if not good:
-        return (
-            "with the library's defaults it is not"
-            if len(at_defaults) == 1
-            else "with their libraries' defaults none is"
-        )
+        return "with their libraries' defaults none is"
     if len(good) == len(at_defaults):
         return "so are their libraries' defaults"
     return f"with their libraries' defaults only {listed(map(title, good))} {is_or_are(good)}"

@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from mbref import __version__
 from mbref.cli.diagnose import add as add_diagnose
@@ -72,11 +73,22 @@ def parser() -> argparse.ArgumentParser:
         prog="mbref", formatter_class=TEXT, epilog=EPILOG,
         description="Reference implementation of the constraint-handling methods of multibody dynamics.",
     )  # fmt: skip
-    whole.add_argument("--version", action="version", version=_versions())
+    whole.add_argument(
+        "--version", action=_Version, nargs=0, dest=argparse.SUPPRESS,
+        help="show the versions of mbref and of the packages that it computes with",
+    )  # fmt: skip
     known = commands(whole, title="commands", required=True, metavar="COMMAND")
     for add in (add_scene_files, add_pictures, add_diagnose, add_run, add_ensemble, add_exchange, add_tables):
         add(known)
     return whole
+
+
+class _Version(argparse.Action):
+    """Prints the versions, which are looked up only then, and exits."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        print(_versions())
+        parser.exit()
 
 
 def _versions() -> str:

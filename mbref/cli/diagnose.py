@@ -56,8 +56,10 @@ def _diagnose(options: argparse.Namespace) -> int:
                     *_start_lines(found),
                     *_motion_lines(along),
                     *_swap_lines(swaps, redundant),
+                    *_driver_lines(scene),
                 ]
-            )
+            ),
+            soft_wrap=True,
         )
     return 0
 
@@ -113,8 +115,8 @@ def _start_lines(found: Diagnosis) -> list[str]:
         f"    rows in redundancy  {_listed(found.redundant_by_joint)}",
         f"    unique reactions    {', '.join(found.unique_reactions) or 'of no joint'}",
         f"    singular values     {found.smallest_singular_value:.3g} to {found.largest_singular_value:.3g}"
-        " (rows of unit length; the",
-        "                        smallest is the distance to a singular position)",
+        " (rows of unit length;",
+        "                        the smallest is 0 in a singular position)",
     ]
 
 
@@ -129,8 +131,8 @@ def _motion_lines(along: AlongMotion | str | None) -> list[str]:
         *[f"    it ends early       {along.stopped}"] * bool(along.stopped),
         f"    rank                {along.rank}",
         f"    redundant rows      {along.redundant}",
-        f"    nearest singular    at t = {along.nearest_time:.3g} s, {along.nearest:.3g} away"
-        + (" (passed, or nearly)" if along.nearest < 1e-3 else ""),
+        f"    nearest singular    at t = {along.nearest_time:.3g} s: smallest singular value"
+        f" {along.nearest:.3g} of the largest" + (" (passed, or nearly)" if along.nearest < 1e-3 else ""),
     ]
     shown = along.crossings[:LISTED]
     lines += [f"    singular position   at t = {c.time:.6g} s: {c.sentence}" for c in shown]
@@ -151,9 +153,18 @@ def _motion_lines(along: AlongMotion | str | None) -> list[str]:
 
 def _swap_lines(swaps: list[dict[str, str]], redundant: bool) -> list[str]:
     if not swaps:
-        return ["  no exchange of up to four joints removes the redundancy"] * redundant
+        return ["  no exchange or removal of up to four joints ends the redundancy"] * redundant
     shown = [" and ".join(f"{name} {kind}" for name, kind in swap.items()) for swap in swaps]
     return ["  without redundancy, as mobile, with", *(f"    {words}" for words in shown)]
+
+
+def _driver_lines(scene: Scene) -> list[str]:
+    """A line where more drivers than freedoms make rows redundant, whatever the joints are."""
+    freedoms = scene.with_(driver=(), load=()).counts().degrees_of_freedom
+    told = (
+        f"  more drivers than degrees of freedom ({len(scene.driver)} and {freedoms}): redundant rows remain"
+    )
+    return [told] * (len(scene.driver) > freedoms)
 
 
 def _listed(numbers: dict[str, int]) -> str:

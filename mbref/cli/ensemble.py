@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -57,9 +58,11 @@ def _ensemble(options: argparse.Namespace) -> int:
         for place, run in ensemble(scenes, times, options.method, limits, pool, options.out):
             runs[place] = run
             progress(len(runs))
-    completed = [run for _, run in sorted(runs.items()) if run.outcome.name == "COMPLETED"]
     rate = len(runs) / (time.perf_counter() - began)
+    completed = [run for _, run in sorted(runs.items()) if run.outcome.name == "COMPLETED"]
     _show_spread(scene, float(times[-1]), completed, rate, options)
+    for sentence in _early_ends(runs):
+        print(sentence, file=sys.stderr)
     return 0 if len(completed) == options.count else 1
 
 
@@ -86,6 +89,17 @@ def _show_spread(
     )
     if completed:
         console().print(_table(scene, end, last))
+
+
+def _early_ends(runs: Mapping[int, Trajectory]) -> Iterator[str]:
+    """Of every outcome but COMPLETED the number of runs, by place, and the cause of the first."""
+    ends: dict[str, list[int]] = {}
+    for place, run in sorted(runs.items()):
+        if run.outcome.name != "COMPLETED":
+            ends.setdefault(run.outcome.name, []).append(place)
+    for outcome, places in ends.items():
+        first = runs[places[0]]
+        yield f"{outcome}: {len(places)}, the first of them variant {places[0]}: {first.message}"
 
 
 def _table(scene: Scene, end: float, last: dict[str, np.ndarray]) -> Any:

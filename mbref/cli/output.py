@@ -65,12 +65,12 @@ def body_table(
 @contextmanager
 def progress_bar(what: str, end: float) -> Iterator[Callable[[float], None]]:
     """Tells how far a long run is on stderr: a bar on a terminal, else a line every ten seconds."""
-    from rich.progress import Progress
-
     on_stderr = Console(stderr=True)
     if not on_stderr.is_terminal:
         yield Lines(what, end, time.monotonic)
         return
+    from rich.progress import Progress
+
     with Progress(console=on_stderr, transient=True) as bar:
         task = bar.add_task(what, total=end)
         yield lambda t: bar.update(task, completed=t)

@@ -23,6 +23,7 @@ ROUNDING = (
     1e-5  # singular values below it (relative) at every pose are taken for rounding of the file's numbers
 )
 MOST_ROWS = 300  # beyond it dense singular values at every pose take too long
+SAME = 1e-9  # part of a length, radian or singular value that is no difference between two poses
 POSES = 5  # at which freedoms are looked at to second order
 MOST_STEPS = 20_000  # a motion that creeps is told as far as it gets
 
@@ -35,8 +36,9 @@ class AlongMotion:
     small at every pose but not zero: rows that would be redundant but for rounding in the scene's numbers.
     ``crossings`` are the singular positions that the motion passes; ``shaky`` tells whether second order
     takes away freedoms of first order at every pose: they are none (A. Müller, Mech. Mach. Theory 2016).
-    ``nearest`` is the least distance to a singular position, at time ``nearest_time`` (s).  ``stopped`` says
-    why the motion ended before the scene's duration, empty where it did not.
+    ``nearest`` is the least of the smallest singular values, over the largest one at the pose, at time
+    ``nearest_time`` (s): 0 in a singular position.  ``stopped`` says why the motion ended before the scene's
+    duration, empty where it did not.
     """
 
     end: float
@@ -110,9 +112,10 @@ def _summary(model: Model, motion: Motion, values: np.ndarray) -> AlongMotion:
     rank = int(ranks.max(initial=0))
     small = values[:, rank:].max(axis=0, initial=0.0)
     nearest = values[:, rank - 1] if rank else np.zeros(len(times))
-    at = int(np.argmin(nearest))
+    at = int(np.argmax(nearest <= nearest.min() * (1 + SAME)))
+    moved = np.ptp(motion.position, axis=0).max() / model.length, np.ptp(motion.orientation, axis=0).max()
     return AlongMotion(
-        end=float(times[-1]), moves=bool(np.ptp(motion.position, axis=0).any()),
+        end=float(times[-1]), moves=bool(max(moved) > SAME),
         rank=rank, redundant=model.m - rank,
         by_rounding=tuple(small[small > RANK_TOLERANCE].tolist()),
         nearest=float(nearest[at]), nearest_time=float(times[at]), crossings=tuple(motion.crossings or ()),

@@ -1,4 +1,4 @@
-"""Exchanges of joints that remove redundant constraints and leave the freedoms of a mechanism."""
+"""Exchanges and removals of joints that end all redundancy and leave the freedoms of a mechanism."""
 
 from __future__ import annotations
 
@@ -23,15 +23,16 @@ MOST_EXCHANGES = 4  # joints exchanged at once
 MOST_TRIALS = 3000
 PART = 1e-6  # weight of a row in a redundancy above which its joint takes part
 
-Exchange = dict[str, str]  # joint → its new type
+REMOVED = "removed"  # in the place of a new type
+Exchange = dict[str, str]  # joint → its new type, or REMOVED
 
 
 def exchanges(scene: Scene, most: int = 6) -> list[Exchange]:
-    """The smallest sets of joints whose exchange removes every redundant row, with the same freedoms.
+    """The smallest sets of joints whose exchange or removal ends all redundancy, with the same freedoms.
 
     At most ``most`` of them, of up to four joints; empty where nothing is redundant or nothing is found.
     Asked at a general pose, without drivers.  A joint on which a driver or a torsion spring acts becomes only
-    a type that can bear it.
+    a type that can bear it, and is not removed.
     """
     model = Model(scene.with_(driver=(), load=()))
     if not model.m:
@@ -99,6 +100,8 @@ def _weaker(scene: Scene, name: str, kinds: Collection[str]) -> dict[str, np.nda
     for kind in (k for k in WEAKER.get(joint.type, ()) if k in kinds):
         others = tuple(_as(j, kind) if j.name == name else j for j in scene.joint)
         found[kind] = _rows(Model(scene.with_(joint=others)))[name]
+    if len(kinds) == len(JOINT_TYPES):
+        found[REMOVED] = _rows(Model(scene))[name][:0]
     return found
 
 

@@ -19,7 +19,8 @@ from mbref.scene import Body, SceneError
 
 RANK_TOLERANCE = 1e-5  # singular values below it (relative) are left alone: rank may drop at the start
 LARGE = 40  # rows; above, dense singular values take longer than sparse factors
-GROSS = 0.05  # of the scene's length, or of its speed: a larger inconsistency is a fault
+GROSS = 0.05  # of the scene's length, or of given velocities: a larger inconsistency is a fault
+CONTRADICTED = 1e-3  # of the speed by which drivers may miss the joints: rounded rates leave less
 MOST_ITERATIONS = 30
 OPEN_WEIGHT, REPEATS = 1e-4, 5  # weight of open velocities beside given ones, and how often it is compensated
 MET = 1e-13  # of the largest velocity: those of another branch miss Φ_q v = ν by more
@@ -154,8 +155,15 @@ def _best_met(model: Model, q: np.ndarray, along: list[np.ndarray]) -> np.ndarra
 
 
 def _fault(model: Model, row: int, what: str) -> SceneError:
-    name = model.row_joint[row]
-    return SceneError([f"joint[{name}]: {what} at joint {name!r}"])
+    return SceneError([f"joint[{model.row_joint[row]}]: {what}"])
+
+
+def _contradiction(model: Model, row: int) -> SceneError:
+    """The fault of drivers whose velocities at t = 0 no motion has; ``row`` is missed most."""
+    names = [driver.joint for driver in model.scene.driver]
+    who = f"the drivers of {', '.join(names)} contradict" if len(names) > 1 else "contradicts"
+    where = f"at t = 0, most of all at joint {model.row_joint[row]!r}"
+    return SceneError([f"driver[{names[0]}]: {who} the joints {where}"])
 
 
 def corrected_positions(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]:
@@ -178,10 +186,10 @@ def _corrected(scenes: Alike, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, di
     q, before, left = _solved(scenes, q, most)
     first, last = (np.abs(phi).max(axis=1) for phi in (before, left))
     for k in np.flatnonzero(first > most).tolist():
-        what = f"the initial positions violate the constraint by {first[k]:.3g}"
+        what = f"positions given to bodies violate it by {first[k]:.3g} m or rad"
         faults[k] = _fault(scenes.model, int(np.argmax(np.abs(before[k]))), what)
     for k in np.flatnonzero((last > 1e-10) & (first <= most)).tolist():
-        what = f"the initial positions cannot be corrected; {last[k]:.3g} is left"
+        what = f"no positions nearby meet it; {last[k]:.3g} m or rad are left"
         faults[k] = _fault(scenes.model, int(np.argmax(np.abs(left[k]))), what)
     return q, first, faults
 
@@ -270,8 +278,8 @@ def _velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float,
     unit, rhs = _unit_rows(jacobian, nu)
     x, open_ = least_norm(unit, rhs, RANK_TOLERANCE)
     off = np.abs(unit @ x - rhs)
-    if off.max(initial=0.0) > GROSS * np.abs(x).max(initial=0.0):
-        raise _fault(scenes.model, int(np.argmax(off)), "the driver contradicts the joints")
+    if off.max(initial=0.0) > CONTRADICTED * np.abs(x).max(initial=0.0):
+        raise _contradiction(scenes.model, int(np.argmax(off)))
     if open_.size and wanted.size:
         step, still_open = least_norm(open_[given], wanted - x[given], RANK_TOLERANCE)
         x, open_ = x + open_ @ step, open_ @ still_open
@@ -279,7 +287,7 @@ def _velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float,
     as_given[given] = wanted
     residual = np.abs(jacobian @ as_given - nu)
     if np.abs(x[given] - wanted).max(initial=0.0) > GROSS * np.abs(wanted).max(initial=0.0):
-        what = f"the initial velocities violate the constraint by {residual.max():.3g}"
+        what = f"velocities given to bodies violate it by {residual.max():.3g} m/s or rad/s"
         raise _fault(scenes.model, int(np.argmax(residual)), what)
     if open_.size:
         weight = np.sqrt(scenes.mass[k]) * scale
@@ -295,8 +303,8 @@ def _sparse_velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray,
     jacobian = model.sparse(blocks)
     x = MinimumNorm(jacobian, scale**-2)(nu)
     off = np.abs(jacobian @ x - nu)
-    if np.max(off) > GROSS * np.max(np.abs(x / scale)):
-        raise _fault(model, int(np.argmax(off)), "the driver contradicts the joints")
+    if np.max(off) > CONTRADICTED * np.max(np.abs(x / scale)):
+        raise _contradiction(model, int(np.argmax(off)))
     nearest, x, aim = MinimumNorm(jacobian, np.where(given, 1.0, OPEN_WEIGHT) / scale**2), v, v
     for _ in range(REPEATS):
         x = aim + nearest(nu - jacobian @ aim)
@@ -308,7 +316,7 @@ def _sparse_velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray,
     residual = np.abs(jacobian @ np.where(given, v, x) - nu)
     miss, wanted = np.abs((x - v) / scale)[given], np.abs(v / scale)[given]
     if np.max(miss, initial=0.0) > GROSS * np.max(wanted, initial=0.0):
-        what = f"the initial velocities violate the constraint by {residual.max():.3g}"
+        what = f"velocities given to bodies violate it by {residual.max():.3g} m/s or rad/s"
         raise _fault(model, int(np.argmax(residual)), what)
     return x, float(np.max(residual, initial=0.0)), not given.all()
 

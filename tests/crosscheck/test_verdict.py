@@ -101,6 +101,14 @@ def test_sentences_of_one_scene():
     assert "known to 3e-14: two formulations that share no code agree; it took 2.4 s" in truth([group()])
 
 
+@pytest.mark.parametrize(("error", "said"), [(2.8, "is not"), (1e-10, "is, too")])
+def test_the_only_engine_with_defaults_is_named(error, said):
+    runs = [record(name, "tuned", 1e-10) for name in ("mbref", "mujoco")]
+    assert headline([group([*runs, record("mujoco", "defaults", error)])]) == (
+        f"Both engines are right at their best settings; with its library's defaults MuJoCo {said}."
+    )
+
+
 def test_other_results_and_other_sentences():
     good = [record(name, family, 1e-10) for name in ("mujoco", "exudyn") for family in ("defaults", "tuned")]
     assert headline([group(good)]) == (

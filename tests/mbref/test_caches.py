@@ -203,6 +203,15 @@ def test_a_new_kernel_is_compiled_with_a_kept_one(tmp_path: Path):
     assert file.exists()
 
 
+def test_a_loaded_kernel_makes_no_environments_of_the_functions_in_it(tmp_path: Path):
+    script = f"""{SMALL_KERNEL}
+from numba.core.environment import Environment
+print(*(name for name in ("twice", "shifted") if any(name in known for known in Environment._memo)))
+"""
+    first, second = (ran(script, tmp_path, tmp_path / "cache")[0] for _ in range(2))
+    assert (first, second) == ("7.0\ntwice shifted\n", "7.0\nshifted\n")
+
+
 @pytest.mark.parametrize("program", ["mbref", "crosscheck"])
 def test_help_touches_no_cache(program, tmp_path: Path):
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}

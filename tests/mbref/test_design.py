@@ -15,7 +15,7 @@ from mbref.design.placed import placed
 from mbref.equations.diagnosis import counts
 from mbref.equations.initial_state import solve_positions
 from mbref.equations.model import Model
-from mbref.scene import Driver, Scene, SceneError, TorsionSpring
+from mbref.scene import Body, Driver, Revolute, Scene, SceneError, TorsionSpring
 from mbref.scenes import find_scene
 
 SPATIAL = ("bennett", "spatial_slider_crank", "sarrus", "andrews_squeezer")
@@ -113,7 +113,8 @@ def test_an_exchange_leaves_the_freedoms_and_no_redundancy(name):
     for swap in found:
         model = Model(scene)
         at = placed(model, general_pose(model))
-        after = counts(at.with_(joint=tuple(_as(j, swap[j.name]) if j.name in swap else j for j in at.joint)))
+        kept = [j for j in at.joint if swap.get(j.name) != "removed"]
+        after = counts(at.with_(joint=[_as(j, swap[j.name]) if j.name in swap else j for j in kept]))
         assert after.redundant == 0, swap
         assert after.degrees_of_freedom == before.degrees_of_freedom, swap
 
@@ -131,6 +132,20 @@ def test_joints_under_drivers_and_torsion_springs_become_only_what_bears_them():
     assert of_a["sprung"] <= {"cylindrical"} and of_a["driven"] <= {"cylindrical"}, of_a
 
 
+def test_one_of_two_hinges_is_removed_unless_something_acts_on_it():
+    """A pendulum on two hinges of one axis: 10 rows of rank 5, which no weaker pair of types has."""
+    door = Body(name="door", mass=1.0, inertia=(0.1, 0.2, 0.3), position=(0.5, 0.0, 0.0))
+    hinges = [
+        Revolute(name=name, bodies=("ground", "door"), anchor=(0.0, 0.0, z), axis=(0.0, 0.0, 1.0))
+        for name, z in (("lower", 0.0), ("upper", 1.0))
+    ]
+    for ground in ("frame", "body"):
+        twice = Scene(name="door", ground=ground, body=(door,), joint=tuple(hinges))
+        assert exchanges(twice) == [{"lower": "removed"}, {"upper": "removed"}]
+        driven = twice.with_(driver=(Driver(joint="upper", polynomial=(0.0, 1.0)),))
+        assert exchanges(driven) == [{"lower": "removed"}]
+
+
 def test_redundancy_within_the_plane_is_not_removed_by_exchanges():
     """Two rockers of equal length beside the crank: their lengths, not their joints, are redundant."""
     assert exchanges(find_scene("five_bar")) == [] and counts(find_scene("five_bar")).redundant > 0
@@ -146,17 +161,29 @@ def test_singular_positions_along_the_motion_are_found():
 
 
 def test_a_motion_that_ends_early_says_why():
-    """A four-bar of revolute joints, one of them askew, holds its own driver."""
-    scene = find_scene("four_bar")
-    corner = scene.joint_named("B")
-    askew = {"name": "B", "type": "revolute", "bodies": corner.bodies, "anchor": corner.anchor_pair[0],
-             "axis": (0.0, 0.1, 1.0)}  # fmt: skip
-    at_rest = [body.model_copy(update={"velocity": None, "angular_velocity": None}) for body in scene.body]
-    joints = [askew if joint.name == "B" else joint for joint in scene.joint]
-    stuck = scene.with_(body=at_rest, joint=joints)
-    found = along_motion(stuck.with_(duration=0.01))
+    """A four-bar of revolute joints, one of them a little askew, holds its own driver."""
+    scene = find_scene("four_bar").with_(duration=0.01)
+    found = along_motion(askew(scene, 0.003))
     assert found.end < 0.01 and found.stopped, found
-    assert along_motion(scene.with_(duration=0.01)).stopped == ""
+    assert along_motion(scene).stopped == ""
+
+
+def test_a_driver_of_a_locked_loop_is_told_at_the_start():
+    with pytest.raises(
+        SceneError, match=r"driver\[A\]: contradicts the joints at t = 0, most of all at joint"
+    ):
+        along_motion(askew(find_scene("four_bar"), 0.1))
+
+
+def askew(scene, tilt):
+    """The four-bar at rest with a revolute joint B whose axis is tilted by a slope."""
+    corner = scene.joint_named("B")
+    revolute = {"name": "B", "type": "revolute", "bodies": corner.bodies, "anchor": corner.anchor_pair[0],
+                "axis": (0.0, tilt, 1.0)}  # fmt: skip
+    at_rest = [body.model_copy(update={"velocity": None, "angular_velocity": None}) for body in scene.body]
+    return scene.with_(
+        body=at_rest, joint=[revolute if joint.name == "B" else joint for joint in scene.joint]
+    )
 
 
 def test_rounded_axes_are_told_as_rounding():

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from mbref.cli import main
-from mbref.scene import Scene, SceneError
+from mbref.scene import Driver, Scene, SceneError
 from mbref.scenes import SCENES
 from mbref.scenes.spatial_slider_crank import OFFSET, RADIUS, ROD
 from mbref.simulation.ensemble import ensemble
@@ -148,6 +148,22 @@ def test_command_refuses_what_cannot_vary(text: str, says: str, capsys: pytest.C
     printed = capsys.readouterr()
     assert (status, printed.out) == (2, "")
     assert says in printed.err, printed.err
+
+
+def test_command_tells_why_variants_end_early(tmp_path: Path, capsys: pytest.CaptureFixture):
+    """A four-bar whose coupler alone is longer cannot turn over: its driver comes to a dead position."""
+    driver = Driver(joint="A", polynomial=(0.0, 3.0))
+    SCENES["four_bar_gravity"]().with_(driver=(driver,), duration=2.0).save(tmp_path / "driven.toml")
+    x = SCENES["four_bar_gravity"]().joint_named("C").anchor_pair[0][0]
+    status = main([
+        "ensemble", str(tmp_path / "driven.toml"), "--vary", f"joint[C].anchor[0]={x + 0.04}:{x + 0.06}",
+        "--count", "2", "--workers", "1", "--method", "taylor",
+    ])  # fmt: skip
+    printed = capsys.readouterr()
+    assert status == 1 and "0 of 2 variants completed" in printed.out, printed
+    assert printed.err.startswith("UNDECIDED: 2, the first of them variant 0: the drivers come to a dead"), (
+        printed
+    )
 
 
 def test_command_and_single_runs_agree(tmp_path: Path, capsys: pytest.CaptureFixture):

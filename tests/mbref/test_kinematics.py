@@ -10,7 +10,7 @@ from mbref.equations.initial_state import corrected_positions
 from mbref.equations.model import Model, displaced
 from mbref.integrators.predictor import LARGEST_TURN
 from mbref.method import MethodError
-from mbref.scene import SceneError
+from mbref.scene import Driver, SceneError
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
 
@@ -67,6 +67,23 @@ def test_kinematic_analysis_of_a_modelled_ground_without_masses():
 def test_what_only_extrapolates_needs_projection(stabilisation):
     with pytest.raises(MethodError, match="predictor only extrapolates"):
         simulate(SCENES["four_bar"](), f"alf-dual+{stabilisation}/predictor", [0.1])
+
+
+@pytest.mark.parametrize("rate", [-249.6, -124.8 * 1.01])
+def test_drivers_that_contradict_each_other_are_named(rate):
+    scene = SCENES["four_bar"]()
+    drivers = (*scene.driver, Driver(joint="D", polynomial=(0.0, rate)))
+    with pytest.raises(SceneError, match=r"driver\[A\]: the drivers of A, D contradict .* joint '[BC]'"):
+        simulate(scene.with_(driver=drivers), "kinematic", [0.01])
+
+
+@pytest.mark.parametrize("method", ["kinematic", "alf-dual+projection", "taylor"])
+def test_drivers_that_agree_drive_together(method):
+    scene = SCENES["four_bar"]()
+    both = scene.with_(driver=(*scene.driver, Driver(joint="D", polynomial=scene.driver[0].polynomial)))
+    alone, together = (simulate(s, method, [0.01]) for s in (scene, both))
+    assert together.outcome.name == "COMPLETED", together.message
+    assert np.abs(alone.position - together.position).max() < 1e-13
 
 
 def test_freedom_without_driver_is_refused():

@@ -139,6 +139,17 @@ def test_every_kind_of_entry_round_trips(tmp_path):
     assert Scene.from_file(tmp_path / "scene.toml") == scene
 
 
+def test_a_spring_between_coincident_points_needs_no_natural_length():
+    spring = {"type": "spring", "bodies": ["leaf", "bolt"], "points": [[1, 0, 2], [1, 0, 2]], "stiffness": 5}
+    data = copy.deepcopy(VALID)
+    place = len(data["load"])
+    assert (
+        Scene(**data | {"load": [*data["load"], spring | {"natural_length": 0}]}).load[place].stiffness == 5
+    )
+    faults = faults_of(data | {"load": [*data["load"], spring | {"natural_length": 0.1}]})
+    assert len(faults) == 1 and faults[0].startswith(f"load[{place}].natural_length: must be 0"), faults
+
+
 def test_unreadable_files_are_faults(tmp_path):
     with pytest.raises(SceneError, match="cannot be read"):
         Scene.from_file(tmp_path / "missing.toml")
@@ -153,7 +164,7 @@ def test_unreadable_files_are_faults(tmp_path):
         (b"a = " + b"[" * 4000 + b"]" * 4000, "is nested too deeply"),
         (b"a = " + b"1" * 5000, "is not TOML"),
         (b"a = 0x" + b"f" * 5000, "a: is not a known field"),
-        (b'name = "\xff"', "is not TOML"),
+        (b'name = "\xff"', "is no text in UTF-8"),
         (b"\x00", "is not TOML"),
     ],
 )

@@ -13,7 +13,7 @@ from mbref.cli import main
 from mbref.cli.output import Lines
 from mbref.cli.scene_files import schema, template
 from mbref.motion import Motion
-from mbref.scene import Scene, SceneError
+from mbref.scene import Driver, Scene, SceneError
 from mbref.scene_slips import link_lengths, probable_slips
 from mbref.scenes import SCENES, find_scene
 
@@ -211,6 +211,23 @@ def test_new_draw_assemble_and_diagnose(tmp_path, monkeypatch, capsys):
     found = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert found["redundant"] == 3 and found["links"]["crank"] == {"A–B": pytest.approx(0.25)}
     assert {"A": "cylindrical", "B": "spherical"} in found["exchanges"] and found["along_motion"] is None
+
+
+def test_diagnose_tells_a_locked_loop_and_drivers_too_many(tmp_path, capsys):
+    scene = find_scene("four_bar_gravity").with_(duration=0.1)
+    pins = [{"name": j.name, "type": "revolute", "bodies": j.bodies, "anchor": j.anchor_pair[0],
+             "axis": (0.0, 0.0, 1.0)} for j in scene.joint]  # fmt: skip
+    scene = scene.with_(joint=pins)
+    scene.with_("joint[A].axis", [0.0, 0.1, 1.0]).save(tmp_path / "locked.toml")
+    assert main(["diagnose", str(tmp_path / "locked.toml")]) == 0
+    out = capsys.readouterr().out
+    assert "degrees of freedom  0" in out and "along the motion of 0.1 s, in which nothing moves" in out, out
+    assert "nearest singular    at t = 0 s: smallest singular value" in out, out
+    drivers = [Driver(joint=name, polynomial=(0.0, 1.0)) for name in "AD"]
+    scene.with_(driver=drivers).save(tmp_path / "driven.toml")
+    assert main(["diagnose", str(tmp_path / "driven.toml")]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last == "  more drivers than degrees of freedom (2 and 1): redundant rows remain"
 
 
 def test_run_writes_csv_and_json_and_animate_a_moving_picture(tmp_path, capsys, monkeypatch):

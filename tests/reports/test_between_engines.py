@@ -46,13 +46,23 @@ def test_reaction_table_and_differences_put_in():
 
 
 def test_choices_shown_where_joints_are_redundant():
-    group = runs_of("planar_slider_crank_gravity")
+    group = runs_of("five_bar")
     blocks = reactions.render(group)
     tables = [block for block in blocks if isinstance(block, Table)]
     assert len(tables) == 2 and "choice" in tables[1].caption, [t.caption for t in tables]
     assert list(tables[1].header) == ["Joint", "pinocchio", "mujoco"], tables[1].header
     times = group.runs[0].record["times"]
     assert f"at t = {times[len(times) // 2]:.3g} s" in tables[1].caption, tables[1].caption
+    shares = [[float(cell) for cell in row[1:]] for row in tables[1].rows]
+    assert max(map(max, shares)) > 1, f"N, of reactions of about 100 N: {shares}"
+
+
+def test_choices_that_are_rounding_are_told_as_zero():
+    blocks = reactions.render(runs_of("planar_slider_crank_gravity"))
+    assert len([block for block in blocks if isinstance(block, Table)]) == 1
+    assert [b.text for b in blocks if isinstance(b, Text)] == [
+        "At t = 0.005 s the components that redundancy leaves open are 0 in every engine."
+    ]
 
 
 def test_acceleration_table_and_differences_put_in():

@@ -17,7 +17,7 @@ from crosscheck.judge.joint_residuals import driver_value
 from crosscheck.judge.loads import Motion, world_inertia, wrenches
 from crosscheck.judge.reference.start_velocities import given
 from crosscheck.judge.tolerances import FREEDOM, ON_PATH, PARALLEL, TRUTH_DRIVEN, TRUTH_DYNAMIC
-from crosscheck.judge.truth.picard import REAL, Solution
+from crosscheck.judge.truth.picard import REAL, NoSolution, Solution
 from mbref import rotations
 from mbref.scene import Cylindrical, Driver, Revolute, Scene, TorsionSpring
 from mbref.trajectory import Trajectory
@@ -115,9 +115,13 @@ class Reduced:
         self._solution = Solution(self._derivative, start, 0.3 / (pace * root[0]))
 
     def __call__(self, times: np.ndarray) -> tuple[np.ndarray, ...]:
-        """q, q', q'' (k,) at times (k,) ≥ 0."""
-        turns, rest = self._turns(np.asarray(times, dtype=REAL))
-        q, s, _ = self._solution.where(2, rest).T
+        """q, q', q'' (k,) at times (k,) ≥ 0; raises NoSolution with the time at which the motion ends."""
+        try:
+            turns, rest = self._turns(np.asarray(times, dtype=REAL))
+            q, s, _ = self._solution.where(2, rest).T
+        except NoSolution:  # which tells σ
+            end = float(self._solution.reach(lambda _: True)[2])
+            raise NoSolution(f"the solution ends at t = {end:.9g}", float(np.nextafter(end, 0.0))) from None
         root = self._terms(q, s)[0]
         rate = s / root
         _, push, half_slope = self._terms(q, rate)
