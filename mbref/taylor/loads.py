@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import pi
 
-from numpy import arctan2, cos, floor, sin, sqrt
+from numpy import arctan2, cos, floor, inf, sin, sqrt
 
 from mbref.kernels.compilation import inlined, kernel
 
@@ -96,6 +96,44 @@ def add_springs(k, memory):
             value, form = product(of[PULL], of[c], k), springs.form[3 * s + c]
             for i in range(nz):
                 sums[k, i] += value * form[i]
+
+
+@kernel
+def time_to_no_length(memory):
+    """The shortest time (s) in which the ends of a spring could meet at their speed; infinite without any.
+
+    The force of a spring with a natural length turns around there.  Beyond that time its series is rounding:
+    a small length divides it.
+    """
+    springs, shortest = memory.polynomials.springs, inf
+    for s in range(springs.stiffness.shape[0]):
+        of, speed = memory.series.springs[SPRING_SERIES * s : SPRING_SERIES * (s + 1)], 0.0
+        for c in range(3):
+            speed += of[VECTOR_OF + c, 1] * of[VECTOR_OF + c, 1]
+        if springs.natural[s] > 0.0 and speed > 0.0:
+            shortest = min(shortest, of[LENGTH, 0] / sqrt(speed))
+    return shortest
+
+
+@kernel
+def part_behind_no_length(memory):
+    """The part of a step behind a position where a spring has no length, at which its force turns around; 0
+    for none.
+
+    Such a spring has turned by more than a right angle.  Its series goes on with a negative length.
+    """
+    springs, series, largest = memory.polynomials.springs, memory.series, 0.0
+    for s in range(springs.stiffness.shape[0]):
+        before, behind, along = 0.0, 0.0, 0.0
+        for c in range(3):
+            form, there, here = springs.form[3 * s + c], springs.constant[s, c], springs.constant[s, c]
+            for i in range(form.shape[0]):
+                there += form[i] * series.past[0, i]
+                here += form[i] * series.terms[0, i]
+            before, behind, along = before + there * there, behind + here * here, along + there * here
+        if springs.natural[s] > 0.0 and along < 0.0:
+            largest = max(largest, sqrt(behind) / (sqrt(before) + sqrt(behind)))
+    return largest
 
 
 @kernel

@@ -23,7 +23,13 @@ from mbref.taylor.correction import correct, violation
 from mbref.taylor.crossing import is_at_crossing
 from mbref.taylor.lanes import LANES, load, store
 from mbref.taylor.layout import BEGIN, EXPAND, STEP
-from mbref.taylor.loads import ANGLE, TORSION_SERIES, expand_drivers
+from mbref.taylor.loads import (
+    ANGLE,
+    TORSION_SERIES,
+    expand_drivers,
+    part_behind_no_length,
+    time_to_no_length,
+)
 from mbref.taylor.partition import choose
 from mbref.taylor.passage import (
     BEFORE,
@@ -54,7 +60,7 @@ LOST_ROWS = 100.0  # tolerances by which rows may be off
 SHORTER = 0.7
 LOOSER = 1e4  # of rates in a passage: they count where a step is short beside the motion's own time
 NEARLY = 0.2  # of a step's first pivot: a step that ends nearer to a singular position is tried beyond it
-OVER = 1.25  # its length then, over the distance
+OVER = 1.25  # its length then, over the distance; the same to where a spring has no length
 
 
 @exchangeable(EXPAND)
@@ -72,7 +78,8 @@ def longest_step(tolerance, memory):
     """The step at which the last two terms of the series are as large as the tolerance.
 
     So are those of its rate, over the largest rate where that is above 1; in a passage, which asks for
-    rounding anyway, they may be LOOSER, and do not count near a singular position.
+    rounding anyway, they may be LOOSER, and do not count near a singular position.  It is at
+    most clearly over the time in which a spring's ends could meet.
     """
     progress, control, past = memory.progress, memory.run.control, memory.series.past
     counts, variables = memory.run.equations.system.counts, memory.solver.order.shape[0]
@@ -87,7 +94,7 @@ def longest_step(tolerance, memory):
             shortest = min(shortest, log(tolerance / size) / k)
             if counted:
                 shortest = min(shortest, log(of_rates / (k * size)) / (k - 1))
-    h = exp(shortest)
+    h = min(exp(shortest), OVER * time_to_no_length(memory))
     if counts.steps == 0 and control.first_step > 0.0:
         h = min(h, control.first_step)
     return h
@@ -114,7 +121,10 @@ def remember_series(memory):
 
 @kernel
 def judge(h, last, memory):
-    """OK where rows and accelerations at the end of a step are off by no more than the tolerance explains."""
+    """OK where rows and accelerations at the end of a step are off by no more than the tolerance explains.
+
+    Behind a position where a spring has no length, all of the time counts in which accelerations are off.
+    """
     progress, state, terms = memory.progress, memory.state, memory.series.terms
     if not progress.violation <= LOST_ROWS * progress.tolerance + ROUNDING:
         return STEP_TOO_SMALL
@@ -127,6 +137,9 @@ def judge(h, last, memory):
         size = larger(size, state[2, i] * h * h)
     if not isfinite(off):
         return NOT_FINITE
+    rates = size_of(memory.series.past, 1, memory.solver.order.shape[0])
+    if off * part_behind_no_length(memory) > exactness_across(progress) * rates * h:
+        return STEP_TOO_SMALL
     lost = LOST_MOTION * progress.order * progress.order * exactness_across(progress)
     return OK if off <= lost + NOISE * size else STEP_TOO_SMALL
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from crosscheck.conformance.closed_forms import CLOSED_FORMS, pendulum, torsion
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
-from mbref.scene import Body, Driver, Revolute, Scene, Sine
+from mbref.scene import Body, Driver, Revolute, Scene, Sine, Spring
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
 
@@ -101,3 +102,42 @@ def test_a_body_that_spins_fast():
     run = simulate(scene, "taylor", times, Limits(rtol=1e-11))
     exact = truth_for(scene, reference_time=600.0).poses(times)
     assert rotations.angle_between(run.orientation, exact.orientation).max() < 1e-9
+
+
+def angle_of_bar(beside: float, duration: float) -> float:
+    """The angle (rad) of the bar of the test below, by the equation of its one degree of freedom."""
+
+    def rates(t, y):
+        tip, turned = (
+            0.4 * np.array([np.cos(y[0]), np.sin(y[0])]),
+            0.4 * np.array([-np.sin(y[0]), np.cos(y[0])]),
+        )
+        vector = tip - [beside - 0.4, 0.0]
+        length = np.sqrt(vector @ vector)
+        return y[1], -20.0 * (1.0 - 0.3 / length) * (vector @ turned) / (0.0133 + 0.04)
+
+    def meets(t, y):
+        return y[0] - np.pi
+
+    meets.terminal = True
+    options = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13}
+    first = solve_ivp(rates, (0.0, duration), (0.0, 5.0), events=meets, **options)
+    behind = first.y[:, -1] + [1e-15, 0.0]
+    return solve_ivp(rates, (first.t[-1], duration), behind, **options).y[0, -1]
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
+@pytest.mark.parametrize("beside", [0.0, 1e-9, 1e-4])
+def test_a_spring_whose_ends_meet(beside, rtol):
+    """Where a spring has no length its force turns around; a series would go on with a negative length."""
+    bar = Body(name="bar", mass=1.0, inertia=(0.001, 0.0133, 0.0133), position=(0.2, 0.0, 0.0),
+               velocity=(0.0, 1.0, 0.0), angular_velocity=(0.0, 0.0, 5.0))  # fmt: skip
+    bodies, ends = ("ground", "bar"), ((beside - 0.4, 0.0, 0.0), (0.4, 0.0, 0.0))
+    scene = Scene(
+        name="meeting", body=(bar,), duration=0.7,
+        joint=(Revolute(name="A", bodies=bodies, anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),),
+        load=(Spring(bodies=bodies, points=ends, stiffness=20.0, natural_length=0.3),),
+    )  # fmt: skip
+    run = simulate(scene, "taylor", [0.0, 0.7], Limits(rtol=rtol))
+    assert run.outcome.name == "COMPLETED", run.message
+    assert abs(run.joint("A").angle[-1] - angle_of_bar(beside, 0.7)) < 30.0 * rtol
