@@ -58,6 +58,12 @@ def add_loads(k, memory):
     add_torsions(k, memory)
 
 
+@inlined
+def has_direction(s, springs):
+    """Whether the force of a spring depends on its direction; else it is linear in the variables."""
+    return springs.natural[s] > 0.0 or springs.damping[s] > 0.0
+
+
 @kernel
 def grow_springs(k, memory):
     """Order k of the springs' vectors, lengths and inverses; order k - 1 of their rates."""
@@ -71,7 +77,7 @@ def grow_springs(k, memory):
         length, inverse = of[LENGTH], of[INVERSE]
         if k == 0:
             length[0] = sqrt(square)
-            inverse[0] = 1.0 / length[0]
+            inverse[0] = 1.0 / length[0] if has_direction(s, springs) else 0.0
         else:
             for i in range(1, k):
                 square -= length[i] * length[k - i]
@@ -102,15 +108,15 @@ def add_springs(k, memory):
 def time_to_no_length(memory):
     """The shortest time (s) in which the ends of a spring could meet at their speed; infinite without any.
 
-    The force of a spring with a natural length turns around there.  Beyond that time its series is rounding:
-    a small length divides it.
+    Beyond that time the series of a force that has the direction of its spring is rounding: a small length
+    divides it.
     """
     springs, shortest = memory.polynomials.springs, inf
     for s in range(springs.stiffness.shape[0]):
         of, speed = memory.series.springs[SPRING_SERIES * s : SPRING_SERIES * (s + 1)], 0.0
         for c in range(3):
             speed += of[VECTOR_OF + c, 1] * of[VECTOR_OF + c, 1]
-        if springs.natural[s] > 0.0 and speed > 0.0:
+        if has_direction(s, springs) and speed > 0.0:
             shortest = min(shortest, of[LENGTH, 0] / sqrt(speed))
     return shortest
 

@@ -126,18 +126,35 @@ def angle_of_bar(beside: float, duration: float) -> float:
     return solve_ivp(rates, (first.t[-1], duration), behind, **options).y[0, -1]
 
 
+def sprung_bar(speed: float, ends: tuple, **spring: float) -> Scene:
+    """A bar that turns on a hinge at a speed (rad/s), with a spring between the ground and it."""
+    bar = Body(name="bar", mass=1.0, inertia=(0.001, 0.0133, 0.0133), position=(0.2, 0.0, 0.0),
+               velocity=(0.0, 0.2 * speed, 0.0), angular_velocity=(0.0, 0.0, speed))  # fmt: skip
+    bodies = ("ground", "bar")
+    return Scene(
+        name="meeting", body=(bar,), duration=0.7,
+        joint=(Revolute(name="A", bodies=bodies, anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),),
+        load=(Spring(bodies=bodies, points=ends, stiffness=20.0, **spring),),
+    )  # fmt: skip
+
+
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 @pytest.mark.parametrize("beside", [0.0, 1e-9, 1e-4])
 def test_a_spring_whose_ends_meet(beside, rtol):
     """Where a spring has no length its force turns around; a series would go on with a negative length."""
-    bar = Body(name="bar", mass=1.0, inertia=(0.001, 0.0133, 0.0133), position=(0.2, 0.0, 0.0),
-               velocity=(0.0, 1.0, 0.0), angular_velocity=(0.0, 0.0, 5.0))  # fmt: skip
-    bodies, ends = ("ground", "bar"), ((beside - 0.4, 0.0, 0.0), (0.4, 0.0, 0.0))
-    scene = Scene(
-        name="meeting", body=(bar,), duration=0.7,
-        joint=(Revolute(name="A", bodies=bodies, anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),),
-        load=(Spring(bodies=bodies, points=ends, stiffness=20.0, natural_length=0.3),),
-    )  # fmt: skip
+    scene = sprung_bar(5.0, ((beside - 0.4, 0.0, 0.0), (0.4, 0.0, 0.0)), natural_length=0.3)
     run = simulate(scene, "taylor", [0.0, 0.7], Limits(rtol=rtol))
     assert run.outcome.name == "COMPLETED", run.message
     assert abs(run.joint("A").angle[-1] - angle_of_bar(beside, 0.7)) < 30.0 * rtol
+
+
+@pytest.mark.parametrize(
+    ("place", "damping"), [(0.4, 0.0), (-0.4, 0.5)], ids=["coincide at the start", "meet, with a damper"]
+)
+def test_a_spring_without_a_natural_length(place, damping):
+    """Its force is linear in the coordinates; that of a damper has the direction of the spring."""
+    scene = sprung_bar(12.0, ((place, 0.0, 0.0), (0.4, 0.0, 0.0)), natural_length=0.0, damping=damping)
+    run = simulate(scene, "taylor", [0.0, 0.7], Limits(rtol=1e-9))
+    other = simulate(scene, "alf-dual", [0.0, 0.7], Limits(rtol=1e-10))
+    assert run.outcome.name == "COMPLETED", run.message
+    assert np.abs(run.joint("A").angle - other.joint("A").angle).max() < 1e-8
