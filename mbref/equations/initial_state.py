@@ -107,7 +107,7 @@ def consistent_starts(scenes: Alike) -> list[Start | SceneError]:
 
 
 class Rates(NamedTuple):
-    """What the velocities (n,) of a scene are found from: those given, which those are, ν, and Φ_q (m, n) of
+    """The equations of a scene's velocities (n,): the given ones, a mask of them, ν, and Φ_q (m, n) for
     velocities over their ``scale`` (n,), or blocks (m, 12) of Φ_q itself where it is large."""
 
     v: np.ndarray

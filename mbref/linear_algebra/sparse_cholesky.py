@@ -32,7 +32,7 @@ def product_of_rows(factor, entry):
 
 @inlined
 def eliminate(value, factor, entry):
-    """A number of S + I/α less what the columns of L before its own take from it."""
+    """A number of S + I/α less the products of the numbers of L in its row and column of earlier columns."""
     symbolic, l, scaled = factor.symbolic, factor.l, factor.scaled
     start, left, right = symbolic.update_start, symbolic.update_left, symbolic.update_right
     for p in range(start[entry], start[entry + 1]):

@@ -137,9 +137,11 @@ def judge(h, last, memory):
         size = larger(size, state[2, i] * h * h)
     if not isfinite(off):
         return NOT_FINITE
-    rates = size_of(memory.series.past, 1, memory.solver.order.shape[0])
-    if off * part_behind_no_length(memory) > exactness_across(progress) * rates * h:
-        return STEP_TOO_SMALL
+    part = part_behind_no_length(memory)
+    if part > 0.0:
+        rates = size_of(memory.series.past, 1, memory.solver.order.shape[0])
+        if off * part > exactness_across(progress) * rates * h:
+            return STEP_TOO_SMALL
     lost = LOST_MOTION * progress.order * progress.order * exactness_across(progress)
     return OK if off <= lost + NOISE * size else STEP_TOO_SMALL
 
