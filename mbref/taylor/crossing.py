@@ -19,10 +19,20 @@ LOST_ROW = 1e-6  # of the largest pivot: formulations may take a row with less f
 
 
 @kernel
+def is_square(memory):
+    """Whether the independent rows determine all variables."""
+    return memory.progress.rank == memory.solver.order.shape[0]
+
+
+@kernel
 def remember_gradient(memory):
-    """Keep G where the step began."""
+    """Keep G where the step began, of a square one its determinant."""
     put_gradient(memory.series.past, memory)
-    keep_gradient(memory)
+    if is_square(memory):
+        progress = memory.progress
+        progress.past_negative, progress.past_logarithm = determinant_of_rows(memory)
+    else:
+        keep_gradient(memory)
 
 
 @kernel
@@ -37,9 +47,28 @@ def keep_gradient(memory):
 @kernel
 def overlap(y, memory):
     """Whether det(G Gᵀ₀) of the independent rows is negative, and its logarithm: G at variables y[0]."""
+    put_gradient(y, memory)
+    if is_square(memory):
+        negative, size = determinant_of_rows(memory)
+        return negative != memory.progress.past_negative, size + memory.progress.past_logarithm
+    return overlap_of_rows(memory)
+
+
+@kernel
+def determinant_of_rows(memory):
+    """Whether det G of a square gradient in ``work`` is negative, and its logarithm."""
+    solver, rank = memory.solver, memory.progress.rank
+    for i in range(rank):
+        for c in range(rank):
+            solver.product[i, c] = solver.work[solver.row[i], c]
+    return determinant(solver.product, rank)
+
+
+@kernel
+def overlap_of_rows(memory):
+    """The same as ``overlap``, of the gradient in ``work``."""
     solver, rank = memory.solver, memory.progress.rank
     product, past, work = solver.product, solver.past_gradient, solver.work
-    put_gradient(y, memory)
     for i in range(rank):
         for j in range(rank):
             product[i, j] = 0.0
@@ -55,20 +84,22 @@ def overlap(y, memory):
 def changes_sign(h, parts, memory):
     """Whether the determinant of the gradients at both ends of a step of h seconds is negative.
 
-    A long step is looked at in parts, because rows that turn by a right angle change the sign too.  The
-    gradient where the step began is kept.
+    A long step is looked at in parts, because rows that turn by a right angle change the sign too, and two
+    changes leave it.  The gradient where the step began is kept.
     """
-    series, changes = memory.series, False
+    series, changes, square = memory.series, False, is_square(memory)
     remember_gradient(memory)
     for part in range(1, parts):
         evaluate_series(h * part / parts, memory)
         negative, _ = overlap(memory.state, memory)
         changes = changes or negative
-        keep_gradient(memory)
+        if not square:
+            keep_gradient(memory)
     negative, _ = overlap(series.terms, memory)
     if parts > 1:
         evaluate_series(h, memory)
-        remember_gradient(memory)
+        if not square:
+            remember_gradient(memory)
     return changes or negative
 
 
