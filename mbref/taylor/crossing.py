@@ -1,7 +1,7 @@
 """Where a step crosses a singular position: determinants of the constraint gradients at both its ends.
 
-det(G Gᵀ₀) changes its sign where branches cross, G₀ being the gradient where the step began; of a square G it is
-det G det G₀, and det G at both ends is the product of the pivots.
+det(G Gᵀ₀) changes its sign where branches cross, G₀ being the gradient where the step began; of a square G
+it is det G det G₀, and det G at both ends is the product of the pivots.
 """
 
 from __future__ import annotations
