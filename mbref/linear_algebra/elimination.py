@@ -84,6 +84,18 @@ def determinant(a, n):
 
 
 @kernel
+def product(pivots, n):
+    """The product of the first n pivots: whether it is negative, and the logarithm of its size."""
+    negative, size, part = False, 0.0, 1.0
+    for k in range(n):
+        negative = negative != (pivots[k] < 0.0)
+        part *= max(abs(pivots[k]), 1e-150)
+        if not 1e-150 < part < 1e150:
+            size, part = size + log(part), 1.0
+    return negative, size + log(part)
+
+
+@kernel
 def full_pivot(a, m, n, rows, columns, tolerance):
     """Gaussian elimination with full pivoting of a[:m, :n], in place; returns the rank (Eq. 10).
 

@@ -1,6 +1,7 @@
 """Where a step crosses a singular position: determinants of the constraint gradients at both its ends.
 
-det(G Gᵀ₀) changes its sign where branches cross, G₀ being the gradient where the step began.
+det(G Gᵀ₀) changes its sign where branches cross, G₀ being the gradient where the step began; of a square G
+it is det G det G₀, and det G at both ends is the product of the pivots.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 from numpy import exp
 
 from mbref.kernels.compilation import kernel
-from mbref.linear_algebra.elimination import determinant
+from mbref.linear_algebra.elimination import determinant, product
 from mbref.taylor.partition import put_gradient
 from mbref.taylor.samples import evaluate_series
 
@@ -19,10 +20,23 @@ LOST_ROW = 1e-6  # of the largest pivot: formulations may take a row with less f
 
 
 @kernel
+def is_square(memory):
+    """Whether the independent rows determine all variables."""
+    return memory.progress.rank == memory.solver.order.shape[0]
+
+
+@kernel
 def remember_gradient(memory):
-    """Keep G where the step began."""
-    put_gradient(memory.series.past, memory)
-    keep_gradient(memory)
+    """Keep G where the step began; of a square one its determinant, by the pivots if they are of its rows."""
+    progress, rank = memory.progress, memory.progress.rank
+    if not is_square(memory):
+        put_gradient(memory.series.past, memory)
+        keep_gradient(memory)
+    elif progress.choice == progress.past_choice:
+        progress.past_negative, progress.past_logarithm = product(memory.solver.past, rank)
+    else:
+        put_gradient(memory.series.past, memory)
+        progress.past_negative, progress.past_logarithm = determinant_of_rows(memory)
 
 
 @kernel
@@ -37,38 +51,78 @@ def keep_gradient(memory):
 @kernel
 def overlap(y, memory):
     """Whether det(G Gᵀ₀) of the independent rows is negative, and its logarithm: G at variables y[0]."""
-    solver, rank = memory.solver, memory.progress.rank
-    product, past, work = solver.product, solver.past_gradient, solver.work
     put_gradient(y, memory)
+    if is_square(memory):
+        negative, size = determinant_of_rows(memory)
+        return negative != memory.progress.past_negative, size + memory.progress.past_logarithm
+    return overlap_of_rows(memory)
+
+
+@kernel
+def determinant_of_rows(memory):
+    """Whether det G of a square gradient in ``work`` is negative, and its logarithm: of rows and variables as
+    they were chosen, so that it is the product of the pivots."""
+    solver, rank = memory.solver, memory.progress.rank
+    for i in range(rank):
+        for c in range(rank):
+            solver.product[i, c] = solver.work[solver.row[i], solver.order[c]]
+    return determinant(solver.product, rank)
+
+
+@kernel
+def overlap_at_end(memory):
+    """The same as ``overlap`` where the step ends."""
+    if not is_square(memory):
+        return overlap(memory.series.terms, memory)
+    negative, size = product(memory.solver.last, memory.progress.rank)
+    return negative != memory.progress.past_negative, size + memory.progress.past_logarithm
+
+
+@kernel
+def size_at_start(memory):
+    """The logarithm of det(G₀ Gᵀ₀)."""
+    if is_square(memory):
+        return 2.0 * memory.progress.past_logarithm
+    _, size = overlap(memory.series.past, memory)
+    return size
+
+
+@kernel
+def overlap_of_rows(memory):
+    """The same as ``overlap``, of the gradient in ``work``."""
+    solver, rank = memory.solver, memory.progress.rank
+    products, past, work = solver.product, solver.past_gradient, solver.work
     for i in range(rank):
         for j in range(rank):
-            product[i, j] = 0.0
+            products[i, j] = 0.0
         for c in range(work.shape[1]):
             entry = work[solver.row[i], c]
             if entry != 0.0:
                 for j in range(rank):
-                    product[i, j] += entry * past[c, j]
-    return determinant(product, rank)
+                    products[i, j] += entry * past[c, j]
+    return determinant(products, rank)
 
 
 @kernel
 def changes_sign(h, parts, memory):
     """Whether the determinant of the gradients at both ends of a step of h seconds is negative.
 
-    A long step is looked at in parts, because rows that turn by a right angle change the sign too.  The
-    gradient where the step began is kept.
+    A long step is looked at in parts, because rows that turn by a right angle change the sign too, and two
+    changes leave it.  The gradient where the step began is kept.
     """
-    series, changes = memory.series, False
+    changes, square = False, is_square(memory)
     remember_gradient(memory)
     for part in range(1, parts):
         evaluate_series(h * part / parts, memory)
         negative, _ = overlap(memory.state, memory)
         changes = changes or negative
-        keep_gradient(memory)
-    negative, _ = overlap(series.terms, memory)
+        if not square:
+            keep_gradient(memory)
+    negative, _ = overlap_at_end(memory)
     if parts > 1:
         evaluate_series(h, memory)
-        remember_gradient(memory)
+        if not square:
+            remember_gradient(memory)
     return changes or negative
 
 
@@ -101,9 +155,9 @@ def sign_change(h, memory):
     several loops are flat at once and the root is a multiple one, by halving.  It ends where the estimate
     that would follow differs by less than CLOSE of the step, changes going on to fall at their last ratio.
     """
-    _, unit = overlap(memory.series.past, memory)
+    unit, (negative, size) = size_at_start(memory), overlap_at_end(memory)
     start, end, middle, changed = 0.0, h, -h, h
-    before, after = 1.0, value_at(end, unit, memory)
+    before, after = 1.0, signed(negative, size - unit)
     if not after < 0.0:
         return -1.0
     replaced, value_there = start, before
@@ -140,7 +194,13 @@ def value_at(h, unit, memory):
     """The determinant at a distance h (s) from the step's beginning, over one of a logarithm."""
     evaluate_series(h, memory)
     negative, size = overlap(memory.state, memory)
-    return -exp(size - unit) if negative else exp(size - unit)
+    return signed(negative, size - unit)
+
+
+@kernel
+def signed(negative, logarithm):
+    """A number by its sign and the logarithm of its size."""
+    return -exp(logarithm) if negative else exp(logarithm)
 
 
 @kernel

@@ -177,6 +177,8 @@ class Progress(NamedTuple):
     )
     past_pivot: float = 1.0  # the least of G where the step began
     approaching: int = 1  # whether it is less than where the step before began, which did not cross
+    past_negative: int = 0  # whether det G of a square gradient is negative where the step began
+    past_logarithm: float = 0.0  # of its size
     largest_pivot: float = 0.1  # that the least one has been, of rows of length one about
     passing: int = 0  # whether singular positions are passed, or run up to
     clearance: float = 0.0  # from singular positions, over that at which a passage ends

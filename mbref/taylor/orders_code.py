@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from llvmlite import ir
 
+from mbref.taylor import layout
 from mbref.taylor.instructions import WHOLE, Blocks, Instructions, constant
 from mbref.taylor.lanes import LANES
 from mbref.taylor.layout import TaylorMemory
@@ -36,8 +37,9 @@ class Factors(NamedTuple):
 class Orders:
     """The orders of a series from the first two, by the response; two at a time share their factors."""
 
-    def __init__(self, taylor: TaylorMemory, write: Instructions):
-        self._taylor, self._write, products = taylor, write, taylor.polynomials.products
+    def __init__(self, taylor: TaylorMemory, write: Instructions, products: layout.Products | None = None):
+        products = products or taylor.polynomials.products
+        self._taylor, self._write, self._products = taylor, write, products
         solver, given = taylor.solver, taylor.polynomials.given
         self._equations = solver.order.size + solver.row.size
         self._functions = range(self._equations, self._equations + given.driver.size)
@@ -84,7 +86,7 @@ class Orders:
     # --- products -----------------------------------------------------------------------------------------
     def _factors(self, k: ir.Value, row: Blocks) -> dict[int, Factors]:
         """The factors of order k by the places of their slots, kept for later orders."""
-        write, products, known = self._write, self._taylor.polynomials.products, {}
+        write, products, known = self._write, self._products, {}
         place, factors = write.multiplied(k, self._slots), {}
         for c in range(0, self._slots, LANES):
             weight = self._weights[c // LANES]
@@ -137,16 +139,27 @@ class Orders:
     ) -> Blocks:
         """Order k + 2 of the terms, stored; the sums known before the newest products are added up first."""
         write, place, sums = self._write, self._write.multiplied(k, self._lanes), []
-        start = self._taylor.polynomials.products.start
         for b in self._blocks:
-            slots = range(start[b], start[b + 1], LANES)
-            parts = [known[c] for c in slots if c in known] + self._linear_forces(place, b)
+            others = self._linear_forces(place, b)
             if force is not None:
-                parts.append(constant(-force[b * LANES : (b + 1) * LANES]))
-            parts = [write.total(parts)] if parts else []
-            parts += [product for c in slots if c in newest for product in newest[c]]
-            sums.append(write.product(write.block(self._scale, place, b * LANES), write.total(parts)))
+                others.append(constant(-force[b * LANES : (b + 1) * LANES]))
+            total = self._total(b, known, newest, others)
+            sums.append(write.product(write.block(self._scale, place, b * LANES), total))
         return self._respond(place, sums)
+
+    def _total(
+        self,
+        block: int,
+        known: Products,
+        newest: dict[int, tuple[ir.Value, ...]],
+        others: Blocks | None = None,
+    ) -> ir.Value:
+        """The sum of a block's products and of others, the newest last."""
+        write, start = self._write, self._products.start
+        slots = range(start[block], start[block + 1], LANES)
+        parts = [known[c] for c in slots if c in known] + (others or [])
+        parts = [write.total(parts)] if parts else []
+        return write.total([*parts, *(product for c in slots if c in newest for product in newest[c])])
 
     def _linear_forces(self, place: ir.Value, block: int) -> list[ir.Value]:
         """Minus the forces that are linear in the variables."""

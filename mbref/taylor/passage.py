@@ -20,7 +20,7 @@ from mbref.kernels.compilation import kernel
 from mbref.kernels.layout import OK
 from mbref.linear_algebra.vectors import copy, larger
 from mbref.simulation.stepping import SINGULAR_AHEAD, STEP_TOO_SMALL, UNDECIDED
-from mbref.taylor.crossing import changes_sign, least_between, overlap, size_at
+from mbref.taylor.crossing import changes_sign, least_between, overlap_at_end, size_at, size_at_start
 from mbref.taylor.partition import kept_pivot
 from mbref.taylor.samples import evaluate_series
 from mbref.taylor.turning import pivot_of_turning, turns_back
@@ -137,9 +137,8 @@ def inside(h, pivot, memory):
     """The logarithms of the determinant where a least pivot vanishes that falls and rises linearly, and of
     the lesser one at the ends of a step of h seconds."""
     past = memory.progress.past_pivot
-    _, behind = overlap(memory.series.terms, memory)
-    _, before = overlap(memory.series.past, memory)
-    return size_at(h * past / (past + pivot), memory), min(before, behind)
+    _, behind = overlap_at_end(memory)
+    return size_at(h * past / (past + pivot), memory), min(size_at_start(memory), behind)
 
 
 @kernel

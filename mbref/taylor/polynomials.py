@@ -154,6 +154,11 @@ def _products(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Produ
                 for target, factor in dict.fromkeys([(one, other), (other, one)]):
                     if target < nz:
                         terms[target].append((nz + r, factor, twice * coefficient))
+    return products_of_lanes(terms)
+
+
+def products_of_lanes(terms: Sequence[Sequence[tuple]]) -> Products:
+    """Products by the factors and weights of each lane's, blocks of slots filled up."""
     slots, start = _slots(terms, (0, 0, 0.0))
     return Products(*_columns(slots, 2), start)
 

@@ -13,6 +13,7 @@ from mbref.kernels.machine_code import Code, code_at, processor
 from mbref.specialised import Untraceable
 from mbref.taylor import correction_code, elimination_code, orders_code
 from mbref.taylor.correction_code import Correction
+from mbref.taylor.driven_code import DrivenOrders
 from mbref.taylor.elimination_code import Elimination
 from mbref.taylor.instructions import Instructions, function_type
 from mbref.taylor.lanes import LANES
@@ -69,7 +70,8 @@ def write_code(taylor: TaylorMemory) -> str:
     module, names = ir.Module(), functions_of(taylor)
     if EXPAND in names:
         write = Instructions(module, EXPAND, orders_code.POINTERS, counts=orders_code.COUNTS)
-        Orders(taylor, write).put()
+        orders = DrivenOrders if rank_of(taylor) == taylor.solver.order.size else Orders
+        orders(taylor, write).put()
         write.end()
     if FACTORISE in names:
         write = Instructions(module, FACTORISE, *elimination_code.POINTERS)

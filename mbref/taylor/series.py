@@ -105,7 +105,7 @@ def expand_with_springs(last, memory):
 def expand(memory):
     """All orders of the variables from the first two, which are consistent."""
     springs, torsions = memory.polynomials.springs, memory.polynomials.torsions
-    if memory.code.expand != 0:
+    if memory.code.expand != 0 and memory.code.rank == memory.progress.rank:
         series, solver = memory.series, memory.solver
         expand_by_code(
             memory.code.expand, series.terms, solver.response, series.left, series.right, series.scale,

@@ -12,7 +12,7 @@ from mbref.cli.run import show
 from mbref.equations.joint_reactions import reactions
 from mbref.equations.model import Model
 from mbref.formulations import FORMULATIONS
-from mbref.linear_algebra.elimination import determinant
+from mbref.linear_algebra.elimination import determinant, product
 from mbref.scene import (
     Body,
     Driver,
@@ -79,6 +79,13 @@ def test_body_on_a_driven_slide(t: float):
 def test_the_sign_of_a_determinant(rows, negative):
     sign, size = determinant(np.array(rows), len(rows))
     assert sign == negative and np.exp(size) == pytest.approx(abs(np.linalg.det(rows)))
+
+
+@pytest.mark.parametrize("pivots", ([2.0, -3.0, 0.5], [-1.0, -2.0], [1e-120, -1e-120, 4.0], []))
+def test_the_product_of_pivots(pivots):
+    negative, size = product(np.array(pivots), len(pivots))
+    assert negative == (np.prod(np.sign(pivots)) < 0.0)
+    assert size == pytest.approx(np.sum(np.log(np.abs(pivots))))
 
 
 def test_cost_that_a_run_prints(capsys):

@@ -6,6 +6,7 @@ import pytest
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from mbref.kernels.layout import OK
 from mbref.method import Method, MethodError
+from mbref.scene import Driver
 from mbref.scenes import SCENES, find_scene
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.simulate import Limits, simulate, why_no_code
@@ -33,6 +34,23 @@ def terms(scene, code):
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_terms_are_those_of_the_kernels(name):
     generic, own = (terms(SCENES[name](), code) for code in ("generic", "specialised"))
+    assert np.abs(generic - own).max() <= 1e-11 * np.abs(generic).max()
+
+
+@pytest.mark.parametrize(
+    ("name", "joint"),
+    (("planar_slider_crank", "A"), ("planar_slider_crank", "B"), ("bennett", "R1"), ("bricard", "P0")),
+)
+def test_terms_of_driven_mechanisms_are_those_of_the_kernels(name, joint):
+    """Of 3, 5, 8 and 18 rows."""
+    scene = SCENES[name]()
+    at_rest = (
+        b.model_copy(update={"velocity": (0.0, 0.0, 0.0), "angular_velocity": (0.0, 0.0, 0.0)})
+        for b in scene.body
+    )
+    driver = Driver(joint=joint, polynomial=(0.0, 0.0, 3.0))
+    scene = scene.with_(body=tuple(at_rest), driver=(driver,))
+    generic, own = (terms(scene, code) for code in ("generic", "specialised"))
     assert np.abs(generic - own).max() <= 1e-11 * np.abs(generic).max()
 
 

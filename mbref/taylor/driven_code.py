@@ -1,0 +1,77 @@
+"""Machine code of the orders of a driven scene's series: rows that determine all variables.
+
+No force moves any variable then, and no multiplier is needed: of the products there are those of rows, which
+may have several lanes.  The response adds up what the lanes of a row have found.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from llvmlite import ir
+
+from mbref.taylor.instructions import Blocks, Instructions
+from mbref.taylor.lanes import LANES, filled
+from mbref.taylor.layout import Products, TaylorMemory
+from mbref.taylor.orders_code import Orders
+from mbref.taylor.orders_code import Products as Sums
+from mbref.taylor.polynomials import products_of_lanes
+
+Term = tuple[int, int, float]
+"""A product's factors and minus its weight."""
+
+
+class DrivenOrders(Orders):
+    """The orders of a series of a scene without freedom, from the first two, by the response."""
+
+    def __init__(self, taylor: TaylorMemory, write: Instructions):
+        self._nz = taylor.solver.order.size
+        lanes = _lanes_of(_terms_of(taylor.polynomials.products, self._nz, taylor.solver.row.size))
+        self._rows = [row for row, _ in lanes]
+        unused: list[list[Term]] = [[]] * (filled(len(lanes)) - len(lanes))
+        super().__init__(taylor, write, products_of_lanes([terms for _, terms in lanes] + unused))
+
+    def _solve(
+        self,
+        k: ir.Value,
+        known: Sums,
+        newest: dict[int, tuple[ir.Value, ...]],
+        force: np.ndarray | None = None,
+    ) -> Blocks:
+        """Order k + 2 of the variables, stored, and of the functions prescribed."""
+        write, ahead = self._write, self._write.plus(self._write.multiplied(k, self._lanes), 2 * self._lanes)
+        numbers = [write.everywhere(write.number(self._terms, ahead, g)) for g in self._functions]
+        response = list(self._functions)
+        for b, rows in enumerate(self._rows[i : i + LANES] for i in range(0, len(self._rows), LANES)):
+            total = self._total(b, known, newest)
+            numbers += [write.repeated([total], lane) for lane in range(len(rows))]
+            response += [self._nz + row for row in rows]
+        row = write.row(self._terms, ahead, self._lanes)
+        for b in range(-(-self._nz // LANES)):
+            parts = [
+                write.product(number, write.block(self._response, e * self._lanes + b * LANES))
+                for number, e in zip(numbers, response, strict=True)
+            ]
+            row[b] = write.total(parts)
+            write.store([row[b]], self._terms, write.plus(ahead, b * LANES))
+        return row
+
+
+def _terms_of(products: Products, nz: int, nr: int) -> list[list[Term]]:
+    """The products of each row."""
+    terms: list[list[Term]] = [[] for _ in range(nr)]
+    for block, (start, end) in enumerate(zip(products.start[:-1], products.start[1:], strict=True)):
+        for c in range(start, end):
+            row = block * LANES + (c - start) % LANES - nz
+            if products.weight[c] and 0 <= row < nr:
+                terms[row].append((int(products.left[c]), int(products.right[c]), -products.weight[c]))
+    return terms
+
+
+def _lanes_of(terms: list[list[Term]]) -> list[tuple[int, list[Term]]]:
+    """The row of each lane and its products, the most first: lanes of a block that rows leave go to those
+    with the most."""
+    count = [1] * len(terms)
+    for _ in range(LANES - len(terms) if terms else 0):
+        count[max(range(len(terms)), key=lambda row: len(terms[row]) / count[row])] += 1
+    lanes = [(row, terms[row][i :: count[row]]) for row in range(len(terms)) for i in range(count[row])]
+    return sorted((lane for lane in lanes if lane[1]), key=lambda lane: -len(lane[1]))
