@@ -3,8 +3,8 @@
     python benchmarks/scaling.py [LOOPS …]
 
 Process CPU time of the stepping, medians of REPEATS rounds in which all take turns; the error, against the
-scene's truth and relative to a link, stands beside every time.  The first tables have milliseconds per step
-at STEPS steps or a few more, the last the cost of an error.
+scene's truth and relative to a link, stands beside every time.  The first tables, of 20 and 200 loops, have
+the cost of an error, the others milliseconds per step at STEPS steps or a few more.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from statistics import median
 
 import numpy as np
-from mujoco_chain import Chain
+from mujoco_chain import EXACT, Chain
 from rich.console import Console
 from rich.table import Table
 
@@ -39,6 +39,7 @@ DENSE_METHOD = "mpi-qr+projection"  # the cheapest of the dense formulations tha
 DENSE_LOOPS = {"four_bar_chain": 20, "slider_crank_chain": 5}  # most that dense factors bear here
 SPATIAL_LOOPS = 20  # most for the engines' own mapping of the scene
 RTOLS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10)
+MUJOCO_RTOLS = (1e-2, 1e-3, 3e-4, 1e-4, 1e-6, 1e-7, 3e-8, 1e-8, 3e-9)
 RK4_STEPS = (2, 3, 4, 8, 16)
 UNPROJECTED = "alf-dual+none"  # for few steps, in which constraints are violated by no more than the error
 MUJOCO_STEPS = (2, 3, 4, 5, 10, 20, 40, 80, 160, 320, 640)
@@ -106,6 +107,17 @@ def of_chain(scene: Scene, truth: np.ndarray, loops: int, steps: int) -> Attempt
     return attempt
 
 
+def of_chain_dop853(scene: Scene, truth: np.ndarray, loops: int, rtol: float) -> Attempt:
+    """By MuJoCo's accelerations of that model in a compiled DOP853."""
+    chain = Chain(loops, scene.duration, EXACT)
+
+    def attempt() -> tuple[float, int, float]:
+        seconds, steps, found = chain.run_dop853(scene.duration, rtol)
+        return seconds, steps, np.abs(found - truth).max()
+
+    return attempt
+
+
 def rivals(chain: str, loops: int) -> list[Rival]:
     """Those that can be had at this size in bearable time."""
     scene = find_scene(f"{chain}[{loops}]")
@@ -163,14 +175,18 @@ def scaling(console: Console, chain: str, sizes: Sequence[int]) -> None:
 
 
 def at_errors(console: Console, loops: int) -> None:
-    """The cost of an error on the chain of four-bars: mbref's two integrators and MuJoCo's best model."""
+    """The cost of an error on the chain of four-bars: mbref and MuJoCo's best model, by RK4 and DOP853."""
     scene = find_scene(f"four_bar_chain[{loops}]")
     truth = end_of(scene)
     curves = {
         "mbref DOP853": [of_mbref(scene, truth, METHOD, rtol=rtol) for rtol in RTOLS],
+        "mbref DOP853, not projected": [of_mbref(scene, truth, UNPROJECTED, rtol=rtol) for rtol in RTOLS],
         "mbref RK4": of_rk4(scene, truth, METHOD),
         "mbref RK4, not projected": of_rk4(scene, truth, UNPROJECTED),
         "MuJoCo RK4, planar by hand": [of_chain(scene, truth, loops, steps) for steps in MUJOCO_STEPS],
+        "MuJoCo DOP853, planar by hand": [
+            of_chain_dop853(scene, truth, loops, rtol) for rtol in MUJOCO_RTOLS
+        ],
     }
     runs = [Rival(name, attempt) for name, attempts in curves.items() for attempt in attempts]
     in_turns(runs)
@@ -193,10 +209,10 @@ def main() -> None:
     sizes = sorted({int(word) for word in sys.argv[1:]}) or LOOPS
     console = Console(width=200)
     began = time.process_time()
-    scaling(console, "four_bar_chain", sizes)
-    scaling(console, "slider_crank_chain", [size for size in sizes if size > 1])
     for loops in (size for size in sizes if size in (20, 200)):
         at_errors(console, loops)
+    scaling(console, "four_bar_chain", sizes)
+    scaling(console, "slider_crank_chain", [size for size in sizes if size > 1])
     console.print(f"{time.process_time() - began:.0f} s of CPU time in all")
 
 

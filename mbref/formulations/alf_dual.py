@@ -29,8 +29,8 @@ from mbref.linear_algebra.sparse_cholesky import (
     assemble_gradients,
     factorise,
     least_squared_pivot,
-    solve,
     substitute_back,
+    substitute_forward,
 )
 
 
@@ -47,6 +47,7 @@ class Options(NamedTuple):
 STRONGER, LARGEST_ALPHA = 1e3, 1e16  # factor of the next α; from there on 1/α is rounding beside S
 INFINITE = 1e300  # α without 1/α
 CLEAR, WIDE = 1e-4, 0.08  # squares of pivots: of clearly independent rows, and where one iteration is enough
+ROUNDING = 1e-14  # relative change of accelerations that is left out
 REDUNDANT_ALPHA = 1e15  # the largest with which a matrix of redundant rows stays positive
 options_of, factor_of = opener(Options), opener(SparseFactor)
 
@@ -66,10 +67,12 @@ def accelerate(system):
 def solve_exactly(system):
     """The solution for independent rows, without 1/α; False where they are not clearly so.
 
-    Rows that are nearer to dependent need a second iteration, which takes the rounding of the first away.
+    Rows that are nearer to dependent need a second iteration, which takes the rounding of the first away,
+    unless its change of M^(1/2) q̈, √(rᵀ S⁻¹ r) with the residual r, is small beside that and M^(1/2) q̈_0: at
+    high speeds accelerations along the rows are larger than those that forces give.
     """
     factor = factor_of(system.scratch)
-    row, column, step = factor.symbolic.row, factor.symbolic.column, factor.step
+    row, step = factor.symbolic.row, factor.step
     if not start(INFINITE, system):
         return False
     pivot = least_squared_pivot(factor)
@@ -79,15 +82,39 @@ def solve_exactly(system):
     add_transpose(factor, step, factor.change)
     for i in range(row.shape[0]):
         system.multipliers[row[i]] = -step[i]
+    size = put_accelerations(system)
     if not pivot > WIDE:
         find_residual(factor.change, system)
-        solve(factor, step)
-        add_transpose(factor, step, factor.change)
-        for i in range(row.shape[0]):
-            system.multipliers[row[i]] -= step[i]
-    for j in range(column.shape[0]):
-        system.acceleration[column[j]] = factor.root[j] * factor.change[j]
+        size = min(size, square_of_forces(system))
+        if not substitute_forward(factor, step) <= ROUNDING * ROUNDING * size:
+            substitute_back(factor, step)
+            add_transpose(factor, step, factor.change)
+            for i in range(row.shape[0]):
+                system.multipliers[row[i]] -= step[i]
+            put_accelerations(system)
     return True
+
+
+@inlined
+def put_accelerations(system):
+    """q̈ of M^(1/2) q̈ in ``factor.change``; the square of its norm."""
+    factor, square = factor_of(system.scratch), 0.0
+    column, root, x = factor.symbolic.column, factor.root, factor.change
+    for j in range(column.shape[0]):
+        system.acceleration[column[j]] = root[j] * x[j]
+        square += x[j] * x[j]
+    return square
+
+
+@inlined
+def square_of_forces(system):
+    """The square of the norm of M^(1/2) q̈_0 = M^(-1/2) g."""
+    factor, square = factor_of(system.scratch), 0.0
+    column, root = factor.symbolic.column, factor.root
+    for j in range(column.shape[0]):
+        part = root[j] * system.force[column[j]]
+        square += part * part
+    return square
 
 
 @kernel

@@ -56,7 +56,7 @@ scratch_of = opener(Scratch)
 
 
 @kernel
-def carry_on(h, y_rate, memory):
+def carry_on(h, memory):
     """a_n and λ* of the step before, or of the formulation at a start; the first Δ = h v_n + ½ h² a_n."""
     scratch, system, n = (
         scratch_of(memory.integrator),
@@ -64,7 +64,7 @@ def carry_on(h, y_rate, memory):
         memory.previous.velocities.shape[0],
     )
     if system.counts.steps == memory.loop.clock.restart:
-        copy(y_rate[y_rate.shape[0] - n :], scratch.acceleration)
+        copy(system.acceleration, scratch.acceleration)
         copy(system.multipliers, scratch.multipliers)
     copy(scratch.acceleration, scratch.before)
     for j in range(n):
@@ -152,7 +152,7 @@ def project(vector, wanted, system, scratch):
 @exchangeable(STEP)
 def step(rates, t, h, y, y_rate, y_new, memory):
     scratch, state, equations = scratch_of(memory.integrator), memory.state, memory.equations
-    carry_on(h, y_rate, memory)
+    carry_on(h, memory)
     status = find_positions(t + h, h, memory)
     if status != OK:
         return -float(status)

@@ -80,12 +80,14 @@ def solve(factor, b):
 
 @inlined
 def substitute_forward(factor, b):
-    """b := L⁻¹ b, as ``factorise`` finds it."""
-    first, row, l = factor.symbolic.l_start, factor.symbolic.l_row, factor.l
+    """b := L⁻¹ b, as ``factorise`` finds it; bᵀ (S + I/α)⁻¹ b."""
+    first, row, l, square = factor.symbolic.l_start, factor.symbolic.l_row, factor.l, 0.0
     for k in range(first.shape[0] - 1):
         value = b[k]
+        square += value * value * l[first[k]]
         for p in range(first[k] + 1, first[k + 1]):
             b[row[p]] -= l[p] * value
+    return square
 
 
 @inlined

@@ -177,12 +177,11 @@ class Run:
         )
 
     def _factor(self) -> tuple[SparseFactor, Active]:
-        """The factor, and the entries of y, which are all where the method does not project."""
-        reduction = self.reduction
-        factor = empty_factor() if reduction is None else reduction.factor()
-        if reduction is None or not self.method.stabilisation.projects:
-            return factor, Active(unsigned(np.arange(7 * self.model.nb)), unsigned(np.arange(self.model.n)))
-        return factor, reduction.active
+        """The factor, and the entries of y, which are all where no part of the equations is left out."""
+        if self.reduction is None:
+            everything = unsigned(np.arange(7 * self.model.nb)), unsigned(np.arange(self.model.n))
+            return empty_factor(), Active(*everything)
+        return self.reduction.factor(), self.reduction.active
 
     def _kernels_on(self, chart: Stabilisation) -> Kernels:
         """The kernels of the method on this chart."""

@@ -44,5 +44,8 @@ def write_rates(y_rate, memory):
 
 @exchangeable(ACCEPT)
 def accept(t, y, memory):
-    normalise(y[: memory.state.coordinates.shape[0]])
+    state, active = memory.state, memory.active
+    expand(y, active, state)
+    normalise(state.coordinates)
+    contract(state.coordinates, state.velocities, active, y)
     return OK

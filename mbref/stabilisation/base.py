@@ -36,7 +36,7 @@ class Stabilisation:
     memory: type | None = None
     numbers: type = NoOptions  # the method's own numbers, a record with their defaults
     feedback: Callable[[Mapping[str, float]], tuple[float, float]] | None = None  # gains of Φ' and Φ in γ
-    projects: bool = False  # every accepted state meets the constraints, and only active coordinates are in y
+    projects: bool = False  # every accepted state meets the constraints
     largest_turn: float = 1.0  # rad that a body may turn in an adaptive step unless the user says
 
     @cached_property
