@@ -11,6 +11,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable
 
+import numpy as np
 from llvmlite import ir
 from numba import f8, i8, types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
@@ -115,6 +116,27 @@ def _gathered(typing, array, offset, lanes, first):
     return block(array, i8, lanes, i8), generate
 
 
+@intrinsic
+def _peak(typing, of):
+    def generate(context, builder, signature, arguments):
+        (value,) = arguments
+        opposite, apart = builder.fneg(value), LANES // 2
+        largest = builder.select(builder.fcmp_ordered(">", value, opposite), value, opposite)
+        while apart:
+            places = [(k + apart) % LANES for k in range(LANES)]
+            of_lanes = ir.Constant(ir.VectorType(ir.IntType(32), LANES), places)
+            other = builder.shuffle_vector(largest, largest, of_lanes)
+            largest = builder.select(builder.fcmp_ordered(">", other, largest), other, largest)
+            apart //= 2
+        return builder.extract_element(largest, ir.IntType(32)(0))
+
+    return f8(block), generate
+
+
+def _plain_peak(of):
+    return np.abs(of).max()
+
+
 def _plain_load(array, offset):
     return array.reshape(-1)[offset : offset + LANES].copy()
 
@@ -131,5 +153,7 @@ load = _plain_load if PLAIN else _load
 """(array, offset): the block at array[offset …]."""
 store = _plain_store if PLAIN else _store
 """(value, array, offset): put a block at array[offset …]."""
+peak = _plain_peak if PLAIN else _peak
+"""(block): the size of its largest number."""
 gathered = _plain_gathered if PLAIN else _gathered
 """(array, offset, lanes, first): the block of array[offset + lanes[first + k]], k = 0 … LANES - 1."""

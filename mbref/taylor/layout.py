@@ -140,6 +140,8 @@ class Solver(NamedTuple):
     row: Annotated[Indices, "nr"]  # the independent rows first
     order: Annotated[Indices, "nz"]  # their dependent variables first
     work: Annotated[Matrix, "nr", "nz"]
+    left: Annotated[Vector, "lanes"]  # 1 for a variable without a pivot, where pivots are chosen
+    peaks: Annotated[Vector, "nr"]  # the largest entry of each row there
     first: Annotated[Vector, "nz"]  # pivots when they were chosen: of G, then of the reduced mass matrix
     last: Annotated[Vector, "nz"]  # pivots of the last factorisation
     past: Annotated[Vector, "nz"]  # pivots where the step began

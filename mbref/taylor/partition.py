@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from numpy import inf
 
-from mbref.kernels.compilation import kernel
+from mbref.kernels.compilation import inlined, kernel
+from mbref.taylor.lanes import LANES, load, peak, store
 
 
 @kernel
@@ -21,18 +22,6 @@ def put_gradient(y, memory):
 
 
 @kernel
-def largest_entry(work, row, order, k):
-    """The largest entry among the rows and columns from k on, and its places."""
-    best, at_row, at_column = -1.0, k, k
-    for p in range(k, row.shape[0]):
-        for q in range(k, order.shape[0]):
-            size = abs(work[row[p], order[q]])
-            if size > best:
-                best, at_row, at_column = size, p, q
-    return best, at_row, at_column
-
-
-@kernel
 def eliminate(work, row, order, k):
     """Subtract the pivot row k from those after it."""
     for p in range(k + 1, row.shape[0]):
@@ -42,26 +31,73 @@ def eliminate(work, row, order, k):
                 work[row[p], order[q]] -= factor * work[row[k], order[q]]
 
 
+@inlined
+def put_rows(memory):
+    """The tableau [G 1] at the first coefficients: a row has a one in the lane of its multiplier."""
+    solver, rows, terms = memory.solver, memory.polynomials.rows, memory.series.terms
+    tableau, linear, place = solver.tableau.reshape(-1), solver.linear, solver.place
+    weight, other = rows.weight, rows.other
+    for j in range(0, tableau.shape[0], LANES):
+        store(load(linear, j), tableau, j)
+    for e in range(place.shape[0]):
+        tableau[place[e]] += weight[e] * terms[0, other[e]]
+
+
 @kernel
 def choose(memory):
-    """Choose independent rows and dependent variables by complete pivoting; how many there are."""
+    """Choose independent rows and dependent variables by complete pivoting; how many there are.
+
+    The tableau is left with other numbers.
+    """
     solver, tolerance = memory.solver, memory.run.equations.system.settings.rank_tolerance
-    row, order, work, rank = solver.row, solver.order, solver.work, 0
-    put_gradient(memory.series.terms, memory)
+    row, order, tableau, peaks, rank = solver.row, solver.order, solver.tableau, solver.peaks, 0
+    put_rows(memory)
+    for j in range(0, tableau.shape[1], LANES):
+        store(load(memory.series.variable, j), solver.left, j)
     for k in range(row.shape[0]):
         row[k] = k
+        subtract_pivot_row(k, 0.0, k, memory)
     for k in range(order.shape[0]):
         order[k] = k
     while rank < min(row.shape[0], order.shape[0]):
-        size, p, q = largest_entry(work, row, order, rank)
-        if size <= tolerance:
+        p = place_of_highest(peaks, row, rank)
+        if not peaks[row[p]] > tolerance:
             break
         row[rank], row[p] = row[p], row[rank]
+        q = rank
+        while q < order.shape[0] - 1 and abs(tableau[row[rank], order[q]]) != peaks[row[rank]]:
+            q += 1
         order[rank], order[q] = order[q], order[rank]
-        eliminate(work, row, order, rank)
+        solver.left[order[rank]] = 0.0
+        inverse = 1.0 / tableau[row[rank], order[rank]]
+        for p in range(rank + 1, row.shape[0]):
+            subtract_pivot_row(row[p], inverse * tableau[row[p], order[rank]], row[rank], memory)
         rank += 1
     memory.progress.choice += 1
     return rank
+
+
+@inlined
+def place_of_highest(peaks, row, first):
+    """The first place, from one on, of the row with the highest peak."""
+    place = first
+    for p in range(first + 1, row.shape[0]):
+        if peaks[row[p]] > peaks[row[place]]:
+            place = p
+    return place
+
+
+@inlined
+def subtract_pivot_row(i, factor, pivot, memory):
+    """Subtract a pivot row, times a factor, from row i in the lanes of variables left, and find its peak."""
+    tableau, left, largest = memory.solver.tableau, memory.solver.left, 0.0
+    lanes = tableau.shape[1]
+    for j in range(0, memory.solver.order.shape[0], LANES):
+        entries = load(tableau, i * lanes + j) - factor * load(tableau, pivot * lanes + j)
+        entries = load(left, j) * entries
+        store(entries, tableau, i * lanes + j)
+        largest = max(largest, peak(entries))
+    memory.solver.peaks[i] = largest
 
 
 @kernel

@@ -11,23 +11,11 @@ from __future__ import annotations
 from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.layout import OK, SINGULAR
 from mbref.taylor.lanes import LANES, load, store
-from mbref.taylor.partition import choose, keep_pivot
+from mbref.taylor.partition import choose, keep_pivot, put_rows
 from mbref.taylor.scene_code import factorise_by_code
 
 KEPT = 0.5  # a pivot over its first below which rows and variables are chosen again
 WITHOUT_INERTIA = 1e-13  # of the largest inertia of a variable
-
-
-@inlined
-def put_rows(memory):
-    """The tableau [G 1] at the first coefficients: a row has a one in the lane of its multiplier."""
-    solver, rows, terms = memory.solver, memory.polynomials.rows, memory.series.terms
-    tableau, linear, place = solver.tableau.reshape(-1), solver.linear, solver.place
-    weight, other = rows.weight, rows.other
-    for j in range(0, tableau.shape[0], LANES):
-        store(load(linear, j), tableau, j)
-    for e in range(place.shape[0]):
-        tableau[place[e]] += weight[e] * terms[0, other[e]]
 
 
 @inlined
