@@ -11,21 +11,18 @@ from llvmlite import ir
 
 from mbref.taylor.instructions import Blocks, Instructions
 from mbref.taylor.lanes import LANES, filled
-from mbref.taylor.layout import Products, TaylorMemory
-from mbref.taylor.orders_code import Orders
-from mbref.taylor.orders_code import Products as Sums
+from mbref.taylor.layout import TaylorMemory
+from mbref.taylor.multiplier_code import MultiplierOrders
+from mbref.taylor.orders_code import Sums, Term, terms_of_rows
 from mbref.taylor.polynomials import products_of_lanes
 
-Term = tuple[int, int, float]
-"""A product's factors and minus its weight."""
 
-
-class DrivenOrders(Orders):
+class DrivenOrders(MultiplierOrders):
     """The orders of a series of a scene without freedom, from the first two, by the response."""
 
     def __init__(self, taylor: TaylorMemory, write: Instructions):
         self._nz = taylor.solver.order.size
-        lanes = _lanes_of(_terms_of(taylor.polynomials.products, self._nz, taylor.solver.row.size))
+        lanes = _lanes_of(terms_of_rows(taylor))
         self._rows = [row for row, _ in lanes]
         unused: list[list[Term]] = [[]] * (filled(len(lanes)) - len(lanes))
         super().__init__(taylor, write, products_of_lanes([terms for _, terms in lanes] + unused))
@@ -54,17 +51,6 @@ class DrivenOrders(Orders):
             row[b] = write.total(parts)
             write.store([row[b]], self._terms, write.plus(ahead, b * LANES))
         return row
-
-
-def _terms_of(products: Products, nz: int, nr: int) -> list[list[Term]]:
-    """The products of each row."""
-    terms: list[list[Term]] = [[] for _ in range(nr)]
-    for block, (start, end) in enumerate(zip(products.start[:-1], products.start[1:], strict=True)):
-        for c in range(start, end):
-            row = block * LANES + (c - start) % LANES - nz
-            if products.weight[c] and 0 <= row < nr:
-                terms[row].append((int(products.left[c]), int(products.right[c]), -products.weight[c]))
-    return terms
 
 
 def _lanes_of(terms: list[list[Term]]) -> list[tuple[int, list[Term]]]:

@@ -151,8 +151,15 @@ class Elimination:
         free = range(self._nz - self._rank)
         motions = [self._row(self._null_space, f, self._of_variables) for f in free]
         momenta = [self._momentum(f, motions[f]) for f in free]
+        return self._reduced(
+            motions, momenta, [self._without_rows(momenta[f], motions[f], particular) for f in free]
+        )
+
+    def _reduced(self, motions: list[Row], momenta: list[Row], solved: list[Row]) -> list[Row]:
+        """Right-hand sides solved for by the reduced mass matrix, whose pivots are kept."""
+        free = range(len(motions))
         reduced = [[self._inner(momenta[f], motions[g]) for g in free] for f in free]
-        solved = [self._without_rows(momenta[f], motions[f], particular) for f in free]
+        solved = list(solved)
         for f in free:
             self._write.put(reduced[f][f], self._last, self._rank + f)
             factor = self._write.inverse(reduced[f][f])
@@ -228,3 +235,29 @@ class Elimination:
         zero = constant([0.0] * LANES)
         blocks = [row.get(block, zero) for block in range(self._lanes // LANES)]
         self._write.store(blocks, self._response, k * self._lanes)
+
+
+class EliminationOfRows(Elimination):
+    """The response of the variables to rows alone."""
+
+    def _put_response(self) -> None:
+        """Nᵀ of the forces that no motion takes."""
+        free = range(self._nz - self._rank)
+        motions = [self._row(self._null_space, f, self._of_variables) for f in free]
+        momenta = [self._momentum(f, motions[f]) for f in free]
+        solved = self._reduced(motions, momenta, motions)
+        forces = []
+        for i in range(self._nz):
+            taken = [
+                self._times(self._write.minus(self._write.repeated(list(momenta[f].values()), i)), solved[f])
+                for f in free
+            ]
+            forces.append(self._sum(self._one(i), *taken))
+        for e in range(self._nz, self._nz + self._nr):
+            parts = [
+                self._times(
+                    self._write.everywhere(self._write.number(self._particular, i * self._lanes + e)), force
+                )
+                for i, force in enumerate(forces)
+            ]
+            self._store(self._sum(*parts), e)

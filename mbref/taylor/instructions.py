@@ -93,6 +93,14 @@ class Instructions:
         """A whole number and more."""
         return self._builder.add(whole, _whole(more))
 
+    def multiplied_by(self, whole: ir.Value, other: ir.Value) -> ir.Value:
+        """The product of two whole numbers."""
+        return self._builder.mul(whole, other)
+
+    def real(self, whole: ir.Value) -> ir.Value:
+        """A whole number as a number."""
+        return self._builder.sitofp(whole, DOUBLE)
+
     def halved(self, whole: ir.Value) -> tuple[ir.Value, ir.Value]:
         """A whole number's half, rounded down, and the remainder."""
         return self._builder.lshr(whole, WORD(1)), self._builder.and_(whole, WORD(1))
@@ -117,12 +125,20 @@ class Instructions:
 
     def added_up(self, block: ir.Value) -> ir.Value:
         """The sum of a block's numbers."""
+        return self.first(self.summed(block))
+
+    def first(self, block: ir.Value) -> ir.Value:
+        """The first number of a block."""
+        return self._builder.extract_element(block, PLACE(0))
+
+    def summed(self, block: ir.Value) -> ir.Value:
+        """A block of the sum of a block's numbers."""
         apart = LANES // 2
         while apart:
             other = self._shuffled(block, block, [(k + apart) % LANES for k in range(LANES)])
             block = self._builder.fadd(block, other)
             apart //= 2
-        return self._builder.extract_element(block, PLACE(0))
+        return block
 
     def difference(self, one: ir.Value, other: ir.Value) -> ir.Value:
         """One minus the other; fused where the other is a product."""

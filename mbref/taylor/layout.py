@@ -195,6 +195,7 @@ class Progress(NamedTuple):
     change: float = 0.0  # of velocities, relative, that a passage may not magnify
     begun: int = 0  # whether a series has been begun
     passed: int = 0  # singular positions in ``Crossings``
+    slowing: float = 0.0  # 1/s, the relative rate of the speed where orders are by power; else 0
     leaving: int = 0  # whether the series comes from a singular position that it has passed
 
 
@@ -211,6 +212,7 @@ class SceneCode(NamedTuple):
 
     rank: int = 0
     expand: int = 0  # finds all orders
+    expand_by_power: int = 0  # finds them without multipliers, of a motion of one freedom that is not at rest
     factorise: int = 0  # finds pivots and response
     violation: int = 0  # finds Φ
     close: int = 0  # takes Φ away

@@ -11,17 +11,18 @@ from numba.extending import intrinsic
 from mbref.kernels.compilation import CACHE, PLAIN
 from mbref.kernels.machine_code import Code, code_at, processor
 from mbref.specialised import Untraceable
-from mbref.taylor import correction_code, elimination_code, orders_code
+from mbref.taylor import correction_code, elimination_code, multiplier_code, orders_code, power_code
 from mbref.taylor.correction_code import Correction
 from mbref.taylor.driven_code import DrivenOrders
-from mbref.taylor.elimination_code import Elimination
+from mbref.taylor.elimination_code import Elimination, EliminationOfRows
 from mbref.taylor.instructions import Instructions, function_type
 from mbref.taylor.lanes import LANES
 from mbref.taylor.layout import TaylorMemory
-from mbref.taylor.orders_code import Orders
+from mbref.taylor.multiplier_code import MultiplierOrders
+from mbref.taylor.power_code import PowerOrders
 
-EXPAND, FACTORISE = "expand", "factorise"
-NAMES = EXPAND, FACTORISE, *correction_code.POINTERS
+EXPAND, POWER, FACTORISE = "expand", "expand_by_power", "factorise"
+NAMES = EXPAND, POWER, FACTORISE, *correction_code.POINTERS
 MOST_BLOCKS = 2_000  # products of blocks that LLVM compiles in a second
 
 
@@ -46,7 +47,8 @@ def functions_of(taylor: TaylorMemory) -> tuple[str, ...]:
     springs = taylor.polynomials.springs.damping.size + taylor.polynomials.torsions.damping.size
     rank, nr, nz = rank_of(taylor), taylor.solver.row.size, taylor.solver.order.size
     is_short = (rank * rank + nr * nz) * taylor.series.terms.shape[1] // LANES <= MOST_BLOCKS
-    names = {EXPAND: not springs, FACTORISE: is_short}
+    by_power = power_code.serves(taylor)
+    names = {EXPAND: not springs and not by_power, POWER: not springs and by_power, FACTORISE: is_short}
     return *(name for name, served in names.items() if served), *correction_code.POINTERS
 
 
@@ -69,13 +71,18 @@ def write_code(taylor: TaylorMemory) -> str:
     """LLVM IR of the functions whose addresses ``SceneCode`` has."""
     module, names = ir.Module(), functions_of(taylor)
     if EXPAND in names:
-        write = Instructions(module, EXPAND, orders_code.POINTERS, counts=orders_code.COUNTS)
-        orders = DrivenOrders if rank_of(taylor) == taylor.solver.order.size else Orders
+        write = Instructions(module, EXPAND, multiplier_code.POINTERS, counts=orders_code.COUNTS)
+        orders = DrivenOrders if rank_of(taylor) == taylor.solver.order.size else MultiplierOrders
         orders(taylor, write).put()
+        write.end()
+    if POWER in names:
+        write = Instructions(module, POWER, power_code.POINTERS, counts=orders_code.COUNTS)
+        PowerOrders(taylor, write).put()
         write.end()
     if FACTORISE in names:
         write = Instructions(module, FACTORISE, *elimination_code.POINTERS)
-        Elimination(taylor, rank_of(taylor), write).put()
+        elimination = EliminationOfRows if POWER in names else Elimination
+        elimination(taylor, rank_of(taylor), write).put()
         write.end()
     for name, pointers in correction_code.POINTERS.items():
         write = Instructions(module, name, pointers)
@@ -88,6 +95,12 @@ def write_code(taylor: TaylorMemory) -> str:
 def expand_by_code(typing, address, terms, response, left, right, scale, growth, sums, last):
     """Call the function at an address that finds the orders 0 … last of multipliers."""
     return types.void(address, terms, response, left, right, scale, growth, sums, last), _call
+
+
+@intrinsic
+def expand_by_power(typing, address, terms, response, left, right, sums, last):
+    """Call the function at an address that finds the orders 0 … last without multipliers."""
+    return types.void(address, terms, response, left, right, sums, last), _call
 
 
 @intrinsic

@@ -11,8 +11,11 @@ from __future__ import annotations
 from mbref.kernels.compilation import inlined, kernel
 from mbref.taylor.lanes import LANES, gathered, load, store
 from mbref.taylor.loads import add_loads, start_loads
-from mbref.taylor.scene_code import expand_by_code
-from mbref.taylor.solver import solution
+from mbref.taylor.passage import size_of
+from mbref.taylor.scene_code import expand_by_code, expand_by_power
+from mbref.taylor.solver import respond_in_loops, solution
+
+SLOWEST = 2.0  # steps over the time in which the speed would vanish: beyond, rounding grows with the order
 
 
 @inlined
@@ -104,14 +107,43 @@ def expand_with_springs(last, memory):
 @kernel
 def expand(memory):
     """All orders of the variables from the first two, which are consistent."""
-    springs, torsions = memory.polynomials.springs, memory.polynomials.torsions
-    if memory.code.expand != 0 and memory.code.rank == memory.progress.rank:
+    code, progress = memory.code, memory.progress
+    progress.slowing = 0.0
+    if code.expand_by_power != 0 and code.rank == progress.rank:
+        series, solver = memory.series, memory.solver
+        expand_by_power(
+            code.expand_by_power, series.terms, solver.response, series.left, series.right, solver.rhs,
+            progress.order - 2,
+        )  # fmt: skip
+        progress.slowing = abs(solver.rhs[0])
+        length = memory.run.loop.clock.length
+        if length == 0.0:  # at the start, before a step: the time in which a variable moves by one
+            length = 1.0 / size_of(series.terms, 1, solver.order.shape[0])
+        if not turns_back_in(length, memory):
+            return
+    expand_with_multipliers(memory)
+
+
+@inlined
+def turns_back_in(h, memory):
+    """Whether a motion whose orders are by power is at rest, or may turn back in much less than h seconds."""
+    return not memory.progress.slowing * h <= SLOWEST
+
+
+@kernel
+def expand_with_multipliers(memory):
+    """All orders of the variables and multipliers from the first two."""
+    springs, torsions, code = memory.polynomials.springs, memory.polynomials.torsions, memory.code
+    memory.progress.slowing = 0.0
+    if code.expand != 0 and code.rank == memory.progress.rank:
         series, solver = memory.series, memory.solver
         expand_by_code(
-            memory.code.expand, series.terms, solver.response, series.left, series.right, series.scale,
+            code.expand, series.terms, solver.response, series.left, series.right, series.scale,
             series.growth, solver.rhs, memory.progress.order - 2,
         )  # fmt: skip
         return
+    if code.expand_by_power != 0:
+        respond_in_loops(memory)
     start_sums(memory)
     if springs.damping.shape[0] + torsions.damping.shape[0] == 0:
         expand_without_springs(memory.progress.order - 2, memory)

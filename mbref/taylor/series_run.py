@@ -57,12 +57,12 @@ EXACT, EXACT_ORDER = 1e-13, 16  # rtol and atol of steps that pass singular posi
 KEPT = 16  # singular positions that are passed in a call
 CALLED = (begin, expand_from, step)  # the SeriesKernels
 KERNELS_OF_SERIES = (
-    *CALLED, enter, advance_series, follow_drivers, advance_over, take_over, begin_here, cross, pass_on,
-    give_back, look_along,
+    *CALLED, enter, advance_series, follow_drivers, advance_over, take_over, begin_here,
+    cross, pass_on, give_back, look_along,
 )  # fmt: skip
 ROUNDING = 1e-16  # of a singular value
 LEAST_ORDER, MOST_ORDER = 4, 30
-CHEAPEST = {GENERIC: (6.0, 1.2), SPECIALISED: (8.0, 1.6)}  # order: at a tolerance of 1, and more per digit
+CHEAPEST = {GENERIC: (6.0, 1.2), SPECIALISED: (7.0, 1.6)}  # order: at a tolerance of 1, and more per digit
 
 
 def order_of(tolerance: float, wanted: float, code: str) -> int:

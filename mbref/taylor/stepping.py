@@ -51,7 +51,7 @@ from mbref.taylor.samples import (
     take_sample,
     take_sample_of_series,
 )
-from mbref.taylor.series import expand
+from mbref.taylor.series import expand, expand_with_multipliers, turns_back_in
 from mbref.taylor.solver import factorise_anew
 from mbref.taylor.start import judged_start
 
@@ -98,6 +98,17 @@ def longest_step(tolerance, memory):
     if counts.steps == 0 and control.first_step > 0.0:
         h = min(h, control.first_step)
     return h
+
+
+@kernel
+def first_lengths(left, memory):
+    """The longest step (s) by the tolerance, and by that of one that crosses; not beyond the time left."""
+    progress = memory.progress
+    whole = 1.0 if progress.passing else share(memory.run.loop.clock.length, memory.run)
+    exact = min(longest_step(whole * exactness(progress), memory), left)
+    if not progress.passing:
+        return exact, exact
+    return exact, min(longest_step(whole * exactness_across(progress), memory), left)
 
 
 @kernel
@@ -218,9 +229,11 @@ def step(memory):
     remember_series(memory)
     progress.cut, progress.left = progress.order, 0.0
     left = progress.end - clock.time
-    whole = 1.0 if progress.passing else share(clock.length, memory.run)
-    exact = min(longest_step(whole * exactness(progress), memory), left)
-    h = min(longest_step(whole * exactness_across(progress), memory), left) if progress.passing else exact
+    exact, h = first_lengths(left, memory)
+    if turns_back_in(h, memory):
+        expand_with_multipliers(memory)
+        keep_terms(memory)
+        exact, h = first_lengths(left, memory)
     while True:
         status = attempt(h, h >= left, memory)
         if status == OK and (progress.crossed or h <= exact):

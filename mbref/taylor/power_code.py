@@ -1,0 +1,221 @@
+"""Machine code of the orders of a series with one freedom and no drivers, without multipliers.
+
+The rows allow one motion, along the velocity v: the power of inertia and forces along it vanishes, v · w = 0
+with w = M a - Q (P. E. B. Jourdain, Quart. J. Pure Appl. Math. 40, 1909).  With the rows it gives each order,
+while multipliers take most of the products in ``mbref.taylor.multiplier_code``.  In Taylor coefficients, with
+v_k = (k + 1) z_{k+1} and w_k = (k + 1) (k + 2) M z_{k+2} - Q_k,
+
+    (k + 1) (k + 2) v_0 · M z_{k+2} = v_0 · Q_k - Σ_{i=1…k} v_i · w_{k-i},
+    z_{k+2} = B z_{k+1} - R s_k + v_0 (v_0 · M z_{k+2}) / (v_0 · M v_0),
+
+where R is the response to rows, s_k sums the products in Φ of z_2 … z_k, and B = -R G' with the rate of G: so
+little is left between one order and the next.  At rest no velocity tells the motion; there and where it turns
+back the general kernels serve.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from llvmlite import ir
+
+from mbref.taylor.instructions import WHOLE, Blocks, Instructions, constant
+from mbref.taylor.lanes import LANES, filled
+from mbref.taylor.layout import Inertia, Products, TaylorMemory
+from mbref.taylor.orders_code import Factors, Orders, Sums, terms_of_rows
+from mbref.taylor.polynomials import products_of_lanes
+
+POINTERS = 5  # terms, response, left, right, sums
+ZERO, HALF = constant([0.0] * LANES), constant([0.5] * LANES)
+
+
+def serves(taylor: TaylorMemory) -> bool:
+    """Whether a scene has one freedom and no drivers, and power takes no more products than multipliers."""
+    if taylor.progress.freedoms != 1 or taylor.polynomials.given.driver.size:
+        return False
+    products = products_of_rows(taylor).weight.size + filled(taylor.solver.order.size)
+    return products <= taylor.polynomials.products.weight.size
+
+
+def products_of_rows(taylor: TaylorMemory) -> Products:
+    """Minus the products of rows, a row in each lane."""
+    terms, nr = terms_of_rows(taylor), taylor.solver.row.size
+    return products_of_lanes([*terms, *[[]] * (filled(nr) - nr)])
+
+
+def moments_of(inertia: Inertia, nz: int) -> np.ndarray:
+    """The matrix (nz, nz) of the forces that are linear in the variables."""
+    matrix = np.zeros((nz, nz))
+    for block in range(filled(nz) // LANES):
+        for c in range(inertia.start[block], inertia.start[block + 1]):
+            if inertia.weight[c]:
+                matrix[block * LANES + c % LANES, inertia.source[c]] += inertia.weight[c]
+    return matrix
+
+
+class PowerOrders(Orders):
+    """The orders of the variables, by the response to rows and the motion's power.
+
+    The factors of power are v_k on the left and w_k on the right.
+    """
+
+    def __init__(self, taylor: TaylorMemory, write: Instructions):
+        self._nr, self._nz = taylor.solver.row.size, taylor.solver.order.size
+        products = products_of_rows(taylor)
+        self._power = range(products.weight.size, products.weight.size + filled(self._nz), LANES)
+        super().__init__(taylor, write, products, self._power.stop)
+        self._sums = write.pointers[4]
+        self._blocks = range(filled(self._nz) // LANES)
+        inertia = taylor.polynomials.inertia
+        self._mass, self._moments = inertia.mass[:, : self._nz], moments_of(inertia, self._nz)
+        self._has_moments = bool(self._moments.any())
+        self._force = [constant(inertia.force[b * LANES : (b + 1) * LANES]) for b in self._blocks]
+
+    def put(self) -> None:
+        """Write all orders, and v · Q / (v · M v), the rate at which the speed grows, into the sums."""
+        write, start, velocity = self._write, self._row(WHOLE(0)), self._row(WHOLE(1))
+        force = self._plus(self._force, self._times(self._moments, start))
+        power = self._inner_product(velocity, force)
+        energy = self._inner_product(velocity, self._times(self._mass, velocity))
+        inverse = write.everywhere(write.inverse(write.first(energy)))
+        self._share = self._scaled(inverse, velocity)
+        self._turning = self._turning_by(velocity)
+        row = self._put(WHOLE(0), self._scaled(HALF, self._turned(velocity)), power, HALF)
+        rate = self._plus(row, row)
+        self._inertia_of_rate = self._times(self._mass, rate)
+        self._lost_force = list(map(write.difference, self._inertia_of_rate, force))
+        self._moments_along = {
+            False: self._times(self._moments.T, velocity), True: self._times(self._moments.T, rate),
+        }  # fmt: skip
+        self._repeat(row)
+        write.store([write.product(power, inverse)], self._sums, 0)
+
+    def _order(
+        self, k: ir.Value, row: Blocks, factors: dict[int, Factors], inner: Sums, is_second: bool = False
+    ) -> Blocks:
+        """Order k + 2: of the power v_k · w_0 is not yet in the sums, nor v_1 · w_{k-1} of a second order."""
+        write, one = self._write, real_block(self._write, k, 1)
+        newest = self._scaled(one, self._lost_force)
+        known = [write.minus(inner[c]) for c in self._power if c in inner]
+        known += self._power_of_moments(k, is_rate=False)
+        if is_second:
+            both = write.product(one, real_block(write, k, 0))
+            newest = self._plus(newest, self._scaled(both, self._inertia_of_rate))
+            known += self._power_of_moments(write.less(k, WHOLE(1)), is_rate=True)
+        lost = (write.minus(write.product(n, z)) for n, z in zip(newest, row, strict=True))
+        power = write.summed(write.total([write.total(known), *lost]))
+        turned = self._turned(row)
+        if inner:
+            turned = self._plus(self._response_to(inner), turned)
+        return self._put(k, turned, power, self._inverse_of_growth(k))
+
+    # --- power --------------------------------------------------------------------------------------------
+    def _factors(self, k: ir.Value, row: Blocks) -> dict[int, Factors]:
+        """Those of rows, and v_k and w_{k-1}."""
+        write, before = self._write, self._write.less(k, WHOLE(1))
+        factors, one = self._factors_of_products(k, row), real_block(self._write, k, 1)
+        force = self._scaled(write.product(one, real_block(write, k, 0)), self._times(self._mass, row))
+        if self._has_moments:
+            force = list(map(write.difference, force, self._times(self._moments, self._row(before))))
+        for c, velocity, lost in zip(self._power, self._scaled(one, row), force, strict=True):
+            write.store([velocity], self._left, write.plus(write.multiplied(k, self._slots), c))
+            write.store([lost], self._right, write.plus(write.multiplied(before, self._slots), c))
+            factors[c] = Factors(velocity, ZERO, velocity)
+        return factors
+
+    def _power_of_moments(self, k: ir.Value, is_rate: bool) -> Blocks:
+        """The power of the moments of order k along the velocity, or along its rate."""
+        if not self._has_moments:
+            return []
+        along = self._moments_along[is_rate]
+        return [self._write.product(one, other) for one, other in zip(along, self._row(k), strict=True)]
+
+    def _inverse_of_growth(self, k: ir.Value) -> ir.Value:
+        """1 / ((k + 1) (k + 2))."""
+        write = self._write
+        growth = write.product(real_block(write, k, 1), real_block(write, k, 2))
+        return write.everywhere(write.inverse(write.first(growth)))
+
+    # --- rows ---------------------------------------------------------------------------------------------
+    def _turning_by(self, velocity: Blocks) -> list[Blocks]:
+        """B: the response to the rate of G, a row of blocks for each variable."""
+        write, rows = self._write, self._taylor.polynomials.rows
+        numbers = [write.repeated(velocity, i) for i in range(self._nz)]
+        turning = []
+        for i in range(self._nz):
+            entries = np.flatnonzero(rows.lane == i)
+            rates = [write.times(np.full(LANES, -rows.weight[e]), numbers[rows.other[e]]) for e in entries]
+            turning.append(
+                [
+                    self._combined(rates, [self._of_row(int(rows.row[e]), b) for e in entries])
+                    for b in self._blocks
+                ]
+            )
+        return turning
+
+    def _turned(self, row: Blocks) -> Blocks:
+        """B times a row of terms."""
+        numbers = [self._write.repeated(row, i) for i in range(self._nz)]
+        return [self._combined(numbers, [blocks[b] for blocks in self._turning]) for b in self._blocks]
+
+    def _response_to(self, products: Sums) -> Blocks:
+        """The response to minus sums of products of rows."""
+        write, start, sums = self._write, self._products.start, []
+        for b in range(start.size - 1):
+            parts = [products[c] for c in range(start[b], start[b + 1], LANES)]
+            sums.append(write.total(parts))
+        write.store(sums, self._sums, 0)
+        numbers = [write.everywhere(write.number(self._sums, e)) for e in range(self._nr)]
+        return [self._combined(numbers, [self._of_row(e, b) for e in range(self._nr)]) for b in self._blocks]
+
+    def _of_row(self, e: int, b: int) -> ir.Value:
+        """A block of the response to row e."""
+        return self._write.block(self._response, (self._nz + e) * self._lanes + b * LANES)
+
+    def _put(self, k: ir.Value, row: Blocks, power: ir.Value, factor: ir.Value) -> Blocks:
+        """Order k + 2 with the share of the motion in a power, times a factor, stored."""
+        write = self._write
+        moved = (write.product(power, share) for share in self._scaled(factor, self._share))
+        row = [write.total(pair) for pair in zip(row, moved, strict=True)]
+        write.store(row, self._terms, write.multiplied(write.plus(k, 2), self._lanes))
+        return row
+
+    # --- blocks of variables ------------------------------------------------------------------------------
+    def _row(self, k: ir.Value) -> Blocks:
+        """Order k of the variables."""
+        place = self._write.multiplied(k, self._lanes)
+        return self._write.row(self._terms, place, filled(self._nz))
+
+    def _times(self, matrix: np.ndarray, row: Blocks) -> Blocks:
+        """A matrix (nz, nz) of numbers known times a row."""
+        write, blocks = self._write, []
+        for b in self._blocks:
+            entries = [np.flatnonzero(line) for line in matrix[b * LANES : (b + 1) * LANES]]
+            parts = []
+            for level in range(max(map(len, entries))):
+                weights, lanes = np.zeros(LANES), [-1] * LANES
+                for lane, places in enumerate(entries):
+                    if level < len(places):
+                        weights[lane] = matrix[b * LANES + lane, places[level]]
+                        lanes[lane] = int(places[level])
+                parts.append(write.times(weights, write.gathered(row, lanes)))
+            blocks.append(write.total(parts))
+        return blocks
+
+    def _scaled(self, factor: ir.Value, row: Blocks) -> Blocks:
+        return [self._write.product(factor, block) for block in row]
+
+    def _plus(self, one: Blocks, other: Blocks) -> Blocks:
+        return [self._write.total(pair) for pair in zip(one, other, strict=True)]
+
+    def _combined(self, factors: Blocks, blocks: Blocks) -> ir.Value:
+        """The sum of the products of factors and blocks."""
+        return self._write.total(list(map(self._write.product, factors, blocks)))
+
+    def _inner_product(self, one: Blocks, other: Blocks) -> ir.Value:
+        """A block of the inner product of two rows."""
+        return self._write.summed(self._combined(one, other))
+
+
+def real_block(write: Instructions, k: ir.Value, more: int) -> ir.Value:
+    """A block of the number k + more."""
+    return write.everywhere(write.real(write.plus(k, more)))
