@@ -195,6 +195,7 @@ class Progress(NamedTuple):
     change: float = 0.0  # of velocities, relative, that a passage may not magnify
     begun: int = 0  # whether a series has been begun
     passed: int = 0  # singular positions in ``Crossings``
+    taken: int = 0  # samples that do not wait
     slowing: float = 0.0  # 1/s, the relative rate of the speed where orders are by power; else 0
     leaving: int = 0  # whether the series comes from a singular position that it has passed
 
@@ -251,6 +252,16 @@ class Beginning(NamedTuple):
     angles: Annotated[Vector, "torsions"]
 
 
+class Waiting(NamedTuple):
+    """Samples whose accelerations and multipliers are found when the steps of a call have ended."""
+
+    state: Annotated[Matrix, "waiting", "3*lanes"]  # variables and their two derivatives
+    angles: Annotated[Matrix, "waiting", "torsions"]  # rad, unwrapped
+    length: Annotated[Vector, "waiting"]  # s, of the step; 0 for a sample that waits no longer
+    lost: Annotated[Vector, "waiting"]  # what the step's tolerance explains, in accelerations times length²
+    passing: Annotated[Indices, "waiting"]  # whether the step was one of a passage
+
+
 class TaylorMemory(NamedTuple):
     """All that the kernels of the method share."""
 
@@ -271,6 +282,8 @@ class TaylorMemory(NamedTuple):
     state: Annotated[Matrix, 3, "lanes"]  # variables and their two derivatives at some time
     pose: Annotated[Matrix, 3, "12*nb"]
     angles: Annotated[Vector, "torsions"]  # rad, unwrapped, at the time of expansion
+    waiting: Waiting  # empty where samples do not wait
+    aside: Snapshot  # the state of the run while samples that wait are taken
 
 
 SERIES = Named(TaylorMemory)

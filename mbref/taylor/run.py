@@ -21,6 +21,7 @@ from mbref.simulation.singular_start import fits_no_branch, leaving
 from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, UNDECIDED
 from mbref.taylor.driven import LEAST_ORDER, LOOSE, ORDER, follow_drivers
 from mbref.taylor.passing_run import PassingRun
+from mbref.taylor.samples import complete_samples
 from mbref.taylor.series_run import SeriesRun, order_of
 
 
@@ -81,6 +82,10 @@ class TaylorRun(SeriesRun):
         super().__init__(scene, method, times, limits)
         self._passage = Passage(self)
 
+    def _waiting(self) -> int:
+        """All samples may wait."""
+        return self.times.size
+
     def _tolerance_and_order(self, limits: Limits) -> tuple[float, int]:
         """Of the steps of the series: of strides where drivers alone are followed over singular positions."""
         wanted = self.method.options_of(self.method.integrator)["order"]
@@ -102,16 +107,20 @@ class TaylorRun(SeriesRun):
 
     def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
         """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
-        before, began = self.making, time.process_time()
+        before, began, seconds = self.making, time.process_time(), 0.0
         status = self._passage.leave_start()
         while status == PAUSED:
             status = self.step_on()
+            seconds += time.process_time() - began
+            if (completed := int(complete_samples(self._packed_taylor.argument))) != OK:
+                status = completed
+            began = time.process_time()
             if status != DONE:
                 status = self._over(status)
                 self.specialise_where_it_pays(status)
             if progress is not None:
                 progress(float(self.memory.loop.clock.time))
-        seconds = time.process_time() - began - (self.making - before)
+        seconds += time.process_time() - began - (self.making - before)
         self.crossings += self.recorded()
         return status, seconds
 

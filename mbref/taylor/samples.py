@@ -1,4 +1,7 @@
-"""Samples between the ends of a step: states from the series, multipliers by the formulation."""
+"""Samples between the ends of a step: states from the series, multipliers by the formulation.
+
+A run in series keeps the variables while it steps; the rest of its samples is found when it pauses or ends.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +9,13 @@ from numpy import sqrt
 
 from mbref.equations.coordinates import contract, copy_state
 from mbref.equations.evaluation import add_resting_rows, assemble_system
-from mbref.kernels.compilation import inlined, kernel
+from mbref.kernels.compilation import INT, entry, inlined, kernel
 from mbref.kernels.layout import GUARD_FAILED, NOT_CONVERGED, OK
 from mbref.linear_algebra.vectors import copy, larger
 from mbref.simulation.samples import take_sample as record_sample
 from mbref.taylor.lanes import LANES, load, store
+from mbref.taylor.layout import SERIES
+from mbref.taylor.snapshots import return_to_snapshot, take_snapshot
 
 BESIDE = 0.1  # part of the largest least pivot below which a position is beside a singular one
 LOST_MOTION = 30.0  # tolerances, times orders², by which accelerations times the step's square may be off
@@ -136,14 +141,19 @@ def rows_times(vector, equations, out):
 
 
 @kernel
-def explained(a, b, length, progress):
-    """Whether two accelerations differ by no more than the tolerance of a step of that length explains."""
-    size, difference, orders = 0.0, 0.0, progress.order * progress.order
+def explained(a, b, length, lost):
+    """Whether two accelerations differ by no more than what a step of that length may have lost explains."""
+    size, difference = 0.0, 0.0
     for k in range(a.shape[0]):
         size = larger(size, b[k])
         difference = larger(difference, a[k] - b[k])
-    lost = LOST_MOTION * orders * progress.tolerance + NOISE
     return difference * length * length <= LOST_MOTION * lost + CLEAR * size * length * length
+
+
+@inlined
+def lost_motion(progress):
+    """The accelerations, times the step's square, by which the tolerance of a step explains a difference."""
+    return LOST_MOTION * progress.order * progress.order * progress.tolerance + NOISE
 
 
 @kernel
@@ -179,7 +189,68 @@ def balance_forces(t, acceleration, run):
 
 @kernel
 def take_sample(h, length, memory):
-    """Record state, accelerations and multipliers at a distance h (s) into a step: OK or why there are none.
+    """Record a sample at a distance h (s) into a step: OK or why there is none.
+
+    It waits for accelerations and multipliers unless the step crosses, or samples of the run never wait.
+    """
+    clock, waiting = memory.run.loop.clock, memory.waiting
+    evaluate_series(h, memory)
+    put_angles(h, memory)
+    if waiting.length.shape[0] == 0:
+        return complete_sample(length, lost_motion(memory.progress), memory.progress.passing, memory)
+    if memory.progress.crossed:
+        waiting.length[clock.sample] = 0.0
+        return complete_sample(length, lost_motion(memory.progress), memory.progress.passing, memory)
+    keep_sample(clock.sample, length, memory)
+    clock.sample += 1
+    return OK
+
+
+@inlined
+def keep_sample(k, length, memory):
+    """Have sample k wait with the state in memory, of a step of that length."""
+    waiting, state = memory.waiting, memory.state.reshape(-1)
+    for j in range(0, state.shape[0], LANES):
+        store(load(state, j), waiting.state, k * state.shape[0] + j)
+    for s in range(memory.angles.shape[0]):
+        waiting.angles[k, s] = memory.angles[s]
+    waiting.length[k], waiting.lost[k] = length, lost_motion(memory.progress)
+    waiting.passing[k] = memory.progress.passing
+
+
+@entry(INT(SERIES))
+def complete_samples(memory):
+    """Find accelerations and multipliers of the samples that wait: OK, or why one has none, which is then the
+    first that is not taken."""
+    clock, progress = memory.run.loop.clock, memory.progress
+    taken, end = progress.taken, clock.sample
+    progress.taken = end
+    take_snapshot(memory.run, memory.aside)
+    for k in range(taken, end):
+        if memory.waiting.length[k] > 0.0:
+            clock.sample = k
+            status = complete_waiting(k, memory)
+            if status != OK:
+                clock.time = memory.run.loop.times[k]
+                return status
+    return_to_snapshot(memory.aside, memory.run)
+    return OK
+
+
+@kernel
+def complete_waiting(k, memory):
+    """Find accelerations and multipliers of sample k, which waits: OK or why there are none."""
+    waiting, state, slot = memory.waiting, memory.state.reshape(-1), memory.polynomials.torsions.slot
+    for j in range(0, state.shape[0], LANES):
+        store(load(waiting.state, k * state.shape[0] + j), state, j)
+    for s in range(slot.shape[0]):
+        memory.run.equations.angles[slot[s]] = waiting.angles[k, s]
+    return complete_sample(waiting.length[k], waiting.lost[k], waiting.passing[k], memory)
+
+
+@kernel
+def complete_sample(length, lost, passing, memory):
+    """Record the sample whose variables are in memory, of a step of that length: OK or why there is none.
 
     Accelerations are the formulation's, but beside a singular position, where the state determines them ill,
     the series'; multipliers balance the forces of either.  There the exact series of a passage give the state
@@ -188,18 +259,18 @@ def take_sample(h, length, memory):
     """
     run, samples, k = memory.run, memory.run.loop.samples, memory.run.loop.clock.sample
     system, watch = run.equations.system, run.watch
-    put_state_at(h, memory)
+    find_poses(memory)
+    put_state(memory)
     copy(system.acceleration, samples.accelerations[k])
     project_state(run.loop.times[k], run)
-    put_angles(h, memory)
     beside = watch.smallest_pivot < BESIDE * watch.reference_pivot
     if beside:
-        if memory.progress.passing:
+        if passing:
             put_state(memory)
         status = balance_forces(run.loop.times[k], samples.accelerations[k], run)
     else:
         status = accelerate(run.loop.times[k], run)
-    if status == OK and not explained(system.acceleration, samples.accelerations[k], length, memory.progress):
+    if status == OK and not explained(system.acceleration, samples.accelerations[k], length, lost):
         status = NOT_CONVERGED
     if status == OK:
         record_sample(run)

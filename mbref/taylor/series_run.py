@@ -36,6 +36,7 @@ from mbref.taylor.layout import (
     Snapshot,
     Solver,
     TaylorMemory,
+    Waiting,
 )
 from mbref.taylor.passing import (
     SHARE,
@@ -48,6 +49,7 @@ from mbref.taylor.passing import (
     take_over,
 )
 from mbref.taylor.polynomials import Geometry
+from mbref.taylor.samples import complete_samples
 from mbref.taylor.scene_code import code_of, functions_of, rank_of
 from mbref.taylor.start import OFF
 from mbref.taylor.stepping import begin, expand_from, step
@@ -57,7 +59,7 @@ EXACT, EXACT_ORDER = 1e-13, 16  # rtol and atol of steps that pass singular posi
 KEPT = 16  # singular positions that are passed in a call
 CALLED = (begin, expand_from, step)  # the SeriesKernels
 KERNELS_OF_SERIES = (
-    *CALLED, enter, advance_series, follow_drivers, advance_over, take_over, begin_here,
+    *CALLED, enter, advance_series, follow_drivers, complete_samples, advance_over, take_over, begin_here,
     cross, pass_on, give_back, look_along,
 )  # fmt: skip
 ROUNDING = 1e-16  # of a singular value
@@ -148,7 +150,7 @@ class SeriesRun(Run):
         sizes = {
             "orders": order + 1, "nz": nz, "ng": ng, "nr": nr,
             "lanes": filled(max(1, nz + nr + ng)), "slots": polynomials.products.left.size,
-            "twofold": polynomials.rows.row.size, "kept": KEPT,
+            "twofold": polynomials.rows.row.size, "kept": KEPT, "waiting": self._waiting(),
             "springs": polynomials.springs.natural.size, "torsions": polynomials.torsions.slot.size,
             **self.model.sizes,
         }  # fmt: skip
@@ -186,7 +188,13 @@ class SeriesRun(Run):
             state=np.zeros((3, sizes["lanes"])),
             pose=np.zeros((3, 12 * self.model.nb)),
             angles=np.zeros(sizes["torsions"]),
+            waiting=allocate(Waiting, sizes),
+            aside=allocate(Snapshot, sizes),
         )
+
+    def _waiting(self) -> int:
+        """Samples that may wait for accelerations and multipliers."""
+        return 0
 
     def _specialise(self) -> None:
         """Expand, and take samples, by code of the scene's own from now on, made or loaded.

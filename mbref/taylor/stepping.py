@@ -265,6 +265,7 @@ def step(memory):
 def begin(memory):
     """Choose the partition at the present state and expand there: OK or why that cannot be."""
     t, slot = memory.run.loop.clock.time, memory.polynomials.torsions.slot
+    memory.progress.taken = memory.run.loop.clock.sample
     for s in range(slot.shape[0]):
         memory.angles[s] = memory.run.equations.angles[slot[s]]
     read_variables(t, memory)
