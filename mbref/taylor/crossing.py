@@ -1,7 +1,8 @@
 """Where a step crosses a singular position: determinants of the constraint gradients at both its ends.
 
 det(G Gᵀ₀) changes its sign where branches cross, G₀ being the gradient where the step began; of a square G
-it is det G det G₀, and det G at both ends is the product of the pivots.
+it is det G det G₀, and det G at both ends is the product of the pivots.  Where one variable is independent,
+the same one at both ends, it is the product of both, times that of the motions T that the rows allow.
 """
 
 from __future__ import annotations
@@ -108,9 +109,11 @@ def changes_sign(h, parts, memory):
     """Whether the determinant of the gradients at both ends of a step of h seconds is negative.
 
     A long step is looked at in parts, because rows that turn by a right angle change the sign too, and two
-    changes leave it.  The gradient where the step began is kept.
+    changes leave it.
     """
     changes, square = False, is_square(memory)
+    if parts == 1 and has_one_motion(memory):
+        return motions_oppose(memory)
     remember_gradient(memory)
     for part in range(1, parts):
         evaluate_series(h * part / parts, memory)
@@ -121,9 +124,26 @@ def changes_sign(h, parts, memory):
     negative, _ = overlap_at_end(memory)
     if parts > 1:
         evaluate_series(h, memory)
-        if not square:
-            remember_gradient(memory)
     return changes or negative
+
+
+@kernel
+def has_one_motion(memory):
+    """Whether the rows leave one variable independent, the same one at both ends of a step."""
+    progress = memory.progress
+    return progress.rank + 1 == memory.solver.order.shape[0] and progress.choice == progress.past_choice
+
+
+@kernel
+def motions_oppose(memory):
+    """Whether the determinant of the gradients at both ends of a step is negative, by pivots and motions."""
+    solver, along = memory.solver, 0.0
+    for i in range(solver.order.shape[0]):
+        along += solver.null_space[0, i] * solver.past_motion[i]
+    negative = along < 0.0
+    for k in range(memory.progress.rank):
+        negative = negative != (solver.last[k] * solver.past[k] < 0.0)
+    return negative
 
 
 @kernel
@@ -132,6 +152,7 @@ def find_crossing(h, memory):
 
     The determinant vanishes there, with a change of sign unless branches of several loops cross at once.
     """
+    remember_gradient(memory)
     change = sign_change(h, memory)
     return change if change >= 0.0 else least_between(h, memory)
 

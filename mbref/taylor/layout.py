@@ -145,6 +145,7 @@ class Solver(NamedTuple):
     first: Annotated[Vector, "nz"]  # pivots when they were chosen: of G, then of the reduced mass matrix
     last: Annotated[Vector, "nz"]  # pivots of the last factorisation
     past: Annotated[Vector, "nz"]  # pivots where the step began
+    past_motion: Annotated[Vector, "nz"]  # T of the first independent variable, if any, where the step began
     past_gradient: Annotated[Matrix, "nz", "nr"]  # Gᵀ of the independent rows where the step began
     product: Annotated[Matrix, "nr", "nr"]  # of gradients at both ends of a step
     place: Annotated[Indices, "twofold"]  # in the tableau, of the products of rows

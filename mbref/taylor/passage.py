@@ -20,7 +20,14 @@ from mbref.kernels.compilation import kernel
 from mbref.kernels.layout import OK
 from mbref.linear_algebra.vectors import copy, larger
 from mbref.simulation.stepping import SINGULAR_AHEAD, STEP_TOO_SMALL, UNDECIDED
-from mbref.taylor.crossing import changes_sign, least_between, overlap_at_end, size_at, size_at_start
+from mbref.taylor.crossing import (
+    changes_sign,
+    least_between,
+    overlap_at_end,
+    remember_gradient,
+    size_at,
+    size_at_start,
+)
 from mbref.taylor.partition import kept_pivot
 from mbref.taylor.samples import evaluate_series
 from mbref.taylor.turning import pivot_of_turning, turns_back
@@ -60,6 +67,8 @@ def remember_pivots_here(memory):
     """Keep the pivots of the last factorisation, and the largest that the least one has been."""
     solver, progress = memory.solver, memory.progress
     copy(solver.last, solver.past)
+    for i in range(solver.order.shape[0]):
+        solver.past_motion[i] = solver.null_space[0, i]
     progress.past_choice, progress.past_pivot = progress.choice, least_pivot(memory)
     progress.largest_pivot = max(progress.largest_pivot, progress.past_pivot)
 
@@ -137,6 +146,7 @@ def inside(h, pivot, memory):
     """The logarithms of the determinant where a least pivot vanishes that falls and rises linearly, and of
     the lesser one at the ends of a step of h seconds."""
     past = memory.progress.past_pivot
+    remember_gradient(memory)
     _, behind = overlap_at_end(memory)
     return size_at(h * past / (past + pivot), memory), min(size_at_start(memory), behind)
 
