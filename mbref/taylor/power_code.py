@@ -32,8 +32,11 @@ def serves(taylor: TaylorMemory) -> bool:
     """Whether a scene has one freedom and no drivers, and power takes no more products than multipliers."""
     if taylor.progress.freedoms != 1 or taylor.polynomials.given.driver.size:
         return False
-    products = products_of_rows(taylor).weight.size + filled(taylor.solver.order.size)
-    return products <= taylor.polynomials.products.weight.size
+    products, nz, nr = taylor.polynomials.products, taylor.solver.order.size, taylor.solver.row.size
+    blocks = np.split(products.weight, products.start[1:-1])
+    counts = np.concatenate([np.count_nonzero(block.reshape(-1, LANES), axis=0) for block in blocks])
+    of_rows = np.maximum.reduceat(counts[nz : nz + nr], np.arange(0, nr, LANES)).sum() * LANES
+    return bool(of_rows + filled(nz) <= products.weight.size)
 
 
 def products_of_rows(taylor: TaylorMemory) -> Products:
