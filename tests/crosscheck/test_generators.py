@@ -162,6 +162,7 @@ def test_a_kept_library_serves_another_process_without_compiling(
 ) -> None:
     needs("casadi")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("LD_LIBRARY_PATH", raising=False)  # where OpenSim, once imported, has another CasADi
     code = (
         "from crosscheck.engines.casadi import library; from mbref.scenes import SCENES; "
         "library.library(SCENES['planar_slider_crank_gravity'](), 0.0); "
