@@ -196,7 +196,7 @@ class Progress(NamedTuple):
     change: float = 0.0  # of velocities, relative, that a passage may not magnify
     begun: int = 0  # whether a series has been begun
     passed: int = 0  # singular positions in ``Crossings``
-    taken: int = 0  # samples that do not wait
+    taken: int = 0  # samples before the first that may wait
     slowing: float = 0.0  # 1/s, the relative rate of the speed where orders are by power; else 0
     leaving: int = 0  # whether the series comes from a singular position that it has passed
 

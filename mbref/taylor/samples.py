@@ -191,61 +191,61 @@ def balance_forces(t, acceleration, run):
 def take_sample(h, length, memory):
     """Record a sample at a distance h (s) into a step: OK or why there is none.
 
-    It waits for accelerations and multipliers unless the step crosses, or samples of the run never wait.
+    It waits for accelerations and multipliers unless the step crosses, or there is no room.
     """
     clock, waiting = memory.run.loop.clock, memory.waiting
     evaluate_series(h, memory)
     put_angles(h, memory)
-    if waiting.length.shape[0] == 0:
+    place = clock.sample - memory.progress.taken
+    if place >= waiting.length.shape[0] or memory.progress.crossed:
+        if place < waiting.length.shape[0]:
+            waiting.length[place] = 0.0
         return complete_sample(length, lost_motion(memory.progress), memory.progress.passing, memory)
-    if memory.progress.crossed:
-        waiting.length[clock.sample] = 0.0
-        return complete_sample(length, lost_motion(memory.progress), memory.progress.passing, memory)
-    keep_sample(clock.sample, length, memory)
+    keep_sample(place, length, memory)
     clock.sample += 1
     return OK
 
 
 @inlined
-def keep_sample(k, length, memory):
-    """Have sample k wait with the state in memory, of a step of that length."""
+def keep_sample(place, length, memory):
+    """Have a sample wait at a place with the state in memory, of a step of that length."""
     waiting, state = memory.waiting, memory.state.reshape(-1)
     for j in range(0, state.shape[0], LANES):
-        store(load(state, j), waiting.state, k * state.shape[0] + j)
+        store(load(state, j), waiting.state, place * state.shape[0] + j)
     for s in range(memory.angles.shape[0]):
-        waiting.angles[k, s] = memory.angles[s]
-    waiting.length[k], waiting.lost[k] = length, lost_motion(memory.progress)
-    waiting.passing[k] = memory.progress.passing
+        waiting.angles[place, s] = memory.angles[s]
+    waiting.length[place], waiting.lost[place] = length, lost_motion(memory.progress)
+    waiting.passing[place] = memory.progress.passing
 
 
 @entry(INT(SERIES))
 def complete_samples(memory):
     """Find accelerations and multipliers of the samples that wait: OK, or why one has none, which is then the
     first that is not taken."""
-    clock, progress = memory.run.loop.clock, memory.progress
-    taken, end = progress.taken, clock.sample
+    clock, progress, waiting = memory.run.loop.clock, memory.progress, memory.waiting
+    first, end = progress.taken, clock.sample
     progress.taken = end
     take_snapshot(memory.run, memory.aside)
-    for k in range(taken, end):
-        if memory.waiting.length[k] > 0.0:
-            clock.sample = k
-            status = complete_waiting(k, memory)
+    for place in range(min(end - first, waiting.length.shape[0])):
+        if waiting.length[place] > 0.0:
+            clock.sample = first + place
+            status = complete_waiting(place, memory)
             if status != OK:
-                clock.time = memory.run.loop.times[k]
+                clock.time = memory.run.loop.times[first + place]
                 return status
     return_to_snapshot(memory.aside, memory.run)
     return OK
 
 
 @kernel
-def complete_waiting(k, memory):
-    """Find accelerations and multipliers of sample k, which waits: OK or why there are none."""
+def complete_waiting(place, memory):
+    """Find accelerations and multipliers of the sample that waits at a place: OK or why there are none."""
     waiting, state, slot = memory.waiting, memory.state.reshape(-1), memory.polynomials.torsions.slot
     for j in range(0, state.shape[0], LANES):
-        store(load(waiting.state, k * state.shape[0] + j), state, j)
+        store(load(waiting.state, place * state.shape[0] + j), state, j)
     for s in range(slot.shape[0]):
-        memory.run.equations.angles[slot[s]] = waiting.angles[k, s]
-    return complete_sample(waiting.length[k], waiting.lost[k], waiting.passing[k], memory)
+        memory.run.equations.angles[slot[s]] = waiting.angles[place, s]
+    return complete_sample(waiting.length[place], waiting.lost[place], waiting.passing[place], memory)
 
 
 @kernel

@@ -10,6 +10,7 @@ from mbref.scene import Driver
 from mbref.scenes import SCENES, find_scene
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.simulate import Limits, simulate, why_no_code
+from mbref.taylor import run as run_module
 from mbref.taylor import scene_code
 from mbref.taylor.run import TaylorRun
 from mbref.trajectory import Outcome
@@ -141,6 +142,19 @@ def test_samples_are_taken_by_code_of_the_scene():
     run = TaylorRun(SCENES["spatial_slider_crank"](), TAYLOR, np.array([0.1]), Limits(code="specialised"))
     assert run.taylor.run is run.memory
     assert run.memory.code.addresses.rates and run.memory.code.addresses.project
+
+
+@pytest.mark.parametrize("name", ("spatial_slider_crank_gravity", "four_bar_gravity", "four_bar"))
+def test_samples_that_find_no_room_to_wait_are_the_same(name, monkeypatch):
+    """But for rounding; also where steps cross singular positions."""
+    found, times = [], np.linspace(0.0, SCENES[name]().duration, 41)
+    for waiting in (1024, 7, 0):
+        monkeypatch.setattr(run_module, "WAITING", waiting)
+        found.append(simulate(SCENES[name](), TAYLOR, times, Limits(code="generic")))
+    for other in found[1:]:
+        assert len(other.times) == 41
+        for array in ("position", "velocity", "acceleration"):
+            np.testing.assert_allclose(getattr(found[0], array), getattr(other, array), 1e-11, 1e-11)
 
 
 def test_auto_takes_the_code_where_many_steps_are_ahead():
