@@ -2,8 +2,8 @@
 
 The generic mapping of a scene has three dimensions and universal joints; this is the least that MuJoCo needs.
 The compliance of closures is scaled down, so that Newton's method meets them in one or two iterations; their
-errors decay by feedback of 1/s; what the chain does not need is switched off.  Other numbers of iterations
-and of steps of the line search, scales, rates of feedback and solvers were found to be dearer.
+errors decay by feedback of 1/s; unused parts of MuJoCo are switched off.  Other numbers of iterations and of
+steps of the line search, scales, rates of feedback and solvers were found to be dearer.
 """
 
 from __future__ import annotations

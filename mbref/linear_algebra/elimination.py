@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from numpy import log
 
-from mbref.kernels.compilation import kernel
+from mbref.kernels.compilation import inlined, kernel
 
 
 @kernel
@@ -53,13 +53,22 @@ def lu_solve(a, n, pivots, b):
         b[k] /= a[k, k]
 
 
+@inlined
+def multiplied(size, part, number):
+    """The size of a product times a number, as a logarithm and a part of which none has been taken.
+
+    Logarithms are taken of as many numbers at a time as a number's range allows.
+    """
+    part *= max(abs(number), 1e-150)
+    if not 1e-150 < part < 1e150:
+        return size + log(part), 1.0
+    return size, part
+
+
 @kernel
 def determinant(a, n):
-    """The determinant of a[:n, :n]: whether it is negative, and the logarithm of its size; LU in place.
-
-    Logarithms are taken of as many pivots at a time as a number's range allows.
-    """
-    negative, size, product = False, 0.0, 1.0
+    """The determinant of a[:n, :n]: whether it is negative, and the logarithm of its size; LU in place."""
+    negative, size, part = False, 0.0, 1.0
     for k in range(n):
         best = k
         for i in range(k + 1, n):
@@ -71,27 +80,23 @@ def determinant(a, n):
                 a[k, j], a[best, j] = a[best, j], a[k, j]
         if a[k, k] < 0.0:
             negative = not negative
-        product *= max(abs(a[k, k]), 1e-150)
-        if not 1e-150 < product < 1e150:
-            size, product = size + log(product), 1.0
+        size, part = multiplied(size, part, a[k, k])
         inverse = 1.0 / a[k, k] if abs(a[k, k]) > 1e-150 else 0.0
         for i in range(k + 1, n):
             factor = a[i, k] * inverse
             if factor != 0.0:
                 for j in range(k + 1, n):
                     a[i, j] -= factor * a[k, j]
-    return negative, size + log(product)
+    return negative, size + log(part)
 
 
 @kernel
-def product(pivots, n):
+def product_of_pivots(pivots, n):
     """The product of the first n pivots: whether it is negative, and the logarithm of its size."""
     negative, size, part = False, 0.0, 1.0
     for k in range(n):
         negative = negative != (pivots[k] < 0.0)
-        part *= max(abs(pivots[k]), 1e-150)
-        if not 1e-150 < part < 1e150:
-            size, part = size + log(part), 1.0
+        size, part = multiplied(size, part, pivots[k])
     return negative, size + log(part)
 
 

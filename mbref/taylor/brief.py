@@ -14,9 +14,10 @@ from mbref.kernels.compilation import kernel
 from mbref.kernels.layout import OK
 from mbref.linear_algebra.vectors import copy
 from mbref.taylor.crossing import find_crossing
+from mbref.taylor.partition import freedoms
 from mbref.taylor.passage import least_pivot, size_of
 from mbref.taylor.samples import evaluate_series, put_angles, put_state_at
-from mbref.taylor.start import freedoms, judged_start
+from mbref.taylor.start import judged_start
 from mbref.taylor.stepping import return_to_start
 from mbref.taylor.twin import APART, CLOSER, MAGNIFIED
 

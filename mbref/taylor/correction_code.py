@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from llvmlite import ir
 
-from mbref.taylor.instructions import Blocks, Instructions, constant
+from mbref.taylor.instructions import Blocks, Instructions, constant, levels
 from mbref.taylor.lanes import LANES
 from mbref.taylor.layout import TaylorMemory
 
@@ -83,16 +83,12 @@ class Correction:
 
     def _linear(self, block: int, row: Blocks) -> list[ir.Value]:
         """The linear terms in a block of rows, one of each row at a time."""
-        rows, parts = self._taylor.polynomials.rows, []
-        terms = [np.flatnonzero(rows.linear_row + self._nz == lane) for lane in self._lanes_of(block)]
-        for level in range(max(map(len, terms))):
-            weights, lanes = np.zeros(LANES), [-1] * LANES
-            for k, places in enumerate(terms):
-                if level < len(places):
-                    weights[k] = rows.linear_weight[places[level]]
-                    lanes[k] = int(rows.linear_lane[places[level]])
-            parts.append(self._write.times(weights, self._write.gathered(row, lanes)))
-        return parts
+        rows = self._taylor.polynomials.rows
+        places = (np.flatnonzero(rows.linear_row + self._nz == lane) for lane in self._lanes_of(block))
+        terms = [[(rows.linear_weight[e], int(rows.linear_lane[e])) for e in of_row] for of_row in places]
+        return [
+            self._write.times(weights, self._write.gathered(row, lanes)) for weights, lanes in levels(terms)
+        ]
 
     def _masked(self, block: int, numbers: np.ndarray) -> np.ndarray:
         """Numbers of a block, those of other lanes than rows' zero."""

@@ -10,8 +10,8 @@ from __future__ import annotations
 from numpy import exp
 
 from mbref.kernels.compilation import kernel
-from mbref.linear_algebra.elimination import determinant, product
-from mbref.taylor.partition import put_gradient
+from mbref.linear_algebra.elimination import determinant, product_of_pivots
+from mbref.taylor.partition import freedoms, put_gradient
 from mbref.taylor.samples import evaluate_series
 
 GOLDEN, SECTIONS = 0.6180339887498949, 70  # of the search for the least determinant
@@ -21,20 +21,14 @@ LOST_ROW = 1e-6  # of the largest pivot: formulations may take a row with less f
 
 
 @kernel
-def is_square(memory):
-    """Whether the independent rows determine all variables."""
-    return memory.progress.rank == memory.solver.order.shape[0]
-
-
-@kernel
 def remember_gradient(memory):
     """Keep G where the step began; of a square one its determinant, by the pivots if they are of its rows."""
     progress, rank = memory.progress, memory.progress.rank
-    if not is_square(memory):
+    if freedoms(memory) > 0:
         put_gradient(memory.series.past, memory)
         keep_gradient(memory)
     elif progress.choice == progress.past_choice:
-        progress.past_negative, progress.past_logarithm = product(memory.solver.past, rank)
+        progress.past_negative, progress.past_logarithm = product_of_pivots(memory.solver.past, rank)
     else:
         put_gradient(memory.series.past, memory)
         progress.past_negative, progress.past_logarithm = determinant_of_rows(memory)
@@ -53,7 +47,7 @@ def keep_gradient(memory):
 def overlap(y, memory):
     """Whether det(G Gᵀ₀) of the independent rows is negative, and its logarithm: G at variables y[0]."""
     put_gradient(y, memory)
-    if is_square(memory):
+    if freedoms(memory) == 0:
         negative, size = determinant_of_rows(memory)
         return negative != memory.progress.past_negative, size + memory.progress.past_logarithm
     return overlap_of_rows(memory)
@@ -73,16 +67,16 @@ def determinant_of_rows(memory):
 @kernel
 def overlap_at_end(memory):
     """The same as ``overlap`` where the step ends."""
-    if not is_square(memory):
+    if freedoms(memory) > 0:
         return overlap(memory.series.terms, memory)
-    negative, size = product(memory.solver.last, memory.progress.rank)
+    negative, size = product_of_pivots(memory.solver.last, memory.progress.rank)
     return negative != memory.progress.past_negative, size + memory.progress.past_logarithm
 
 
 @kernel
 def size_at_start(memory):
     """The logarithm of det(G₀ Gᵀ₀)."""
-    if is_square(memory):
+    if freedoms(memory) == 0:
         return 2.0 * memory.progress.past_logarithm
     _, size = overlap(memory.series.past, memory)
     return size
@@ -111,7 +105,7 @@ def changes_sign(h, parts, memory):
     A long step is looked at in parts, because rows that turn by a right angle change the sign too, and two
     changes leave it.
     """
-    changes, square = False, is_square(memory)
+    changes, square = False, freedoms(memory) == 0
     if parts == 1 and has_one_motion(memory):
         return motions_oppose(memory)
     remember_gradient(memory)
@@ -131,7 +125,7 @@ def changes_sign(h, parts, memory):
 def has_one_motion(memory):
     """Whether the rows leave one variable independent, the same one at both ends of a step."""
     progress = memory.progress
-    return progress.rank + 1 == memory.solver.order.shape[0] and progress.choice == progress.past_choice
+    return freedoms(memory) == 1 and progress.choice == progress.past_choice
 
 
 @kernel

@@ -1,7 +1,7 @@
 """Machine code of the orders of a driven scene's series: rows that determine all variables.
 
 No force moves any variable then, and no multiplier is needed: of the products there are those of rows, which
-may have several lanes.  The response adds up what the lanes of a row have found.
+may have several lanes.  The response adds up the sums of a row's lanes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from mbref.taylor.instructions import Blocks, Instructions
 from mbref.taylor.lanes import LANES, filled
 from mbref.taylor.layout import TaylorMemory
 from mbref.taylor.multiplier_code import MultiplierOrders
-from mbref.taylor.orders_code import Sums, Term, terms_of_rows
+from mbref.taylor.orders_code import Newest, Sums, Term, terms_of_rows
 from mbref.taylor.polynomials import products_of_lanes
 
 
@@ -27,13 +27,7 @@ class DrivenOrders(MultiplierOrders):
         unused: list[list[Term]] = [[]] * (filled(len(lanes)) - len(lanes))
         super().__init__(taylor, write, products_of_lanes([terms for _, terms in lanes] + unused))
 
-    def _solve(
-        self,
-        k: ir.Value,
-        known: Sums,
-        newest: dict[int, tuple[ir.Value, ...]],
-        force: np.ndarray | None = None,
-    ) -> Blocks:
+    def _solve(self, k: ir.Value, known: Sums, newest: Newest, force: np.ndarray | None = None) -> Blocks:
         """Order k + 2 of the variables, stored, and of the functions prescribed."""
         write, ahead = self._write, self._write.plus(self._write.multiplied(k, self._lanes), 2 * self._lanes)
         numbers = [write.everywhere(write.number(self._terms, ahead, g)) for g in self._functions]

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 from llvmlite import ir
 
-from mbref.taylor.instructions import Blocks, Instructions, constant
+from mbref.taylor.instructions import Blocks, Instructions, constant, levels
 from mbref.taylor.lanes import LANES
 from mbref.taylor.layout import TaylorMemory
 
@@ -64,13 +64,8 @@ class Elimination:
             self._taylor.polynomials.rows,
             range(block * LANES, min((block + 1) * LANES, self._nz)),
         )
-        terms = [np.flatnonzero((rows.row == r) & (rows.lane == variable)) for variable in variables]
-        for level in range(max(map(len, terms), default=0)):
-            weights, lanes = np.zeros(LANES), [-1] * LANES
-            for k, places in enumerate(terms):
-                if level < len(places):
-                    weights[k], lanes[k] = rows.weight[places[level]], int(rows.other[places[level]])
-            yield weights, lanes
+        places = (np.flatnonzero((rows.row == r) & (rows.lane == variable)) for variable in variables)
+        return levels([[(rows.weight[e], int(rows.other[e])) for e in of_one] for of_one in places])
 
     def _eliminate(self, k: int) -> None:
         """Take the k-th dependent variable out of all other rows, first out of the one that is next."""
@@ -124,6 +119,16 @@ class Elimination:
         forces = [self._force(i, rows) for i in range(self._nz)]
         for i, row in enumerate(rows):
             self._store(row, i)
+        self._put_rows(forces)
+
+    def _put_inverse(self) -> None:
+        """Rows that determine all variables: no force moves any, and multipliers are not asked for."""
+        for i in range(self._nz):
+            self._store({}, i)
+        self._put_rows([self._one(i) for i in range(self._nz)])
+
+    def _put_rows(self, forces: list[Row]) -> None:
+        """The response to rows: Nᵀ of the forces that are left at the variables."""
         for e in range(self._nz, self._nz + self._nr):
             parts = [
                 self._times(
@@ -133,27 +138,17 @@ class Elimination:
             ]
             self._store(self._sum(*parts), e)
 
-    def _put_inverse(self) -> None:
-        """Rows that determine all variables: no force moves any, and multipliers are not asked for."""
-        for i in range(self._nz):
-            self._store({}, i)
-        for e in range(self._nz, self._nz + self._nr):
-            parts = [
-                self._times(
-                    self._write.everywhere(self._write.number(self._particular, i * self._lanes + e)), one
-                )
-                for i, one in enumerate(map(self._one, range(self._nz)))
-            ]
-            self._store(self._sum(*parts), e)
-
     def _free_motions(self, particular: list[Row]) -> list[Row]:
         """The response of the independent variables, by the reduced mass matrix."""
+        motions, momenta = self._motions_and_momenta()
+        rest = [self._without_rows(p, motion, particular) for p, motion in zip(momenta, motions, strict=True)]
+        return self._reduced(motions, momenta, rest)
+
+    def _motions_and_momenta(self) -> tuple[list[Row], list[Row]]:
+        """T and M T, a row for each independent variable."""
         free = range(self._nz - self._rank)
         motions = [self._row(self._null_space, f, self._of_variables) for f in free]
-        momenta = [self._momentum(f, motions[f]) for f in free]
-        return self._reduced(
-            motions, momenta, [self._without_rows(momenta[f], motions[f], particular) for f in free]
-        )
+        return motions, [self._momentum(f, motion) for f, motion in enumerate(motions)]
 
     def _reduced(self, motions: list[Row], momenta: list[Row], solved: list[Row]) -> list[Row]:
         """Right-hand sides solved for by the reduced mass matrix, whose pivots are kept."""
@@ -241,23 +236,13 @@ class EliminationOfRows(Elimination):
     """The response of the variables to rows alone."""
 
     def _put_response(self) -> None:
-        """Nᵀ of the forces that no motion takes."""
-        free = range(self._nz - self._rank)
-        motions = [self._row(self._null_space, f, self._of_variables) for f in free]
-        momenta = [self._momentum(f, motions[f]) for f in free]
-        solved = self._reduced(motions, momenta, motions)
-        forces = []
+        """By the forces that no motion takes."""
+        motions, momenta = self._motions_and_momenta()
+        solved, forces = self._reduced(motions, momenta, motions), []
         for i in range(self._nz):
             taken = [
-                self._times(self._write.minus(self._write.repeated(list(momenta[f].values()), i)), solved[f])
-                for f in free
+                self._times(self._write.minus(self._write.repeated(list(momentum.values()), i)), motion)
+                for momentum, motion in zip(momenta, solved, strict=True)
             ]
             forces.append(self._sum(self._one(i), *taken))
-        for e in range(self._nz, self._nz + self._nr):
-            parts = [
-                self._times(
-                    self._write.everywhere(self._write.number(self._particular, i * self._lanes + e)), force
-                )
-                for i, force in enumerate(forces)
-            ]
-            self._store(self._sum(*parts), e)
+        self._put_rows(forces)

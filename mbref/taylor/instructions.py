@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from llvmlite import ir
@@ -92,10 +92,6 @@ class Instructions:
     def plus(self, whole: ir.Value, more: int | ir.Value) -> ir.Value:
         """A whole number and more."""
         return self._builder.add(whole, _whole(more))
-
-    def multiplied_by(self, whole: ir.Value, other: ir.Value) -> ir.Value:
-        """The product of two whole numbers."""
-        return self._builder.mul(whole, other)
 
     def real(self, whole: ir.Value) -> ir.Value:
         """A whole number as a number."""
@@ -202,3 +198,14 @@ def _whole(number: int | ir.Value) -> ir.Value:
 def constant(numbers: Sequence[float]) -> ir.Constant:
     """A block of numbers known."""
     return ir.Constant(BLOCK, [float(number) for number in numbers])
+
+
+def levels(terms: Sequence[Sequence[tuple[float, int]]]) -> Iterator[tuple[np.ndarray, list[int]]]:
+    """Weights (LANES,) and lanes of terms, given by weight and lane of each of a block's numbers: one of each
+    number at a time; -1 for a number that has no more."""
+    for level in range(max(map(len, terms), default=0)):
+        weights, lanes = np.zeros(LANES), [-1] * LANES
+        for k, of_number in enumerate(terms):
+            if level < len(of_number):
+                weights[k], lanes[k] = of_number[level]
+        yield weights, lanes

@@ -259,7 +259,7 @@ class Waiting(NamedTuple):
     state: Annotated[Matrix, "waiting", "3*lanes"]  # variables and their two derivatives
     angles: Annotated[Matrix, "waiting", "torsions"]  # rad, unwrapped
     length: Annotated[Vector, "waiting"]  # s, of the step; 0 for a sample that waits no longer
-    lost: Annotated[Vector, "waiting"]  # what the step's tolerance explains, in accelerations times length²
+    lost: Annotated[Vector, "waiting"]  # accelerations times length² that a step of its tolerance may lose
     passing: Annotated[Indices, "waiting"]  # whether the step was one of a passage
 
 

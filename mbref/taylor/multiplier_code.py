@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from llvmlite import ir
 
 from mbref.taylor.instructions import WHOLE, Blocks, Instructions, constant
 from mbref.taylor.lanes import LANES
 from mbref.taylor.layout import Products, TaylorMemory
-from mbref.taylor.orders_code import Factors, Orders, Sums
+from mbref.taylor.orders_code import Factors, Newest, Orders, Sums
 
 POINTERS = 7  # terms, response, left, right, scale, growth, sums
 
@@ -41,18 +43,12 @@ class MultiplierOrders(Orders):
         self, k: ir.Value, row: Blocks, factors: dict[int, Factors], inner: Sums, is_second: bool = False
     ) -> Blocks:
         """Order k + 2 of the variables and order k of the multipliers."""
-        write, newest = self._write, {}
+        write, newest = self._write, Newest()
         for c, (left, right) in self._first.items():
             newest[c] = write.product(left, factors[c].right), write.product(factors[c].left, right)
         return self._solve(k, inner, newest)
 
-    def _solve(
-        self,
-        k: ir.Value,
-        known: Sums,
-        newest: dict[int, tuple[ir.Value, ...]],
-        force: np.ndarray | None = None,
-    ) -> Blocks:
+    def _solve(self, k: ir.Value, known: Sums, newest: Newest, force: np.ndarray | None = None) -> Blocks:
         """Order k + 2 of the terms, stored; the sums known before the newest products are added up first."""
         write, place, sums = self._write, self._write.multiplied(k, self._lanes), []
         for b in self._blocks:
@@ -63,17 +59,11 @@ class MultiplierOrders(Orders):
             sums.append(write.product(write.block(self._scale, place, b * LANES), total))
         return self._respond(place, sums)
 
-    def _total(
-        self,
-        block: int,
-        known: Sums,
-        newest: dict[int, tuple[ir.Value, ...]],
-        others: Blocks | None = None,
-    ) -> ir.Value:
+    def _total(self, block: int, known: Sums, newest: Newest, others: Sequence[ir.Value] = ()) -> ir.Value:
         """The sum of a block's products and of others, the newest last."""
         write, start = self._write, self._products.start
         slots = range(start[block], start[block + 1], LANES)
-        parts = [known[c] for c in slots if c in known] + (others or [])
+        parts = [*(known[c] for c in slots if c in known), *others]
         parts = [write.total(parts)] if parts else []
         return write.total([*parts, *(product for c in slots if c in newest for product in newest[c])])
 

@@ -2,7 +2,7 @@
 
 The orders are a loop of few instructions, so that code fetched once serves all of them.  The numbers that
 meet in a product are known, so that blocks are shuffled in registers.  A sum may take a product in before it
-is rounded, as in the kernels.  Each order follows from ``mbref.taylor.multiplier_code`` or ``power_code``.
+is rounded, as in the kernels.  ``multiplier_code``, ``driven_code`` and ``power_code`` find each order.
 """
 
 from __future__ import annotations
@@ -21,6 +21,10 @@ from mbref.taylor.layout import Products, TaylorMemory
 
 Sums = dict[int, ir.Value]
 """Sums of products of a slot, by its place."""
+Newest = dict[int, tuple[ir.Value, ...]]
+"""The products of a slot with the newest factors, by its place."""
+Term = tuple[int, int, float]
+"""A product's factors and minus its weight."""
 AT_ONCE = 8  # slots whose sums a processor keeps in its registers
 COUNTS = 1  # the last order of multipliers
 
@@ -82,6 +86,7 @@ class Orders(ABC):
 
     # --- products -----------------------------------------------------------------------------------------
     def _factors_of_products(self, k: ir.Value, row: Blocks) -> dict[int, Factors]:
+        """Those of ``products``."""
         write, products, known = self._write, self._products, {}
         place, factors = write.multiplied(k, self._slots), {}
         for c in range(0, products.weight.size, LANES):
@@ -124,10 +129,6 @@ class Orders(ABC):
             ahead.append(write.total([blocks[size + n], write.product(left, blocks[2 * size + n])]))
             factors.append(right)
         return [*sums, *ahead, *factors]
-
-
-Term = tuple[int, int, float]
-"""A product's factors and minus its weight."""
 
 
 def terms_of_rows(taylor: TaylorMemory) -> list[list[Term]]:

@@ -5,7 +5,14 @@ from __future__ import annotations
 from numpy import inf
 
 from mbref.kernels.compilation import inlined, kernel
+from mbref.linear_algebra.vectors import copy
 from mbref.taylor.lanes import LANES, load, peak, store
+
+
+@kernel
+def freedoms(memory):
+    """Variables that the rows leave to the forces."""
+    return memory.solver.order.shape[0] - memory.progress.rank
 
 
 @kernel
@@ -52,8 +59,7 @@ def choose(memory):
     solver, tolerance = memory.solver, memory.run.equations.system.settings.rank_tolerance
     row, order, tableau, peaks, rank = solver.row, solver.order, solver.tableau, solver.peaks, 0
     put_rows(memory)
-    for j in range(0, tableau.shape[1], LANES):
-        store(load(memory.series.variable, j), solver.left, j)
+    copy(memory.series.variable, solver.left)
     for k in range(row.shape[0]):
         row[k] = k
         subtract_pivot_row(k, 0.0, k, memory)

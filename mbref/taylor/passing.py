@@ -20,10 +20,10 @@ from mbref.stabilisation.projection import put_active
 from mbref.taylor.brief import crosses, may_be_brief, parts_at, pass_briefly, step_exactly, step_usually
 from mbref.taylor.crossing import find_crossing
 from mbref.taylor.layout import SERIES
+from mbref.taylor.partition import freedoms
 from mbref.taylor.passage import AHEAD, least_pivot
 from mbref.taylor.samples import project_state, put_state_at, put_terms
 from mbref.taylor.snapshots import take_snapshot
-from mbref.taylor.start import freedoms
 from mbref.taylor.stepping import keep_terms
 from mbref.taylor.twin import LEAST_CHANGE, twin_agrees
 

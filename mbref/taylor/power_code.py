@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 from llvmlite import ir
 
-from mbref.taylor.instructions import WHOLE, Blocks, Instructions, constant
+from mbref.taylor.instructions import WHOLE, Blocks, Instructions, constant, levels
 from mbref.taylor.lanes import LANES, filled
 from mbref.taylor.layout import Inertia, Products, TaylorMemory
 from mbref.taylor.orders_code import Factors, Orders, Sums, terms_of_rows
@@ -86,9 +86,9 @@ class PowerOrders(Orders):
         rate = self._plus(row, row)
         self._inertia_of_rate = self._times(self._mass, rate)
         self._lost_force = list(map(write.difference, self._inertia_of_rate, force))
-        self._moments_along = {
-            False: self._times(self._moments.T, velocity), True: self._times(self._moments.T, rate),
-        }  # fmt: skip
+        self._velocity_moments, self._rate_moments = (
+            self._times(self._moments.T, along) for along in (velocity, rate)
+        )
         self._repeat(row)
         write.store([write.product(power, inverse)], self._sums, 0)
 
@@ -99,11 +99,11 @@ class PowerOrders(Orders):
         write, one = self._write, real_block(self._write, k, 1)
         newest = self._scaled(one, self._lost_force)
         known = [write.minus(inner[c]) for c in self._power if c in inner]
-        known += self._power_of_moments(k, is_rate=False)
+        known += self._power_of_moments(self._velocity_moments, k)
         if is_second:
             both = write.product(one, real_block(write, k, 0))
             newest = self._plus(newest, self._scaled(both, self._inertia_of_rate))
-            known += self._power_of_moments(write.less(k, WHOLE(1)), is_rate=True)
+            known += self._power_of_moments(self._rate_moments, write.less(k, WHOLE(1)))
         lost = (write.minus(write.product(n, z)) for n, z in zip(newest, row, strict=True))
         power = write.summed(write.total([write.total(known), *lost]))
         turned = self._turned(row)
@@ -125,11 +125,10 @@ class PowerOrders(Orders):
             factors[c] = Factors(velocity, ZERO, velocity)
         return factors
 
-    def _power_of_moments(self, k: ir.Value, is_rate: bool) -> Blocks:
-        """The power of the moments of order k along the velocity, or along its rate."""
+    def _power_of_moments(self, along: Blocks, k: ir.Value) -> Blocks:
+        """The power of the moments of order k along the velocity or its rate, times their matrix."""
         if not self._has_moments:
             return []
-        along = self._moments_along[is_rate]
         return [self._write.product(one, other) for one, other in zip(along, self._row(k), strict=True)]
 
     def _inverse_of_growth(self, k: ir.Value) -> ir.Value:
@@ -192,15 +191,9 @@ class PowerOrders(Orders):
         """A matrix (nz, nz) of numbers known times a row."""
         write, blocks = self._write, []
         for b in self._blocks:
-            entries = [np.flatnonzero(line) for line in matrix[b * LANES : (b + 1) * LANES]]
-            parts = []
-            for level in range(max(map(len, entries))):
-                weights, lanes = np.zeros(LANES), [-1] * LANES
-                for lane, places in enumerate(entries):
-                    if level < len(places):
-                        weights[lane] = matrix[b * LANES + lane, places[level]]
-                        lanes[lane] = int(places[level])
-                parts.append(write.times(weights, write.gathered(row, lanes)))
+            lines = matrix[b * LANES : (b + 1) * LANES]
+            terms = [[(line[i], int(i)) for i in np.flatnonzero(line)] for line in lines]
+            parts = [write.times(weights, write.gathered(row, lanes)) for weights, lanes in levels(terms)]
             blocks.append(write.total(parts))
         return blocks
 

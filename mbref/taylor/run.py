@@ -24,8 +24,6 @@ from mbref.taylor.passing_run import PassingRun
 from mbref.taylor.samples import complete_samples
 from mbref.taylor.series_run import SeriesRun, order_of
 
-WAITING = 1024  # samples at most that wait for accelerations and multipliers
-
 
 class CrossingRun(Run):
     """One simulation in steps whose passages of singular positions are Taylor series."""
@@ -80,13 +78,11 @@ class CrossingRun(Run):
 class TaylorRun(SeriesRun):
     """One simulation by Taylor series, which near singular positions give way to exact ones."""
 
+    most_waiting = 1024
+
     def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
         super().__init__(scene, method, times, limits)
         self._passage = Passage(self)
-
-    def _waiting(self) -> int:
-        """All samples that steps of a call are likely to take."""
-        return min(self.times.size, WAITING)
 
     def _tolerance_and_order(self, limits: Limits) -> tuple[float, int]:
         """Of the steps of the series: of strides where drivers alone are followed over singular positions."""

@@ -142,7 +142,7 @@ def rows_times(vector, equations, out):
 
 @kernel
 def explained(a, b, length, lost):
-    """Whether two accelerations differ by no more than what a step of that length may have lost explains."""
+    """Whether two accelerations differ by no more than a step of that length may have ``lost``."""
     size, difference = 0.0, 0.0
     for k in range(a.shape[0]):
         size = larger(size, b[k])
@@ -209,11 +209,9 @@ def take_sample(h, length, memory):
 @inlined
 def keep_sample(place, length, memory):
     """Have a sample wait at a place with the state in memory, of a step of that length."""
-    waiting, state = memory.waiting, memory.state.reshape(-1)
-    for j in range(0, state.shape[0], LANES):
-        store(load(state, j), waiting.state, place * state.shape[0] + j)
-    for s in range(memory.angles.shape[0]):
-        waiting.angles[place, s] = memory.angles[s]
+    waiting = memory.waiting
+    copy(memory.state.reshape(-1), waiting.state[place])
+    copy(memory.angles, waiting.angles[place])
     waiting.length[place], waiting.lost[place] = length, lost_motion(memory.progress)
     waiting.passing[place] = memory.progress.passing
 
@@ -240,9 +238,8 @@ def complete_samples(memory):
 @kernel
 def complete_waiting(place, memory):
     """Find accelerations and multipliers of the sample that waits at a place: OK or why there are none."""
-    waiting, state, slot = memory.waiting, memory.state.reshape(-1), memory.polynomials.torsions.slot
-    for j in range(0, state.shape[0], LANES):
-        store(load(waiting.state, place * state.shape[0] + j), state, j)
+    waiting, slot = memory.waiting, memory.polynomials.torsions.slot
+    copy(waiting.state[place], memory.state.reshape(-1))
     for s in range(slot.shape[0]):
         memory.run.equations.angles[slot[s]] = waiting.angles[place, s]
     return complete_sample(waiting.length[place], waiting.lost[place], waiting.passing[place], memory)

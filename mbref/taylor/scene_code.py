@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 
 from llvmlite import ir
 from numba import types
@@ -26,8 +27,8 @@ NAMES = EXPAND, POWER, FACTORISE, *correction_code.POINTERS
 MOST_BLOCKS = 2_000  # products of blocks that LLVM compiles in a second
 
 
-def code_of(taylor: TaylorMemory) -> Code:
-    """The code of a scene for a rank of its rows, made or loaded.
+def code_of(taylor: TaylorMemory, names: Sequence[str]) -> Code:
+    """The code of a scene's functions for a rank of its rows, made or loaded.
 
     Raises Untraceable where the code would be long, or there is no JIT.
     """
@@ -38,7 +39,7 @@ def code_of(taylor: TaylorMemory) -> Code:
         raise Untraceable(
             f"an order of its series takes {length} products of blocks, more than {MOST_BLOCKS}"
         )
-    return code_at(CACHE / "scenes" / f"{_key(taylor)}.code", lambda: write_code(taylor))
+    return code_at(CACHE / "scenes" / f"{_key(taylor, names)}.code", lambda: write_code(taylor, names))
 
 
 def functions_of(taylor: TaylorMemory) -> tuple[str, ...]:
@@ -57,19 +58,19 @@ def rank_of(taylor: TaylorMemory) -> int:
     return taylor.solver.order.size - int(taylor.progress.freedoms)
 
 
-def _key(taylor: TaylorMemory) -> str:
+def _key(taylor: TaylorMemory, names: Sequence[str]) -> str:
     """A digest of all that the code depends on."""
     polynomials, solver = taylor.polynomials, taylor.solver
-    digest = hashlib.sha256(f"{functions_of(taylor)} {rank_of(taylor)} {processor()}".encode())
+    digest = hashlib.sha256(f"{names} {rank_of(taylor)} {processor()}".encode())
     arrays = *polynomials.products, *polynomials.inertia, *polynomials.rows, solver.linear, solver.order
     for array in (*arrays, polynomials.given.driver):
         digest.update(str(array.shape).encode() + array.tobytes())
     return digest.hexdigest()[:32]
 
 
-def write_code(taylor: TaylorMemory) -> str:
+def write_code(taylor: TaylorMemory, names: Sequence[str]) -> str:
     """LLVM IR of the functions whose addresses ``SceneCode`` has."""
-    module, names = ir.Module(), functions_of(taylor)
+    module = ir.Module()
     if EXPAND in names:
         write = Instructions(module, EXPAND, multiplier_code.POINTERS, counts=orders_code.COUNTS)
         orders = DrivenOrders if rank_of(taylor) == taylor.solver.order.size else MultiplierOrders

@@ -81,10 +81,11 @@ def order_of(tolerance: float, wanted: float, code: str) -> int:
 class SeriesRun(Run):
     """The steps of one simulation in Taylor series; the memory of the general kernels takes its samples.
 
-    ``strides`` says whether drivers alone are followed (``mbref.taylor.driven``).
+    ``strides`` says whether drivers alone are followed (``mbref.taylor.driven``), ``most_waiting`` how many
+    samples may wait for accelerations and multipliers until steps of a call have ended.
     """
 
-    strides = False
+    strides, most_waiting = False, 0
 
     def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
         super().__init__(scene, method, times, replace(limits, code=GENERIC))
@@ -150,7 +151,8 @@ class SeriesRun(Run):
         sizes = {
             "orders": order + 1, "nz": nz, "ng": ng, "nr": nr,
             "lanes": filled(max(1, nz + nr + ng)), "slots": polynomials.products.left.size,
-            "twofold": polynomials.rows.row.size, "kept": KEPT, "waiting": self._waiting(),
+            "twofold": polynomials.rows.row.size, "kept": KEPT,
+            "waiting": min(self.times.size, self.most_waiting),
             "springs": polynomials.springs.natural.size, "torsions": polynomials.torsions.slot.size,
             **self.model.sizes,
         }  # fmt: skip
@@ -192,10 +194,6 @@ class SeriesRun(Run):
             aside=allocate(Snapshot, sizes),
         )
 
-    def _waiting(self) -> int:
-        """Samples that may wait for accelerations and multipliers."""
-        return 0
-
     def _specialise(self) -> None:
         """Expand, and take samples, by code of the scene's own from now on, made or loaded.
 
@@ -211,9 +209,9 @@ class SeriesRun(Run):
 
     def _put_code(self) -> None:
         """Have the series made by code of the scene's own from now on; raises Untraceable without any."""
-        self._code, code = code_of(self.taylor), self.taylor.code
-        code.rank = rank_of(self.taylor)
-        for name in functions_of(self.taylor):
+        names, code = functions_of(self.taylor), self.taylor.code
+        self._code, code.rank = code_of(self.taylor, names), rank_of(self.taylor)
+        for name in names:
             code[name] = self._code.address(name)
 
     def expand(self) -> int:

@@ -7,6 +7,7 @@ from mbref.kernels.compilation import kernel
 from mbref.kernels.layout import OK, SINGULAR
 from mbref.linear_algebra.vectors import larger, largest
 from mbref.simulation.stepping import UNDECIDED
+from mbref.taylor.partition import freedoms
 from mbref.taylor.passage import ROOT, least_pivot
 from mbref.taylor.samples import put_terms
 
@@ -22,12 +23,6 @@ def judged_start(status, memory):
     if nearly_dependent and (status == SINGULAR or (status == OK and hides_rank(memory))):
         return UNDECIDED
     return UNDECIDED if status == OK and misses_state(memory) else status
-
-
-@kernel
-def freedoms(memory):
-    """Variables that the rows leave to the forces."""
-    return memory.solver.order.shape[0] - memory.progress.rank
 
 
 @kernel

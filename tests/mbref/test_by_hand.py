@@ -12,7 +12,7 @@ from mbref.cli.run import show
 from mbref.equations.joint_reactions import reactions
 from mbref.equations.model import Model
 from mbref.formulations import FORMULATIONS
-from mbref.linear_algebra.elimination import determinant, product
+from mbref.linear_algebra.elimination import determinant, product_of_pivots
 from mbref.scene import (
     Body,
     Driver,
@@ -83,7 +83,7 @@ def test_the_sign_of_a_determinant(rows, negative):
 
 @pytest.mark.parametrize("pivots", ([2.0, -3.0, 0.5], [-1.0, -2.0], [1e-120, -1e-120, 4.0], []))
 def test_the_product_of_pivots(pivots):
-    negative, size = product(np.array(pivots), len(pivots))
+    negative, size = product_of_pivots(np.array(pivots), len(pivots))
     assert negative == (np.prod(np.sign(pivots)) < 0.0)
     assert size == pytest.approx(np.sum(np.log(np.abs(pivots))))
 

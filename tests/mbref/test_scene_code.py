@@ -10,7 +10,6 @@ from mbref.scene import Driver
 from mbref.scenes import SCENES, find_scene
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.simulate import Limits, simulate, why_no_code
-from mbref.taylor import run as run_module
 from mbref.taylor import scene_code
 from mbref.taylor.run import TaylorRun
 from mbref.trajectory import Outcome
@@ -149,7 +148,7 @@ def test_samples_that_find_no_room_to_wait_are_the_same(name, monkeypatch):
     """But for rounding; also where steps cross singular positions."""
     found, times = [], np.linspace(0.0, SCENES[name]().duration, 41)
     for waiting in (1024, 7, 0):
-        monkeypatch.setattr(run_module, "WAITING", waiting)
+        monkeypatch.setattr(TaylorRun, "most_waiting", waiting)
         found.append(simulate(SCENES[name](), TAYLOR, times, Limits(code="generic")))
     for other in found[1:]:
         assert len(other.times) == 41

@@ -188,7 +188,7 @@ DEFECTS = (
     Defect("mbref/taylor/power_code.py", "        if is_second:", "        if False:", BY_POWER),
     Defect(
         "mbref/taylor/power_code.py",
-        "known += self._power_of_moments(k, is_rate=False)",
+        "known += self._power_of_moments(self._velocity_moments, k)",
         "pass",
         BY_POWER,
     ),
