@@ -276,24 +276,29 @@ class Run:
     def _specialise(self) -> None:
         """Go on with code specialised for the scene, made or loaded; raises Untraceable."""
         began = time.process_time()
-        self.memory = self.with_code(self.model, self.start)
-        self.packed = packed(self.memory)
+        kernels = self._make_code(self.model, self.start)
+        write(self._lent.values.code.addresses, self.specialised.addresses)
+        self.packed = self._lent.packed_as(kernels, lambda memory: memory._replace(kernels=kernels))
+        self.memory = self.packed.values
         self.making += time.process_time() - began
 
-    def with_code(self, model: Model, start: Start, varied: Varied | None = None) -> Memory:
-        """Memory of this run with code specialised for a scene of its structure.
+    def with_code(self, model: Model, start: Start, varied: Varied) -> Memory:
+        """Memory of this run with code for all scenes that differ from one in the numbers ``varied``; raises
+        Untraceable."""
+        kernels, general = self._make_code(model, start, varied), self._lent.values
+        addresses, numbers = record(self.specialised.addresses), varied.numbers[0].copy()
+        code = general.code._replace(addresses=addresses, numbers=numbers)
+        return general._replace(code=code, kernels=kernels)
 
-        Or for all that differ from it in the numbers ``varied``; raises Untraceable.
-        """
+    def _make_code(self, model: Model, start: Start, varied: Varied | None = None) -> Kernels:
+        """The kernels of a run on code that is now ``specialised`` for a scene of the structure of this one;
+        raises Untraceable."""
         stabilisation = self.method.stabilisation
         if not stabilisation.projects:
             raise Untraceable(f"{stabilisation.name} has no specialised code")
-        tolerance, general = self.limits.rank_tolerance, self._lent.values
+        tolerance = self.limits.rank_tolerance
         self.specialised = specialise(model, self.method, tolerance, start, self.part, varied)
-        code = general.code._replace(addresses=record(self.specialised.addresses))
-        if varied:
-            code = code._replace(numbers=varied.numbers[0].copy())
-        return general._replace(code=code, kernels=self._kernels_on(with_specialised_code(stabilisation)))
+        return self._kernels_on(with_specialised_code(stabilisation))
 
     @property
     def memory_of_kernels(self) -> Memory:

@@ -14,7 +14,7 @@ from mbref.equations.branches import SMOOTH, Passed
 from mbref.equations.initial_state import Start
 from mbref.equations.model import Model
 from mbref.kernels.lent_memory import Lent, copied, fill, lent, shapes_of, take_back
-from mbref.kernels.named_memory import Packed, allocate, packed
+from mbref.kernels.named_memory import Packed, allocate
 from mbref.kernels.records import record
 from mbref.method import Method
 from mbref.scene import Scene
@@ -204,8 +204,11 @@ class SeriesRun(Run):
         self.making += time.process_time() - began
         with contextlib.suppress(Untraceable):  # then samples are taken by the general kernels
             super()._specialise()
-            self.taylor = self.taylor._replace(run=self.memory)
-            self._packed_taylor = packed(self.taylor, self.packed)
+            run = self.memory
+            self._packed_taylor = self._lent_series.packed_as(
+                run.kernels, lambda taylor: taylor._replace(run=run), self.packed
+            )
+            self.taylor = self._packed_taylor.values
 
     def _put_code(self) -> None:
         """Have the series made by code of the scene's own from now on; raises Untraceable without any."""

@@ -11,6 +11,8 @@ import pytest
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from mbref.equations import reduction
 from mbref.kernels import lent_memory
+from mbref.kernels.compilation import PLAIN
+from mbref.kernels.named_memory import Packed
 from mbref.method import Method
 from mbref.scene import Scene
 from mbref.scenes import SCENES
@@ -117,6 +119,17 @@ def test_memory_in_use_is_not_lent():
     one.give_back()
     third = Run(CRANK, method, TIMES, limits)
     assert third.memory is one.memory and third.memory is not other.memory
+
+
+@pytest.mark.skipif(PLAIN, reason="no machine code without the JIT")
+@pytest.mark.parametrize("method", [METHODS[0], "taylor"])
+def test_memory_with_code_is_packed_once(method, monkeypatch):
+    def run() -> list:
+        return results(simulate(CRANK, method, TIMES, Limits(code="specialised")))
+
+    first = run()
+    monkeypatch.setattr(Packed, "__init__", lambda *_: pytest.fail("packed again"))
+    assert run() == first
 
 
 def test_memory_of_passages_is_lent_again():
