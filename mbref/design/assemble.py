@@ -39,11 +39,20 @@ class _Reshaped(Packs):
         super().__init__([scene])
 
     def points(self, bodies: np.ndarray, points: np.ndarray) -> np.ndarray:
+        return super().points(bodies, self._moved(bodies, points.reshape(-1, 3)).reshape(points.shape))
+
+    def in_bodies(self, vectors: np.ndarray) -> np.ndarray:
+        points, vectors = self.structure.vector_is_point, vectors.copy()
+        vectors[0, points] = self._moved(self.structure.vector_body[points], vectors[0, points])
+        return super().in_bodies(vectors)
+
+    def _moved(self, bodies: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Where the points (k, 3) of bodies (k,) are."""
         names = [body.name for body in self.bodies]
         names.append(FRAME if GROUND in names else GROUND)
-        pairs = zip(bodies.tolist(), points.reshape(-1, 3).tolist(), strict=True)
+        pairs = zip(bodies.tolist(), points.tolist(), strict=True)
         moved = [self._elsewhere.get((names[b], (x, y, z)), np.array([x, y, z])) for b, (x, y, z) in pairs]
-        return super().points(bodies, np.array(moved).reshape(points.shape))
+        return np.array(moved).reshape(points.shape)
 
 
 def assemble(scene: Scene, lengths: Mapping[tuple[str, str], float]) -> Assembled:

@@ -9,11 +9,9 @@ expression that is not identically zero does not vanish there.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from mbref.equations.initial_state import Start
 from mbref.equations.model import Model, Terms
 from mbref.equations.random_states import RandomStates, random_states
 
@@ -59,7 +57,7 @@ def patterns(model: Model, terms: Terms) -> tuple[np.ndarray, np.ndarray, np.nda
 
 def nonzero(model: Model, terms: Terms) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """``patterns`` of each state: entries (…, m, 12), rows (…, m) and columns (…, n)."""
-    entries = (terms.jacobian != 0) & (model.entry_columns < model.n)
+    entries = (terms.jacobian != 0) & model.structure.of_bodies
     rows = (terms.gamma != 0) | (terms.phi != 0) | (terms.nu != 0)
     return entries, rows, terms.force != 0
 
@@ -79,22 +77,16 @@ def reached(
         found = more
 
 
-def without_rounding(starts: Sequence[Start], length: np.ndarray, held: Sequence[int] = ()) -> list[Start]:
-    """Starts with zero for the roundings of zero in their coordinates, and in velocities that are not given.
-
-    Of s scenes of one structure and lengths (s,) in m; columns that are ``held`` are zero, too.
-    """
-    if not starts:
-        return []
-    q, v, given = (np.array([getattr(start, name) for start in starts]) for name in ("q", "v", "given"))
-    poses, size = q.reshape(len(q), -1, 7), np.abs(v)
-    small = np.full(poses.shape, STILL)
+def without_rounding(
+    q: np.ndarray, v: np.ndarray, given: np.ndarray, length: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates (s, 7 nb) and velocities (s, 6 nb) of starts with zero for the roundings of zero, but for
+    velocities that are ``given`` (s, 6 nb).  Of s scenes of lengths (s,) in m."""
+    small = np.full((len(q), q.shape[1] // 7, 7), STILL)
     small[..., :3] *= length[:, None, None]
-    q = np.where(np.abs(poses) < small, 0.0, poses).reshape(q.shape)
-    still = (size < STILL * size.max(axis=1, keepdims=True, initial=0.0)) & (given == 0)
-    still[:, held] = True
-    v = np.where(still, 0.0, v)
-    return [replace(start, q=q[k], v=v[k]) for k, start in enumerate(starts)]
+    largest = np.abs(v).max(axis=1, keepdims=True, initial=0.0)
+    still = (np.abs(v) < STILL * largest) & (given == 0)
+    return np.where(np.abs(q) < small.reshape(q.shape), 0.0, q), np.where(still, 0.0, v)
 
 
 def active_coordinates(q: np.ndarray, velocities: np.ndarray) -> np.ndarray:

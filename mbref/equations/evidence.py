@@ -45,12 +45,18 @@ class Evidence:
         self._rounds, self._split = (len(read), len(asked.read)), 1 + sum(len(s.part) for s in read)
         self._entries = entries
         self._trials, self._shared = Trials(model, asked), asked.shared
-        self._moves, self._found = start.v != 0, self._of_one(model, start)
+        self._moves, self._found = start.v != 0, self._of_one(model, start, self.terms(model, start))
         self._reached = self._reach(model, self._found.acting[0])
 
-    def agrees(self, model: Model, start: Start) -> bool:
-        """Whether a scene of the same structure gives the same answers."""
-        return bool(self._agree(model, self._of_one(model, start))[0])
+    def agrees(self, model: Model, start: Start, terms: Terms) -> bool:
+        """Whether a scene of the same structure gives the same answers, from its ``terms``."""
+        return bool(self._agree(model, self._of_one(model, start, terms))[0])
+
+    def terms(self, model: Model, start: Start) -> Terms:
+        """The terms (1, k, …) of a scene at ``states``."""
+        part, places, velocities = self.states(start.q[None], start.v[None])
+        found = model.along(part * model.scene.duration, places[0], velocities[0])
+        return Terms(*(value[None] for value in vars(found).values()))
 
     def which_agree(
         self, model: Model, q: np.ndarray, v: np.ndarray, mass: np.ndarray, terms: Terms
@@ -66,9 +72,9 @@ class Evidence:
         parts of the duration (k,), coordinates (s, k, 7 nb) and velocities (s, k, 6 nb)."""
         part, displacement, velocity = self._states
         places = np.repeat(q, len(part), axis=0)
-        displace_all(places, np.tile(displacement, (len(q), 1)), np.zeros(q.shape[1]))
+        displace_all(places, np.concatenate([displacement] * len(q)), np.zeros(q.shape[1]))
         places = places.reshape(len(q), len(part), q.shape[1])
-        velocities = np.tile(velocity, (len(q), 1, 1))
+        velocities = np.stack([velocity] * len(q))
         places[:, 0], velocities[:, 0] = q, v
         return part, places, velocities
 
@@ -87,12 +93,8 @@ class Evidence:
         found = (reached(model, e, a[: model.m], a[model.m :] | self._moves) for e, a in rounds)
         return [part.tobytes() for parts in found for part in parts]
 
-    def _of_one(self, model: Model, start: Start) -> Answers:
-        q, v = start.q[None], start.v[None]
-        part, places, velocities = self.states(q, v)
-        found = model.along(part * model.scene.duration, places[0], velocities[0])
-        terms = Terms(*(value[None] for value in vars(found).values()))
-        return self._answers(model, q, v, model.mass[None], terms)
+    def _of_one(self, model: Model, start: Start, terms: Terms) -> Answers:
+        return self._answers(model, start.q[None], start.v[None], model.mass[None], terms)
 
     def _answers(self, model: Model, q: np.ndarray, v: np.ndarray, mass: np.ndarray, terms: Terms) -> Answers:
         """The answers of each of s scenes."""
@@ -137,6 +139,8 @@ class Trials:
 
     def answers(self, samples: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Which rows have a constant length, and which pairs are perpendicular, in blocks (s, k, m, 12)."""
+        if not self._row.size:
+            return (np.zeros((len(samples), 0), dtype=bool),) * 2
         places = self._sample[:, :, None], self._row[:, None, None], self._entry[:, None, :]
         numbers = samples[:, *places] * self._has_entry[:, None, :]
         lengths = np.sqrt((numbers * numbers).sum(axis=-1))

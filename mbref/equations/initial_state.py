@@ -94,12 +94,13 @@ def consistent_start(model: Model) -> Start:
 
 def consistent_starts(scenes: Alike) -> list[Start | SceneError]:
     """The nearest consistent state of each scene, or an error naming the joint that is grossly violated."""
-    q, before, faults = _corrected(scenes, scenes.poses)
-    v, given = given_velocities(scenes.bodies, q)
-    terms, model = scenes.terms(np.arange(len(q)), q, v), scenes.model
+    q, before, faults, terms = _corrected(scenes, scenes.poses)
+    (v, given), model = given_velocities(scenes.bodies, q), scenes.model
     if not (v.any() or terms.nu.any()):
         return [faults.get(k) or Start(q[k], v[k], float(before[k]), 0.0, v[k]) for k in range(len(q))]
-    scale = np.tile(np.repeat(np.stack([np.ones(len(q)), 1 / scenes.length], axis=1), 3, axis=1), model.nb)
+    scale = np.ones((len(q), model.nb, 2, 3))
+    scale[:, :, 1] = 1 / scenes.length[:, None, None]
+    scale = scale.reshape(v.shape)
     jacobian = terms.jacobian if model.m > LARGE else model.dense(terms.jacobian) * scale[:, None]
     rates = map(Rates, v, given, terms.nu, scale, jacobian)
     states = enumerate(zip(q, before.tolist(), rates, strict=True))
@@ -171,27 +172,28 @@ def corrected_positions(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]
 
     Raises SceneError naming the joint where q is grossly inconsistent or cannot be corrected.
     """
-    corrected, before, faults = _corrected(_alone(model), q[None])
+    corrected, before, faults, _ = _corrected(_alone(model), q[None])
     if faults:
         raise faults[0]
     return corrected[0], float(before[0])
 
 
-def _corrected(scenes: Alike, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[int, SceneError]]:
-    """Consistent coordinates near q (s, 7 nb), the largest |Φ| (s,) before, and errors by place."""
+def _corrected(scenes: Alike, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[int, SceneError], Terms]:
+    """Consistent coordinates near q (s, 7 nb), the largest |Φ| (s,) before, errors by place, and the terms
+    there at rest."""
     faults: dict[int, SceneError] = {}
-    if not scenes.model.m:
-        return q, np.zeros(len(q)), faults
     most = GROSS * np.maximum(1.0, scenes.length)
-    q, before, left = _solved(scenes, q, most)
-    first, last = (np.abs(phi).max(axis=1) for phi in (before, left))
+    q, before, terms = _solved(scenes, q, most)
+    first, last = (np.abs(phi).max(axis=1, initial=0.0) for phi in (before, terms.phi))
+    if not (last > 1e-10).any():
+        return q, first, faults, terms
     for k in np.flatnonzero(first > most).tolist():
         what = f"positions given to bodies violate it by {first[k]:.3g} m or rad"
         faults[k] = _fault(scenes.model, int(np.argmax(np.abs(before[k]))), what)
     for k in np.flatnonzero((last > 1e-10) & (first <= most)).tolist():
         what = f"no positions nearby meet it; {last[k]:.3g} m or rad are left"
-        faults[k] = _fault(scenes.model, int(np.argmax(np.abs(left[k]))), what)
-    return q, first, faults
+        faults[k] = _fault(scenes.model, int(np.argmax(np.abs(terms.phi[k]))), what)
+    return q, first, faults, terms
 
 
 def is_met(violation: Any, length: Any) -> Any:
@@ -205,31 +207,31 @@ def solve_positions(model: Model, t: float, q: np.ndarray) -> tuple[np.ndarray, 
     With the pseudo-inverse, so that redundant rows and a singular start do no harm; the change is least
     in the metric of M.
     """
-    found, _, phi = _solved(_alone(model, t), q[None], np.full(1, np.inf))
-    return found[0], phi[0]
+    found, _, terms = _solved(_alone(model, t), q[None], np.full(1, np.inf))
+    return found[0], terms.phi[0]
 
 
-def _solved(scenes: Alike, q: np.ndarray, most: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _solved(scenes: Alike, q: np.ndarray, most: np.ndarray) -> tuple[np.ndarray, np.ndarray, Terms]:
     """``solve_positions`` of each scene from q (s, 7 nb), unless the largest |Φ| exceeds ``most`` (s,): the
-    coordinates, and Φ (s, m) before and after."""
-    model, q, places = scenes.model, q.copy(), np.arange(len(q))
-    at_rest, phi = np.zeros((len(q), model.n)), np.zeros((len(q), model.m))
-    before = phi
-    for k in range(MOST_ITERATIONS):
-        terms = scenes.terms(places, q[places], at_rest[places])
-        off = np.abs(terms.phi).max(axis=1, initial=0.0)
-        phi[places], open_ = terms.phi, ~is_met(off, scenes.length[places])
-        if k == 0:
-            before, open_ = phi.copy(), open_ & (off <= most)
+    coordinates, Φ (s, m) before, and the terms after, at rest."""
+    q, every, at_rest = q.copy(), np.arange(len(q)), np.zeros((len(q), scenes.model.n))
+    first = terms = scenes.terms(every, q, at_rest)
+    off = np.abs(terms.phi).max(axis=1, initial=0.0)
+    places, open_ = every, ~is_met(off, scenes.length) & (off <= most)
+    if not open_.any():
+        return q, first.phi, first
+    for _ in range(MOST_ITERATIONS):
         places = places[open_]
-        if not places.size:
-            break
         x = _least_changes(scenes, places, terms.jacobian[open_], -terms.phi[open_])
         moves = np.abs(x).max(axis=1) >= 1e-15
         places, moved = places[moves], q[places[moves]]
         displace_all(moved, x[moves], np.zeros(q.shape[1]))
         q[places] = moved
-    return q, before, phi
+        terms = scenes.terms(places, moved, at_rest[places])
+        open_ = ~is_met(np.abs(terms.phi).max(axis=1, initial=0.0), scenes.length[places])
+        if not open_.any():
+            break
+    return q, first.phi, scenes.terms(every, q, at_rest)
 
 
 def _least_changes(scenes: Alike, places: np.ndarray, blocks: np.ndarray, rhs: np.ndarray) -> np.ndarray:
@@ -257,8 +259,8 @@ def given_velocities(bodies: Sequence[Sequence[Body]], q: np.ndarray) -> tuple[n
                 v[k, b, :3], given[k, b, :3] = body.velocity, True
             if body.angular_velocity is not None:
                 v[k, b, 3:], given[k, b, 3:] = body.angular_velocity, True
-    turning = v[..., 3:].any(axis=2)
-    if turning.any():
+    if v[..., 3:].any():
+        turning = v[..., 3:].any(axis=2)
         to_body = rotations.to_matrix(q.reshape(*shape[:2], 7)[turning, 3:]).swapaxes(1, 2)
         v[turning, 3:] = (to_body @ v[turning, 3:, None])[..., 0]
     return v.reshape(len(q), -1), given.reshape(len(q), -1)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,10 +15,10 @@ import numpy as np
 from mbref import rotations
 from mbref.equations.coordinates import displace_all
 from mbref.equations.evaluation import evaluate_along
-from mbref.equations.packing import Packs, row_of, with_ground
+from mbref.equations.packing import Packs, row_of
 from mbref.equations.random_states import RandomStates
 from mbref.kernels.layout import Counts, Equations, Frames, Settings, System
-from mbref.kernels.lent_memory import Lent, copied, fill, lent, shapes_of, take_back
+from mbref.kernels.lent_memory import Lent, copied, lent, take_back
 from mbref.kernels.named_memory import allocate
 from mbref.kernels.records import record
 from mbref.kernels.scene_layout import SceneData
@@ -52,7 +51,7 @@ class Model:
         """A scene, or that at a place of several that are packed."""
         packs = packs or Packs([scene])
         self.scene, self._packs, self._place = scene, packs, place
-        self.bodies, self.joints = with_ground(scene)
+        self.bodies, self.joints = packs.listed[place], packs.joints[place]
         self.nb, self.n, self.kinematic = packs.nb, 6 * packs.nb, packs.kinematic
         self.structure, self.data = packs.structure, row_of(packs.data, place)
         self.m, self.row_joint = len(self.structure.row_joint), self.structure.row_joint
@@ -65,7 +64,7 @@ class Model:
     def memory(self) -> Lent:
         """Memory of evaluations with the numbers of this scene, lent when it is first asked for."""
         if self._lent is None:
-            self._lent = lent((Equations, *self.sizes.values(), shapes_of(self.data)), self.equations)
+            self._lent = lent((Equations, self.structure), self.equations)
             self.put_numbers(self._lent.values, self.data)
         return self._lent
 
@@ -75,11 +74,10 @@ class Model:
             take_back(self._lent)
             self._lent = None
 
-    @cached_property
+    @property
     def sizes(self) -> dict[str, int]:
         """Sizes of the model's memory (see ``kernels.layout``)."""
-        angles = max(1, int(np.count_nonzero(self.data.loads.angle >= 0)))
-        return {"nb": self.nb, "n": self.n, "m": self.m, "angles": angles, "dense_rows": 0, "width": 12}
+        return self.structure.sizes
 
     def equations(
         self, sizes: Mapping[str, int] | None = None, data: SceneData | None = None, **system: Any
@@ -105,15 +103,16 @@ class Model:
         return found
 
     def put_numbers(self, equations: Equations, data: SceneData) -> None:
-        """Have memory of evaluations hold the data of a scene and the masses of this model."""
-        fill(equations.scene, data)
+        """Have memory of evaluations hold the numbers of a scene of its structure and this model's masses."""
+        for mine, theirs in zip(equations.scene.numbers, data.numbers, strict=True):
+            mine[...] = theirs
         equations.system.mass[:] = self.mass
         equations.system.inverse_root[:] = self._packs.inverse_root[self._place]
 
     @property
     def has_angles(self) -> bool:
         """Whether a torsion spring unwraps its angle."""
-        return bool((self.data.loads.angle >= 0).any())
+        return self.structure.has_angles
 
     def start(self) -> np.ndarray:
         """Coordinates (7 nb,) of the scene's poses, principal frames."""
@@ -166,15 +165,10 @@ class Model:
         moved = all_displaced(q, states.displacement)
         return self.along(states.part * self.scene.duration, moved, states.velocity)
 
-    @cached_property
+    @property
     def closed_loops(self) -> int:
         """Independent loops of bodies and joints; without one, no position is singular."""
-        part, loops = list(range(self.nb + 1)), 0
-        for joint in self.joints:
-            first, second = (part[self.index(name)] for name in joint.bodies)
-            loops += first == second
-            part = [first if p == second else p for p in part]
-        return loops
+        return self.structure.closed_loops
 
     def index(self, name: str) -> int:
         """Index of a body, ``nb`` for the fixed frame."""

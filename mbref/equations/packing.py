@@ -6,7 +6,7 @@ counts the scenes.  An entry that scenes share, as variants share most, is read 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -15,8 +15,8 @@ import numpy as np
 from mbref import rotations
 from mbref.equations.joints import driver_primitive, primitives_of
 from mbref.equations.joints.base import Primitive, frame
-from mbref.equations.structure import Structure, structure_of
-from mbref.equations.units import body_lengths, metric_root
+from mbref.equations.structure import LoadPlace, Places, PrimitivePlace, structure_of
+from mbref.equations.units import body_lengths, inverse_root, metric
 from mbref.kernels.scene_layout import (
     FORCE,
     MOMENT,
@@ -47,6 +47,8 @@ from mbref.scene import (
 FRAME = "the fixed frame"  # holds a modelled ground
 AT_REST = Sine(amplitude=0.0, frequency=0.0, phase=0.0)
 NONE = (0.0, 0.0, 0.0)
+AT_ORIGIN = (*NONE, 1.0, *NONE, 1.0, 1.0, 1.0, 1.0)  # the fixed frame, as ``_of_body``
+OF_MASS = np.array([7, 7, 7, 8, 9, 10])  # of the numbers of a body: the diagonal of its part of M
 
 
 def shape_of(scene: Scene) -> Hashable:
@@ -71,34 +73,66 @@ class Packs:
     For s scenes of nb bodies: ``mass`` (s, 6 nb), the diagonal of M, and ``inverse_root``, M^(-1/2), 1 where
     the mass is zero; ``principal`` and ``orientation`` (s, nb, 4) of principal frames, from the body's own
     and from the world; ``length`` (s,), the largest distance between two centres of mass and joint anchors at
-    t = 0 (m).  ``listed`` has the bodies of each scene.
+    t = 0 (m).  ``listed`` has the bodies of each scene, ``joints`` its joints.
     """
 
     def __init__(self, scenes: Sequence[Scene]):
         self.scenes, self.kinematic = scenes, not scenes[0].has_mass()
         listed = [with_ground(scene) for scene in scenes]
-        self.listed = [bodies for bodies, _ in listed]
-        self.bodies, self.joints = listed[0]
+        self.listed, self.joints = [bodies for bodies, _ in listed], [joints for _, joints in listed]
+        self.bodies = self.listed[0]
         self.nb = len(self.bodies)
         self.index = {body.name: b for b, body in enumerate(self.bodies)}
         self.index.setdefault(GROUND, self.nb)
         self.index[FRAME] = self.nb
-        bodies = self._bodies([body for bodies, _ in listed for body in bodies])
-        joints = [joint for _, joints in listed for joint in joints]
+        joints = [joint for joints in self.joints for joint in joints]
+        driven = {driver.joint: k for k, driver in enumerate(scenes[0].driver)}
+        of_joints = _once(partial(_of_joint, driven=driven), joints)
+        self.structure = structure_of(self._places([found for found, _ in of_joints], driven))
+        bodies = self._bodies()
         lengths = self._lengths(joints)
-        self.structure, primitives = self._primitives(joints)
+        primitives, loads = self._fixed_in_bodies([number for _, rows in of_joints for number in rows])
         self.data = SceneData(
             gravity=self._gravity(),
             lengths=lengths,
-            metric_root=metric_root(self.mass, lengths),
+            metric_root=inverse_root(metric(self.mass, lengths)),
             bodies=bodies,
             primitives=primitives,
-            moving=self._all(np.arange(primitives.kind.shape[1])),
+            moving=self._all(np.arange(self.structure.kind.size)),
             resting=self._all(np.zeros(0, dtype=np.int64)),
             row_bodies=self._all(self.structure.row_bodies),
             drivers=self._drivers(),
-            loads=self._loads(),
+            loads=loads,
         )
+
+    def _places(self, primitives: Sequence[Sequence[Primitive]], driven: Mapping[str, int]) -> Places:
+        """All of a scene but its numbers, from the primitives of each joint, the first scene's first."""
+        scene, joints = self.scenes[0], self.joints[0]
+        ends = [tuple(map(self.index.__getitem__, joint.bodies)) for joint in joints]
+        loads = () if self.kinematic else scene.load
+        return Places(
+            nb=self.nb,
+            primitives=tuple(
+                PrimitivePlace(p.kind, joint.name, *bodies, driven[joint.name] if p.driven else -1)
+                for joint, bodies, found in zip(joints, ends, primitives, strict=False)
+                for p in found
+            ),
+            loads=tuple(self._load_place(k, load) for k, load in enumerate(loads)),
+            anchored=tuple(body for bodies in ends for body in bodies),
+            drivers=len(scene.driver),
+            terms=max((len(driver.polynomial) for driver in scene.driver), default=1),
+        )
+
+    def _load_place(self, place: int, load: Load) -> LoadPlace:
+        """Kind and bodies of load[place]; SceneError for a type without equations."""
+        if isinstance(load, Moment | Force):
+            return LoadPlace(FORCE if isinstance(load, Force) else MOMENT, self.index[load.body], 0)
+        if isinstance(load, Spring):
+            return LoadPlace(SPRING, *map(self.index.__getitem__, load.bodies))
+        if not isinstance(load, TorsionSpring):
+            raise SceneError([f"load[{place}]: mbref has no equations for loads of type {load.type!r}"])
+        bodies = self.scenes[0].joint_named(load.joint).bodies
+        return LoadPlace(TORSION_SPRING, *map(self.index.__getitem__, bodies))
 
     def _all(self, array: np.ndarray) -> np.ndarray:
         """An array that is the same for all scenes."""
@@ -110,114 +144,75 @@ class Packs:
         return np.array([*rows], dtype=float).reshape(len(self.scenes), -1, width)
 
     def _gravity(self) -> np.ndarray:
-        return np.array([NONE if self.kinematic else scene.gravity for scene in self.scenes])
+        return np.array([NONE if self.kinematic else scene.gravity for scene in self.scenes], dtype=float)
 
-    def _bodies(self, bodies: Sequence[Body]) -> Bodies:
-        frames = _once(_principal_axes, bodies)
-        poses = self._rows(((*body.position, *body.orientation) for body in bodies), 7)
-        given, shape = poses[:, :, 3:], (len(self.scenes), self.nb)
-        self.turns_frames = any(axes is not None for _, axes in frames)
-        self.principal = _quaternions([axes for _, axes in frames]).reshape(*shape, 4)
-        self.orientation = rotations.multiply(given, self.principal) if self.turns_frames else given
-        mass, inertia = np.ones(shape), np.ones((*shape, 3))
-        if not self.kinematic:
-            mass = np.array([body.mass for body in bodies]).reshape(shape)
-            inertia = self._rows((moments for moments, _ in frames), 3)
-        masses = np.concatenate([np.repeat(mass[..., None], 3, axis=-1), inertia], axis=-1)
-        self.mass = masses.reshape(len(self.scenes), 6 * self.nb)
-        self.inverse_root = 1 / np.sqrt(np.where(self.mass > 0, self.mass, 1.0))
-        to_local = rotations.to_matrix(self.orientation).swapaxes(-1, -2)
-        self._to_local = np.concatenate([to_local, self._all(np.eye(3)[None])], axis=1)  # the fixed frame's
-        self._centres = np.concatenate([poses[:, :, :3], self._all(np.zeros((1, 3)))], axis=1)
-        return Bodies(mass, inertia)
+    def _bodies(self) -> Bodies:
+        """Masses and moments; places and frames of the bodies, the fixed frame behind them."""
+        found = [_once(_of_body, bodies) for bodies in self.listed]
+        numbers = self._rows((row for rows in found for row in (*(own for own, _ in rows), AT_ORIGIN)), 11)
+        axes = [axes for rows in found for _, axes in rows]
+        if self.kinematic:
+            numbers[..., 7:] = 1.0
+        self.turns_frames = any(each is not None for each in axes)
+        frames = numbers[..., 3:7]
+        self.principal = _quaternions(axes).reshape(len(self.scenes), self.nb, 4)
+        if self.turns_frames:
+            frames[:, :-1] = rotations.multiply(frames[:, :-1], self.principal)
+        self._to_local = np.ascontiguousarray(rotations.to_matrix(frames).swapaxes(-1, -2))
+        self._centres, self.orientation = numbers[..., :3], frames[:, :-1]
+        self.mass = numbers[:, :-1].take(OF_MASS, axis=-1).reshape(len(self.scenes), 6 * self.nb)
+        self.inverse_root = inverse_root(self.mass)
+        return Bodies(numbers[:, :-1, 7], numbers[:, :-1, 8:])
 
     def _lengths(self, joints: Sequence[Joint]) -> np.ndarray:
         """Lengths (s, nb) of bodies; the anchors' distances from them, and the scenes' ``length``."""
         anchors = self._rows(_once(_anchors, joints), 6).reshape(len(self.scenes), -1, 3)
-        ends = [self.index[name] for joint in self.joints for name in joint.bodies]
         scene = self.scenes[0]
         own = self._centres[:, : len(scene.body)], anchors[:, : 2 * len(scene.joint)]
         points = np.concatenate(own, axis=1)
         apart = points[:, :, None] - points[:, None]
         self.length = np.sqrt((apart * apart).sum(axis=-1).max(axis=(1, 2)))
         self.length = np.where(self.length > 0.0, self.length, 1.0)
-        return body_lengths(self.nb, np.array(ends, dtype=int), anchors, self._centres)
+        return body_lengths(anchors - self._centres[:, self.structure.anchored], self.structure.anchor_shares)
 
-    def _structured(self, joints: Sequence[Joint]) -> tuple[Structure, np.ndarray]:
-        """The structure of the rows of all joints and drivers, and numbers (s, p, 16) as ``_of_joint``."""
-        driven = {driver.joint: k for k, driver in enumerate(self.scenes[0].driver)}
-        found = _once(partial(_of_joint, driven=driven), joints)
-        places = []
-        for joint, (primitives, _) in zip(self.joints, found, strict=False):  # of the first scene
-            first, second = (self.index[name] for name in joint.bodies)
-            for p in primitives:
-                places.append((p.kind, joint.name, first, second, driven[joint.name] if p.driven else -1))
-        numbers = np.concatenate([numbers for _, numbers in found] or [np.zeros((0, 16))])
-        structure = structure_of(self.nb, tuple(places))
-        return structure, numbers.reshape(len(self.scenes), len(places), 16)
+    def _fixed_in_bodies(self, of_joints: Sequence[tuple[float, ...]]) -> tuple[Primitives, Loads]:
+        """Primitives and loads, from the numbers of the primitives of all joints and drivers, scene by scene.
 
-    def _primitives(self, joints: Sequence[Joint]) -> tuple[Structure, Primitives]:
-        """The structure of the constraint rows, and the primitives of all joints and drivers."""
-        structure, numbers = self._structured(joints)
-        scenes, p = numbers.shape[:2]
-        vectors = numbers[..., :15].reshape(scenes, p, 5, 3).swapaxes(1, 2)
-        directions = self.directions(structure.of_directions, vectors[:, 2:].reshape(scenes, 3 * p, 3))
-        first, turning, second = directions.reshape(scenes, 3, p, 3).swapaxes(0, 1)
-        return structure, Primitives(
-            kind=self._all(structure.kind),
-            first=self._all(structure.first),
-            second=self._all(structure.second),
-            driver=self._all(structure.driver),
-            row=self._all(structure.row),
-            point_first=self.points(structure.first, vectors[:, 0]),
-            point_second=self.points(structure.second, vectors[:, 1]),
-            direction_first=first,
-            turning_first=turning,
-            direction_second=second,
-            length=numbers[..., 15],
+        Their vectors are turned to the principal frames of the bodies all at once.
+        """
+        structure, scenes = self.structure, () if self.kinematic else self.scenes
+        numbers = self._rows(of_joints, 16)
+        of_loads = self._rows((_numbers_of(load, scene) for scene in scenes for load in scene.load), 24)
+        (s, p), l = numbers.shape[:2], of_loads.shape[1]
+        world = np.concatenate(
+            [numbers[..., :15].reshape(s, 5 * p, 3), of_loads[..., 3:21].reshape(s, 6 * l, 3)], axis=1
         )
+        own = self.in_bodies(world)
+        of_primitives, vectors = own[:, : 5 * p].reshape(s, p, 5, 3), own[:, 5 * p :].reshape(s, l, 6, 3)
+        primitives = Primitives(
+            self._all(structure.kind), self._all(structure.first), self._all(structure.second),
+            self._all(structure.driver), self._all(structure.row),
+            *(of_primitives[:, :, k] for k in range(5)), numbers[..., 15],
+        )  # fmt: skip
+        loads = Loads(
+            *map(self._all, structure.load), self._all(structure.angle), of_loads[..., :3],
+            *(vectors[:, :, k] for k in range(6)), *(of_loads[..., k] for k in range(21, 24)),
+        )  # fmt: skip
+        return primitives, loads
+
+    def in_bodies(self, vectors: np.ndarray) -> np.ndarray:
+        """World vectors (s, 5 p + 6 l, 3) of the structure at t = 0 in the principal frames of its bodies."""
+        origins = self._centres[:, self.structure.vector_origin]
+        return self.directions(self.structure.vector_body, vectors - origins)
 
     def _drivers(self) -> Drivers:
         """All drivers, their polynomials filled up with zeros to the highest degree."""
-        drivers = [driver for scene in self.scenes for driver in scene.driver]
-        terms = max((len(driver.polynomial) for driver in self.scenes[0].driver), default=1)
+        drivers, terms = (
+            [driver for scene in self.scenes for driver in scene.driver],
+            self.structure.places.terms,
+        )
         numbers = self._rows(_once(partial(_driver, terms=terms), drivers), 3 + terms)
         return Drivers(numbers[..., 0], numbers[..., 1], numbers[..., 2], numbers[..., 3:])
-
-    def _loads(self) -> Loads:
-        """All loads; none of scenes without masses."""
-        scenes = () if self.kinematic else self.scenes
-        kinds = np.array([self._kind(k, load) for scene in scenes[:1] for k, load in enumerate(scene.load)])
-        kinds = kinds.reshape(-1, 3).astype(np.int64)
-        numbers = self._rows((_numbers_of(load, scene) for scene in scenes for load in scene.load), 24)
-        numbers = numbers.reshape(len(self.scenes), len(kinds), 24)
-        kind, first, second = kinds.T
-        vectors = numbers[..., :21].reshape(*numbers.shape[:-1], 7, 3).swapaxes(0, 2).swapaxes(1, 2)
-        is_angle = kind == TORSION_SPRING
-        points = [
-            np.where(has_point[:, None], self.points(bodies, at), 0.0)
-            for has_point, bodies, at in (
-                ((kind == FORCE) | (kind == SPRING), first, vectors[1]),
-                (kind == SPRING, second, vectors[2]),
-            )
-        ]
-        axes = [self.directions(first, vector) for vector in vectors[3:6]]
-        return Loads(
-            self._all(kind), self._all(first), self._all(second),
-            self._all(np.where(is_angle, np.cumsum(is_angle) - 1, -1)),
-            vectors[0], *points, *axes, self.directions(second, vectors[6]),
-            numbers[..., 21], numbers[..., 22], numbers[..., 23],
-        )  # fmt: skip
-
-    def _kind(self, place: int, load: Load) -> tuple[int, int, int]:
-        """Kind and bodies of load[place]; SceneError for a type without equations."""
-        if isinstance(load, Moment | Force):
-            return FORCE if isinstance(load, Force) else MOMENT, self.index[load.body], 0
-        if isinstance(load, Spring):
-            return SPRING, *map(self.index.__getitem__, load.bodies)
-        if not isinstance(load, TorsionSpring):
-            raise SceneError([f"load[{place}]: mbref has no equations for loads of type {load.type!r}"])
-        return TORSION_SPRING, *map(self.index.__getitem__, self.scenes[0].joint_named(load.joint).bodies)
 
     def directions(self, bodies: np.ndarray, vectors: np.ndarray) -> np.ndarray:
         """World vectors (…, k, 3) at t = 0, each in the principal frame (s, k, 3) of a body of index (k,)."""
@@ -264,14 +259,22 @@ def _quaternions(axes: Sequence[np.ndarray | None]) -> np.ndarray:
     return rotations.from_matrix(np.array([np.eye(3) if each is None else each for each in axes]))
 
 
-def _principal_axes(body: Body) -> tuple[Sequence[float], np.ndarray | None]:
-    """Principal moments, and the rotation from the principal frame to the body's; None for the same frame."""
-    if body.inertia is None:
+def _of_body(body: Body) -> tuple[tuple[float, ...], np.ndarray | None]:
+    """Place, orientation, mass and principal moments, and the rotation from the principal frame to the body's
+    own; None for the same frame."""
+    mass = 1.0 if body.mass is None else body.mass
+    moments, axes = _principal_axes(body.inertia)
+    return (*body.position, *body.orientation, mass, *moments), axes
+
+
+def _principal_axes(inertia: Any) -> tuple[Sequence[float], np.ndarray | None]:
+    """Principal moments, and the rotation from the principal frame to that of a moment of inertia; None for
+    the same frame."""
+    if inertia is None:
         return (1.0, 1.0, 1.0), None
-    if not isinstance(body.inertia[0], tuple):
-        return body.inertia, None
-    inertia = np.array(body.inertia)
-    moments, axes = np.linalg.eigh(inertia)
+    if not isinstance(inertia[0], tuple):
+        return inertia, None
+    moments, axes = np.linalg.eigh(np.array(inertia))
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
     return np.maximum(moments, 0.0), axes
 
@@ -282,12 +285,13 @@ def _anchors(joint: Joint) -> tuple[float, ...]:
     return *first, *second
 
 
-def _of_joint(joint: Joint, driven: dict[str, int]) -> tuple[list[Primitive], np.ndarray]:
-    """The primitives of a joint and its driver, and their vectors and lengths (p, 16): two points, then three
-    directions, in the order of ``Structure.of_directions``."""
+def _of_joint(joint: Joint, driven: Mapping[str, int]) -> tuple[list[Primitive], list[tuple[float, ...]]]:
+    """The primitives of a joint and its driver, and the 16 numbers of each: two points, three directions
+    (``direction_first``, ``turning_first``, ``direction_second``) and a length."""
     found = [*primitives_of(joint), *([driver_primitive(joint)] if joint.name in driven else [])]
-    numbers = [(*p.point_first, *p.point_second, *p.first, *p.turning, *p.second, p.length) for p in found]
-    return found, np.array(numbers, dtype=float)
+    return found, [
+        (*p.point_first, *p.point_second, *p.first, *p.turning, *p.second, p.length) for p in found
+    ]
 
 
 def _driver(driver: Driver, terms: int) -> tuple[float, ...]:

@@ -58,17 +58,21 @@ class Reduction:
         return data._replace(primitives=Primitives(*kept), moving=moving, resting=still)
 
 
-def reduction_of(model: Model, start: Start) -> Reduction:
-    """The reduction of a scene at its start: one that is known for its structure and agrees, or found now."""
+def reduction_of(model: Model, start: Start) -> tuple[Reduction, np.ndarray]:
+    """The reduction of a scene at its start: one that is known for its structure and agrees, or found now.
+
+    And the blocks (m, 12) of Φ_q there, which decide with others.
+    """
     known = _known.get(model.structure, [])
     for reduction in known:
-        if reduction.evidence.agrees(model, start):
-            return reduction
+        terms = reduction.evidence.terms(model, start)
+        if reduction.evidence.agrees(model, start, terms):
+            return reduction, terms.jacobian[0, 0]
     found = _found(model, start)
     if model.structure not in _known and len(_known) >= MOST_STRUCTURES:
         _known.pop(next(iter(_known)), None)
     _known[model.structure] = [found, *known][:MOST_OF_ONE]
-    return found
+    return found, model.blocks(0.0, start.q, start.v).jacobian
 
 
 def _found(model: Model, start: Start) -> Reduction:

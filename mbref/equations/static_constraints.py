@@ -131,6 +131,8 @@ def held_by_rows(
 
 def at_rest(start: Start, columns: Sequence[int]) -> Start:
     """The start with zero for the roundings of zero in the velocities held."""
+    if not columns:
+        return start
     v = start.v.copy()
     v[columns] = 0.0
     return replace(start, v=v)

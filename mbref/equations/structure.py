@@ -1,23 +1,60 @@
-"""Structure: constraint rows without their numbers, one object for all scenes of an equal structure."""
+"""Structure: a scene without its numbers, one object for all scenes of an equal structure.
+
+All that follows from names, types and bodies alone is found once and kept with it.
+"""
 
 from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from mbref.equations.joints.base import ROWS_OF
+from mbref.kernels.scene_layout import FORCE, SPRING, TORSION_SPRING
 
 MOST_KEPT = 256  # structures
-PrimitivePlace = tuple[int, str, int, int, int]  # kind, joint, first and second body, driver or -1
+
+
+class PrimitivePlace(NamedTuple):
+    """A primitive constraint without its numbers."""
+
+    kind: int
+    joint: str
+    first: int  # body
+    second: int
+    driver: int  # -1 without
+
+
+class LoadPlace(NamedTuple):
+    """A load without its numbers."""
+
+    kind: int
+    first: int  # body
+    second: int  # 0 without
+
+
+class Places(NamedTuple):
+    """All of nb bodies, primitives, loads and drivers but their numbers; the fixed frame is body nb.
+
+    ``anchored`` are the bodies of the joints' anchors, ``terms`` those of the longest driver's polynomial.
+    """
+
+    nb: int
+    primitives: tuple[PrimitivePlace, ...]
+    loads: tuple[LoadPlace, ...]
+    anchored: tuple[int, ...]
+    drivers: int
+    terms: int
 
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """The primitives of p, their m rows and the columns of those; nobody changes the arrays.
+    """The primitives of p and loads of l, the m rows and their columns; nobody changes the arrays.
 
     ``entry_columns`` (m, 12) says the column of every entry of the blocks; those of the fixed frame are ≥ n.
+    Vectors are those of the primitives, then those of the loads, as ``packing`` lists them.
     """
 
     nb: int  # bodies; the fixed frame has this number
@@ -28,18 +65,71 @@ class Structure:
     row: np.ndarray  # (p,) the first row of each
     row_bodies: np.ndarray  # (m, 2)
     entry_columns: np.ndarray  # (m, 12)
-    rows: np.ndarray  # (m,) 0 to m - 1
     row_joint: tuple[str, ...]  # (m,) names
-    of_directions: np.ndarray  # (3 p,) bodies: direction_first, turning_first and direction_second of each
+    load: np.ndarray  # (3, l): kind, first and second body
+    angle: np.ndarray  # (l,) index of the unwrapped angle of a torsion spring, else -1
+    anchored: np.ndarray  # (e,) bodies of the joints' anchors
+    vector_body: np.ndarray  # (5 p + 6 l,) in whose frame each vector is fixed
+    vector_origin: np.ndarray  # (5 p + 6 l,) from whose centre of mass; directions have the fixed frame
+    places: Places
+
+    @functools.cached_property
+    def sizes(self) -> dict[str, int]:
+        """Sizes of the memory of evaluations (see ``kernels.layout``)."""
+        angles, m = max(1, int(np.count_nonzero(self.angle >= 0))), len(self.row_joint)
+        return {"nb": self.nb, "n": 6 * self.nb, "m": m, "angles": angles, "dense_rows": 0, "width": 12}
+
+    @functools.cached_property
+    def has_angles(self) -> bool:
+        """Whether a torsion spring unwraps its angle."""
+        return bool((self.angle >= 0).any())
+
+    @functools.cached_property
+    def of_bodies(self) -> np.ndarray:
+        """Which entries (m, 12) of the blocks are not the fixed frame's."""
+        of_bodies: np.ndarray = self.entry_columns < 6 * self.nb
+        return of_bodies
+
+    @functools.cached_property
+    def vector_is_point(self) -> np.ndarray:
+        """(5 p + 6 l,) whether each vector is a point: the first two of a primitive or a load are."""
+        places = self.places
+        return np.array([k < 2 for _ in places.primitives for k in range(5)]
+                        + [k < 2 for _ in places.loads for k in range(6)], dtype=bool)  # fmt: skip
+
+    @functools.cached_property
+    def rows(self) -> np.ndarray:
+        """(m,) 0 to m - 1."""
+        return np.arange(len(self.row_joint))
+
+    @functools.cached_property
+    def closed_loops(self) -> int:
+        """Independent loops of bodies and joints; without one, no position is singular."""
+        part, loops = list(range(self.nb + 1)), 0
+        for _, one, other in dict.fromkeys((p.joint, p.first, p.second) for p in self.places.primitives):
+            first, second = part[one], part[other]
+            loops += first == second
+            part = [first if p == second else p for p in part]
+        return loops
+
+    @functools.cached_property
+    def anchor_shares(self) -> np.ndarray:
+        """The share (e, nb) of an anchor among those on each body."""
+        on_body = self.anchored[:, None] == np.arange(self.nb)
+        shares: np.ndarray = on_body / np.maximum(on_body.sum(axis=0), 1)
+        return shares
 
 
 @functools.lru_cache(maxsize=MOST_KEPT)
-def structure_of(nb: int, places: tuple[PrimitivePlace, ...]) -> Structure:
-    """The structure of primitives between nb bodies and the fixed frame, which is number nb."""
+def structure_of(places: Places) -> Structure:
+    """The structure of a scene between whose bodies and the fixed frame these primitives and loads are."""
+    nb, primitives = places.nb, places.primitives
     kind, first, second, driver = (
-        np.array([place[k] for place in places], dtype=np.int64) for k in (0, 2, 3, 4)
+        np.array([place[k] for place in primitives], dtype=np.int64) for k in (0, 2, 3, 4)
     )
-    rows = np.array([ROWS_OF[place[0]] for place in places], dtype=np.int64)
+    load = np.array(places.loads, dtype=np.int64).reshape(-1, 3).T.copy()
+    is_angle = load[0] == TORSION_SPRING
+    rows = np.array([ROWS_OF[place.kind] for place in primitives], dtype=np.int64)
     row_bodies = np.repeat(np.stack([first, second], axis=1), rows, axis=0)
     return Structure(
         nb=nb,
@@ -50,7 +140,26 @@ def structure_of(nb: int, places: tuple[PrimitivePlace, ...]) -> Structure:
         row=np.cumsum([0, *rows], dtype=np.int64)[:-1],
         row_bodies=row_bodies,
         entry_columns=(6 * row_bodies[:, :, None] + np.arange(6)).reshape(len(row_bodies), 12),
-        rows=np.arange(len(row_bodies)),
-        row_joint=tuple(place[1] for place, count in zip(places, rows, strict=True) for _ in range(count)),
-        of_directions=np.concatenate([first, first, second]),
-    )
+        row_joint=tuple(
+            place.joint for place, count in zip(primitives, rows, strict=True) for _ in range(count)
+        ),
+        load=load,
+        angle=np.where(is_angle, np.cumsum(is_angle) - 1, -1),
+        anchored=np.array(places.anchored, dtype=int),
+        vector_body=_of_vectors([(p.first, p.second, p.first, p.first, p.second) for p in primitives]
+                                + [(l.first, l.second, *(l.first,) * 3, l.second) for l in places.loads]),
+        vector_origin=_of_vectors([(p.first, p.second, nb, nb, nb) for p in primitives]
+                                  + [_origins(l, nb) for l in places.loads]),
+        places=places,
+    )  # fmt: skip
+
+
+def _of_vectors(bodies: list[tuple[int, ...]]) -> np.ndarray:
+    return np.array([body for each in bodies for body in each], dtype=np.int64)
+
+
+def _origins(load: LoadPlace, nb: int) -> tuple[int, ...]:
+    """The bodies from whose centres of mass the vectors of a load are: two points, then directions."""
+    first = load.first if load.kind in (FORCE, SPRING) else nb
+    second = load.second if load.kind == SPRING else nb
+    return first, second, nb, nb, nb, nb

@@ -5,7 +5,7 @@ Sizes: nb bodies, m constraint rows, p primitives, d drivers, l loads.  Body ``n
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from mbref.kernels.named_memory import IndexTable, Indices, Matrix, Vector
 
@@ -64,6 +64,10 @@ class Loads(NamedTuple):
     natural: Annotated[Vector, "l"]  # length (m) or angle (rad)
 
 
+FIRST_NUMBERS = Primitives._fields.index("point_first")  # the fields before are those of a structure
+FIRST_OF_LOADS = Loads._fields.index("force")
+
+
 class SceneData(NamedTuple):
     """A scene as kernels read it; none changes it."""
 
@@ -77,3 +81,9 @@ class SceneData(NamedTuple):
     row_bodies: Annotated[IndexTable, "m", 2]  # the two bodies of each row
     drivers: Drivers
     loads: Loads
+
+    @property
+    def numbers(self) -> tuple[Any, ...]:
+        """The arrays in which scenes of one structure differ."""
+        primitives, loads = self.primitives[FIRST_NUMBERS:], self.loads[FIRST_OF_LOADS:]
+        return self.gravity, self.lengths, self.metric_root, *self.bodies, *primitives, *self.drivers, *loads

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def dense_null_shares(matrix: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """``null_shares`` (…, r) of small matrices (…, m, n), whose rows may be zero."""
-    lengths = np.linalg.norm(matrix, axis=-1, keepdims=True)
+    lengths = np.sqrt((matrix * matrix).sum(axis=-1, keepdims=True))
     d = matrix / np.where(lengths > 0, lengths, 1.0)
     unit = np.eye(matrix.shape[-2])
     inverse = np.linalg.solve(ALPHA * (d @ d.swapaxes(-1, -2)) + unit, unit[:, rows])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -75,7 +76,9 @@ def _starts(
     (s, 7 nb) and velocities (s, 6 nb) of all."""
     q, v = packs.start(), np.zeros_like(packs.mass)
     found = {k: start for k, start in enumerate(evaluations.starts()) if isinstance(start, Start)}
-    rounded = without_rounding([*found.values()], packs.length[[*found]], _reduction(run).held)
-    for k, start in zip(found, rounded, strict=True):
-        q[k], v[k] = start.q, start.v
-    return dict(zip(found, rounded, strict=True)), q, v
+    if found:
+        places, starts = [*found], found.values()
+        at, rates, given = (np.array([getattr(s, name) for s in starts]) for name in ("q", "v", "given"))
+        q[places], v[places] = without_rounding(at, rates, given, packs.length[places])
+        v[:, _reduction(run).held] = 0.0
+    return {k: replace(start, q=q[k], v=v[k]) for k, start in found.items()}, q, v

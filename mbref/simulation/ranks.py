@@ -27,13 +27,19 @@ class Ranks(NamedTuple):
 NO_RANKS = Ranks(0, 1.0, 0.0)
 
 
-def ranks_at(model: Model, q: np.ndarray, factor: SparseFactor, tolerance: float) -> Ranks:
-    """Those of the rows of a factor, at q (7 nb,); of too many only whether pivots say that none depends."""
+def ranks_at(
+    model: Model, q: np.ndarray, factor: SparseFactor, tolerance: float, blocks: np.ndarray | None = None
+) -> Ranks:
+    """Those of the rows of a factor, at q (7 nb,); of too many only whether pivots say that none depends.
+
+    ``blocks`` (m, 12) are those of Φ_q there, where they are known.
+    """
     size = factor.symbolic.row.size
+    if blocks is None:
+        blocks = model.blocks(0.0, q, np.zeros(model.n)).jacobian
     if size > MOST_ROWS:
-        return NO_RANKS._replace(rank=size if are_clear(model, q, factor) else 0)
-    blocks = model.blocks(0.0, q, np.zeros(model.n)).jacobian[None]
-    (found,) = all_ranks(model, blocks, model.data.metric_root[None], factor.symbolic, tolerance)
+        return NO_RANKS._replace(rank=size if are_clear(model, blocks, factor) else 0)
+    (found,) = all_ranks(model, blocks[None], model.data.metric_root[None], factor.symbolic, tolerance)
     return found
 
 
@@ -58,9 +64,8 @@ def _ranks(values: np.ndarray, tolerance: float) -> Ranks:
     return Ranks(rank, float(least), float(rest))
 
 
-def are_clear(model: Model, q: np.ndarray, factor: SparseFactor) -> bool:
-    """Whether all pivots of the factor at q (7 nb,) are those of independent rows."""
-    blocks = model.blocks(0.0, q, np.zeros(model.n)).jacobian
+def are_clear(model: Model, blocks: np.ndarray, factor: SparseFactor) -> bool:
+    """Whether all pivots of the factor of Φ_q as blocks (m, 12) are those of independent rows."""
     positive = factorise_once(blocks.reshape(-1), model.data.metric_root, packed(factor).argument)
     squares = 1.0 / (factor.l[factor.symbolic.l_start[:-1]] * factor.diagonal)
     return bool(positive and squares.min() > INDEPENDENT)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,10 @@ import numpy as np
 from mbref.equations.active_coordinates import without_rounding
 from mbref.equations.branches import Passed
 from mbref.equations.degrees_of_freedom import freedoms_left
-from mbref.equations.evaluation import evaluate_along
 from mbref.equations.initial_state import Start, consistent_start
 from mbref.equations.model import Model
 from mbref.equations.reduction import Reduction, reduction_of
 from mbref.equations.static_constraints import at_rest
-from mbref.kernels.compilation import Exchangeable
 from mbref.kernels.layout import (
     NOT_CONVERGED,
     Active,
@@ -29,7 +28,7 @@ from mbref.kernels.layout import (
     State,
     Watch,
 )
-from mbref.kernels.lent_memory import Lent, lent, shapes_of, take_back, write
+from mbref.kernels.lent_memory import Lent, lent, take_back, write
 from mbref.kernels.named_memory import allocate, packed
 from mbref.kernels.records import record
 from mbref.kernels.scene_layout import SceneData
@@ -38,6 +37,7 @@ from mbref.method import Method
 from mbref.scene import Scene, SceneError
 from mbref.simulation.control import control_of
 from mbref.simulation.limits import AUTO, SPECIALISED, Limits
+from mbref.simulation.preparation import prepare
 from mbref.simulation.ranks import NO_RANKS, Ranks, ranks_at
 from mbref.simulation.stepping import CREEPING, PAUSED, SINGULAR_AHEAD, UNDECIDED, advance_to_end
 from mbref.specialised import Part, Specialised, Untraceable, Varied, specialise, with_specialised_code
@@ -54,6 +54,7 @@ class Run:
 
     def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
         self.scene, self.method, self.times, self.limits = scene, method, times, limits
+        self._blocks: np.ndarray | None = None  # (m, 12) of Φ_q at the start, where it was asked for
         self.model, self.start, self.reduction = self._posed()
         self._control = control_of(self.model, method, times, limits)
         prepare(method)  # so that the run alone is timed
@@ -87,8 +88,9 @@ class Run:
         self._check_freedoms(model, start)
         if not (self.method.formulation.linear_algebra.sparse or self.method.stabilisation.projects):
             return model, start, None
-        (start,) = without_rounding([start], np.array([model.length]))
-        reduction = reduction_of(model, start)
+        q, v = without_rounding(start.q[None], start.v[None], start.given[None], np.array([model.length]))
+        start = replace(start, q=q[0], v=v[0])
+        reduction, self._blocks = reduction_of(model, start)
         return model, at_rest(start, reduction.held), reduction
 
     def _check_freedoms(self, model: Model, start: Start) -> None:
@@ -118,8 +120,8 @@ class Run:
 
     def _lend_memory(self) -> Lent:
         """Memory with the numbers of this run."""
-        model, reduction, data = self.model, self.reduction, self.reduced(self.model.data)
-        key = (Memory, *self._identity(), reduction, self.times.size, *model.sizes.values(), shapes_of(data))
+        data = self.reduced(self.model.data)
+        key = (Memory, *self._identity(), self.model.structure, self.reduction, self.times.size)
         memory = lent(key, lambda: self._allocate(data))
         self._put_numbers(memory.values, data)
         return memory
@@ -213,7 +215,8 @@ class Run:
 
     def _ranks_at_start(self) -> Ranks:
         """Of the constraint rows."""
-        return ranks_at(self.model, self.start.q, self.memory.factor, self.limits.rank_tolerance)
+        factor, tolerance = self.memory.factor, self.limits.rank_tolerance
+        return ranks_at(self.model, self.start.q, factor, tolerance, self._blocks)
 
     def enter_state(self) -> None:
         """Start from the time of the clock and the state in memory."""
@@ -314,19 +317,3 @@ def missing_masses(scene: Scene) -> list[str]:
         for b, body in enumerate(scene.body)
         if body.mass is None
     ]
-
-
-def prepare(method: Method) -> None:
-    """Compile the kernels of the method, or load them from the cache of this machine."""
-    for kernel in kernels_of(method):
-        kernel.prepare()
-
-
-def kernels_of(method: Method) -> list[Exchangeable]:
-    """All kernels that a run by the method calls, but those of its formulation's helpers."""
-    integrator, chart = method.integrator, method.stabilisation
-    kernels = (
-        integrator.step, integrator.propose, chart.rates, chart.accept, method.formulation.accelerate,
-        advance_to_end, evaluate_along, chart.enter.callable,
-    )  # fmt: skip
-    return [kernel for kernel in kernels if kernel is not None]

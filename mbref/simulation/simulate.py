@@ -13,7 +13,7 @@ from mbref.method import DEFAULT, Method, MethodError
 from mbref.motion import Motion
 from mbref.scene import Scene
 from mbref.scenes import find_scene
-from mbref.simulation import run as general
+from mbref.simulation import preparation
 from mbref.simulation.limits import SPECIALISED, Limits
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.run import Run
@@ -103,14 +103,14 @@ def prepare(method: Method) -> None:
     Those of the default method and of Taylor series are among them: comparisons and crossings need them.
     """
     with compiled_beside(KERNELS_OF_SERIES, prepare_series.__module__, prepare_series.__name__):
-        general.prepare(method)
-        general.prepare(Method.parse(DEFAULT))
+        preparation.prepare(method)
+        preparation.prepare(Method.parse(DEFAULT))
     prepare_series()
 
 
 def are_compiled(method: Method) -> bool:
     """Whether the kernels of a run by the method are in the cache of this machine."""
-    return all(kernel.is_kept for kernel in general.kernels_of(method))
+    return all(kernel.is_kept for kernel in preparation.kernels_of(method))
 
 
 def why_no_code(scene: Scene, method: Method) -> str:

@@ -10,6 +10,7 @@ import pytest
 
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from mbref.equations import reduction
+from mbref.equations.model import Model
 from mbref.kernels import lent_memory
 from mbref.kernels.compilation import PLAIN
 from mbref.kernels.named_memory import Packed
@@ -109,6 +110,24 @@ def test_scenes_that_differ_in_masses_and_loads_share_a_geometry():
         kept = dict(geometry._known)
         assert [alone(scene, "taylor") for scene in scenes] == repeated
         geometry._known.update(kept)
+
+
+def test_scenes_that_differ_in_numbers_alone_share_a_structure():
+    numbers = list(variants(CRANK, [Variation("load[0].moment[2]", 50.0, 150.0)], 3))
+    structures = {Model(scene).structure for scene in numbers}
+    others = CRANK.with_(load=()), CRANK.with_(joint=CRANK.joint[::-1]), FIVE_BAR, SPATIAL
+    assert len(structures) == 1
+    assert len(structures | {Model(scene).structure for scene in others}) == 1 + len(others)
+
+
+@pytest.mark.parametrize("scene", [CRANK, SPATIAL, FIVE_BAR], ids=lambda scene: scene.name)
+def test_a_repeated_run_evaluates_its_start_twice(scene, monkeypatch):
+    """At rest to correct it, and beside the states at which equations are read."""
+    simulated(scene)
+    asked, along = [], Model.along
+    monkeypatch.setattr(Model, "along", lambda *given: asked.append(given) or along(*given))
+    Run(scene, Method.parse(METHODS[0]), TIMES, Limits())
+    assert len(asked) == 2
 
 
 def test_memory_in_use_is_not_lent():

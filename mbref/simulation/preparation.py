@@ -1,0 +1,24 @@
+"""Preparation: the kernels that a run by a method calls, compiled or loaded before its clock runs."""
+
+from __future__ import annotations
+
+from mbref.equations.evaluation import evaluate_along
+from mbref.kernels.compilation import Exchangeable
+from mbref.method import Method
+from mbref.simulation.stepping import advance_to_end
+
+
+def prepare(method: Method) -> None:
+    """Compile the kernels of the method, or load them from the cache of this machine."""
+    for kernel in kernels_of(method):
+        kernel.prepare()
+
+
+def kernels_of(method: Method) -> list[Exchangeable]:
+    """All kernels that a run by the method calls, but those of its formulation's helpers."""
+    integrator, chart = method.integrator, method.stabilisation
+    kernels = (
+        integrator.step, integrator.propose, chart.rates, chart.accept, method.formulation.accelerate,
+        advance_to_end, evaluate_along, chart.enter.callable,
+    )  # fmt: skip
+    return [kernel for kernel in kernels if kernel is not None]
