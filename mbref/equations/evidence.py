@@ -145,10 +145,13 @@ class Trials:
         numbers = samples[:, *places] * self._has_entry[:, None, :]
         lengths = np.sqrt((numbers * numbers).sum(axis=-1))
         least, most = lengths.min(axis=2, initial=np.inf), lengths.max(axis=2, initial=0.0)
+        are_constant = (least > SMALL) & (most - least <= ROUNDING * most)
+        if not self._one.size:
+            return are_constant, np.zeros((len(samples), 0), dtype=bool)
         units = numbers / np.where(lengths > 0.0, lengths, 1.0)[..., None]
         products = units[:, self._one] * units[:, self._other]
         cosines = np.abs(products.sum(axis=-1)).max(axis=2, initial=0.0)
-        return (least > SMALL) & (most - least <= ROUNDING * most), cosines < ROUNDING
+        return are_constant, cosines < ROUNDING
 
 
 def _entries(columns_of_row: list[int], columns: Sequence[int]) -> list[int]:

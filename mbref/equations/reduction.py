@@ -8,6 +8,7 @@ reduction is that of the scene before.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -42,6 +43,12 @@ class Reduction:
     static: StaticRows
     evidence: Evidence
 
+    @cached_property
+    def identity(self) -> bytes:
+        """All that code of a scene takes for constant, but numbers."""
+        arrays = *self.active, *self.symbolic, *self.static
+        return b"".join(part for a in arrays for part in (str(a.shape).encode(), a.tobytes()))
+
     def factor(self) -> SparseFactor:
         """Memory of the factor."""
         return sparse_factor(self.symbolic, self.static)
@@ -49,13 +56,24 @@ class Reduction:
     def scene(self, data: SceneData, all_move: bool, axis: int = 0) -> SceneData:
         """The data of a scene without the primitives that have no entry, which ``axis`` counts; all others
         move where asked."""
-        resting = np.zeros_like(self.resting) if all_move else self.resting
-        kept = (column.take(self.primitives, axis=axis) for column in data.primitives)
-        moving, still = np.flatnonzero(~resting), np.flatnonzero(resting)
+        moving, still = self._all_moving if all_move else self._moving
         if axis:
             scenes = data.row_bodies.shape[:axis]
             moving, still = (np.broadcast_to(one, (*scenes, one.size)) for one in (moving, still))
-        return data._replace(primitives=Primitives(*kept), moving=moving, resting=still)
+        kept = data.primitives
+        if self.primitives.size < kept.kind.shape[axis]:
+            kept = Primitives(*(column.take(self.primitives, axis=axis) for column in kept))
+        return data._replace(primitives=kept, moving=moving, resting=still)
+
+    @cached_property
+    def _moving(self) -> tuple[np.ndarray, np.ndarray]:
+        """Primitives, by number among those here, that move, and those that do not."""
+        return np.flatnonzero(~self.resting), np.flatnonzero(self.resting)
+
+    @cached_property
+    def _all_moving(self) -> tuple[np.ndarray, np.ndarray]:
+        """The same where all of them move."""
+        return np.arange(self.resting.size), np.zeros(0, dtype=np.int64)
 
 
 def reduction_of(model: Model, start: Start) -> tuple[Reduction, np.ndarray]:

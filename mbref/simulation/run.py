@@ -60,8 +60,8 @@ class Run:
         prepare(method)  # so that the run alone is timed
         self._lent = self._lend_memory()
         self.memory, self.packed = self._lent.values, self._lent.packed
-        if method.stabilisation.projects:
-            self.part = Part(self.memory.active, self.memory.factor)
+        if method.stabilisation.projects and self.reduction:
+            self.part = Part(self.memory.active, self.memory.factor, self.reduction.identity)
         self.put_start()
         self.enter_state()
         self.specialised: Specialised | None = None

@@ -39,6 +39,7 @@ class Part:
 
     active: Active
     factor: SparseFactor
+    identity: bytes  # all of both but numbers
 
 
 @dataclass(frozen=True)
@@ -180,8 +181,7 @@ def _key(
     model: Model, method: Method, rank_tolerance: float, start: Start, part: Part, varied: Varied | None
 ) -> str:
     digest = hashlib.sha256(f"{method} {rank_tolerance} {processor()}".encode())
-    factor = part.factor
     numbers = varied.constants() if varied else (model.data, start.q, start.v)
-    for array in arrays_of((*numbers, part.active, factor.symbolic, factor.static)):
-        digest.update(str(array.shape).encode() + array.tobytes())
+    shapes_and_bytes = ((str(a.shape).encode(), a.tobytes()) for a in arrays_of(numbers))
+    digest.update(b"".join(part for pair in shapes_and_bytes for part in pair) + part.identity)
     return digest.hexdigest()[:32]

@@ -25,11 +25,12 @@ def geometry_of(model: Model, start: Start, moving: np.ndarray, driven: bool) ->
     ``driven``: for kinematics alone, because drivers prescribe the whole motion.
     """
     key = driven, _key(model, start, moving)
-    if key not in _known:
+    found = _known.get(key)  # once: to hash joints takes time
+    if found is None:
         if len(_known) >= MOST_KEPT:
             _known.pop(next(iter(_known)), None)
-        _known[key] = Geometry(NaturalCoordinates(model, start, moving, driven))
-    return _known[key]
+        found = _known[key] = Geometry(NaturalCoordinates(model, start, moving, driven))
+    return found
 
 
 def _key(model: Model, start: Start, moving: np.ndarray) -> Hashable:

@@ -198,10 +198,12 @@ def _inertia(model: Model, forms: Forms, lanes: int) -> Inertia:
 def _moment(forms: Forms, body: int, moment: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Constant (d,) and linear (d, d) force of a moment: ½ Σ (moment × R e) · δ(R e) over three axes."""
     constant, matrix = np.zeros(forms.d), np.zeros((forms.d, forms.d))
-    all_at_rest, all_moving = (each.reshape(3, 3, -1) for each in forms.of_axes(body))
-    for at_rest, moving in zip(all_at_rest[..., 0], all_moving, strict=True):
-        constant += 0.5 * rotations.cross(moment, at_rest) @ moving
-        matrix += 0.5 * moving.T @ rotations.cross(moment, moving.T).T
+    at_rest, all_moving = (each.reshape(3, 3, -1) for each in forms.of_axes(body))
+    of_rest = 0.5 * rotations.cross(moment, at_rest[..., 0])
+    of_moving = rotations.cross(moment, all_moving.swapaxes(1, 2))
+    for own, moving, turned in zip(of_rest, all_moving, of_moving, strict=True):
+        constant += own @ moving
+        matrix += 0.5 * moving.T @ turned.T
     return constant, matrix
 
 

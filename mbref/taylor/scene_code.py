@@ -63,8 +63,8 @@ def _key(taylor: TaylorMemory, names: Sequence[str]) -> str:
     polynomials, solver = taylor.polynomials, taylor.solver
     digest = hashlib.sha256(f"{names} {rank_of(taylor)} {processor()}".encode())
     arrays = *polynomials.products, *polynomials.inertia, *polynomials.rows, solver.linear, solver.order
-    for array in (*arrays, polynomials.given.driver):
-        digest.update(str(array.shape).encode() + array.tobytes())
+    every = (*arrays, polynomials.given.driver)
+    digest.update(b"".join(part for a in every for part in (str(a.shape).encode(), a.tobytes())))
     return digest.hexdigest()[:32]
 
 

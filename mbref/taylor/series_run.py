@@ -72,7 +72,7 @@ def order_of(tolerance: float, wanted: float, code: str) -> int:
     if wanted == 0:
         first, per_digit = CHEAPEST[code]
         best = 2 * round((first - per_digit * np.log10(tolerance)) / 2)
-        return int(np.clip(best, LEAST_ORDER, MOST_ORDER))
+        return int(min(max(best, LEAST_ORDER), MOST_ORDER))
     if wanted not in range(LEAST_ORDER, MOST_ORDER + 1):
         raise ValueError(f"taylor: order must be {LEAST_ORDER} to {MOST_ORDER}, got {wanted:g}")
     return int(wanted)
