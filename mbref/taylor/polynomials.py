@@ -178,14 +178,18 @@ def _inertia(model: Model, forms: Forms, lanes: int) -> Inertia:
     of, loads = forms.of, model.data.loads
     weight = model.data.bodies.mass[:, None] * (model.data.gravity / of.length)
     force, linear = (weight[:, :, None] * forms.centres).sum(axis=(0, 1)), np.zeros((forms.d, forms.d))
-    for k in np.flatnonzero((loads.kind == FORCE) & (loads.first < of.nb)):
-        _, point = forms(of.point(int(loads.first[k]), loads.point_first[k]))
-        force += (loads.force[k] / of.length) @ point
-    for k in np.flatnonzero(loads.kind == MOMENT):
-        constant, matrix = _moment(forms, int(loads.first[k]), loads.force[k] / of.length**2)
-        force, linear = force + constant, linear + matrix
-    moved = linear if linear.any() else ()
-    terms: list[list[tuple]] = [[(j, row[j]) for j in np.flatnonzero(row)] for row in moved]
+    places = [*enumerate(zip(loads.kind.tolist(), loads.first.tolist(), strict=True))]
+    for k, (kind, body) in places:
+        if kind == FORCE and body < of.nb:
+            _, point = forms(of.point(body, loads.point_first[k]))
+            force += (loads.force[k] / of.length) @ point
+    for k, (kind, body) in places:
+        if kind == MOMENT:
+            constant, matrix = _moment(forms, body, loads.force[k] / of.length**2)
+            force, linear = force + constant, linear + matrix
+    terms: list[list[tuple]] = [[] for _ in range(forms.d)]
+    for i, j in zip(*(place.tolist() for place in np.nonzero(linear)), strict=True):
+        terms[i].append((j, linear[i, j]))
     slots, start = _slots([*terms, *[[]] * (lanes - len(terms))], (0, 0.0))
     force = np.concatenate([force, np.zeros(lanes - forms.d)])
     mass = np.zeros((forms.d, lanes))
@@ -199,11 +203,10 @@ def _moment(forms: Forms, body: int, moment: np.ndarray) -> tuple[np.ndarray, np
     """Constant (d,) and linear (d, d) force of a moment: ½ Σ (moment × R e) · δ(R e) over three axes."""
     constant, matrix = np.zeros(forms.d), np.zeros((forms.d, forms.d))
     at_rest, all_moving = (each.reshape(3, 3, -1) for each in forms.of_axes(body))
-    of_rest = 0.5 * rotations.cross(moment, at_rest[..., 0])
-    of_moving = rotations.cross(moment, all_moving.swapaxes(1, 2))
-    for own, moving, turned in zip(of_rest, all_moving, of_moving, strict=True):
-        constant += own @ moving
-        matrix += 0.5 * moving.T @ turned.T
+    vectors = np.concatenate([at_rest, all_moving], axis=2).swapaxes(1, 2)
+    for moving, turned in zip(all_moving, rotations.cross(moment, vectors), strict=True):
+        constant += 0.5 * turned[0] @ moving
+        matrix += 0.5 * moving.T @ turned[1:].T
     return constant, matrix
 
 
