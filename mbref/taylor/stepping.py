@@ -121,13 +121,14 @@ def keep_terms(memory):
 
 @kernel
 def remember_series(memory):
-    """Keep the series of the step's beginning, and the pivots there."""
+    """Keep the series of the step's beginning, and the pivots there; angles have no last order."""
     remember_pivots(memory)
     keep_terms(memory)
     series = memory.series
     for s in range(series.past_angles.shape[0]):
-        for k in range(memory.progress.order + 1):
+        for k in range(memory.progress.order):
             series.past_angles[s, k] = series.torsions[TORSION_SERIES * s + ANGLE, k]
+        series.past_angles[s, memory.progress.order] = 0.0
 
 
 @kernel
