@@ -26,7 +26,7 @@ from crosscheck.cli.running import (
     studied,
 )  # fmt: skip
 from crosscheck.study.grid import Record, key, made_by
-from crosscheck.study.progress import counted
+from crosscheck.study.progress import counted, followed
 from mbref.scene import SceneError
 from mbref.trajectory import Outcome
 
@@ -122,11 +122,13 @@ def _verify_drawn(engine: str, arguments: argparse.Namespace) -> int:
 def _certify(arguments: argparse.Namespace) -> int:
     from crosscheck.judge.reference.certify import NotCertified, certified
 
+    request.refuse_without_flint()
+    request.refuse_missing_folder(arguments.out)
     scene = request.find_certifiable(arguments.scene)
     times = request.sample_times(request.lasting(scene, None, arguments.duration), None, arguments.samples)
     try:
-        table = certified(scene, times, arguments.digits)
-    except (NotCertified, ImportError) as error:
+        table = certified(scene, times, arguments.digits, shown=lambda name: followed(name, times[-1]))
+    except NotCertified as error:
         raise RequestError(str(error)) from None
     text = json.dumps(table, indent=1, ensure_ascii=False)
     if arguments.out:

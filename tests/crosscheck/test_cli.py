@@ -305,6 +305,29 @@ def test_help_and_an_example_in_one_line_that_can_be_copied(capsys, command):
     parser().parse_args(example.split()[1:])
 
 
+@pytest.mark.parametrize("digits", ["0", "3", "500", "-2", "many"])
+def test_digits_that_no_two_formulations_agree_on(capsys, digits):
+    status, _, err = run_main(capsys, "certify", "heavy_top", "--digits", digits)
+    assert status == 2 and f"argument --digits: must be from 4 to 100, got {digits}" in err, err
+
+
+def test_certify_without_its_package(capsys, monkeypatch):
+    monkeypatch.setattr(request.importlib.util, "find_spec", lambda name: None)
+    status, _, err = run_main(capsys, "certify", "heavy_top")
+    assert status == 2 and err.endswith("not installed: pip install python-flint\n"), err
+
+
+def test_certify_tells_its_progress_and_looks_for_its_folder_first(capsys, tmp_path):
+    pytest.importorskip("flint", reason="python-flint is the extra `certify`")
+    asked = ("certify", "four_bar_gravity", "--digits", "4", "--duration", "0.002", "--out")
+    status, _, err = run_main(capsys, *asked, str(tmp_path / "nowhere" / "table.json"))
+    assert status == 2 and err == f"--out: {tmp_path / 'nowhere'} is no folder\n", err
+    status, _, err = run_main(capsys, *asked, str(tmp_path / "table.json"))
+    assert status == 0 and (tmp_path / "table.json").exists(), err
+    for name in "AB":
+        assert f"formulation {name}: 100 of 100" in err and "t = 0.002 s" in err, err
+
+
 def test_the_time_limit_of_tune_is_one_number(capsys):
     _, out, _ = run_main(capsys, "tune", "--help")
     assert f"without computing; default: {grid.TIME_LIMIT:g} --reference-time" in " ".join(out.split()), out
