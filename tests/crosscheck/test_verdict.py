@@ -11,6 +11,7 @@ import pytest
 from rich.console import Console
 
 from crosscheck.cli import differences, tables
+from crosscheck.judge.reference.cache import mechanism
 from crosscheck.study.difference import changes, circumstances, load
 from crosscheck.study.sentences import (
     ADAPTERS,
@@ -223,6 +224,53 @@ def test_differences_beyond_noise(tmp_path):
     assert not any(change.sentences for change in changes(before, before))
 
 
+def test_a_failure_that_comes_earlier_and_a_measure_beside_the_error():
+    early = failed("a", "x", 0.5)
+    moved = record("a", "y", 1e-5, 0.1)
+    measured = [
+        moved | {"metrics": {"error": 1e-5, "reaction_error": e, "energy_error": None}} for e in (1e-9, 1e-3)
+    ]
+    worse = moved | {"metrics": {"error": 1e-2, "reaction_error": 1.0}}
+    for before, after, expected in (
+        (early, early | {"t_end": 0.02}, ["end not finite at 0.5 s → not finite at 0.02 s"]),
+        (early, early | {"t_end": 0.49}, []),
+        (early | {"t_end": 0.0}, early | {"t_end": -1e-8}, []),
+        (*measured, ["reactions 1.00e-09 → 1.00e-03"]),
+        (measured[0], worse, ["error 1.00e-05 → 1.00e-02"]),
+    ):
+        named = [{"run": {**r, "repeated": False}} for r in (before, after)]
+        assert changes(*named)[0].sentences == expected
+
+
+def test_runs_of_another_mechanism_are_not_compared(tmp_path):
+    """A scene that was edited under its name between two reports."""
+    first, second = (synthetic.scene().with_(gravity=(0.0, g, 0.0)) for g in (-9.81, -1.62))
+    old, new = (
+        record("a", "x", e, 0.1, scene=s.name, mechanism=mechanism(s)) | {"key": s.name + str(e)}
+        for e, s in ((1e-5, first), (1e-1, second))
+    )
+    stale = record("a", "stale", 1e-5, 0.1, scene=first.name, mechanism=mechanism(first))
+    folders = [saved(tmp_path / "old", [old]), saved(tmp_path / "new", [old, stale, new])]
+    for folder, scene in zip(folders, (first, second), strict=True):
+        (folder / "scenes").mkdir()
+        scene.save(folder / "scenes" / f"{scene.name}.toml")
+    before, after = map(load, folders)
+    assert len(after) == 1, "records of the mechanism before it was edited are left out"
+    assert [c.sentences for c in changes(before, after)] == [["only in the new set"], ["only in the old set"]]
+    told = circumstances(before, after)
+    assert told == [f"{first.name}: the mechanism was changed, so its runs are not compared."], told
+    console = Console(width=80, file=io.StringIO())
+    assert differences.show(console, *map(str, folders), False)
+    assert "The sets have no run in common" in console.file.getvalue()
+
+
+def test_a_comparison_leaves_files_as_they_are(tmp_path):
+    path = saved(tmp_path / "cut", [record("a", "x", 1e-5, 0.1)]) / "records.jsonl"
+    path.write_text(path.read_text() + '{"key": "cut sho')
+    before = path.read_text()
+    assert len(load(path)) == 1 and path.read_text() == before
+
+
 def test_runs_of_one_set_alone_are_counted_by_engine(tmp_path):
     both, gone = record("a", "x", 1e-5, 0.1), [record("b", family, 1e-5, 0.1) for family in "pq"]
     folders = [saved(tmp_path / name, runs) for name, runs in (("old", [both, *gone]), ("new", [both]))]
@@ -233,12 +281,14 @@ def test_runs_of_one_set_alone_are_counted_by_engine(tmp_path):
         said.append(console.file.getvalue())
     assert "b: 2 runs only in the old set" in said[0] and "runs\nscene" not in said[0]
     assert said[0].count("only in the old set") == 1 and said[1].count("only in the old set") == 2
+    assert "0 of 1 runs of both sets changed." in said[0]
 
 
 def test_times_of_other_machines_are_not_compared():
     slow = record("a", "x", 1e-5, 0.1, machine={"cpu": "b"}, cost={"seconds": 9.0})
     named = [{"run": {**r, "repeated": False}} for r in (record("a", "x", 1e-5, 0.1), slow)]
     assert not changes(*named)[0].sentences
+    assert circumstances(*named)[-1] == "Times of 1 run are not compared: the machines differ."
 
 
 def test_tables_of_eighty_columns_and_whole_numbers():
