@@ -22,7 +22,7 @@ from crosscheck.study.command import command
 from crosscheck.study.fair_timing import timed
 from crosscheck.study.hurried import NOT_STARTED, Hurried
 from crosscheck.study.record_view import PUBLIC, is_judged
-from crosscheck.study.sentences import unknown
+from crosscheck.study.truth_sentences import unknown
 from mbref.scene import Body, Moment, Scene
 from mbref.scenes import SCENES
 from mbref.scenes.four_bar import four_bar_gravity

@@ -21,9 +21,9 @@ from crosscheck.study.sentences import (
     fast,
     headline,
     right,
-    truth,
     verdict,
 )
+from crosscheck.study.truth_sentences import truth
 from crosscheck.study.tuning import tuned
 from crosscheck.study.verdict import Grade, Judged, grade, judged
 from crosscheck.study.wording import multiple, span
@@ -125,6 +125,11 @@ def test_other_results_and_other_sentences():
         "Exudyn completes no run: not finite at t = 0.25 s."
     ), right([group(lost)])
     cut = group(kind="reference", reason="singular", until=0.3, both=False)
+    assert headline([cut]).startswith(
+        "mbref, MuJoCo and Pinocchio are right at their best settings up to t = 0.3 s, as far as the motion "
+        "is known; with"
+    ), headline([cut])
+    assert right([cut]).startswith("mbref, MuJoCo and Pinocchio agree with the truth to 6.1e-9 as far as it")
     known = "up to t = 0.3 s of 0.4 s (singular), and errors are of this part: two runs of one formulation"
     assert known in truth([cut]), truth([cut])
 
@@ -138,6 +143,31 @@ def test_sentences_of_several_scenes():
     assert "Elsewhere the fastest is Pinocchio on spatial_slider_crank" in fast(groups), fast(groups)
     assert "Pinocchio and Exudyn end at t = 0 s on planar_slider_crank, where a" in breaks(groups)
     assert "and Pinocchio are right at their best settings on the scenes they can run;" in headline(groups)
+
+
+def test_a_motion_that_is_not_known_beside_one_that_is():
+    still = [record(name, "tuned", None, times=[0.0], scene=SOUND.name) for name in ("mbref", "exudyn")]
+    groups = [group(), group(still, SOUND, kind="", reason="two ways", bound=None)]
+    assert headline(groups) == (
+        "mbref, MuJoCo and Pinocchio are right at their best settings on planar_slider_crank, whose motion "
+        "is known; with their libraries' defaults none is."
+    ), headline(groups)
+    assert "agree with the truth to 6.1e-9 on planar_slider_crank." in right(groups), right(groups)
+
+
+def test_defaults_that_nothing_judges():
+    unjudged = [record(name, "defaults", None, times=[0.0]) for name in ("mujoco", "exudyn")]
+    assert breaks([group(unjudged, kind="", reason="two ways", bound=None)]) == (
+        "The defaults of MuJoCo and Exudyn complete; without a truth nothing tells whether they are right."
+    )
+    assert breaks([group([record("mbref", "own", 1e-12)])]) == "No setting is a library's default."
+
+
+def test_a_best_setting_beside_one_that_ran_out_of_time():
+    late = record("sundials", "ggl", None, 0.2, outcome="TIMED_OUT", t_end=0.0, time_limit=5.0)
+    assert right([group([record("sundials", "ggl", 2.87), late])]) == (
+        "SUNDIALS IDA is wrong at best of the settings that end within 5 s: off by 2.87e+00."
+    )
 
 
 def test_no_truth_and_no_claim_of_right():
