@@ -63,6 +63,11 @@ def error(record: Record) -> float:
     return math.inf if value is None or math.isnan(value) else value
 
 
+def known_error(record: Record) -> float:
+    """The error of a record, or the bound on the truth's own error where that is larger."""
+    return max(error(record), record["metrics"].get("error_bound") or 0.0)
+
+
 def error_text(record: Record) -> str:
     """The error of a record as shown: ``< 3e-12`` below what the truth may be off itself, – without one and
     for a run that never moved."""

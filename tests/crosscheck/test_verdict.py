@@ -11,6 +11,7 @@ import pytest
 from rich.console import Console
 
 from crosscheck.cli import differences, tables
+from crosscheck.cli.terminal_plot import scatter
 from crosscheck.judge.reference.cache import mechanism
 from crosscheck.study.difference import changes, circumstances, load
 from crosscheck.study.sentences import (
@@ -29,6 +30,7 @@ from crosscheck.study.verdict import Grade, Judged, grade, judged
 from crosscheck.study.wording import multiple, span
 from mbref.records import append
 from mbref.scenes import SCENES
+from reports.runs import Run
 from tests.reports import synthetic
 
 REDUNDANT, SOUND = SCENES["planar_slider_crank"](), SCENES["spatial_slider_crank"]()
@@ -319,6 +321,13 @@ def test_times_of_other_machines_are_not_compared():
     named = [{"run": {**r, "repeated": False}} for r in (record("a", "x", 1e-5, 0.1), slow)]
     assert not changes(*named)[0].sentences
     assert circumstances(*named)[-1] == "Times of 1 run are not compared: the machines differ."
+
+
+def test_errors_are_drawn_no_lower_than_they_are_known():
+    below = record("a", "x", 1e-17, 0.1)
+    assert Run(below).drawn == (3e-14, 0.1)
+    drawn = scatter([below], {("a", "x"): "A"}).plain
+    assert "1e-14" in drawn and "1e-16" not in drawn, drawn
 
 
 def test_tables_of_eighty_columns_and_whole_numbers():
