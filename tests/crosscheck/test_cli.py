@@ -305,6 +305,14 @@ def test_help_and_an_example_in_one_line_that_can_be_copied(capsys, command):
     parser().parse_args(example.split()[1:])
 
 
+def test_an_adapter_that_fails_when_it_is_imported(capsys, tmp_path, monkeypatch):
+    (tmp_path / "bad_adapter.py").write_text("from crosscheck.engine import Engine\n\nENGINE = Engine()\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    status, _, err = run_main(capsys, "verify", "bad_adapter:ENGINE")
+    assert status == 2 and err.startswith("engine 'bad_adapter:ENGINE' cannot be loaded: TypeError: "), err
+    assert err.endswith(f"({tmp_path / 'bad_adapter.py'}, line 3)\n"), err
+
+
 @pytest.mark.parametrize("digits", ["0", "3", "500", "-2", "many"])
 def test_digits_that_no_two_formulations_agree_on(capsys, digits):
     status, _, err = run_main(capsys, "certify", "heavy_top", "--digits", digits)
