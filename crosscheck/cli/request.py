@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
 import math
 import traceback
 from collections.abc import Callable, Iterable, Sequence
@@ -74,18 +73,6 @@ def find_certifiable(name: str) -> Scene:
     from crosscheck.conformance.random_mechanisms import random_mechanism
 
     return random_mechanism(int(seed))
-
-
-def refuse_without_flint() -> None:
-    """Raise RequestError where the package for numbers of many digits is not installed."""
-    if importlib.util.find_spec("flint") is None:
-        raise RequestError("certify: the package python-flint is not installed: pip install python-flint")
-
-
-def refuse_missing_folder(file: str | None) -> None:
-    """Raise RequestError where a file cannot be written for want of its folder."""
-    if file and not Path(file).parent.is_dir():
-        raise RequestError(f"--out: {Path(file).parent} is no folder")
 
 
 def find_engines(names: Sequence[str] | None, notice: Notice) -> list[str]:

@@ -11,7 +11,17 @@ from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error, error_text
 from crosscheck.study.truth_sentences import names, truth, up_to
 from crosscheck.study.verdict import Grade, Judged, grade
-from crosscheck.study.wording import agree, at_most, is_or_are, its_or_their, listed, multiple, seconds, span
+from crosscheck.study.wording import (
+    agree,
+    at_most,
+    is_or_are,
+    its_or_their,
+    listed,
+    multiple,
+    seconds,
+    span,
+    uncapitalised,
+)
 
 TITLES = {"mujoco": "MuJoCo", "pinocchio": "Pinocchio", "exudyn": "Exudyn", "simbody": "Simbody",
           "sundials": "SUNDIALS IDA", "ondsel": "OndselSolver", "casadi": "CasADi"}  # fmt: skip
@@ -72,7 +82,10 @@ def headline(groups: Sequence[Judged]) -> str:
         if good
         else f"No engine is right{_everywhere(groups)} at any setting that was run"
     )
-    return f"{first}{_as_far_as_known(groups, told, good)}; {_defaults_in_short(told)}."
+    far = up_to(told)
+    if far:
+        first = f"{far[1:].capitalize()}, as far as the motion is known, {uncapitalised(first)}"
+    return f"{first}{_where_known(groups, told, good)}; {_defaults_in_short(told)}."
 
 
 def right(groups: Sequence[Judged]) -> str:
@@ -303,13 +316,11 @@ def _on(groups: Sequence[Judged], names: Sequence[str] = ()) -> str:
     return "" if count == 1 else " on both scenes" if count == 2 else f" on all {count} scenes"
 
 
-def _as_far_as_known(groups: Sequence[Judged], told: Sequence[Judged], good: Sequence[str]) -> str:
-    """The scenes that a headline is of, and how far their motions are known."""
+def _where_known(groups: Sequence[Judged], told: Sequence[Judged], good: Sequence[str]) -> str:
+    """The scenes that a headline is of."""
     if len(told) < len(groups):
-        whose = "whose motion is known" if len(told) == 1 else "whose motions are known"
-        return f" on {names(told)}, {whose}{up_to(told)}"
-    far = up_to(told)
-    return (_on(groups, good) if good else "") + (f"{far}, as far as the motion is known" if far else "")
+        return f" on {names(told)}, whose {'motion is' if len(told) == 1 else 'motions are'} known"
+    return _on(groups, good) if good else ""
 
 
 def _everywhere(groups: Sequence[Judged]) -> str:

@@ -25,6 +25,11 @@ def runs(number: int) -> str:
     return f"{number} run{'s' if number != 1 else ''}"
 
 
+def uncapitalised(sentence: str) -> str:
+    """A sentence as the end of another; a name that begins with a capital is left."""
+    return sentence[0].lower() + sentence[1:] if sentence.startswith(("All ", "Both ", "No ")) else sentence
+
+
 def is_or_are(names: Sequence[object]) -> str:
     """``is`` of one, ``are`` of several."""
     return "is" if len(names) == 1 else "are"

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crosscheck.cli import request, running
+from crosscheck.cli import certifying, request, running
 from crosscheck.cli.commands import main
 from crosscheck.cli.parser import parser
 from crosscheck.engine import BUILT_IN, engine
@@ -320,7 +320,7 @@ def test_digits_that_no_two_formulations_agree_on(capsys, digits):
 
 
 def test_certify_without_its_package(capsys, monkeypatch):
-    monkeypatch.setattr(request.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(certifying.importlib.util, "find_spec", lambda name: None)
     status, _, err = run_main(capsys, "certify", "heavy_top")
     assert status == 2 and err.endswith("not installed: pip install python-flint\n"), err
 

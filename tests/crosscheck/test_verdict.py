@@ -128,9 +128,13 @@ def test_other_results_and_other_sentences():
     ), right([group(lost)])
     cut = group(kind="reference", reason="singular", until=0.3, both=False)
     assert headline([cut]).startswith(
-        "mbref, MuJoCo and Pinocchio are right at their best settings up to t = 0.3 s, as far as the motion "
-        "is known; with"
+        "Up to t = 0.3 s, as far as the motion is known, mbref, MuJoCo and Pinocchio are right at their best "
+        "settings; with"
     ), headline([cut])
+    bad = group([record("mbref", "own", 1.0)], kind="reference", reason="singular", until=0.3, both=False)
+    assert headline([bad]).startswith(
+        "Up to t = 0.3 s, as far as the motion is known, no engine is right at any"
+    )
     assert right([cut]).startswith("mbref, MuJoCo and Pinocchio agree with the truth to 6.1e-9 as far as it")
     known = "up to t = 0.3 s of 0.4 s (singular), and errors are of this part: two runs of one formulation"
     assert known in truth([cut]), truth([cut])
