@@ -115,6 +115,8 @@ def fast(groups: Sequence[Judged]) -> str:
     """Times of stepping that reach LEVEL, as multiples of the fastest engine's."""
     found = {group.scene.name: group.costs(LEVEL) for group in groups}
     costs = {name: cost for name, cost in found.items() if cost}
+    if not any(_is_judged(group) for group in groups):
+        return "Without a truth no error is known, so speeds are not compared."
     if not costs:
         return f"No engine reaches an error of {SAID}, so speeds are not compared."
     never = [n for n in _engines(groups) if not any(n in cost for cost in costs.values())]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 import shlex
 import subprocess
@@ -11,8 +12,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
-from crosscheck.cli import certifying, request, running
+from crosscheck.cli import certifying, request, running, tables
 from crosscheck.cli.commands import main
 from crosscheck.cli.parser import parser
 from crosscheck.engine import BUILT_IN, engine
@@ -396,6 +398,43 @@ def test_tuning_and_the_cheapest_setting(capsys, still):
     assert "--option seconds=0.1 " in document["records"][0]["command"], document["records"][0]["command"]
     status, out, err = run_main(capsys, "tune", "elsewhere:ENGINE", still)
     assert status == 1 and "No setting reaches an error of 1e-06" in out, (out, err)
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        (
+            {"metrics": {"error": 1e-7, "error_bound": 1e-12}},
+            "No setting reaches an error of 1e-08; the nearest",
+        ),
+        (
+            {"metrics": {"error": 1e-9, "error_bound": 1e-7}},
+            "The truth is known to 1e-07, so no run can be seen",
+        ),
+        ({"metrics": {"error": None}}, "No error is known, because the motion has no truth"),
+        ({"metrics": {"error": 1e-9}, "outcome": "NOT_FINITE"}, "no run completes"),
+    ],
+)
+def test_an_error_that_no_setting_reaches_or_nothing_tells(more, says):
+    asked = {"options": {"s": 1.0}}
+    run = {
+        "engine": "e",
+        "family": "f",
+        "outcome": "COMPLETED",
+        "t_end": 1.0,
+        "asked": asked,
+        "cost": {"seconds": 1},
+    }
+    shown = Console(width=200, file=io.StringIO())
+    tables.print_tuning(shown, 1e-8, [], [{**run, **more}], "my.toml")
+    assert says in shown.file.getvalue(), shown.file.getvalue()
+
+
+def test_a_motion_without_a_truth_is_told_by_tune(capsys, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    asked = ("tune", FAKE, two_blocks(tmp_path), "--reference-time", "0")
+    status, out, _ = run_main(capsys, *asked)
+    assert status == 1 and "There is no reference for two: none was asked for." in out, out
 
 
 def test_versions_of_engines(capsys):

@@ -180,6 +180,7 @@ def test_no_truth_and_no_claim_of_right():
     still = [record(name, "tuned", None, times=[0.0]) for name in ("mbref", "exudyn")]
     unknown = group(still, kind="", reason="two ways", bound=None)
     assert "no reference for this motion" in headline([unknown])
+    assert fast([unknown]) == "Without a truth no error is known, so speeds are not compared."
     assert "There is no reference for planar_slider_crank: two ways." in truth([unknown])
 
 
