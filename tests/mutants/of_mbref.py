@@ -175,7 +175,7 @@ DEFECTS = (
     Defect(TS, "x, y, z = a[7] - a[5],", "x, y, z = a[5] - a[7],", CLOSED_FORMS),
     Defect(
         TS,
-        "beside = watch.smallest_pivot < BESIDE * watch.reference_pivot",
+        "beside = is_exact and watch.smallest_pivot < BESIDE * watch.reference_pivot",
         "beside = False",
         CLOSED_FORMS,
     ),
