@@ -13,6 +13,8 @@ from crosscheck.study.command import parsed_option
 from crosscheck.study.grid import TIME_LIMIT
 from crosscheck.study.sweep import QUICK_LIMIT
 
+DIGITS = f"{FEWEST_DIGITS} to {MOST_DIGITS}"  # that a command line may ask for
+
 
 def add_selection(parser: argparse.ArgumentParser) -> None:
     """Scenes, engines, families, sample times, tolerance and limits of runs."""
@@ -124,7 +126,7 @@ def whole(text: str) -> int:
 def digits(text: str) -> int:
     """A number of decimal digits that two formulations can be asked to agree on."""
     if not (text.isdecimal() and FEWEST_DIGITS <= int(text) <= MOST_DIGITS):
-        raise argparse.ArgumentTypeError(f"must be from {FEWEST_DIGITS} to {MOST_DIGITS}, got {text}")
+        raise argparse.ArgumentTypeError(f"must be from {DIGITS}, got {text}")
     return int(text)
 
 

@@ -18,6 +18,7 @@ from crosscheck.study.record_view import (
     by_scene,
     engine_and_family,
     error,
+    error_bound,
     error_text,
     is_completed,
     never_moved,
@@ -89,7 +90,7 @@ def print_tuning(
 
 def _unreached(level: float, nearest: Record) -> str:
     """The sentence above the nearest run: an error that is not reached, or that nothing could tell."""
-    bound = nearest["metrics"].get("error_bound") or 0.0
+    bound = error_bound(nearest)
     if not is_completed(nearest):
         return f"No setting reaches an error of {level:g}: no run completes. The one that got furthest:"
     if not math.isfinite(error(nearest)):

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from crosscheck.study.grid import Record
-from crosscheck.study.record_view import ended, error, error_text, is_completed, of_scenes
+from crosscheck.study.record_view import ended, error, error_bound, error_text, is_completed, of_scenes
 from crosscheck.study.wording import runs
 from mbref.records import looked_at
 from mbref.scene import Scene, SceneError
@@ -136,7 +136,7 @@ def _sentences(old: Record | None, new: Record | None) -> Iterator[str]:
     little = EARLIER**3 * new["asked"].get("end", 0.0)
     if not (is_completed(new) or math.isclose(old["t_end"], new["t_end"], rel_tol=EARLIER, abs_tol=little)):
         yield f"end {ended(old)} → {ended(new)}"
-    bound = max(r["metrics"].get("error_bound") or 0.0 for r in (old, new))
+    bound = max(map(error_bound, (old, new)))
     if _is_changed(error(old), error(new), ERROR_RATIO, max(NOISE, bound)):
         yield f"error {error_text(old)} → {error_text(new)}"
     else:

@@ -13,6 +13,8 @@ from mbref.trajectory import Outcome
 
 PUBLIC = ("engine", "version", "method", "settings", "outcome", "message", "t_end", "times", "bodies",
           "reactions", "metrics", "cost")  # fmt: skip
+SMALLEST = 1e-16  # an error of exactly zero is drawn here
+UNTIMED = 1e-6  # s; a run that reports no time is drawn no lower
 
 
 def public(record: Record) -> Record:
@@ -63,15 +65,20 @@ def error(record: Record) -> float:
     return math.inf if value is None or math.isnan(value) else value
 
 
-def known_error(record: Record) -> float:
-    """The error of a record, or the bound on the truth's own error where that is larger."""
-    return max(error(record), record["metrics"].get("error_bound") or 0.0)
+def error_bound(record: Record) -> float:
+    """The bound on the truth's own error; 0 without one."""
+    return record["metrics"].get("error_bound") or 0.0
+
+
+def drawn(record: Record, seconds: float) -> tuple[float, float]:
+    """The error of a record, no lower than it is known, and its time (s), as drawn on logarithmic axes."""
+    return max(error(record), error_bound(record), SMALLEST), max(seconds, UNTIMED)
 
 
 def error_text(record: Record) -> str:
     """The error of a record as shown: ``< 3e-12`` below what the truth may be off itself, – without one and
     for a run that never moved."""
-    value, bound = error(record), record["metrics"].get("error_bound") or 0.0
+    value, bound = error(record), error_bound(record)
     if not math.isfinite(value) or never_moved(record):
         return "–"
     return f"< {bound:.0e}" if value < bound else f"{value:.2e}"

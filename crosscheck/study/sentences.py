@@ -84,7 +84,7 @@ def headline(groups: Sequence[Judged]) -> str:
     )
     far = up_to(told)
     if far:
-        first = f"{far[1:].capitalize()}, as far as the motion is known, {uncapitalised(first)}"
+        first = f"{far}, as far as the motion is known, {uncapitalised(first)}"
     return f"{first}{_where_known(groups, told, good)}; {_defaults_in_short(told)}."
 
 
@@ -310,11 +310,11 @@ def _place(scenes: Sequence[Judged], groups: Sequence[Judged]) -> str:
     return f" on {names(scenes)}" if len(scenes) < len(groups) else _on(groups)
 
 
-def _on(groups: Sequence[Judged], names: Sequence[str] = ()) -> str:
+def _on(groups: Sequence[Judged], engines: Sequence[str] = ()) -> str:
     """`` on all 5 scenes``, or of the engines named that not all can run; nothing of a single scene."""
     count = len(groups)
-    if any(name not in group.engines() for name in names for group in groups):
-        return " on the scenes they can run" if len(names) > 1 else " on the scenes it can run"
+    if any(name not in group.engines() for name in engines for group in groups):
+        return " on the scenes they can run" if len(engines) > 1 else " on the scenes it can run"
     return "" if count == 1 else " on both scenes" if count == 2 else f" on all {count} scenes"
 
 

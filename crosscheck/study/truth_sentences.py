@@ -53,9 +53,10 @@ def _until(scene: Scene, known: Mapping[str, Any]) -> str:
 
 
 def up_to(groups: Sequence[Judged]) -> str:
-    """How far the least known of the motions is known; nothing where all are to their ends."""
+    """How far the least known of the motions is known, as a sentence begins; nothing where all are to their
+    ends."""
     ends = [group.truth["until"] for group in groups if group.truth["reason"]]
-    return f" up to t = {min(ends):.4g} s" if ends else ""
+    return f"Up to t = {min(ends):.4g} s" if ends else ""
 
 
 def names(groups: Sequence[Judged]) -> str:

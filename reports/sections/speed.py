@@ -12,9 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 from matplotlib.gridspec import GridSpec
 
+from crosscheck.study.record_view import UNTIMED
 from reports import figures
 from reports.blocks import Block, Figure, Heading, Plot, Table, Text
-from reports.runs import UNTIMED, WRONG, Curve, Run, SceneRuns, duration, short
+from reports.runs import WRONG, Curve, Run, SceneRuns, duration, short
 from reports.speed_figure import speed_svg, toggles
 
 Failures = Mapping[tuple[Curve, str], Sequence[Run]]

@@ -131,8 +131,8 @@ DEFECTS = (  # adapters and processes
     ),
     Defect(
         "reports/runs.py",
-        "return max(known_error(self.record), SMALLEST), max(self.seconds, UNTIMED)",
-        "return max(known_error(self.record), SMALLEST), max(self.t_end, UNTIMED)",
+        "return drawn(self.record, self.seconds)",
+        "return drawn(self.record, self.t_end)",
         REPORTS,
     ),
     Defect(

@@ -144,7 +144,7 @@ DEFECTS = (
         'record["key"]: record for record in lines[::-1]',
         RECORDS,
     ),
-    Defect(R, "os.truncate(path, end)", "os.truncate(path, 0)", RECORDS),
+    Defect(R, "os.truncate(path, whole)", "os.truncate(path, 0)", RECORDS),
     Defect(R, "if text and len(foreign) == len(lines):", "if False:", RECORDS),
     Defect(R, "file.truncate(before)", "pass", RECORDS),
     Defect(R, "enumerate(lines, 1)", "enumerate(lines)", RECORDS),
