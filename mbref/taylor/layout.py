@@ -204,6 +204,7 @@ class Progress(NamedTuple):
     taken: int = 0  # samples before the first that may wait
     slowing: float = 0.0  # 1/s, the relative rate of the speed where orders are by power; else 0
     leaving: int = 0  # whether the series comes from a singular position that it has passed
+    striding: int = 0  # whether drivers are followed, by loose series where no singular position is passed
 
 
 class SeriesKernels(NamedTuple):

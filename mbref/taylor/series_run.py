@@ -105,6 +105,7 @@ class SeriesRun(Run):
         progress.change = max(self.memory.control.rtol, LEAST_CHANGE)
         progress.end = self.times[-1]
         progress.farthest = OFF * max(1.0, self.model.length)
+        progress.striding = self.strides
         progress.freedoms = self.part.active.velocities.size - self.ranks.rank
         self.wants_code = limits.code == AUTO
         if limits.code == SPECIALISED:

@@ -120,19 +120,20 @@ def first_lengths(left, memory):
 
 @kernel
 def keep_terms(memory):
-    """The terms, which are looked along from now on."""
+    """The terms, which are looked along from now on; angles have no last order."""
     series, progress = memory.series, memory.progress
     for j in range(0, (progress.order + 1) * series.terms.shape[1], LANES):
         store(load(series.terms, j), series.past, j)
     for s in range(series.past_angles.shape[0]):
-        for k in range(progress.order + 1):
+        for k in range(progress.order):
             series.past_angles[s, k] = series.torsions[TORSION_SERIES * s + ANGLE, k]
+        series.past_angles[s, progress.order] = 0.0
     progress.top = progress.cut = progress.order
     progress.meets = 0.0
 
 
 @kernel
-def look_along(memory):
+def keep_series(memory):
     """Have steps look along the series that begins here, without its rounding."""
     keep_terms(memory)
     meet(memory)
@@ -142,7 +143,7 @@ def look_along(memory):
 def remember_series(memory):
     """Keep the series of the step's beginning, and the pivots there."""
     remember_pivots(memory)
-    look_along(memory)
+    keep_series(memory)
 
 
 @kernel
@@ -246,7 +247,7 @@ def step(memory):
     exact, h = first_lengths(left, memory)
     if turns_back_in(h, memory):
         expand_with_multipliers(memory)
-        look_along(memory)
+        keep_series(memory)
         exact, h = first_lengths(left, memory)
     if 0.0 < progress.meets < h and not progress.passing:
         clock.passage = clock.time + h
