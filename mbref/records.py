@@ -28,6 +28,15 @@ def stored(path: str | Path | None) -> dict[str, dict[str, Any]]:
     Lines that hold no record are told by number on stderr and left alone.  Raises RecordsError where no line
     holds one, OSError where the file cannot be read.
     """
+    return _read(path, is_mended=True)
+
+
+def looked_at(path: str | Path | None) -> dict[str, dict[str, Any]]:
+    """As ``stored``, but the file is left as it is, with a last line that is cut short."""
+    return _read(path, is_mended=False)
+
+
+def _read(path: str | Path | None, is_mended: bool) -> dict[str, dict[str, Any]]:
     if path is None or not Path(path).exists():
         return {}
     text = Path(path).read_bytes()
@@ -36,7 +45,7 @@ def stored(path: str | Path | None) -> dict[str, dict[str, Any]]:
     foreign = [number for number, record in enumerate(lines, 1) if record is None]
     if text and len(foreign) == len(lines):
         raise RecordsError(f"{path}: holds no records; name another file, or remove it")
-    if end < len(text):
+    if is_mended and end < len(text):
         os.truncate(path, end)
     if foreign:
         numbers = ", ".join(map(str, foreign))

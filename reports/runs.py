@@ -16,12 +16,14 @@ from crosscheck.judge.tolerances import ERROR_LEVELS, EXCESS, FALSE_SUCCESS
 from crosscheck.judge.truth import NoSolution, Truth, truth_for
 from crosscheck.study.fair_timing import model_difference
 from crosscheck.study.grid import Record
-from crosscheck.study.record_view import error_text, varied_settings
+from crosscheck.study.record_view import error_text, known_error, varied_settings
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
 LEVELS, WRONG = ERROR_LEVELS, FALSE_SUCCESS
 Curve = tuple[str, str]  # engine, family
+SMALLEST = 1e-16  # an error of exactly zero is drawn here
+UNTIMED = 1e-6  # s; a run that reports no time is drawn no lower
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,11 @@ class Run:
     @property
     def error(self) -> float:
         return self.metric("error")
+
+    @property
+    def drawn(self) -> tuple[float, float]:
+        """Error and time (s) on logarithmic axes; the error no lower than it is known."""
+        return max(known_error(self.record), SMALLEST), max(self.seconds, UNTIMED)
 
     @property
     def by_error(self) -> tuple[bool, float]:

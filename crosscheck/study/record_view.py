@@ -6,7 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from crosscheck.judge.reference.cache import mechanism
 from crosscheck.study.grid import Record
+from mbref.scene import Scene
 from mbref.trajectory import Outcome
 
 PUBLIC = ("engine", "version", "method", "settings", "outcome", "message", "t_end", "times", "bodies",
@@ -32,6 +34,21 @@ def is_completed(record: Record) -> bool:
     return record["outcome"] == Outcome.COMPLETED.label
 
 
+def of_scenes(records: Sequence[Record], scenes: Sequence[Scene]) -> list[Record]:
+    """The records of these scenes; without those of another mechanism, as a scene had before it was edited.
+    Records that name no mechanism count as of the scene they name."""
+    known = {scene.name: mechanism(scene) for scene in scenes}
+    return [r for r in records if r["scene"] in known and r.get("mechanism") in (None, known[r["scene"]])]
+
+
+def ended(record: Record) -> str:
+    """``completed``, or how and when the run ended; no time where it was ended from outside."""
+    said = record["outcome"].lower().replace("_", " ")
+    if is_completed(record) or record["outcome"] in (Outcome.TIMED_OUT.label, Outcome.CRASHED.label):
+        return str(said)
+    return f"{said} at {max(record['t_end'], 0.0):.4g} s"
+
+
 def by_scene(records: Sequence[Record]) -> dict[str, list[Record]]:
     """Records grouped by the scene's name, in their order."""
     groups: dict[str, list[Record]] = {}
@@ -44,6 +61,11 @@ def error(record: Record) -> float:
     """The error of a record; infinite where there is none to compare with."""
     value = record["metrics"].get("error")
     return math.inf if value is None or math.isnan(value) else value
+
+
+def known_error(record: Record) -> float:
+    """The error of a record, or the bound on the truth's own error where that is larger."""
+    return max(error(record), record["metrics"].get("error_bound") or 0.0)
 
 
 def error_text(record: Record) -> str:
