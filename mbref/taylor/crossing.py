@@ -181,8 +181,6 @@ def sign_change(h, memory):
         middle = 0.5 * (start + end)
         if k < INTERPOLATIONS:
             middle = interpolated(start, before, end, after, replaced, value_there)
-        if k == 0 and 0.0 < memory.progress.meets < h:
-            middle = memory.progress.meets
         changed = abs(middle - last)
         if changed * min(1.0, changed / before_last) <= CLOSE * h:
             break

@@ -72,4 +72,4 @@ def test_passages_take_few_steps(name):
     found, known = (np.array([p.time for p in each.crossings]) for each in (run, exact))
     assert known.size == 3
     assert np.abs(found - known).max() < 1e-8
-    assert np.abs(run.coordinates - exact.coordinates).max() < 1e-7
+    assert np.abs(run.position - exact.position).max() < 1e-7

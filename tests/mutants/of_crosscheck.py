@@ -130,9 +130,9 @@ DEFECTS = (  # adapters and processes
         REPORTS,
     ),
     Defect(
-        "reports/sections/speed.py",
-        "(max(r.error, SMALLEST), max(r.seconds, UNTIMED))",
-        "(max(r.error, SMALLEST), max(r.t_end, UNTIMED))",
+        "reports/runs.py",
+        "return max(known_error(self.record), SMALLEST), max(self.seconds, UNTIMED)",
+        "return max(known_error(self.record), SMALLEST), max(self.t_end, UNTIMED)",
         REPORTS,
     ),
     Defect(
