@@ -262,7 +262,7 @@ DEFECTS = (
     ),
     Defect(
         "mbref/taylor/brief.py",
-        "    return energy(memory.state, memory) >= least and energy(memory.series.terms, memory) >= least",
+        "    return least >= SLOWEST * first and not (moved and turns_back(memory.series.terms, memory))",
         "    return True",
         BRIEF,
     ),
