@@ -28,20 +28,31 @@ def stored(path: str | Path | None) -> dict[str, dict[str, Any]]:
     Lines that hold no record are told by number on stderr and left alone.  Raises RecordsError where no line
     holds one, OSError where the file cannot be read.
     """
+    records, whole, size = _parsed(path)
+    if path is not None and whole < size:
+        os.truncate(path, whole)
+    return records
+
+
+def looked_at(path: str | Path | None) -> dict[str, dict[str, Any]]:
+    """As ``stored``, but the file is left as it is, with a last line that is cut short."""
+    return _parsed(path)[0]
+
+
+def _parsed(path: str | Path | None) -> tuple[dict[str, dict[str, Any]], int, int]:
+    """The records of the file by ``key``, the size of its whole lines, and its own (bytes)."""
     if path is None or not Path(path).exists():
-        return {}
+        return {}, 0, 0
     text = Path(path).read_bytes()
     end = text.rfind(b"\n") + 1
     lines = [_record(line) for line in text[:end].splitlines()]
     foreign = [number for number, record in enumerate(lines, 1) if record is None]
     if text and len(foreign) == len(lines):
         raise RecordsError(f"{path}: holds no records; name another file, or remove it")
-    if end < len(text):
-        os.truncate(path, end)
     if foreign:
         numbers = ", ".join(map(str, foreign))
         print(f"{path}: no record in line {numbers}; left as it is", file=sys.stderr)
-    return {record["key"]: record for record in lines if record is not None}
+    return {record["key"]: record for record in lines if record is not None}, end, len(text)
 
 
 def opened(path: str | Path | None) -> dict[str, dict[str, Any]]:

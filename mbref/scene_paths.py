@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from mbref.scene_fields import meant
 from mbref.scene_validation import SceneError
 
 STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[([^\]]+)\]")
@@ -38,7 +39,7 @@ def _replaced(value: Any, steps: Sequence[str], change: Callable[[Any], Any], pa
         return tuple(_replaced(v, rest, change, path) if i == place else v for i, v in enumerate(value))
     fields = _fields_of(value)
     if step not in fields:
-        raise SceneError([f"{path}: the scene has no {step!r} there"])
+        raise SceneError([f"{path}: the scene has no {step!r} there{meant(step, fields)}"])
     return {**fields, step: _replaced(fields[step], rest, change, path)}
 
 
@@ -57,4 +58,5 @@ def _place(entries: tuple[Any, ...], step: str, path: str) -> int:
         return names.index(step)
     if step.isdigit() and int(step) < len(entries):
         return int(step)
-    raise SceneError([f"{path}: the scene has no {step!r} there"])
+    named = [name for name in names if isinstance(name, str)]
+    raise SceneError([f"{path}: the scene has no {step!r} there{meant(step, named)}"])

@@ -16,7 +16,7 @@ from crosscheck.judge.tolerances import ERROR_LEVELS, EXCESS, FALSE_SUCCESS
 from crosscheck.judge.truth import NoSolution, Truth, truth_for
 from crosscheck.study.fair_timing import model_difference
 from crosscheck.study.grid import Record
-from crosscheck.study.record_view import error_text, varied_settings
+from crosscheck.study.record_view import drawn, error_text, varied_settings
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
@@ -66,6 +66,11 @@ class Run:
     @property
     def error(self) -> float:
         return self.metric("error")
+
+    @property
+    def drawn(self) -> tuple[float, float]:
+        """Error and time (s) on logarithmic axes; the error no lower than it is known."""
+        return drawn(self.record, self.seconds)
 
     @property
     def by_error(self) -> tuple[bool, float]:

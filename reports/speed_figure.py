@@ -13,7 +13,6 @@ from reports.places import of_run
 from reports.runs import Run, SceneRuns, duration
 
 HEIGHT, TOP, FOOT = 380.0, 26.0, 40.0  # px: of the axes, above and below them
-SMALLEST, UNTIMED = 1e-16, 1e-6  # where an error of zero and a time of zero are drawn
 LEAST_WIDE = 18  # percent of the width that the name of a grade takes
 MOST_LABELS = 7  # on an axis
 DASHES = ("", "6 4", "2 4", "9 3 2 3")
@@ -24,7 +23,7 @@ def speed_svg(scene_runs: SceneRuns, description: str) -> str:
     shown = [run for run in scene_runs.completed() if math.isfinite(run.error)]
     if not shown:
         return ""
-    axes = _Axes([max(r.error, SMALLEST) for r in shown], [max(r.seconds, UNTIMED) for r in shown])
+    axes = _Axes(*zip(*(r.drawn for r in shown), strict=True))
     name = f"Time of stepping against the largest error on {scene_runs.scene.name}"
     return "".join([
         f'<svg class="plot" height="{TOP + HEIGHT + FOOT:g}" role="group" aria-label="{escape(name)}">',
@@ -97,7 +96,7 @@ def _curves(scene_runs: SceneRuns, axes: _Axes) -> Iterator[str]:
     for (engine, family), runs in scene_runs.curves().items():
         order[engine] = order.get(engine, -1) + 1
         drawn = [run for run in runs if run.completed and math.isfinite(run.error)]
-        spots = [(axes.x(max(r.error, SMALLEST)), axes.y(max(r.seconds, UNTIMED))) for r in drawn]
+        spots = [(axes.x(r.drawn[0]), axes.y(r.drawn[1])) for r in drawn]
         look = "hollow" if is_hollow(family) else ""
         told = f'data-engine="{escape(engine)}" data-family="{escape(family)}"'
         yield f'<g class="tone{tone(engine)} {look}" {told}>'

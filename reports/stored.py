@@ -12,7 +12,8 @@ import numpy as np
 from crosscheck.engine import engine_names
 from crosscheck.judge.model_identity import gate_times
 from crosscheck.study.grid import Record
-from mbref.records import stored
+from crosscheck.study.record_view import of_scenes
+from mbref.records import looked_at
 from mbref.scene import Scene
 from reports.runs import SceneRuns, by_scene
 
@@ -23,11 +24,13 @@ def groups(folder: Path) -> list[SceneRuns]:
         raise FileNotFoundError(f"{folder}: has no records.jsonl and scenes/ of a report")
     scenes = [Scene.from_file(path) for path in sorted((folder / "scenes").glob("*.toml"))]
     named = {scene.name: scene for scene in scenes}
-    times = stored(folder / "timings.jsonl")
-    records = [r for r in stored(folder / "records.jsonl").values() if r["scene"] in named]
+    times = looked_at(folder / "timings.jsonl")
+    records, *more = (
+        of_scenes(list(looked_at(folder / f"{name}.jsonl").values()), scenes)
+        for name in ("records", "truths", "motions", "branches")
+    )
     gates = [r for r in records if _is_gate(named[r["scene"]], r)]
     runs = [_timed(r, times) for r in records if not any(r is gate for gate in gates)]
-    more = (list(stored(folder / f"{name}.jsonl").values()) for name in ("truths", "motions", "branches"))
     return by_scene(_ordered(runs), named, gates, *more)
 
 

@@ -8,9 +8,9 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 
 from crosscheck.cli import listing, request, tables
+from crosscheck.cli.certifying import certify
 from crosscheck.cli.comparing import compare, tune
 from crosscheck.cli.parser import parser
 from crosscheck.cli.request import RequestError
@@ -119,23 +119,6 @@ def _verify_drawn(engine: str, arguments: argparse.Namespace) -> int:
     return OTHERWISE if found.violations else COMPLETED
 
 
-def _certify(arguments: argparse.Namespace) -> int:
-    from crosscheck.judge.reference.certify import NotCertified, certified
-
-    scene = request.find_certifiable(arguments.scene)
-    times = request.sample_times(request.lasting(scene, None, arguments.duration), None, arguments.samples)
-    try:
-        table = certified(scene, times, arguments.digits)
-    except (NotCertified, ImportError) as error:
-        raise RequestError(str(error)) from None
-    text = json.dumps(table, indent=1, ensure_ascii=False)
-    if arguments.out:
-        Path(arguments.out).write_text(text + "\n")
-    else:
-        print(text)
-    return COMPLETED
-
-
 def _report(arguments: argparse.Namespace) -> int:
     """The report stands above this package, so it is started as a program and never imported."""
     with subprocess.Popen([sys.executable, "-m", "reports", *_report_options(arguments)]) as program:
@@ -167,5 +150,5 @@ COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "verify": _verify,
     "report": _report,
     "diff": _diff,
-    "certify": _certify,
+    "certify": certify,
 }

@@ -13,6 +13,7 @@ from crosscheck.cli.running import (
     OTHERWISE,
     asked_of,
     console,
+    missing_truths,
     notice,
     print_json,
 )  # fmt: skip
@@ -70,6 +71,8 @@ def tune(arguments: argparse.Namespace) -> int:
         print_json([{"scene": scene.name, "error": arguments.error, "records": found}])
     else:
         tables.print_tuning(console(), arguments.error, best, records, arguments.scene)
+        for sentence in missing_truths(cases, records):
+            console().print(sentence, soft_wrap=True)
     return COMPLETED if best else OTHERWISE
 
 

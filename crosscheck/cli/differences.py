@@ -10,13 +10,26 @@ from rich.console import Console
 
 from crosscheck.cli.request import RequestError
 from crosscheck.cli.tables import listing_table
-from crosscheck.study.difference import ERROR_RATIO, NOISE, TIME_RATIO, Change, changes, circumstances, load
+from crosscheck.study.difference import (
+    ERROR_RATIO,
+    MEASURE_NOISE,
+    NOISE,
+    SINGLE_RATIO,
+    TIME_RATIO,
+    Change,
+    changes,
+    circumstances,
+    load,
+)
+from crosscheck.study.wording import runs
 
 COUNT = (
-    f"{{}} of {{}} runs changed: another outcome, an error above {NOISE:g} that changed by more than "
-    f"{ERROR_RATIO:g} times, a time that changed by more than {TIME_RATIO:g} times on the same machine, or a "
-    "run of one set alone."
+    "{} of {} runs of both sets changed. Changes are: another outcome or end; an error "
+    f"(above {NOISE:g}) or another measure (above {MEASURE_NOISE:g}) by more than {ERROR_RATIO:g} times; "
+    f"on the same machine a time by more than {TIME_RATIO:g} times, {SINGLE_RATIO:g} where it was measured "
+    "once."
 )
+NONE_OF_BOTH = "The sets have no run in common, so nothing is compared."
 HEADER = ("scene", "engine", "family", "settings", "change")
 
 
@@ -42,7 +55,9 @@ def show(console: Console, old: str, new: str, is_all: bool) -> bool:
         for change in shown:
             table.add_row(*_row(change))
         console.print(table)
-    console.print(COUNT.format(len(changed), len(found)), soft_wrap=True)
+    both = [change for change in found if change.old and change.new]
+    count = COUNT.format(sum(bool(change.sentences) for change in both), len(both))
+    console.print(count if both else NONE_OF_BOTH, soft_wrap=True)
     return bool(changed)
 
 
@@ -50,7 +65,7 @@ def _of_one_set(changed: Sequence[Change]) -> Iterator[str]:
     """How many runs of every engine one set alone has."""
     alone = [change for change in changed if change.old is None or change.new is None]
     counts = Counter((change.identity[1], *change.sentences) for change in alone)
-    yield from (f"{engine}: {number} runs {sentence}" for (engine, sentence), number in counts.items())
+    yield from (f"{engine}: {runs(number)} {sentence}" for (engine, sentence), number in counts.items())
 
 
 def _row(change: Change) -> tuple[str, ...]:

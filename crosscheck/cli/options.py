@@ -7,10 +7,13 @@ import math
 from typing import Any
 
 from crosscheck.engine import ON_REQUEST, engine_names
+from crosscheck.judge.reference.certify import FEWEST_DIGITS, MOST_DIGITS
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.study.command import parsed_option
 from crosscheck.study.grid import TIME_LIMIT
 from crosscheck.study.sweep import QUICK_LIMIT
+
+DIGITS = f"{FEWEST_DIGITS} to {MOST_DIGITS}"  # that a command line may ask for
 
 
 def add_selection(parser: argparse.ArgumentParser) -> None:
@@ -117,6 +120,13 @@ def whole(text: str) -> int:
     """A positive whole number of a command line."""
     if not text.isdecimal() or not int(text):
         raise argparse.ArgumentTypeError(f"must be a positive whole number, got {text}")
+    return int(text)
+
+
+def digits(text: str) -> int:
+    """A number of decimal digits that two formulations can be asked to agree on."""
+    if not (text.isdecimal() and FEWEST_DIGITS <= int(text) <= MOST_DIGITS):
+        raise argparse.ArgumentTypeError(f"must be from {DIGITS}, got {text}")
     return int(text)
 
 

@@ -8,11 +8,13 @@ from typing import Any
 
 from crosscheck.cli.listing import TABLES
 from crosscheck.cli.options import (
+    DIGITS,
     add_depth,
     add_engines,
     add_limits,
     add_reference_time,
     add_selection,
+    digits,
     positive,
     whole,
 )
@@ -73,7 +75,7 @@ def _add_certify(commands: Commands) -> None:
     about = "the motion of a scene to many digits, on which two formulations agree (needs python-flint)"
     parser = _add(commands, "certify", about, example)
     parser.add_argument("scene", metavar="SCENE", help="a built-in name, a .toml file, or random_N")
-    parser.add_argument("--digits", type=int, default=20, metavar="N", help="default: 20")
+    parser.add_argument("--digits", type=digits, default=20, metavar="N", help=f"{DIGITS}; default: 20")
     parser.add_argument("--samples", type=int, default=3, metavar="N", help="from 0 to the end (default: 3)")
     parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
     parser.add_argument("--out", metavar="FILE", help="default: standard output")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import traceback
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -119,6 +120,10 @@ def _unknown_engine(name: str) -> str | None:
         return str(error.args[0])
     except (ImportError, AttributeError, ValueError) as error:
         return f"engine {name!r} cannot be loaded: {error}"
+    except Exception as error:  # whatever the code of an adapter raises when it is imported
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        said = f"{type(error).__name__}: {error} ({last.filename}, line {last.lineno})"
+        return f"engine {name!r} cannot be loaded: {said}"
     return None
 
 

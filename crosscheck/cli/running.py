@@ -18,8 +18,8 @@ from crosscheck.study.grid import TIME_LIMIT, Case, Record, study
 from crosscheck.study.hurried import Hurried
 from crosscheck.study.progress import shown
 from crosscheck.study.record_view import is_judged, public
-from crosscheck.study.sentences import unknown
 from crosscheck.study.sweep import QUICK_LIMIT, thinned
+from crosscheck.study.truth_sentences import unknown
 from crosscheck.study.truths import known_at
 from mbref.scene import Scene
 

@@ -18,6 +18,7 @@ from crosscheck.study.record_view import (
     by_scene,
     engine_and_family,
     error,
+    error_bound,
     error_text,
     is_completed,
     never_moved,
@@ -77,14 +78,26 @@ def print_tuning(
 ) -> None:
     """The settings that reach an error, the cheapest first, with their commands; else the nearest run."""
     if not reached:
-        nearest = min(records, key=lambda r: (not is_completed(r), error(r)))
-        console.print(f"No setting reaches an error of {level:g}; the nearest run has {error_text(nearest)}:")
+        nearest = min(records, key=lambda r: (not is_completed(r), error(r), -r["t_end"]))
+        console.print(_unreached(level, nearest), soft_wrap=True)
     table = _table("settings", ("engine, family", "settings", "error", "time (s)"), 2)
     for r in reached or [nearest]:
         table.add_row(" ".join(engine_and_family(r)), _options(r), error_text(r), _seconds(r))
     console.print(table)
     for r in reached[:1]:
         console.print(f"The cheapest: {command(r, path)}", soft_wrap=True)
+
+
+def _unreached(level: float, nearest: Record) -> str:
+    """The sentence above the nearest run: an error that is not reached, or that nothing could tell."""
+    bound = error_bound(nearest)
+    if not is_completed(nearest):
+        return f"No setting reaches an error of {level:g}: no run completes. The one that got furthest:"
+    if not math.isfinite(error(nearest)):
+        return "No error is known, because the motion has no truth. One of the runs:"
+    if bound > level:
+        return f"The truth is known to {bound:.0e}, so no run can be seen to reach {level:g}. The nearest:"
+    return f"No setting reaches an error of {level:g}; the nearest run has {error_text(nearest)}:"
 
 
 def _print_verdict(console: Console, said: Verdict) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from rich.text import Text
 
 from crosscheck.study.grid import Record
-from crosscheck.study.record_view import engine_and_family, error, is_completed
+from crosscheck.study.record_view import drawn, engine_and_family, error, is_completed
 
 COLOURS = ("blue", "red", "green", "magenta", "yellow", "cyan")
 WIDTH, HEIGHT = 64, 16  # characters of the plot
@@ -29,8 +29,9 @@ def scatter(records: Sequence[Record], letters: Mapping[tuple[str, str], str]) -
 
 
 def _place(record: Record) -> tuple[float, float]:
-    """Decades of error and time, exact zeros at the lower end."""
-    return math.log10(max(error(record), 1e-16)), math.log10(max(record["cost"]["seconds"], 1e-6))
+    """Decades of error, drawn no lower than it is known, and time; exact zeros at the lower end."""
+    off, seconds = drawn(record, record["cost"]["seconds"])
+    return math.log10(off), math.log10(seconds)
 
 
 def _range(values: Sequence[float]) -> tuple[float, float]:

@@ -9,11 +9,18 @@ from pathlib import Path
 from typing import NamedTuple
 
 from crosscheck.study.grid import Record
-from crosscheck.study.record_view import error, error_text, is_completed
-from mbref.records import stored
+from crosscheck.study.record_view import ended, error, error_bound, error_text, is_completed, of_scenes
+from crosscheck.study.wording import runs
+from mbref.records import looked_at
+from mbref.scene import Scene, SceneError
 
 ERROR_RATIO = 2.0  # of errors; rounding and another order of operations scatter them by less above NOISE
 NOISE = 1e-12  # errors below it are rounding
+EARLIER = 0.1  # part of its end time by which a run that fails ends at another time
+MEASURES = {"velocities": "velocity_error", "closure": "violation_position", "energy": "energy_error",
+            "reactions": "reaction_error"}  # fmt: skip
+"""Metrics that are compared where the error did not change."""
+MEASURE_NOISE = 1e-11  # of these
 TIME_RATIO, SINGLE_RATIO = 1.5, 2.0  # of times: of interleaved repeats on the same machine, of single runs
 
 Identity = tuple[str, str, str, str, str]  # scene, engine, family, options, sample times
@@ -34,16 +41,26 @@ def load(path: str | Path) -> dict[Identity, Record]:
     file = Path(path) / "records.jsonl" if Path(path).is_dir() else Path(path)
     if not file.exists():
         raise ValueError(f"{file}: no such file")
-    times = stored(file.parent / "timings.jsonl")
-    found = {}
-    for record in stored(file).values():
+    times = looked_at(file.parent / "timings.jsonl")
+    found: dict[Identity, Record] = {}
+    for record in _of_the_report(file, list(looked_at(file).values())):
         if "asked" not in record:
             raise ValueError(
                 f"{file}: its records lack the field asked, the request of the run; make them again"
             )
-        cost = {**record["cost"], "seconds": times.get(record["key"], record["cost"])["seconds"]}
+        timed = times.get(record["key"]) or record["cost"]
+        cost = {**record["cost"], "seconds": timed["seconds"]}
         found[identity(record)] = {**record, "cost": cost, "repeated": record["key"] in times}
     return found
+
+
+def _of_the_report(file: Path, records: Sequence[Record]) -> Sequence[Record]:
+    """The records of the mechanisms that the scenes of a report's folder have now; all where it has none."""
+    paths = sorted((file.parent / "scenes").glob("*.toml"))
+    try:
+        return of_scenes(records, [Scene.from_file(path) for path in paths]) if paths else records
+    except SceneError as error:
+        raise ValueError(f"{file.parent / 'scenes'}: {error}") from None
 
 
 def identity(record: Record) -> Identity:
@@ -60,22 +77,41 @@ def identity(record: Record) -> Identity:
 
 
 def changes(old: Mapping[Identity, Record], new: Mapping[Identity, Record]) -> list[Change]:
-    """Every run of either set, in the order of the new one and then of the old."""
-    names = dict.fromkeys([*new, *old])
+    """Every run of either set, in the order of the new one and then of the old; runs of different mechanisms
+    are each of one set alone."""
     return [
-        Change(name, old.get(name), new.get(name), list(_sentences(old.get(name), new.get(name))))
-        for name in names
+        Change(name, before, after, list(_sentences(before, after)))
+        for name in dict.fromkeys([*new, *old])
+        for before, after in _paired(old.get(name), new.get(name))
     ]
 
 
+def _paired(old: Record | None, new: Record | None) -> Sequence[tuple[Record | None, Record | None]]:
+    return [(None, new), (old, None)] if _is_other_mechanism(old, new) else [(old, new)]
+
+
+def _is_other_mechanism(old: Record | None, new: Record | None) -> bool:
+    """Whether both records name their mechanisms, and not the same."""
+    if old is None or new is None:
+        return False
+    return len({old.get("mechanism"), new.get("mechanism")} - {None}) > 1
+
+
 def circumstances(old: Mapping[Identity, Record], new: Mapping[Identity, Record]) -> list[str]:
-    """Sentences on versions and machines that differ between the sets."""
+    """Sentences on versions, machines and mechanisms that differ between the sets."""
     before, after = (_circumstances(records) for records in (old, new))
     names = dict.fromkeys([*before, *after])
+    both = [(old[name], new[name]) for name in new if name in old]
+    others = dict.fromkeys(b["scene"] for a, b in both if _is_other_mechanism(a, b))
+    untimed = sum(a["machine"] != b["machine"] for a, b in both if not _is_other_mechanism(a, b))
     return [
-        f"{name}: {before.get(name, 'none')} → {after.get(name, 'none')}"
-        for name in names
-        if before.get(name) != after.get(name)
+        *(
+            f"{name}: {before.get(name, 'none')} → {after.get(name, 'none')}"
+            for name in names
+            if before.get(name) != after.get(name)
+        ),
+        *(f"{scene}: the mechanism was changed, so its runs are not compared." for scene in others),
+        *([f"Times of {runs(untimed)} are not compared: the machines differ."] if untimed else []),
     ]
 
 
@@ -95,11 +131,16 @@ def _sentences(old: Record | None, new: Record | None) -> Iterator[str]:
         yield "only in the new set" if old is None else "only in the old set"
         return
     if old["outcome"] != new["outcome"]:
-        yield f"outcome {_ended(old)} → {_ended(new)}"
+        yield f"outcome {ended(old)} → {ended(new)}"
         return
-    bound = max(r["metrics"].get("error_bound") or 0.0 for r in (old, new))
+    little = EARLIER**3 * new["asked"].get("end", 0.0)
+    if not (is_completed(new) or math.isclose(old["t_end"], new["t_end"], rel_tol=EARLIER, abs_tol=little)):
+        yield f"end {ended(old)} → {ended(new)}"
+    bound = max(map(error_bound, (old, new)))
     if _is_changed(error(old), error(new), ERROR_RATIO, max(NOISE, bound)):
         yield f"error {error_text(old)} → {error_text(new)}"
+    else:
+        yield from _measures(old["metrics"], new["metrics"])
     if not (is_completed(new) and old["machine"] == new["machine"]):
         return
     both = old["repeated"] and new["repeated"]
@@ -108,9 +149,14 @@ def _sentences(old: Record | None, new: Record | None) -> Iterator[str]:
         yield f"time {seconds[0]:.2e} s → {seconds[1]:.2e} s"
 
 
-def _ended(record: Record) -> str:
-    end = "" if is_completed(record) else f" at {record['t_end']:.4g} s"
-    return record["outcome"].lower().replace("_", " ") + end
+def _measures(old: Mapping[str, float | None], new: Mapping[str, float | None]) -> Iterator[str]:
+    """The measures of a motion beside its error that both runs have and that changed."""
+    for name, metric in MEASURES.items():
+        before, after = old.get(metric), new.get(metric)
+        if before is None or after is None:
+            continue
+        if _is_changed(before, after, ERROR_RATIO, MEASURE_NOISE):
+            yield f"{name} {before:.2e} → {after:.2e}"
 
 
 def _is_changed(old: float, new: float, ratio: float, noise: float) -> bool:

@@ -21,6 +21,7 @@ import numpy as np
 import mbref
 from crosscheck.engine import Cannot, Setting, engine
 from crosscheck.judge import metrics
+from crosscheck.judge.reference.cache import mechanism
 from crosscheck.judge.reference.motion import given_up
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth import Truth, truth_for
@@ -145,6 +146,7 @@ def record_of(case: Case, trajectory: Trajectory) -> Record:
         "schema": SCHEMA,
         "key": key(case),
         "scene": case.scene.name,
+        "mechanism": mechanism(case.scene),
         **trajectory.to_record(),
         "family": case.setting.family,
         "asked": _asked(case),

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from crosscheck.judge.tolerances import FLOOR
 from crosscheck.study.grid import Case, Record, default_cases
-from crosscheck.study.record_view import by_scene, error, error_text, is_completed, varied_settings
+from crosscheck.study.record_view import by_scene, ended, error, error_text, is_completed, varied_settings
 from mbref.scene import Scene
 
 HEADER = ("scene", "engine", "family", "settings", "least error", "time (s)", f"within {FLOOR:.0e}", "others")
@@ -81,6 +81,4 @@ def _reaches(record: Record) -> bool:
 
 def _said(record: Record) -> str:
     """The error, or how and when the run ended."""
-    if is_completed(record):
-        return error_text(record)
-    return f"{record['outcome'].lower().replace('_', ' ')} at {record['t_end']:.3g} s"
+    return error_text(record) if is_completed(record) else ended(record)

@@ -20,6 +20,7 @@ from crosscheck.study.grid import Progress as Advance
 from crosscheck.study.grid import Record
 
 PARTS = 10  # lines of a progress that no terminal shows
+HUNDREDTHS = 100  # parts in which the progress of one motion is told
 COLUMNS = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
            TextColumn("left"), TimeRemainingColumn(),
            TextColumn("{task.fields[last]}", markup=False))  # fmt: skip
@@ -49,6 +50,19 @@ def shown(what: str, total: int) -> Iterator[Advance]:
             show(done, total, f"{record['scene']} {record['engine']} {record['family']}: {record['outcome']}")
 
         yield advance
+
+
+@contextmanager
+def followed(what: str, end: float) -> Iterator[Callable[[float], None]]:
+    """Progress of a motion from t = 0 to ``end`` (s), in hundredths; yields a function that takes the time
+    reached."""
+    with _display(what, HUNDREDTHS) as show:
+
+        def reached(t: float) -> None:
+            done = min(int(HUNDREDTHS * t / end), HUNDREDTHS)
+            show(done, HUNDREDTHS, f"t = {min(t, end):.3g} s")
+
+        yield reached
 
 
 @contextmanager

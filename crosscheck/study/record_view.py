@@ -6,11 +6,15 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from crosscheck.judge.reference.cache import mechanism
 from crosscheck.study.grid import Record
+from mbref.scene import Scene
 from mbref.trajectory import Outcome
 
 PUBLIC = ("engine", "version", "method", "settings", "outcome", "message", "t_end", "times", "bodies",
           "reactions", "metrics", "cost")  # fmt: skip
+SMALLEST = 1e-16  # an error of exactly zero is drawn here
+UNTIMED = 1e-6  # s; a run that reports no time is drawn no lower
 
 
 def public(record: Record) -> Record:
@@ -32,6 +36,21 @@ def is_completed(record: Record) -> bool:
     return record["outcome"] == Outcome.COMPLETED.label
 
 
+def of_scenes(records: Sequence[Record], scenes: Sequence[Scene]) -> list[Record]:
+    """The records of these scenes; without those of another mechanism, as a scene had before it was edited.
+    Records that name no mechanism count as of the scene they name."""
+    known = {scene.name: mechanism(scene) for scene in scenes}
+    return [r for r in records if r["scene"] in known and r.get("mechanism") in (None, known[r["scene"]])]
+
+
+def ended(record: Record) -> str:
+    """``completed``, or how and when the run ended; no time where it was ended from outside."""
+    said = record["outcome"].lower().replace("_", " ")
+    if is_completed(record) or record["outcome"] in (Outcome.TIMED_OUT.label, Outcome.CRASHED.label):
+        return str(said)
+    return f"{said} at {max(record['t_end'], 0.0):.4g} s"
+
+
 def by_scene(records: Sequence[Record]) -> dict[str, list[Record]]:
     """Records grouped by the scene's name, in their order."""
     groups: dict[str, list[Record]] = {}
@@ -46,10 +65,20 @@ def error(record: Record) -> float:
     return math.inf if value is None or math.isnan(value) else value
 
 
+def error_bound(record: Record) -> float:
+    """The bound on the truth's own error; 0 without one."""
+    return record["metrics"].get("error_bound") or 0.0
+
+
+def drawn(record: Record, seconds: float) -> tuple[float, float]:
+    """The error of a record, no lower than it is known, and its time (s), as drawn on logarithmic axes."""
+    return max(error(record), error_bound(record), SMALLEST), max(seconds, UNTIMED)
+
+
 def error_text(record: Record) -> str:
     """The error of a record as shown: ``< 3e-12`` below what the truth may be off itself, – without one and
     for a run that never moved."""
-    value, bound = error(record), record["metrics"].get("error_bound") or 0.0
+    value, bound = error(record), error_bound(record)
     if not math.isfinite(value) or never_moved(record):
         return "–"
     return f"< {bound:.0e}" if value < bound else f"{value:.2e}"

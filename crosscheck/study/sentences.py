@@ -4,14 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from crosscheck.judge.tolerances import ERROR_LEVELS
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error, error_text
+from crosscheck.study.truth_sentences import names, truth, up_to
 from crosscheck.study.verdict import Grade, Judged, grade
-from crosscheck.study.wording import agree, at_most, is_or_are, its_or_their, listed, multiple, seconds, span
-from mbref.scene import Scene
+from crosscheck.study.wording import (
+    agree,
+    at_most,
+    is_or_are,
+    its_or_their,
+    listed,
+    multiple,
+    seconds,
+    span,
+    uncapitalised,
+)
 
 TITLES = {"mujoco": "MuJoCo", "pinocchio": "Pinocchio", "exudyn": "Exudyn", "simbody": "Simbody",
           "sundials": "SUNDIALS IDA", "ondsel": "OndselSolver", "casadi": "CasADi"}  # fmt: skip
@@ -58,10 +68,12 @@ def title(engine: str) -> str:
 
 
 def headline(groups: Sequence[Judged]) -> str:
-    """Who is right at best and at the defaults, in one line."""
-    at_best = _worst(groups, Judged.best)
-    if not any(g is not Grade.UNJUDGED for g in at_best.values()):
-        return "There is no reference for this motion: the engines are compared with each other."
+    """Who is right at best and at the defaults, in one line, and of how much of the motions that is known."""
+    told = [group for group in groups if _is_judged(group)]
+    if not told:
+        these = "this motion" if len(groups) == 1 else "these motions"
+        return f"There is no reference for {these}: the engines are compared with each other."
+    at_best = _worst(told, Judged.best)
     good = [name for name, found in at_best.items() if found is Grade.RIGHT]
     first = (
         f"{'Both' if len(good) == 2 else f'All {len(good)}'} engines are right at their best settings"
@@ -70,7 +82,10 @@ def headline(groups: Sequence[Judged]) -> str:
         if good
         else f"No engine is right{_everywhere(groups)} at any setting that was run"
     )
-    return f"{first}{_on(groups, good) if good else ''}; {_defaults_in_short(groups)}."
+    far = up_to(told)
+    if far:
+        first = f"{far}, as far as the motion is known, {uncapitalised(first)}"
+    return f"{first}{_where_known(groups, told, good)}; {_defaults_in_short(told)}."
 
 
 def right(groups: Sequence[Judged]) -> str:
@@ -90,7 +105,9 @@ def right(groups: Sequence[Judged]) -> str:
     sentences = []
     if good:
         most = at_most(max(worst[name] for name in good), sure)
-        sentences = [f"{listed(map(title, good))} {agree(good)} with the truth to {most}{_on(told, good)}."]
+        where = _on(told, good) if len(told) == len(groups) else f" on {names(told)}"
+        far = " as far as it is known" if any(group.truth["reason"] for group in told) else ""
+        sentences = [f"{listed(map(title, good))} {agree(good)} with the truth to {most}{where}{far}."]
     return " ".join([*sentences, *(_less_than_right(told, name) for name in worst if name not in good)])
 
 
@@ -98,6 +115,8 @@ def fast(groups: Sequence[Judged]) -> str:
     """Times of stepping that reach LEVEL, as multiples of the fastest engine's."""
     found = {group.scene.name: group.costs(LEVEL) for group in groups}
     costs = {name: cost for name, cost in found.items() if cost}
+    if not any(_is_judged(group) for group in groups):
+        return "Without a truth no error is known, so speeds are not compared."
     if not costs:
         return f"No engine reaches an error of {SAID}, so speeds are not compared."
     never = [n for n in _engines(groups) if not any(n in cost for cost in costs.values())]
@@ -117,49 +136,20 @@ def breaks(groups: Sequence[Judged]) -> str:
     sentences = [_failed(groups, name, scenes) for name, scenes in _merged(failed).items()]
     sentences += [_wrong(name, scenes, groups) for name, scenes in wrong.items()]
     if not sentences:
-        return "No engine's defaults fail or are wrong." + _other_failures(groups)
+        sentences = [_no_bad_defaults(groups)]
     return " ".join(sentences) + _other_failures(groups)
 
 
-def truth(groups: Sequence[Judged]) -> str:
-    """The kinds of truth, the bounds on their errors, and their cost."""
-    parts = []
-    closed = [g for g in groups if g.truth["kind"] not in ("", "reference")]
-    if closed:
-        bound = max(g.truth["bound"] for g in closed)
-        parts.append(f"The exact motion of {_names(closed)} is known in closed form or by a reduced "
-                     f"equation, to {bound:.0e}.")  # fmt: skip
-        parts += [
-            f"That of {g.scene.name} is known{_until(g.scene, g.truth)}." for g in closed if g.truth["reason"]
-        ]
-    parts += [_reference(group) for group in groups if group not in closed]
-    return " ".join(parts)
-
-
-def unknown(scene: Scene, known: Mapping[str, Any]) -> str:
-    """From when on the true motion of a scene is not known, and why; empty where it is known to the end."""
-    if not known["kind"]:
-        return f"There is no reference for {scene.name}: {known['reason']}."
-    return f"The motion of {scene.name} is known{_until(scene, known)}." if known["reason"] else ""
-
-
-def _reference(group: Judged) -> str:
-    known, name = group.truth, group.scene.name
-    if not known["kind"]:
-        return unknown(group.scene, known)
-    ways = (
-        "two formulations that share no code agree" if known["both"] else "two runs of one formulation agree"
-    )
-    return (f"The reference of {name} is known to {known['bound']:.0e}{_until(group.scene, known)}: {ways}; "
-            f"it took {known['seconds']:.1f} s of CPU time.")  # fmt: skip
-
-
-def _until(scene: Scene, known: Mapping[str, Any]) -> str:
-    """How far a truth is known, and why no further; nothing where it is known to the end."""
-    if not known["reason"]:
-        return ""
-    end = f"{known['until']:.4g} s of {scene.duration:.4g} s"
-    return f" up to t = {end} ({known['reason']}), and errors are of this part"
+def _no_bad_defaults(groups: Sequence[Judged]) -> str:
+    """The defaults where none is known to fail or to be wrong."""
+    found = _worst(groups, Judged.defaults)
+    if not found:
+        return "No setting is a library's default."
+    unjudged = [name for name, verdict in found.items() if verdict is Grade.UNJUDGED]
+    if unjudged:
+        owners = listed(map(title, unjudged))
+        return f"The defaults of {owners} complete; without a truth nothing tells whether they are right."
+    return "No engine's defaults fail or are wrong."
 
 
 def _is_judged(group: Judged) -> bool:
@@ -189,7 +179,15 @@ def _less_than_right(groups: Sequence[Judged], name: str) -> str:
         return f"{title(name)} completes no run{place}: {_end(found[lost[0]])}."
     scene = max(found, key=lambda s: error(found[s]))
     place = "" if len(groups) == 1 else f" on {scene}"
-    return f"{title(name)} is {graded[scene]} at best{place}: off by {error_text(found[scene])}."
+    best = f"at best{_of_those_that_end(groups, scene, name)}"
+    return f"{title(name)} is {graded[scene]} {best}{place}: off by {error_text(found[scene])}."
+
+
+def _of_those_that_end(groups: Sequence[Judged], scene: str, name: str) -> str:
+    """The time limit, where it ended settings of an engine that might be better than the best."""
+    records = next(g.records for g in groups if g.scene.name == scene)
+    limits = {r["time_limit"] for r in records if r["engine"] == name and r["outcome"] == TIMED_OUT}
+    return f" of the settings that end within {max(limits):g} s" if limits else ""
 
 
 def _fast_on_one(costs: Mapping[str, float]) -> str:
@@ -305,23 +303,26 @@ def _end(record: Record) -> str:
     return f"{record['outcome'].lower().replace('_', ' ')} at t = {max(record['t_end'], 0):.3g} s"
 
 
-def _names(groups: Sequence[Judged]) -> str:
-    return listed(group.scene.name for group in groups)
-
-
 def _place(scenes: Sequence[Judged], groups: Sequence[Judged]) -> str:
     """`` on`` the scenes; nothing where there is but one."""
     if len(groups) == 1:
         return ""
-    return f" on {_names(scenes)}" if len(scenes) < len(groups) else _on(groups)
+    return f" on {names(scenes)}" if len(scenes) < len(groups) else _on(groups)
 
 
-def _on(groups: Sequence[Judged], names: Sequence[str] = ()) -> str:
+def _on(groups: Sequence[Judged], engines: Sequence[str] = ()) -> str:
     """`` on all 5 scenes``, or of the engines named that not all can run; nothing of a single scene."""
     count = len(groups)
-    if any(name not in group.engines() for name in names for group in groups):
-        return " on the scenes they can run" if len(names) > 1 else " on the scenes it can run"
+    if any(name not in group.engines() for name in engines for group in groups):
+        return " on the scenes they can run" if len(engines) > 1 else " on the scenes it can run"
     return "" if count == 1 else " on both scenes" if count == 2 else f" on all {count} scenes"
+
+
+def _where_known(groups: Sequence[Judged], told: Sequence[Judged], good: Sequence[str]) -> str:
+    """The scenes that a headline is of."""
+    if len(told) < len(groups):
+        return f" on {names(told)}, whose {'motion is' if len(told) == 1 else 'motions are'} known"
+    return _on(groups, good) if good else ""
 
 
 def _everywhere(groups: Sequence[Judged]) -> str:

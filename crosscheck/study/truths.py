@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.judge.model_identity import gate_times
+from crosscheck.judge.reference.cache import mechanism
 from crosscheck.judge.reference.reference import NoReference, reference
 from crosscheck.judge.truth import NoSolution, Truth, closed_form
 from crosscheck.judge.truth.reference_truth import trajectory
@@ -34,7 +35,8 @@ def truth_record(scene: Scene, times: np.ndarray, reference_time: float) -> Reco
     start = time.process_time()
     found = known_at(scene, wanted, reference_time)
     found.setdefault("seconds", time.process_time() - start)
-    return {"key": key(scene, times), "scene": scene.name, "given": reference_time, **found}
+    asked = {"key": key(scene, times), "scene": scene.name, "mechanism": mechanism(scene)}
+    return {**asked, "given": reference_time, **found}
 
 
 def known_at(scene: Scene, times: np.ndarray, reference_time: float) -> Record:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from crosscheck.study.grid import Case, Record
-from crosscheck.study.record_view import error, is_completed
+from crosscheck.study.record_view import error, error_bound, is_completed
 
 
 class Tuned(NamedTuple):
@@ -41,7 +41,7 @@ def tuned(cases: Sequence[Case], level: float, run: Callable[[Sequence[Case]], l
 
 def _reaches(record: Record, level: float) -> bool:
     """Whether a run is known to be so near: an error below the bound of the truth tells no more."""
-    bound = record["metrics"].get("error_bound") or 0.0
+    bound = error_bound(record)
     return is_completed(record) and max(error(record), bound) <= level
 
 

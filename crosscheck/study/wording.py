@@ -20,6 +20,16 @@ def at_most(value: float, bound: float) -> str:
     return f"{math.ceil(value / 10.0 ** (exponent - 1)) / 10:.1f}e{exponent}"
 
 
+def runs(number: int) -> str:
+    """``1 run``, ``2 runs``."""
+    return f"{number} run{'s' if number != 1 else ''}"
+
+
+def uncapitalised(sentence: str) -> str:
+    """A sentence as the end of another; a name that begins with a capital is left."""
+    return sentence[0].lower() + sentence[1:] if sentence.startswith(("All ", "Both ", "No ")) else sentence
+
+
 def is_or_are(names: Sequence[object]) -> str:
     """``is`` of one, ``are`` of several."""
     return "is" if len(names) == 1 else "are"

@@ -24,7 +24,7 @@ def add(commands: Any) -> None:
         epilog="examples:\n"
         "  mbref run planar_slider_crank --method mpi-svd+projection --times 0.1,0.2,0.4 --rtol 1e-11\n"
         "  mbref run four_bar --method mpi-svd+partitioning --duration 0.02 --json\n"
-        "  mbref run mechanism.toml --method lm1+baumgarte[alpha=10,beta=10]/rk4[step=1e-4]\n"
+        "  mbref run mechanism.toml --method 'lm1+baumgarte[alpha=10,beta=10]/rk4[step=1e-4]'\n"
         "  mbref run four_bar --duration 0.1 --branch 2=2\n"
         "  mbref run mechanism.toml --out run.csv",
     )  # fmt: skip

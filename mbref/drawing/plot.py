@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mbref.drawing.svg import COLOURS, GREY
+from mbref.scene_fields import meant
 
 UNITS = {
     "position": "m", "velocity": "m/s", "angular_velocity": "rad/s", "acceleration": "m/s²",
@@ -40,13 +41,20 @@ def plot(columns: Mapping[str, np.ndarray], names: Sequence[str]) -> Any:
     return figure
 
 
+def _beginnings(columns: Sequence[str]) -> list[str]:
+    """The columns and their beginnings, such as ``rod`` and ``rod.position``."""
+    parts = [column.split(".") for column in columns]
+    return list(dict.fromkeys(".".join(p[:n]) for p in parts for n in range(1, len(p) + 1)))
+
+
 def grouped(columns: Sequence[str], names: Sequence[str]) -> dict[str, list[str]]:
     """The columns chosen by names or beginnings, under their quantity; ValueError for an unknown name."""
     chosen = []
     for name in names:
         found = [column for column in columns if column == name or column.startswith(f"{name}.")]
         if not found:
-            raise ValueError(f"no column {name!r}; columns: {', '.join(columns)}")
+            known = f"; columns: {', '.join(columns)}"
+            raise ValueError(f"no column {name!r}{meant(name, _beginnings(columns)) or known}")
         chosen += [column for column in found if column not in chosen]
     if not names:
         chosen = [c for c in columns if quantity_of(c) in DEFAULT] or list(columns)

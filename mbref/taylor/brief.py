@@ -3,9 +3,9 @@
 A mechanism of one freedom without drivers moves along a curve.  In the arc length σ of the metric of M,
 σ'' = Q(σ) - c(σ) σ' with c ≥ 0: loads and dampers do not depend on time.  By Liouville's formula a motion
 that begins faster by a part ε, with v = σ', is ahead by δσ = ε v₀² v ∫ W / v² dt, W = exp(-∫ c dt) ≤ 1, and
-its variables by ε x' T (v₀ / v_least)² at most after a time T.  Where that is small beside the distance at
-which twins disagree, no twin is needed (``mbref.taylor.twin``); where it is not, or the exact steps do not
-cross, the series is as it was, and a longer passage judges (``mbref.taylor.passing``).
+its variables by ε x' ∫ v₀² / v² dt at most.  Where that is small beside the distance at which twins disagree,
+no twin is needed (``mbref.taylor.twin``); where it is not, or the exact steps do not cross, the series is as
+it was, and a longer passage judges (``mbref.taylor.passing``).
 """
 
 from __future__ import annotations
@@ -19,9 +19,11 @@ from mbref.taylor.passage import least_pivot, size_of
 from mbref.taylor.samples import evaluate_series, put_angles, put_state_at
 from mbref.taylor.start import judged_start
 from mbref.taylor.stepping import return_to_start
+from mbref.taylor.turning import turns_back
 from mbref.taylor.twin import APART, CLOSER, MAGNIFIED
 
-SLOWEST = 0.25  # of the kinetic energy where the passage began: it does not fall below
+SLOWEST = 0.02  # of the kinetic energy where the passage began: it does not fall below
+LULL = 0.5  # of the distance at which twins are apart: for what the integral misses
 MOST_STEPS = 6  # of a brief passage
 
 
@@ -103,15 +105,19 @@ def return_to_beginning(memory):
 def crosses(memory):
     """Whether few exact steps cross a singular position, which is recorded, on a determined motion."""
     clock, counts, progress = memory.run.loop.clock, memory.run.equations.system.counts, memory.progress
-    began, crossings, least = clock.time, counts.crossings, SLOWEST * energy(memory.series.terms, memory)
+    crossings = counts.crossings
+    first, slower, delay = energy(memory.series.terms, memory), 1.0, 0.0
     progress.entered = least_pivot(memory)
     for _ in range(MOST_STEPS):
         if clock.time >= progress.end or memory.kernels.step(memory) != OK:
             return False
-        if not keeps_moving(least, memory):
+        middle, after = energy_in_middle(memory), energy(memory.series.terms, memory)
+        if not keeps_moving(min(middle, after), first, memory):
             return False
+        delay += clock.length * (slower + 4.0 * first / middle + first / after) / 6.0
+        slower = first / after
         if counts.crossings != crossings:
-            is_certain = magnifies_little(clock.time - began, memory)
+            is_certain = magnifies_little(delay, memory)
             if is_certain:
                 record_crossing(memory)
             progress.leaving = is_certain
@@ -130,24 +136,31 @@ def energy(rates, memory):
 
 
 @kernel
-def keeps_moving(least, memory):
-    """Whether a motion that has a freedom is as fast as energies of ``least`` in the middle and at the end of
-    the last step, in which an exact series bends but little."""
-    if freedoms(memory) == 0:
-        return True
+def energy_in_middle(memory):
+    """The energy in the middle of the last step."""
     evaluate_series(0.5 * memory.run.loop.clock.length, memory)
-    return energy(memory.state, memory) >= least and energy(memory.series.terms, memory) >= least
+    return energy(memory.state, memory)
 
 
 @kernel
-def magnifies_little(duration, memory):
-    """Whether a motion that does not get slow in a passage of a duration (s) keeps twins together."""
+def keeps_moving(least, first, memory):
+    """Whether a motion that has a freedom has neither turned back in the last step nor lost nearly all of its
+    first energy."""
+    if freedoms(memory) == 0:
+        return True
+    moved = energy(memory.series.past, memory) > 0.0
+    return least >= SLOWEST * first and not (moved and turns_back(memory.series.terms, memory))
+
+
+@kernel
+def magnifies_little(delay, memory):
+    """Whether a passage keeps twins together: by ∫ v₀² / v² dt (s), by Simpson's rule in each step."""
     progress = memory.progress
     if freedoms(memory) == 0:
         return True
     speed = size_of(memory.series.terms, 1, memory.solver.order.shape[0])
     near = CLOSER * min(MAGNIFIED * progress.change, APART)
-    return progress.change * speed * duration / SLOWEST <= near
+    return progress.change * speed * delay <= LULL * near
 
 
 @kernel

@@ -25,6 +25,7 @@ from mbref.taylor.passage import (
     NEAR,
     STEEPEST,
     VANISHING,
+    distance_ahead,
     inside,
     is_near,
     keeps_signs,
@@ -98,13 +99,13 @@ def stride(memory):
     left = progress.end - clock.time
     h = min(reach(memory), left)
     if h * fall > progress.past_pivot:
-        return begin_exactly(memory)
+        return begin_exactly(progress.past_pivot / fall, memory)
     while True:
         status = land(h, h >= left, memory)
         if status == OK:
             return put_samples(h, left, memory)
         if status == SINGULAR_AHEAD:
-            return begin_exactly(memory)
+            return begin_exactly(distance_ahead(h, memory), memory)
         counts.rejected += 1
         h *= SHORTER
         return_to_start(memory)
@@ -172,11 +173,12 @@ def goes_on(h, memory):
 
 
 @kernel
-def begin_exactly(memory):
-    """Expand again where the stride began, now for exact steps: SINGULAR_AHEAD, or why that cannot be."""
+def begin_exactly(ahead, memory):
+    """Expand again where the stride began, now for exact steps, a time (s) ahead of a singular position:
+    SINGULAR_AHEAD, or why that cannot be."""
     progress = memory.progress
     return_to_start(memory)
-    progress.passing, progress.tolerance, progress.crossed = 1, EXACT, 0
+    progress.passing, progress.tolerance, progress.crossed, progress.ahead = 1, EXACT, 0, ahead
     status = memory.kernels.expand(memory.run.loop.clock.time, memory)
     return SINGULAR_AHEAD if status == OK else status
 

@@ -188,6 +188,11 @@ class Progress(NamedTuple):
     is_clear: int = 0  # whether the passage has ended
     left: float = 0.0  # of the violation, where the step began; known after an attempt failed
     entered: float = 0.0  # the least pivot where the series began
+    meets: float = (
+        0.0  # s, in which the series meets a singular position; negative if it comes from one, else 0
+    )
+    ahead: float = 0.0  # s, the same from the pivots of an attempt that came to it; 0 if there was none
+    top: int = 0  # the last order of the series that is not rounding
     cut: int = 0  # the last order of the series that an attempt takes
     usual: float = 0.0  # the tolerance of steps that pass no singular position
     usual_order: int = 0  # the order of their series
@@ -199,6 +204,7 @@ class Progress(NamedTuple):
     taken: int = 0  # samples before the first that may wait
     slowing: float = 0.0  # 1/s, the relative rate of the speed where orders are by power; else 0
     leaving: int = 0  # whether the series comes from a singular position that it has passed
+    striding: int = 0  # whether drivers are followed, by loose series where no singular position is passed
 
 
 class SeriesKernels(NamedTuple):

@@ -174,10 +174,12 @@ class Passage:
 
     def take_branch(self) -> int:
         """Take the run along the branch asked for at the last singular position that it has passed."""
-        series, asked = self._series(), dict(self._run.limits.branches)[len(self._run.crossings)]
-        self._run.crossings[-1] = self._run.crossings[-1]._replace(taken=asked)
-        series.take_over(self._run)
-        return self._given_back(series.leave_along_branch(self._run.crossings[-1]), series)
+        run, series = self._run, self._series()
+        crossing = run.crossings[-1]._replace(taken=dict(run.limits.branches)[len(run.crossings)])
+        run.crossings[-1] = crossing
+        run.memory.loop.clock.sample = int(np.searchsorted(run.times, crossing.time, side="right"))
+        series.take_over(run)
+        return self._given_back(series.leave_along_branch(crossing), series)
 
     def leave_start(self) -> int:
         """Leave a singular position at t = 0: PAUSED, also where there is none, DONE at the end, else why the

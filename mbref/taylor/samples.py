@@ -250,9 +250,9 @@ def complete_sample(length, lost, passing, memory):
     """Record the sample whose variables are in memory, of a step of that length: OK or why there is none.
 
     Accelerations are the formulation's, but beside a singular position, where the state determines them ill,
-    the series'; multipliers balance the forces of either.  There the exact series of a passage give the state
-    too: a projection would divide their rounding by the distance.  NOT_CONVERGED where the series'
-    accelerations contradict the formulation's.
+    the series', unless they are those of a stride; multipliers balance the forces of either.  There the exact
+    series of a passage give the state too: a projection would divide their rounding by the distance.
+    NOT_CONVERGED where the series' accelerations contradict the formulation's.
     """
     run, samples, k = memory.run, memory.run.loop.samples, memory.run.loop.clock.sample
     system, watch = run.equations.system, run.watch
@@ -260,7 +260,8 @@ def complete_sample(length, lost, passing, memory):
     put_state(memory)
     copy(system.acceleration, samples.accelerations[k])
     project_state(run.loop.times[k], run)
-    beside = watch.smallest_pivot < BESIDE * watch.reference_pivot
+    is_exact = passing or not memory.progress.striding
+    beside = is_exact and watch.smallest_pivot < BESIDE * watch.reference_pivot
     if beside:
         if passing:
             put_state(memory)

@@ -55,7 +55,7 @@ from mbref.taylor.start import OFF
 from mbref.taylor.stepping import begin, expand_from, step
 from mbref.taylor.twin import LEAST_CHANGE
 
-EXACT, EXACT_ORDER = 1e-13, 16  # rtol and atol of steps that pass singular positions, and their least order
+EXACT, EXACT_ORDER = 1e-13, 22  # rtol and atol of steps that pass singular positions, and their least order
 KEPT = 16  # singular positions that are passed in a call
 CALLED = (begin, expand_from, step)  # the SeriesKernels
 KERNELS_OF_SERIES = (
@@ -105,6 +105,7 @@ class SeriesRun(Run):
         progress.change = max(self.memory.control.rtol, LEAST_CHANGE)
         progress.end = self.times[-1]
         progress.farthest = OFF * max(1.0, self.model.length)
+        progress.striding = self.strides
         progress.freedoms = self.part.active.velocities.size - self.ranks.rank
         self.wants_code = limits.code == AUTO
         if limits.code == SPECIALISED:

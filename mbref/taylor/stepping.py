@@ -30,6 +30,7 @@ from mbref.taylor.loads import (
     part_behind_no_length,
     time_to_no_length,
 )
+from mbref.taylor.meeting import meet
 from mbref.taylor.partition import choose
 from mbref.taylor.passage import (
     BEFORE,
@@ -60,6 +61,8 @@ LOST_ROWS = 100.0  # tolerances by which rows may be off
 SHORTER = 0.7
 LOOSER = 1e4  # of rates in a passage: they count where a step is short beside the motion's own time
 NEARLY = 0.2  # of a step's first pivot: a step that ends nearer to a singular position is tried beyond it
+CROSSING = 1.05  # of the time in which a singular position is met: a longer step crosses it
+BEST = 0.6  # of a step that crosses: where it begins, from the singular position
 OVER = 1.25  # its length then, over the distance; the same to where a spring has no length
 
 
@@ -88,7 +91,7 @@ def longest_step(tolerance, memory):
     if progress.passing:
         of_rates *= LOOSER
     counted = not progress.passing or progress.past_pivot >= BEFORE * progress.largest_pivot
-    for k in range(progress.order - 1, progress.order + 1):
+    for k in range(progress.top - 1, min(progress.top + 1, progress.order) + 1):
         size = size_of(past, k, variables)
         if size > 0.0:
             shortest = min(shortest, log(tolerance / size) / k)
@@ -108,26 +111,39 @@ def first_lengths(left, memory):
     exact = min(longest_step(whole * exactness(progress), memory), left)
     if not progress.passing:
         return exact, exact
-    return exact, min(longest_step(whole * exactness_across(progress), memory), left)
+    across = min(longest_step(whole * exactness_across(progress), memory), left)
+    ahead, progress.ahead = progress.meets if progress.meets > 0.0 else progress.ahead, 0.0
+    if across < CROSSING * ahead and exact > (1.0 - NEARLY) * ahead:
+        exact = across = ahead - BEST * across
+    return exact, across
 
 
 @kernel
 def keep_terms(memory):
-    """The terms, which are looked along from now on."""
-    series = memory.series
-    for j in range(0, (memory.progress.order + 1) * series.terms.shape[1], LANES):
+    """The terms, which are looked along from now on; angles have no last order."""
+    series, progress = memory.series, memory.progress
+    for j in range(0, (progress.order + 1) * series.terms.shape[1], LANES):
         store(load(series.terms, j), series.past, j)
+    for s in range(series.past_angles.shape[0]):
+        for k in range(progress.order):
+            series.past_angles[s, k] = series.torsions[TORSION_SERIES * s + ANGLE, k]
+        series.past_angles[s, progress.order] = 0.0
+    progress.top = progress.cut = progress.order
+    progress.meets = 0.0
+
+
+@kernel
+def keep_series(memory):
+    """Have steps look along the series that begins here, without its rounding."""
+    keep_terms(memory)
+    meet(memory)
 
 
 @kernel
 def remember_series(memory):
     """Keep the series of the step's beginning, and the pivots there."""
     remember_pivots(memory)
-    keep_terms(memory)
-    series = memory.series
-    for s in range(series.past_angles.shape[0]):
-        for k in range(memory.progress.order + 1):
-            series.past_angles[s, k] = series.torsions[TORSION_SERIES * s + ANGLE, k]
+    keep_series(memory)
 
 
 @kernel
@@ -200,11 +216,11 @@ def next_length(h, exact, memory):
     near to or crossed, by the series without its rounding; else one that does not reach it."""
     progress = memory.progress
     near = progress.crossed or least_pivot(memory) < NEARLY * progress.past_pivot
-    if progress.cut == progress.order and near and h > exact:
+    if progress.cut == progress.top and near and h > exact:
         over = OVER * distance_ahead(h, memory)
         progress.cut = least_term(over, memory)
         return over
-    progress.cut = progress.order
+    progress.cut = progress.top
     return exact if h > exact else h * SHORTER
 
 
@@ -213,7 +229,7 @@ def least_term(h, memory):
     """The order, below the last, of the least term at a distance h (s): those beyond grow by rounding."""
     past, variables = memory.series.past, memory.solver.order.shape[0]
     best, least, power = 2, 1e300, h
-    for k in range(2, memory.progress.order):
+    for k in range(2, memory.progress.top):
         power *= h
         size = size_of(past, k, variables) * power
         if size < least:
@@ -227,19 +243,21 @@ def step(memory):
     loop, control, counts = memory.run.loop, memory.run.control, memory.run.equations.system.counts
     clock, times, progress = loop.clock, loop.times, memory.progress
     remember_series(memory)
-    progress.cut, progress.left = progress.order, 0.0
-    left = progress.end - clock.time
+    left, progress.left = progress.end - clock.time, 0.0
     exact, h = first_lengths(left, memory)
     if turns_back_in(h, memory):
         expand_with_multipliers(memory)
-        keep_terms(memory)
+        keep_series(memory)
         exact, h = first_lengths(left, memory)
+    if 0.0 < progress.meets < h and not progress.passing:
+        clock.passage = clock.time + h
+        return SINGULAR_AHEAD
     while True:
         status = attempt(h, h >= left, memory)
         if status == OK and (progress.crossed or h <= exact):
             break
         if status == SINGULAR_AHEAD or (status == UNDECIDED and (progress.crossed or h <= exact)):
-            clock.passage = clock.time + h
+            clock.passage, progress.ahead = clock.time + h, distance_ahead(h, memory)
             return status
         counts.rejected += 1
         h = min(next_length(h, exact, memory), left)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.published import BY_SCENE, problem_of
+from crosscheck.study.record_view import error_bound
 from reports.blocks import Block, Heading, Table, Text
 from reports.runs import Run, SceneRuns, duration, power
 
@@ -51,7 +52,7 @@ def _shown(group: SceneRuns, error: float | None, run: Run) -> str:
     """The error for a table cell: ``< 3e-12`` below what rounding and, if asked, the truth may be off."""
     _, problem = BY_SCENE[group.scene.name]
     asks_truth = problem.measure(group.scene, run.trajectory, None) is None
-    bound = run.record["metrics"].get("error_bound") or 0.0  # over the scene's length
+    bound = error_bound(run.record)  # over the scene's length
     least = max(LEAST, bound * max(1.0, scene_length(group.scene)) if asks_truth else 0.0)
     if error is None or error >= least:
         return power(math.nan if error is None else error)

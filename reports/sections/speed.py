@@ -12,13 +12,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 from matplotlib.gridspec import GridSpec
 
+from crosscheck.study.record_view import UNTIMED
 from reports import figures
 from reports.blocks import Block, Figure, Heading, Plot, Table, Text
 from reports.runs import WRONG, Curve, Run, SceneRuns, duration, short
 from reports.speed_figure import speed_svg, toggles
-
-SMALLEST = 1e-16  # an error of exactly zero is drawn here
-UNTIMED = 1e-6  # s; a run that reports no time is drawn no lower
 
 Failures = Mapping[tuple[Curve, str], Sequence[Run]]
 
@@ -59,6 +57,8 @@ def _caption(scene_runs: SceneRuns, drawable: Sequence[Run]) -> str:
             f" The least error is {best.said} ({best.label}, {duration(best.seconds)}); "
             f"the least time {duration(quick.seconds)} ({quick.label}, error {quick.said})."
         )
+    if any(run.error < run.drawn[0] for run in drawable):
+        text += " An error below the bound on the truth's own error is drawn at that bound."
     if wrong := sum(run.is_false_success for run in drawable):
         text += (
             f" {wrong} completed with an error above {short(WRONG)}: wrong, although reported as a success."
@@ -104,7 +104,7 @@ def plot(scene_runs: SceneRuns, failures: Failures) -> Drawing:
 
 
 def _draw_curve(axes: Axes, curve: Curve, runs: Sequence[Run], look: figures.Look) -> None:
-    points = np.array([(max(r.error, SMALLEST), max(r.seconds, UNTIMED)) for r in runs])
+    points = np.array([r.drawn for r in runs])
     if len(points):
         axes.plot(*points.T, label=" ".join(curve), markersize=5, alpha=0.9, **look)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from crosscheck.judge.tolerances import FALSE_SUCCESS, FLOOR
+from crosscheck.study.record_view import ended
 from crosscheck.study.sentences import title, verdict
 from crosscheck.study.verdict import DEFAULTS, Judged, grade
 from reports import places
@@ -102,13 +103,8 @@ def _row(group: SceneRuns) -> dict[str, list[Verdict]]:
 
 def _verdict(group: SceneRuns, run: Run) -> Verdict:
     found, runs = grade(run.record), group.curves()[run.curve]
-    lines = [run.said, duration(run.seconds)] if run.completed else [_end(run)]
+    lines = [run.said, duration(run.seconds)] if run.completed else [ended(run.record)]
     if failed := sum(not other.completed for other in runs) * run.completed:
         lines.append(f"{failed} of {len(runs)} failed")
     place, href = places.of_cell(group.scene.name, run.curve), f"#{places.of_run(run)}"
     return Verdict(run.curve[1], str(found), SIGNS[found], lines, place, href)
-
-
-def _end(run: Run) -> str:
-    said = run.outcome.label.lower().replace("_", " ")
-    return f"{said} at {run.t_end:.3g} s" if run.t_end or run.record["times"] else said

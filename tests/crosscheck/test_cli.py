@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 import shlex
 import subprocess
@@ -11,8 +12,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
-from crosscheck.cli import request, running
+from crosscheck.cli import certifying, request, running, tables
 from crosscheck.cli.commands import main
 from crosscheck.cli.parser import parser
 from crosscheck.engine import BUILT_IN, engine
@@ -22,7 +24,7 @@ from crosscheck.study.command import command
 from crosscheck.study.fair_timing import timed
 from crosscheck.study.hurried import NOT_STARTED, Hurried
 from crosscheck.study.record_view import PUBLIC, is_judged
-from crosscheck.study.sentences import unknown
+from crosscheck.study.truth_sentences import unknown
 from mbref.scene import Body, Moment, Scene
 from mbref.scenes import SCENES
 from mbref.scenes.four_bar import four_bar_gravity
@@ -305,6 +307,37 @@ def test_help_and_an_example_in_one_line_that_can_be_copied(capsys, command):
     parser().parse_args(example.split()[1:])
 
 
+def test_an_adapter_that_fails_when_it_is_imported(capsys, tmp_path, monkeypatch):
+    (tmp_path / "bad_adapter.py").write_text("from crosscheck.engine import Engine\n\nENGINE = Engine()\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    status, _, err = run_main(capsys, "verify", "bad_adapter:ENGINE")
+    assert status == 2 and err.startswith("engine 'bad_adapter:ENGINE' cannot be loaded: TypeError: "), err
+    assert err.endswith(f"({tmp_path / 'bad_adapter.py'}, line 3)\n"), err
+
+
+@pytest.mark.parametrize("digits", ["0", "3", "500", "-2", "many"])
+def test_digits_that_no_two_formulations_agree_on(capsys, digits):
+    status, _, err = run_main(capsys, "certify", "heavy_top", "--digits", digits)
+    assert status == 2 and f"argument --digits: must be from 4 to 100, got {digits}" in err, err
+
+
+def test_certify_without_its_package(capsys, monkeypatch):
+    monkeypatch.setattr(certifying.importlib.util, "find_spec", lambda name: None)
+    status, _, err = run_main(capsys, "certify", "heavy_top")
+    assert status == 2 and err.endswith("not installed: pip install python-flint\n"), err
+
+
+def test_certify_tells_its_progress_and_looks_for_its_folder_first(capsys, tmp_path):
+    pytest.importorskip("flint", reason="python-flint is the extra `certify`")
+    asked = ("certify", "four_bar_gravity", "--digits", "4", "--duration", "0.002", "--out")
+    status, _, err = run_main(capsys, *asked, str(tmp_path / "nowhere" / "table.json"))
+    assert status == 2 and err == f"--out: {tmp_path / 'nowhere'} is no folder\n", err
+    status, _, err = run_main(capsys, *asked, str(tmp_path / "table.json"))
+    assert status == 0 and (tmp_path / "table.json").exists(), err
+    for name in "AB":
+        assert f"formulation {name}: 100 of 100" in err and "t = 0.002 s" in err, err
+
+
 def test_the_time_limit_of_tune_is_one_number(capsys):
     _, out, _ = run_main(capsys, "tune", "--help")
     assert f"without computing; default: {grid.TIME_LIMIT:g} --reference-time" in " ".join(out.split()), out
@@ -365,6 +398,43 @@ def test_tuning_and_the_cheapest_setting(capsys, still):
     assert "--option seconds=0.1 " in document["records"][0]["command"], document["records"][0]["command"]
     status, out, err = run_main(capsys, "tune", "elsewhere:ENGINE", still)
     assert status == 1 and "No setting reaches an error of 1e-06" in out, (out, err)
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        (
+            {"metrics": {"error": 1e-7, "error_bound": 1e-12}},
+            "No setting reaches an error of 1e-08; the nearest",
+        ),
+        (
+            {"metrics": {"error": 1e-9, "error_bound": 1e-7}},
+            "The truth is known to 1e-07, so no run can be seen",
+        ),
+        ({"metrics": {"error": None}}, "No error is known, because the motion has no truth"),
+        ({"metrics": {"error": 1e-9}, "outcome": "NOT_FINITE"}, "no run completes"),
+    ],
+)
+def test_an_error_that_no_setting_reaches_or_nothing_tells(more, says):
+    asked = {"options": {"s": 1.0}}
+    run = {
+        "engine": "e",
+        "family": "f",
+        "outcome": "COMPLETED",
+        "t_end": 1.0,
+        "asked": asked,
+        "cost": {"seconds": 1},
+    }
+    shown = Console(width=200, file=io.StringIO())
+    tables.print_tuning(shown, 1e-8, [], [{**run, **more}], "my.toml")
+    assert says in shown.file.getvalue(), shown.file.getvalue()
+
+
+def test_a_motion_without_a_truth_is_told_by_tune(capsys, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    asked = ("tune", FAKE, two_blocks(tmp_path), "--reference-time", "0")
+    status, out, _ = run_main(capsys, *asked)
+    assert status == 1 and "There is no reference for two: none was asked for." in out, out
 
 
 def test_versions_of_engines(capsys):

@@ -153,6 +153,13 @@ def test_changed_models_tell_what_is_left_out(old, new, says, tmp_path):
     assert any(says in sentence for sentence in told), told
 
 
+def test_a_model_without_a_body_is_refused_by_its_file(tmp_path):
+    path = tmp_path / "empty.xml"
+    path.write_text("<mujoco/>")
+    with pytest.raises(SceneError, match=r"empty\.xml: has no body$"):
+        FORMAT.read(path)
+
+
 def test_what_no_scene_can_hold_is_refused_by_name(tmp_path):
     text = (MODELS / "four_bar.xml").read_text()
     bent = text.replace('<joint name="B"/>', '<joint name="B"/><joint name="B2" axis="1 1 0"/>')

@@ -11,6 +11,8 @@ import pytest
 from rich.console import Console
 
 from crosscheck.cli import differences, tables
+from crosscheck.cli.terminal_plot import scatter
+from crosscheck.judge.reference.cache import mechanism
 from crosscheck.study.difference import changes, circumstances, load
 from crosscheck.study.sentences import (
     ADAPTERS,
@@ -20,14 +22,15 @@ from crosscheck.study.sentences import (
     fast,
     headline,
     right,
-    truth,
     verdict,
 )
+from crosscheck.study.truth_sentences import truth
 from crosscheck.study.tuning import tuned
 from crosscheck.study.verdict import Grade, Judged, grade, judged
 from crosscheck.study.wording import multiple, span
 from mbref.records import append
 from mbref.scenes import SCENES
+from reports.runs import Run
 from tests.reports import synthetic
 
 REDUNDANT, SOUND = SCENES["planar_slider_crank"](), SCENES["spatial_slider_crank"]()
@@ -124,6 +127,15 @@ def test_other_results_and_other_sentences():
         "Exudyn completes no run: not finite at t = 0.25 s."
     ), right([group(lost)])
     cut = group(kind="reference", reason="singular", until=0.3, both=False)
+    assert headline([cut]).startswith(
+        "Up to t = 0.3 s, as far as the motion is known, mbref, MuJoCo and Pinocchio are right at their best "
+        "settings; with"
+    ), headline([cut])
+    bad = group([record("mbref", "own", 1.0)], kind="reference", reason="singular", until=0.3, both=False)
+    assert headline([bad]).startswith(
+        "Up to t = 0.3 s, as far as the motion is known, no engine is right at any"
+    )
+    assert right([cut]).startswith("mbref, MuJoCo and Pinocchio agree with the truth to 6.1e-9 as far as it")
     known = "up to t = 0.3 s of 0.4 s (singular), and errors are of this part: two runs of one formulation"
     assert known in truth([cut]), truth([cut])
 
@@ -139,10 +151,36 @@ def test_sentences_of_several_scenes():
     assert "and Pinocchio are right at their best settings on the scenes they can run;" in headline(groups)
 
 
+def test_a_motion_that_is_not_known_beside_one_that_is():
+    still = [record(name, "tuned", None, times=[0.0], scene=SOUND.name) for name in ("mbref", "exudyn")]
+    groups = [group(), group(still, SOUND, kind="", reason="two ways", bound=None)]
+    assert headline(groups) == (
+        "mbref, MuJoCo and Pinocchio are right at their best settings on planar_slider_crank, whose motion "
+        "is known; with their libraries' defaults none is."
+    ), headline(groups)
+    assert "agree with the truth to 6.1e-9 on planar_slider_crank." in right(groups), right(groups)
+
+
+def test_defaults_that_nothing_judges():
+    unjudged = [record(name, "defaults", None, times=[0.0]) for name in ("mujoco", "exudyn")]
+    assert breaks([group(unjudged, kind="", reason="two ways", bound=None)]) == (
+        "The defaults of MuJoCo and Exudyn complete; without a truth nothing tells whether they are right."
+    )
+    assert breaks([group([record("mbref", "own", 1e-12)])]) == "No setting is a library's default."
+
+
+def test_a_best_setting_beside_one_that_ran_out_of_time():
+    late = record("sundials", "ggl", None, 0.2, outcome="TIMED_OUT", t_end=0.0, time_limit=5.0)
+    assert right([group([record("sundials", "ggl", 2.87), late])]) == (
+        "SUNDIALS IDA is wrong at best of the settings that end within 5 s: off by 2.87e+00."
+    )
+
+
 def test_no_truth_and_no_claim_of_right():
     still = [record(name, "tuned", None, times=[0.0]) for name in ("mbref", "exudyn")]
     unknown = group(still, kind="", reason="two ways", bound=None)
     assert "no reference for this motion" in headline([unknown])
+    assert fast([unknown]) == "Without a truth no error is known, so speeds are not compared."
     assert "There is no reference for planar_slider_crank: two ways." in truth([unknown])
 
 
@@ -223,6 +261,53 @@ def test_differences_beyond_noise(tmp_path):
     assert not any(change.sentences for change in changes(before, before))
 
 
+def test_a_failure_that_comes_earlier_and_a_measure_beside_the_error():
+    early = failed("a", "x", 0.5)
+    moved = record("a", "y", 1e-5, 0.1)
+    measured = [
+        moved | {"metrics": {"error": 1e-5, "reaction_error": e, "energy_error": None}} for e in (1e-9, 1e-3)
+    ]
+    worse = moved | {"metrics": {"error": 1e-2, "reaction_error": 1.0}}
+    for before, after, expected in (
+        (early, early | {"t_end": 0.02}, ["end not finite at 0.5 s → not finite at 0.02 s"]),
+        (early, early | {"t_end": 0.49}, []),
+        (early | {"t_end": 0.0}, early | {"t_end": -1e-8}, []),
+        (*measured, ["reactions 1.00e-09 → 1.00e-03"]),
+        (measured[0], worse, ["error 1.00e-05 → 1.00e-02"]),
+    ):
+        named = [{"run": {**r, "repeated": False}} for r in (before, after)]
+        assert changes(*named)[0].sentences == expected
+
+
+def test_runs_of_another_mechanism_are_not_compared(tmp_path):
+    """A scene that was edited under its name between two reports."""
+    first, second = (synthetic.scene().with_(gravity=(0.0, g, 0.0)) for g in (-9.81, -1.62))
+    old, new = (
+        record("a", "x", e, 0.1, scene=s.name, mechanism=mechanism(s)) | {"key": s.name + str(e)}
+        for e, s in ((1e-5, first), (1e-1, second))
+    )
+    stale = record("a", "stale", 1e-5, 0.1, scene=first.name, mechanism=mechanism(first))
+    folders = [saved(tmp_path / "old", [old]), saved(tmp_path / "new", [old, stale, new])]
+    for folder, scene in zip(folders, (first, second), strict=True):
+        (folder / "scenes").mkdir()
+        scene.save(folder / "scenes" / f"{scene.name}.toml")
+    before, after = map(load, folders)
+    assert len(after) == 1, "records of the mechanism before it was edited are left out"
+    assert [c.sentences for c in changes(before, after)] == [["only in the new set"], ["only in the old set"]]
+    told = circumstances(before, after)
+    assert told == [f"{first.name}: the mechanism was changed, so its runs are not compared."], told
+    console = Console(width=80, file=io.StringIO())
+    assert differences.show(console, *map(str, folders), False)
+    assert "The sets have no run in common" in console.file.getvalue()
+
+
+def test_a_comparison_leaves_files_as_they_are(tmp_path):
+    path = saved(tmp_path / "cut", [record("a", "x", 1e-5, 0.1)]) / "records.jsonl"
+    path.write_text(path.read_text() + '{"key": "cut sho')
+    before = path.read_text()
+    assert len(load(path)) == 1 and path.read_text() == before
+
+
 def test_runs_of_one_set_alone_are_counted_by_engine(tmp_path):
     both, gone = record("a", "x", 1e-5, 0.1), [record("b", family, 1e-5, 0.1) for family in "pq"]
     folders = [saved(tmp_path / name, runs) for name, runs in (("old", [both, *gone]), ("new", [both]))]
@@ -233,12 +318,21 @@ def test_runs_of_one_set_alone_are_counted_by_engine(tmp_path):
         said.append(console.file.getvalue())
     assert "b: 2 runs only in the old set" in said[0] and "runs\nscene" not in said[0]
     assert said[0].count("only in the old set") == 1 and said[1].count("only in the old set") == 2
+    assert "0 of 1 runs of both sets changed." in said[0]
 
 
 def test_times_of_other_machines_are_not_compared():
     slow = record("a", "x", 1e-5, 0.1, machine={"cpu": "b"}, cost={"seconds": 9.0})
     named = [{"run": {**r, "repeated": False}} for r in (record("a", "x", 1e-5, 0.1), slow)]
     assert not changes(*named)[0].sentences
+    assert circumstances(*named)[-1] == "Times of 1 run are not compared: the machines differ."
+
+
+def test_errors_are_drawn_no_lower_than_they_are_known():
+    below = record("a", "x", 1e-17, 0.1)
+    assert Run(below).drawn == (3e-14, 0.1)
+    drawn = scatter([below], {("a", "x"): "A"}).plain
+    assert "1e-14" in drawn and "1e-16" not in drawn, drawn
 
 
 def test_tables_of_eighty_columns_and_whole_numbers():

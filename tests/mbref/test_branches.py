@@ -46,7 +46,7 @@ def test_branches_of_a_rhombus_and_of_a_loop_that_has_none_besides():
 @pytest.mark.parametrize("method", METHODS)
 def test_the_fold_of_a_driven_rhombus(method):
     """The rocker rests and the coupler lies on the crank; samples before the crossing stay as they are."""
-    times = np.linspace(0.0, 0.06, 25)
+    times = np.linspace(0.0, 0.06, 241)
     smooth = simulate(four_bar(), method, times)
     fold = simulate(four_bar(), method, times, Limits(branches={2: 2}))
     assert fold.outcome.label == "COMPLETED" and [c.taken for c in fold.crossings] == [1, 2]

@@ -5,7 +5,7 @@ import pytest
 
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import closed_form
-from mbref.scene import Body, Revolute, Scene
+from mbref.scene import Body, Revolute, Scene, TorsionSpring
 from mbref.scenes import find_scene
 from mbref.scenes.four_bar import four_bar_gravity, parallelogram
 from mbref.simulation.simulate import Limits, simulate
@@ -82,6 +82,18 @@ def test_samples_beside_crossings_are_right_at_a_loose_tolerance(method):
     assert run.outcome.label == exact.outcome.label == "COMPLETED"
     off = np.abs(run.acceleration - exact.acceleration).max() / np.abs(exact.acceleration).max()
     assert measure(scene, run, closed_form(scene))["error"] < 1e-5 and off < 1e-3
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-4, 3e-5])
+def test_angles_of_torsion_springs_go_on_behind_brief_passages(rtol):
+    """Exact steps of a passage leave terms of higher orders than the usual steps behind it have."""
+    scene = four_bar_gravity().with_(load=(TorsionSpring(joint="A", stiffness=1.0),))
+    times = np.linspace(0.0, 3.0, 31)
+    run = simulate(scene, "taylor", times, Limits(rtol=rtol))
+    exact = simulate(scene, "alf-dual+projection", times, Limits(rtol=1e-11))
+    assert run.outcome.label == exact.outcome.label == "COMPLETED", run.message
+    assert len(run.crossings) == len(exact.crossings) == 5
+    assert np.abs(run.position - exact.position).max() < rtol
 
 
 def swung(rate: float) -> Scene:

@@ -9,9 +9,10 @@ import pytest
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from mbref.method import Method
-from mbref.scene import Body, Driver, Revolute, Scene, Sine, Spherical, Universal
+from mbref.scene import Body, Cylindrical, Driver, Revolute, Scene, Sine, Spherical, Universal
 from mbref.scenes import SCENES
 from mbref.scenes.links import CRANK_RATE, about_z, link, midpoint
+from mbref.scenes.planar_slider_crank import slider_crank
 from mbref.simulation.simulate import Limits, simulate
 from mbref.taylor.run import TaylorRun
 
@@ -49,6 +50,28 @@ def test_singular_positions_are_those_of_the_kinematic_analysis(name):
     for one, other in zip(*(run.crossings for run in runs), strict=True):
         assert np.abs(np.array(one.position) - other.position).max() < 1e-9
         assert np.abs(np.array(one.velocity) - other.velocity).max() < 1e-6 * CRANK_RATE
+
+
+@pytest.mark.parametrize("code", ["generic", "specialised"])
+def test_accelerations_between_singular_positions_are_exact(code):
+    """Every centre of a crank at rate ω with a rod of its length moves by cos ωt and sin ωt.  Masses off the
+    axes and rows of parallel hinges make a redundant row look independent, so that all places seem to be
+    beside a singular position."""
+    base, rate, shift = slider_crank(0.308, 0.308, 0.3, "off_axes"), -5.8, (0.09, -0.12, 0.3)
+    a, b, c, d = base.joint
+    joints = (
+        a, b, Revolute(name="C", bodies=c.bodies, anchor=c.anchor, axis=Z),
+        Cylindrical(name="D", bodies=d.bodies, anchor=d.anchor, axis=d.axis),
+    )  # fmt: skip
+    bodies = [
+        body.model_copy(update={"position": tuple(np.add(body.position, shift).tolist())})
+        for body in base.body
+    ]
+    scene = base.with_(body=tuple(bodies), joint=joints, driver=(Driver(joint="A", polynomial=(0.0, rate)),))
+    run = simulate(scene, "taylor", np.linspace(0.0, 2.5, 41), Limits(rtol=1e-12, code=code))
+    assert run.outcome.name == "COMPLETED", run.message
+    swinging = run.position - [(0.0, 0.0, 0.3), (0.0, 0.0, 0.3), shift]
+    assert np.abs(run.acceleration + rate**2 * swinging).max() < 1e-9 * np.abs(run.acceleration).max()
 
 
 def test_another_branch_is_taken_where_it_is_asked_for():

@@ -137,6 +137,8 @@ def test_several_numbers_of_one_entry_vary():
         ("body[0].mass=0:inf", "is no interval"),
         ("bodies[0].mass=1:2", "bodies[0].mass: is not a path"),
         ("body[nobody].mass=1:2", "body[nobody].mass: the scene has no 'nobody'"),
+        ("body[cranc].mass=1:2", "the scene has no 'cranc' there; did you mean 'crank'?"),
+        ("body[0].mas=1:2", "the scene has no 'mas' there; did you mean 'mass'?"),
         ("body[3].mass=1:2", "body[3].mass: the scene has no '3'"),
         ("body[0].weight=1:2", "body[0].weight: the scene has no 'weight'"),
         ("body[0].name=1:2", "body[0].name: is not a number"),

@@ -160,6 +160,9 @@ def test_plot_has_a_panel_for_each_quantity(crank):
     assert (axes[1].lines[0].get_ydata() == crank.joint("A").angle).all()
     with pytest.raises(ValueError, match=r"no column 'slider\.colour'"):
         crank.plot("slider.colour")
+    for misspelt, suggested in (("slidr.position", "slider.position"), ("enrgy", "energy")):
+        with pytest.raises(ValueError, match=f"'; did you mean '{suggested}'\\?$"):
+            crank.plot(misspelt)
 
 
 def test_panels_of_a_plot_have_the_units_of_their_quantities(crank):

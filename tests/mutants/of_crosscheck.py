@@ -130,9 +130,9 @@ DEFECTS = (  # adapters and processes
         REPORTS,
     ),
     Defect(
-        "reports/sections/speed.py",
-        "(max(r.error, SMALLEST), max(r.seconds, UNTIMED))",
-        "(max(r.error, SMALLEST), max(r.t_end, UNTIMED))",
+        "reports/runs.py",
+        "return drawn(self.record, self.seconds)",
+        "return drawn(self.record, self.t_end)",
         REPORTS,
     ),
     Defect(

@@ -144,7 +144,7 @@ DEFECTS = (
         'record["key"]: record for record in lines[::-1]',
         RECORDS,
     ),
-    Defect(R, "os.truncate(path, end)", "os.truncate(path, 0)", RECORDS),
+    Defect(R, "os.truncate(path, whole)", "os.truncate(path, 0)", RECORDS),
     Defect(R, "if text and len(foreign) == len(lines):", "if False:", RECORDS),
     Defect(R, "file.truncate(before)", "pass", RECORDS),
     Defect(R, "enumerate(lines, 1)", "enumerate(lines)", RECORDS),
@@ -175,7 +175,7 @@ DEFECTS = (
     Defect(TS, "x, y, z = a[7] - a[5],", "x, y, z = a[5] - a[7],", CLOSED_FORMS),
     Defect(
         TS,
-        "beside = watch.smallest_pivot < BESIDE * watch.reference_pivot",
+        "beside = is_exact and watch.smallest_pivot < BESIDE * watch.reference_pivot",
         "beside = False",
         CLOSED_FORMS,
     ),
@@ -262,7 +262,7 @@ DEFECTS = (
     ),
     Defect(
         "mbref/taylor/brief.py",
-        "    return energy(memory.state, memory) >= least and energy(memory.series.terms, memory) >= least",
+        "    return least >= SLOWEST * first and not (moved and turns_back(memory.series.terms, memory))",
         "    return True",
         BRIEF,
     ),

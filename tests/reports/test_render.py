@@ -15,6 +15,7 @@ from synthetic import groups
 from crosscheck.cli import collection
 from crosscheck.cli import main as command_line
 from crosscheck.engine import Setting
+from crosscheck.judge.reference.cache import mechanism
 from crosscheck.study import comparison as comparisons
 from crosscheck.study import ladder
 from crosscheck.study import sweep as sweeps
@@ -150,6 +151,19 @@ def test_rendering_again_and_nothing_is_run(tmp_path, of_fakes, capsys, monkeypa
     assert again.count('class="command"') == first.count('class="command"') == 3
     assert program.main(["--render", str(tmp_path / "none")]) == 2
     assert "has no records.jsonl and scenes/" in capsys.readouterr().err
+
+
+def test_records_of_a_scene_before_it_was_edited_are_not_rendered(tmp_path, of_fakes, monkeypatch):
+    monkeypatch.setattr(sweeps, "quick_scenes", lambda: [still("still").with_(gravity=(0.0, -1.62, 0.0))])
+    assert program.main(["--quick", "--out", str(tmp_path)]) == 0
+    monkeypatch.setattr(sweeps, "quick_scenes", lambda: [still("still")])
+    assert program.main(["--quick", "--out", str(tmp_path)]) == 0
+    assert len((tmp_path / "records.jsonl").read_text().splitlines()) == 8, "of two mechanisms"
+    [group] = stored.groups(tmp_path)
+    assert len(group.runs) == 3 and {run.record["mechanism"] for run in group.runs} == {
+        mechanism(group.scene)
+    }
+    assert group.truth["mechanism"] == mechanism(group.scene)
 
 
 def test_program_interrupted_and_what_to_do(tmp_path, of_fakes, capsys, monkeypatch):

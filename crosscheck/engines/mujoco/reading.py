@@ -50,6 +50,8 @@ def read(path: Path) -> Imported:
     except ValueError as error:
         raise SceneError([f"{path}: MuJoCo cannot read it: {' '.join(str(error).split())}"]) from None
     reader = _Reader(mujoco, model)
+    if model.nbody < 2:  # the first is the world
+        raise SceneError([f"{path}: has no body"])
     joints = [*reader.tree_joints(), *reader.equalities()]
     if path.suffix == ".urdf":
         joints += closures(text, reader.world_place, reader.name_of)

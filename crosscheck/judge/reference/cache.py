@@ -61,6 +61,11 @@ def canonical(scene: Scene) -> str:
     return json.dumps({**scene.to_dict(), "name": "", "duration": 0.0}, sort_keys=True)
 
 
+def mechanism(scene: Scene) -> str:
+    """A short hash of all fields of a scene that determine its motion."""
+    return hashlib.sha256(canonical(scene).encode()).hexdigest()[:16]
+
+
 def _path(scene: Scene) -> Path:
     root = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "mbref" / "references"
     return root / hashlib.sha256((version() + canonical(scene)).encode()).hexdigest()

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,7 @@ from crosscheck.judge.reference.arithmetic import EXTENDED, doubles, many_digits
 from crosscheck.judge.reference.bound import SAFETY, differences
 from crosscheck.judge.reference.cache import canonical
 from crosscheck.judge.reference.isostatic import Pose, isostatic, replaced
-from crosscheck.judge.reference.motion import Motion
+from crosscheck.judge.reference.motion import Motion, Told, untold
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from mbref.scene import Scene
@@ -32,15 +34,28 @@ METHODS = {
 ACROSS = {"A": METHODS["A"], "A again": "of more digits and another order, where B keeps too few"}
 """Through singular positions."""
 
+FEWEST_DIGITS = 4  # series of fewer have too few terms
+MOST_DIGITS = 100  # tolerances of many more are below the smallest double
+
+Shown = Callable[[str], AbstractContextManager[Told]]
+"""Shows the progress of the formulation named while the context lasts."""
+
 FOLDER = Path(__file__).with_name("certified")
 RATES = ("velocity", "angular_velocity")
+
+
+def unshown(_: str) -> AbstractContextManager[Told]:
+    """Show nothing."""
+    return nullcontext(untold)
 
 
 class NotCertified(ArithmeticError):
     """The formulations do not agree to the digits asked for, or one of them ends before."""
 
 
-def certified(scene: Scene, times: np.ndarray, digits: int, seconds: float = np.inf) -> dict[str, Any]:
+def certified(
+    scene: Scene, times: np.ndarray, digits: int, seconds: float = np.inf, shown: Shown = unshown
+) -> dict[str, Any]:
     """A table of positions (m), orientations (w, x, y, z) and velocities of both kinds (m/s, rad/s; world) at
     ascending times (k,) as decimal strings, with its ``id`` (of scene and times), ``digits``, ``bound``,
     ``rate_bound`` (of velocities, each relative to the largest of its kind), both ``methods``, the
@@ -49,7 +64,7 @@ def certified(scene: Scene, times: np.ndarray, digits: int, seconds: float = np.
     Raises NotCertified, and ImportError without python-flint.
     """
     for spare in SPARE:
-        moved, a, b = _motions(scene, times, digits, spare, seconds)
+        moved, a, b = _motions(scene, times, digits, spare, seconds, shown)
         bound = SAFETY * float(differences(scene, a, b).max(initial=0.0))
         if bound <= 10.0**-digits:
             least = 10.0 ** -(digits + spare)
@@ -59,20 +74,26 @@ def certified(scene: Scene, times: np.ndarray, digits: int, seconds: float = np.
 
 
 def _motions(
-    scene: Scene, times: np.ndarray, digits: int, spare: int, seconds: float
+    scene: Scene, times: np.ndarray, digits: int, spare: int, seconds: float, shown: Shown
 ) -> tuple[Scene, Motion, Motion]:
     """The mechanism without contradictions, its motion by A, and by B or, through singular positions, where
     B keeps too few digits, by A with other digits and another order."""
-    moved, a = scene, _by_a(scene, times, digits, digits + spare, seconds)
+
+    def by_a(of: Scene, order: int, places: int) -> Motion:
+        with shown("formulation A") as told:
+            return _by_a(of, times, order, places, seconds, told)
+
+    moved, a = scene, by_a(scene, digits, digits + spare)
     if a.contradiction > 10.0**-digits:
         moved = isostatic(scene, _poses(scene, float(times[-1])))
-        a = _by_a(moved, times, digits, digits + spare, seconds)
+        a = by_a(moved, digits, digits + spare)
     if a.crossings:
         orders = 3 * digits // 2, 7 * digits // 4
-        a, b = (_by_a(moved, times, order, 4 * order // 3, seconds) for order in orders)
+        a, b = (by_a(moved, order, 4 * order // 3) for order in orders)
     else:
         _refuse_ended(scene, a, "A")
-        b = tree_motion(moved, times, many_digits(digits + spare), seconds=seconds)
+        with shown("formulation B") as told:
+            b = tree_motion(moved, times, many_digits(digits + spare), seconds=seconds, told=told)
     _refuse_ended(scene, a, "A")
     _refuse_ended(scene, b, "B")
     return moved, a, b
@@ -98,10 +119,12 @@ def _refuse_ended(scene: Scene, motion: Motion, name: str) -> None:
         raise NotCertified(f"{scene.name}: {name} ends at t = {motion.reached:.6g} s: {motion.reason}")
 
 
-def _by_a(scene: Scene, times: np.ndarray, order: int, places: int, seconds: float) -> Motion:
+def _by_a(scene: Scene, times: np.ndarray, order: int, places: int, seconds: float, told: Told) -> Motion:
     """By formulation A to so many places a step, in arithmetic of twice the order."""
     exact = many_digits(2 * order)
-    return natural_motion(scene, times, exact, seconds=seconds, order=2 * order, tolerance=10.0**-places)
+    return natural_motion(
+        scene, times, exact, seconds=seconds, order=2 * order, tolerance=10.0**-places, told=told
+    )
 
 
 def _table(

@@ -7,7 +7,7 @@ from t ≥ 0, and after so many CPU seconds of the calling thread the motion end
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from threading import Event
@@ -15,6 +15,9 @@ from threading import Event
 import numpy as np
 
 Times = Sequence[float] | np.ndarray
+
+Told = Callable[[float], None]
+"""Takes the time (s) that a motion has reached, step by step."""
 
 OVER = "the time for it was up"
 
@@ -41,6 +44,10 @@ def is_over(deadline: float) -> bool:
     if _given_up.is_set():
         raise GivenUp("the motion is no longer wanted")
     return time.thread_time() > deadline
+
+
+def untold(_: float) -> None:
+    """Tell nobody the time that a motion has reached."""
 
 
 @dataclass(frozen=True)

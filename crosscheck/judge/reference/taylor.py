@@ -17,7 +17,7 @@ from scipy.optimize import minimize_scalar
 from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
 from crosscheck.judge.reference.expansion import Expansion, Series, value
 from crosscheck.judge.reference.held_rows import HeldRows, independent
-from crosscheck.judge.reference.motion import OVER, Motion, Times, is_over
+from crosscheck.judge.reference.motion import OVER, Motion, Times, Told, is_over, untold
 from crosscheck.judge.reference.natural import NaturalCoordinates
 from crosscheck.judge.reference.natural_loads import Loads
 from crosscheck.judge.reference.saddle_point import SaddlePoint
@@ -52,17 +52,18 @@ class Ended(ArithmeticError):
 def natural_motion(
     scene: Scene, times: Times, arithmetic: Arithmetic, *, seconds: float = np.inf,
     order: int = ORDER, tolerance: float | None = None, seed: int = 0, displaced: float = 0.0,
+    told: Told = untold,
 ) -> Motion:  # fmt: skip
     """The motion at ascending times (k,) ≥ 0 in natural coordinates (see Motion), by series of an order.
 
     ``tolerance`` is of a step, relative (default: the arithmetic's rounding unit).  Another ``seed`` prefers
     other rows where some are redundant, and displaces joints by up to ``displaced``, relative to the largest
-    coordinate.  ``seconds`` limits the CPU time of the calling thread.
+    coordinate.  ``seconds`` limits the CPU time of the calling thread; ``told`` hears the time of every step.
     """
     began, reason, samples = time.thread_time(), "", []
     stepper = Stepper(scene, arithmetic, order, tolerance or arithmetic.eps, (seed, displaced))
     try:
-        for sample in stepper.samples(times, began + seconds):
+        for sample in stepper.samples(times, began + seconds, told):
             samples.append(sample)
     except Ended as end:
         reason = str(end)
@@ -105,7 +106,7 @@ class Stepper:
         self.of.c[joints] = self.of.c[joints] + self.of.arithmetic.array(moved)
         return 1 + PREFERENCE * rng.random(len(self.of.c))
 
-    def samples(self, times: Times, deadline: float) -> Iterator[Sample]:
+    def samples(self, times: Times, deadline: float, told: Told) -> Iterator[Sample]:
         """X, X', X'' (3, n) at ascending times; raises Ended where the motion cannot be followed."""
         self._refuse_undetermined()
         self._start()
@@ -121,6 +122,7 @@ class Stepper:
                 d = self.of.arithmetic.number(pending.pop(0)) - self.t
                 yield tuple(self.of.arithmetic.settled(value(series, d, n)) for n in range(3))
             self._advance(expansion, series, h)
+            told(float(self.t))
 
     def _start(self) -> None:
         """Put the coordinates onto the rows, and take the velocities that the rule asks for."""

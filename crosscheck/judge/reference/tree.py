@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.judge.reference.arithmetic import Arithmetic
-from crosscheck.judge.reference.motion import OVER, Motion, is_over
+from crosscheck.judge.reference.motion import OVER, Motion, Told, is_over, untold
 from crosscheck.judge.reference.panels import Panel, Panels
 from crosscheck.judge.reference.stiff_panels import StiffPanels
 from crosscheck.judge.reference.tree_equations import OPEN, TreeEquations
@@ -34,18 +34,19 @@ SEVERAL = 3  # panels across one singular position that do not settle before it 
 def tree_motion(
     scene: Scene, times: np.ndarray, arithmetic: Arithmetic, *, seconds: float,
     nodes_per_digit: float = NODES_PER_DIGIT, seed: int = 0, displaced: float = 0.0,
+    told: Told = untold,
 ) -> Motion:  # fmt: skip
     """The motion of a scene at ascending times (k,) ≥ 0 in an arithmetic; see Motion.
 
     Another ``seed`` prefers other rows where some are redundant, and displaces the joints that close loops by
     up to ``displaced``, relative to the scene's length.  The motion ends early, with the reason, after so
-    many CPU seconds, where the loops do not stay closed, and where no panel of time is short enough.  Raises
-    SceneError when the given velocities contradict the joints.
+    many CPU seconds, where the loops do not stay closed, and where no panel of time is short enough; ``told``
+    hears the time of every panel.  Raises SceneError when the given velocities contradict the joints.
     """
     clock = time.thread_time()
     equations = TreeEquations(scene, arithmetic, (seed, displaced))
     run = _Run(equations, np.asarray(times, dtype=float), nodes_per_digit)
-    reason = run.through(clock + seconds)
+    reason = run.through(clock + seconds, told)
     return run.motion(reason, time.thread_time() - clock)
 
 
@@ -64,7 +65,7 @@ class _Run:
         self.taken = self.steps = 0
         self.stiff, self.is_stiff = StiffPanels(self.panels), False
 
-    def through(self, until: float) -> str:
+    def through(self, until: float, told: Told) -> str:
         """Runs to the last time; the reason where the motion ends before."""
         if reason := self.equations.undetermined():
             return reason
@@ -82,6 +83,7 @@ class _Run:
                 return "no panel of time is short enough"
             if panel.settled and not self._accepts(panel):
                 return "rows that were redundant at the start are not later: it is a singular position"
+            told(float(self.t))
         return ""
 
     def _tried(self, last: Panel | None, length: Any) -> Panel:

@@ -1,0 +1,64 @@
+"""Sentences on how the true motions are known, how far, and to which bound."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from crosscheck.study.verdict import Judged
+from crosscheck.study.wording import listed
+from mbref.scene import Scene
+
+
+def truth(groups: Sequence[Judged]) -> str:
+    """The kinds of truth, the bounds on their errors, and their cost."""
+    parts = []
+    closed = [g for g in groups if g.truth["kind"] not in ("", "reference")]
+    if closed:
+        bounds = {g.truth["bound"] for g in closed}
+        better = " or better" if len(bounds) > 1 else ""
+        parts.append(f"The exact motion of {names(closed)} is known in closed form or by a reduced "
+                     f"equation, to {max(bounds):.0e}{better}.")  # fmt: skip
+        parts += [
+            f"That of {g.scene.name} is known{_until(g.scene, g.truth)}." for g in closed if g.truth["reason"]
+        ]
+    parts += [_reference(group) for group in groups if group not in closed]
+    return " ".join(parts)
+
+
+def unknown(scene: Scene, known: Mapping[str, Any]) -> str:
+    """From when on the true motion of a scene is not known, and why; empty where it is known to the end."""
+    if not known["kind"]:
+        return f"There is no reference for {scene.name}: {known['reason']}."
+    return f"The motion of {scene.name} is known{_until(scene, known)}." if known["reason"] else ""
+
+
+def _reference(group: Judged) -> str:
+    known, name = group.truth, group.scene.name
+    if not known["kind"]:
+        return unknown(group.scene, known)
+    ways = (
+        "two formulations that share no code agree" if known["both"] else "two runs of one formulation agree"
+    )
+    return (f"The reference of {name} is known to {known['bound']:.0e}{_until(group.scene, known)}: {ways}; "
+            f"it took {known['seconds']:.1f} s of CPU time.")  # fmt: skip
+
+
+def _until(scene: Scene, known: Mapping[str, Any]) -> str:
+    """How far a truth is known, and why no further; nothing where it is known to the end."""
+    if not known["reason"]:
+        return ""
+    end = f"{known['until']:.4g} s of {scene.duration:.4g} s"
+    return f" up to t = {end} ({known['reason']}), and errors are of this part"
+
+
+def up_to(groups: Sequence[Judged]) -> str:
+    """How far the least known of the motions is known, as a sentence begins; nothing where all are to their
+    ends."""
+    ends = [group.truth["until"] for group in groups if group.truth["reason"]]
+    return f"Up to t = {min(ends):.4g} s" if ends else ""
+
+
+def names(groups: Sequence[Judged]) -> str:
+    """The names of the scenes, listed."""
+    return listed(group.scene.name for group in groups)

@@ -1,0 +1,75 @@
+"""Series near singular positions without the terms by which rounding has the motion miss them."""
+
+import numpy as np
+import pytest
+
+from mbref.kernels.compilation import INT, entry
+from mbref.kernels.layout import OK
+from mbref.method import Method
+from mbref.scenes import SCENES
+from mbref.simulation.simulate import Limits, simulate
+from mbref.taylor.layout import SERIES
+from mbref.taylor.meeting import meet
+from mbref.taylor.run import TaylorRun
+
+ORDER = 22
+
+
+@entry(INT(SERIES))
+def without_miss(memory):
+    """Take the miss out of the series that is looked along: OK."""
+    meet(memory)
+    return OK
+
+
+def looking_along(motion: np.ndarray, miss: float, distance: float) -> TaylorRun:
+    """A run whose series is a motion of radius 1 that misses a position at a distance (s)."""
+    method = Method.parse(f"taylor[order={ORDER}]")
+    run = TaylorRun(SCENES["four_bar_gravity"](), method, np.array([0.1]), Limits(code="generic"))
+    progress, nz = run.taylor.progress, run.taylor.solver.order.size
+    orders = np.arange(ORDER + 1)[:, None]
+    run.taylor.series.past[:] = 0.0
+    run.taylor.series.past[: ORDER + 1, :nz] = motion[:, :nz] + miss * np.arange(1, nz + 1) / distance**orders
+    progress.past_pivot, progress.largest_pivot = abs(distance), 1.0
+    progress.top = progress.cut = ORDER
+    without_miss(run.packed_series.argument)
+    return run
+
+
+@pytest.mark.parametrize("distance", (0.01, -0.01, 0.03))
+def test_a_miss_by_rounding_is_taken_out(distance):
+    """Of a position ahead, with the time to it, and of one behind."""
+    motion = np.random.default_rng(5).uniform(0.5, 1.0, (ORDER + 1, 6))
+    run = looking_along(motion, 1e-15, distance)
+    progress, nz = run.taylor.progress, run.taylor.solver.order.size
+    assert progress.meets == pytest.approx(distance, rel=1e-6)
+    assert 4 <= progress.cut == progress.top < ORDER
+    left = run.taylor.series.past[: int(progress.top), :nz] - motion[: int(progress.top), :nz]
+    reached = 4.0 * abs(distance) ** np.arange(
+        int(progress.top)
+    )  # of steps four times as long as the distance
+    assert np.abs(left * reached[:, None]).max() < 1e-12
+
+
+@pytest.mark.parametrize("miss", (1e-9, 1e-12, 1e-13))
+def test_a_gap_stays(miss):
+    """One wider than rounding explains."""
+    motion = np.random.default_rng(5).uniform(0.5, 1.0, (ORDER + 1, 6))
+    run = looking_along(motion, miss, 0.01)
+    assert run.taylor.progress.meets == 0.0
+    assert run.taylor.progress.cut == ORDER
+
+
+@pytest.mark.parametrize("name", ("four_bar_gravity", "five_bar_gravity"))
+def test_passages_take_few_steps(name):
+    """As few as the motion itself asks for, and to the tolerance."""
+    scene = SCENES[name]()
+    times = np.linspace(0.0, scene.duration, 11)
+    run = simulate(scene, Method.parse("taylor[order=22]"), times, Limits(rtol=1e-8, code="generic"))
+    exact = simulate(scene, Method.parse("taylor[order=26]"), times, Limits(rtol=1e-12, code="generic"))
+    assert run.outcome.label == exact.outcome.label == "COMPLETED"
+    assert run.cost.steps + run.cost.rejected <= 18
+    found, known = (np.array([p.time for p in each.crossings]) for each in (run, exact))
+    assert known.size == 3
+    assert np.abs(found - known).max() < 1e-8
+    assert np.abs(run.position - exact.position).max() < 1e-7
