@@ -27,7 +27,7 @@ FREEDOMS = {
 MEASURED = {  # error of mbref (m)
     "point_pendulum": 5.8e-12, "andrews_squeezer": 1.3e-13, "bricard": 9.2e-14, "bricard_thin": 5.4e-13,
     "flyball_governor": ROUNDING, "rigid_slider_crank": 3.4e-13, "rigid_slider_crank_middle": 4.3e-13,
-    "heavy_top": 1.2e-11, "bennett": 4.7e-13, "sarrus": ROUNDING, "h_frame": 8.1e-13,
+    "heavy_top": 1.2e-11, "bennett": 4.7e-13, "sarrus": 1.6e-13, "h_frame": 8.1e-13,
 }  # fmt: skip
 BRIEF = {"andrews_squeezer": 0.01, "flyball_governor": 0.05, "heavy_top": 0.1}  # s
 MASSLESS_TURNS = {"point_pendulum": "lm1+projection/dop853", "bricard_thin": "alf+projection/dop853"}
