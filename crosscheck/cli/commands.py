@@ -116,7 +116,7 @@ def _verify_drawn(engine: str, arguments: argparse.Namespace) -> int:
     else:
         for block in deep_tables(found):
             console().print(block)
-    return OTHERWISE if found.violations else COMPLETED
+    return COMPLETED if found.conforms else OTHERWISE
 
 
 def _report(arguments: argparse.Namespace) -> int:

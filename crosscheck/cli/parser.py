@@ -34,8 +34,8 @@ EXIT = (
     "exit status: 0 when the command did what was asked, 1 otherwise, 2 for bad input, 130 when interrupted. "
     "`run` gives 1 where a run did not complete; `compare` and `report` give 0 although engines fail, since "
     "failures of engines are results, and `compare` 1 where two engines simulate different "
-    "mechanisms. `tune` gives 1 where no setting reaches the error, `verify` where a card is violated, "
-    "`diff` where sets differ beyond noise."
+    "mechanisms. `tune` gives 1 where no setting reaches the error, `verify` where a card is violated "
+    "or no scene was run, `diff` where sets differ beyond noise."
 )
 
 

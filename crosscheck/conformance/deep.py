@@ -59,6 +59,11 @@ class Tally:
     worst: dict[str, tuple[float, str]] = field(default_factory=dict)
     violations: list[dict[str, Any]] = field(default_factory=list)
 
+    @property
+    def conforms(self) -> bool:
+        """Whether no card is violated, and some mechanism was run."""
+        return not self.violations and self.decided(RUN) > 0
+
     def open(self) -> list[str]:
         """Cards that are not decided on as many mechanisms as planned."""
         cards = list(dict.fromkeys(card for _, asked in KINDS for card in asked))

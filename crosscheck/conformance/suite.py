@@ -58,9 +58,9 @@ class Conformance:
 
     @property
     def conforms(self) -> bool:
-        """Whether no property failed and some passed."""
-        statuses = {verdict.status for verdict in self.verdicts}
-        return FAIL not in statuses and PASS in statuses
+        """Whether no property failed, and some passed in a run: an engine that refuses every scene has none."""
+        failed = any(verdict.status == FAIL for verdict in self.verdicts)
+        return not failed and any(v.status == PASS and v.property != REFUSAL for v in self.verdicts)
 
     def to_record(self) -> dict[str, Any]:
         """The record that ``verify --json`` prints; numbers that are not finite are null."""
@@ -240,7 +240,8 @@ def _summary(conformance: Conformance) -> Text:
     counts = [f"{sum(v.status == status for v in conformance.verdicts)} {status}" for status in MARKS]
     scenes = {v.scene for v in conformance.verdicts}
     run = {v.scene for v in conformance.verdicts if v.property == "run" and v.status in (PASS, FAIL)}
-    return Text(f"{conformance.engine}: {', '.join(counts)}; {len(run)} of {len(scenes)} scenes run")
+    nothing = "" if run else "; an engine that runs none is not shown to conform"
+    return Text(f"{conformance.engine}: {', '.join(counts)}; {len(run)} of {len(scenes)} scenes run{nothing}")
 
 
 def _finite(value: Any) -> Any:

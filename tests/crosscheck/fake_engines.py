@@ -58,6 +58,11 @@ class Segfault(Fake):
         os.kill(os.getpid(), signal.SIGSEGV)
 
 
+class Refusing(Fake):
+    def cannot(self, scene: Scene) -> Cannot:
+        return Cannot(Owner.MODEL, "this fake runs nothing")
+
+
 class NoSettings(Fake):
     def settings(self, scene: Scene) -> list[Setting]:
         raise ValueError("none")
@@ -217,7 +222,7 @@ class Versionless(Fake):
 FAKE, SEGFAULT, HANG, CHATTER, RAISE, QUIT = Fake(), Segfault(), Hang(), Chatter(), Raise(), Quit()
 THREADS, MISSING, RECORDER, AGING = Threads(), Missing(), Recorder(), Aging()
 KEEPING, HERALD = Keeping(), Herald()
-SLOW, STUCK, NO_SETTINGS = Slow(), Stuck(), NoSettings()
+SLOW, STUCK, NO_SETTINGS, REFUSING = Slow(), Stuck(), NoSettings(), Refusing()
 MALFORMED, SCALARS, VERSIONLESS = Malformed(), Scalars(), Versionless()
 
 

@@ -67,6 +67,13 @@ def test_shaken_scene_and_truth():
         assert 0 < apart < 1e-12, f"{name}: {apart:.1e} from data that are off by rounding"
 
 
+def test_an_engine_that_refuses_every_scene_is_not_shown_to_conform(capsys, monkeypatch):
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    assert main(["verify", "fake_engines:REFUSING", "--scene", "free_fall", "--in-process"]) == 1
+    assert "an engine that runs none is not shown to conform" in " ".join(capsys.readouterr().out.split())
+    assert main(["verify", "fake_engines:REFUSING", "--mechanisms", "1"]) == 1
+
+
 def test_verify_command_and_crashing_engine(capsys, monkeypatch):
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
     status = main(["verify", "fake_engines:SEGFAULT", "--scene", "free_fall"])
