@@ -58,7 +58,7 @@ class Conformance:
 
     @property
     def conforms(self) -> bool:
-        """Whether no property failed, and some passed in a run: an engine that refuses every scene has none."""
+        """Whether no property failed and some passed in a run; an engine that refuses all has none."""
         failed = any(verdict.status == FAIL for verdict in self.verdicts)
         return not failed and any(v.status == PASS and v.property != REFUSAL for v in self.verdicts)
 

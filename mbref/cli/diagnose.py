@@ -131,9 +131,13 @@ def _motion_lines(along: AlongMotion | str | None) -> list[str]:
         *[f"    it ends early       {along.stopped}"] * bool(along.stopped),
         f"    rank                {along.rank}",
         f"    redundant rows      {along.redundant}",
-        f"    nearest singular    at t = {along.nearest_time:.3g} s: smallest singular value"
-        f" {along.nearest:.3g} of the largest" + (" (passed, or nearly)" if along.nearest < 1e-3 else ""),
     ]
+    if not along.crossings:
+        nearly = " (passed, or nearly)" if along.nearest < 1e-3 else ""
+        lines.append(
+            f"    nearest singular    at t = {along.nearest_time:.3g} s: smallest singular value"
+            f" {along.nearest:.3g} of the largest{nearly}"
+        )
     shown = along.crossings[:LISTED]
     lines += [f"    singular position   at t = {c.time:.6g} s: {c.sentence}" for c in shown]
     if len(along.crossings) > LISTED:

@@ -230,6 +230,12 @@ def test_diagnose_tells_a_locked_loop_and_drivers_too_many(tmp_path, capsys):
     assert last == "  more drivers than degrees of freedom (2 and 1): redundant rows remain"
 
 
+def test_diagnose_names_no_nearest_position_beside_those_that_are_passed(capsys):
+    assert main(["diagnose", "four_bar"]) == 0
+    out = capsys.readouterr().out
+    assert "singular position   at t = 0.0125865 s: one branch" in out and "nearest singular" not in out, out
+
+
 def test_run_writes_csv_and_json_and_animate_a_moving_picture(tmp_path, capsys, monkeypatch):
     run = ["run", "planar_slider_crank", "--duration", "0.01", "--samples", "3"]
     assert main([*run, "--out", str(tmp_path / "run.json")]) == 0

@@ -239,7 +239,7 @@ class Stepper:
         series = Series(expansion.x)
         h = series.reach(self._tolerance)
         if h <= SHORTEST * max(1e-3, float(self.t)):
-            raise Ended("its series ends, as at a singular position that no smooth branch goes through")
+            raise Ended("its steps end: its series cannot be continued over a singular position there")
         h, now = min(h, max(most, LEAST_STEP)), self._sharpness[-1]
         ahead = self._ahead(expansion.x, series, h)
         if ahead < now < NEAR * max(self._sharpness[-USUAL:]):
