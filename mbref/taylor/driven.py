@@ -34,10 +34,19 @@ from mbref.taylor.passage import (
     size_of,
 )
 from mbref.taylor.samples import LOST_MOTION, evaluate_series, put_terms, take_sample
-from mbref.taylor.stepping import LOST_ROWS, SHORTER, expand_at, remember_series, return_to_start
+from mbref.taylor.stepping import (
+    BEST,
+    LOST_ROWS,
+    SHORTER,
+    expand_at,
+    longest_step,
+    remember_series,
+    return_to_start,
+)
 
 LOOSE, EXACT = 3e-7, 1e-13  # tolerances of series, far from singular positions and near one
 KEEPING = 1e-4  # tolerance of strides' corrections, which keep a factor at which the next series is predicted
+SHORT = 0.25  # of a step that crosses: shorter strides towards its beginning are not worth it
 ORDER, LEAST_ORDER = 16, 12  # of the series, unless another one is asked for; the least that passes
 
 
@@ -81,6 +90,7 @@ def step_exactly(memory):
     is_behind = progress.crossed or pivot >= progress.past_pivot
     if is_behind and pivot >= AHEAD * progress.largest_pivot:
         progress.passing, progress.tolerance, progress.crossed = 0, KEEPING, 0
+        progress.order = progress.usual_order
         progress.past_pivot = 0.0
     return OK
 
@@ -99,13 +109,13 @@ def stride(memory):
     left = progress.end - clock.time
     h = min(reach(memory), left)
     if h * fall > progress.past_pivot:
-        return begin_exactly(progress.past_pivot / fall, memory)
+        return approach(progress.past_pivot / fall, left, memory)
     while True:
         status = land(h, h >= left, memory)
         if status == OK:
             return put_samples(h, left, memory)
         if status == SINGULAR_AHEAD:
-            return begin_exactly(distance_ahead(h, memory), memory)
+            return approach(distance_ahead(h, memory), left, memory)
         counts.rejected += 1
         h *= SHORTER
         return_to_start(memory)
@@ -173,14 +183,34 @@ def goes_on(h, memory):
 
 
 @kernel
-def begin_exactly(ahead, memory):
-    """Expand again where the stride began, now for exact steps, a time (s) ahead of a singular position:
-    SINGULAR_AHEAD, or why that cannot be."""
-    progress = memory.progress
+def approach(ahead, left, memory):
+    """Have exact steps begin where the first one crosses a singular position that is a time ``ahead`` (s): by a
+    stride to there, or here where that is near.  SINGULAR_AHEAD, or why that cannot be."""
+    progress, h = memory.progress, length_before(ahead, memory)
     return_to_start(memory)
-    progress.passing, progress.tolerance, progress.crossed, progress.ahead = 1, EXACT, 0, ahead
+    progress.crossed = 0
+    if 0.0 < h < left:
+        status = land(h, True, memory)
+        if status == OK:
+            status, ahead = put_samples(h, left, memory), ahead - h
+            if status != OK:
+                return status
+        else:
+            return_to_start(memory)
+    progress.passing, progress.tolerance, progress.ahead = 1, EXACT, ahead
+    progress.order = progress.exact_order
     status = memory.kernels.expand(memory.run.loop.clock.time, memory)
     return SINGULAR_AHEAD if status == OK else status
+
+
+@kernel
+def length_before(ahead, memory):
+    """Of a stride (s) to where an exact step crosses a singular position best, by the terms of the present
+    series, whose order is lower; 0 where it is short."""
+    progress = memory.progress
+    across = longest_step(EXACT ** (progress.order / progress.exact_order), memory)
+    h = ahead - BEST * across
+    return h if h > SHORT * across else 0.0
 
 
 @kernel
@@ -202,4 +232,5 @@ def may_have_crossed(h, memory):
         between, ends = inside(h, pivot, memory)
         changes = between - ends < VANISHING
     evaluate_series(h, memory)
+    memory.progress.crossed = changes
     return changes

@@ -27,8 +27,8 @@ def meet(memory):
     ``progress.meets`` is the time (s) to the singular position then, ``progress.top`` the last order of use.
     """
     progress, past = memory.progress, memory.series.past
-    order = progress.order
-    if order < LEAST_ORDER or not progress.past_pivot < BEFORE * progress.largest_pivot:
+    order, is_near = progress.order, progress.past_pivot < BEFORE * progress.largest_pivot
+    if order < LEAST_ORDER or not (progress.passing or is_near):
         return
     i = place_of_largest(order, memory)
     last, before = past[order, i], past[order - 1, i]
