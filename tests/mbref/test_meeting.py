@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from crosscheck.judge.metrics import measure
+from crosscheck.judge.truth import truth_for
 from mbref.kernels.compilation import INT, entry
 from mbref.kernels.layout import OK
 from mbref.method import Method
@@ -73,3 +75,15 @@ def test_passages_take_few_steps(name):
     assert known.size == 3
     assert np.abs(found - known).max() < 1e-8
     assert np.abs(run.position - exact.position).max() < 1e-7
+
+
+@pytest.mark.parametrize("name", ("four_bar", "five_bar"))
+def test_a_driven_singular_position_is_crossed_by_one_exact_step(name):
+    """A stride ends where that step begins; samples beside the position are exact."""
+    scene = SCENES[name]()
+    first = simulate(scene, Method.parse("taylor"), [scene.duration]).crossings[0].time
+    times = np.sort(np.append(np.linspace(0.0, scene.duration, 11), first + np.array([-1e-5, 0.0, 1e-5])))
+    run = simulate(scene, Method.parse("taylor"), times, Limits(code="generic"))
+    assert len(run.crossings) == 4 and run.cost.steps + run.cost.rejected <= 14
+    error = measure(scene, run, truth_for(scene))
+    assert error["error"] < 1e-12 and error["velocity_error"] < 1e-12, error
