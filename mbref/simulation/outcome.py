@@ -165,5 +165,5 @@ def _cause(run: Run, status: int) -> str:
         h = memory.control.smallest_step
         return f"the error estimate asks for a step below {h:.3g} s at t = {t:.6g} s"
     if status == LEFT_MOTION:
-        return f"{OUTCOMES[status].sentence}, as the default method shows, by t = {t:.6g} s"
+        return f"{OUTCOMES[status].sentence}, as one that projection holds shows, by t = {t:.6g} s"
     return f"{OUTCOMES[status].sentence} at t = {t:.6g} s ({run.method.formulation.name})"

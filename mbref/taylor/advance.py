@@ -5,7 +5,7 @@ from __future__ import annotations
 from mbref.kernels.compilation import INT, entry, kernel
 from mbref.kernels.layout import OK
 from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, TOO_MANY_STEPS
-from mbref.taylor.brief import parts_at, pass_briefly
+from mbref.taylor.brief import is_full, parts_at, pass_briefly
 from mbref.taylor.layout import SERIES
 from mbref.taylor.samples import put_terms
 
@@ -46,11 +46,10 @@ def advance_series(memory):
         if status != OK:
             put_terms(memory.series.past, memory)
             return status
-        passed = memory.progress.passed
-        if passed and parts_at(counts.crossings, memory):
+        if memory.progress.passed and parts_at(counts.crossings, memory):
             return PAUSED
         if clock.time >= memory.progress.end:
             return DONE
-        if passed == memory.crossings.time.shape[0]:
+        if is_full(memory):
             return PAUSED
     return PAUSED

@@ -13,7 +13,7 @@ from __future__ import annotations
 from mbref.kernels.compilation import kernel
 from mbref.kernels.layout import OK
 from mbref.linear_algebra.vectors import copy
-from mbref.taylor.crossing import find_crossing
+from mbref.taylor.crossing import find_crossings
 from mbref.taylor.partition import freedoms
 from mbref.taylor.passage import least_pivot, size_of
 from mbref.taylor.samples import evaluate_series, put_angles, put_state_at
@@ -59,10 +59,25 @@ def parts_at(crossing, memory):
 
 
 @kernel
+def is_full(memory):
+    """Whether there is no room for the singular positions of another step, which meets two at most."""
+    return memory.progress.passed + 2 > memory.crossings.time.shape[0]
+
+
+@kernel
+def parts_in_pair(before, memory):
+    """Whether the last step met two singular positions, behind a number of them, and another branch than the
+    smooth one is asked for at one."""
+    if memory.run.equations.system.counts.crossings < before + 2:
+        return False
+    return parts_at(before + 1, memory) or parts_at(before + 2, memory)
+
+
+@kernel
 def pass_briefly(memory):
     """Whether the singular position ahead of where the last step began is passed; else all is as it was."""
-    clock, counts, progress = memory.run.loop.clock, memory.run.equations.system.counts, memory.progress
-    if not may_be_brief(memory) or progress.passed == memory.crossings.time.shape[0]:
+    clock, counts = memory.run.loop.clock, memory.run.equations.system.counts
+    if not may_be_brief(memory) or is_full(memory):
         return False
     time, sample, passage = clock.time, clock.sample, clock.passage
     steps, crossings = counts.steps, counts.crossings
@@ -117,9 +132,9 @@ def crosses(memory):
         delay += clock.length * (slower + 4.0 * first / middle + first / after) / 6.0
         slower = first / after
         if counts.crossings != crossings:
-            is_certain = magnifies_little(delay, memory)
+            is_certain = magnifies_little(delay, memory) and not parts_in_pair(crossings, memory)
             if is_certain:
-                record_crossing(memory)
+                record_crossings(memory)
             progress.leaving = is_certain
             return is_certain
     return False
@@ -164,11 +179,19 @@ def magnifies_little(delay, memory):
 
 
 @kernel
-def record_crossing(memory):
+def record_crossings(memory):
     """Record time and state where the last step crossed."""
+    first, second = find_crossings(memory.run.loop.clock.length, memory)
+    record_at(first, memory)
+    if second >= 0.0:
+        record_at(second, memory)
+
+
+@kernel
+def record_at(h, memory):
+    """Record time and state at a distance h (s) from where the last step began."""
     run, crossings, k = memory.run, memory.crossings, memory.progress.passed
     length = run.loop.clock.length
-    h = find_crossing(length, memory)
     put_state_at(h, memory)
     crossings.time[k] = run.loop.clock.time - (length - h)
     copy(run.state.coordinates, crossings.coordinates[k])

@@ -1,4 +1,4 @@
-"""Runs that nothing holds to their branch: completed only on the motion that the default method follows.
+"""Runs that nothing holds to their branch: completed only on the motion that one with projection follows.
 
 Without projection nothing but the accelerations holds a run to its branch.  At a singular position they are
 ill-determined, and a pseudo-inverse whose rank drops there lets the run go on along another branch with all
@@ -13,11 +13,11 @@ import time
 import numpy as np
 
 from mbref import rotations
-from mbref.method import DEFAULT, Method
+from mbref.method import DEFAULT, SHORT, Method
 from mbref.simulation.limits import GENERIC, Limits
 from mbref.simulation.run import Run
-from mbref.simulation.stepping import DONE, LEFT_MOTION, UNDECIDED
-from mbref.taylor.run import CrossingRun
+from mbref.simulation.stepping import CREEPING, DONE, LEFT_MOTION, TOO_MANY_STEPS, UNDECIDED
+from mbref.taylor.run import CrossingRun, TaylorRun
 
 MOST_STEPS = 100_000
 TOLERANCE = 1e-10  # of the projected run
@@ -27,7 +27,7 @@ COARSE = 0.1  # the same of a run in fixed steps, whose error its tolerance does
 
 
 def compare_with_default(run: Run, ended: int) -> int:
-    """The status of a run that ended with one, after comparing its samples with those of the default method.
+    """The status of a run that ended with one, after comparing its samples with those of one with projection.
 
     LEFT_MOTION where it left the motion, whose samples end there; UNDECIDED, at the time of the clock, where
     the projected run does not tell a branch of a run that is DONE; else as it was.  A run that projection
@@ -37,9 +37,7 @@ def compare_with_default(run: Run, ended: int) -> int:
     if not (clock.sample and _may_leave(run) and run.limits.compared):
         return ended
     began = time.process_time()
-    limits = Limits(rtol=TOLERANCE, code=GENERIC, most_steps=MOST_STEPS)
-    projected = CrossingRun(run.scene, Method.parse(DEFAULT), run.times, limits)
-    status, _ = projected.advance(None)
+    projected, status = _held(run)
     run.making += time.process_time() - began
     theirs = projected.memory.loop.clock
     off = _distances(run, projected, min(int(theirs.sample), int(clock.sample))) > _allowed(run)
@@ -51,6 +49,21 @@ def compare_with_default(run: Run, ended: int) -> int:
         return ended
     clock.time = theirs.time
     return UNDECIDED
+
+
+def _held(run: Run) -> tuple[Run, int]:
+    """A run of the same scene that projection holds, and how it ended: by series where the default method
+    fails otherwise than at a branch or by its steps."""
+    limits = Limits(rtol=TOLERANCE, code=GENERIC, most_steps=MOST_STEPS)
+    projected: Run = CrossingRun(run.scene, Method.parse(DEFAULT), run.times, limits)
+    status, _ = projected.advance(None)
+    if status in (DONE, UNDECIDED, TOO_MANY_STEPS, CREEPING):
+        return projected, status
+    series = TaylorRun(run.scene, Method.parse(SHORT["taylor"]), run.times, limits)
+    of_series, _ = series.advance(None)
+    if series.memory.loop.clock.sample < projected.memory.loop.clock.sample:
+        return projected, status
+    return series, of_series
 
 
 def _may_leave(run: Run) -> bool:

@@ -16,6 +16,8 @@ from mbref.taylor.samples import evaluate_series
 
 GOLDEN, SECTIONS = 0.6180339887498949, 70  # of the search for the least determinant
 INTERPOLATIONS, HALVINGS = 12, 45  # of the search for its change of sign
+ASIDE = 1e-5  # of a step, from where its determinant is least: the sign there tells two changes of it
+SEPARATE = 1e-11  # of the determinant where it began, between two changes: less is rounding of one place
 CLOSE = 1e-13  # of a step, by which two estimates of the change would differ at its end
 LOST_ROW = 1e-6  # of the largest pivot: formulations may take a row with less for one that depends on others
 
@@ -141,14 +143,51 @@ def motions_oppose(memory):
 
 
 @kernel
-def find_crossing(h, memory):
-    """The time (s, from its beginning) at which a step of h seconds that crossed met the singular position.
+def find_crossings(h, memory):
+    """The times (s, from its beginning) at which a step of h seconds that crossed met singular positions:
+    the second is negative where it met one.
 
     The determinant vanishes there, with a change of sign unless branches of several loops cross at once.
     """
     remember_gradient(memory)
     change = sign_change(h, memory)
-    return change if change >= 0.0 else least_between(h, memory)
+    return (change, -1.0) if change >= 0.0 else two_changes(h, memory)
+
+
+@kernel
+def crossings_in(h, memory):
+    """How many singular positions a step of h seconds met that crossed: one, or two of different loops."""
+    remember_gradient(memory)
+    negative, _ = overlap_at_end(memory)
+    if negative:
+        return 1
+    _, second = two_changes(h, memory)
+    return 2 if second >= 0.0 else 1
+
+
+@kernel
+def two_changes(h, memory):
+    """The same as ``find_crossings``, of a step at whose ends the determinant has the same sign: between two
+    changes it has the other one."""
+    unit, least = size_at_start(memory), least_between(h, memory)
+    for aside in (-ASIDE * h, ASIDE * h):
+        between = least + aside
+        if 0.0 < between < h and value_at(between, unit, memory) < -SEPARATE:
+            first = change_between(0.0, between, unit, memory)
+            return first, change_between(h, between, unit, memory)
+    return least, -1.0
+
+
+@kernel
+def change_between(outside, inside, unit, memory):
+    """The time (s) between two at which the determinant changes its sign; it is negative inside."""
+    for _ in range(HALVINGS):
+        middle = 0.5 * (outside + inside)
+        if value_at(middle, unit, memory) < 0.0:
+            inside = middle
+        else:
+            outside = middle
+    return 0.5 * (outside + inside)
 
 
 @kernel
@@ -158,8 +197,9 @@ def is_at_crossing(at, h, memory):
     progress = memory.progress
     if not progress.crossed:
         return False
-    crossing = find_crossing(h, memory)
-    return abs(at - crossing) * progress.past_pivot <= LOST_ROW * progress.largest_pivot * crossing
+    first, second = find_crossings(h, memory)
+    distance = min(abs(at - first), abs(at - second))
+    return distance * progress.past_pivot <= LOST_ROW * progress.largest_pivot * first
 
 
 @kernel

@@ -15,7 +15,7 @@ from mbref.kernels.layout import OK
 from mbref.linear_algebra.vectors import larger
 from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED
 from mbref.taylor.advance import begin_once
-from mbref.taylor.brief import record_crossing
+from mbref.taylor.brief import is_full, record_crossings
 from mbref.taylor.crossing import changes_sign
 from mbref.taylor.layout import SERIES
 from mbref.taylor.passage import (
@@ -55,7 +55,7 @@ def follow_drivers(memory):
     """Begin a series unless one has begun, and advance to the end, or by a number of steps or of singular
     positions: DONE, PAUSED, or why the motion cannot be followed."""
     clock, counts, control = memory.run.loop.clock, memory.run.equations.system.counts, memory.run.control
-    progress, kept = memory.progress, memory.crossings.time.shape[0]
+    progress = memory.progress
     status = begin_once(memory)
     if status != OK:
         return status
@@ -70,7 +70,7 @@ def follow_drivers(memory):
             return status
         if clock.time >= progress.end:
             return DONE
-        if progress.passed == kept:
+        if is_full(memory):
             return PAUSED
     return PAUSED
 
@@ -85,7 +85,7 @@ def step_exactly(memory):
     if memory.kernels.step(memory) != OK:
         return UNDECIDED
     if progress.crossed:
-        record_crossing(memory)
+        record_crossings(memory)
     pivot = least_pivot(memory)
     is_behind = progress.crossed or pivot >= progress.past_pivot
     if is_behind and pivot >= AHEAD * progress.largest_pivot:

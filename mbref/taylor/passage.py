@@ -102,6 +102,26 @@ def keeps_signs(memory):
 
 
 @kernel
+def changes_signs(memory):
+    """Whether pivots of rows and variables that were used in all of a step change their signs."""
+    progress = memory.progress
+    if progress.choice == progress.past_choice:
+        return not keeps_signs(memory)
+    return progress.choice == progress.past_choice + 1 and kept_pivot(memory) < 0.0
+
+
+@kernel
+def vanishes_inside(h, memory):
+    """Whether the determinant vanishes inside a step of h seconds."""
+    remember_gradient(memory)
+    _, behind = overlap_at_end(memory)
+    ends = min(size_at_start(memory), behind)
+    vanishes = size_at(least_between(h, memory), memory) < VANISHED + ends
+    evaluate_series(h, memory)
+    return vanishes
+
+
+@kernel
 def is_near(pivot, progress):
     """Whether a step begins or ends near a singular position."""
     return min(pivot, progress.past_pivot) < NEAR * progress.largest_pivot
@@ -120,8 +140,9 @@ def has_crossed(h, pivot, memory):
 
     Pivots of the same rows and variables whose signs stay have vanished twice or never, and twice takes a
     way that is long beside them: else no determinant is needed.  Branches of several loops that cross at once
-    leave the sign of the determinant: in a motion that does not turn back, it is looked at where a least
-    pivot vanishes that falls and rises linearly.
+    leave the sign of the determinant, and so do two crossings: it is looked at where it is least if pivots
+    change their signs and, in a motion that does not turn back, where a least pivot vanishes that falls and
+    rises linearly.
     """
     progress, moved = memory.progress, moved_in(h, memory)
     brief = progress.past_pivot + pivot > STEEPEST * moved
@@ -129,6 +150,8 @@ def has_crossed(h, pivot, memory):
         return False
     far = progress.passing and progress.past_pivot >= BEFORE * progress.largest_pivot
     if changes_sign(h, min(int(moved / LONG) + 1, MOST_PARTS), memory):
+        return True
+    if changes_signs(memory) and vanishes_inside(h, memory):
         return True
     turns = turns_back(memory.series.terms, memory)
     if brief or (keeps_signs(memory) and not is_near(pivot, progress)) or turns:

@@ -17,8 +17,16 @@ from mbref.simulation.stepping import (
     share,
 )
 from mbref.stabilisation.projection import put_active
-from mbref.taylor.brief import crosses, may_be_brief, parts_at, pass_briefly, step_exactly, step_usually
-from mbref.taylor.crossing import find_crossing
+from mbref.taylor.brief import (
+    crosses,
+    is_full,
+    may_be_brief,
+    parts_at,
+    pass_briefly,
+    step_exactly,
+    step_usually,
+)
+from mbref.taylor.crossing import find_crossings
 from mbref.taylor.layout import SERIES
 from mbref.taylor.partition import freedoms
 from mbref.taylor.passage import AHEAD, least_pivot
@@ -62,7 +70,7 @@ def advance_over(status, source, memory):
     while True:
         if status == SINGULAR_AHEAD:
             status = pass_over(source, memory)
-        if status != PAUSED or memory.progress.passed == memory.crossings.time.shape[0]:
+        if status != PAUSED or is_full(memory):
             return status
         status = advance_steps(source)
         if status != SINGULAR_AHEAD:
@@ -168,7 +176,7 @@ def pass_on(memory):
 
 @kernel
 def step_on(memory):
-    """The steps of ``pass_on``; ``crossing`` is the singular position that the last one passed."""
+    """The steps of ``pass_on``; ``crossing`` is the first singular position that the last one passed."""
     clock, counts, progress = memory.run.loop.clock, memory.run.equations.system.counts, memory.progress
     passed = counts.crossings
     while counts.steps < memory.run.control.most_steps:
@@ -177,7 +185,7 @@ def step_on(memory):
             put_terms(memory.series.past, memory)
             return status
         if counts.crossings != passed:
-            keep_crossing(memory)
+            keep_first_crossing(memory)
         if clock.time >= progress.end:
             return DONE
         judge_clearance(memory)
@@ -186,11 +194,25 @@ def step_on(memory):
     return TOO_MANY_STEPS
 
 
+@entry(INT(SERIES))
+def keep_second_crossing(memory):
+    """Keep where the last step crossed for the second time: OK."""
+    _, second = find_crossings(memory.run.loop.clock.length, memory)
+    keep_crossing(second, memory)
+    return OK
+
+
 @kernel
-def keep_crossing(memory):
-    """Keep where the last step crossed; the state in memory stays behind it."""
+def keep_first_crossing(memory):
+    """Keep where the last step crossed."""
+    first, _ = find_crossings(memory.run.loop.clock.length, memory)
+    keep_crossing(first, memory)
+
+
+@kernel
+def keep_crossing(h, memory):
+    """Keep the state at a distance h (s) from where the last step began; that in memory stays behind it."""
     run, length = memory.run, memory.run.loop.clock.length
-    h = find_crossing(length, memory)
     copy_state(run.state, run.previous)
     put_state_at(h, memory)
     take_snapshot(run, memory.crossing)

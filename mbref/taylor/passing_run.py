@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,16 @@ from mbref.simulation.singular_start import Leaving
 from mbref.simulation.stepping import DONE, PAUSED, UNDECIDED
 from mbref.specialised import Untraceable
 from mbref.taylor.layout import Polynomials
-from mbref.taylor.passing import advance_over, begin_here, cross, give_back, look_along, pass_on, take_over
+from mbref.taylor.passing import (
+    advance_over,
+    begin_here,
+    cross,
+    give_back,
+    keep_second_crossing,
+    look_along,
+    pass_on,
+    take_over,
+)
 from mbref.taylor.polynomials import Geometry
 from mbref.taylor.series_run import EXACT, SeriesRun
 from mbref.taylor.start import OFF
@@ -87,17 +97,23 @@ class PassingRun(SeriesRun):
         return status
 
     def _recorded(self, passing: Entry) -> int:
-        """The status of steps that may pass a singular position, which is recorded."""
-        counts = self.memory.equations.system.counts
+        """The status of steps that may pass singular positions, which are recorded."""
+        counts: Any = self.memory.equations.system.counts
         passed = int(counts.crossings)
         status = int(passing(self._packed_taylor.argument))
-        if status not in (PAUSED, DONE) or counts.crossings == passed:
+        if status not in (PAUSED, DONE):
             return status
-        taken, found = dict(self.limits.branches).get(passed + 1, SMOOTH), self.taylor.crossing
-        q, v = found.coordinates.copy(), found.velocities.copy()
-        crossing = Passed(float(found.instant.time), q, v, taken)
-        self.crossings.append(crossing)
-        return status if taken == SMOOTH else self._take_branch(singular_position(self.model, crossing))
+        for number in range(passed + 1, int(counts.crossings) + 1):
+            if number == passed + 2:
+                keep_second_crossing(self._packed_taylor.argument)
+            taken, found = dict(self.limits.branches).get(number, SMOOTH), self.taylor.crossing
+            q, v = found.coordinates.copy(), found.velocities.copy()
+            crossing = Passed(float(found.instant.time), q, v, taken)
+            self.crossings.append(crossing)
+            if taken != SMOOTH:
+                counts.crossings = number
+                return self._take_branch(singular_position(self.model, crossing))
+        return status
 
     def leave_along_branch(self, crossing: Passed) -> int:
         """Go on from a singular position just passed along another branch than the smooth one: PAUSED, DONE

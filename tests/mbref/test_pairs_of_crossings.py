@@ -1,0 +1,69 @@
+"""Singular positions of different loops that follow each other within a step: each is told."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mbref.scene import Revolute, Scene
+from mbref.scenes.four_bar import LENGTH, Z, parallelogram
+from mbref.scenes.links import about_z, link
+from mbref.simulation.simulate import Limits, simulate
+
+METHODS = ("taylor", "taylor[order=28]", "alf-dual+projection")
+APART = (2e-2, -5e-3, 3e-4)  # rad, of the crank, between the flat positions of both loops
+
+
+def two_rhombi(apart: float, angle: float = 0.3) -> Scene:
+    """A rhombus whose rocker is the crank of another one, on a frame that is turned by a small angle."""
+    first = parallelogram(angle, "two_rhombi")
+    along = np.array([math.cos(apart), math.sin(apart), 0.0]) * LENGTH
+    pin = next(joint.anchor for joint in first.joint if joint.name == "C")
+    end, foot = tuple(np.array(pin) + along), tuple(np.array([LENGTH, 0.0, 0.0]) + along)
+    bars = (
+        link("coupler2", pin, end, about_z(apart), LENGTH),
+        link("rocker2", foot, end, about_z(angle), LENGTH),
+    )
+    hinges = (
+        Revolute(name="E", bodies=("rocker", "coupler2"), anchor=pin, axis=Z),
+        Revolute(name="F", bodies=("coupler2", "rocker2"), anchor=end, axis=Z),
+        Revolute(name="G", bodies=("ground", "rocker2"), anchor=foot, axis=Z),
+    )
+    return first.with_(
+        gravity=(0.0, -9.81, 0.0), body=(*first.body, *bars), joint=(*first.joint, *hinges), duration=1.0
+    )
+
+
+def angles(run) -> np.ndarray:
+    """The crank's at each singular position, from its flat ones (rad)."""
+    return np.array([math.asin(passed.position[0, 1] / (LENGTH / 2)) for passed in run.crossings])
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-9, 1e-12])
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("apart", APART)
+def test_both_are_told(apart, method, rtol):
+    """The crank swings from 0.3 rad to π - 0.3 rad below its frame and back: flat at 0 and at the turn of
+    the other frame, there and at π from there."""
+    run = simulate(two_rhombi(apart), method, [1.0], Limits(rtol=rtol, code="generic"))
+    assert run.outcome.label == "COMPLETED", run.message
+    there, beyond = sorted((0.0, apart), reverse=True), sorted((0.0, -apart))
+    expected = (there + beyond)[: len(run.crossings)]
+    assert len(run.crossings) >= 4
+    assert np.abs(angles(run)[:4] - expected).max() < 1e-9
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("number", [1, 2])
+def test_another_branch_is_taken_at_the_one_asked_for(number, method):
+    """At the first or the second of two within a step: the loop goes over whose flat position it is."""
+    apart, times = -2e-2, np.linspace(0.0, 0.6, 61)
+    run = simulate(two_rhombi(apart), method, times, Limits(branches={number: 2}, code="generic"))
+    assert run.outcome.label == "COMPLETED", run.message
+    assert np.abs(angles(run)[:number] - [0.0, apart][:number]).max() < 1e-9
+    behind = times > run.crossings[number - 1].time
+    turned = 2 * np.arctan2(run.orientation[..., 3], run.orientation[..., 0])
+    coupler, frame = (1, 0.0) if number == 1 else (3, apart)
+    assert np.abs(turned[~behind, coupler] - frame).max() < 1e-9
+    assert np.abs(turned[behind, coupler] - frame).max() > 0.1
+    assert np.ptp(run.energy) < 1e-7 * np.abs(run.energy).max()
