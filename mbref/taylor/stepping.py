@@ -134,9 +134,18 @@ def keep_terms(memory):
 
 @kernel
 def keep_series(memory):
-    """Have steps look along the series that begins here, without its rounding."""
+    """Have steps look along the series that begins here, without its rounding where that makes them longer.
+
+    Subtracted, a miss at a small distance may leave few orders that rounding does not outgrow.
+    """
+    progress = memory.progress
     keep_terms(memory)
     meet(memory)
+    if progress.meets != 0.0:
+        reached = longest_step(exactness(progress), memory)
+        keep_terms(memory)
+        if longest_step(exactness(progress), memory) < reached:
+            meet(memory)
 
 
 @kernel
