@@ -184,8 +184,8 @@ def goes_on(h, memory):
 
 @kernel
 def approach(ahead, left, memory):
-    """Have exact steps begin where the first one crosses a singular position that is a time ``ahead`` (s): by a
-    stride to there, or here where that is near.  SINGULAR_AHEAD, or why that cannot be."""
+    """Have exact steps begin where the first one crosses a singular position best: by a stride to there, or
+    here where the position, a time ``ahead`` (s), is near.  SINGULAR_AHEAD, or why that cannot be."""
     progress, h = memory.progress, length_before(ahead, memory)
     return_to_start(memory)
     progress.crossed = 0

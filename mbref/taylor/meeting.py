@@ -21,26 +21,31 @@ LEAST_TOP = 4
 
 
 @kernel
-def meet(memory):
-    """Subtract the miss from the series that is looked along, where its last terms show nothing else.
-
-    ``progress.meets`` is the time (s) to the singular position then, ``progress.top`` the last order of use.
-    """
+def time_to_meet(memory):
+    """The time (s) to the singular position that the series in use misses by rounding; 0 where it misses none
+    or its last terms show anything else.  Negative times are of a position behind."""
     progress, past = memory.progress, memory.series.past
     order, is_near = progress.order, progress.past_pivot < BEFORE * progress.largest_pivot
     if order < LEAST_ORDER or not (progress.passing or is_near):
-        return
+        return 0.0
     i = place_of_largest(order, memory)
     last, before = past[order, i], past[order - 1, i]
     if last == 0.0 or not abs(before * before - last * past[order - 2, i]) <= PURE * before * before:
-        return
+        return 0.0
     distance, miss = before / last, abs(last)
     for _ in range(order):
         miss *= abs(distance)
-    if miss * progress.past_pivot <= MISSED:
-        subtract_miss(distance, memory)
-        progress.top = last_order(distance, memory)
-        progress.cut, progress.meets = progress.top, distance
+    return distance if miss * progress.past_pivot <= MISSED else 0.0
+
+
+@kernel
+def meet(distance, memory):
+    """Have the series in use meet a singular position at a distance (s): without its miss, and up to the last
+    order that is not rounding (``progress.top``)."""
+    progress = memory.progress
+    subtract_miss(distance, memory)
+    progress.top = last_order(distance, memory)
+    progress.cut, progress.meets = progress.top, distance
 
 
 @kernel

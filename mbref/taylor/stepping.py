@@ -30,7 +30,7 @@ from mbref.taylor.loads import (
     part_behind_no_length,
     time_to_no_length,
 )
-from mbref.taylor.meeting import meet
+from mbref.taylor.meeting import meet, time_to_meet
 from mbref.taylor.partition import choose
 from mbref.taylor.passage import (
     BEFORE,
@@ -63,6 +63,7 @@ LOOSER = 1e4  # of rates in a passage: they count where a step is short beside t
 NEARLY = 0.2  # of a step's first pivot: a step that ends nearer to a singular position is tried beyond it
 CROSSING = 1.05  # of the time in which a singular position is met: a longer step crosses it
 BEST = 0.6  # of a step that crosses: where it begins, from the singular position
+WORTH = 0.5  # of a step that a series with its rounding allows: a series without it allows as long a one
 OVER = 1.25  # its length then, over the distance; the same to where a spring has no length
 
 
@@ -134,18 +135,16 @@ def keep_terms(memory):
 
 @kernel
 def keep_series(memory):
-    """Have steps look along the series that begins here, without its rounding where that makes them longer.
-
-    Subtracted, a miss at a small distance may leave few orders that rounding does not outgrow.
-    """
-    progress = memory.progress
+    """Have steps look along the series that begins here, without its rounding unless that makes them short:
+    beside a near position few orders may be left that rounding does not outgrow."""
     keep_terms(memory)
-    meet(memory)
-    if progress.meets != 0.0:
-        reached = longest_step(exactness(progress), memory)
-        keep_terms(memory)
-        if longest_step(exactness(progress), memory) < reached:
-            meet(memory)
+    distance = time_to_meet(memory)
+    if distance != 0.0:
+        tolerance = exactness(memory.progress)
+        reached = longest_step(tolerance, memory)
+        meet(distance, memory)
+        if not longest_step(tolerance, memory) > WORTH * reached:
+            keep_terms(memory)
 
 
 @kernel

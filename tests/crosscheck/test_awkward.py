@@ -82,5 +82,5 @@ def test_a_mechanism_that_locks_has_a_reference_until_then(seed):
     scene = awkward("locking", seed)
     times = np.linspace(0.0, scene.duration, 61)
     found, reason = judged(scene, times, *runs(scene, times, SECONDS))
-    assert reason.startswith("its series ends, as at a singular position")
+    assert reason.startswith("its steps end: its series cannot be continued over a singular position")
     assert 10 < len(found.times) < len(times) and found.bound.max() < 1e-9

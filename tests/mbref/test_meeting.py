@@ -11,7 +11,7 @@ from mbref.method import Method
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
 from mbref.taylor.layout import SERIES
-from mbref.taylor.meeting import meet
+from mbref.taylor.meeting import meet, time_to_meet
 from mbref.taylor.run import TaylorRun
 
 ORDER = 22
@@ -20,7 +20,9 @@ ORDER = 22
 @entry(INT(SERIES))
 def without_miss(memory):
     """Take the miss out of the series that is looked along: OK."""
-    meet(memory)
+    distance = time_to_meet(memory)
+    if distance != 0.0:
+        meet(distance, memory)
     return OK
 
 
