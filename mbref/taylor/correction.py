@@ -96,16 +96,22 @@ def close_rate(memory):
 
 
 @kernel
+def largest_change(memory):
+    """The largest change of a variable by the last correction."""
+    solver, change = memory.solver, 0.0
+    for j in range(solver.order.shape[0]):
+        change = larger(change, solver.change[j])
+    return change
+
+
+@kernel
 def changes_factor(left, memory):
     """Whether the last correction, which took a violation away, has changed the factor.
 
     It has by the correction over the distance from a singular position, which the least pivot tells; where
     masses differ much, light bodies move the farther the heavier the others are, by the change over Φ.
     """
-    solver, tolerance, change = memory.solver, memory.progress.tolerance, 0.0
-    pivot = least_pivot(memory)
-    for j in range(solver.order.shape[0]):
-        change = larger(change, solver.change[j])
+    tolerance, change, pivot = memory.progress.tolerance, memory.progress.corrected, least_pivot(memory)
     return left > tolerance * pivot * pivot or change * change > tolerance * left
 
 
@@ -125,6 +131,7 @@ def correct(memory):
             break
     if not left <= SMALL:
         return NOT_CONVERGED
+    progress.corrected = largest_change(memory)
     if changes_factor(left, memory):
         status = factorise(memory)
     close_rate(memory)

@@ -171,6 +171,8 @@ class Progress(NamedTuple):
     farthest: float = 0.0  # m by which the series may miss the coordinates of the start
     freedoms: int = 0  # at the start, by singular values of the constraint rows
     violation: float = 0.0  # the largest before the last correction
+    corrected: float = 0.0  # the largest change of a variable by the last correction
+    resting: int = 0  # whether the motion began at rest beside a singular position that is near
     crossed: int = 0  # whether the last attempt crossed a singular position
     end: float = 0.0  # time of the last step's end
     choice: int = 0  # of the partition, counted

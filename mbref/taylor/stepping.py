@@ -54,7 +54,7 @@ from mbref.taylor.samples import (
 )
 from mbref.taylor.series import expand, expand_with_multipliers, turns_back_in
 from mbref.taylor.solver import factorise_anew
-from mbref.taylor.start import judged_start
+from mbref.taylor.start import is_turned, judged_start
 
 ROUNDING = 1e-12  # of rows
 LOST_ROWS = 100.0  # tolerances by which rows may be off
@@ -166,6 +166,8 @@ def judge(h, last, memory):
     status = judge_branch(h, last, memory)
     if status != OK:
         return status
+    if progress.resting and is_turned(memory):
+        return UNDECIDED
     off, size = 0.0, 1.0
     for i in range(memory.solver.order.shape[0]):
         off = larger(off, (2.0 * terms[2, i] - state[2, i]) * h * h)
@@ -297,6 +299,7 @@ def begin(memory):
     read_variables(t, memory)
     expand_drivers(t, memory)
     memory.progress.rank, memory.progress.crossed, memory.progress.leaving = choose(memory), 0, 0
+    memory.progress.resting = 0
     factorise_anew(memory)
     status = memory.kernels.expand(t, memory)
     return status if t > 0.0 else judged_start(status, memory)
