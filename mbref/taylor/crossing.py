@@ -155,14 +155,12 @@ def find_crossings(h, memory):
 
 
 @kernel
-def crossings_in(h, memory):
-    """How many singular positions a step of h seconds met that crossed: one, or two of different loops."""
-    remember_gradient(memory)
-    negative, _ = overlap_at_end(memory)
-    if negative:
-        return 1
-    _, second = two_changes(h, memory)
-    return 2 if second >= 0.0 else 1
+def count_crossings(h, memory):
+    """How many singular positions a step of h seconds met that crossed, one or two of different loops; keeps
+    the times at which it did (``progress.first``, ``progress.second``)."""
+    progress = memory.progress
+    progress.first, progress.second = find_crossings(h, memory)
+    return 2 if progress.second >= 0.0 else 1
 
 
 @kernel
