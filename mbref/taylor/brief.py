@@ -13,7 +13,6 @@ from __future__ import annotations
 from mbref.kernels.compilation import kernel
 from mbref.kernels.layout import OK
 from mbref.linear_algebra.vectors import copy
-from mbref.taylor.crossing import find_crossings
 from mbref.taylor.partition import freedoms
 from mbref.taylor.passage import least_pivot, size_of
 from mbref.taylor.samples import evaluate_series, put_angles, put_state_at
@@ -181,10 +180,10 @@ def magnifies_little(delay, memory):
 @kernel
 def record_crossings(memory):
     """Record time and state where the last step crossed."""
-    first, second = find_crossings(memory.run.loop.clock.length, memory)
-    record_at(first, memory)
-    if second >= 0.0:
-        record_at(second, memory)
+    progress = memory.progress
+    record_at(progress.first, memory)
+    if progress.second >= 0.0:
+        record_at(progress.second, memory)
 
 
 @kernel

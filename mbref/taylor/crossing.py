@@ -15,6 +15,7 @@ from mbref.taylor.partition import freedoms, put_gradient
 from mbref.taylor.samples import evaluate_series
 
 GOLDEN, SECTIONS = 0.6180339887498949, 70  # of the search for the least determinant
+FEW = 12  # sections, after which a determinant that vanishes is less than 1e-4 of those at the ends
 INTERPOLATIONS, HALVINGS = 12, 45  # of the search for its change of sign
 ASIDE = 1e-5  # of a step, from where its determinant is least: the sign there tells two changes of it
 SEPARATE = 1e-11  # of the determinant where it began, between two changes: less is rounding of one place
@@ -155,21 +156,19 @@ def find_crossings(h, memory):
 
 
 @kernel
-def crossings_in(h, memory):
-    """How many singular positions a step of h seconds met that crossed: one, or two of different loops."""
-    remember_gradient(memory)
-    negative, _ = overlap_at_end(memory)
-    if negative:
-        return 1
-    _, second = two_changes(h, memory)
-    return 2 if second >= 0.0 else 1
+def count_crossings(h, memory):
+    """How many singular positions a step of h seconds met that crossed, one or two of different loops; keeps
+    the times at which it did (``progress.first``, ``progress.second``)."""
+    progress = memory.progress
+    progress.first, progress.second = find_crossings(h, memory)
+    return 2 if progress.second >= 0.0 else 1
 
 
 @kernel
 def two_changes(h, memory):
     """The same as ``find_crossings``, of a step at whose ends the determinant has the same sign: between two
     changes it has the other one."""
-    unit, least = size_at_start(memory), least_between(h, memory)
+    unit, least = size_at_start(memory), least_between(h, SECTIONS, memory)
     for aside in (-ASIDE * h, ASIDE * h):
         between = least + aside
         if 0.0 < between < h and value_at(between, unit, memory) < -SEPARATE:
@@ -259,12 +258,12 @@ def signed(negative, logarithm):
 
 
 @kernel
-def least_between(h, memory):
+def least_between(h, sections, memory):
     """The time (s) inside a step of h seconds at which the determinant is least, by golden section."""
     start, end = 0.0, h
     one, other = h - GOLDEN * h, GOLDEN * h
     before, after = size_at(one, memory), size_at(other, memory)
-    for _ in range(SECTIONS):
+    for _ in range(sections):
         if before < after:
             end, other, after = other, one, before
             one = end - GOLDEN * (end - start)

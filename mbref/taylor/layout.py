@@ -172,6 +172,8 @@ class Progress(NamedTuple):
     freedoms: int = 0  # at the start, by singular values of the constraint rows
     violation: float = 0.0  # the largest before the last correction
     corrected: float = 0.0  # the largest change of a variable by the last correction
+    first: float = 0.0  # s, from the last step's beginning to where it crossed
+    second: float = 0.0  # s, the same of the second singular position; negative if it met one
     resting: int = 0  # whether the motion began at rest beside a singular position that is near
     crossed: int = 0  # whether the last attempt crossed a singular position
     end: float = 0.0  # time of the last step's end

@@ -21,6 +21,8 @@ from mbref.kernels.layout import OK
 from mbref.linear_algebra.vectors import copy, larger
 from mbref.simulation.stepping import SINGULAR_AHEAD, STEP_TOO_SMALL, UNDECIDED
 from mbref.taylor.crossing import (
+    FEW,
+    SECTIONS,
     changes_sign,
     least_between,
     overlap_at_end,
@@ -43,7 +45,8 @@ CLOCK = 3e-16  # of the time: its rounding, over which drivers and variables mov
 DEEPEST = 0.2  # of a step's first pivot: its last is not less, so that the next is not the worse for it
 SHORTEST = 0.05  # the same, of a step that crosses: refused, it would be tried again from nearer
 VANISHING = log(0.2)  # of a determinant over its values at both ends, that falls and rises linearly
-VANISHED = -30.0  # the same logarithm at its least, of a step that begins far from where it crosses
+FALLING = -5.0  # the same logarithm near where it vanishes
+VANISHED = -30.0  # the same at its least, of a step that begins far from where it crosses
 LONG, MOST_PARTS = 0.5, 8  # that a variable moves in a part of a step, and the most parts
 STEEPEST = 1.5  # that a pivot falls and rises in a step, over the most that a variable moves
 LEFT = 2.0  # of the violation that corrections leave, of rows that depend on others: it is no gap's
@@ -116,7 +119,9 @@ def vanishes_inside(h, memory):
     remember_gradient(memory)
     _, behind = overlap_at_end(memory)
     ends = min(size_at_start(memory), behind)
-    vanishes = size_at(least_between(h, memory), memory) < VANISHED + ends
+    vanishes = size_at(least_between(h, FEW, memory), memory) < FALLING + ends
+    if vanishes:
+        vanishes = size_at(least_between(h, SECTIONS, memory), memory) < VANISHED + ends
     evaluate_series(h, memory)
     return vanishes
 
@@ -159,7 +164,7 @@ def has_crossed(h, pivot, memory):
     between, ends = inside(h, pivot, memory)
     vanishes = between - ends < VANISHING
     if vanishes and far:
-        vanishes = size_at(least_between(h, memory), memory) < VANISHED + ends
+        vanishes = size_at(least_between(h, SECTIONS, memory), memory) < VANISHED + ends
     evaluate_series(h, memory)
     return vanishes
 

@@ -26,7 +26,6 @@ from mbref.taylor.brief import (
     step_exactly,
     step_usually,
 )
-from mbref.taylor.crossing import find_crossings
 from mbref.taylor.layout import SERIES
 from mbref.taylor.partition import freedoms
 from mbref.taylor.passage import AHEAD, least_pivot
@@ -185,7 +184,7 @@ def step_on(memory):
             put_terms(memory.series.past, memory)
             return status
         if counts.crossings != passed:
-            keep_first_crossing(memory)
+            keep_crossing(memory.progress.first, memory)
         if clock.time >= progress.end:
             return DONE
         judge_clearance(memory)
@@ -197,16 +196,8 @@ def step_on(memory):
 @entry(INT(SERIES))
 def keep_second_crossing(memory):
     """Keep where the last step crossed for the second time: OK."""
-    _, second = find_crossings(memory.run.loop.clock.length, memory)
-    keep_crossing(second, memory)
+    keep_crossing(memory.progress.second, memory)
     return OK
-
-
-@kernel
-def keep_first_crossing(memory):
-    """Keep where the last step crossed."""
-    first, _ = find_crossings(memory.run.loop.clock.length, memory)
-    keep_crossing(first, memory)
 
 
 @kernel

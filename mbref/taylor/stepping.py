@@ -20,7 +20,7 @@ from mbref.simulation.stepping import (
     share,
 )
 from mbref.taylor.correction import correct, violation
-from mbref.taylor.crossing import crossings_in, is_at_crossing
+from mbref.taylor.crossing import count_crossings, is_at_crossing
 from mbref.taylor.lanes import LANES, load, store
 from mbref.taylor.layout import BEGIN, EXPAND, STEP
 from mbref.taylor.loads import (
@@ -284,7 +284,7 @@ def step(memory):
             return status
     put_angles(h, memory)
     counts.steps += 1
-    counts.crossings += crossings_in(h, memory) if progress.crossed else 0
+    counts.crossings += count_crossings(h, memory) if progress.crossed else 0
     clock.time, clock.length = now, h
     return OK
 
