@@ -15,7 +15,7 @@ from mbref.simulation.dead_position import is_at_dead_position
 from mbref.simulation.ranks import Ranks
 from mbref.simulation.remedies import remedy
 from mbref.simulation.run import Run
-from mbref.simulation.singular_start import CLOSE, begins_at_rest, fits_no_branch, rests_beside
+from mbref.simulation.singular_start import begins_at_rest, fits_no_branch
 from mbref.simulation.stepping import (
     CREEPING,
     DONE,
@@ -48,11 +48,6 @@ DEAD_POSITION = (
 REST_POSITION = (
     "the motion begins at rest on a singular position, and the branch along which it is pushed cannot be "
     "followed; velocities of the bodies along a branch tell it"
-)
-
-BESIDE_REST = (
-    "the motion begins at rest so near to a singular position that rounding turns it (a singular value of "
-    "unit rows is {:.1e}); begin on that position, or where the value is above {:g}"
 )
 
 NO_BRANCH = (
@@ -129,8 +124,6 @@ def _message(run: Run, status: int) -> str:
         return REST_POSITION
     if status == UNDECIDED and run.memory.loop.clock.time == 0.0 and fits_no_branch(run):
         return NO_BRANCH
-    if status == UNDECIDED and rests_beside(run):
-        return BESIDE_REST.format(run.ranks.least, CLOSE)
     if status != DONE:
         return "; ".join(filter(None, (_cause(run, status), _rounded(run.ranks), _remedy(run, status))))
     return report_of(run.start, run.ranks, int(run.memory.equations.system.counts.crossings))

@@ -17,7 +17,6 @@ from mbref.equations.initial_state import MET, rate_violation
 from mbref.simulation.run import Run
 
 BESIDE = 1e-6  # least singular value of unit rows
-CLOSE = 5e-6  # the same, of a motion from rest that rounding may turn
 STILL = 1e-12  # of a force along a branch over the largest: a body that nothing moves stays at rest
 
 
@@ -77,13 +76,6 @@ def begins_beside(run: Run) -> bool:
     if not run.ranks.least < BESIDE or not np.any(run.start.v):
         return False
     return rate_violation(run.model, run.start.q, run.start.v) <= MET
-
-
-def rests_beside(run: Run) -> bool:
-    """Whether a run begins closed loops without drivers at rest, so near to a singular position that rounding
-    may turn its motion."""
-    at_rest = not (run.scene.driver or np.any(run.start.v))
-    return at_rest and run.model.closed_loops > 0 and run.ranks.least < CLOSE
 
 
 def leaving_acceleration(run: Run) -> np.ndarray | None:

@@ -157,7 +157,6 @@ def test_turning_back_at_the_root_of_rounding_is_undecided_or_right(loop, method
             assert measure(scene, run, closed_form(scene))["error"] < 1e-6, distance
         else:
             assert run.outcome.label == "UNDECIDED", run.message
-            assert "begins at rest so near to a singular position that rounding turns it" in run.message
             assert distance < 5e-6, f"{distance}: {run.message}"
 
 
