@@ -35,7 +35,7 @@ class Lent:
     def packed_as(self, key: Hashable, change: Callable[[Any], Any], part: Packed | None = None) -> Packed:
         """Its arrays and records packed with a change that a key says all of, such as with other kernels.
 
-        ``part`` is what is packed already, of the changed memory.
+        ``part`` is the part of the changed memory that is packed already.
         """
         if key not in self._others:
             self._others[key] = packed(change(self.values), part)

@@ -22,7 +22,7 @@ from mbref.taylor.turning import turns_back
 from mbref.taylor.twin import APART, CLOSER, MAGNIFIED
 
 SLOWEST = 0.02  # of the kinetic energy where the passage began: it does not fall below
-LULL = 0.5  # of the distance at which twins are apart: for what the integral misses
+LULL = 0.5  # of the distance at which twins are apart: a margin for the error of the integral
 MOST_STEPS = 6  # of a brief passage
 
 

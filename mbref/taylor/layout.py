@@ -192,9 +192,7 @@ class Progress(NamedTuple):
     is_clear: int = 0  # whether the passage has ended
     left: float = 0.0  # of the violation, where the step began; known after an attempt failed
     entered: float = 0.0  # the least pivot where the series began
-    meets: float = (
-        0.0  # s, in which the series meets a singular position; negative if it comes from one, else 0
-    )
+    meets: float = 0.0  # s, until the series meets a singular position; negative behind one, 0 without one
     ahead: float = 0.0  # s, the same from the pivots of an attempt that came to it; 0 if there was none
     top: int = 0  # the last order of the series that is not rounding
     cut: int = 0  # the last order of the series that an attempt takes

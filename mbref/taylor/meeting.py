@@ -15,7 +15,7 @@ from mbref.taylor.passage import BEFORE
 LEAST_ORDER = 10
 PURE = 1e-3  # relative difference of two ratios of terms that show rounding alone
 MISSED = 3e-16  # gap, of unit rows, that rounding explains
-LEFT = 0.25  # of the growth over two orders of rounding: more is what is left of it
+LEFT = 0.25  # of the growth of rounding over two orders: terms that grow faster are rounding
 TOLD = 3  # last orders that are spent on telling the difference, and one
 LEAST_TOP = 4
 

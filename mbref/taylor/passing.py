@@ -184,7 +184,7 @@ def step_on(memory):
             put_terms(memory.series.past, memory)
             return status
         if counts.crossings != passed:
-            keep_crossing(memory.progress.first, memory)
+            keep_crossing(progress.first, memory)
         if clock.time >= progress.end:
             return DONE
         judge_clearance(memory)
