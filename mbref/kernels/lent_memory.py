@@ -11,6 +11,7 @@ import itertools
 from collections.abc import Callable, Hashable
 from typing import Any
 
+from mbref.kernels.aligned import aligned_copy
 from mbref.kernels.copying import Bytes, copy_rows, table_of
 from mbref.kernels.named_memory import Packed, packed
 from mbref.kernels.records import Numbers
@@ -97,4 +98,4 @@ def shapes_of(values: Any) -> tuple[Any, ...]:
 
 def copied(values: Any) -> Any:
     """The same schema with arrays of its own."""
-    return type(values)(*(copied(v) if isinstance(v, tuple) else v.copy() for v in values))
+    return type(values)(*(copied(v) if isinstance(v, tuple) else aligned_copy(v) for v in values))

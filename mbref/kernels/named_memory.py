@@ -29,6 +29,7 @@ from numba.core.typing.templates import AttributeTemplate
 from numba.extending import NativeValue, infer_getattr, intrinsic, models, register_model, unbox
 from numba.np.numpy_support import from_dtype
 
+from mbref.kernels.aligned import aligned_zeros
 from mbref.kernels.compilation import INDEX_TABLE, INDICES, MATRIX, PLAIN, UNSIGNED, VECTOR
 from mbref.kernels.dimensions import Shapes, check_sizes, size_of
 from mbref.kernels.records import Numbers, dtype_of, is_record, numbers_of, record
@@ -135,7 +136,7 @@ def _maker(field: Field, hint: Any, sizes: Mapping[str, int]) -> Callable[[], An
     if not field.shape:
         return lambda: record(hint())
     shape = tuple(size_of(part, sizes) for part in field.shape)
-    return functools.partial(np.zeros, shape, field.dtype)
+    return functools.partial(aligned_zeros, shape, field.dtype)
 
 
 @functools.cache

@@ -15,7 +15,6 @@ from mbref.equations.initial_state import Start
 from mbref.equations.model import Model
 from mbref.kernels.lent_memory import Lent, copied, fill, lent, shapes_of, take_back
 from mbref.kernels.named_memory import Packed, allocate
-from mbref.kernels.records import record
 from mbref.method import Method
 from mbref.scene import Scene
 from mbref.simulation.limits import AUTO, GENERIC, SPECIALISED, Limits
@@ -26,17 +25,10 @@ from mbref.taylor.driven import follow_drivers
 from mbref.taylor.geometry import geometry_of
 from mbref.taylor.lanes import filled
 from mbref.taylor.layout import (
-    Beginning,
-    Crossings,
     Polynomials,
-    Progress,
-    SceneCode,
     Series,
     SeriesKernels,
-    Snapshot,
-    Solver,
     TaylorMemory,
-    Waiting,
 )
 from mbref.taylor.passing import (
     SHARE,
@@ -171,28 +163,16 @@ class SeriesRun(Run):
         series.scale[:, :nz], series.scale[:, nz : nz + nr] = -1.0 / grown[:, None], -1.0
         series.growth[:], series.growth[:, nz : nz + nr] = 1.0, grown[:, None]
         series.variable[:nz] = 1.0
-        return TaylorMemory(
+        parting = [k for k, taken in dict(self.limits.branches).items() if taken != SMOOTH]
+        return allocate(
+            TaylorMemory,
+            sizes,
             run=self.memory,
             polynomials=copied(self.polynomials),
             readings=copied(self.geometry.readings),
             series=series,
-            solver=allocate(Solver, sizes),
-            progress=record(Progress()),
             kernels=SeriesKernels(*(kernel.pointer for kernel in CALLED)),
-            code=record(SceneCode()),
-            began=allocate(Snapshot, sizes),
-            crossing=allocate(Snapshot, sizes),
-            beginning=allocate(Beginning, sizes),
-            parting=np.array(
-                [k for k, taken in dict(self.limits.branches).items() if taken != SMOOTH], np.int64
-            ),
-            crossings=allocate(Crossings, sizes),
-            landing=np.zeros((2, sizes["lanes"])),
-            state=np.zeros((3, sizes["lanes"])),
-            pose=np.zeros((3, 12 * self.model.nb)),
-            angles=np.zeros(sizes["torsions"]),
-            waiting=allocate(Waiting, sizes),
-            aside=allocate(Snapshot, sizes),
+            parting=np.array(parting, np.int64),
         )
 
     def _specialise(self) -> None:
