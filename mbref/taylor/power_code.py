@@ -10,7 +10,7 @@ v_k = (k + 1) z_{k+1} and w_k = (k + 1) (k + 2) M z_{k+2} - Q_k,
 
 where R is the response to rows, s_k sums the products in Φ of z_2 … z_k, and B = -R G' with the rate of G: so
 little is left between one order and the next.  At rest no velocity tells the motion; there and where it turns
-back the general kernels serve.
+back the orders have multipliers.
 """
 
 from __future__ import annotations

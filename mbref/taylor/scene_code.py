@@ -49,7 +49,7 @@ def functions_of(taylor: TaylorMemory) -> tuple[str, ...]:
     rank, nr, nz = rank_of(taylor), taylor.solver.row.size, taylor.solver.order.size
     is_short = (rank * rank + nr * nz) * taylor.series.terms.shape[1] // LANES <= MOST_BLOCKS
     by_power = power_code.serves(taylor)
-    names = {EXPAND: not springs and not by_power, POWER: not springs and by_power, FACTORISE: is_short}
+    names = {EXPAND: not springs, POWER: not springs and by_power, FACTORISE: is_short}
     return *(name for name, served in names.items() if served), *correction_code.POINTERS
 
 

@@ -109,7 +109,7 @@ def expand(memory):
     """All orders of the variables from the first two, which are consistent."""
     code, progress = memory.code, memory.progress
     progress.slowing = 0.0
-    if code.expand_by_power != 0 and code.rank == progress.rank:
+    if code.expand_by_power != 0 and code.rank == progress.rank and not begins_at_rest(memory):
         series, solver = memory.series, memory.solver
         expand_by_power(
             code.expand_by_power, series.terms, solver.response, series.left, series.right, solver.rhs,
@@ -125,6 +125,13 @@ def expand(memory):
 
 
 @inlined
+def begins_at_rest(memory):
+    """Whether no step has been taken, and no variable moves."""
+    is_first = memory.run.loop.clock.length == 0.0
+    return is_first and not size_of(memory.series.terms, 1, memory.solver.order.shape[0]) > 0.0
+
+
+@inlined
 def turns_back_in(h, memory):
     """Whether a motion whose orders are by power is at rest, or may turn back in much less than h seconds."""
     return not memory.progress.slowing * h <= SLOWEST
@@ -135,6 +142,8 @@ def expand_with_multipliers(memory):
     """All orders of the variables and multipliers from the first two."""
     springs, torsions, code = memory.polynomials.springs, memory.polynomials.torsions, memory.code
     memory.progress.slowing = 0.0
+    if code.expand_by_power != 0:
+        respond_in_loops(memory)
     if code.expand != 0 and code.rank == memory.progress.rank:
         series, solver = memory.series, memory.solver
         expand_by_code(
@@ -142,8 +151,6 @@ def expand_with_multipliers(memory):
             series.growth, solver.rhs, memory.progress.order - 2,
         )  # fmt: skip
         return
-    if code.expand_by_power != 0:
-        respond_in_loops(memory)
     start_sums(memory)
     if springs.damping.shape[0] + torsions.damping.shape[0] == 0:
         expand_without_springs(memory.progress.order - 2, memory)
