@@ -14,7 +14,7 @@ from mbref.simulation.crossings import Crossings
 from mbref.simulation.dead_position import is_at_dead_position
 from mbref.simulation.ranks import Ranks
 from mbref.simulation.remedies import remedy
-from mbref.simulation.run import Run
+from mbref.simulation.run import NEARLY, Run
 from mbref.simulation.singular_start import begins_at_rest, fits_no_branch
 from mbref.simulation.stepping import (
     CREEPING,
@@ -58,6 +58,10 @@ NO_BRANCH = (
 NEARLY_DEPENDENT = (
     "constraint rows depend on each other there but for {:.1e} (singular value of unit rows), and whether "
     "they take a freedom cannot be told: give the axes and points of the joints with 12 digits"
+)
+BESIDE = (
+    "; if the mechanism begins beside a singular position, rounding turns its motion: begin on that position, "
+    "or where the singular value is above {:g}"
 )
 REDUNDANT = "rows that depend on others at the start but for {:.1e} count as redundant"
 ROUNDING = 1e-13  # a singular value that needs no mention
@@ -142,8 +146,10 @@ def _rounded(ranks: Ranks) -> str:
 
 def _remedy(run: Run, status: int) -> str:
     """The remedy of an early end; for rows that are nearly dependent at the start, one of the scene."""
-    nearly = run.memory.equations.system.settings.nearly_dependent and run.memory.loop.clock.time == 0.0
-    return NEARLY_DEPENDENT.format(run.ranks.least) if nearly else remedy(run, status)
+    if not run.memory.equations.system.settings.nearly_dependent or run.memory.loop.clock.time > 0.0:
+        return remedy(run, status)
+    turned = run.model.closed_loops > 0 and not run.scene.driver
+    return NEARLY_DEPENDENT.format(run.ranks.least) + (BESIDE.format(NEARLY) if turned else "")
 
 
 def _cause(run: Run, status: int) -> str:
