@@ -13,7 +13,7 @@ from __future__ import annotations
 from mbref.kernels.compilation import kernel
 from mbref.kernels.layout import OK
 from mbref.linear_algebra.vectors import copy
-from mbref.taylor.partition import freedoms
+from mbref.taylor.partition import freedoms, is_undriven
 from mbref.taylor.passage import least_pivot, size_of
 from mbref.taylor.samples import evaluate_series, put_angles, put_state_at
 from mbref.taylor.start import judged_start
@@ -44,8 +44,7 @@ def step_usually(memory):
 @kernel
 def may_be_brief(memory):
     """Whether the motion has no freedom, or one and no drivers."""
-    undriven = memory.run.equations.scene.drivers.polynomial.shape[0] == 0
-    return freedoms(memory) <= undriven
+    return freedoms(memory) <= is_undriven(memory)
 
 
 @kernel

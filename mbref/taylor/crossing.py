@@ -1,104 +1,36 @@
-"""Where a step crosses a singular position: determinants of the constraint gradients at both its ends.
-
-det(G Gᵀ₀) changes its sign where branches cross, G₀ being the gradient where the step began; of a square G
-it is det G det G₀, and det G at both ends is the product of the pivots.  Where one variable is independent,
-the same one at both ends, it is the product of both, times that of the motions T that the rows allow.
-"""
+"""Where a step crosses a singular position: the determinant of the constraint gradients at its beginning and
+at another time changes its sign there (``mbref.taylor.overlap``)."""
 
 from __future__ import annotations
 
-from numpy import exp
+from numpy import exp, log
 
 from mbref.kernels.compilation import kernel
-from mbref.linear_algebra.elimination import determinant, product_of_pivots
-from mbref.taylor.partition import freedoms, put_gradient
+from mbref.taylor.overlap import (
+    has_one_motion,
+    keep_gradient,
+    motions_oppose,
+    overlap,
+    overlap_at_end,
+    rates_oppose,
+    remember_gradient,
+    size_at_start,
+)
+from mbref.taylor.partition import freedoms, is_undriven
 from mbref.taylor.samples import evaluate_series
+from mbref.taylor.turning import turns_back
 
 GOLDEN, SECTIONS = 0.6180339887498949, 70  # of the search for the least determinant
+NEGATIVE = -1e300  # less than all logarithms
 FEW = 12  # sections, after which a determinant that vanishes is less than 1e-4 of those at the ends
+LEVEL = log(0.5)  # of a determinant over the larger of those at the ends
 INTERPOLATIONS, HALVINGS = 12, 45  # of the search for its change of sign
 ASIDE = 1e-5  # of a step, from where its determinant is least: the sign there tells two changes of it
 SEPARATE = 1e-11  # of the determinant where it began, between two changes: less is rounding of one place
+STRAIGHT = 4  # most parts of a step in which rates turn by less than a right angle, or do not turn back
+MET = 1e-6  # part of the time to a singular position by which it may be off where a series meets it
 CLOSE = 1e-13  # of a step, by which two estimates of the change would differ at its end
 LOST_ROW = 1e-6  # of the largest pivot: formulations may take a row with less for one that depends on others
-
-
-@kernel
-def remember_gradient(memory):
-    """Keep G where the step began; of a square one its determinant, by the pivots if they are of its rows."""
-    progress, rank = memory.progress, memory.progress.rank
-    if freedoms(memory) > 0:
-        put_gradient(memory.series.past, memory)
-        keep_gradient(memory)
-    elif progress.choice == progress.past_choice:
-        progress.past_negative, progress.past_logarithm = product_of_pivots(memory.solver.past, rank)
-    else:
-        put_gradient(memory.series.past, memory)
-        progress.past_negative, progress.past_logarithm = determinant_of_rows(memory)
-
-
-@kernel
-def keep_gradient(memory):
-    """Keep Gᵀ of the independent rows of the gradient in ``work``."""
-    solver = memory.solver
-    for i in range(memory.progress.rank):
-        for c in range(solver.work.shape[1]):
-            solver.past_gradient[c, i] = solver.work[solver.row[i], c]
-
-
-@kernel
-def overlap(y, memory):
-    """Whether det(G Gᵀ₀) of the independent rows is negative, and its logarithm: G at variables y[0]."""
-    put_gradient(y, memory)
-    if freedoms(memory) == 0:
-        negative, size = determinant_of_rows(memory)
-        return negative != memory.progress.past_negative, size + memory.progress.past_logarithm
-    return overlap_of_rows(memory)
-
-
-@kernel
-def determinant_of_rows(memory):
-    """Whether det G of a square gradient in ``work`` is negative, and its logarithm: of rows and variables as
-    they were chosen, so that it is the product of the pivots."""
-    solver, rank = memory.solver, memory.progress.rank
-    for i in range(rank):
-        for c in range(rank):
-            solver.product[i, c] = solver.work[solver.row[i], solver.order[c]]
-    return determinant(solver.product, rank)
-
-
-@kernel
-def overlap_at_end(memory):
-    """The same as ``overlap`` where the step ends."""
-    if freedoms(memory) > 0:
-        return overlap(memory.series.terms, memory)
-    negative, size = product_of_pivots(memory.solver.last, memory.progress.rank)
-    return negative != memory.progress.past_negative, size + memory.progress.past_logarithm
-
-
-@kernel
-def size_at_start(memory):
-    """The logarithm of det(G₀ Gᵀ₀)."""
-    if freedoms(memory) == 0:
-        return 2.0 * memory.progress.past_logarithm
-    _, size = overlap(memory.series.past, memory)
-    return size
-
-
-@kernel
-def overlap_of_rows(memory):
-    """The same as ``overlap``, of the gradient in ``work``."""
-    solver, rank = memory.solver, memory.progress.rank
-    products, past, work = solver.product, solver.past_gradient, solver.work
-    for i in range(rank):
-        for j in range(rank):
-            products[i, j] = 0.0
-        for c in range(work.shape[1]):
-            entry = work[solver.row[i], c]
-            if entry != 0.0:
-                for j in range(rank):
-                    products[i, j] += entry * past[c, j]
-    return determinant(products, rank)
 
 
 @kernel
@@ -109,8 +41,11 @@ def changes_sign(h, parts, memory):
     changes leave it.
     """
     changes, square = False, freedoms(memory) == 0
-    if parts == 1 and has_one_motion(memory):
-        return motions_oppose(memory)
+    if has_one_motion(memory):
+        if parts == 1:
+            return motions_oppose(memory)
+        if parts <= STRAIGHT and is_undriven(memory) and not turns_back(memory.series.terms, memory):
+            return rates_oppose(memory)
     remember_gradient(memory)
     for part in range(1, parts):
         evaluate_series(h * part / parts, memory)
@@ -118,29 +53,10 @@ def changes_sign(h, parts, memory):
         changes = changes or negative
         if not square:
             keep_gradient(memory)
-    negative, _ = overlap_at_end(memory)
+    negative, _ = overlap_at_end(memory) if square else overlap(memory.series.terms, memory)
     if parts > 1:
         evaluate_series(h, memory)
     return changes or negative
-
-
-@kernel
-def has_one_motion(memory):
-    """Whether the rows leave one variable independent, the same one at both ends of a step."""
-    progress = memory.progress
-    return freedoms(memory) == 1 and progress.choice == progress.past_choice
-
-
-@kernel
-def motions_oppose(memory):
-    """Whether the determinant of the gradients at both ends of a step is negative, by pivots and motions."""
-    solver, along = memory.solver, 0.0
-    for i in range(solver.order.shape[0]):
-        along += solver.null_space[0, i] * solver.past_motion[i]
-    negative = along < 0.0
-    for k in range(memory.progress.rank):
-        negative = negative != (solver.last[k] * solver.past[k] < 0.0)
-    return negative
 
 
 @kernel
@@ -215,6 +131,12 @@ def sign_change(h, memory):
     if not after < 0.0:
         return -1.0
     replaced, value_there = start, before
+    met = memory.progress.meets
+    if 0.0 < met < (1.0 - MET) * h:
+        low, high = (1.0 - MET) * met, (1.0 + MET) * met
+        at_low, at_high = value_at(low, unit, memory), value_at(high, unit, memory)
+        if at_low > 0.0 > at_high:
+            start, before, end, after = low, at_low, high, at_high
     for k in range(INTERPOLATIONS + HALVINGS):
         last, before_last = middle, changed
         middle = 0.5 * (start + end)
@@ -259,11 +181,14 @@ def signed(negative, logarithm):
 
 @kernel
 def least_between(h, sections, memory):
-    """The time (s) inside a step of h seconds at which the determinant is least, by golden section."""
+    """The time (s) inside a step of h seconds at which the determinant is least, by golden section; or the
+    first that is looked at where it is negative."""
     start, end = 0.0, h
     one, other = h - GOLDEN * h, GOLDEN * h
     before, after = size_at(one, memory), size_at(other, memory)
     for _ in range(sections):
+        if min(before, after) == NEGATIVE:
+            return one if before == NEGATIVE else other
         if before < after:
             end, other, after = other, one, before
             one = end - GOLDEN * (end - start)
@@ -276,8 +201,15 @@ def least_between(h, sections, memory):
 
 
 @kernel
+def stays_level(h, largest, memory):
+    """Whether the determinant is not near zero at two times inside a step of h seconds, beside the larger of
+    those at its ends, by logarithms: one that vanishes twice is, at one of them."""
+    return min(size_at(h - GOLDEN * h, memory), size_at(GOLDEN * h, memory)) > largest + LEVEL
+
+
+@kernel
 def size_at(h, memory):
-    """The logarithm of the determinant's size at a distance h (s) from the step's beginning."""
+    """The determinant's logarithm at a distance h (s) from the step's beginning; NEGATIVE where that is."""
     evaluate_series(h, memory)
-    _, size = overlap(memory.state, memory)
-    return size
+    negative, size = overlap(memory.state, memory)
+    return NEGATIVE if negative else size

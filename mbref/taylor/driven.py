@@ -31,7 +31,7 @@ from mbref.taylor.passage import (
     keeps_signs,
     least_pivot,
     moved_in,
-    size_of,
+    size_in_use,
 )
 from mbref.taylor.samples import LOST_MOTION, evaluate_series, put_terms, take_sample
 from mbref.taylor.stepping import (
@@ -151,7 +151,7 @@ def reach(memory):
     for quarters in range(4, fewest - 1, -1):
         order, longest = progress.order * quarters // 4, largest
         for k in range(order - 1, order + 1):
-            size = size_of(memory.series.past, k, memory.solver.order.shape[0])
+            size = size_in_use(k, memory)
             if size > 0.0:
                 longest = min(longest, log(LOOSE / size) / k)
         if longest > best or quarters == 4:

@@ -179,6 +179,8 @@ class Progress(NamedTuple):
     end: float = 0.0  # time of the last step's end
     choice: int = 0  # of the partition, counted
     past_choice: int = 0  # where the step began
+    odd: int = 0  # whether rows and variables are chosen in an order that an odd number of exchanges makes
+    past_odd: int = 0  # the same where the step began
     kept_pivot: float = (
         0.0  # the least of G just before the last choice; minus infinity if a sign had changed
     )

@@ -9,8 +9,8 @@ that the last ones tell it.  Without it a step may be many times as long as d.
 from __future__ import annotations
 
 from mbref.kernels.compilation import kernel
-from mbref.taylor.lanes import LANES, load, peak, store
-from mbref.taylor.passage import BEFORE
+from mbref.taylor.lanes import LANES, load, store
+from mbref.taylor.passage import BEFORE, size_in_use
 
 LEAST_ORDER = 10
 PURE = 1e-3  # relative difference of two ratios of terms that show rounding alone
@@ -78,19 +78,10 @@ def subtract_miss(distance, memory):
 def last_order(distance, memory):
     """The last order whose terms do not grow as fast as rounding."""
     k, growth = memory.progress.order - TOLD, LEFT / (distance * distance)
-    size, one_less = size_in_blocks(k, memory), size_in_blocks(k - 1, memory)
+    size, one_less = size_in_use(k, memory), size_in_use(k - 1, memory)
     while k > LEAST_TOP:
-        two_less = size_in_blocks(k - 2, memory)
+        two_less = size_in_use(k - 2, memory)
         if not size > growth * two_less:
             break
         k, size, one_less = k - 1, one_less, two_less
     return k
-
-
-@kernel
-def size_in_blocks(k, memory):
-    """The largest coefficient of order k."""
-    series, size, lanes = memory.series, 0.0, memory.series.past.shape[1]
-    for j in range(0, memory.solver.order.shape[0], LANES):
-        size = max(size, peak(load(series.variable, j) * load(series.past, k * lanes + j)))
-    return size

@@ -16,6 +16,12 @@ def freedoms(memory):
 
 
 @kernel
+def is_undriven(memory):
+    """Whether there are no drivers."""
+    return memory.run.equations.scene.drivers.polynomial.shape[0] == 0
+
+
+@kernel
 def put_gradient(y, memory):
     """G at variables y[0] into ``work``; rows are of length one about, or zero in all positions."""
     rows, work = memory.polynomials.rows, memory.solver.work
@@ -58,6 +64,7 @@ def choose(memory):
     """
     solver, tolerance = memory.solver, memory.run.equations.system.settings.rank_tolerance
     row, order, tableau, peaks, rank = solver.row, solver.order, solver.tableau, solver.peaks, 0
+    odd = False
     put_rows(memory)
     copy(memory.series.variable, solver.left)
     for k in range(row.shape[0]):
@@ -69,10 +76,12 @@ def choose(memory):
         p = place_of_highest(peaks, row, rank)
         if not peaks[row[p]] > tolerance:
             break
+        odd = odd != (p != rank)
         row[rank], row[p] = row[p], row[rank]
         q = rank
         while q < order.shape[0] - 1 and abs(tableau[row[rank], order[q]]) != peaks[row[rank]]:
             q += 1
+        odd = odd != (q != rank)
         order[rank], order[q] = order[q], order[rank]
         solver.left[order[rank]] = 0.0
         inverse = 1.0 / tableau[row[rank], order[rank]]
@@ -80,6 +89,7 @@ def choose(memory):
             subtract_pivot_row(row[p], inverse * tableau[row[p], order[rank]], row[rank], memory)
         rank += 1
     memory.progress.choice += 1
+    memory.progress.odd = odd
     return rank
 
 

@@ -25,11 +25,11 @@ from mbref.taylor.crossing import (
     SECTIONS,
     changes_sign,
     least_between,
-    overlap_at_end,
-    remember_gradient,
     size_at,
-    size_at_start,
+    stays_level,
 )
+from mbref.taylor.lanes import LANES, load, peak
+from mbref.taylor.overlap import overlap_at_end, remember_gradient, size_at_start
 from mbref.taylor.partition import kept_pivot
 from mbref.taylor.samples import evaluate_series
 from mbref.taylor.turning import pivot_of_turning, turns_back
@@ -72,7 +72,8 @@ def remember_pivots_here(memory):
     copy(solver.last, solver.past)
     for i in range(solver.order.shape[0]):
         solver.past_motion[i] = solver.null_space[0, i]
-    progress.past_choice, progress.past_pivot = progress.choice, least_pivot(memory)
+    progress.past_choice, progress.past_odd = progress.choice, progress.odd
+    progress.past_pivot = least_pivot(memory)
     progress.largest_pivot = max(progress.largest_pivot, progress.past_pivot)
 
 
@@ -106,22 +107,22 @@ def keeps_signs(memory):
 
 @kernel
 def changes_signs(memory):
-    """Whether pivots of rows and variables that were used in all of a step change their signs."""
+    """Whether pivots of a step's rows and variables change their signs, or others were chosen twice in it."""
     progress = memory.progress
     if progress.choice == progress.past_choice:
         return not keeps_signs(memory)
-    return progress.choice == progress.past_choice + 1 and kept_pivot(memory) < 0.0
+    return kept_pivot(memory) < 0.0
 
 
 @kernel
 def vanishes_inside(h, memory):
-    """Whether the determinant vanishes inside a step of h seconds."""
-    remember_gradient(memory)
-    _, behind = overlap_at_end(memory)
-    ends = min(size_at_start(memory), behind)
-    vanishes = size_at(least_between(h, FEW, memory), memory) < FALLING + ends
+    """Whether the determinant vanishes inside a step of h seconds, or changes its sign twice."""
+    less, more = sizes_at_ends(memory)
+    vanishes = not stays_level(h, more, memory)
     if vanishes:
-        vanishes = size_at(least_between(h, SECTIONS, memory), memory) < VANISHED + ends
+        vanishes = size_at(least_between(h, FEW, memory), memory) < FALLING + less
+    if vanishes:
+        vanishes = size_at(least_between(h, SECTIONS, memory), memory) < VANISHED + less
     evaluate_series(h, memory)
     return vanishes
 
@@ -173,10 +174,17 @@ def has_crossed(h, pivot, memory):
 def inside(h, pivot, memory):
     """The logarithms of the determinant where a least pivot vanishes that falls and rises linearly, and of
     the lesser one at the ends of a step of h seconds."""
-    past = memory.progress.past_pivot
+    past, (less, _) = memory.progress.past_pivot, sizes_at_ends(memory)
+    return size_at(h * past / (past + pivot), memory), less
+
+
+@kernel
+def sizes_at_ends(memory):
+    """The logarithms of the determinant at the ends of a step: the lesser and the larger one."""
     remember_gradient(memory)
     _, behind = overlap_at_end(memory)
-    return size_at(h * past / (past + pivot), memory), min(size_at_start(memory), behind)
+    before = size_at_start(memory)
+    return min(before, behind), max(before, behind)
 
 
 @kernel
@@ -185,6 +193,15 @@ def size_of(series, k, variables):
     size = 0.0
     for i in range(variables):
         size = larger(size, series[k, i])
+    return size
+
+
+@kernel
+def size_in_use(k, memory):
+    """The largest coefficient of order k of the series that steps look along."""
+    series, size, lanes = memory.series, 0.0, memory.series.past.shape[1]
+    for j in range(0, memory.solver.order.shape[0], LANES):
+        size = max(size, peak(load(series.variable, j) * load(series.past, k * lanes + j)))
     return size
 
 

@@ -41,7 +41,7 @@ from mbref.taylor.passage import (
     least_pivot,
     remember_pivots,
     remember_pivots_here,
-    size_of,
+    size_in_use,
 )
 from mbref.taylor.readings import read_variables
 from mbref.taylor.samples import (
@@ -85,21 +85,20 @@ def longest_step(tolerance, memory):
     rounding anyway, they may be LOOSER, and do not count near a singular position.  It is at
     most clearly over the time in which a spring's ends could meet.
     """
-    progress, control, past = memory.progress, memory.run.control, memory.series.past
-    counts, variables = memory.run.equations.system.counts, memory.solver.order.shape[0]
+    progress, control = memory.progress, memory.run.control
     h = control.largest_step
-    shortest, of_rates = log(h), tolerance * max(1.0, size_of(past, 1, variables))
+    shortest, of_rates = log(h), tolerance * max(1.0, size_in_use(1, memory))
     if progress.passing:
         of_rates *= LOOSER
     counted = not progress.passing or progress.past_pivot >= BEFORE * progress.largest_pivot
     for k in range(progress.top - 1, min(progress.top + 1, progress.order) + 1):
-        size = size_of(past, k, variables)
+        size = size_in_use(k, memory)
         if size > 0.0:
             shortest = min(shortest, log(tolerance / size) / k)
             if counted:
                 shortest = min(shortest, log(of_rates / (k * size)) / (k - 1))
     h = min(exp(shortest), OVER * time_to_no_length(memory))
-    if counts.steps == 0 and control.first_step > 0.0:
+    if memory.run.equations.system.counts.steps == 0 and control.first_step > 0.0:
         h = min(h, control.first_step)
     return h
 
@@ -109,10 +108,11 @@ def first_lengths(left, memory):
     """The longest step (s) by the tolerance, and by that of one that crosses; not beyond the time left."""
     progress = memory.progress
     whole = 1.0 if progress.passing else share(memory.run.loop.clock.length, memory.run)
-    exact = min(longest_step(whole * exactness(progress), memory), left)
+    usual, looser = exactness(progress), exactness_across(progress)
+    exact = min(longest_step(whole * usual, memory), left)
     if not progress.passing:
         return exact, exact
-    across = min(longest_step(whole * exactness_across(progress), memory), left)
+    across = exact if looser == usual else min(longest_step(whole * looser, memory), left)
     ahead, progress.ahead = progress.meets if progress.meets > 0.0 else progress.ahead, 0.0
     if across < CROSSING * ahead and exact > (1.0 - NEARLY) * ahead:
         exact = across = ahead - BEST * across
@@ -176,7 +176,7 @@ def judge(h, last, memory):
         return NOT_FINITE
     part = part_behind_no_length(memory)
     if part > 0.0:
-        rates = size_of(memory.series.past, 1, memory.solver.order.shape[0])
+        rates = size_in_use(1, memory)
         if off * part > exactness_across(progress) * rates * h:
             return STEP_TOO_SMALL
     lost = LOST_MOTION * progress.order * progress.order * exactness_across(progress)
@@ -237,11 +237,10 @@ def next_length(h, exact, memory):
 @kernel
 def least_term(h, memory):
     """The order, below the last, of the least term at a distance h (s): those beyond grow by rounding."""
-    past, variables = memory.series.past, memory.solver.order.shape[0]
     best, least, power = 2, 1e300, h
     for k in range(2, memory.progress.top):
         power *= h
-        size = size_of(past, k, variables) * power
+        size = size_in_use(k, memory) * power
         if size < least:
             best, least = k, size
     return best

@@ -1,44 +1,71 @@
-"""The sign of det(G Gᵀ₀) by pivots and motions / by the determinant."""
+"""det(G Gᵀ₀) by pivots and motions / by the determinant."""
 
 import numpy as np
 import pytest
 
-from mbref.kernels.compilation import INT, entry
+from mbref.kernels.compilation import INT, entry, kernel
 from mbref.kernels.layout import OK
 from mbref.method import Method
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits
-from mbref.taylor.crossing import motions_oppose, overlap, remember_gradient
 from mbref.taylor.layout import SERIES
+from mbref.taylor.overlap import (
+    motions_oppose,
+    overlap,
+    overlap_of_motions,
+    remember_gradient,
+    size_at_start,
+    size_of_motion,
+)
+from mbref.taylor.partition import choose
 from mbref.taylor.run import TaylorRun
 from mbref.taylor.solver import respond
 
 NEGATIVE, ALIKE = 1, 2
+ROUNDING = 1e-9  # of logarithms of determinants
 
 
-@entry(INT(SERIES))
-def signs(memory):
+@kernel
+def compared(memory):
     """NEGATIVE where the determinant is, ALIKE where pivots and motions tell the same: their sum."""
     respond(memory)
     remember_gradient(memory)
-    negative, _ = overlap(memory.series.terms, memory)
-    return NEGATIVE * negative + ALIKE * (motions_oppose(memory) == negative)
+    negative, size = overlap(memory.series.terms, memory)
+    _, first = overlap(memory.series.past, memory)
+    told, found = overlap_of_motions(memory)
+    sizes = abs(found - size) < ROUNDING and abs(size_of_motion(memory) - first) < ROUNDING
+    signs = told == negative and motions_oppose(memory) == negative
+    return NEGATIVE * negative + ALIKE * (signs and sizes and size_at_start(memory) == size_of_motion(memory))
 
 
-@pytest.mark.parametrize("name", ("spatial_slider_crank_gravity", "four_bar_gravity"))
-def test_pivots_and_motions_tell_the_sign_of_the_determinant(name):
-    """Of the gradient where a motion begins and that at drawn variables, by the same rows and variables."""
+@entry(INT(SERIES))
+def by_chosen(memory):
+    """The same, by the rows and variables of the beginning."""
+    return compared(memory)
+
+
+@entry(INT(SERIES))
+def by_choosing(memory):
+    """The same, by rows and variables that are chosen anew; 0 where there are fewer rows."""
+    return compared(memory) if choose(memory) == memory.progress.rank else 0
+
+
+@pytest.mark.parametrize("signs", (by_chosen, by_choosing))
+@pytest.mark.parametrize("name", ("planar_slider_crank", "spatial_slider_crank_gravity", "four_bar_gravity"))
+def test_pivots_and_motions_tell_the_determinant(name, signs):
+    """Of the gradient where a motion begins and that at drawn variables."""
     run = TaylorRun(SCENES[name](), Method.parse("taylor"), np.array([0.1]), Limits(code="generic"))
     assert run.expand() == OK
     taylor, rng, found = run.taylor, np.random.default_rng(3), set()
     solver, progress, nz = taylor.solver, taylor.progress, taylor.solver.order.size
-    assert progress.rank == nz - 1
+    assert progress.rank == nz - 1 == solver.row.size
     taylor.series.past[:], progress.past_choice = taylor.series.terms, progress.choice
     solver.past[:], solver.past_motion[:] = solver.last, solver.null_space[0, :nz]
+    progress.past_odd = progress.odd
     for _ in range(200):
         taylor.series.terms[0, :nz] = rng.normal(size=nz)
         told = int(signs(run.packed_series.argument))
         assert told >= ALIKE
-        along = solver.null_space[0, :nz] @ solver.past_motion
-        found.add((told - ALIKE, bool(along < 0.0)))
-    assert found == {(negative, turned) for negative in (0, 1) for turned in (False, True)}
+        found.add((told - ALIKE, bool(progress.odd)))
+    assert {negative for negative, _ in found} == {0, 1}
+    assert signs is by_chosen or {odd for _, odd in found} == {0, 1}
