@@ -111,7 +111,7 @@ class TaylorRun(SeriesRun):
             status = self.step_on()
             seconds += time.process_time() - began
             if (completed := int(complete_samples(self._packed_taylor.argument))) != OK:
-                status = completed
+                status = UNDECIDED if status == UNDECIDED else completed
             began = time.process_time()
             if status != DONE:
                 status = self._over(status)
