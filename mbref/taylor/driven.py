@@ -25,6 +25,7 @@ from mbref.taylor.passage import (
     NEAR,
     STEEPEST,
     VANISHING,
+    changes_signs,
     distance_ahead,
     inside,
     is_near,
@@ -32,6 +33,7 @@ from mbref.taylor.passage import (
     least_pivot,
     moved_in,
     size_in_use,
+    vanishes_inside,
 )
 from mbref.taylor.samples import LOST_MOTION, evaluate_series, put_terms, take_sample
 from mbref.taylor.stepping import (
@@ -218,7 +220,8 @@ def may_have_crossed(h, memory):
     """Whether a stride of h seconds ends near a singular position, or may have passed one.
 
     Pivots whose signs stay have vanished twice or never, and twice takes a way that is long beside them: else
-    determinants tell.
+    determinants tell.  Two loops that cross one after the other leave the sign at the end, but not those of
+    pivots.
     """
     progress, pivot, moved = memory.progress, least_pivot(memory), moved_in(h, memory)
     if not pivot >= AHEAD * progress.largest_pivot:
@@ -228,6 +231,8 @@ def may_have_crossed(h, memory):
         return False
     looked_at = not (brief or (kept and not is_near(pivot, progress)))
     changes = changes_sign(h, min(int(moved / LONG) + 1, MOST_PARTS), memory)
+    if not changes and changes_signs(memory):
+        changes = vanishes_inside(h, memory)
     if looked_at and not changes:
         between, ends = inside(h, pivot, memory)
         changes = between - ends < VANISHING

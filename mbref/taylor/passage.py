@@ -10,6 +10,8 @@
   and turns the velocity by as much again.  A motion that comes nearer than LEAST and does not cross is lost.
   Rounding of the lengths may open a gap that a motion meets before it turns back nearer than ROOT: that is
   lost too.  Whether another one is determined, its twin tells (``mbref.taylor.twin``).
+- A correction that moves the state by as much as its distance from the singular position, which the pivot
+  tells, may take it to another branch: where a driver stands still there, the pivot is the correction's.
 """
 
 from __future__ import annotations
@@ -30,7 +32,7 @@ from mbref.taylor.crossing import (
 )
 from mbref.taylor.lanes import LANES, load, peak
 from mbref.taylor.overlap import overlap_at_end, remember_gradient, size_at_start
-from mbref.taylor.partition import kept_pivot
+from mbref.taylor.partition import freedoms, kept_pivot
 from mbref.taylor.samples import evaluate_series
 from mbref.taylor.turning import pivot_of_turning, turns_back
 
@@ -45,7 +47,7 @@ CLOCK = 3e-16  # of the time: its rounding, over which drivers and variables mov
 DEEPEST = 0.2  # of a step's first pivot: its last is not less, so that the next is not the worse for it
 SHORTEST = 0.05  # the same, of a step that crosses: refused, it would be tried again from nearer
 VANISHING = log(0.2)  # of a determinant over its values at both ends, that falls and rises linearly
-FALLING = -5.0  # the same logarithm near where it vanishes
+FALLING = -2.0  # the same logarithm near where it vanishes, of two places too that are close
 VANISHED = -30.0  # the same at its least, of a step that begins far from where it crosses
 LONG, MOST_PARTS = 0.5, 8  # that a variable moves in a part of a step, and the most parts
 STEEPEST = 1.5  # that a pivot falls and rises in a step, over the most that a variable moves
@@ -53,7 +55,9 @@ LEFT = 2.0  # of the violation that corrections leave, of rows that depend on ot
 CREPT = 1e-6  # pivot over its largest below which a crossing is rounding's, unless the series began there
 LEAST = 1e-9  # pivot over its largest below which the branch depends on rounding
 ROOT = 2.5e-8  # pivot, of unit rows, at the root of the gaps that rounding of the lengths may open
+DRIVEN_ROOT = 1e-7  # the same where drivers prescribe the whole motion, which has no twin
 FALLEN = 0.5  # of the pivot where a passage began: a larger one has not come near
+SHIFTED = 0.05  # of the pivot, by which a correction may move the state that it tells the branch of
 
 
 @kernel
@@ -257,9 +261,11 @@ def judge_branch(h, last, memory):
     deepest = (SHORTEST if progress.crossed else DEEPEST) * progress.past_pivot
     if not progress.violation <= resolution(memory) or (not last and pivot < deepest):
         return STEP_TOO_SMALL
-    root = min(ROOT, FALLEN * progress.entered)
+    if progress.corrected > SHIFTED * pivot:
+        return STEP_TOO_SMALL if progress.crossed or last else UNDECIDED
+    root = min(ROOT if freedoms(memory) > 0 else DRIVEN_ROOT, FALLEN * progress.entered)
     if turned and pivot_of_turning(h, memory) < root:
         return UNDECIDED
-    if progress.crossed or last or pivot >= progress.past_pivot:
+    if progress.crossed or pivot >= progress.past_pivot:
         return OK
     return OK if pivot >= max(root, LEAST * progress.largest_pivot) else UNDECIDED

@@ -40,6 +40,7 @@ from mbref.taylor.start import OFF
 SERIES = "taylor[order=16]"  # lower orders magnify rounding less
 BEHIND = 3e-3  # lengths or rad behind a crossing where another branch is entered
 CORRECTIONS = 6  # of the state there
+COUNTED = 0.02  # of its distance from the crossing: a lesser pivot is of rows that depend on others
 
 
 class PassingRun(SeriesRun):
@@ -190,6 +191,26 @@ class PassingRun(SeriesRun):
         """Go on a time ahead (s) of a singular position that is left with velocities (n,), from a state near
         that of the motion, which is corrected: PAUSED, or why that cannot be."""
         (q, v), self.memory.loop.clock.time = moved, start.time + ahead
+        settings = self.memory.equations.system.settings
+        usual, settings.rank_tolerance = settings.rank_tolerance, self._least_pivot_at(q, start.coordinates)
+        status = self._corrected(start, velocities, ahead, (q, v))
+        settings.rank_tolerance = usual
+        if status != OK:
+            return status
+        progress = self.taylor.progress
+        progress["past_pivot"], progress["clearance"], progress.is_clear = 0.0, 0.0, 0
+        begin_here(self._packed_taylor.argument)
+        return PAUSED
+
+    def _corrected(
+        self,
+        start: Passed | SingularPosition,
+        velocities: np.ndarray,
+        ahead: float,
+        moved: tuple[np.ndarray, np.ndarray],
+    ) -> int:
+        """Have the series come from a singular position with velocities (n,): OK, or why it cannot."""
+        q, v = moved
         for _ in range(CORRECTIONS):
             self.memory.state.coordinates[:], self.memory.state.velocities[:] = q, v
             if (status := self.expand()) != OK:
@@ -197,10 +218,18 @@ class PassingRun(SeriesRun):
             there, here = self._state_at(-ahead), self._state_at(0.0)
             q = displaced(here[0], displacement(there[0], start.coordinates))
             v = here[1] + velocities - there[1]
-        progress = self.taylor.progress
-        progress["past_pivot"], progress["clearance"], progress.is_clear = 0.0, 0.0, 0
-        begin_here(self._packed_taylor.argument)
-        return PAUSED
+        return OK
+
+    def _least_pivot_at(self, q: np.ndarray, crossing: np.ndarray) -> float:
+        """The least pivot that counts at coordinates near a singular position, before they are corrected.
+
+        Rows of spherical loops depend on others where the constraints hold: a state that violates them by the
+        square of its distance has pivots of that size, and those that the distance leaves are as large as it.
+        """
+        moved = displacement(q, crossing).reshape(-1, 6)
+        places = np.abs(moved[:, :3] / self.model.data.lengths[:, None]).max()
+        distance = float(max(places, np.abs(moved[:, 3:]).max()))
+        return max(self.memory.equations.system.settings.rank_tolerance, COUNTED * distance)
 
     def _time_in_which(self, velocities: np.ndarray) -> float:
         """Time (s) in which the fastest body moves by BEHIND."""

@@ -16,7 +16,8 @@ from mbref.kernels.layout import NOT_CONVERGED, OK
 from mbref.method import Method
 from mbref.scene import Scene
 from mbref.simulation.limits import GENERIC, Limits
-from mbref.simulation.run import Run
+from mbref.simulation.ranks import ranks_at
+from mbref.simulation.run import NEARLY, Run
 from mbref.simulation.singular_start import fits_no_branch, leaving
 from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, UNDECIDED
 from mbref.taylor.driven import LEAST_ORDER, LOOSE, ORDER, follow_drivers
@@ -53,6 +54,7 @@ class CrossingRun(Run):
 
     def take_steps(self) -> int:
         """As those of every run, brief passages among them once there are series for them."""
+        self._look_at_rows_again()
         return self._passage.advance_over(PAUSED) if self._passage.is_made else super().take_steps()
 
     def pass_singular_position(self, status: int) -> int:
@@ -73,6 +75,15 @@ class CrossingRun(Run):
         if status == PAUSED:
             self.enter_state()
         return why if status == UNDECIDED and why == NOT_CONVERGED else status
+
+    def _look_at_rows_again(self) -> None:
+        """Rows that were nearly dependent at the start for a singular position are not, away from that."""
+        settings = self.memory.equations.system.settings
+        if settings.nearly_dependent and self.memory.loop.clock.time > 0.0:
+            ranks = ranks_at(
+                self.model, self.memory.state.coordinates, self.memory.factor, self.limits.rank_tolerance
+            )
+            settings.nearly_dependent = ranks.rank != self.ranks.rank or ranks.least < NEARLY
 
 
 class TaylorRun(SeriesRun):
@@ -111,7 +122,7 @@ class TaylorRun(SeriesRun):
             status = self.step_on()
             seconds += time.process_time() - began
             if (completed := int(complete_samples(self._packed_taylor.argument))) != OK:
-                status = completed
+                status = UNDECIDED if status == UNDECIDED else completed
             began = time.process_time()
             if status != DONE:
                 status = self._over(status)

@@ -10,10 +10,11 @@ from crosscheck.judge.reaction_balance import with_exact_reactions
 from crosscheck.judge.truth import closed_form
 from crosscheck.study import stability
 from mbref import rotations
-from mbref.scene import GROUND, Body, Fixed, Revolute, Scene, Translational
+from mbref.scene import GROUND, Body, Driver, Fixed, Revolute, Scene, Translational
 from mbref.scenes import find_scene
 from mbref.scenes.five_bar import five_bar, five_bar_gravity
 from mbref.scenes.four_bar import four_bar, four_bar_gravity, parallelogram
+from mbref.scenes.links import about_z, link
 from mbref.scenes.planar_slider_crank import planar_slider_crank_heavy, slider_crank
 from mbref.simulation.simulate import Limits, simulate
 
@@ -262,6 +263,75 @@ def test_a_small_inertia_on_a_cart(inertia):
 @pytest.mark.parametrize("angle", [0.3, 1e-2, math.pi - 1e-3])
 def test_a_driven_loop_crosses_from_any_angle(loop, angle):
     assert error_of(RHOMBI[loop][0](angle), 2.5) < 1e-11
+
+
+def leaning(links: tuple[tuple[float, float], ...], lean: float = 0.0) -> Scene:
+    """Parallelograms in a chain, on a base line at an angle: cranks of a length and an angle to it (rad).
+
+    Each rocker is the next one's crank, on an arm of its own.
+    """
+    base, across = about_z(lean), 0.7
+    place = lambda k, length, angle: (  # noqa: E731
+        k * across * math.cos(lean) + length * math.cos(lean + angle),
+        k * across * math.sin(lean) + length * math.sin(lean + angle),
+        0.0,
+    )
+    bodies = [link("bar0", place(0, 0.0, 0.0), place(0, *links[0]), about_z(lean + links[0][1]), links[0][0])]
+    joints = [("A0", GROUND, "bar0", place(0, 0.0, 0.0))]
+    for k, (length, angle) in enumerate(links):
+        here, there, foot = place(k, length, angle), place(k + 1, length, angle), place(k + 1, 0.0, 0.0)
+        bodies.append(link(f"rod{k}", here, there, base, across))
+        bodies.append(link(f"bar{k + 1}", foot, there, about_z(lean + angle), length))
+        joints += [
+            (f"B{k}", f"bar{k}", f"rod{k}", here),
+            (f"C{k}", f"rod{k}", f"bar{k + 1}", there),
+            (f"D{k}", GROUND, f"bar{k + 1}", foot),
+        ]
+    hinges = [Revolute(name=n, bodies=(i, j), anchor=at, axis=(0.0, 0.0, 1.0)) for n, i, j, at in joints]
+    return Scene(name="leaning", body=tuple(bodies), joint=tuple(hinges))
+
+
+def turned_back(angle: float, distance: float) -> Scene:
+    """A parallelogram whose driver stands still at a distance (rad) from the flat position after 0.5 s, and
+    has turned it back after 1 s."""
+    turn = 4.0 * (distance - angle)
+    driver = Driver(joint="A0", polynomial=(0.0, turn, -turn))
+    return leaning(((0.5, angle),), angle).with_(driver=(driver,))
+
+
+@pytest.mark.parametrize("method", ["alf-dual+projection", "taylor"])
+@pytest.mark.parametrize("distance", [0.0, 1e-9, 1e-8])
+def test_a_driver_that_turns_back_at_the_flat_position_is_right_or_undecided(distance, method):
+    """A correction moved a state beside the flat position as far as that, and beyond: runs completed on the
+    other branch."""
+    for angle in np.linspace(0.3, 0.9, 60):
+        scene = turned_back(float(angle), distance)
+        run = simulate(scene, method, [1.0])
+        assert run.outcome.label in ("COMPLETED", "UNDECIDED"), run.message
+        if run.outcome.label == "COMPLETED":
+            assert np.abs(run.position[-1] - [body.position for body in scene.body]).max() < 1e-6, angle
+
+
+@pytest.mark.parametrize("method", ["alf-dual+projection", "taylor"])
+@pytest.mark.parametrize("distance", [1e-6, 1e-4])
+def test_a_driver_that_turns_back_before_the_flat_position_is_followed(distance, method):
+    for angle in np.linspace(0.3, 0.9, 10):
+        scene = turned_back(float(angle), distance)
+        run = simulate(scene, method, [1.0])
+        assert run.outcome.label == "COMPLETED" and not run.crossings, run.message
+        assert np.abs(run.position[-1] - [body.position for body in scene.body]).max() < 1e-8
+
+
+def test_two_loops_that_cross_one_after_the_other_in_a_stride_are_recorded():
+    """They leave the sign of the determinant: runs had recorded two crossings too few."""
+    for ahead in np.linspace(0.05, 1.5, 40):
+        scene = leaning(((0.5, 0.5), (0.4, 0.5 + float(ahead))))
+        scene = scene.with_(driver=(Driver(joint="A0", polynomial=(0.0, 3.0)),))
+        times = sorted((k * math.pi - angle) / 3.0 for angle in (0.5, 0.5 + ahead) for k in range(1, 6))
+        run = simulate(scene, "taylor", [4.0])
+        assert run.outcome.label == "COMPLETED", run.message
+        found = [crossing.time for crossing in run.crossings]
+        assert found == pytest.approx([t for t in times if t < 4.0], abs=1e-9), ahead
 
 
 @pytest.mark.parametrize("method", ["mpi-svd+projection", "alf-dual+projection/rk4[step=1e-3]", "kinematic"])
