@@ -60,8 +60,8 @@ NEARLY_DEPENDENT = (
     "they take a freedom cannot be told: give the axes and points of the joints with 12 digits"
 )
 BESIDE = (
-    "; if the mechanism begins beside a singular position, rounding turns its motion: begin on that position, "
-    "or where the singular value is above {:g}"
+    "; if the mechanism begins beside a singular position, rounding turns its motion: begin on that "
+    "position, or where the singular value is above {:g}"
 )
 REDUNDANT = "rows that depend on others at the start but for {:.1e} count as redundant"
 ROUNDING = 1e-13  # a singular value that needs no mention

@@ -158,7 +158,8 @@ def test_turning_back_at_the_root_of_rounding_is_undecided_or_right(loop, method
             assert measure(scene, run, closed_form(scene))["error"] < 1e-6, distance
         else:
             assert run.outcome.label == "UNDECIDED", run.message
-            assert "beside a singular position, rounding turns its motion" in run.message
+            told = "begins beside a singular position, rounding turns its motion" in run.message
+            assert told == ("at t = 0 s" in run.message), run.message
             assert distance < 5e-6, f"{distance}: {run.message}"
 
 
