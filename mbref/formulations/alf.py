@@ -135,6 +135,7 @@ ALF = Formulation(
     equations="Eqs. 17-20",
     accelerate=accelerate,
     linear_algebra=Dense(Scratch),
+    needs_all_rows=True,
     handles_redundancy=True,
     handles_singular_mass=True,
     numbers=Options,

@@ -188,6 +188,7 @@ class Watch(NamedTuple):
     past_pivot: float = 0.0  # smallest_pivot of the last accepted state
     reference_pivot: float = 0.0  # the largest that smallest_pivot has been; 0 where nothing is watched
     generic_rank: int = 0
+    regular: int = 0  # whether the motion begins on no singular position, where the rank is less
     accepted_time: float = 0.0  # s
 
 

@@ -41,6 +41,7 @@ from mbref.simulation.preparation import prepare
 from mbref.simulation.ranks import NO_RANKS, Ranks, ranks_at
 from mbref.simulation.stepping import CREEPING, PAUSED, SINGULAR_AHEAD, UNDECIDED, advance_to_end
 from mbref.specialised import Part, Specialised, Untraceable, Varied, specialise, with_specialised_code
+from mbref.stabilisation.all_coordinates import rates as rates_of_all_rows
 from mbref.stabilisation.base import Stabilisation
 
 OUT_OF_REACH, PACE_STEPS = 100.0, 20_000  # limits of steps that the end is away, at the pace of so many
@@ -186,16 +187,16 @@ class Run:
         return self.reduction.factor(), self.reduction.active
 
     def _kernels_on(self, chart: Stabilisation) -> Kernels:
-        """The kernels of the method on this chart."""
-        integrator = self.method.integrator
+        """The kernels of the method on this chart; it leaves rows out that some formulations need."""
+        integrator, formulation = self.method.integrator, self.method.formulation
         kernels = Kernels(
             step=integrator.step,
             propose=integrator.propose,
-            rates=chart.rates,
+            rates=rates_of_all_rows if formulation.needs_all_rows and chart.projects else chart.rates,
             rates_with_outputs=chart.rates_with_outputs,
             fallback_rates=chart.fallback_rates,
             accept=chart.accept,
-            accelerate=self.method.formulation.accelerate,
+            accelerate=formulation.accelerate,
         )
         return Kernels(*(kernel.pointer if kernel else None for kernel in kernels))
 
@@ -210,6 +211,10 @@ class Run:
         if self.method.stabilisation.projects:
             self.ranks = ranks
             memory.watch.generic_rank = ranks.rank
+            freedoms = self.part.active.velocities.size - ranks.rank
+            memory.watch.regular = freedoms <= (
+                0 if self.scene.driver else 1
+            )  # more may be a singular position's
             settings.nearly_dependent = self.ranks.least < NEARLY
             settings.rounding *= min(1.0, self.model.length)
 
@@ -265,8 +270,13 @@ class Run:
         return UNDECIDED if status == SINGULAR_AHEAD else status
 
     def specialise_where_it_pays(self, status: int) -> None:
-        """Go on with machine code of the scene's own where many steps are ahead of a run that is PAUSED."""
-        if self.wants_code and status == PAUSED and self._steps_ahead() >= STEPS_WORTH_CODE:
+        """Go on with machine code of the scene's own where many steps are ahead of a run that is PAUSED.
+
+        General kernels leave out rows that depend on others, and take fewer steps where there are any.
+        """
+        independent = self.memory.equations.system.settings.independent
+        worth = self.wants_code and independent and status == PAUSED
+        if worth and self._steps_ahead() >= STEPS_WORTH_CODE:
             self.wants_code = False
             with contextlib.suppress(Untraceable):  # then the general kernels go on
                 self._specialise()

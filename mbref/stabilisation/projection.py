@@ -16,19 +16,23 @@ from typing import Annotated, NamedTuple
 from numpy import sqrt
 
 from mbref.equations.coordinates import contract, displace, expand
-from mbref.equations.evaluation import add_resting_rows, evaluate, violation_rate
+from mbref.equations.evaluation import add_resting_rows, assemble_system, evaluate, violation_rate
 from mbref.kernels.compilation import exchangeable, inlined, kernel
 from mbref.kernels.layout import ACCEPT, ENTER, NOT_CONVERGED, OK, RATES, SINGULAR
-from mbref.kernels.named_memory import Vector, opener
+from mbref.kernels.named_memory import Matrix, Vector, opener
 from mbref.linear_algebra.minimum_norm import NEVER, solve_fixed_iterations
 from mbref.linear_algebra.sparse_cholesky import find_squared_pivots, regularised_factor
-from mbref.linear_algebra.vectors import flush_denormals, largest, sort
-from mbref.stabilisation.all_coordinates import accelerate, rates
+from mbref.linear_algebra.vectors import copy, flush_denormals, largest, sort
+from mbref.stabilisation.all_coordinates import accelerate, write_rates
 from mbref.stabilisation.base import Stabilisation
 
 ALPHA = 1e10  # of the iteration
 REPEATED, ALONE = 1, 2  # iterations of a correction that Newton's method repeats, and of one made once
 INDEPENDENT = (5.0 * ALPHA**-0.25) ** 2  # the squared pivot from which on a row counts as independent
+DEPENDENT, CLEAR = (
+    3e-3,
+    0.05,
+)  # pivots up to which a row clearly depends on others, and from which it does not
 LEAST_REFERENCE = 0.05  # that the smallest pivot is compared with, also at a start near a singular position
 MOST_ITERATIONS = 10
 ROUNDING = 1e3  # tolerances: the violation below which iterations may fail to reduce it further
@@ -40,10 +44,11 @@ FACTOR_FAILED = -1.0  # a Newton step's answer in place of the violation
 
 
 class Scratch(NamedTuple):
-    """Corrections of positions: (δr, δπ') per body and the change of coordinates."""
+    """Corrections of positions: (δr, δπ') per body and the change of coordinates; blocks of rows left out."""
 
     correction: Annotated[Vector, "n"]
     change: Annotated[Vector, "7*nb"]
+    blocks: Annotated[Matrix, "m", "width"]
 
 
 scratch_of = opener(Scratch)
@@ -218,6 +223,67 @@ def project_velocities(iterations, memory):
 @exchangeable(ACCEPT)
 def accept(t, y, memory):
     return project(t, y, memory)
+
+
+@exchangeable(RATES)
+def rates(t, y, y_rate, memory):
+    """y' by the rows that were independent where the step began.
+
+    Rows that depend on others do so on the constraints alone: a stage of a step violates these a little, and
+    there such a row contradicts the others by as much as it is independent of them.
+    """
+    state, equations = memory.state, memory.equations
+    expand(y, memory.active, state)
+    assemble_system(t, state.coordinates, state.velocities, equations)
+    some = depend_on_others(memory)
+    if some:
+        leave_out_dependent_rows(memory)
+    status = memory.kernels.accelerate(equations.system)
+    if some:
+        put_back_dependent_rows(memory)
+    write_rates(y_rate, memory)
+    return status
+
+
+@kernel
+def depend_on_others(memory):
+    """Whether rows clearly depended on others, as many as ever, at the last state that was projected.
+
+    Near a singular position more rows seem to; a motion that may have begun on one does not tell how many do.
+    """
+    pivots, watched, independent = memory.pivots, memory.watch, 0
+    if not watched.regular:
+        return False
+    for k in range(pivots.shape[0]):
+        if pivots[k] > DEPENDENT:
+            independent += 1
+            if pivots[k] < CLEAR:
+                return False
+    return independent < pivots.shape[0] and independent == watched.generic_rank
+
+
+@kernel
+def leave_out_dependent_rows(memory):
+    """Have the rows that depended on others be zero, with the blocks of each kept."""
+    pivots, row, system = memory.pivots, memory.factor.symbolic.row, memory.equations.system
+    kept = scratch_of(memory.chart).blocks
+    for k in range(pivots.shape[0]):
+        if not pivots[k] > DEPENDENT:
+            i = row[k]
+            copy(system.blocks[i], kept[i])
+            system.blocks[i], system.rhs[i] = 0.0, 0.0
+            if system.jacobian.shape[0] > 0:
+                system.jacobian[i] = 0.0
+
+
+@kernel
+def put_back_dependent_rows(memory):
+    """Have the blocks of rows that were left out be as they were: an evaluation writes those that change."""
+    pivots, row, system = memory.pivots, memory.factor.symbolic.row, memory.equations.system
+    kept = scratch_of(memory.chart).blocks
+    for k in range(pivots.shape[0]):
+        if not pivots[k] > DEPENDENT:
+            copy(kept[row[k]], system.blocks[row[k]])
 
 
 @exchangeable(RATES)
