@@ -211,10 +211,8 @@ class Run:
         if self.method.stabilisation.projects:
             self.ranks = ranks
             memory.watch.generic_rank = ranks.rank
-            freedoms = self.part.active.velocities.size - ranks.rank
-            memory.watch.regular = freedoms <= (
-                0 if self.scene.driver else 1
-            )  # more may be a singular position's
+            freedoms = self.part.active.velocities.size - ranks.rank  # more may be a singular position's
+            memory.watch.regular = freedoms <= (0 if self.scene.driver else 1)
             settings.nearly_dependent = self.ranks.least < NEARLY
             settings.rounding *= min(1.0, self.model.length)
 

@@ -29,10 +29,8 @@ from mbref.stabilisation.base import Stabilisation
 ALPHA = 1e10  # of the iteration
 REPEATED, ALONE = 1, 2  # iterations of a correction that Newton's method repeats, and of one made once
 INDEPENDENT = (5.0 * ALPHA**-0.25) ** 2  # the squared pivot from which on a row counts as independent
-DEPENDENT, CLEAR = (
-    3e-3,
-    0.05,
-)  # pivots up to which a row clearly depends on others, and from which it does not
+DEPENDENT = 3e-3  # the pivot up to which a row clearly depends on others
+CLEAR = 0.05  # the pivot from which on it clearly does not
 LEAST_REFERENCE = 0.05  # that the smallest pivot is compared with, also at a start near a singular position
 MOST_ITERATIONS = 10
 ROUNDING = 1e3  # tolerances: the violation below which iterations may fail to reduce it further

@@ -18,8 +18,7 @@ LINKAGES = {"spherical": spherical, "bennett": SCENES["bennett"], "bricard": SCE
 
 
 @pytest.mark.parametrize(
-    "method",
-    ("alf-dual+projection", "mpi-svd+projection", "mpi-qr+projection", "mpi-gs+projection"),
+    "method", ("alf-dual+projection", "mpi-svd+projection", "mpi-qr+projection", "mpi-gs+projection")
 )
 @pytest.mark.parametrize("name", LINKAGES)
 def test_redundant_rows_do_not_shorten_steps(name, method):
