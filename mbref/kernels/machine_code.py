@@ -11,8 +11,11 @@ import llvmlite.binding as llvm
 from mbref.kernels import checked_file
 
 MOST = 64  # pieces of code that a process keeps loaded
-
 _loaded: dict[Path, Code] = {}
+
+
+class NoGeneratedCode(Exception):
+    """A scene or method without generated code, with the reason."""
 
 
 class Code:

@@ -16,11 +16,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from mbref.kernels.machine_code import NoGeneratedCode as Untraceable
+
 COMPARISONS = {">": "ogt", ">=": "oge", "<": "olt", "<=": "ole"}  # as LLVM names them
-
-
-class Untraceable(Exception):
-    """A kernel that cannot be recorded, with the reason."""
 
 
 class Record:

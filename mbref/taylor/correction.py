@@ -5,9 +5,9 @@ from __future__ import annotations
 from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.layout import NOT_CONVERGED, OK
 from mbref.linear_algebra.vectors import larger
+from mbref.taylor.generated_calls import close_by_code, violation_by_code
 from mbref.taylor.lanes import LANES, gathered, load, store
 from mbref.taylor.passage import least_pivot
-from mbref.taylor.scene_code import close_by_code, violation_by_code
 from mbref.taylor.solver import factorise, solution
 
 SMALL = 1e-6  # a violation whose correction leaves its square

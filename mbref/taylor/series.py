@@ -9,10 +9,10 @@ is added to the sums of all later orders at once, so that little is left between
 from __future__ import annotations
 
 from mbref.kernels.compilation import inlined, kernel
+from mbref.taylor.generated_calls import expand_by_code, expand_by_power
 from mbref.taylor.lanes import LANES, gathered, load, store
 from mbref.taylor.loads import add_loads, start_loads
 from mbref.taylor.passage import size_of
-from mbref.taylor.scene_code import expand_by_code, expand_by_power
 from mbref.taylor.solver import respond_in_loops, solution
 
 SLOWEST = 2.0  # steps over the time in which the speed would vanish: beyond, rounding grows with the order

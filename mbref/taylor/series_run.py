@@ -14,12 +14,12 @@ from mbref.equations.branches import SMOOTH, Passed
 from mbref.equations.initial_state import Start
 from mbref.equations.model import Model
 from mbref.kernels.lent_memory import Lent, copied, fill, lent, shapes_of, take_back
+from mbref.kernels.machine_code import NoGeneratedCode
 from mbref.kernels.named_memory import Packed, allocate
 from mbref.method import Method
 from mbref.scene import Scene
 from mbref.simulation.limits import AUTO, GENERIC, SPECIALISED, Limits
 from mbref.simulation.run import Run
-from mbref.specialised import Untraceable
 from mbref.taylor.advance import advance_series, enter
 from mbref.taylor.driven import follow_drivers
 from mbref.taylor.geometry import geometry_of
@@ -42,7 +42,6 @@ from mbref.taylor.passing import (
 )
 from mbref.taylor.polynomials import Geometry
 from mbref.taylor.samples import complete_samples
-from mbref.taylor.scene_code import code_of, functions_of, rank_of
 from mbref.taylor.start import OFF
 from mbref.taylor.stepping import begin, expand_from, step
 from mbref.taylor.twin import LEAST_CHANGE
@@ -178,12 +177,12 @@ class SeriesRun(Run):
     def _specialise(self) -> None:
         """Expand, and take samples, by code of the scene's own from now on, made or loaded.
 
-        Raises Untraceable where the series cannot have any.
+        Raises NoGeneratedCode where the series cannot have any.
         """
         began = time.process_time()
         self._put_code()
         self.making += time.process_time() - began
-        with contextlib.suppress(Untraceable):  # then samples are taken by the general kernels
+        with contextlib.suppress(NoGeneratedCode):  # then samples are taken by the general kernels
             super()._specialise()
             run = self.memory
             self._packed_taylor = self._lent_series.packed_as(
@@ -192,11 +191,12 @@ class SeriesRun(Run):
             self.taylor = self._packed_taylor.values
 
     def _put_code(self) -> None:
-        """Have the series made by code of the scene's own from now on; raises Untraceable without any."""
-        names, code = functions_of(self.taylor), self.taylor.code
-        self._code, code.rank = code_of(self.taylor, names), rank_of(self.taylor)
-        for name in names:
-            code[name] = self._code.address(name)
+        """Have the series made by code of the scene's own from now on; raises NoGeneratedCode without any."""
+        try:
+            from mbref.taylor.generated.build import put_code  # optional, and not needed by most runs
+        except ModuleNotFoundError:
+            raise NoGeneratedCode("the subpackage mbref.taylor.generated is not installed") from None
+        self._code = put_code(self.taylor)
 
     def expand(self) -> int:
         """Expand at the present time and state, for steps until the end: OK or why that cannot be."""

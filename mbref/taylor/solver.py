@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.layout import OK, SINGULAR
+from mbref.taylor.generated_calls import factorise_by_code
 from mbref.taylor.lanes import LANES, load, store
 from mbref.taylor.partition import choose, keep_pivot, put_rows
-from mbref.taylor.scene_code import factorise_by_code
 
 KEPT = 0.5  # a pivot over its first below which rows and variables are chosen again
 WITHOUT_INERTIA = 1e-13  # of the largest inertia of a variable

@@ -8,21 +8,16 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from llvmlite import ir
 
+from mbref.taylor.generated_calls import function_type
 from mbref.taylor.lanes import BLOCK, LANES, WORD
 
 DOUBLE, PLACE = ir.DoubleType(), ir.IntType(32)
-DOUBLES, WHOLES = DOUBLE.as_pointer(), WORD.as_pointer()
 WHOLE = WORD
 PLACES = ir.VectorType(PLACE, LANES)
 FUSED = ("contract",)
 CHAINS = 4  # sums that are added up side by side: one would wait for each of its products
 
 Blocks = list[ir.Value]
-
-
-def function_type(doubles: int, wholes: int = 0, counts: int = 0) -> ir.FunctionType:
-    """The type of a function of so many arrays of doubles and of whole numbers, and of whole numbers."""
-    return ir.FunctionType(ir.VoidType(), [DOUBLES] * doubles + [WHOLES] * wholes + [WORD] * counts)
 
 
 class Instructions:

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from llvmlite import ir
 
-from mbref.taylor.instructions import WHOLE, Blocks, Instructions, constant
+from mbref.taylor.generated.instructions import WHOLE, Blocks, Instructions, constant
+from mbref.taylor.generated.orders import Factors, Newest, Orders, Sums
 from mbref.taylor.lanes import LANES
 from mbref.taylor.layout import Products, TaylorMemory
-from mbref.taylor.orders_code import Factors, Newest, Orders, Sums
 
 POINTERS = 7  # terms, response, left, right, scale, growth, sums
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from llvmlite import ir
 
-from mbref.taylor.instructions import Blocks, Instructions, constant, levels
+from mbref.taylor.generated.instructions import Blocks, Instructions, constant, levels
 from mbref.taylor.lanes import LANES
 from mbref.taylor.layout import TaylorMemory
 

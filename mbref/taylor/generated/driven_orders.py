@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 from llvmlite import ir
 
-from mbref.taylor.instructions import Blocks, Instructions
+from mbref.taylor.generated.instructions import Blocks, Instructions
+from mbref.taylor.generated.multiplier_orders import MultiplierOrders
+from mbref.taylor.generated.orders import Newest, Sums, Term, terms_of_rows
 from mbref.taylor.lanes import LANES, filled
 from mbref.taylor.layout import TaylorMemory
-from mbref.taylor.multiplier_code import MultiplierOrders
-from mbref.taylor.orders_code import Newest, Sums, Term, terms_of_rows
 from mbref.taylor.polynomials import products_of_lanes
 
 

@@ -2,7 +2,7 @@
 
 The orders are a loop of few instructions, so that code fetched once serves all of them.  The numbers that
 meet in a product are known, so that blocks are shuffled in registers.  A sum may take a product in before it
-is rounded, as in the kernels.  ``multiplier_code``, ``driven_code`` and ``power_code`` find each order.
+is rounded, as in the kernels.  ``multiplier_orders``, ``driven_orders`` and ``power_orders`` find each order.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from llvmlite import ir
 
-from mbref.taylor.instructions import WHOLE, Blocks, Instructions, constant
+from mbref.taylor.generated.instructions import WHOLE, Blocks, Instructions, constant
 from mbref.taylor.lanes import LANES
 from mbref.taylor.layout import Products, TaylorMemory
 

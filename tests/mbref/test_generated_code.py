@@ -1,8 +1,15 @@
 """Machine code of a scene's series against the kernels that serve every scene."""
 
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import mbref
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from mbref.kernels.layout import OK
 from mbref.method import Method, MethodError
@@ -10,7 +17,8 @@ from mbref.scene import Driver
 from mbref.scenes import SCENES, find_scene
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.simulate import Limits, simulate, why_no_code
-from mbref.taylor import scene_code
+from mbref.simulation.stepping import DONE
+from mbref.taylor.generated import build
 from mbref.taylor.run import TaylorRun
 from mbref.trajectory import Outcome
 
@@ -183,7 +191,7 @@ def test_springs_are_left_to_the_kernels_and_long_eliminations_too():
     names = {}
     for scene in ("planar_slider_crank", "andrews_squeezer", "bricard"):
         run = TaylorRun(SCENES[scene](), TAYLOR, np.array([0.01]), Limits(code="specialised"))
-        names[scene] = {name for name in scene_code.NAMES if run.taylor.code[name]}
+        names[scene] = {name for name in build.NAMES if run.taylor.code[name]}
     corrections = {"violation", "close", "close_rate"}
     assert names["planar_slider_crank"] == {"expand", "factorise", *corrections}
     assert names["andrews_squeezer"] == {"factorise", *corrections}
@@ -221,6 +229,48 @@ def test_a_scene_that_has_no_code_is_told_why(monkeypatch):
     assert why_no_code(SCENES["andrews_squeezer"](), TAYLOR) == ""
     with pytest.raises(MethodError, match="products of blocks, more than 2000"):
         simulate(find_scene("four_bar_chain[40]"), "taylor", [0.01], Limits(code="specialised"))
-    monkeypatch.setattr(scene_code, "PLAIN", True)
+    monkeypatch.setattr(build, "PLAIN", True)
     with pytest.raises(MethodError, match="without the JIT"):
         simulate(SCENES["four_bar"](), "taylor", [0.01], Limits(code="specialised"))
+
+
+WITHOUT = """
+import importlib.util
+from mbref.method import MethodError
+from mbref.scenes import SCENES
+from mbref.simulation.simulate import Limits, simulate
+from mbref.trajectory import Outcome
+assert importlib.util.find_spec("mbref.taylor.generated") is None
+for code in ("auto", "generic"):
+    motion = simulate(SCENES["four_bar"](), "taylor", [0.0, 0.01], Limits(code=code))
+    assert motion.outcome == Outcome.COMPLETED, motion.message
+try:
+    simulate(SCENES["four_bar"](), "taylor", [0.1], Limits(code="specialised"))
+except MethodError as reason:
+    assert "mbref.taylor.generated is not installed" in str(reason)
+else:
+    raise AssertionError("generated code is optional, but asked for")
+"""
+
+
+def test_mbref_runs_without_the_subpackage(tmp_path):
+    package = Path(mbref.__file__).parent
+    shutil.copytree(package, tmp_path / "mbref", ignore=shutil.ignore_patterns("generated", "__pycache__"))
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", WITHOUT],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_auto_goes_on_by_the_kernels_without_the_subpackage(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mbref.taylor.generated.build", None)
+    scene, times = SCENES["planar_slider_crank"](), np.array([0.4])
+    run = TaylorRun(scene, TAYLOR, times, Limits(rtol=1e-9, largest_step=1.2e-5))
+    assert run.advance(None)[0] == DONE
+    assert not run.wants_code and run.taylor.code.expand == 0, "code was asked for, and there is none"

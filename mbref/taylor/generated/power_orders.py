@@ -2,7 +2,7 @@
 
 The rows allow one motion, along the velocity v: the power of inertia and forces along it vanishes, v · w = 0
 with w = M a - Q (P. E. B. Jourdain, Quart. J. Pure Appl. Math. 40, 1909).  With the rows it gives each order,
-while multipliers take most of the products in ``mbref.taylor.multiplier_code``.  In Taylor coefficients, with
+while multipliers take most of the products in ``multiplier_orders``.  In Taylor coefficients, with
 v_k = (k + 1) z_{k+1} and w_k = (k + 1) (k + 2) M z_{k+2} - Q_k,
 
     (k + 1) (k + 2) v_0 · M z_{k+2} = v_0 · Q_k - Σ_{i=1…k} v_i · w_{k-i},
@@ -18,10 +18,10 @@ from __future__ import annotations
 import numpy as np
 from llvmlite import ir
 
-from mbref.taylor.instructions import WHOLE, Blocks, Instructions, constant, levels
+from mbref.taylor.generated.instructions import WHOLE, Blocks, Instructions, constant, levels
+from mbref.taylor.generated.orders import Factors, Orders, Sums, terms_of_rows
 from mbref.taylor.lanes import LANES, filled
 from mbref.taylor.layout import Inertia, Products, TaylorMemory
-from mbref.taylor.orders_code import Factors, Orders, Sums, terms_of_rows
 from mbref.taylor.polynomials import products_of_lanes
 
 POINTERS = 5  # terms, response, left, right, sums

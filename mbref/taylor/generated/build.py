@@ -1,0 +1,99 @@
+"""Generated functions of a scene: the orders of its series, the linear system and the corrections."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+
+from llvmlite import ir
+
+from mbref.kernels.compilation import CACHE, PLAIN
+from mbref.kernels.machine_code import Code, NoGeneratedCode, code_at, processor
+from mbref.taylor.generated import corrections, elimination, multiplier_orders, orders, power_orders
+from mbref.taylor.generated.corrections import Correction
+from mbref.taylor.generated.driven_orders import DrivenOrders
+from mbref.taylor.generated.elimination import Elimination, EliminationOfRows
+from mbref.taylor.generated.instructions import Instructions
+from mbref.taylor.generated.multiplier_orders import MultiplierOrders
+from mbref.taylor.generated.power_orders import PowerOrders
+from mbref.taylor.lanes import LANES
+from mbref.taylor.layout import TaylorMemory
+
+EXPAND, POWER, FACTORISE = "expand", "expand_by_power", "factorise"
+NAMES = EXPAND, POWER, FACTORISE, *corrections.POINTERS
+MOST_BLOCKS = 2_000  # products of blocks that LLVM compiles in a second
+
+
+def put_code(taylor: TaylorMemory) -> Code:
+    """Write the addresses of a scene's functions into memory; they are valid while the code returned lives.
+
+    Raises NoGeneratedCode where the functions would be long, or there is no JIT.
+    """
+    names = functions_of(taylor)
+    code, addresses = code_of(taylor, names), taylor.code
+    addresses.rank = rank_of(taylor)
+    for name in names:
+        addresses[name] = code.address(name)
+    return code
+
+
+def code_of(taylor: TaylorMemory, names: Sequence[str]) -> Code:
+    """Return the code of functions of a scene, made or loaded; raises NoGeneratedCode."""
+    if PLAIN:
+        raise NoGeneratedCode("without the JIT there is no machine code")
+    lanes = taylor.series.terms.shape[1]
+    if (length := lanes * lanes // LANES) > MOST_BLOCKS:
+        raise NoGeneratedCode(
+            f"an order of its series takes {length} products of blocks, more than {MOST_BLOCKS}"
+        )
+    return code_at(CACHE / "scenes" / f"{_key(taylor, names)}.code", lambda: write_code(taylor, names))
+
+
+def functions_of(taylor: TaylorMemory) -> tuple[str, ...]:
+    """The names of a scene's functions: loads of springs are no sums of products of series, and elimination
+    of many rows is left to the kernels' loops."""
+    springs = taylor.polynomials.springs.damping.size + taylor.polynomials.torsions.damping.size
+    rank, nr, nz = rank_of(taylor), taylor.solver.row.size, taylor.solver.order.size
+    is_short = (rank * rank + nr * nz) * taylor.series.terms.shape[1] // LANES <= MOST_BLOCKS
+    by_power = power_orders.serves(taylor)
+    names = {EXPAND: not springs, POWER: not springs and by_power, FACTORISE: is_short}
+    return *(name for name, served in names.items() if served), *corrections.POINTERS
+
+
+def rank_of(taylor: TaylorMemory) -> int:
+    """The rank of the rows where all of the start's freedoms are left."""
+    return taylor.solver.order.size - int(taylor.progress.freedoms)
+
+
+def _key(taylor: TaylorMemory, names: Sequence[str]) -> str:
+    """A digest of all that the code depends on."""
+    polynomials, solver = taylor.polynomials, taylor.solver
+    digest = hashlib.sha256(f"{names} {rank_of(taylor)} {processor()}".encode())
+    arrays = *polynomials.products, *polynomials.inertia, *polynomials.rows, solver.linear, solver.order
+    every = (*arrays, polynomials.given.driver)
+    digest.update(b"".join(part for a in every for part in (str(a.shape).encode(), a.tobytes())))
+    return digest.hexdigest()[:32]
+
+
+def write_code(taylor: TaylorMemory, names: Sequence[str]) -> str:
+    """LLVM IR of the functions whose addresses ``SceneCode`` has."""
+    module = ir.Module()
+    if EXPAND in names:
+        write = Instructions(module, EXPAND, multiplier_orders.POINTERS, counts=orders.COUNTS)
+        is_driven = rank_of(taylor) == taylor.solver.order.size
+        (DrivenOrders if is_driven else MultiplierOrders)(taylor, write).put()
+        write.end()
+    if POWER in names:
+        write = Instructions(module, POWER, power_orders.POINTERS, counts=orders.COUNTS)
+        PowerOrders(taylor, write).put()
+        write.end()
+    if FACTORISE in names:
+        write = Instructions(module, FACTORISE, *elimination.POINTERS)
+        kind = EliminationOfRows if POWER in names else Elimination
+        kind(taylor, rank_of(taylor), write).put()
+        write.end()
+    for name, pointers in corrections.POINTERS.items():
+        write = Instructions(module, name, pointers)
+        getattr(Correction(taylor, write), name)()
+        write.end()
+    return str(module)
