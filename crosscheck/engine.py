@@ -34,7 +34,7 @@ FamilyParts = Mapping[str, Mapping[str, Mapping[str, float]]]  # kind of part â†
 
 
 class Owner(enum.Enum):
-    """The part that would have to change before the engine could do what it refuses."""
+    """The part that would have to change before an engine could do what it refuses."""
 
     ADAPTER = "missing in the adapter"
     ENGINE = "missing in the engine"
@@ -43,7 +43,15 @@ class Owner(enum.Enum):
 
 @dataclass(frozen=True)
 class Cannot:
-    """A refusal, given before running: a sentence about the scene, and the part that is the cause."""
+    """A refusal, given before running.
+
+    Attributes
+    ----------
+    owner : Owner
+        The part that is the cause: adapter, engine, or the engine's model.
+    reason : str
+        One sentence about the scene.
+    """
 
     owner: Owner
     reason: str
@@ -54,15 +62,24 @@ class Cannot:
 
 @dataclass(frozen=True)
 class Supports:
-    """The joint types, driven coordinates ("angle", "displacement") and load types that an adapter maps to
-    its engine."""
+    """Features that an adapter maps to its engine.
+
+    Attributes
+    ----------
+    joints : collection of str
+        Joint types, as in scene files.
+    drivers : collection of str
+        Driven coordinates: ``"angle"``, ``"displacement"``.
+    loads : collection of str
+        Load types, as in scene files.
+    """
 
     joints: Collection[str] = ()
     drivers: Collection[str] = ()
     loads: Collection[str] = ()
 
     def missing(self, scene: Scene) -> Cannot | None:
-        """The refusal of the first joint, driver or load of a scene that is not declared, or None."""
+        """Return the refusal of the first joint, driver or load that is not declared, or None."""
         reasons = [
             f"joint {joint.name!r} is of type {joint.type!r}, which the adapter does not map"
             for joint in scene.joint
@@ -85,9 +102,13 @@ class Supports:
 class Setting:
     """One way of running an engine.
 
-    ``family`` groups the settings that differ only in accuracy: "defaults" are the library's own,
-    "tuned" the most accurate that its documentation allows.  ``options`` are the engine's own numbers;
-    (family, options) reproduce the run.
+    Attributes
+    ----------
+    family : str
+        Group of settings that differ in accuracy only. ``"defaults"`` is the library's own choice,
+        ``"tuned"`` the most accurate one that its documentation allows.
+    options : mapping of str to Any
+        Numbers of the engine. Family and options reproduce the run.
     """
 
     family: str
@@ -99,16 +120,31 @@ class Setting:
 
 
 def best_family(settings: Sequence[Setting]) -> list[Setting]:
-    """Of settings, those of the family "tuned", else of the first family, coarse to fine."""
+    """Return the settings of the family "tuned", or of the first family, coarse to fine."""
     families = [setting.family for setting in settings]
     best = BEST if BEST in families or not families else families[0]
     return [setting for setting in settings if setting.family == best]
 
 
 class Engine(ABC):
-    """A simulator that takes a Scene and gives a Trajectory. Constructed without arguments.
+    """A simulator that takes a Scene and returns a Trajectory. Constructed without arguments.
 
     The third-party package is imported inside the methods, so that naming an engine loads nothing.
+
+    Attributes
+    ----------
+    name, package : str
+        Name of the engine, and the package to install when it is missing.
+    supports : Supports
+        Joint types, drivers and loads that the adapter maps. Everything else is refused.
+    rounding : float
+        Relative rounding of the engine's numbers: 2**-52, or 2**-23 in single precision.
+    families : mapping of str to str
+        Families of settings and their descriptions, for `crosscheck list settings`.
+    integrated_here : collection of str
+        Families whose integrator or extrapolation belongs to crosscheck.
+    options : mapping of str to str
+        Options of a setting and their descriptions, with units.
     """
 
     name: str
@@ -121,52 +157,70 @@ class Engine(ABC):
 
     @abstractmethod
     def version(self) -> str:
-        """Version of the engine; raises ImportError when its package is not installed."""
+        """Return the version of the engine.
+
+        Raises
+        ------
+        ImportError
+            If its package is not installed.
+        """
 
     def cannot(self, scene: Scene) -> Cannot | None:
-        """The refusal of a scene that cannot be run, or None: anything that ``supports`` does not declare,
-        then what ``refuses`` says."""
+        """Return the refusal of a scene, or None if the engine can run it.
+
+        Undeclared joints, drivers and loads come first, then the result of ``refuses``.
+        """
         return self.supports.missing(scene) or self.refuses(scene)
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """The refusal of a scene of declared joints, drivers and loads that still cannot be run, or None."""
+        """Return a refusal beyond the declared joints, drivers and loads, or None."""
         return None
 
     @abstractmethod
     def settings(self, scene: Scene) -> Sequence[Setting]:
-        """The sweep over this engine's families and accuracies for a scene, coarse to fine in each
-        family."""
+        """Return the settings of all families for a scene, coarse to fine in each family."""
 
     def settings_of(self, scene: Scene, family: str) -> Sequence[Setting]:
-        """The sweep over the accuracies of one family, coarse to fine; none where it does not serve the
-        scene."""
+        """Return the settings of one family, coarse to fine; none if it does not serve the scene."""
         return [setting for setting in self.settings(scene) if setting.family == family]
 
     def serves(self, scene: Scene, family: str) -> bool:
-        """Whether the sweep of a scene has the family; here by making that sweep."""
+        """Return whether a family has settings for a scene."""
         return bool(self.settings_of(scene, family))
 
     def best_settings(self, scene: Scene) -> Sequence[Setting]:
-        """The sweep of the engine's best family, "tuned", or without that of its first."""
+        """Return the settings of the family "tuned", or of the first family."""
         return best_family(self.settings(scene))
 
     def has_family(self, family: str) -> bool:
-        """Whether `run` takes this family although the sweep of `settings` may leave it out."""
+        """Return whether `run` accepts a family that `settings` may leave out."""
         return False
 
     def family_parts(self) -> FamilyParts:
-        """The parts from which an engine's families are composed; empty where it only has its sweep's."""
+        """Return the parts of which families are composed; empty if there are none."""
         return {}
 
     def prepare(self, families: Sequence[str]) -> None:  # noqa: B027 - most engines need nothing
-        """Import and compile ahead of the first run of these families in a process."""
+        """Import and compile what the families need, ahead of the first run in a process."""
 
     @abstractmethod
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """Simulate from t = 0 and sample at ``times`` (k,), increasing, the first may be 0.
+        """Simulate from t = 0 and sample.
 
-        A failure of the engine is an Outcome of the trajectory, with the states reached before it.
-        ``cost.seconds`` is the process CPU time of the stepping alone.
+        Parameters
+        ----------
+        scene : Scene
+            The mechanism.
+        times : ndarray, shape (k,)
+            Increasing sample times, s. The first one may be 0.
+        setting : Setting
+            Family and options.
+
+        Returns
+        -------
+        Trajectory
+            The states that the run reached. A failure of the engine is the outcome, not an exception.
+            ``cost.seconds`` is the process CPU time of the stepping alone.
         """
 
 
@@ -177,7 +231,7 @@ ENTRY_POINTS = "crosscheck.engines"
 
 
 def engine_names() -> tuple[str, ...]:
-    """Names of crosscheck's own engines and of those that installed packages offer."""
+    """Return the names of crosscheck's engines and of engines in installed packages."""
     return (
         *BUILT_IN,
         *OPTIONAL,
@@ -187,14 +241,16 @@ def engine_names() -> tuple[str, ...]:
 
 
 def default_engines() -> tuple[str, ...]:
-    """The engines that run when none is named: all but those that run on request, and the optional ones that
-    are not installed."""
+    """Return the engines that run when none is named.
+
+    Engines that run on request only, and optional engines that are not installed, are left out.
+    """
     asked = (name for name in engine_names() if name not in ON_REQUEST)
     return tuple(name for name in asked if name not in OPTIONAL or installed(name))
 
 
 def installed(name: str) -> bool:
-    """Whether the package of a known engine is installed."""
+    """Return whether the package of a known engine is installed."""
     try:
         engine(name).version()
     except ImportError:
@@ -203,8 +259,19 @@ def installed(name: str) -> bool:
 
 
 def engine(name: str) -> Engine:
-    """The engine of that name, or at ``module:attribute`` of a module that can be imported or lies in the
-    working directory; raises LookupError with the known names."""
+    """Return an engine.
+
+    Parameters
+    ----------
+    name : str
+        The name of an engine, or ``module:attribute`` of a module that can be imported or is in the working
+        directory.
+
+    Raises
+    ------
+    LookupError
+        If there is no such engine; the message lists the known ones.
+    """
     if name in BUILT_IN + OPTIONAL + ON_REQUEST:
         return _as_engine(name, import_module(f"crosscheck.engines.{name}").ENGINE)
     for point in metadata.entry_points(group=ENTRY_POINTS):

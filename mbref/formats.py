@@ -14,7 +14,15 @@ GROUP = "mbref.formats"
 
 @dataclass(frozen=True)
 class Imported:
-    """The scene of a file, and a sentence for every part of the file that the scene does not have."""
+    """A scene read from a file of another program.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene.
+    left_out : tuple of str
+        One sentence for each part of the file that the scene does not represent.
+    """
 
     scene: Scene
     left_out: tuple[str, ...]
@@ -22,7 +30,15 @@ class Imported:
 
 @dataclass(frozen=True)
 class Exported:
-    """The text of a file, and a sentence for every part of the scene that the file does not have."""
+    """The text of a file for another program.
+
+    Attributes
+    ----------
+    text : str
+        The text.
+    left_out : tuple of str
+        One sentence for each part of the scene that the file does not represent.
+    """
 
     text: str
     left_out: tuple[str, ...]
@@ -47,7 +63,18 @@ def read(path: str | Path) -> Imported:
 
 
 def write(scene: Scene, path: str | Path) -> tuple[str, ...]:
-    """Write a scene by the format of the path's ending; what the file does not have.  Raises as ``read``."""
+    """Write a scene in the format of the file suffix.
+
+    Returns
+    -------
+    tuple of str
+        One sentence for each part of the scene that the file does not represent.
+
+    Raises
+    ------
+    ValueError
+        If no installed format has this suffix.
+    """
     exported = _found(path, "writes").write(scene)
     Path(path).write_text(exported.text, encoding="utf-8")
     return exported.left_out

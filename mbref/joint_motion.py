@@ -13,14 +13,22 @@ from mbref.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class JointMotion:
-    """The second body's motion relative to the first from t = 0 at k times; None where a joint has no such.
+    """Motion of the second body of a joint relative to the first, from t = 0, at k sample times.
 
-    ``angle`` (k,) about the axis in rad, counted on over full turns from the first sample, and its ``rate``
-    (k,) in rad/s: revolute, cylindrical and planar joints.  ``displacement`` (k,) along the axis in m:
-    translational and cylindrical joints.  ``rotation`` (k, 3) is the rotation vector of the second body
-    relative to the first (rad, along the world's axes as they are fixed to the first body).  ``force`` and
-    ``moment`` (k, 3), N and N m in the world, act on the second body at its anchor; ``open`` (k,) counts the
-    dimensions of the two that equilibrium does not determine.
+    Attributes
+    ----------
+    angle, rate : ndarray, shape (k,), or None
+        Angle about the axis (rad, counted on over full turns) and its rate (rad/s), of revolute, cylindrical
+        and planar joints.
+    displacement : ndarray, shape (k,), or None
+        Displacement along the axis, m, of translational and cylindrical joints.
+    rotation : ndarray, shape (k, 3)
+        Rotation vector of the second body relative to the first, rad, along the world's axes at t = 0 as they
+        are fixed to the first body.
+    force, moment : ndarray, shape (k, 3), or None
+        Reaction on the second body at its anchor, world frame, N and N m.
+    open : ndarray, shape (k,), or None
+        Number of reaction components that equilibrium does not determine.
     """
 
     name: str

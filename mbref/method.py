@@ -37,12 +37,24 @@ Part = TypeVar("Part", Formulation, Stabilisation, Integrator)
 
 
 class MethodError(Exception):
-    """A method name that means nothing, or an option that its part does not have."""
+    """An unknown method, or an option that a part of the method does not have."""
 
 
 @dataclass(frozen=True)
 class Method:
-    """A row of the paper's tables, and how it is integrated."""
+    """Formulation, stabilisation and integrator: a row of the paper's tables, and how it is integrated.
+
+    Attributes
+    ----------
+    formulation : Formulation
+        How accelerations and multipliers are computed.
+    stabilisation : Stabilisation
+        How the constraints are kept.
+    integrator : Integrator
+        How time steps are taken.
+    options : mapping of str to mapping of str to float
+        Options by name of the part, where they differ from the defaults.
+    """
 
     formulation: Formulation
     stabilisation: Stabilisation
@@ -78,7 +90,19 @@ class Method:
     @staticmethod
     @functools.lru_cache(maxsize=MOST_NAMES)
     def parse(name: str) -> Method:
-        """The method of a name, or of one of SHORT with options; raises MethodError with the known names."""
+        """Return the method of a name such as ``lm1+baumgarte[alpha=10,beta=10]/rk4[step=1e-4]``.
+
+        Parameters
+        ----------
+        name : str
+            ``formulation+stabilisation/integrator``, options in brackets, or a short name of SHORT. The
+            stabilisation defaults to ``none``, the integrator to ``dop853``.
+
+        Raises
+        ------
+        MethodError
+            If a part or an option is unknown (the message lists the known ones), or parts do not go together.
+        """
         short, bracket, rest = name.strip().partition("[")
         name = SHORT[short] + bracket + rest if short in SHORT else name
         head, _, integrator = name.partition("/")

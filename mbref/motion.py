@@ -25,39 +25,63 @@ VECTORS = ("position", "velocity", "angular_velocity", "acceleration", "angular_
 
 @dataclass(frozen=True, repr=False)
 class Motion(Trajectory):
-    """A trajectory and the ``mechanism`` (a Scene) that it moves.
+    """A trajectory together with its scene: joints, energies, tables, files and pictures.
 
-    ``motion["rod"].position`` (k, 3) is a body's, ``motion.joint("A").angle`` (k,) a joint's.
+    ``motion["rod"].position`` is the motion of a body, ``motion.joint("A").angle`` of a joint. All attributes
+    of Trajectory are present.
+
+    Attributes
+    ----------
+    mechanism : Scene
+        The scene that moves.
     """
 
     mechanism: Scene = field(kw_only=True)
 
     @staticmethod
     def of(scene: Scene, trajectory: Trajectory) -> Motion:
-        """A trajectory of any engine with its scene."""
+        """Return the trajectory of any engine together with its scene."""
         return Motion(**{f.name: getattr(trajectory, f.name) for f in fields(Trajectory)}, mechanism=scene)
 
     def joint(self, name: str) -> JointMotion:
-        """Angle, displacement and reaction of a joint; raises KeyError that lists the joints."""
+        """Return angle, displacement and reaction of one joint.
+
+        Raises
+        ------
+        KeyError
+            If no joint has this name; the message lists the joints.
+        """
         return joint_motion(self.mechanism, self, name)
 
     @property
     def kinetic_energy(self) -> np.ndarray:
-        """Kinetic energy (k,), J; ValueError where a body has no mass."""
+        """Kinetic energy, J, shape (k,). Raises ValueError if a body has no mass."""
         return kinetic(self.mechanism, self)
 
     @property
     def potential_energy(self) -> np.ndarray:
-        """Energy (k,) of gravity, springs and torsion springs, J; ValueError where a body has no mass."""
+        """Energy of gravity, springs and torsion springs, J, shape (k,).
+
+        Raises ValueError if a body has no mass.
+        """
         return potential(self.mechanism, self)
 
     @property
     def energy(self) -> np.ndarray:
-        """Kinetic plus potential energy (k,), J: constant without drivers, dampers, forces and moments."""
+        """Kinetic plus potential energy, J, shape (k,).
+
+        It is constant if the scene has no drivers, dampers, forces and moments.
+        """
         return self.kinetic_energy + self.potential_energy
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Every number over time as a column (k,): ``time``, ``rod.position.x``, ``A.angle``, ``energy``."""
+        """Return every number over time as a column.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (k,)
+            ``time``, ``rod.position.x``, ``A.angle``, ``energy`` and so on, in SI units.
+        """
         table = {"time": self.times}
         for name in self.bodies:
             table.update(_body_columns(name, self[name]))
@@ -68,7 +92,13 @@ class Motion(Trajectory):
         return table
 
     def to_dataframe(self) -> Any:
-        """The columns as a pandas DataFrame, indexed by time; raises ImportError where pandas is missing."""
+        """Return the columns as a pandas DataFrame, indexed by time.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        """
         try:
             import pandas
         except ImportError:
@@ -76,7 +106,7 @@ class Motion(Trajectory):
         return pandas.DataFrame(self.columns()).set_index("time")
 
     def to_csv(self, path: str | Path) -> None:
-        """Write the columns as CSV with a line of headings, numbers in full."""
+        """Write the columns as CSV. The first line has their names, numbers have all digits."""
         table = self.columns()
         with open(path, "w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file)
@@ -84,13 +114,21 @@ class Motion(Trajectory):
             writer.writerows(zip(*(column.tolist() for column in table.values()), strict=True))
 
     def save(self, path: str | Path) -> None:
-        """Write scene and trajectory as one JSON object; ``Motion.load`` gives back an equal motion."""
+        """Write scene and trajectory as one JSON object, which ``Motion.load`` reads."""
         whole = {"scene": self.mechanism.to_dict(), "record": self.to_record()}
         Path(path).write_text(strict_json(whole) + "\n", encoding="utf-8")
 
     @staticmethod
     def load(path: str | Path) -> Motion:
-        """Read what ``save`` wrote; raises OSError, or ValueError where the file holds something else."""
+        """Read a file that ``Motion.save`` wrote.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be read.
+        ValueError
+            If the file holds something else.
+        """
         try:
             whole = json.loads(Path(path).read_text(encoding="utf-8"))
             scene = Scene(**whole["scene"])
@@ -99,17 +137,36 @@ class Motion(Trajectory):
             raise ValueError(f"{path}: is not a file that Motion.save wrote") from None
 
     def plot(self, *names: str) -> Any:
-        """Columns over time as a matplotlib figure, one panel for each quantity.
+        """Plot columns over time, one panel for each quantity.
 
-        ``names`` are columns or their beginnings (``"rod.position"``); without any, the coordinates of the
-        joints and the energy.  Raises ValueError for a name of no column, ImportError without matplotlib.
+        Parameters
+        ----------
+        *names : str
+            Columns or their beginnings, such as ``"rod.position"``. Default: joint coordinates and energy.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        ValueError
+            If a name fits no column.
+        ImportError
+            If matplotlib is not installed.
         """
         from mbref.drawing.plot import plot
 
         return plot(self.columns(), names)
 
     def picture(self, view: str | None = None) -> str:
-        """The moving mechanism as SVG, seen in a ``view`` (xy, xz, yz, oblique or AZIMUTH,ELEVATION in °)."""
+        """Return the moving mechanism as SVG.
+
+        Parameters
+        ----------
+        view : str, optional
+            ``"xy"``, ``"xz"``, ``"yz"``, ``"oblique"`` or ``"AZIMUTH,ELEVATION"`` in degrees.
+        """
         return moving(self.mechanism, self, View.parse(view) if view else None)
 
     def _repr_html_(self) -> str:

@@ -12,7 +12,17 @@ import numpy as np
 
 
 class Outcome(enum.Enum):
-    """How a run ended; ``letter`` is the footnote letter of the paper's tables, where it has one."""
+    """How a run ended.
+
+    Attributes
+    ----------
+    label : str
+        The name, as in records: ``"COMPLETED"``.
+    letter : str
+        The footnote letter of Tables I to III of Neto & Ambrósio (2003), or an empty string.
+    sentence : str
+        What the outcome means.
+    """
 
     COMPLETED = ("COMPLETED", "", "reached the end time")
     SINGULAR_MATRIX = ("SINGULAR_MATRIX", "a", "the leading matrix is singular")
@@ -33,7 +43,19 @@ class Outcome(enum.Enum):
 
 @dataclass(frozen=True)
 class Cost:
-    """Cost of a run: process CPU seconds of the stepping alone, build apart, and counts."""
+    """Cost of a run.
+
+    Attributes
+    ----------
+    seconds : float
+        Process CPU time of the stepping alone, s.
+    build_seconds : float
+        CPU time of everything before the first step, s.
+    steps, rejected : int
+        Accepted and rejected steps.
+    rhs, factorisations, newton : int
+        Evaluations of the accelerations, matrix factorisations, and Newton iterations.
+    """
 
     seconds: float = 0.0
     build_seconds: float = 0.0
@@ -46,11 +68,22 @@ class Cost:
 
 @dataclass(frozen=True)
 class Crossing:
-    """A singular position that a run passed at a time (s), and the branches of motion that meet there.
+    """A singular position that a run crossed, and the branches of motion that meet there.
 
-    ``position`` (nb, 3), m, and ``orientation`` (nb, 4) of the bodies; ``velocity`` and ``angular_velocity``
-    (b, nb, 3), world, on each of the b branches to second order, the smooth one first.  The run took
-    branch ``taken``, counted from 1; ``sentence`` says how many there are, or why they cannot be told.
+    Attributes
+    ----------
+    time : float
+        Time of the singular position, s.
+    position : ndarray, shape (nb, 3)
+        Centres of mass of the bodies, world frame, m.
+    orientation : ndarray, shape (nb, 4)
+        Unit quaternions (w, x, y, z), body to world.
+    velocity, angular_velocity : ndarray, shape (b, nb, 3)
+        Velocities on each of the b branches, world frame, m/s and rad/s. The smooth branch is the first one.
+    taken : int
+        The branch that the run followed, counted from 1.
+    sentence : str
+        How many branches there are, or the reason why they are not known.
     """
 
     time: float
@@ -62,10 +95,22 @@ class Crossing:
     sentence: str
 
     def instants(self, end: float, count: int) -> np.ndarray:
-        """Times (count,), s, at which its branches are seen to part, of a run from 0 to ``end``.
+        """Return times at which the branches are seen to separate.
 
-        From a quarter turn of the fastest body before the crossing to not quite half a turn after it, where
-        the next crossing often is; all of the run where no body turns.
+        From a quarter turn of the fastest body before the crossing to slightly less than half a turn after
+        it, where the next crossing often is. If no body turns, the times cover the whole run.
+
+        Parameters
+        ----------
+        end : float
+            End of the run, s.
+        count : int
+            Number of times.
+
+        Returns
+        -------
+        ndarray, shape (count,)
+            Times, s.
         """
         rate = float(np.linalg.norm(self.angular_velocity, axis=-1).max(initial=0.0))
         if not rate:
@@ -74,7 +119,7 @@ class Crossing:
         return np.linspace(max(0.0, self.time - 0.25 * turn), min(end, self.time + 0.45 * turn), count)
 
     def to_record(self) -> dict[str, Any]:
-        """The crossing as numbers, lists and text."""
+        """Return the crossing as numbers, lists and text, for JSON."""
         arrays = ("position", "orientation", "velocity", "angular_velocity")
         return {
             "time": self.time, "taken": self.taken, "sentence": self.sentence,
@@ -83,14 +128,26 @@ class Crossing:
 
     @staticmethod
     def from_record(record: Mapping[str, Any]) -> Crossing:
-        """The crossing that a record was made of."""
+        """Return the crossing that ``to_record`` wrote."""
         arrays = {key: np.array(v, dtype=float) for key, v in record.items() if isinstance(v, list)}
         return Crossing(**{**record, **arrays})
 
 
 @dataclass(frozen=True)
 class BodyMotion:
-    """One body's share of a trajectory: the rows (k, …) of its arrays, in the same frames and units."""
+    """Motion of one body at k sample times, in the frames and units of Trajectory.
+
+    Attributes
+    ----------
+    name : str
+        Name of the body.
+    position, velocity, angular_velocity : ndarray, shape (k, 3)
+        Centre of mass (m) and velocities (m/s, rad/s), world frame.
+    orientation : ndarray, shape (k, 4)
+        Unit quaternions (w, x, y, z), body to world.
+    acceleration, angular_acceleration : ndarray, shape (k, 3), or None
+        World frame, m/s² and rad/s². None if the engine does not give them.
+    """
 
     name: str
     position: np.ndarray
@@ -109,17 +166,41 @@ PER_BODY = ("position", "orientation", "velocity", "angular_velocity", "accelera
 
 @dataclass(frozen=True, repr=False)
 class Trajectory:
-    """Poses of every body at the caller's times, as far as the run got.
+    """Poses of all bodies at the sample times that a run reached.
 
-    With k times reached and nb bodies: ``position`` (k, nb, 3) of the centres of mass, ``velocity``,
-    ``angular_velocity`` (k, nb, 3), all in the world frame; ``orientation`` (k, nb, 4) unit
-    quaternions (w, x, y, z), body to world.  ``acceleration`` and ``angular_acceleration``
-    (k, nb, 3, world) and ``reactions`` are None where the engine does not give them.
-    ``reactions[joint]`` (k, 6) is the force and the moment (world) on the joint's second body at the
-    anchor on that body, the driver's share included.  ``open_reactions[joint]`` (k,) counts the dimensions of
-    it that equilibrium does not determine, because of redundant rows or at a singular position; None where
-    that is not known.  ``crossings`` are the singular positions passed; None
-    where the engine, or the method, does not look for them.
+    k sample times were reached, the scene has nb bodies, and all vectors are in the world frame.
+
+    Attributes
+    ----------
+    times : ndarray, shape (k,)
+        Sample times, s.
+    bodies : tuple of str
+        Names of the bodies, in the order of the arrays.
+    position, velocity, angular_velocity : ndarray, shape (k, nb, 3)
+        Centres of mass (m) and velocities (m/s, rad/s).
+    orientation : ndarray, shape (k, nb, 4)
+        Unit quaternions (w, x, y, z), body to world.
+    acceleration, angular_acceleration : ndarray, shape (k, nb, 3), or None
+        m/s² and rad/s². None if the engine does not give them.
+    reactions : mapping of str to ndarray, shape (k, 6), or None
+        By joint: force (N) and moment (N m) on the second body at its anchor, including the driver's.
+    open_reactions : mapping of str to ndarray, shape (k,), or None
+        By joint: number of reaction components that equilibrium does not determine, because of redundant
+        constraint rows or at a singular position.
+    crossings : sequence of Crossing, or None
+        Singular positions that the run crossed. None if the method or engine does not look for them.
+    outcome : Outcome
+        How the run ended.
+    t_end : float
+        Time that the run reached, s.
+    message : str
+        One sentence on the end of the run.
+    cost : Cost
+        CPU time and counts.
+    scene, engine, version, method : str
+        Names of the scene, the engine, its version, and the method or family of settings.
+    settings : mapping
+        Numbers of the method or engine that reproduce the run.
     """
 
     scene: str
@@ -150,7 +231,13 @@ class Trajectory:
         )
 
     def __getitem__(self, name: str) -> BodyMotion:
-        """The motion of the body of that name; raises KeyError that lists the bodies."""
+        """Return the motion of one body.
+
+        Raises
+        ------
+        KeyError
+            If no body has this name; the message lists the bodies.
+        """
         if name not in self.bodies:
             raise KeyError(f"no body {name!r}; bodies: {', '.join(self.bodies)}")
         b = self.bodies.index(name)
@@ -164,7 +251,7 @@ class Trajectory:
         *, scene: str, engine: str, version: str, method: str, settings: Mapping[str, Any],
         bodies: tuple[str, ...], outcome: Outcome, message: str,
     ) -> Trajectory:  # fmt: skip
-        """A trajectory without a single state: a run that crashed, hung or never began."""
+        """Return a trajectory without states, for a run that crashed, hung or did not begin."""
         nb = len(bodies)
         return Trajectory(
             scene, engine, version, method, settings, np.zeros(0), bodies, np.zeros((0, nb, 3)),
@@ -173,7 +260,7 @@ class Trajectory:
         )  # fmt: skip
 
     def to_record(self) -> dict[str, Any]:
-        """The record that ``run --json`` prints (its ``metrics`` are added by crosscheck)."""
+        """Return the record that ``run --json`` prints. crosscheck adds its ``metrics``."""
         per_body = [key for key in PER_BODY if getattr(self, key) is not None]
         return {
             "engine": self.engine,
@@ -197,7 +284,7 @@ class Trajectory:
 
     @staticmethod
     def from_record(scene: str, record: Mapping[str, Any]) -> Trajectory:
-        """The trajectory a record was made of."""
+        """Return the trajectory of a record that ``to_record`` wrote."""
         names = tuple(record["bodies"])
         k, crossings, marks = len(record["times"]), record.get("crossings"), record.get("open_reactions")
 

@@ -17,11 +17,16 @@ INTERVAL, DEVIATION = ":", "+-"
 
 @dataclass(frozen=True)
 class Variation:
-    """A number of a scene and how it varies: uniform from ``low`` to ``high``, or normal with mean
-    ``low`` and standard deviation ``high`` where ``normal``.
+    """A number of a scene and its distribution.
 
-    ``path`` is that of the scene's faults, an entry by its place or by its name: ``body[0].mass``,
-    ``joint[B].anchor[0]``, ``gravity[1]``.
+    Attributes
+    ----------
+    path : str
+        Place of the number, as in messages: ``body[0].mass``, ``joint[B].anchor[0]``, ``gravity[1]``.
+    low, high : float
+        Limits of the uniform distribution; mean and standard deviation if ``normal``.
+    normal : bool
+        Whether the distribution is normal.
     """
 
     path: str
@@ -31,7 +36,13 @@ class Variation:
 
     @staticmethod
     def parse(text: str) -> Variation:
-        """``PATH=LOW:HIGH`` or ``PATH=MEAN+-DEVIATION``; raises ValueError."""
+        """Parse ``PATH=LOW:HIGH`` or ``PATH=MEAN+-DEVIATION``.
+
+        Raises
+        ------
+        ValueError
+            If the text has another form, or limits that are not finite or not in order.
+        """
         path, equals, spread = text.partition("=")
         normal = DEVIATION in spread
         numbers = spread.split(DEVIATION if normal else INTERVAL)
@@ -44,16 +55,32 @@ class Variation:
         return Variation(path.strip(), low, high, normal)
 
     def draw(self, random: np.random.Generator) -> float:
-        """One value."""
+        """Return one random value."""
         return float(
             random.normal(self.low, self.high) if self.normal else random.uniform(self.low, self.high)
         )
 
 
 def variants(scene: Scene, variations: Sequence[Variation], count: int, seed: int = 0) -> Iterator[Scene]:
-    """``count`` copies of the scene with independently drawn numbers; the k-th depends on seed and k only.
+    """Yield copies of a scene with independently drawn numbers.
 
-    Raises SceneError where a path leads to no number of the scene, or a variant is no valid scene.
+    Variant k depends on ``seed`` and k only.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene to vary.
+    variations : sequence of Variation
+        The numbers that vary.
+    count : int
+        Number of copies.
+    seed : int
+        Seed of the random numbers.
+
+    Raises
+    ------
+    SceneError
+        If a path leads to no number of the scene, or a variant is not a valid scene.
     """
     for k in range(count):
         data = {field: getattr(scene, field) for field in Scene.model_fields}

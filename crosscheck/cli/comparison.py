@@ -34,11 +34,16 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class Comparison:
-    """One mechanism in several engines: printed, it is the output of `crosscheck compare`.
+    """One mechanism in several engines. ``print`` shows the output of `crosscheck compare`.
 
-    ``judged`` has the scene, the record of its truth and the records of all runs, ``path`` the scene's
-    name in commands, and ``difference`` the sentence on how the engines' mechanisms differ, None where they
-    agree.
+    Attributes
+    ----------
+    judged : Judged
+        The scene, the record of its truth, and the records of all runs.
+    path : str
+        Name of the scene in commands.
+    difference : str or None
+        One sentence on how the mechanisms of the engines differ. None if they agree.
     """
 
     judged: Judged
@@ -47,28 +52,31 @@ class Comparison:
 
     @cached_property
     def verdict(self) -> Verdict:
-        """Its sentences: headline, right, fast, breaks and truth."""
+        """Sentences of the verdict: headline, right, fast, breaks and truth."""
         return verdict([self.judged], self.difference)
 
     @property
     def records(self) -> Sequence[Record]:
-        """The records of all runs."""
+        """Records of all runs."""
         return self.judged.records
 
     @property
     def rows(self) -> list[Row]:
-        """One dictionary a run, the completed runs of least error first: engine, family, settings, verdict,
-        outcome, end time (s), error and the other metrics, CPU seconds of stepping and steps."""
+        """One dictionary for each run, completed runs with the least error first.
+
+        Keys: engine, family, settings, verdict, outcome, end time (s), error and the other metrics, CPU
+        seconds of stepping, and steps.
+        """
         return [_row(r) for r in sorted(self.records, key=lambda r: (not is_completed(r), error(r)))]
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """``rows`` as a pandas DataFrame."""
+        """Return ``rows`` as a pandas DataFrame."""
         import pandas
 
         return pandas.DataFrame(self.rows)
 
     def document(self) -> dict[str, Any]:
-        """The document of `crosscheck compare --json`: scene, verdict, truth, difference and records."""
+        """Return the document of `crosscheck compare --json`."""
         truth = {name: self.judged.truth[name] for name in TRUTH}
         return {"scene": self.judged.scene.name, "records": [public(r) for r in self.records],
                 "verdict": self.verdict._asdict(), "truth": truth, "difference": self.difference}  # fmt: skip
@@ -96,14 +104,37 @@ def compare(
     time_limit: float | None = None, reference_time: float = SECONDS, out: str | Path | None = None,
     notice: Notice | None = None,
 ) -> Comparison:  # fmt: skip
-    """Engines compared on a mechanism, as `crosscheck compare` does.
+    """Compare engines on a mechanism, as `crosscheck compare` does.
 
-    ``scene`` is a Scene, a built-in name or a .toml file; ``engines`` default to all that are installed,
-    ``families`` of settings to a few, at ``depth`` "whole" to all.  ``duration`` is the end time (s), by
-    default the scene's, ``time_limit`` the CPU time (s) a run may take or wait, ``reference_time`` the CPU
-    time (s) of the reference.  Records are kept in the folder ``out`` and not made again.  ``notice`` takes
-    sentences about engines that are left out.  Raises RequestError for a request that cannot be met and
-    SceneError for a faulty scene.
+    Parameters
+    ----------
+    scene : Scene, str or path
+        A Scene, the name of a built-in one, or a .toml file.
+    engines : sequence of str, optional
+        Names of engines. Default: all that are installed.
+    families : sequence of str, optional
+        Families of settings. Default: a few; all if ``depth`` is ``"whole"``.
+    depth : {"quick", "whole"}
+        How many families and settings run.
+    duration : float, optional
+        End time, s. Default: the scene's duration.
+    samples : int
+        Number of sample times.
+    time_limit : float, optional
+        CPU time (s) of one run.
+    reference_time : float
+        CPU time (s) of the reference solution.
+    out : path, optional
+        Folder in which records are kept. They are not made again.
+    notice : callable, optional
+        Receives sentences about engines that are left out.
+
+    Raises
+    ------
+    RequestError
+        If the request cannot be met.
+    SceneError
+        If the scene is faulty.
     """
     if depth not in ("quick", "whole"):
         raise request.RequestError(f"depth: must be quick or whole, got {depth!r}")
@@ -123,7 +154,10 @@ def compare(
 
 
 def comparisons(found: Collection, paths: dict[str, str], reference_time: float) -> list[Comparison]:
-    """One comparison a scene of a collection; ``paths`` are the scenes' names in commands."""
+    """Return one comparison for each scene of a collection.
+
+    ``paths`` are the names of the scenes in commands.
+    """
     of_scene = {
         scene.name: [record for record in found.identities if record["scene"] == scene.name]
         for scene in found.scenes

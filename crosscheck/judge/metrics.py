@@ -40,11 +40,28 @@ class Metric:
 
 
 def measure(scene: Scene, trajectory: Trajectory, truth: Truth | None = None) -> dict[str, float | None]:
-    """Every metric of a trajectory by name, ``error_bound``, the bound on the truth's own error, and
-    ``error_until``, the time (s) of the last sample that has an error.
+    """Return every metric of a trajectory.
 
-    Both are None without a truth or without a sample.  Raises ValueError when the bodies are not the
-    scene's.
+    Parameters
+    ----------
+    scene : Scene
+        The mechanism.
+    trajectory : Trajectory
+        The run of any engine.
+    truth : Truth, optional
+        The exact motion, as ``truth_for`` returns it.
+
+    Returns
+    -------
+    dict of str to float or None
+        Metrics by name (`crosscheck list metrics`); ``error_bound``, the bound on the truth's own error; and
+        ``error_until``, the time (s) of the last sample that has an error. Both are None without a truth or
+        without a sample.
+
+    Raises
+    ------
+    ValueError
+        If the bodies differ from the bodies of the scene.
     """
     trajectory = in_scene_order(scene, trajectory)
     exact = exact_motion(trajectory, truth)

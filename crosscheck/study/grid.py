@@ -43,8 +43,23 @@ Progress = Callable[[int, int, Record], None]  # cases done, cases in all, the r
 
 
 class Case(NamedTuple):
-    """One run of a study; ``time_limit`` is CPU time (s), without imports and compiling, ``reference_time``
-    what the reference may take of CPU time (s) where the scene has no closed form."""
+    """One run of a study.
+
+    Attributes
+    ----------
+    scene : Scene
+        The mechanism.
+    times : ndarray, shape (k,)
+        Sample times, s.
+    engine : str
+        Name of the engine.
+    setting : Setting
+        Family and options.
+    time_limit : float
+        CPU time (s) of the run, without imports and compilation.
+    reference_time : float
+        CPU time (s) of the reference solution where the scene has no closed form.
+    """
 
     scene: Scene
     times: np.ndarray
@@ -55,7 +70,7 @@ class Case(NamedTuple):
 
 
 class Unable(NamedTuple):
-    """A pair of a default sweep that is not run, and why."""
+    """An engine that cannot run a scene, and its refusal."""
 
     scene: Scene
     engine: str
@@ -69,9 +84,20 @@ def default_cases(
     times: np.ndarray | None = None,
     time_limit: float = TIME_LIMIT,
 ) -> tuple[list[Case], list[Unable]]:
-    """The sweep of every engine's settings over a scene, and the engines that cannot run it.
+    """Return the settings of every engine for a scene as cases, and the engines that cannot run it.
 
-    ``families`` restricts the settings; ``times`` (k,) default to SAMPLES over the scene's duration.
+    Parameters
+    ----------
+    scene : Scene
+        The mechanism.
+    engines : sequence of str
+        Names of engines.
+    families : sequence of str, optional
+        Families of settings. Default: all.
+    times : ndarray, shape (k,), optional
+        Sample times, s. Default: SAMPLES equidistant ones over the scene's duration.
+    time_limit : float
+        CPU time (s) of a run.
     """
     times = np.linspace(0.0, scene.duration, SAMPLES) if times is None else times
     cases, unable = [], []
@@ -92,15 +118,24 @@ def study(
     progress: Progress | None = None,
     run: Callable[[Case], Any] | None = None,
 ) -> list[Record]:
-    """The record of every case, in the order of the cases.
+    """Return the record of every case, in the order of the cases.
 
-    Each record is appended to ``records_path`` as its run ends; records that the file already has are
-    not run again, unless they ran out of a shorter time limit than the case's.  Runs are spread by
-    ``executor``, by default threads, one a core: the runs are in child processes.  Any executor of
-    concurrent.futures will do, such as a process pool, or a Dask client's ``get_executor()`` for runs on
-    other machines; its workers have to have this package and the engines, and say which machine they are.
-    ``run`` makes the record of one case, by default ``run_case``; many short runs of an engine that neither
-    hangs nor crashes are made sooner by ``run_here`` in a process pool.
+    Parameters
+    ----------
+    cases : sequence of Case
+        The runs.
+    executor : concurrent.futures.Executor, optional
+        Where the runs happen. Default: threads, one for each core, which run engines in child processes. A
+        process pool or a Dask client's ``get_executor()`` also works; its workers need this package and the
+        engines.
+    records_path : path, optional
+        JSON lines file. Each record is appended as its run ends. Stored records are not made again, unless
+        they ran out of a time limit that is shorter than the limit of the case.
+    progress : callable, optional
+        Called with the number of cases done, the number of all cases, and the new record.
+    run : callable, optional
+        Makes the record of one case. Default: ``run_case``. ``run_here`` is faster in a process pool for many
+        short runs of an engine that neither hangs nor crashes.
     """
     keys = [key(case) for case in cases]
     records = known(cases, records_path)

@@ -20,7 +20,23 @@ UNIQUE_SHARE = 1e-9  # the same for the squares of a large scene, where other si
 
 @dataclass(frozen=True)
 class Counts:
-    """Counts at t = 0, the ground's where it is a body."""
+    """Coordinates, constraint rows and their rank at t = 0.
+
+    Attributes
+    ----------
+    coordinates : int
+        Six for each body; the ground counts if it is modelled as a body.
+    rows : int
+        Number of constraint rows.
+    rows_by_joint : dict of str to int
+        Rows by joint. Rows of a driver count under its joint, rows of a modelled ground under ``"ground"``.
+    rank : int
+        Rank of the constraint Jacobian.
+    redundant : int
+        Rows minus rank.
+    degrees_of_freedom : int
+        Coordinates minus rank.
+    """
 
     coordinates: int  # 6 per body
     rows: int
@@ -32,7 +48,21 @@ class Counts:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Counts, redundancy by joint and the distance from a singular position, at t = 0."""
+    """Counts, redundancy by joint and distance from a singular position, at t = 0.
+
+    Attributes
+    ----------
+    counts : Counts
+        Coordinates, rows, rank, redundant rows and degrees of freedom.
+    redundant_by_joint : dict of str to int
+        Rows that take part in a redundancy. Their reactions are not unique.
+    unique_reactions : tuple of str
+        Joints all of whose rows have a unique multiplier.
+    smallest_singular_value : float
+        Smallest nonzero singular value of Φ_q with unit rows: the distance from a singular position.
+    largest_singular_value : float
+        Largest singular value of Φ_q with unit rows.
+    """
 
     counts: Counts
     redundant_by_joint: dict[str, int]  # rows that take part in a redundancy; their reactions are not unique
@@ -42,7 +72,13 @@ class Diagnosis:
 
 
 def counts(scene: Scene) -> Counts:
-    """Counts of a scene at its corrected initial positions."""
+    """Return the counts of a scene at its corrected initial positions.
+
+    Raises
+    ------
+    SceneError
+        If the initial positions contradict the joints.
+    """
     model = Model(scene)
     return _counts(model, rank_at_start(model, consistent_start(model)))
 
@@ -55,10 +91,20 @@ def rank_at_start(model: Model, start: Start) -> int:
 
 
 def diagnose(scene: Scene) -> Diagnosis:
-    """Counts, redundancy joint by joint, and the distance to a singular position, at the initial positions.
+    """Return counts, redundancy by joint and the distance to a singular position at t = 0.
 
-    A multiplier is unique where its row takes no part in any vanishing combination of rows: a left null
+    A multiplier is unique if its row takes part in no vanishing combination of rows, that is in no left null
     vector of Φ_q (Wojtyra, J. Theor. Appl. Mech. 43, 2005).
+
+    Parameters
+    ----------
+    scene : Scene
+        The mechanism; masses are not needed.
+
+    Raises
+    ------
+    SceneError
+        If the initial positions contradict the joints.
     """
     model = Model(scene)
     start = consistent_start(model)

@@ -72,7 +72,19 @@ CHAINS: dict[str, Callable[[int, str], Scene]] = {
 
 
 def find_scene(name: str) -> Scene:
-    """The built-in scene of that name, or the scene in that .toml file; raises SceneError."""
+    """Return a built-in scene or the scene in a file.
+
+    Parameters
+    ----------
+    name : str
+        A name in SCENES, a chain with its number of loops (``four_bar_chain[40]``), or the path of a .toml
+        file.
+
+    Raises
+    ------
+    SceneError
+        If there is no such scene or file, or the file is faulty.
+    """
     if name in SCENES:
         return SCENES[name]()
     chain = re.fullmatch(r"(\w+)\[([1-9]\d*)\]", name)

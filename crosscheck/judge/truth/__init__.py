@@ -43,19 +43,38 @@ class Truth(Protocol):
 
     @property
     def name(self) -> str:
-        """The family."""
+        """Name of the family of closed forms, or of the reference."""
 
     @property
     def accuracy(self) -> float:
         """Bound on the error of the poses, relative to the scene's length and to the angle turned."""
 
     def poses(self, times: np.ndarray) -> Trajectory:
-        """Poses, velocities and accelerations (world) at times (k,) ≥ 0, double precision."""
+        """Return poses, velocities and accelerations.
+
+        Parameters
+        ----------
+        times : ndarray, shape (k,)
+            Sample times ≥ 0, s.
+        """
 
 
 def truth_for(scene: Scene, reference_time: float = SECONDS) -> Truth | None:
-    """The truth of a scene: of its family if that is known, else a reference, for which ``poses`` takes up to
-    so many CPU seconds when first asked; None where that is 0."""
+    """Return the truth of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        The mechanism.
+    reference_time : float
+        CPU time (s) that a reference solution may take when ``poses`` is called first. Zero allows closed
+        forms only.
+
+    Returns
+    -------
+    Truth or None
+        A closed form if the scene's family is known, otherwise a reference solution. None without either.
+    """
     return closed_form(scene) or (ReferenceTruth(scene, reference_time) if reference_time else None)
 
 
