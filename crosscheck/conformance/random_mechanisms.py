@@ -35,6 +35,7 @@ CLOSING = (0.4, 0.15, 0.2, 0.05, 0.1, 0.08, 0.0, 0.02)  # and to close a loop
 PLANAR = 0.65  # part of the mechanisms whose axes are parallel, so that their loops are redundant
 HINGED = 0.25  # part of the loops that are a second hinge on the axis of the first
 TRIES = 60
+MOST_DRAWS = 1000  # of a mechanism; a few do
 DURATION = 0.01  # s
 CONTINUES = 1e-9  # relative residual of the acceleration equations where a mobility is not of the instant
 
@@ -57,9 +58,10 @@ def random_mechanism(seed: int) -> Scene:
     the instant (a singular position) is drawn again.  The same seed gives the same scene.
     """
     rng = np.random.default_rng(seed)
-    while (scene := _Drawing(rng).scene(f"random_{seed}")) is None:
-        pass
-    return scene
+    for _ in range(MOST_DRAWS):
+        if scene := _Drawing(rng).scene(f"random_{seed}"):
+            return scene
+    raise RuntimeError(f"seed {seed}: no mechanism that moves in {MOST_DRAWS} draws")
 
 
 def compare(scene: Scene, engines: Sequence[str]) -> Comparison:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crosscheck.judge.reference.motion import given_up
+from crosscheck.judge.deadline import given_up
 from crosscheck.processes.pool import end_idle
 from crosscheck.study import pictures, sweep
 from crosscheck.study.chains import Chains

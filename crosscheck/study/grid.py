@@ -21,8 +21,8 @@ import numpy as np
 import mbref
 from crosscheck.engine import Cannot, Setting, engine
 from crosscheck.judge import metrics
+from crosscheck.judge.deadline import given_up
 from crosscheck.judge.reference.cache import mechanism
-from crosscheck.judge.reference.motion import given_up
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth import Truth, truth_for
 from crosscheck.processes.child import stop_all

@@ -210,7 +210,7 @@ def joint_names(stage: Stage) -> Iterator[str]:
     places = {joint.name: stage.place(*anchors(joint)[1]) for joint in stage.scene.joint}
     while places:
         place = next(iter(places.values()))
-        near = [name for name, other in places.items() if _stay_together(place, other)]
+        near = [name for name, other in places.items() if other is place or _stay_together(place, other)]
         words = svg.text(-9, -10, ", ".join(near), f'fill="{INK}" font-weight="600"', "end")
         yield svg.follow(place, words, stage.seconds)
         places = {name: other for name, other in places.items() if name not in near}

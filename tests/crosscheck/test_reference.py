@@ -19,6 +19,7 @@ from crosscheck.conformance.random_mechanisms import random_mechanism
 from crosscheck.conformance.relations import ASKEW, Isometry
 from crosscheck.engine import engine
 from crosscheck.judge import constraints, metrics
+from crosscheck.judge.deadline import GivenUp, given_up
 from crosscheck.judge.energy import energy_series
 from crosscheck.judge.gauss_principle import gauss, stacked
 from crosscheck.judge.reference import cache, tree_loads
@@ -27,7 +28,6 @@ from crosscheck.judge.reference.arithmetic import DOUBLE, EXTENDED, doubles, man
 from crosscheck.judge.reference.bound import differences
 from crosscheck.judge.reference.certify import NotCertified, certified, digest
 from crosscheck.judge.reference.isostatic import isostatic, replaced
-from crosscheck.judge.reference.motion import GivenUp, given_up
 from crosscheck.judge.reference.natural import NaturalCoordinates
 from crosscheck.judge.reference.reference import NoReference, Reference, judged, reference, runs
 from crosscheck.judge.reference.saddle_point import SaddlePoint

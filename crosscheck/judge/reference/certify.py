@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.judge.deadline import TimeIsUp, within
 from crosscheck.judge.reference.arithmetic import EXTENDED, doubles, many_digits
 from crosscheck.judge.reference.bound import SAFETY, differences
 from crosscheck.judge.reference.cache import canonical
@@ -61,10 +62,20 @@ def certified(
     ``rate_bound`` (of velocities, each relative to the largest of its kind), both ``methods``, the
     ``replaced`` joints where there are any, and the ``hash`` of all this.
 
-    Raises NotCertified, and ImportError without python-flint.
+    ``seconds`` of CPU time are for all formulations together.  Raises NotCertified, and ImportError without
+    python-flint.
     """
+    try:
+        with within(seconds):
+            return _agreed(scene, times, digits, shown)
+    except TimeIsUp as end:
+        raise NotCertified(f"{scene.name}: {end}") from None
+
+
+def _agreed(scene: Scene, times: np.ndarray, digits: int, shown: Shown) -> dict[str, Any]:
+    """The table on whose digits the formulations agree; raises NotCertified."""
     for spare in SPARE:
-        moved, a, b = _motions(scene, times, digits, spare, seconds, shown)
+        moved, a, b = _motions(scene, times, digits, spare, shown)
         bound = SAFETY * float(differences(scene, a, b).max(initial=0.0))
         if bound <= 10.0**-digits:
             least = 10.0 ** -(digits + spare)
@@ -74,14 +85,14 @@ def certified(
 
 
 def _motions(
-    scene: Scene, times: np.ndarray, digits: int, spare: int, seconds: float, shown: Shown
+    scene: Scene, times: np.ndarray, digits: int, spare: int, shown: Shown
 ) -> tuple[Scene, Motion, Motion]:
     """The mechanism without contradictions, its motion by A, and by B or, through singular positions, where
     B keeps too few digits, by A with other digits and another order."""
 
     def by_a(of: Scene, order: int, places: int) -> Motion:
         with shown("formulation A") as told:
-            return _by_a(of, times, order, places, seconds, told)
+            return _by_a(of, times, order, places, told)
 
     moved, a = scene, by_a(scene, digits, digits + spare)
     if a.contradiction > 10.0**-digits:
@@ -93,7 +104,7 @@ def _motions(
     else:
         _refuse_ended(scene, a, "A")
         with shown("formulation B") as told:
-            b = tree_motion(moved, times, many_digits(digits + spare), seconds=seconds, told=told)
+            b = tree_motion(moved, times, many_digits(digits + spare), seconds=np.inf, told=told)
     _refuse_ended(scene, a, "A")
     _refuse_ended(scene, b, "B")
     return moved, a, b
@@ -119,12 +130,10 @@ def _refuse_ended(scene: Scene, motion: Motion, name: str) -> None:
         raise NotCertified(f"{scene.name}: {name} ends at t = {motion.reached:.6g} s: {motion.reason}")
 
 
-def _by_a(scene: Scene, times: np.ndarray, order: int, places: int, seconds: float, told: Told) -> Motion:
+def _by_a(scene: Scene, times: np.ndarray, order: int, places: int, told: Told) -> Motion:
     """By formulation A to so many places a step, in arithmetic of twice the order."""
     exact = many_digits(2 * order)
-    return natural_motion(
-        scene, times, exact, seconds=seconds, order=2 * order, tolerance=10.0**-places, told=told
-    )
+    return natural_motion(scene, times, exact, order=2 * order, tolerance=10.0**-places, told=told)
 
 
 def _table(

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.judge.deadline import ask
 from crosscheck.judge.reference.held_rows import HeldRows
 from crosscheck.judge.reference.natural import NaturalCoordinates
 from crosscheck.judge.reference.natural_loads import Loads, LoadSeries, convolved
@@ -39,6 +40,7 @@ class Expansion:
         self._grow(0)
         self._grow(1)
         for k in range(order + 1):
+            ask()
             self._solve(k)
 
     @property

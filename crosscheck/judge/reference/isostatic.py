@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from crosscheck.judge.constraints import initial_poses, jacobian
+from crosscheck.judge.deadline import ask
 from crosscheck.judge.tolerances import RANK
 from mbref.scene import JOINT_TYPES, Joint, Scene, Universal
 
@@ -33,6 +34,7 @@ def isostatic(scene: Scene, along: Sequence[Pose] = ()) -> Scene:
     needed = {d.joint for d in scene.driver} | {l.joint for l in scene.load if l.type == "torsion_spring"}
 
     def serves(trial: Scene) -> bool:
+        ask()
         if _rank(trial) != rank:
             return False
         return all(

@@ -6,44 +6,19 @@ from t ≥ 0, and after so many CPU seconds of the calling thread the motion end
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from threading import Event
 
 import numpy as np
+
+from crosscheck.judge.deadline import TimeIsUp
 
 Times = Sequence[float] | np.ndarray
 
 Told = Callable[[float], None]
 """Takes the time (s) that a motion has reached, step by step."""
 
-OVER = "the time for it was up"
-
-_given_up = Event()
-
-
-class GivenUp(Exception):
-    """A motion was not followed to its end, because it is no longer wanted."""
-
-
-@contextmanager
-def given_up() -> Iterator[None]:
-    """Until the block is left, motions that other threads follow end by GivenUp: an interrupt does not wait
-    for them."""
-    _given_up.set()
-    try:
-        yield
-    finally:
-        _given_up.clear()
-
-
-def is_over(deadline: float) -> bool:
-    """Whether the calling thread's CPU time (s) is past a deadline; raises GivenUp."""
-    if _given_up.is_set():
-        raise GivenUp("the motion is no longer wanted")
-    return time.thread_time() > deadline
+OVER = str(TimeIsUp())
 
 
 def untold(_: float) -> None:

@@ -13,9 +13,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from crosscheck.judge.deadline import ask
 from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
 from crosscheck.judge.reference.crossing import bridged, singular_ahead, singular_time
-from crosscheck.judge.reference.motion import is_over
 
 SWEEPS = 60  # Picard iterations before a panel is shortened
 MANY = 35  # a panel that took more is not followed by a longer one
@@ -99,7 +99,7 @@ class Panels:
         t, places = start + length / 2 * (self.nodes + 1), doubles(self.nodes)
         y, last, crossing = guess, np.inf, None
         for sweep in range(1, SWEEPS):
-            is_over(np.inf)  # raises where the motion is no longer wanted
+            ask()
             with np.errstate(all="ignore"):
                 here = y if crossing is None else equations.nearer(t, y)
                 rates, distance = equations.other_rates(t, here)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
 
+from crosscheck.judge.deadline import ask
 from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
 
 ROUNDS = 40  # of refinement, at most
@@ -56,6 +57,7 @@ class SaddlePoint:
         wanted = self._arithmetic.settled(np.concatenate([force.ravel(), rate]))
         found, left, last = 0 * wanted, wanted, FIRST
         for _ in range(ROUNDS):
+            ask()
             size = np.abs(left).max()
             if float(size) == 0.0:
                 break

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.judge import constraints
+from crosscheck.judge.deadline import ask
 from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
 from crosscheck.judge.tolerances import RANK
 from mbref.scene import Scene
@@ -62,6 +63,7 @@ def least_squares(arithmetic: Arithmetic, matrix: np.ndarray, wanted: np.ndarray
     inverse = np.linalg.pinv(doubles(matrix), rcond=RANK)
     x, left, last = arithmetic.zeros(matrix.shape[1]), wanted, np.inf
     for _ in range(ROUNDS):
+        ask()
         gap, slope = doubles(wanted - left - matrix @ x), doubles(-1 * matrix.T @ left)
         step = inverse @ (gap - inverse.T @ slope)
         size = float(np.abs(step).max(initial=0.0))
@@ -79,6 +81,7 @@ def null_space(arithmetic: Arithmetic, matrix: np.ndarray) -> np.ndarray:
     rank = int((s > RANK * s.max(initial=0.0)).sum())
     basis, inverse, last = arithmetic.array(vt[rank:].T), np.linalg.pinv(near, rcond=RANK), np.inf
     for _ in range(ROUNDS):
+        ask()
         step = inverse @ doubles(matrix @ basis)
         size = float(np.abs(step).max(initial=0.0))
         if not size < STALLED * last:

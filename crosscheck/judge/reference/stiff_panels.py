@@ -14,9 +14,9 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
+from crosscheck.judge.deadline import ask
 from crosscheck.judge.reference.arithmetic import doubles
 from crosscheck.judge.reference.crossing import singular_time
-from crosscheck.judge.reference.motion import is_over
 from crosscheck.judge.reference.panels import (
     LAST,
     LONGEST,
@@ -67,7 +67,7 @@ class StiffPanels:
         settled, light, last = self.panels.arithmetic.settled, equations.light, np.inf
         t, half, y = start + length / 2 * (self.panels.nodes + 1), length / 2, guess
         for sweep in range(SWEEPS):
-            is_over(np.inf)
+            ask()
             rates, distance = equations.other_rates(t, y)
             if last > AGAIN:
                 factors = self._factorised(equations.in_doubles(), doubles(t), doubles(y), float(half))
@@ -132,6 +132,7 @@ def _slopes(equations: Equations, t: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 def _rates(equations: Equations, t: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Rates (…, K, n) of states (…, K, n)."""
+    ask()
     many, flat = np.tile(t, len(y)), y.reshape(-1, y.shape[-1])
     other, _ = equations.other_rates(many, flat)
     return np.concatenate([equations.light_rates(flat), other], axis=1).reshape(y.shape)

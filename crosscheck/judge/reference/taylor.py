@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from crosscheck.judge.deadline import TimeIsUp, ask, within
 from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
 from crosscheck.judge.reference.expansion import Expansion, Series, value
 from crosscheck.judge.reference.held_rows import HeldRows, independent
-from crosscheck.judge.reference.motion import OVER, Motion, Times, Told, is_over, untold
+from crosscheck.judge.reference.motion import Motion, Times, Told, untold
 from crosscheck.judge.reference.natural import NaturalCoordinates
 from crosscheck.judge.reference.natural_loads import Loads
 from crosscheck.judge.reference.saddle_point import SaddlePoint
@@ -40,6 +41,7 @@ DEPENDENT = 0.02  # part of the present sharpness that it falls below
 SHORTER = 0.8  # factor on a step that ends too near to a singular position
 LEAST_STEP = 1e-6  # s, where no time is left
 SHORTEST = 1e-9  # step, relative to the time reached, at which the series is said to end
+STEPS_END = "its steps end: its series cannot be continued over a singular position there"
 WITHOUT_INERTIA = 1e-13  # part of the largest inertia of a freedom that counts as none
 
 Sample = tuple[np.ndarray, ...]
@@ -63,9 +65,10 @@ def natural_motion(
     began, reason, samples = time.thread_time(), "", []
     stepper = Stepper(scene, arithmetic, order, tolerance or arithmetic.eps, (seed, displaced))
     try:
-        for sample in stepper.samples(times, began + seconds, told):
-            samples.append(sample)
-    except Ended as end:
+        with within(seconds):
+            for sample in stepper.samples(times, told):
+                samples.append(sample)
+    except (Ended, TimeIsUp) as end:
         reason = str(end)
     shape = (len(samples), 3, 3, 4 * len(scene.body) + 4)
     x, v, a = np.moveaxis(np.array(samples, dtype=arithmetic.dtype).reshape(shape), 1, 0)
@@ -94,8 +97,7 @@ class Stepper:
         self._angles = [arithmetic.number(0.0) for _ in self._loads.torsions]
         self._weights = self._varied(*way)
         self._every, self._lost = HeldRows(self.of, range(len(self.of.c))), np.inf
-        self._held = self._choice(self._x, self.t)[0]
-        self._sharpness = [self._sharp(self._x, self.t)]
+        self._held, self._sharpness = self._every, [0.0]
 
     def _varied(self, seed: int, displaced: float) -> np.ndarray:
         """Weights (m,) of the rows, near one, that prefer other rows by the seed; joints are displaced."""
@@ -106,14 +108,15 @@ class Stepper:
         self.of.c[joints] = self.of.c[joints] + self.of.arithmetic.array(moved)
         return 1 + PREFERENCE * rng.random(len(self.of.c))
 
-    def samples(self, times: Times, deadline: float, told: Told) -> Iterator[Sample]:
+    def samples(self, times: Times, told: Told) -> Iterator[Sample]:
         """X, X', X'' (3, n) at ascending times; raises Ended where the motion cannot be followed."""
+        self._held = self._choice(self._x, self.t)[0]
+        self._sharpness = [self._sharp(self._x, self.t)]
         self._refuse_undetermined()
         self._start()
         pending = list(times)
         while pending:
-            if is_over(deadline):
-                raise Ended(OVER)
+            ask()
             expansion, h = self._step(2 * (float(times[-1]) - float(self.t)))
             series = expansion.x[: Series(expansion.x).terms(h)]
             if not self.steps:
@@ -163,6 +166,7 @@ class Stepper:
 
     def _sharp(self, x: np.ndarray, t: Any) -> float:
         """How far the held rows are from dependent: their least singular value, being of length one."""
+        ask()
         return float(np.linalg.svd(self._held.unit_gradient(x, t), compute_uv=False)[-1])
 
     def _choose_again(self) -> None:
@@ -239,7 +243,7 @@ class Stepper:
         series = Series(expansion.x)
         h = series.reach(self._tolerance)
         if h <= SHORTEST * max(1e-3, float(self.t)):
-            raise Ended("its steps end: its series cannot be continued over a singular position there")
+            raise Ended(STEPS_END)
         h, now = min(h, max(most, LEAST_STEP)), self._sharpness[-1]
         ahead = self._ahead(expansion.x, series, h)
         if ahead < now < NEAR * max(self._sharpness[-USUAL:]):
@@ -250,10 +254,23 @@ class Stepper:
             if middle and self._may_leap(Series(longer.x).left_out(2 * middle)):
                 self.crossings.append(float(self.t) + middle)
                 return longer, 2 * middle
+        return expansion, self._shortened(expansion.x, series, h, ahead)
+
+    def _shortened(self, x: np.ndarray, series: Series, h: float, ahead: float) -> float:
+        """The length (s) of a step that does not end much nearer to a singular position; ``ahead`` is the
+        sharpness at the end of one of length h.  Raises Ended where no length is short enough.
+
+        The sharpness where the step begins is taken anew: correcting the coordinates has changed it since.
+        """
+        if ahead >= NEAR * self._sharpness[-1]:
+            return h
+        least, now = SHORTEST * max(1e-3, float(self.t)), self._sharp(self._x, self.t)
         while ahead < NEAR * now:
+            if h <= least:
+                raise Ended(STEPS_END)
             h *= SHORTER
-            ahead = self._ahead(expansion.x, series, h)
-        return expansion, h
+            ahead = self._ahead(x, series, h)
+        return h
 
     def _others_serve(self, series: np.ndarray, middle: float) -> bool:
         """Whether only the held rows are dependent so far ahead (s), and others are not, which are then held:

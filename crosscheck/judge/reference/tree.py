@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.judge.deadline import TimeIsUp, ask, within
 from crosscheck.judge.reference.arithmetic import Arithmetic
-from crosscheck.judge.reference.motion import OVER, Motion, Told, is_over, untold
+from crosscheck.judge.reference.motion import Motion, Told, untold
 from crosscheck.judge.reference.panels import Panel, Panels
 from crosscheck.judge.reference.stiff_panels import StiffPanels
 from crosscheck.judge.reference.tree_equations import OPEN, TreeEquations
@@ -46,7 +47,11 @@ def tree_motion(
     clock = time.thread_time()
     equations = TreeEquations(scene, arithmetic, (seed, displaced))
     run = _Run(equations, np.asarray(times, dtype=float), nodes_per_digit)
-    reason = run.through(clock + seconds, told)
+    try:
+        with within(seconds):
+            reason = run.through(told)
+    except TimeIsUp as end:
+        reason = str(end)
     return run.motion(reason, time.thread_time() - clock)
 
 
@@ -57,7 +62,7 @@ class _Run:
         self.equations, self.arithmetic, self.times = equations, equations.arithmetic, times
         self.panels = Panels(self.arithmetic, round(-nodes_per_digit * np.log10(self.arithmetic.eps)))
         self.t = self.arithmetic.number(0.0)
-        self.state = equations.start()
+        self.state = self.arithmetic.zeros(0)
         self.samples: list[tuple[np.ndarray, np.ndarray]] = []
         self.crossings: list[float] = []
         self.foreseen = 0.0  # time of the next singular position, or a past one
@@ -65,15 +70,16 @@ class _Run:
         self.taken = self.steps = 0
         self.stiff, self.is_stiff = StiffPanels(self.panels), False
 
-    def through(self, until: float, told: Told) -> str:
-        """Runs to the last time; the reason where the motion ends before."""
+    def through(self, told: Told) -> str:
+        """Run to the last time; return the reason where the motion ends before."""
+        ask()
+        self.state = self.equations.start()
         if reason := self.equations.undetermined():
             return reason
         end, panel = self.times.max(initial=0.0), None
         length = self.arithmetic.number(FIRST * end or 1.0)
         while self.taken < len(self.times):
-            if is_over(until):
-                return OVER
+            ask()
             panel = self._tried(panel, self._before_singular(length))
             is_shortened = panel.settled and panel.length < length
             length = length if is_shortened else panel.length * panel.factor

@@ -119,9 +119,9 @@ class Reduced:
         try:
             turns, rest = self._turns(np.asarray(times, dtype=REAL))
             q, s, _ = self._solution.where(2, rest).T
-        except NoSolution:  # which tells σ
+        except NoSolution as found:  # it has σ, not the time
             end = float(self._solution.reach(lambda _: True)[2])
-            raise NoSolution(f"the solution ends at t = {end:.9g}", float(np.nextafter(end, 0.0))) from None
+            raise NoSolution.ending(found.reason, end) from None
         root = self._terms(q, s)[0]
         rate = s / root
         _, push, half_slope = self._terms(q, rate)

@@ -8,10 +8,13 @@ away is shortened.  There is no step-size tolerance: the answer is as exact as t
 from __future__ import annotations
 
 import functools
+import time
 from collections.abc import Callable
 from threading import Lock
 
 import numpy as np
+
+from crosscheck.judge.deadline import TimeIsUp, ask, within
 
 NODES = 64  # per panel, degree 63
 SWEEPS = 60  # Picard iterations before a panel is shortened
@@ -20,24 +23,33 @@ ROOT_STEPS = 20  # Newton iterations for the place of a value
 UP, DOWN = np.longdouble(1.2), np.longdouble(0.7)  # factors on the length of the next panel
 REAL = np.longdouble  # 64-bit mantissa on x86; double elsewhere, with the accuracy of double
 SETTLED = 64 * float(np.finfo(REAL).eps)  # relative size of the last change and of the series' tail
+SECONDS = 20.0  # CPU time for all panels of a solution: it is known up to where they came
 SMALLEST = 1e-12  # panel length, relative to the time reached, at which the solution has a singularity
 
 Derivative = Callable[[np.ndarray], np.ndarray]
 
 
 class NoSolution(ArithmeticError):
-    """The solution ends: its derivative becomes singular before the time asked for; it is known up to
-    ``until`` (s)."""
+    """The solution ends before the time asked for: its derivative becomes singular, or the time for it was
+    up; it is known up to ``until`` (s)."""
 
     def __init__(self, reason: str, until: float = 0.0):
         super().__init__(reason)
-        self.until = until
+        self.reason, self.until = reason, until
+
+    @classmethod
+    def ending(cls, reason: str, end: float) -> NoSolution:
+        """The solution ends for a reason, a clause, at a value of its variable."""
+        found = cls(f"{reason} at t = {end:.9g}", float(np.nextafter(end, 0.0)))
+        found.reason = reason
+        return found
 
 
 class Solution:
     """y' = f(y), y(0) = y0, for any t ≥ 0; f maps (n, m) states to (n, m) derivatives.
 
-    Panels are computed when first asked for and kept; threads may ask at once.
+    Panels are computed when first asked for, in at most SECONDS of CPU time, and kept; threads may ask at
+    once.
     """
 
     def __init__(self, derivative: Derivative, start: np.ndarray, first_panel: float):
@@ -46,7 +58,7 @@ class Solution:
         self._values: list[np.ndarray] = []  # (NODES, m) per panel
         self._state = np.asarray(start, dtype=REAL)
         self._next = REAL(first_panel)
-        self._asked = Lock()
+        self._asked, self._spent = Lock(), 0.0
 
     def __call__(self, times: np.ndarray) -> np.ndarray:
         """States (k, m) at times (k,) ≥ 0; raises NoSolution when the solution ends before."""
@@ -80,8 +92,15 @@ class Solution:
     def _panels(self, is_short: Callable[[], bool]) -> tuple[np.ndarray, np.ndarray]:
         """Edges (p + 1,) and values (p, NODES, m) of the panels, of which there are added while too few."""
         with self._asked:
-            while not self._values or is_short():
-                self._add_panel()
+            began = time.thread_time()
+            try:
+                with within(SECONDS - self._spent):
+                    while not self._values or is_short():
+                        self._add_panel()
+            except TimeIsUp as end:
+                raise NoSolution.ending(str(end), float(self._edges[-1])) from None
+            finally:
+                self._spent += time.thread_time() - began
             return np.array(self._edges), np.stack(self._values)
 
     def _add_panel(self) -> None:
@@ -91,8 +110,7 @@ class Solution:
                 break
             self._next = self._next * DOWN
             if self._next < SMALLEST * max(float(self._edges[-1]), 1e-3):
-                end = float(self._edges[-1])
-                raise NoSolution(f"the solution ends at t = {end:.9g}", float(np.nextafter(end, 0.0)))
+                raise NoSolution.ending("the solution ends", float(self._edges[-1]))
         self._values.append(values)
         self._edges.append(self._edges[-1] + self._next)
         self._state = values[-1]
@@ -103,6 +121,7 @@ class Solution:
         integrate, series = _matrices()
         y = np.tile(self._state, (NODES, 1))
         for sweep in range(SWEEPS):
+            ask()
             with np.errstate(all="ignore"):
                 slope = self._derivative(y)
                 better = self._state + length / 2 * (integrate @ slope)
