@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 from crosscheck.cli import request, tables
 from crosscheck.cli.comparison import WIDTH, comparisons
@@ -17,11 +17,13 @@ from crosscheck.cli.running import (
     notice,
     print_json,
 )  # fmt: skip
+from crosscheck.engine import engine
 from crosscheck.study import sweep
 from crosscheck.study.command import command
 from crosscheck.study.comparison import Wanted, collected, scouted
-from crosscheck.study.grid import Case, Record, key, study
-from crosscheck.study.progress import shown
+from crosscheck.study.grid import study
+from crosscheck.study.ladder import families
+from crosscheck.study.progress import counted
 from crosscheck.study.record_view import public
 from crosscheck.study.timings import REPEATS, with_timings
 from crosscheck.study.tuning import tuned
@@ -59,23 +61,21 @@ def tune(arguments: argparse.Namespace) -> int:
     scene = request.lasting(scene, None, arguments.duration)
     times = request.sample_times(scene, None, sweep.QUICK_SAMPLES)
     scouted([scene], [name])
-    limit = arguments.time_limit
+    limit, ours = arguments.time_limit, engine(name).integrated_here
     planned = request.plan([scene], [name], Choice(is_quick=False), [times], limit, notice)
     cases = [case._replace(reference_time=arguments.reference_time) for case in planned]
-    records, reached = tuned(cases, arguments.error, _studied)
-    case_of = {key(case): case for case in cases}
-    best = with_timings([case_of[r["key"]] for r in reached], reached, None, notice)
-    best.sort(key=lambda record: record["cost"]["seconds"])
+    with counted("trying settings", len(families(cases))) as advance, ThreadPoolExecutor() as threads:
+        found = tuned(cases, arguments.error, lambda some: study(some, threads), ours, advance)
+    best = with_timings(found.cases, found.reached, None, notice)
+    best.sort(key=lambda record: (record["family"] in ours, record["cost"]["seconds"]))
     if arguments.json:
-        found = [{**public(r), "command": command(r, arguments.scene)} for r in best]
-        print_json([{"scene": scene.name, "error": arguments.error, "records": found}])
+        shown = [
+            {**public(r), "command": command(r, arguments.scene), "integrated_here": r["family"] in ours}
+            for r in best
+        ]
+        print_json([{"scene": scene.name, "error": arguments.error, "records": shown}])
     else:
-        tables.print_tuning(console(), arguments.error, best, records, arguments.scene)
-        for sentence in missing_truths(cases, records):
+        tables.print_tuning(console(), arguments.error, best, found.records, arguments.scene)
+        for sentence in missing_truths(cases, found.records):
             console().print(sentence, soft_wrap=True)
     return COMPLETED if best else OTHERWISE
-
-
-def _studied(cases: Sequence[Case]) -> list[Record]:
-    with shown("trying settings", len(cases)) as progress:
-        return study(cases, progress=progress)

@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from crosscheck.cli.terminal_plot import scatter
+from crosscheck.engine import Engine, engine
 from crosscheck.study.command import command
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import (
@@ -24,7 +25,7 @@ from crosscheck.study.record_view import (
     never_moved,
     varied_settings,
 )
-from crosscheck.study.sentences import LEVEL, SAID, Verdict
+from crosscheck.study.sentences import LEVEL, SAID, Verdict, title
 from crosscheck.study.verdict import Grade, Judged, grade
 
 MEASURED = ("violation_position", "energy_error")  # metrics that the table of runs shows beside the error
@@ -76,16 +77,45 @@ def _ranked(records: Sequence[Record], letters: Mapping[tuple[str, str], str], w
 def print_tuning(
     console: Console, level: float, reached: Sequence[Record], records: Sequence[Record], path: str
 ) -> None:
-    """The settings that reach an error, the cheapest first, with their commands; else the nearest run."""
+    """The settings that reach an error, first those of the engine itself, then those that crosscheck
+    integrates, either the cheapest first, with the cheapest's commands; else the nearest run."""
     if not reached:
         nearest = min(records, key=lambda r: (not is_completed(r), error(r), -r["t_end"]))
         console.print(_unreached(level, nearest), soft_wrap=True)
-    table = _table("settings", ("engine, family", "settings", "error", "time (s)"), 2)
-    for r in reached or [nearest]:
+        _print_settings(console, "the nearest run", [nearest])
+        return
+    simulator = engine(records[0]["asked"]["engine"])
+    name, ours = records[0]["engine"], simulator.integrated_here
+    own = [r for r in reached if r["family"] not in ours]
+    rest = [r for r in reached if r["family"] in ours]
+    if not own:
+        missing = all(r["family"] in ours for r in records)
+        reason = "has no integrator of its own here" if missing else f"reaches {level:g} with none of its own"
+        console.print(f"{title(name)} {reason}.", soft_wrap=True)
+    for group, heading in ((own, f"integrated by {title(name)} itself"), (rest, "integrated by crosscheck")):
+        if group:
+            _print_settings(console, heading, group)
+            console.print(
+                f"{_to_set(simulator, group[0])}\nThe cheapest: {command(group[0], path)}", soft_wrap=True
+            )
+
+
+def _print_settings(console: Console, heading: str, records: Sequence[Record]) -> None:
+    table = _table(heading, ("engine, family", "settings", "error", "time (s)"), 2)
+    for r in records:
         table.add_row(" ".join(engine_and_family(r)), _options(r), error_text(r), _seconds(r))
     console.print(table)
-    for r in reached[:1]:
-        console.print(f"The cheapest: {command(r, path)}", soft_wrap=True)
+
+
+def _to_set(found: Engine, record: Record) -> str:
+    """The description of a record's family, and its options with their descriptions."""
+    family = found.families.get(record["family"], "")
+    options = [
+        f"{n} = {v:g} ({found.options[n]})" if n in found.options else f"{n} = {v}"
+        for n, v in record["asked"]["options"].items()
+    ]
+    parts = [f"{record['family']}: {family}" if family else record["family"], *options]
+    return "; ".join(parts) + "."
 
 
 def _unreached(level: float, nearest: Record) -> str:

@@ -14,11 +14,12 @@ import numpy as np
 from crosscheck.judge.deadline import given_up
 from crosscheck.processes.pool import end_idle
 from crosscheck.study import pictures, sweep
+from crosscheck.study.between import MOST_COARSER
 from crosscheck.study.chains import Chains
 from crosscheck.study.fair_timing import identity_cases
 from crosscheck.study.grid import Case, Record, key, known, record_of, study
 from crosscheck.study.hurried import Hurried
-from crosscheck.study.ladder import families, finest, first
+from crosscheck.study.ladder import Family, beyond, families, finest, first
 from crosscheck.study.progress import counted, shown
 from crosscheck.study.scouting import scout, unasked
 from crosscheck.study.timings import REPEATS, with_timings
@@ -29,6 +30,7 @@ from mbref.scene import Scene
 
 Notice = Callable[[str], None]  # takes one sentence for the user
 Truths = Future[list[Record]]
+Made = tuple[Sequence[Family], dict[str, Record]]  # families, coarse to fine, and records by key
 
 
 class Collection(NamedTuple):
@@ -94,8 +96,8 @@ def _measured(
     path = _file(wanted, "records.jsonl")
     if path is not None and (there := len(known(cases, path))):
         notice(f"{path} has {there} of the runs")
-    by_key = (_few if wanted.is_quick else _all)(cases, gates, path)
-    run = [case for case in cases if key(case) in by_key]
+    groups, by_key = (_few if wanted.is_quick else _all)(families(cases), gates, path)
+    run = [case for group in groups for case in group if key(case) in by_key]
     told, found = [by_key[key(case)] for case in run], truths.result()
     moving = _pictures(list(zip(run, told, strict=True)), found, wanted.out)
     long = sweep.QUICK_LONG if wanted.is_quick else sweep.LONG
@@ -103,16 +105,30 @@ def _measured(
     return Collection(scenes, timed, [by_key[key(gate)] for gate in gates], found, *moving)
 
 
-def _few(cases: Sequence[Case], gates: Sequence[Case], path: Path | None) -> dict[str, Record]:
-    """Records by key: of every family the coarsest and the middle setting, then the finest affordable."""
-    groups = families(cases)
-    records = _made("running", [*(case for group in groups for case in first(group)), *gates], path)
-    fine = [case for group in groups for case in finest(group, records)]
-    return records | _made("running at finer settings", fine, path)
+def _few(groups: Sequence[Family], gates: Sequence[Case], path: Path | None) -> Made:
+    """Of every family the coarsest and the middle setting, coarser ones that serve, then the finest
+    affordable."""
+    begun = _made("running", [*(case for group in groups for case in first(group)), *gates], path)
+    fine = [case for group in groups for case in finest(group, begun)]
+    return _with_coarser(groups, begun | _made("running at finer settings", fine, path), path)
 
 
-def _all(cases: Sequence[Case], gates: Sequence[Case], path: Path | None) -> dict[str, Record]:
-    return _made("running", [*cases, *gates], path)
+def _all(groups: Sequence[Family], gates: Sequence[Case], path: Path | None) -> Made:
+    """Every setting of every family, and coarser ones that serve."""
+    cases = [case for group in groups for case in group]
+    return _with_coarser(groups, _made("running", [*cases, *gates], path), path)
+
+
+def _with_coarser(groups: Sequence[Family], records: dict[str, Record], path: Path | None) -> Made:
+    """The families continued to the coarsest setting that reaches the first error level, so that no family is
+    judged by a sweep that begins too fine."""
+    for _ in range(MOST_COARSER):
+        added = [beyond(group, records) for group in groups]
+        if not any(added):
+            break
+        groups = [[*coarse, *group] for coarse, group in zip(added, groups, strict=True)]
+        records = records | _made("running at coarser settings", [c for more in added for c in more], path)
+    return groups, records
 
 
 def _made(what: str, cases: Sequence[Case], path: Path | None) -> dict[str, Record]:

@@ -1,12 +1,15 @@
-"""Which settings of a family are run at quick depth: the coarsest, the middle one and the finest that is
-affordable by what those two cost."""
+"""Which settings of a family are run: at quick depth the coarsest, the middle one and the finest that is
+affordable by what those two cost; at any depth coarser ones, as long as these still reach the first error
+level."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from crosscheck.judge.tolerances import ERROR_LEVELS
+from crosscheck.study.between import STILL_CHEAPER, coarser, work
 from crosscheck.study.grid import Case, Record, key
-from crosscheck.study.record_view import is_completed
+from crosscheck.study.record_view import error, is_completed
 
 AFFORDABLE = 3.0  # CPU seconds of stepping that the finest run is expected to take at most
 SCALING = "step"  # the option of fixed steps, to which the cost is inversely proportional
@@ -33,6 +36,21 @@ def finest(family: Family, records: Mapping[str, Record]) -> list[Case]:
     costs = [_cost(records[key(case)]) for case in (family[0], family[_middle(family)])]
     beyond = range(len(family) - 1, _middle(family), -1)
     return [family[i] for i in beyond if _expected(family, costs, i) <= AFFORDABLE][:1]
+
+
+def beyond(family: Family, records: Mapping[str, Record]) -> list[Case]:
+    """The setting coarser than the coarsest one that was run, in a list; empty where that misses the first of
+    ERROR_LEVELS, fails, costs no less than the next finer one that was run, or has no neighbour."""
+    run = [case for case in family if key(case) in records][:2]
+    if len(run) < 2 or family[0] != run[0]:
+        return []
+    first, second = (records[key(case)] for case in run)
+    if not (is_completed(first) and error(first) <= ERROR_LEVELS[0]):
+        return []
+    if is_completed(second) and work(first) > STILL_CHEAPER * work(second):
+        return []
+    setting = coarser(family[0].setting, family[1].setting, family[0].scene.duration)
+    return [] if setting is None else [family[0]._replace(setting=setting)]
 
 
 def _middle(family: Family) -> int:

@@ -1,50 +1,141 @@
-"""The cheapest settings of an engine that reach an error, family by family."""
+"""The cheapest settings of an engine that reach an error: in every family the setting is bracketed by its
+coarsest one that runs, then bisected."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
+from crosscheck.engine import Setting
+from crosscheck.study.between import MOST_COARSER, STILL_CHEAPER, between, coarser, work
 from crosscheck.study.grid import Case, Record
+from crosscheck.study.ladder import families
 from crosscheck.study.record_view import error, error_bound, is_completed
+
+NEAR = 1.12  # ratio of the work of two settings between which no other is tried
+HALVINGS = 6  # of a bracket, at most
+
+Run = Callable[[Sequence[Case]], list[Record]]
 
 
 class Tuned(NamedTuple):
-    """All records that were made, and of every family that reaches the error the coarsest that does."""
+    """All records that were made, and of every family that reaches the error its cheapest run, the cheapest
+    first: their cases and records."""
 
     records: list[Record]
+    cases: list[Case]
     reached: list[Record]
 
 
-def tuned(cases: Sequence[Case], level: float, run: Callable[[Sequence[Case]], list[Record]]) -> Tuned:
-    """Run every family of one engine on one scene from coarse to fine until it reaches an error.
+def tuned(
+    cases: Sequence[Case], level: float, run: Run, integrated_here: Collection[str] = (),
+    advance: Callable[[str], None] = lambda family: None,
+) -> Tuned:  # fmt: skip
+    """Find the cheapest setting of every family of one engine on one scene that reaches an error.
 
-    A family is given up where it ran out of time or costs more than another that has reached it.
+    The cheapest families begin.  A family is given up where it ran out of time, or costs more before it
+    reaches the error than another has needed; families ``integrated_here``, by crosscheck, end no search of
+    the engine's own.  ``advance`` takes the name of each family that is done.
     """
-    families: dict[str, list[Case]] = {}
-    for case in cases:
-        families.setdefault(case.setting.family, []).append(case)
-    records: list[Record] = []
-    reached: list[Record] = []
-    while families:
-        found = run([left[0] for left in families.values()])
-        records += found
-        reached += [record for record in found if _reaches(record, level)]
-        limit = min((r["cost"]["seconds"] for r in reached), default=float("inf"))
-        families = {
-            name: left[1:]
-            for (name, left), record in zip(families.items(), found, strict=True)
-            if len(left) > 1 and not _reaches(record, level) and _may_be_cheaper(record, limit)
-        }
-    return Tuned(records, sorted(reached, key=lambda record: record["cost"]["seconds"]))
+    groups = families(cases)
+    firsts = run([group[0] for group in groups])
+    searches = [_Search(group, first, level, run) for group, first in zip(groups, firsts, strict=True)]
+    for search in sorted(searches, key=lambda s: (s.is_any_of(integrated_here), s.cost())):
+        rivals = [
+            s for s in searches if search.is_any_of(integrated_here) or not s.is_any_of(integrated_here)
+        ]
+        search.carry_out(min((s.least() for s in rivals), default=math.inf))
+        advance(search.family)
+    found = sorted((pair for s in searches for pair in s.cheapest()), key=lambda pair: _seconds(pair[1]))
+    records = [record for s in searches for _, record in s.made]
+    return Tuned(records, [case for case, _ in found], [record for _, record in found])
 
 
-def _reaches(record: Record, level: float) -> bool:
-    """Whether a run is known to be so near: an error below the bound of the truth tells no more."""
-    bound = error_bound(record)
-    return is_completed(record) and max(error(record), bound) <= level
+Pair = tuple[Case, Record]
 
 
-def _may_be_cheaper(record: Record, limit: float) -> bool:
-    """Whether a finer setting of the family could cost less than ``limit`` (s)."""
-    return record["outcome"] != "TIMED_OUT" and record["cost"]["seconds"] < limit
+class _Search:
+    """The search in one family, whose coarsest setting was run."""
+
+    def __init__(self, settings: Sequence[Case], first: Record, level: float, run: Run) -> None:
+        self._settings, self._level, self._run = settings, level, run
+        self.family = settings[0].setting.family
+        self.made = [(settings[0], first)]
+
+    def is_any_of(self, names: Collection[str]) -> bool:
+        """Whether the family has one of these names."""
+        return self.family in names
+
+    def cost(self) -> float:
+        """CPU seconds of the coarsest run; infinite where it did not complete."""
+        _, first = self.made[0]
+        return _seconds(first) if is_completed(first) else math.inf
+
+    def cheapest(self) -> list[Pair]:
+        """The run of least work that reaches the error, in a list; empty without one."""
+        return sorted((p for p in self.made if self._reaches(p[1])), key=lambda pair: work(pair[1]))[:1]
+
+    def least(self) -> float:
+        """The CPU seconds of that run; infinite without one."""
+        return min((_seconds(record) for _, record in self.cheapest()), default=math.inf)
+
+    def carry_out(self, limit: float) -> None:
+        """Bracket the error and bisect, as long as a run that misses it costs less than ``limit`` (s)."""
+        [first] = self.made
+        bracket = self._coarsened(first) if self._reaches(first[1]) else self._refined(first, limit)
+        if bracket is not None:
+            self._bisect(*bracket)
+
+    def _coarsened(self, reached: Pair) -> tuple[Pair, Pair] | None:
+        """The first coarser run that misses the error and the last that reaches it; None where the coarsest
+        that gains something still reaches it."""
+        finer = self._settings[1].setting if len(self._settings) > 1 else self._settings[0].setting
+        longest = self._settings[0].scene.duration
+        for _ in range(MOST_COARSER):
+            setting = coarser(reached[0].setting, finer, longest)
+            if setting is None:
+                return None
+            tried = self._tried(setting)
+            if not self._reaches(tried[1]):
+                return tried, reached
+            if work(tried[1]) > STILL_CHEAPER * work(reached[1]):
+                return None
+            finer, reached = reached[0].setting, tried
+        return None
+
+    def _refined(self, missed: Pair, limit: float) -> tuple[Pair, Pair] | None:
+        """The last run that misses the error and the first that reaches it; None where none of the settings
+        does, or the search is given up."""
+        for case in self._settings[1:]:
+            if missed[1]["outcome"] == "TIMED_OUT" or _seconds(missed[1]) >= limit:
+                return None
+            tried = self._tried(case.setting)
+            if self._reaches(tried[1]):
+                return missed, tried
+            missed = tried
+        return None
+
+    def _bisect(self, missed: Pair, reached: Pair) -> None:
+        for _ in range(HALVINGS):
+            if is_completed(missed[1]) and work(reached[1]) <= NEAR * work(missed[1]):
+                return
+            setting = between(missed[0].setting, reached[0].setting)
+            if setting is None:
+                return
+            tried = self._tried(setting)
+            missed, reached = (missed, tried) if self._reaches(tried[1]) else (tried, reached)
+
+    def _tried(self, setting: Setting) -> Pair:
+        case = self._settings[0]._replace(setting=setting)
+        [record] = self._run([case])
+        self.made.append((case, record))
+        return case, record
+
+    def _reaches(self, record: Record) -> bool:
+        """Whether a run is known to be so near: an error below the bound of the truth tells no more."""
+        return is_completed(record) and max(error(record), error_bound(record)) <= self._level
+
+
+def _seconds(record: Record) -> float:
+    return float(record["cost"]["seconds"])

@@ -25,7 +25,6 @@ from crosscheck.study.sentences import (
     verdict,
 )
 from crosscheck.study.truth_sentences import truth
-from crosscheck.study.tuning import tuned
 from crosscheck.study.verdict import Grade, Judged, grade, judged
 from crosscheck.study.wording import multiple, span
 from mbref.records import append
@@ -194,40 +193,6 @@ def test_engines_without_a_truth_are_compared_at_the_same_times():
 
 def test_multiples():
     assert (multiple(3.24), multiple(139.6), span(1.5, 20.2)) == ("3.2 times", "140 times", "1.5 to 20 times")
-
-
-class Case:
-    def __init__(self, family, record):
-        self.setting, self.record = type("S", (), {"family": family}), record
-
-
-def test_tuning_and_the_families_given_up():
-    """Of three families one reaches the error, one costs more before it does, one runs out of time."""
-    sweep = [Case("quick", record("e", "quick", e, s)) for e, s in ((1e-3, 0.1), (1e-7, 0.2), (1e-9, 0.9))]
-    sweep += [Case("dear", record("e", "dear", e, s)) for e, s in ((1e-4, 0.15), (1e-5, 0.3), (1e-8, 0.6))]
-    late = record("e", "hangs", None, outcome="TIMED_OUT")
-    sweep += [Case("hangs", late), Case("hangs", record("e", "hangs", 0.0))]
-    found = tuned(sweep, 1e-6, lambda cases: [case.record for case in cases])
-    assert [r["cost"]["seconds"] for r in found.reached] == [0.2], found.reached
-    assert len(found.records) == 5, "the finer settings of all families were run"
-
-
-def test_a_family_dearer_than_the_cheapest_that_reached_is_given_up():
-    sweep = [Case("cheap", record("e", "cheap", 1e-7, 0.1)), Case("dear", record("e", "dear", 1e-7, 0.5))]
-    sweep += [
-        Case("between", record("e", "between", 1e-3, 0.3)),
-        Case("between", record("e", "b", 1e-7, 0.4)),
-    ]
-    found = tuned(sweep, 1e-6, lambda cases: [case.record for case in cases])
-    assert [r["cost"]["seconds"] for r in found.reached] == [0.1, 0.5], found.reached
-    assert len(found.records) == 3, "the finer setting was run"
-
-
-def test_no_setting_reaches_an_error_below_what_the_truth_may_be_off():
-    rough = {"metrics": {"error": 1e-13, "error_bound": 2e-9}}
-    sweep = [Case("x", record("e", "x", 0.0) | rough)]
-    for level, count in ((1e-10, 0), (1e-8, 1)):
-        assert len(tuned(sweep, level, lambda cases: [case.record for case in cases]).reached) == count
 
 
 def test_differences_of_errors_below_the_bound_are_shown_by_it():

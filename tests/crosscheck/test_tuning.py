@@ -1,0 +1,154 @@
+"""Tuning: engines of known cost and error / the cheapest setting, worked out by hand."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Setting
+from crosscheck.study.between import between, coarser, work
+from crosscheck.study.comparison import _with_coarser
+from crosscheck.study.grid import Case, key
+from crosscheck.study.ladder import beyond
+from crosscheck.study.tuning import tuned
+from mbref.scene import Body, Scene
+
+BLOCK = Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
+SCENE = Scene(name="block", body=(BLOCK,), duration=1.0)
+
+
+class Modelled:
+    """An engine on paper: a family of order p with error C hᵖ, cost c / h seconds and 1 / h right-hand sides,
+    that ``breaks`` above a step."""
+
+    def __init__(self, **families: tuple[float, float, float, float]) -> None:
+        self.families, self.asked = families, []
+
+    def __call__(self, cases: list[Case]) -> list[dict[str, Any]]:
+        return [self.record(case) for case in cases]
+
+    def record(self, case: Case) -> dict[str, Any]:
+        order, factor, cost, breaks = self.families[case.setting.family]
+        h = case.setting.options["step"]
+        self.asked.append((case.setting.family, h))
+        return {
+            "key": key(case), "family": case.setting.family,
+            "outcome": "COMPLETED" if h <= breaks else "NOT_FINITE", "t_end": 1.0,
+            "metrics": {"error": factor * h**order, "error_bound": 1e-14},
+            "cost": {"seconds": cost / h, "rhs": 1 / h},
+        }  # fmt: skip
+
+    def cases(self, *steps: float) -> list[Case]:
+        times = np.array([0.0, 1.0])
+        return [Case(SCENE, times, "fake_engines:FAKE", Setting(f, {"step": h}))
+                for f in self.families for h in steps]  # fmt: skip
+
+
+def found(engine: Modelled, level: float, *steps: float, ours: tuple[str, ...] = ()) -> dict[str, float]:
+    done = tuned(engine.cases(*steps), level, engine, ours)
+    return {r["family"]: case.setting.options["step"]
+            for case, r in zip(done.cases, done.reached, strict=True)}  # fmt: skip
+
+
+@pytest.mark.parametrize("level", [1e-2, 3e-4, 1e-6])
+def test_the_cheapest_step_is_found_between_coarser_and_finer_than_the_grid(level):
+    """An error of h⁴ reaches the level at h = level^¼; the grid of steps begins finer, or has it inside."""
+    best = level**0.25
+    for steps in ((0.01, 0.003, 0.001), (0.9, 0.3, 0.1, 0.03, 0.01)):
+        step = found(Modelled(rk4=(4.0, 1.0, 1e-3, 1.0)), level, *steps)["rk4"]
+        assert best / 1.15 < step <= best, (level, steps, step, best)
+
+
+def test_the_most_accurate_setting_is_not_the_answer():
+    engine = Modelled(rk4=(4.0, 1.0, 1e-3, 1.0))
+    done = tuned(engine.cases(0.1, 0.01, 0.001), 1e-3, engine)
+    [cheapest] = done.reached
+    assert cheapest["metrics"]["error"] > 1e-4, cheapest
+    assert cheapest["cost"]["rhs"] == min(
+        r["cost"]["rhs"] for r in done.records if r["metrics"]["error"] <= 1e-3
+    )
+    assert 0.001 not in [h for _, h in engine.asked], "a setting finer than the first that reaches was run"
+
+
+def test_a_step_that_breaks_bounds_the_search_from_above():
+    """Any step that runs is accurate: the answer is the largest that runs, 0.05."""
+    step = found(Modelled(soft=(1.0, 1e-9, 1e-3, 0.05)), 1e-3, 0.004, 0.002)["soft"]
+    assert 0.05 / 1.15 < step <= 0.05, step
+
+
+def test_a_family_that_gains_nothing_by_coarser_steps_is_left():
+    """Samples bound the step: beyond 0.1 the work stays, and no further setting is tried."""
+    engine = Modelled(f=(4.0, 1e-12, 1e-3, 1.0))
+    engine.record = lambda case, record=engine.record: _bounded(record(case))  # type: ignore[method-assign]
+    done = tuned(engine.cases(0.1, 0.05), 1e-3, engine)
+    assert len(done.records) == 2 and work(done.reached[0]) == 10, done.records
+
+
+def _bounded(record: dict[str, Any]) -> dict[str, Any]:
+    seconds = max(record["cost"]["seconds"], 1e-2)
+    return {**record, "cost": {"seconds": seconds, "rhs": max(record["cost"]["rhs"], 10.0)}}
+
+
+def test_families_dearer_than_the_cheapest_are_given_up_before_they_reach():
+    engine = Modelled(cheap=(4.0, 1.0, 1e-3, 1.0), dear=(1.0, 1.0, 1.0, 1.0))
+    assert list(found(engine, 1e-6, 0.1, 0.01, 0.001)) == ["cheap"]
+    assert [h for family, h in engine.asked if family == "dear"] == [0.1], engine.asked
+
+
+def test_an_integrator_of_crosscheck_ends_no_search_of_the_engines_own():
+    engine = Modelled(ours=(8.0, 1.0, 1e-6, 1.0), own=(2.0, 1.0, 1.0, 1.0), dearer=(1.0, 1.0, 1.0, 1.0))
+    both = found(engine, 1e-4, 0.1, 0.01, 0.001, 0.0001, ours=("ours",))
+    assert list(both) == ["ours", "own"], both
+    assert both["own"] == pytest.approx(1e-2, rel=0.15)
+
+
+def test_a_family_that_ran_out_of_time_is_given_up():
+    engine = Modelled(slow=(4.0, 1.0, 1.0, 1.0))
+    engine.record = lambda case, record=engine.record: {**record(case), "outcome": "TIMED_OUT"}  # type: ignore
+    assert not found(engine, 1e-9, 0.1, 0.01) and len(engine.asked) == 1, engine.asked
+
+
+def test_no_setting_reaches_an_error_below_what_the_truth_may_be_off():
+    for bound, count in ((2e-9, 0), (1e-11, 1)):
+        engine = Modelled(f=(4.0, 1e-3, 1e-3, 1.0))
+        engine.record = lambda case, record=engine.record, bound=bound: _rough(record(case), bound)  # type: ignore
+        assert len(tuned(engine.cases(0.001, 0.0005), 1e-10, engine).reached) == count
+
+
+def _rough(record: dict[str, Any], bound: float) -> dict[str, Any]:
+    return {**record, "metrics": {**record["metrics"], "error_bound": bound}}
+
+
+def test_settings_between_and_beyond():
+    first, second = (Setting("f", {"step": h, "beta": 0.2 / h, "hard": 1e-7}) for h in (0.1, 0.025))
+    assert between(first, second) == Setting("f", {"step": 0.05, "beta": 4.0, "hard": 1e-7})
+    assert coarser(first, second, longest=1.0) == Setting("f", {"step": 0.4, "beta": 0.5, "hard": 1e-7})
+    assert coarser(first, second, longest=0.39) is None, "longer than the motion"
+    loose = [Setting("f", {"rtol": r}) for r in (0.1, 0.01)]
+    assert coarser(*loose, longest=9.0) is None, "a tolerance of 1 asks for nothing"
+    assert coarser(Setting("f", {"rtol": 0.01}), Setting("f", {"rtol": 1e-3}), 9.0) == loose[0]
+    assert between(first, first) is None and coarser(first, first, 1.0) is None
+    assert between(Setting("f", {"n": 1}), Setting("f", {"n": 4})) is None, "a count is not halved"
+
+
+def test_work_is_counted_where_it_can_be():
+    costs = ({"rhs": 8, "steps": 2, "seconds": 0.5}, {"rhs": 0, "steps": 2, "seconds": 0.5}, {"seconds": 0.5})
+    assert [work({"cost": cost}) for cost in costs] == [8, 2, 0.5]
+
+
+def test_a_sweep_that_begins_too_fine_is_continued_to_coarser_settings():
+    """Steps 0.01 and 0.005 of a fourth-order family: 0.16 is the last to be run, as 0.16⁴ is below 1e-3."""
+    engine = Modelled(rk4=(4.0, 1.0, 1e-3, 1.0))
+    family = engine.cases(0.01, 0.005)
+    records = {key(case): engine.record(case) for case in family}
+    steps = []
+    while more := beyond(family, records):
+        family, records = [*more, *family], records | {key(c): engine.record(c) for c in more}
+        steps += [case.setting.options["step"] for case in more]
+    assert steps == [0.02, 0.04, 0.08, 0.16, 0.32], steps
+    assert not beyond(
+        family[1:], records | {key(family[1]): {**records[key(family[1])], "outcome": "STEP_FAILED"}}
+    )
+    assert _with_coarser([family], records, None) == ([family], records)
