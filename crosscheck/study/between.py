@@ -25,15 +25,16 @@ def between(coarse: Setting, fine: Setting) -> Setting | None:
 def coarser(coarsest: Setting, next_finer: Setting, longest: float) -> Setting | None:
     """The setting that lies beyond the coarsest of a family by as much as the next finer lies below it.
 
-    None where they differ in no number, and beyond the ``longest`` step (s) and the LOOSEST tolerance.
+    None where they differ in no number that grows, as steps and tolerances do, and beyond the ``longest``
+    step (s) and the LOOSEST tolerance.
     """
     found = _changed(coarsest, next_finer, lambda a, b: a * a / b)
     if found is None or found == coarsest:
         return None
-    grown = [name for name, value in found.options.items() if value != coarsest.options[name]]
+    changed = [name for name in found.options if found.options[name] != coarsest.options[name]]
+    grown = [name for name in changed if found.options[name] > coarsest.options[name]]
     limits = {name: longest if name == STEP else LOOSEST for name in grown}
-    larger = [name for name in grown if found.options[name] > coarsest.options[name]]
-    return None if any(found.options[name] > limits[name] for name in larger) else found
+    return found if grown and all(found.options[name] <= limits[name] for name in grown) else None
 
 
 def work(record: Record) -> float:

@@ -129,6 +129,7 @@ def test_settings_between_and_beyond():
     loose = [Setting("f", {"rtol": r}) for r in (0.1, 0.01)]
     assert coarser(*loose, longest=9.0) is None, "a tolerance of 1 asks for nothing"
     assert coarser(Setting("f", {"rtol": 0.01}), Setting("f", {"rtol": 1e-3}), 9.0) == loose[0]
+    assert coarser(*(Setting("f", {"iterations": n}) for n in (1.0, 2.0)), 9.0) is None, "nothing grows"
     assert between(first, first) is None and coarser(first, first, 1.0) is None
     assert between(Setting("f", {"n": 1}), Setting("f", {"n": 4})) is None, "a count is not halved"
 
