@@ -79,7 +79,7 @@ def pass_briefly(memory):
         return False
     time, sample, passage = clock.time, clock.sample, clock.passage
     steps, crossings = counts.steps, counts.crossings
-    keep_beginning(memory)
+    save_step_start(memory)
     return_to_start(memory)
     step_exactly(memory)
     status = memory.kernels.expand(time, memory)
@@ -90,28 +90,28 @@ def pass_briefly(memory):
     if not passed:
         clock.time, clock.sample, clock.passage = time, sample, passage
         counts.steps, counts.crossings = steps, crossings
-        return_to_beginning(memory)
+        restore_step_start(memory)
     return passed
 
 
 @kernel
-def keep_beginning(memory):
+def save_step_start(memory):
     """Keep the variables where the last step began, and the angles there, which are those of the run."""
-    beginning, past = memory.beginning, memory.series.past
+    saved, past = memory.step_start, memory.series.past
     for order in range(2):
-        copy(past[order], beginning.terms[order])
+        copy(past[order], saved.terms[order])
     put_angles(0.0, memory)
-    copy(memory.angles, beginning.angles)
+    copy(memory.angles, saved.angles)
 
 
 @kernel
-def return_to_beginning(memory):
-    """Have the last step begin again where ``keep_beginning`` found it."""
-    beginning, slot = memory.beginning, memory.polynomials.torsions.slot
+def restore_step_start(memory):
+    """Have the last step begin again where ``save_step_start`` found it."""
+    saved, slot = memory.step_start, memory.polynomials.torsions.slot
     for order in range(2):
-        copy(beginning.terms[order], memory.series.past[order])
+        copy(saved.terms[order], memory.series.past[order])
     for s in range(slot.shape[0]):
-        memory.run.equations.angles[slot[s]] = beginning.angles[s]
+        memory.run.equations.angles[slot[s]] = saved.angles[s]
 
 
 @kernel
@@ -171,7 +171,7 @@ def magnifies_little(delay, memory):
     progress = memory.progress
     if freedoms(memory) == 0:
         return True
-    speed = size_of(memory.series.terms, 1, memory.solver.order.shape[0])
+    speed = size_of(memory.series.terms, 1, memory.solver.pivot_columns.shape[0])
     near = CLOSER * min(MAGNIFIED * progress.change, APART)
     return progress.change * speed * delay <= LULL * near
 

@@ -6,8 +6,8 @@ from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.layout import NOT_CONVERGED, OK
 from mbref.linear_algebra.vectors import larger
 from mbref.taylor.generated_calls import close_by_code, violation_by_code
-from mbref.taylor.lanes import LANES, gathered, load, store
 from mbref.taylor.passage import least_pivot
+from mbref.taylor.simd import WIDTH, gather, load, store
 from mbref.taylor.solver import factorise, solution
 
 SMALL = 1e-6  # a violation whose correction leaves its square
@@ -22,7 +22,7 @@ def violation(memory):
         violation_by_code(code.violation, memory.series.terms, solver.phi)
     else:
         violation_in_loops(memory)
-    for r in range(solver.order.shape[0], solver.order.shape[0] + solver.row.shape[0]):
+    for r in range(solver.pivot_columns.shape[0], solver.pivot_columns.shape[0] + solver.pivot_rows.shape[0]):
         largest = larger(largest, solver.phi[r])
     return largest
 
@@ -31,13 +31,13 @@ def violation(memory):
 def violation_in_loops(memory):
     """Φ of every row at the first coefficients."""
     rows, products, terms = memory.polynomials.rows, memory.polynomials.products, memory.series.terms
-    phi, nz = memory.solver.phi, memory.solver.order.shape[0]
+    phi, nz = memory.solver.phi, memory.solver.pivot_columns.shape[0]
     for block in range(products.start.shape[0] - 1):
-        total = load(rows.constant, block * LANES)
-        for c in range(products.start[block], products.start[block + 1], LANES):
-            one = load(products.weight, c) * gathered(terms, 0, products.left, c)
-            total = total + one * gathered(terms, 0, products.right, c)
-        store(total, phi, block * LANES)
+        total = load(rows.constant, block * WIDTH)
+        for c in range(products.start[block], products.start[block + 1], WIDTH):
+            one = load(products.weight, c) * gather(terms, 0, products.left, c)
+            total = total + one * gather(terms, 0, products.right, c)
+        store(total, phi, block * WIDTH)
     for e in range(rows.linear_row.shape[0]):
         phi[nz + rows.linear_row[e]] += rows.linear_weight[e] * terms[0, rows.linear_lane[e]]
 
@@ -46,17 +46,17 @@ def violation_in_loops(memory):
 def violation_rate(memory):
     """Φ' of every row at the first two coefficients."""
     rows, products, terms = memory.polynomials.rows, memory.polynomials.products, memory.series.terms
-    phi, nz, lanes = memory.solver.phi, memory.solver.order.shape[0], memory.series.terms.shape[1]
+    phi, nz, lanes = memory.solver.phi, memory.solver.pivot_columns.shape[0], memory.series.terms.shape[1]
     for block in range(products.start.shape[0] - 1):
-        total = 0.0 * load(rows.constant, block * LANES)
-        for c in range(products.start[block], products.start[block + 1], LANES):
-            left, left_rate = gathered(terms, 0, products.left, c), gathered(terms, lanes, products.left, c)
+        total = 0.0 * load(rows.constant, block * WIDTH)
+        for c in range(products.start[block], products.start[block + 1], WIDTH):
+            left, left_rate = gather(terms, 0, products.left, c), gather(terms, lanes, products.left, c)
             right, right_rate = (
-                gathered(terms, 0, products.right, c),
-                gathered(terms, lanes, products.right, c),
+                gather(terms, 0, products.right, c),
+                gather(terms, lanes, products.right, c),
             )
             total = total + load(products.weight, c) * (left * right_rate + left_rate * right)
-        store(total, phi, block * LANES)
+        store(total, phi, block * WIDTH)
     for e in range(rows.linear_row.shape[0]):
         phi[nz + rows.linear_row[e]] += rows.linear_weight[e] * terms[1, rows.linear_lane[e]]
 
@@ -66,9 +66,9 @@ def subtract_violation(order, memory):
     """Change the variables of order 0 or 1 by the least, in the metric of M, that takes Φ or Φ' away."""
     solver, terms, variable = memory.solver, memory.series.terms, memory.series.variable
     lanes = terms.shape[1]
-    for j in range(0, lanes, LANES):
+    for j in range(0, lanes, WIDTH):
         store(-1.0 * load(solver.phi, j), solver.rhs, j)
-    for j in range(0, lanes, LANES):
+    for j in range(0, lanes, WIDTH):
         change = load(variable, j) * solution(solver, j)
         store(change, solver.change, j)
         store(load(terms, order * lanes + j) + change, terms, order * lanes + j)
@@ -99,7 +99,7 @@ def close_rate(memory):
 def largest_change(memory):
     """The largest change of a variable by the last correction."""
     solver, change = memory.solver, 0.0
-    for j in range(solver.order.shape[0]):
+    for j in range(solver.pivot_columns.shape[0]):
         change = larger(change, solver.change[j])
     return change
 

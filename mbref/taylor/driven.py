@@ -179,7 +179,7 @@ def land(h, last, memory):
 def goes_on(h, memory):
     """Whether the new series has the second derivatives of the old one, to the tolerance."""
     progress, state, terms, off = memory.progress, memory.state, memory.series.terms, 0.0
-    for i in range(memory.solver.order.shape[0]):
+    for i in range(memory.solver.pivot_columns.shape[0]):
         off = larger(off, (2.0 * terms[2, i] - state[2, i]) * h * h)
     return isfinite(off) and off <= LOST_MOTION * progress.order * progress.order * LOOSE
 

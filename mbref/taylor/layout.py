@@ -2,7 +2,7 @@
 
 Sizes: nz variables, nr rows, ng functions that drivers prescribe, nb bodies, orders of a
 series from 0 on.  A coefficient of the series is a row of ``lanes`` numbers: variables, multipliers,
-functions, filled up with zeros.  Variables and lengths are in units of the scene's length.
+functions, padded_size up with zeros.  Variables and lengths are in units of the scene's length.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from mbref.kernels.layout import Memory
 from mbref.kernels.named_memory import Indices, Kernel, Matrix, Named, Vector
 
 
-class Readings(NamedTuple):
+class PoseMaps(NamedTuple):
     """Variables as linear forms of their bodies' poses: position (m) and rotation matrix by rows.
 
     A direction that a driver turns by ψ is cos ψ along - sin ψ across.
@@ -137,11 +137,11 @@ class Solver(NamedTuple):
     (none from a row that depends on others) or of a function prescribed.
     """
 
-    row: Annotated[Indices, "nr"]  # the independent rows first
-    order: Annotated[Indices, "nz"]  # their dependent variables first
+    pivot_rows: Annotated[Indices, "nr"]  # the independent rows first
+    pivot_columns: Annotated[Indices, "nz"]  # their dependent variables first
     work: Annotated[Matrix, "nr", "nz"]
     left: Annotated[Vector, "lanes"]  # 1 for a variable without a pivot, where pivots are chosen
-    peaks: Annotated[Vector, "nr"]  # the largest entry of each row there
+    row_max: Annotated[Vector, "nr"]  # the largest entry of each row there
     first: Annotated[Vector, "nz"]  # pivots when they were chosen: of G, then of the reduced mass matrix
     last: Annotated[Vector, "nz"]  # pivots of the last factorisation
     past: Annotated[Vector, "nz"]  # pivots where the step began
@@ -232,14 +232,14 @@ class SceneCode(NamedTuple):
 
 
 class Instant(NamedTuple):
-    """When a snapshot was taken."""
+    """When a saved was taken."""
 
     time: float = 0.0  # s
     sample: int = 0  # the next one to take
     crossings: int = 0  # singular positions passed so far
 
 
-class Snapshot(NamedTuple):
+class SavedState(NamedTuple):
     """The state of a run at an instant."""
 
     instant: Instant
@@ -256,7 +256,7 @@ class Crossings(NamedTuple):
     velocities: Annotated[Matrix, "kept", "n"]
 
 
-class Beginning(NamedTuple):
+class StepStart(NamedTuple):
     """Where a brief passage begins: values and rates of the variables, and angles of torsion springs."""
 
     terms: Annotated[Matrix, 2, "lanes"]
@@ -278,23 +278,23 @@ class TaylorMemory(NamedTuple):
 
     run: Memory  # of the simulation: samples, counts, limits, and the general kernels
     polynomials: Polynomials
-    readings: Readings
+    pose_maps: PoseMaps
     series: Series
     solver: Solver
     progress: Progress
     kernels: SeriesKernels
     code: SceneCode
-    began: Snapshot  # from where the last passage is smooth
-    crossing: Snapshot  # the last singular position passed
-    beginning: Beginning
+    crossing_start: SavedState  # from where the last passage is smooth
+    crossing: SavedState  # the last singular position passed
+    step_start: StepStart
     crossings: Crossings
     parting: Annotated[Indices, "parting"]  # numbers of the singular positions left along another branch
-    landing: Annotated[Matrix, 2, "lanes"]  # values and rates of the variables where a passage ended
+    crossing_end: Annotated[Matrix, 2, "lanes"]  # values and rates of the variables where a passage ended
     state: Annotated[Matrix, 3, "lanes"]  # variables and their two derivatives at some time
     pose: Annotated[Matrix, 3, "12*nb"]
     angles: Annotated[Vector, "torsions"]  # rad, unwrapped, at the time of expansion
     waiting: Waiting  # empty where samples do not wait
-    aside: Snapshot  # the state of the run while samples that wait are taken
+    before_samples: SavedState  # the state of the run while samples that wait are taken
 
 
 SERIES = Named(TaylorMemory)

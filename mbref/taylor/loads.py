@@ -92,7 +92,7 @@ def grow_springs(k, memory):
 @kernel
 def add_springs(k, memory):
     """Order k of their forces: -(stiffness (1 - natural / l) + damping l' / l) times the vector."""
-    springs, sums, nz = memory.polynomials.springs, memory.series.sums, memory.solver.order.shape[0]
+    springs, sums, nz = memory.polynomials.springs, memory.series.sums, memory.solver.pivot_columns.shape[0]
     for s in range(springs.stiffness.shape[0]):
         of = memory.series.springs[SPRING_SERIES * s : SPRING_SERIES * (s + 1)]
         pull = springs.damping[s] * product(of[RATE], of[INVERSE], k)
@@ -168,7 +168,7 @@ def grow_torsions(k, memory):
 @kernel
 def add_torsions(k, memory):
     """Order k of their forces: -(stiffness (θ - natural) + damping θ') times C δS - S δC."""
-    torsions, sums, nz = memory.polynomials.torsions, memory.series.sums, memory.solver.order.shape[0]
+    torsions, sums, nz = memory.polynomials.torsions, memory.series.sums, memory.solver.pivot_columns.shape[0]
     for s in range(torsions.stiffness.shape[0]):
         of = memory.series.torsions[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
         angle = of[ANGLE, k] - torsions.natural[s] if k == 0 else of[ANGLE, k]
@@ -190,7 +190,7 @@ def expand_drivers(t, memory):
     given, functions, n = (
         memory.polynomials.given,
         memory.series.terms,
-        memory.solver.order.shape[0] + memory.solver.row.shape[0],
+        memory.solver.pivot_columns.shape[0] + memory.solver.pivot_rows.shape[0],
     )
     driven, drivers = memory.series.driven, memory.run.equations.scene.drivers
     for g in range(given.driver.shape[0]):

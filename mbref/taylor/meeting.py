@@ -9,8 +9,8 @@ that the last ones tell it.  Without it a step may be many times as long as d.
 from __future__ import annotations
 
 from mbref.kernels.compilation import kernel
-from mbref.taylor.lanes import LANES, load, store
 from mbref.taylor.passage import BEFORE, size_in_use
+from mbref.taylor.simd import WIDTH, load, store
 
 LEAST_ORDER = 10
 PURE = 1e-3  # relative difference of two ratios of terms that show rounding alone
@@ -52,7 +52,7 @@ def meet(distance, memory):
 def place_of_largest(order, memory):
     """The variable whose term of an order is the largest."""
     place, past = 0, memory.series.past
-    for i in range(1, memory.solver.order.shape[0]):
+    for i in range(1, memory.solver.pivot_columns.shape[0]):
         if abs(past[order, i]) > abs(past[order, place]):
             place = i
     return place
@@ -66,7 +66,7 @@ def subtract_miss(distance, memory):
     lanes = past.shape[1]
     for k in range(order - 1, -1, -1):
         of_angles, factor = factor, factor * distance
-        for j in range(0, memory.solver.order.shape[0], LANES):
+        for j in range(0, memory.solver.pivot_columns.shape[0], WIDTH):
             missed = factor * (load(variable, j) * load(past, order * lanes + j))
             store(load(past, k * lanes + j) - missed, past, k * lanes + j)
         for s in range(angles.shape[0]):

@@ -4,8 +4,8 @@ The variables of a body are its centre of mass and its rotation from the start, 
 E. Bayo, Kinematic and Dynamic Simulation of Multibody Systems, 1994): points and directions fixed in it are
 linear in them, joints are rows of second degree, and the mass matrix is constant.  Bodies that keep their
 relative orientation share R.  Where an axis of R is known to rest, R has two variables, the components of
-one image; else it has the images of three directions, axes of joints first, so that joints share variables.
-Linear equations eliminate variables (see ``expressions``).
+one direction vector; otherwise it has three direction vectors, axes of joints first, so that joints share
+variables.  Linear equations eliminate variables (see ``expressions``).
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from mbref import rotations
 from mbref.equations.initial_state import Start
 from mbref.equations.model import Model
 from mbref.kernels.scene_layout import DISTANCE, DOT1, DOT2, POINT
+from mbref.taylor.direction_vectors import DirectionVectors, direction_forms
 from mbref.taylor.expressions import (
     ONE,
     Elimination,
@@ -31,7 +32,6 @@ from mbref.taylor.expressions import (
     product_sum,
     significant,
 )
-from mbref.taylor.images import Images, image_forms
 from mbref.taylor.loads import COSINE, SINE, VALUE
 from mbref.taylor.orientations import Orientations, Triple
 
@@ -55,15 +55,15 @@ class NaturalCoordinates:
         self.place = poses[:, :3] / self.length
         axes = rotations.to_matrix(poses[:, 3:])
         self._moving = moving.reshape(-1, 6)
-        self.images = Images(self.length)
+        self.direction_vectors = DirectionVectors(self.length)
         self.given: dict[int, tuple[int, int]] = {}
-        self.centres = [self.images.add(b, np.eye(12)[:3]) for b in range(self.nb)]
+        self.centres = [self.direction_vectors.add(b, np.eye(12)[:3]) for b in range(self.nb)]
         self._positions = range(3 * self.nb)
         self.eliminate = Elimination(self._may_go)
-        self.orientations = Orientations(model, axes, self._moving[:, 3:], self.images)
+        self.orientations = Orientations(model, axes, self._moving[:, 3:], self.direction_vectors)
         self.rows = self._rows()
         gone = self.eliminate.expressed
-        kept = (v for v in range(len(self.images)) if v not in gone and v not in self.given)
+        kept = (v for v in range(len(self.direction_vectors)) if v not in gone and v not in self.given)
         self.kept = sorted(kept, key=lambda v: -self._products_of(v))
 
     # --- variables ----------------------------------------------------------------------------------------
@@ -77,11 +77,15 @@ class NaturalCoordinates:
 
     def direction(self, body: int, local: np.ndarray) -> Triple:
         """A direction fixed in a body, given in its principal frame."""
-        return tuple(map(self.eliminate, self.orientations[body].image(self.orientations.world(body, local))))
+        return tuple(
+            map(
+                self.eliminate, self.orientations[body].direction_vector(self.orientations.world(body, local))
+            )
+        )
 
     def point(self, body: int, local: np.ndarray) -> Triple:
         """A point fixed in a body, given in its principal frame from its centre of mass (m)."""
-        arm = self.orientations[body].image(self.orientations.world(body, local) / self.length)
+        arm = self.orientations[body].direction_vector(self.orientations.world(body, local) / self.length)
         if body == self.nb:
             return arm
         centre = ({v: 1.0} for v in self.centres[body])
@@ -123,7 +127,7 @@ class NaturalCoordinates:
         for b, c in zip(*np.nonzero(~self._moving[:, :3]), strict=True):
             yield {self.centres[b][c]: 1.0, ONE: -float(self.place[b, c])}
         numbered = self.orientations.numbered
-        pairs = [(numbered[one].image(a), numbered[other].image(b))
+        pairs = [(numbered[one].direction_vector(a), numbered[other].direction_vector(b))
                  for (one, a), (other, b) in self.orientations.shared_axes()]  # fmt: skip
         primitives = self.model.data.primitives
         pairs += [self._ends(p) for p in np.flatnonzero(primitives.kind == POINT)]
@@ -159,7 +163,7 @@ class NaturalCoordinates:
             return None
         body = int(table.first[p])
         at_rest = (self.direction(body, w[p]) for w in (table.direction_first, table.turning_first))
-        if any(set(component) - {ONE} for image in at_rest for component in image):
+        if any(set(component) - {ONE} for direction_vector in at_rest for component in direction_vector):
             return None
         number = self.orientations.number(int(table.second[p]))
         return number if self.orientations.numbered[number].frame is not None else None
@@ -198,13 +202,15 @@ class NaturalCoordinates:
         """A direction that is of second degree as variables, and the rows that define them."""
         table = self.model.data.primitives
         body = int(table.first[p])
-        along, across = (image_forms(np.eye(3), w[p]) for w in (table.turning_first, table.direction_first))
-        own = self.images.add(body, along, across, int(table.driver[p]))
+        along, across = (
+            direction_forms(np.eye(3), w[p]) for w in (table.turning_first, table.direction_first)
+        )
+        own = self.direction_vectors.add(body, along, across, int(table.driver[p]))
         rows = [plus(row, -1.0, {v: 1.0}) for row, v in zip(turned, own, strict=True)]
         return [{(ONE, v): 1.0} for v in own], rows
 
     def _prescribed(self, driver: int, functions: Sequence[int]) -> tuple[int, ...]:
-        variables = self.images.add(self.nb, np.zeros((len(functions), 12)))
+        variables = self.direction_vectors.add(self.nb, np.zeros((len(functions), 12)))
         self.given |= {v: (driver, function) for v, function in zip(variables, functions, strict=True)}
         return variables
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from mbref import rotations
 from mbref.equations.model import Model
+from mbref.taylor.direction_vectors import DirectionVectors, direction_forms
 from mbref.taylor.expressions import ONE, ROUNDING, Expression, Polynomial, cleaned, product_sum
-from mbref.taylor.images import Images, image_forms
 
-PARALLEL = 1e-9  # sine of an angle between the images of one axis
+PARALLEL = 1e-9  # sine of an angle between the direction_vectors of one axis
 APART = 0.2  # sine of the least angle between two directions of a basis
 
 Triple = tuple[Expression, ...]
@@ -25,8 +25,8 @@ Frame = tuple[int, np.ndarray]  # the number of an orientation, and an axis fixe
 class Orientation:
     """R of some bodies: fixed (no variables), turning about an axis, or free.
 
-    The variables of a free one are the images of its ``basis``, three directions (3, 3) in rows.  One that
-    turns has a right-handed basis (arm, across, axis) and, as variables, the components of the arm's image
+    The variables of a free one are the direction vectors of its ``basis``, three directions (3, 3) in rows.
+    One that turns has a right-handed basis (arm, across, axis) and, as variables, the components of the arm
     along the first two of the fixed ``frame`` (3, 3), whose third is the axis.
     """
 
@@ -39,21 +39,21 @@ class Orientation:
         """The inverse of the basis (3, 3)."""
         return np.asarray(np.linalg.inv(self.basis))
 
-    def image(self, w: np.ndarray) -> Triple:
+    def direction_vector(self, w: np.ndarray) -> Triple:
         """R w of a direction w (3,) that is fixed in the bodies."""
         if self.basis is None:
             return tuple({ONE: c} if c else {} for c in w.tolist())
         a, b, c = (w @ self._inverse).tolist()
         if self.frame is None:
             x, y, z = self.variables[:3], self.variables[3:6], self.variables[6:]
-            images = ({i: a, j: b, k: c} for i, j, k in zip(x, y, z, strict=True))
+            direction_vectors = ({i: a, j: b, k: c} for i, j, k in zip(x, y, z, strict=True))
         else:
             cosine, sine = self.variables
-            images = (
+            direction_vectors = (
                 {ONE: c * z, cosine: a * x + b * y, sine: a * y - b * x}
                 for x, y, z in zip(*self.frame.tolist(), strict=True)
             )
-        return tuple(map(cleaned, images))
+        return tuple(map(cleaned, direction_vectors))
 
     def rows(self) -> Iterator[Polynomial]:
         """R is a rotation."""
@@ -61,10 +61,10 @@ class Orientation:
             cosine, sine = ({v: 1.0} for v in self.variables)
             yield product_sum([(cosine, cosine), (sine, sine), ({ONE: 1.0}, {ONE: -1.0})], 0.5)
         elif self.basis is not None:
-            images = [self.image(b) for b in self.basis]
+            direction_vectors = [self.direction_vector(b) for b in self.basis]
             for i, j in itertools.combinations_with_replacement(range(3), 2):
                 square = {ONE: -float(self.basis[i] @ self.basis[j])}
-                pairs = [*zip(images[i], images[j], strict=True), (square, {ONE: 1.0})]
+                pairs = [*zip(direction_vectors[i], direction_vectors[j], strict=True), (square, {ONE: 1.0})]
                 yield product_sum(pairs, 0.5 if i == j else 1.0)
 
 
@@ -75,12 +75,14 @@ class Orientations:
     """The orientations of a model's bodies, by number: -1 is the fixed frame's.
 
     ``axes`` (nb, 3, 3) are the principal frames at the start, ``moving`` (nb, 3) says about which principal
-    axes a body can turn, ``images`` takes the variables.
+    axes a body can turn, ``direction_vectors`` takes the variables.
     """
 
-    def __init__(self, model: Model, axes: np.ndarray, moving: np.ndarray, images: Images):
+    def __init__(
+        self, model: Model, axes: np.ndarray, moving: np.ndarray, direction_vectors: DirectionVectors
+    ):
         self.model, self.nb = model, model.nb
-        self._axes, self._moving, self._images = axes, moving, images
+        self._axes, self._moving, self._direction_vectors = axes, moving, direction_vectors
         self.group = self._groups()
         self.numbered = self._orientations()
 
@@ -173,10 +175,10 @@ class Orientations:
         return Orientation(self._variables(group, np.eye(3), basis), basis=basis)
 
     def _variables(self, group: int, axes: np.ndarray, directions: Sequence[np.ndarray]) -> tuple[int, ...]:
-        """Components along axes at rest (k, 3) of the images of directions that move with an orientation."""
+        """Add components along axes at rest (k, 3) of directions that move with an orientation."""
         body = self.group.index(group)
-        forms = [image_forms(axes, self._axes[body].T @ w) for w in directions]
-        return self._images.add(body, np.concatenate(forms))
+        forms = [direction_forms(axes, self._axes[body].T @ w) for w in directions]
+        return self._direction_vectors.add(body, np.concatenate(forms))
 
     def _directions(self, group: int) -> Iterator[np.ndarray]:
         """Directions for the basis of an orientation, the best first: axes of joints, arms, own axes."""

@@ -37,7 +37,7 @@ def keep_gradient(memory):
     solver = memory.solver
     for i in range(memory.progress.rank):
         for c in range(solver.work.shape[1]):
-            solver.past_gradient[c, i] = solver.work[solver.row[i], c]
+            solver.past_gradient[c, i] = solver.work[solver.pivot_rows[i], c]
 
 
 @kernel
@@ -57,7 +57,7 @@ def determinant_of_rows(memory):
     solver, rank = memory.solver, memory.progress.rank
     for i in range(rank):
         for c in range(rank):
-            solver.product[i, c] = solver.work[solver.row[i], solver.order[c]]
+            solver.product[i, c] = solver.work[solver.pivot_rows[i], solver.pivot_columns[c]]
     return determinant(solver.product, rank)
 
 
@@ -92,7 +92,7 @@ def overlap_of_rows(memory):
         for j in range(rank):
             products[i, j] = 0.0
         for c in range(work.shape[1]):
-            entry = work[solver.row[i], c]
+            entry = work[solver.pivot_rows[i], c]
             if entry != 0.0:
                 for j in range(rank):
                     products[i, j] += entry * past[c, j]
@@ -103,7 +103,7 @@ def overlap_of_rows(memory):
 def has_one_motion(memory):
     """Whether the rows leave one variable independent, and are the same ones at both ends of a step."""
     progress = memory.progress
-    same = progress.choice == progress.past_choice or progress.rank == memory.solver.row.shape[0]
+    same = progress.choice == progress.past_choice or progress.rank == memory.solver.pivot_rows.shape[0]
     return freedoms(memory) == 1 and same
 
 
@@ -122,7 +122,7 @@ def oppose(along, memory):
 def along_motions(memory):
     """The product of the motions T that the rows allow at both ends of a step."""
     solver, along = memory.solver, 0.0
-    for i in range(solver.order.shape[0]):
+    for i in range(solver.pivot_columns.shape[0]):
         along += solver.null_space[0, i] * solver.past_motion[i]
     return along
 
@@ -140,7 +140,7 @@ def rates_oppose(memory):
     It does where branches cross, however far the minors turn on the way: they are smooth, and vanish there.
     """
     solver, past, terms, before, after = memory.solver, memory.series.past, memory.series.terms, 0.0, 0.0
-    for i in range(solver.order.shape[0]):
+    for i in range(solver.pivot_columns.shape[0]):
         before += solver.past_motion[i] * past[1, i]
         after += solver.null_space[0, i] * terms[1, i]
     return oppose(before * after, memory)
@@ -159,7 +159,7 @@ def overlap_of_motions(memory):
 def size_of_motion(memory):
     """The same as ``size_at_start``, by pivots and motions."""
     solver, square = memory.solver, 0.0
-    for i in range(solver.order.shape[0]):
+    for i in range(solver.pivot_columns.shape[0]):
         square += solver.past_motion[i] * solver.past_motion[i]
     _, size = product_of_pivots(solver.past, memory.progress.rank)
     return 2.0 * size + log(square)

@@ -6,13 +6,13 @@ from numpy import inf
 
 from mbref.kernels.compilation import inlined, kernel
 from mbref.linear_algebra.vectors import copy
-from mbref.taylor.lanes import LANES, load, peak, store
+from mbref.taylor.simd import WIDTH, load, max_abs, store
 
 
 @kernel
 def freedoms(memory):
     """Variables that the rows leave to the forces."""
-    return memory.solver.order.shape[0] - memory.progress.rank
+    return memory.solver.pivot_columns.shape[0] - memory.progress.rank
 
 
 @kernel
@@ -35,13 +35,13 @@ def put_gradient(y, memory):
 
 
 @kernel
-def eliminate(work, row, order, k):
+def eliminate(work, pivot_rows, pivot_columns, k):
     """Subtract the pivot row k from those after it."""
-    for p in range(k + 1, row.shape[0]):
-        factor = work[row[p], order[k]] / work[row[k], order[k]]
+    for p in range(k + 1, pivot_rows.shape[0]):
+        factor = work[pivot_rows[p], pivot_columns[k]] / work[pivot_rows[k], pivot_columns[k]]
         if factor != 0.0:
-            for q in range(k, order.shape[0]):
-                work[row[p], order[q]] -= factor * work[row[k], order[q]]
+            for q in range(k, pivot_columns.shape[0]):
+                work[pivot_rows[p], pivot_columns[q]] -= factor * work[pivot_rows[k], pivot_columns[q]]
 
 
 @inlined
@@ -50,7 +50,7 @@ def put_rows(memory):
     solver, rows, terms = memory.solver, memory.polynomials.rows, memory.series.terms
     tableau, linear, place = solver.tableau.reshape(-1), solver.linear, solver.place
     weight, other = rows.weight, rows.other
-    for j in range(0, tableau.shape[0], LANES):
+    for j in range(0, tableau.shape[0], WIDTH):
         store(load(linear, j), tableau, j)
     for e in range(place.shape[0]):
         tableau[place[e]] += weight[e] * terms[0, other[e]]
@@ -63,30 +63,31 @@ def choose(memory):
     The tableau is left with other numbers.
     """
     solver, tolerance = memory.solver, memory.run.equations.system.settings.rank_tolerance
-    row, order, tableau, peaks, rank = solver.row, solver.order, solver.tableau, solver.peaks, 0
+    pivot_rows, pivot_columns, rank = solver.pivot_rows, solver.pivot_columns, 0
+    tableau, row_max = solver.tableau, solver.row_max
     odd = False
     put_rows(memory)
     copy(memory.series.variable, solver.left)
-    for k in range(row.shape[0]):
-        row[k] = k
+    for k in range(pivot_rows.shape[0]):
+        pivot_rows[k] = k
         subtract_pivot_row(k, 0.0, k, memory)
-    for k in range(order.shape[0]):
-        order[k] = k
-    while rank < min(row.shape[0], order.shape[0]):
-        p = place_of_highest(peaks, row, rank)
-        if not peaks[row[p]] > tolerance:
+    for k in range(pivot_columns.shape[0]):
+        pivot_columns[k] = k
+    while rank < min(pivot_rows.shape[0], pivot_columns.shape[0]):
+        p = place_of_largest_row(row_max, pivot_rows, rank)
+        if not row_max[pivot_rows[p]] > tolerance:
             break
         odd = odd != (p != rank)
-        row[rank], row[p] = row[p], row[rank]
-        q = rank
-        while q < order.shape[0] - 1 and abs(tableau[row[rank], order[q]]) != peaks[row[rank]]:
+        pivot_rows[rank], pivot_rows[p] = pivot_rows[p], pivot_rows[rank]
+        q, r = rank, pivot_rows[rank]
+        while q < pivot_columns.shape[0] - 1 and abs(tableau[r, pivot_columns[q]]) != row_max[r]:
             q += 1
         odd = odd != (q != rank)
-        order[rank], order[q] = order[q], order[rank]
-        solver.left[order[rank]] = 0.0
-        inverse = 1.0 / tableau[row[rank], order[rank]]
-        for p in range(rank + 1, row.shape[0]):
-            subtract_pivot_row(row[p], inverse * tableau[row[p], order[rank]], row[rank], memory)
+        pivot_columns[rank], pivot_columns[q] = pivot_columns[q], pivot_columns[rank]
+        c = pivot_columns[rank]
+        solver.left[c], inverse = 0.0, 1.0 / tableau[r, c]
+        for p in range(rank + 1, pivot_rows.shape[0]):
+            subtract_pivot_row(pivot_rows[p], inverse * tableau[pivot_rows[p], c], r, memory)
         rank += 1
     memory.progress.choice += 1
     memory.progress.odd = odd
@@ -94,26 +95,26 @@ def choose(memory):
 
 
 @inlined
-def place_of_highest(peaks, row, first):
-    """The first place, from one on, of the row with the highest peak."""
+def place_of_largest_row(row_max, pivot_rows, first):
+    """The first place, from one on, of the row with the largest entry."""
     place = first
-    for p in range(first + 1, row.shape[0]):
-        if peaks[row[p]] > peaks[row[place]]:
+    for p in range(first + 1, pivot_rows.shape[0]):
+        if row_max[pivot_rows[p]] > row_max[pivot_rows[place]]:
             place = p
     return place
 
 
 @inlined
 def subtract_pivot_row(i, factor, pivot, memory):
-    """Subtract a pivot row, times a factor, from row i in the lanes of variables left, and find its peak."""
+    """Subtract a pivot row, times a factor, from row i in the free columns; keep its largest entry."""
     tableau, left, largest = memory.solver.tableau, memory.solver.left, 0.0
     lanes = tableau.shape[1]
-    for j in range(0, memory.solver.order.shape[0], LANES):
+    for j in range(0, memory.solver.pivot_columns.shape[0], WIDTH):
         entries = load(tableau, i * lanes + j) - factor * load(tableau, pivot * lanes + j)
         entries = load(left, j) * entries
         store(entries, tableau, i * lanes + j)
-        largest = max(largest, peak(entries))
-    memory.solver.peaks[i] = largest
+        largest = max(largest, max_abs(entries))
+    memory.solver.row_max[i] = largest
 
 
 @kernel

@@ -30,10 +30,10 @@ from mbref.taylor.crossing import (
     size_at,
     stays_level,
 )
-from mbref.taylor.lanes import LANES, load, peak
 from mbref.taylor.overlap import overlap_at_end, remember_gradient, size_at_start
 from mbref.taylor.partition import freedoms, kept_pivot
 from mbref.taylor.samples import evaluate_series
+from mbref.taylor.simd import WIDTH, load, max_abs
 from mbref.taylor.turning import pivot_of_turning, turns_back
 
 NEAR = 0.3  # least pivot of G, over the largest that it has been, below which a singular position is near
@@ -74,7 +74,7 @@ def remember_pivots_here(memory):
     """Keep the pivots of the last factorisation, and the largest that the least one has been."""
     solver, progress = memory.solver, memory.progress
     copy(solver.last, solver.past)
-    for i in range(solver.order.shape[0]):
+    for i in range(solver.pivot_columns.shape[0]):
         solver.past_motion[i] = solver.null_space[0, i]
     progress.past_choice, progress.past_odd = progress.choice, progress.odd
     progress.past_pivot = least_pivot(memory)
@@ -93,7 +93,7 @@ def least_pivot(memory):
 @kernel
 def moved_in(h, memory):
     """The most that a variable moves in a step of h seconds, at the rates of both ends."""
-    variables, series = memory.solver.order.shape[0], memory.series
+    variables, series = memory.solver.pivot_columns.shape[0], memory.series
     return h * max(size_of(series.past, 1, variables), size_of(series.terms, 1, variables))
 
 
@@ -204,8 +204,8 @@ def size_of(series, k, variables):
 def size_in_use(k, memory):
     """The largest coefficient of order k of the series that steps look along."""
     series, size, lanes = memory.series, 0.0, memory.series.past.shape[1]
-    for j in range(0, memory.solver.order.shape[0], LANES):
-        size = max(size, peak(load(series.variable, j) * load(series.past, k * lanes + j)))
+    for j in range(0, memory.solver.pivot_columns.shape[0], WIDTH):
+        size = max(size, max_abs(load(series.variable, j) * load(series.past, k * lanes + j)))
     return size
 
 
@@ -236,7 +236,7 @@ def resolution(memory):
     """The violation of a step that passes no gap, whose correction costs energy; drivers round with time."""
     progress, terms, rounding, speed = memory.progress, memory.series.terms, ROUNDING, 0.0
     if memory.polynomials.given.driver.shape[0] > 0:
-        for i in range(memory.solver.order.shape[0]):
+        for i in range(memory.solver.pivot_columns.shape[0]):
             speed = max(speed, abs(terms[1, i]))
         rounding = max(rounding, CLOCK * memory.run.loop.clock.time * speed)
     if progress.crossed:

@@ -30,7 +30,7 @@ from mbref.taylor.layout import SERIES
 from mbref.taylor.partition import freedoms
 from mbref.taylor.passage import AHEAD, least_pivot
 from mbref.taylor.samples import project_state, put_state_at, put_terms
-from mbref.taylor.snapshots import take_snapshot
+from mbref.taylor.saved_state import save_state
 from mbref.taylor.stepping import keep_terms
 from mbref.taylor.twin import LEAST_CHANGE, twin_agrees
 
@@ -55,7 +55,7 @@ def take(source, memory):
     times = memory.run.loop.times
     memory.run.watch.reference_pivot = source.watch.reference_pivot
     memory.progress.end = times[times.shape[0] - 1]
-    take_snapshot(memory.run, memory.began)
+    save_state(memory.run, memory.crossing_start)
 
 
 @entry(INT(INT, MEMORY, SERIES))
@@ -126,7 +126,7 @@ def step_clear(memory):
 @entry(INT(SERIES))
 def begin_here(memory):
     """Have the passage begin at the present state: OK."""
-    take_snapshot(memory.run, memory.began)
+    save_state(memory.run, memory.crossing_start)
     return OK
 
 
@@ -206,7 +206,7 @@ def keep_crossing(h, memory):
     run, length = memory.run, memory.run.loop.clock.length
     copy_state(run.state, run.previous)
     put_state_at(h, memory)
-    take_snapshot(run, memory.crossing)
+    save_state(run, memory.crossing)
     copy_state(run.previous, run.state)
     memory.crossing.instant.time -= length - h
 

@@ -12,25 +12,25 @@ from mbref import rotations
 from mbref.equations.model import Model
 from mbref.kernels.scene_layout import FORCE, MOMENT, SPRING, TORSION_SPRING, Bodies, Loads
 from mbref.taylor.expressions import ONE, Expression, cleaned
-from mbref.taylor.lanes import LANES, filled
 from mbref.taylor.layout import Given, Inertia, Polynomials, Poses, Products, Rows, Springs, Torsions
 from mbref.taylor.loads import VALUE
 from mbref.taylor.natural import NaturalCoordinates
 from mbref.taylor.orientations import Triple
+from mbref.taylor.simd import WIDTH, padded_size
 
 
 class Geometry:
     """The equations of a scene in natural coordinates, but for masses and loads, which may be any.
 
-    ``readings`` are those of the variables, ``tableau`` the ``linear`` and ``place`` of a ``layout.Solver``.
+    ``pose_maps`` are those of the variables, ``tableau`` the ``linear`` and ``place`` of a ``layout.Solver``.
     """
 
     def __init__(self, of: NaturalCoordinates):
-        self.natural, self.readings, self._forms = of, of.images.of(of.kept), Forms(of)
+        self.natural, self.pose_maps, self._forms = of, of.direction_vectors.pose_maps(of.kept), Forms(of)
         multipliers = len(of.kept)
         lane = {v: i for i, v in enumerate(of.kept)}
         lane |= {v: multipliers + len(of.rows) + g for g, v in enumerate(of.given)}
-        self._lanes = filled(max(1, len(lane) + len(of.rows)))
+        self._lanes = padded_size(max(1, len(lane) + len(of.rows)))
         self._rows, self._products = _rows(of, lane, self._lanes), _products(of, lane, self._lanes)
         self._poses, self._given = _poses(of, self._forms), _given(of)
         self.tableau = _tableau(self._rows, len(of.kept), len(of.rows), self._lanes)
@@ -93,14 +93,16 @@ class Forms:
     @cached_property
     def _of_inertia(self) -> np.ndarray:
         """The parts (4 nb, d, d) of M that a body's mass, and ∫ x² dm of its principal axes, have."""
-        images = [self.of_axes(b)[1].reshape(3, 3, self.d) for b in range(self.of.nb)]
-        forms = [form for b, axes in enumerate(images) for form in (self.centres[b], *axes)]
+        direction_vectors = [self.of_axes(b)[1].reshape(3, 3, self.d) for b in range(self.of.nb)]
+        forms = [form for b, axes in enumerate(direction_vectors) for form in (self.centres[b], *axes)]
         return np.array([form.T @ form for form in forms]).reshape(4 * self.of.nb, self.d, self.d)
 
     def of_axes(self, body: int) -> tuple[np.ndarray, np.ndarray]:
         """Constants (9,) and coefficients (9, d) of the directions of a body's principal axes."""
         if body not in self._of_axes:
-            self._of_axes[body] = self([component for image in self.axes(body) for component in image])
+            self._of_axes[body] = self(
+                [component for direction_vector in self.axes(body) for component in direction_vector]
+            )
         return self._of_axes[body]
 
     def mass(self, bodies: Bodies) -> np.ndarray:
@@ -158,16 +160,16 @@ def _products(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Produ
 
 
 def products_of_lanes(terms: Sequence[Sequence[tuple]]) -> Products:
-    """Products by the factors and weights of each lane's, blocks of slots filled up."""
+    """Products by the factors and weights of each lane's, vectors of slots padded."""
     slots, start = _slots(terms, (0, 0, 0.0))
     return Products(*_columns(slots, 2), start)
 
 
 def _slots(terms: Sequence[Sequence[tuple]], nothing: tuple) -> tuple[list[tuple], np.ndarray]:
-    """The terms of each lane in blocks, filled up with nothing; where each block of lanes begins."""
+    """The terms of each lane in vectors, padded with nothing; where each block of lanes begins."""
     slots, start = [], [0]
-    for block in range(0, len(terms), LANES):
-        levels = itertools.zip_longest(*terms[block : block + LANES], fillvalue=nothing)
+    for block in range(0, len(terms), WIDTH):
+        levels = itertools.zip_longest(*terms[block : block + WIDTH], fillvalue=nothing)
         slots += [slot for level in levels for slot in level]
         start.append(len(slots))
     return slots, np.array(start)
@@ -250,9 +252,9 @@ def _torsions(loads: Loads, forms: Forms) -> Torsions:
     of, rows = forms.of, []
     for k in np.flatnonzero(loads.kind == TORSION_SPRING):
         first, second = int(loads.first[k]), int(loads.second[k])
-        images = (of.direction(first, loads.x_first[k]), of.direction(first, loads.y_first[k]),
+        direction_vectors = (of.direction(first, loads.x_first[k]), of.direction(first, loads.y_first[k]),
                   of.direction(second, loads.x_second[k]))  # fmt: skip
-        constant, form = forms([e for image in images for e in image])
+        constant, form = forms([e for direction_vector in direction_vectors for e in direction_vector])
         stiffness, damping = (c[k] / of.length**2 for c in (loads.stiffness, loads.damping))
         rows.append((constant, form, stiffness, damping, loads.natural[k], loads.angle[k]))
     return _torsions_of(rows, forms.d)

@@ -13,9 +13,9 @@ from mbref.kernels.compilation import INT, entry, inlined, kernel
 from mbref.kernels.layout import GUARD_FAILED, NOT_CONVERGED, OK
 from mbref.linear_algebra.vectors import copy, larger
 from mbref.simulation.samples import take_sample as record_sample
-from mbref.taylor.lanes import LANES, load, store
 from mbref.taylor.layout import SERIES
-from mbref.taylor.snapshots import return_to_snapshot, take_snapshot
+from mbref.taylor.saved_state import restore_state, save_state
+from mbref.taylor.simd import WIDTH, load, store
 
 BESIDE = 0.1  # part of the largest least pivot below which a position is beside a singular one
 LOST_MOTION = 30.0  # tolerances, times orders², by which accelerations times the step's square may be off
@@ -28,7 +28,7 @@ def evaluate_series(h, memory):
     """All lanes and their first two derivatives at a distance h (s) from the step's beginning (Horner)."""
     past, state = memory.series.past, memory.state
     last, lanes = memory.progress.cut, past.shape[1]
-    for j in range(0, lanes, LANES):
+    for j in range(0, lanes, WIDTH):
         value = load(past, last * lanes + j)
         rate = 0.0 * value
         half = rate
@@ -120,7 +120,7 @@ def put_state_at(h, memory):
 def put_terms(series, memory):
     """Coordinates and velocities of all bodies where a series begins."""
     state = memory.state
-    for i in range(memory.solver.order.shape[0]):
+    for i in range(memory.solver.pivot_columns.shape[0]):
         state[0, i], state[1, i] = series[0, i], series[1, i]
     find_poses(memory)
     put_state(memory)
@@ -223,7 +223,7 @@ def complete_samples(memory):
     clock, progress, waiting = memory.run.loop.clock, memory.progress, memory.waiting
     first, end = progress.taken, clock.sample
     progress.taken = end
-    take_snapshot(memory.run, memory.aside)
+    save_state(memory.run, memory.before_samples)
     for place in range(min(end - first, waiting.length.shape[0])):
         if waiting.length[place] > 0.0:
             clock.sample = first + place
@@ -231,7 +231,7 @@ def complete_samples(memory):
             if status != OK:
                 clock.time = memory.run.loop.times[first + place]
                 return status
-    return_to_snapshot(memory.aside, memory.run)
+    restore_state(memory.before_samples, memory.run)
     return OK
 
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from mbref.kernels.compilation import inlined, kernel
 from mbref.taylor.generated_calls import expand_by_code, expand_by_power
-from mbref.taylor.lanes import LANES, gathered, load, store
 from mbref.taylor.loads import add_loads, start_loads
 from mbref.taylor.passage import size_of
+from mbref.taylor.simd import WIDTH, gather, load, store
 from mbref.taylor.solver import respond_in_loops, solution
 
 SLOWEST = 2.0  # steps over the time in which the speed would vanish: beyond, rounding grows with the order
@@ -24,9 +24,9 @@ def start_sums(memory):
     sums, force = memory.series.sums, memory.polynomials.inertia.force
     size = sums.shape[0] * sums.shape[1]
     zero = 0.0 * load(force, 0)
-    for j in range(0, size, LANES):
+    for j in range(0, size, WIDTH):
         store(zero, sums, j)
-    for j in range(0, sums.shape[1], LANES):
+    for j in range(0, sums.shape[1], WIDTH):
         store(-1.0 * load(force, j), sums, j)
 
 
@@ -38,20 +38,20 @@ def put_sums(k, memory):
     inertia = memory.polynomials.inertia
     share = 0.5 if k == 0 else 1.0  # the product of the first factors is counted twice
     for block in range(products.start.shape[0] - 1):
-        place = k * lanes + block * LANES
+        place = k * lanes + block * WIDTH
         one = 0.0 * load(series.sums, place)
         other = one
-        for c in range(products.start[block], products.start[block + 1], LANES):
-            a = load(products.weight, c) * gathered(terms, (k + 1) * lanes, products.left, c)
-            b = gathered(terms, (k + 1) * lanes, products.right, c)
+        for c in range(products.start[block], products.start[block + 1], WIDTH):
+            a = load(products.weight, c) * gather(terms, (k + 1) * lanes, products.left, c)
+            b = gather(terms, (k + 1) * lanes, products.right, c)
             store(a, left, k * slots + c)
             store(b, right, k * slots + c)
             one = one + a * load(right, c)
             other = other + load(left, c) * b
         total = load(series.sums, place) + share * (one + other)
-        for c in range(inertia.start[block], inertia.start[block + 1], LANES):
-            total = total - load(inertia.weight, c) * gathered(terms, k * lanes, inertia.source, c)
-        store(load(series.scale, place) * total, memory.solver.rhs, block * LANES)
+        for c in range(inertia.start[block], inertia.start[block + 1], WIDTH):
+            total = total - load(inertia.weight, c) * gather(terms, k * lanes, inertia.source, c)
+        store(load(series.scale, place) * total, memory.solver.rhs, block * WIDTH)
 
 
 @inlined
@@ -61,15 +61,15 @@ def add_to_later_sums(k, last, memory):
     left, right, sums, slots = series.left, series.right, series.sums, series.left.shape[1]
     lanes = sums.shape[1]
     for block in range(start.shape[0] - 1):
-        for c in range(start[block], start[block + 1], LANES):
+        for c in range(start[block], start[block + 1], WIDTH):
             a, b = load(left, k * slots + c), load(right, k * slots + c)
-            place, source = (k + 1) * lanes + block * LANES, slots + c
+            place, source = (k + 1) * lanes + block * WIDTH, slots + c
             for _ in range(min(k - 1, last - k)):
                 more = a * load(right, source) + load(left, source) * b
                 store(load(sums, place) + more, sums, place)
                 place, source = place + lanes, source + slots
             if 2 * k <= last:
-                place = 2 * k * lanes + block * LANES
+                place = 2 * k * lanes + block * WIDTH
                 store(load(sums, place) + a * b, sums, place)
 
 
@@ -77,11 +77,11 @@ def add_to_later_sums(k, last, memory):
 def solve_order(k, last, memory):
     """Order k + 2 of the variables and order k of the multipliers; loads are in the sums."""
     series, terms, rhs = memory.series, memory.series.terms, memory.solver.rhs
-    n, lanes = memory.solver.order.shape[0] + memory.solver.row.shape[0], terms.shape[1]
+    n, lanes = memory.solver.pivot_columns.shape[0] + memory.solver.pivot_rows.shape[0], terms.shape[1]
     put_sums(k, memory)
     for g in range(n, n + memory.polynomials.given.driver.shape[0]):
         rhs[g] = terms[k + 2, g]
-    for j in range(0, lanes, LANES):
+    for j in range(0, lanes, WIDTH):
         grown = load(series.growth, k * lanes + j) * solution(memory.solver, j)
         store(grown, terms, (k + 2) * lanes + j)
     if k > 0:
@@ -118,7 +118,7 @@ def expand(memory):
         progress.slowing = abs(solver.rhs[0])
         length = memory.run.loop.clock.length
         if length == 0.0:  # at the start, before a step: the time in which a variable moves by one
-            length = 1.0 / size_of(series.terms, 1, solver.order.shape[0])
+            length = 1.0 / size_of(series.terms, 1, solver.pivot_columns.shape[0])
         if not turns_back_in(length, memory):
             return
     expand_with_multipliers(memory)
@@ -128,7 +128,7 @@ def expand(memory):
 def begins_at_rest(memory):
     """Whether no step has been taken, and no variable moves."""
     is_first = memory.run.loop.clock.length == 0.0
-    return is_first and not size_of(memory.series.terms, 1, memory.solver.order.shape[0]) > 0.0
+    return is_first and not size_of(memory.series.terms, 1, memory.solver.pivot_columns.shape[0]) > 0.0
 
 
 @inlined

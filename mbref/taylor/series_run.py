@@ -23,7 +23,6 @@ from mbref.simulation.run import Run
 from mbref.taylor.advance import advance_series, enter
 from mbref.taylor.driven import follow_drivers
 from mbref.taylor.geometry import geometry_of
-from mbref.taylor.lanes import filled
 from mbref.taylor.layout import (
     Polynomials,
     Series,
@@ -42,6 +41,7 @@ from mbref.taylor.passing import (
 )
 from mbref.taylor.polynomials import Geometry
 from mbref.taylor.samples import complete_samples
+from mbref.taylor.simd import padded_size
 from mbref.taylor.start import OFF
 from mbref.taylor.stepping import begin, expand_from, step
 from mbref.taylor.twin import LEAST_CHANGE
@@ -142,7 +142,7 @@ class SeriesRun(Run):
         nz, ng, nr = len(natural.kept), len(natural.given), len(natural.rows)
         sizes = {
             "orders": order + 1, "nz": nz, "ng": ng, "nr": nr,
-            "lanes": filled(max(1, nz + nr + ng)), "slots": polynomials.products.left.size,
+            "lanes": padded_size(max(1, nz + nr + ng)), "slots": polynomials.products.left.size,
             "twofold": polynomials.rows.row.size, "kept": KEPT,
             "waiting": min(self.times.size, self.most_waiting),
             "springs": polynomials.springs.natural.size, "torsions": polynomials.torsions.slot.size,
@@ -168,7 +168,7 @@ class SeriesRun(Run):
             sizes,
             run=self.memory,
             polynomials=copied(self.polynomials),
-            readings=copied(self.geometry.readings),
+            pose_maps=copied(self.geometry.pose_maps),
             series=series,
             kernels=SeriesKernels(*(kernel.pointer for kernel in CALLED)),
             parting=np.array(parting, np.int64),
@@ -223,13 +223,13 @@ class SeriesRun(Run):
 
 def shapes_of_equations(geometry: Geometry, polynomials: Polynomials) -> Hashable:
     """The shapes of the equations of a scene: all of them have room in memory that is made for one."""
-    return shapes_of((polynomials, geometry.readings, geometry.tableau))
+    return shapes_of((polynomials, geometry.pose_maps, geometry.tableau))
 
 
 def put_equations(memory: TaylorMemory, geometry: Geometry, polynomials: Polynomials) -> None:
     """Have memory of series hold the equations of a scene."""
     fill(memory.polynomials, polynomials)
-    fill(memory.readings, geometry.readings)
+    fill(memory.pose_maps, geometry.pose_maps)
     memory.solver.linear[:], memory.solver.place[:] = geometry.tableau
 
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.layout import OK, SINGULAR
 from mbref.taylor.generated_calls import factorise_by_code
-from mbref.taylor.lanes import LANES, load, store
 from mbref.taylor.partition import choose, keep_pivot, put_rows
+from mbref.taylor.simd import WIDTH, load, store
 
 KEPT = 0.5  # a pivot over its first below which rows and variables are chosen again
 WITHOUT_INERTIA = 1e-13  # of the largest inertia of a variable
@@ -25,14 +25,14 @@ def exchange(memory):
     Behind it a row of the tableau has N in the lanes of multipliers and -T in those of independent variables.
     """
     solver, rank = memory.solver, memory.progress.rank
-    tableau, row, order, last = solver.tableau, solver.row, solver.order, solver.last
+    tableau, rows, columns, last = solver.tableau, solver.pivot_rows, solver.pivot_columns, solver.last
     put_rows(memory)
     for k in range(rank):
-        r, c = row[k], order[k]
+        r, c = rows[k], columns[k]
         last[k] = tableau[r, c]
         multiply_row(tableau, r, 1.0 / tableau[r, c])
         for p in range(rank):
-            i = row[p]
+            i = rows[p]
             entry = tableau[i, c]
             if i != r and entry != 0.0:
                 subtract_multiple(tableau, i, entry, r)
@@ -42,7 +42,7 @@ def exchange(memory):
 def multiply_row(matrix, i, factor):
     """Multiply row i of a matrix by a factor."""
     lanes = matrix.shape[1]
-    for j in range(i * lanes, (i + 1) * lanes, LANES):
+    for j in range(i * lanes, (i + 1) * lanes, WIDTH):
         store(factor * load(matrix, j), matrix, j)
 
 
@@ -50,7 +50,7 @@ def multiply_row(matrix, i, factor):
 def subtract_multiple(matrix, i, factor, k):
     """Subtract row k of a matrix, times a factor, from row i."""
     lanes = matrix.shape[1]
-    for j in range(0, lanes, LANES):
+    for j in range(0, lanes, WIDTH):
         left = load(matrix, i * lanes + j) - factor * load(matrix, k * lanes + j)
         store(left, matrix, i * lanes + j)
 
@@ -59,26 +59,28 @@ def subtract_multiple(matrix, i, factor, k):
 def split(memory):
     """N in rows of all variables and T in rows of the independent ones, from the tableau."""
     solver, rank, variable = memory.solver, memory.progress.rank, memory.series.variable
-    tableau, row, order, lanes = solver.tableau, solver.row, solver.order, solver.tableau.shape[1]
+    tableau, rows, columns = solver.tableau, solver.pivot_rows, solver.pivot_columns
+    lanes = tableau.shape[1]
     particular, null_space = solver.particular, solver.null_space
     for k in range(rank):
-        for j in range(0, lanes, LANES):
-            eliminated = load(tableau, row[k] * lanes + j)
-            store(eliminated - load(variable, j) * eliminated, particular, order[k] * lanes + j)
-        for q in range(rank, order.shape[0]):
-            null_space[q - rank, order[k]] = -tableau[row[k], order[q]]
-    for q in range(rank, order.shape[0]):
-        for j in range(0, lanes, LANES):
-            store(0.0 * load(variable, j), particular, order[q] * lanes + j)
-        for p in range(rank, order.shape[0]):
-            null_space[q - rank, order[p]] = 1.0 if p == q else 0.0
+        for j in range(0, lanes, WIDTH):
+            eliminated = load(tableau, rows[k] * lanes + j)
+            store(eliminated - load(variable, j) * eliminated, particular, columns[k] * lanes + j)
+        for q in range(rank, columns.shape[0]):
+            null_space[q - rank, columns[k]] = -tableau[rows[k], columns[q]]
+    for q in range(rank, columns.shape[0]):
+        for j in range(0, lanes, WIDTH):
+            store(0.0 * load(variable, j), particular, columns[q] * lanes + j)
+        for p in range(rank, columns.shape[0]):
+            null_space[q - rank, columns[p]] = 1.0 if p == q else 0.0
 
 
 @inlined
 def reduce_inertia(memory):
     """Tᵀ M T in ``reduced``, and Tᵀ and -Tᵀ M N in the independent variables' rows of the response."""
     solver, mass, rank = memory.solver, memory.polynomials.inertia.mass, memory.progress.rank
-    null_space, momentum, order, nz = solver.null_space, solver.momentum, solver.order, solver.order.shape[0]
+    null_space, momentum, columns = solver.null_space, solver.momentum, solver.pivot_columns
+    nz = columns.shape[0]
     for f in range(nz - rank):
         put_combination(f, null_space, mass, nz, momentum)
         for g in range(nz - rank):
@@ -86,14 +88,14 @@ def reduce_inertia(memory):
             for i in range(nz):
                 total += momentum[f, i] * null_space[g, i]
             solver.reduced[f, g] = total
-        put_free_motion(f, order[rank + f], nz, solver)
+        put_free_motion(f, columns[rank + f], nz, solver)
 
 
 @inlined
 def put_combination(f, factors, matrix, rows, out):
     """The combination of the rows of a matrix by the factors in row f, into row f of ``out``."""
     lanes = matrix.shape[1]
-    for j in range(0, lanes, LANES):
+    for j in range(0, lanes, WIDTH):
         total = factors[f, 0] * load(matrix, j)
         for i in range(1, rows):
             total = total + factors[f, i] * load(matrix, i * lanes + j)
@@ -107,7 +109,7 @@ def put_free_motion(f, variable, nz, solver):
         solver.null_space, solver.particular, solver.momentum, solver.response,
     )  # fmt: skip
     lanes = response.shape[1]
-    for j in range(0, lanes, LANES):
+    for j in range(0, lanes, WIDTH):
         total = load(null_space, f * lanes + j)
         for i in range(nz):
             total = total - momentum[f, i] * load(particular, i * lanes + j)
@@ -118,16 +120,16 @@ def put_free_motion(f, variable, nz, solver):
 def solve_reduced(memory):
     """The response of the independent variables, by Gauss–Jordan elimination of the reduced mass matrix."""
     solver, rank = memory.solver, memory.progress.rank
-    reduced, response, order, last = solver.reduced, solver.response, solver.order, solver.last
-    for f in range(order.shape[0] - rank):
+    reduced, response, columns, last = solver.reduced, solver.response, solver.pivot_columns, solver.last
+    for f in range(columns.shape[0] - rank):
         last[rank + f] = reduced[f, f]
         factor = 1.0 / reduced[f, f]
-        multiply_row(response, order[rank + f], factor)
+        multiply_row(response, columns[rank + f], factor)
         multiply_numbers(reduced, f, factor)
-        for g in range(order.shape[0] - rank):
+        for g in range(columns.shape[0] - rank):
             entry = reduced[g, f]
             if g != f and entry != 0.0:
-                subtract_multiple(response, order[rank + g], entry, order[rank + f])
+                subtract_multiple(response, columns[rank + g], entry, columns[rank + f])
                 subtract_numbers(reduced, g, entry, f)
 
 
@@ -149,16 +151,16 @@ def subtract_numbers(matrix, g, factor, f):
 def put_dependent(memory):
     """The response of the dependent variables: N, and T of the independent ones'."""
     solver, rank = memory.solver, memory.progress.rank
-    response, particular, null_space, order = (
-        solver.response, solver.particular, solver.null_space, solver.order,
+    response, particular, null_space, columns = (
+        solver.response, solver.particular, solver.null_space, solver.pivot_columns,
     )  # fmt: skip
-    lanes, nz = response.shape[1], order.shape[0]
+    lanes, nz = response.shape[1], columns.shape[0]
     for k in range(rank):
-        i = order[k]
-        for j in range(0, lanes, LANES):
+        i = columns[k]
+        for j in range(0, lanes, WIDTH):
             total = load(particular, i * lanes + j)
             for f in range(nz - rank):
-                total = total + null_space[f, i] * load(response, order[rank + f] * lanes + j)
+                total = total + null_space[f, i] * load(response, columns[rank + f] * lanes + j)
             store(total, response, i * lanes + j)
 
 
@@ -166,15 +168,15 @@ def put_dependent(memory):
 def put_multipliers(memory):
     """The response of the multipliers: Nᵀ of the forces that the dependent variables' motion leaves."""
     solver, rank, response = memory.solver, memory.progress.rank, memory.solver.response
-    particular, forces, order = solver.particular, solver.forces, solver.order
-    nz, lanes = order.shape[0], response.shape[1]
+    particular, forces, columns = solver.particular, solver.forces, solver.pivot_columns
+    nz, lanes = columns.shape[0], response.shape[1]
     for k in range(rank):
-        put_force(order[k], memory)
-    for e in range(nz, nz + solver.row.shape[0]):
-        for j in range(0, lanes, LANES):
+        put_force(columns[k], memory)
+    for e in range(nz, nz + solver.pivot_rows.shape[0]):
+        for j in range(0, lanes, WIDTH):
             total = 0.0 * load(response, 0)
             for k in range(rank):
-                total = total + particular[order[k], e] * load(forces, order[k] * lanes + j)
+                total = total + particular[columns[k], e] * load(forces, columns[k] * lanes + j)
             store(total, response, e * lanes + j)
 
 
@@ -184,7 +186,7 @@ def put_force(i, memory):
     solver, inertia, lanes = memory.solver, memory.polynomials.inertia, memory.solver.response.shape[1]
     response, forces, mass, coupled = solver.response, solver.forces, inertia.mass, inertia.coupled
     first, end = inertia.first[i], inertia.first[i + 1]
-    for j in range(0, lanes, LANES):
+    for j in range(0, lanes, WIDTH):
         left = 0.0 * load(forces, 0)
         for e in range(first, end):
             left = left - mass[i, coupled[e]] * load(response, coupled[e] * lanes + j)
@@ -208,7 +210,7 @@ def respond(memory):
     if code.factorise != 0 and code.rank == memory.progress.rank:
         factorise_by_code(
             code.factorise, memory.series.terms, solver.tableau, solver.particular, solver.null_space,
-            solver.response, solver.last, solver.row, solver.order,
+            solver.response, solver.last, solver.pivot_rows, solver.pivot_columns,
         )  # fmt: skip
     else:
         respond_in_loops(memory)
@@ -219,11 +221,11 @@ def respond(memory):
 @inlined
 def put_inverse(solver):
     """The response of the variables to rows that determine all of them, so that no force moves any."""
-    response, particular, nz = solver.response, solver.particular, solver.order.shape[0]
+    response, particular, nz = solver.response, solver.particular, solver.pivot_columns.shape[0]
     zero, lanes = 0.0 * load(response, 0), response.shape[1]
-    for j in range(0, (nz + solver.row.shape[0]) * lanes, LANES):
+    for j in range(0, (nz + solver.pivot_rows.shape[0]) * lanes, WIDTH):
         store(zero, response, j)
-    for e in range(nz, nz + solver.row.shape[0]):
+    for e in range(nz, nz + solver.pivot_rows.shape[0]):
         for i in range(nz):
             response[e, i] = particular[i, e]
 
@@ -233,7 +235,7 @@ def respond_in_loops(memory):
     """The pivots and the response by elimination of the rows, then of the reduced mass matrix."""
     exchange(memory)
     split(memory)
-    if memory.progress.rank == memory.solver.order.shape[0]:
+    if memory.progress.rank == memory.solver.pivot_columns.shape[0]:
         put_inverse(memory.solver)
     else:
         reduce_inertia(memory)
@@ -280,7 +282,7 @@ def inertia_left(memory):
 def add_functions(functions, memory):
     """The response to functions prescribed: what rows that depend on them take, and themselves."""
     solver, rows, terms = memory.solver, memory.polynomials.rows, memory.series.terms
-    response, n = solver.response, solver.order.shape[0] + solver.row.shape[0]
+    response, n = solver.response, solver.pivot_columns.shape[0] + solver.pivot_rows.shape[0]
     for g in range(n, n + functions):
         for j in range(response.shape[1]):
             response[g, j] = 0.0
@@ -296,9 +298,9 @@ def add_functions(functions, memory):
 @inlined
 def subtract_row(row, lane, value, solver):
     """Of a row's dependence on a function: what it takes away from the right-hand side."""
-    response, lanes, nz = solver.response, solver.response.shape[1], solver.order.shape[0]
-    if lane >= nz + solver.row.shape[0]:
-        for j in range(0, lanes, LANES):
+    response, lanes, nz = solver.response, solver.response.shape[1], solver.pivot_columns.shape[0]
+    if lane >= nz + solver.pivot_rows.shape[0]:
+        for j in range(0, lanes, WIDTH):
             more = value * load(response, (nz + row) * lanes + j)
             store(load(response, lane * lanes + j) - more, response, lane * lanes + j)
 

@@ -21,7 +21,6 @@ from mbref.simulation.stepping import (
 )
 from mbref.taylor.correction import correct, violation
 from mbref.taylor.crossing import count_crossings, is_at_crossing
-from mbref.taylor.lanes import LANES, load, store
 from mbref.taylor.layout import BEGIN, EXPAND, STEP
 from mbref.taylor.loads import (
     ANGLE,
@@ -43,7 +42,7 @@ from mbref.taylor.passage import (
     remember_pivots_here,
     size_in_use,
 )
-from mbref.taylor.readings import read_variables
+from mbref.taylor.pose_maps import read_variables
 from mbref.taylor.samples import (
     LOST_MOTION,
     NOISE,
@@ -53,6 +52,7 @@ from mbref.taylor.samples import (
     take_sample_of_series,
 )
 from mbref.taylor.series import expand, expand_with_multipliers, turns_back_in
+from mbref.taylor.simd import WIDTH, load, store
 from mbref.taylor.solver import factorise_anew
 from mbref.taylor.start import is_turned, judged_start
 
@@ -123,7 +123,7 @@ def first_lengths(left, memory):
 def keep_terms(memory):
     """The terms, which are looked along from now on; angles have no last order."""
     series, progress = memory.series, memory.progress
-    for j in range(0, (progress.order + 1) * series.terms.shape[1], LANES):
+    for j in range(0, (progress.order + 1) * series.terms.shape[1], WIDTH):
         store(load(series.terms, j), series.past, j)
     for s in range(series.past_angles.shape[0]):
         for k in range(progress.order):
@@ -169,7 +169,7 @@ def judge(h, last, memory):
     if progress.resting and is_turned(memory):
         return UNDECIDED
     off, size = 0.0, 1.0
-    for i in range(memory.solver.order.shape[0]):
+    for i in range(memory.solver.pivot_columns.shape[0]):
         off = larger(off, (2.0 * terms[2, i] - state[2, i]) * h * h)
         size = larger(size, state[2, i] * h * h)
     if not isfinite(off):
@@ -189,7 +189,7 @@ def expand_at(h, last, memory):
     progress, terms, state = memory.progress, memory.series.terms, memory.state
     evaluate_series(h, memory)
     lanes, variable = terms.shape[1], memory.series.variable
-    for j in range(0, lanes, LANES):
+    for j in range(0, lanes, WIDTH):
         store(load(variable, j) * load(state, j), terms, j)
         store(load(variable, j) * load(state, lanes + j), terms, lanes + j)
     put_angles(h, memory)

@@ -13,7 +13,7 @@ HALVINGS = 40  # of the search for the place
 def turns_back(rates, memory):
     """Whether rates of the variables, in row 1, point against those where the step began."""
     past, along = memory.series.past, 0.0
-    for i in range(memory.solver.order.shape[0]):
+    for i in range(memory.solver.pivot_columns.shape[0]):
         along += past[1, i] * rates[1, i]
     return along <= 0.0
 
@@ -31,7 +31,7 @@ def pivot_of_turning(h, memory):
             start = middle
     put_gradient(memory.state, memory)
     for k in range(memory.progress.rank):
-        least = min(least, abs(solver.work[solver.row[k], solver.order[k]]))
-        eliminate(solver.work, solver.row, solver.order, k)
+        least = min(least, abs(solver.work[solver.pivot_rows[k], solver.pivot_columns[k]]))
+        eliminate(solver.work, solver.pivot_rows, solver.pivot_columns, k)
     evaluate_series(h, memory)
     return least

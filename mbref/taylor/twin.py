@@ -10,7 +10,7 @@ from mbref.kernels.compilation import kernel
 from mbref.kernels.layout import OK
 from mbref.linear_algebra.vectors import copy, larger
 from mbref.taylor.passage import size_of
-from mbref.taylor.snapshots import return_to_snapshot
+from mbref.taylor.saved_state import restore_state
 
 LEAST_CHANGE = 1e-9  # of the velocities of a twin
 MAGNIFIED, APART = 100.0, 1e-2  # lengths by which twins end apart: over the change, and whatever it is
@@ -24,13 +24,13 @@ def twin_agrees(rtol, memory):
 
     Nearer, where it counts another number of singular positions: a step may pass two.
     """
-    run, landing, terms = memory.run, memory.landing, memory.series.terms
+    run, landing, terms = memory.run, memory.crossing_end, memory.series.terms
     passed, change = run.equations.system.counts.crossings, max(rtol, LEAST_CHANGE)
     for order in range(2):
         copy(terms[order], landing[order])
     if not follow_twin(change, run.loop.clock.time, memory):
         return False
-    places, rates, variables = 0.0, 0.0, memory.solver.order.shape[0]
+    places, rates, variables = 0.0, 0.0, memory.solver.pivot_columns.shape[0]
     for i in range(variables):
         places = larger(places, terms[0, i] - landing[0, i])
         rates = larger(rates, terms[1, i] - landing[1, i])
@@ -44,7 +44,7 @@ def twin_agrees(rtol, memory):
 def follow_twin(change, until, memory):
     """Go on to a time (s) from the beginning of the passage, velocities changed: whether that is possible."""
     run, clock, counts = memory.run, memory.run.loop.clock, memory.run.equations.system.counts
-    return_to_snapshot(memory.began, run)
+    restore_state(memory.crossing_start, run)
     for i in range(run.state.velocities.shape[0]):
         run.state.velocities[i] *= 1.0 + change
     memory.progress.end = until

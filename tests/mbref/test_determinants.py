@@ -57,8 +57,8 @@ def test_pivots_and_motions_tell_the_determinant(name, signs):
     run = TaylorRun(SCENES[name](), Method.parse("taylor"), np.array([0.1]), Limits(code="generic"))
     assert run.expand() == OK
     taylor, rng, found = run.taylor, np.random.default_rng(3), set()
-    solver, progress, nz = taylor.solver, taylor.progress, taylor.solver.order.size
-    assert progress.rank == nz - 1 == solver.row.size
+    solver, progress, nz = taylor.solver, taylor.progress, taylor.solver.pivot_columns.size
+    assert progress.rank == nz - 1 == solver.pivot_rows.size
     taylor.series.past[:], progress.past_choice = taylor.series.terms, progress.choice
     solver.past[:], solver.past_motion[:] = solver.last, solver.null_space[0, :nz]
     progress.past_odd = progress.odd

@@ -45,7 +45,7 @@ def agree(scene):
     """Whether the terms of a scene's code are those of the kernels; by power it gives those of variables."""
     (expected, _), (found, run) = (terms(scene, code) for code in ("generic", "specialised"))
     by_power = run.taylor.progress.slowing > 0.0
-    lanes = slice(run.taylor.solver.order.size if by_power else None)
+    lanes = slice(run.taylor.solver.pivot_columns.size if by_power else None)
     return np.abs(found - expected)[:, lanes].max() <= 1e-11 * np.abs(expected).max()
 
 
@@ -102,7 +102,7 @@ def test_power_gives_the_terms_of_one_freedom(name, duration):
         run.memory.state.coordinates[:], run.memory.state.velocities[:] = state
         run.memory.loop.clock.length = duration
         assert run.expand() == OK
-        found.append(run.taylor.series.terms[:17, : run.taylor.solver.order.size].copy())
+        found.append(run.taylor.series.terms[:17, : run.taylor.solver.pivot_columns.size].copy())
     assert run.taylor.progress.slowing > 0.0, "by power"
     sizes = np.abs(found[0]).max(axis=1)
     time = min(duration, (sizes[2:] ** (-1.0 / np.arange(2, 17))).min())
@@ -206,7 +206,7 @@ def test_every_order_is_that_of_the_kernels(order):
         for code in ("generic", "specialised")
     )
     assert own.expand() == generic.expand() == OK
-    variables = own.taylor.solver.order.size
+    variables = own.taylor.solver.pivot_columns.size
     found, expected = (run.taylor.series.terms[: order + 1, :variables] for run in (own, generic))
     assert np.abs(expected[order]).max() > 0.0
     size = np.abs(expected).max(axis=1, keepdims=True)

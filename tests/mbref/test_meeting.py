@@ -30,7 +30,7 @@ def looking_along(motion: np.ndarray, miss: float, distance: float) -> TaylorRun
     """A run whose series is a motion of radius 1 that misses a position at a distance (s)."""
     method = Method.parse(f"taylor[order={ORDER}]")
     run = TaylorRun(SCENES["four_bar_gravity"](), method, np.array([0.1]), Limits(code="generic"))
-    progress, nz = run.taylor.progress, run.taylor.solver.order.size
+    progress, nz = run.taylor.progress, run.taylor.solver.pivot_columns.size
     orders = np.arange(ORDER + 1)[:, None]
     run.taylor.series.past[:] = 0.0
     run.taylor.series.past[: ORDER + 1, :nz] = motion[:, :nz] + miss * np.arange(1, nz + 1) / distance**orders
@@ -45,7 +45,7 @@ def test_a_miss_by_rounding_is_taken_out(distance):
     """Of a position ahead, with the time to it, and of one behind."""
     motion = np.random.default_rng(5).uniform(0.5, 1.0, (ORDER + 1, 6))
     run = looking_along(motion, 1e-15, distance)
-    progress, nz = run.taylor.progress, run.taylor.solver.order.size
+    progress, nz = run.taylor.progress, run.taylor.solver.pivot_columns.size
     assert progress.meets == pytest.approx(distance, rel=1e-6)
     assert 4 <= progress.cut == progress.top < ORDER
     left = run.taylor.series.past[: int(progress.top), :nz] - motion[: int(progress.top), :nz]

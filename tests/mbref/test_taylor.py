@@ -23,7 +23,7 @@ from mbref.scene import (
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
 from mbref.taylor.expressions import ONE, Elimination, independent
-from mbref.taylor.lanes import filled, gathered, load, store
+from mbref.taylor.simd import gather, load, padded_size, store
 
 FIELDS = ("position", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
 ROD = {"mass": 2.0, "inertia": (0.1, 0.7, 0.8)}
@@ -169,7 +169,7 @@ def test_polynomials_that_follow_from_others_are_left_out():
 
 def block_sum(factor, a, b, lanes, out):
     """out[8 …] := factor a[8 …] + b's numbers in lanes, times a's first block, minus b[8 …]."""
-    total = factor * load(a, 8) + gathered(b, 16, lanes, 0) * load(a, 0)
+    total = factor * load(a, 8) + gather(b, 16, lanes, 0) * load(a, 0)
     store(total - load(b, 8), out, 8)
 
 
@@ -179,7 +179,7 @@ def test_blocks_are_added_multiplied_and_gathered():
     expected = 0.7 * a[1] + b[2, lanes] * a[0]
     (block_sum if PLAIN else njit(block_sum))(0.7, a, b, lanes, out)
     assert np.allclose(out[8:], expected - b[1], rtol=1e-14, atol=1e-15) and not out[:8].any()
-    assert [filled(size) for size in (0, 1, 8, 9)] == [0, 8, 8, 16]
+    assert [padded_size(size) for size in (0, 1, 8, 9)] == [0, 8, 8, 16]
 
 
 @pytest.mark.parametrize("length", [0.05, 1.0, 30.0])

@@ -223,7 +223,7 @@ DEFECTS = (
         CLOSED_FORMS,
     ),
     Defect(
-        "mbref/taylor/readings.py",
+        "mbref/taylor/pose_maps.py",
         "c * x_rate - s * y_rate - speed * turned",
         "c * x_rate - s * y_rate + speed * turned",
         CLOSED_FORMS,

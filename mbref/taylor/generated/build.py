@@ -16,12 +16,12 @@ from mbref.taylor.generated.elimination import Elimination, EliminationOfRows
 from mbref.taylor.generated.instructions import Instructions
 from mbref.taylor.generated.multiplier_orders import MultiplierOrders
 from mbref.taylor.generated.power_orders import PowerOrders
-from mbref.taylor.lanes import LANES
 from mbref.taylor.layout import TaylorMemory
+from mbref.taylor.simd import WIDTH
 
 EXPAND, POWER, FACTORISE = "expand", "expand_by_power", "factorise"
 NAMES = EXPAND, POWER, FACTORISE, *corrections.POINTERS
-MOST_BLOCKS = 2_000  # products of blocks that LLVM compiles in a second
+MOST_VECTORS = 2_000  # products of vectors that LLVM compiles in a second
 
 
 def put_code(taylor: TaylorMemory) -> Code:
@@ -42,9 +42,9 @@ def code_of(taylor: TaylorMemory, names: Sequence[str]) -> Code:
     if PLAIN:
         raise NoGeneratedCode("without the JIT there is no machine code")
     lanes = taylor.series.terms.shape[1]
-    if (length := lanes * lanes // LANES) > MOST_BLOCKS:
+    if (length := lanes * lanes // WIDTH) > MOST_VECTORS:
         raise NoGeneratedCode(
-            f"an order of its series takes {length} products of blocks, more than {MOST_BLOCKS}"
+            f"an order of its series takes {length} products of vectors, more than {MOST_VECTORS}"
         )
     return code_at(CACHE / "scenes" / f"{_key(taylor, names)}.code", lambda: write_code(taylor, names))
 
@@ -53,8 +53,8 @@ def functions_of(taylor: TaylorMemory) -> tuple[str, ...]:
     """The names of a scene's functions: loads of springs are no sums of products of series, and elimination
     of many rows is left to the kernels' loops."""
     springs = taylor.polynomials.springs.damping.size + taylor.polynomials.torsions.damping.size
-    rank, nr, nz = rank_of(taylor), taylor.solver.row.size, taylor.solver.order.size
-    is_short = (rank * rank + nr * nz) * taylor.series.terms.shape[1] // LANES <= MOST_BLOCKS
+    rank, nr, nz = rank_of(taylor), taylor.solver.pivot_rows.size, taylor.solver.pivot_columns.size
+    is_short = (rank * rank + nr * nz) * taylor.series.terms.shape[1] // WIDTH <= MOST_VECTORS
     by_power = power_orders.serves(taylor)
     names = {EXPAND: not springs, POWER: not springs and by_power, FACTORISE: is_short}
     return *(name for name, served in names.items() if served), *corrections.POINTERS
@@ -62,14 +62,20 @@ def functions_of(taylor: TaylorMemory) -> tuple[str, ...]:
 
 def rank_of(taylor: TaylorMemory) -> int:
     """The rank of the rows where all of the start's freedoms are left."""
-    return taylor.solver.order.size - int(taylor.progress.freedoms)
+    return taylor.solver.pivot_columns.size - int(taylor.progress.freedoms)
 
 
 def _key(taylor: TaylorMemory, names: Sequence[str]) -> str:
     """A digest of all that the code depends on."""
     polynomials, solver = taylor.polynomials, taylor.solver
     digest = hashlib.sha256(f"{names} {rank_of(taylor)} {processor()}".encode())
-    arrays = *polynomials.products, *polynomials.inertia, *polynomials.rows, solver.linear, solver.order
+    arrays = (
+        *polynomials.products,
+        *polynomials.inertia,
+        *polynomials.rows,
+        solver.linear,
+        solver.pivot_columns,
+    )
     every = (*arrays, polynomials.given.driver)
     digest.update(b"".join(part for a in every for part in (str(a.shape).encode(), a.tobytes())))
     return digest.hexdigest()[:32]
@@ -80,7 +86,7 @@ def write_code(taylor: TaylorMemory, names: Sequence[str]) -> str:
     module = ir.Module()
     if EXPAND in names:
         write = Instructions(module, EXPAND, multiplier_orders.POINTERS, counts=orders.COUNTS)
-        is_driven = rank_of(taylor) == taylor.solver.order.size
+        is_driven = rank_of(taylor) == taylor.solver.pivot_columns.size
         (DrivenOrders if is_driven else MultiplierOrders)(taylor, write).put()
         write.end()
     if POWER in names:

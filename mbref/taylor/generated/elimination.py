@@ -11,12 +11,12 @@ from collections.abc import Iterator
 import numpy as np
 from llvmlite import ir
 
-from mbref.taylor.generated.instructions import Blocks, Instructions, constant, levels
-from mbref.taylor.lanes import LANES
+from mbref.taylor.generated.instructions import Instructions, Vectors, constant, levels
 from mbref.taylor.layout import TaylorMemory
+from mbref.taylor.simd import WIDTH
 
 Row = dict[int, ir.Value]
-"""The blocks of a row that are not known to be zero, by their number."""
+"""The vectors of a row that are not known to be zero, by their number."""
 POINTERS = 6, 2  # terms, tableau, particular, null_space, response, last; row, order
 
 
@@ -25,10 +25,10 @@ class Elimination:
 
     def __init__(self, taylor: TaylorMemory, rank: int, write: Instructions):
         self._taylor, self._write = taylor, write
-        self._rank, self._nz = rank, taylor.solver.order.size
-        self._nr, self._lanes = taylor.solver.row.size, taylor.series.terms.shape[1]
-        self._of_variables = range(-(-self._nz // LANES))  # blocks
-        self._of_rows = range(self._nz // LANES, -(-(self._nz + self._nr) // LANES))
+        self._rank, self._nz = rank, taylor.solver.pivot_columns.size
+        self._nr, self._lanes = taylor.solver.pivot_rows.size, taylor.series.terms.shape[1]
+        self._of_variables = range(-(-self._nz // WIDTH))  # vectors
+        self._of_rows = range(self._nz // WIDTH, -(-(self._nz + self._nr) // WIDTH))
         (self._terms, self._tableau, self._particular, self._null_space, self._response, self._last,
          row, order) = write.pointers  # fmt: skip
         self._rows = [write.multiplied(write.number(row, k), self._lanes) for k in range(self._rank)]
@@ -47,22 +47,22 @@ class Elimination:
             self._put_response()
 
     # --- N and T ------------------------------------------------------------------------------------------
-    def _gradient(self, r: int) -> Blocks:
+    def _gradient(self, r: int) -> Vectors:
         """Row r of [G 1]."""
         linear, variables = self._taylor.solver.linear[r], self._write.row(self._terms, 0, self._lanes)
-        blocks = []
-        for block in range(self._lanes // LANES):
-            parts = [constant(linear[block * LANES : (block + 1) * LANES])]
-            for weights, lanes in self._levels(r, block):
-                parts.append(self._write.times(weights, self._write.gathered(variables, lanes)))
-            blocks.append(self._write.total(parts))
-        return blocks
+        vectors = []
+        for vector in range(self._lanes // WIDTH):
+            parts = [constant(linear[vector * WIDTH : (vector + 1) * WIDTH])]
+            for weights, lanes in self._levels(r, vector):
+                parts.append(self._write.times(weights, self._write.gather(variables, lanes)))
+            vectors.append(self._write.total(parts))
+        return vectors
 
-    def _levels(self, r: int, block: int) -> Iterator[tuple[np.ndarray, list[int]]]:
-        """Weights and lanes of the products in a block of row r, of each variable one at a time."""
+    def _levels(self, r: int, vector: int) -> Iterator[tuple[np.ndarray, list[int]]]:
+        """Weights and lanes of the products in a vector of row r, of each variable one at a time."""
         rows, variables = (
             self._taylor.polynomials.rows,
-            range(block * LANES, min((block + 1) * LANES, self._nz)),
+            range(vector * WIDTH, min((vector + 1) * WIDTH, self._nz)),
         )
         places = (np.flatnonzero((rows.row == r) & (rows.lane == variable)) for variable in variables)
         return levels([[(rows.weight[e], int(rows.other[e])) for e in of_one] for of_one in places])
@@ -73,14 +73,16 @@ class Elimination:
         pivot = write.number(self._tableau, self._rows[k], column)
         write.put(pivot, self._last, k)
         factor = write.everywhere(write.inverse(pivot))
-        row = [write.product(factor, block) for block in write.row(self._tableau, self._rows[k], self._lanes)]
+        row = [
+            write.product(factor, vector) for vector in write.row(self._tableau, self._rows[k], self._lanes)
+        ]
         write.store(row, self._tableau, self._rows[k])
         for p in [*range(k + 1, self._rank), *range(k)]:
             entry = write.everywhere(write.number(self._tableau, self._rows[p], column))
             others = write.row(self._tableau, self._rows[p], self._lanes)
             left = [
-                write.difference(other, write.product(entry, block))
-                for other, block in zip(others, row, strict=True)
+                write.difference(other, write.product(entry, vector))
+                for other, vector in zip(others, row, strict=True)
             ]
             write.store(left, self._tableau, self._rows[p])
 
@@ -89,19 +91,19 @@ class Elimination:
         write, free = self._write, self._columns[self._rank :]
         for k, column in enumerate(self._columns[: self._rank]):
             place = write.multiplied(column, self._lanes)
-            for block in self._of_rows:
-                (eliminated,) = write.row(self._tableau, write.plus(self._rows[k], block * LANES), LANES)
-                kept = [float(lane >= self._nz) for lane in range(block * LANES, (block + 1) * LANES)]
+            for vector in self._of_rows:
+                (eliminated,) = write.row(self._tableau, write.plus(self._rows[k], vector * WIDTH), WIDTH)
+                kept = [float(lane >= self._nz) for lane in range(vector * WIDTH, (vector + 1) * WIDTH)]
                 eliminated = write.times(np.array(kept), eliminated)
-                write.store([eliminated], self._particular, write.plus(place, block * LANES))
+                write.store([eliminated], self._particular, write.plus(place, vector * WIDTH))
             for f, other in enumerate(free):
                 entry = write.number(self._tableau, self._rows[k], other)
                 write.put(write.minus(entry), self._null_space, f * self._lanes, column)
-        zero = constant([0.0] * LANES)
+        zero = constant([0.0] * WIDTH)
         for f, column in enumerate(free):
             place = write.multiplied(column, self._lanes)
-            for block in self._of_rows:
-                write.store([zero], self._particular, write.plus(place, block * LANES))
+            for vector in self._of_rows:
+                write.store([zero], self._particular, write.plus(place, vector * WIDTH))
             for g, other in enumerate(free):
                 write.put(ir.DoubleType()(float(f == g)), self._null_space, f * self._lanes, other)
 
@@ -174,31 +176,31 @@ class Elimination:
         """M times a motion, whose variables are in memory, too."""
         mass = self._taylor.polynomials.inertia.mass
         row = {}
-        for block in self._of_variables:
-            lanes = slice(block * LANES, (block + 1) * LANES)
-            diagonal = np.zeros(LANES)
+        for vector in self._of_variables:
+            lanes = slice(vector * WIDTH, (vector + 1) * WIDTH)
+            diagonal = np.zeros(WIDTH)
             own = mass[lanes, lanes].diagonal()
             diagonal[: own.size] = own
-            parts = [self._write.times(diagonal, motion[block])]
+            parts = [self._write.times(diagonal, motion[vector])]
             for i in range(self._nz):
                 coupled = mass[i, lanes].copy()
-                if i // LANES == block:
-                    coupled[i % LANES] = 0.0
+                if i // WIDTH == vector:
+                    coupled[i % WIDTH] = 0.0
                 if coupled.any():
                     number = self._write.number(self._null_space, f * self._lanes + i)
                     parts.append(self._write.times(coupled, self._write.everywhere(number)))
-            row[block] = self._write.total(parts)
+            row[vector] = self._write.total(parts)
         return row
 
     def _inner(self, momentum: Row, motion: Row) -> ir.Value:
-        parts = [self._write.product(momentum[block], motion[block]) for block in self._of_variables]
+        parts = [self._write.product(momentum[vector], motion[vector]) for vector in self._of_variables]
         return self._write.added_up(self._write.total(parts))
 
     def _without_rows(self, momentum: Row, motion: Row, particular: list[Row]) -> Row:
         """A motion in the lanes of variables, and minus its momentum times N in those of multipliers."""
-        blocks = [momentum[block] for block in self._of_variables]
+        vectors = [momentum[vector] for vector in self._of_variables]
         parts = [
-            self._times(self._write.minus(self._write.repeated(blocks, i)), row)
+            self._times(self._write.minus(self._write.repeated(vectors, i)), row)
             for i, row in enumerate(particular)
         ]
         return self._sum(motion, *parts)
@@ -206,30 +208,32 @@ class Elimination:
     def _force(self, i: int, rows: list[Row]) -> Row:
         """The force that is left at a variable by the inertia of all others."""
         mass = self._taylor.polynomials.inertia.mass[i]
-        parts = [self._times(constant([-mass[j]] * LANES), rows[j]) for j in np.flatnonzero(mass[: self._nz])]
+        parts = [self._times(constant([-mass[j]] * WIDTH), rows[j]) for j in np.flatnonzero(mass[: self._nz])]
         return self._sum(self._one(i), *parts)
 
     def _one(self, i: int) -> Row:
         """One in a variable's lane."""
-        return {i // LANES: constant([float(lane == i % LANES) for lane in range(LANES)])}
+        return {i // WIDTH: constant([float(lane == i % WIDTH) for lane in range(WIDTH)])}
 
     # --- rows ---------------------------------------------------------------------------------------------
-    def _row(self, pointer: ir.Value, k: int, blocks: range) -> Row:
+    def _row(self, pointer: ir.Value, k: int, vectors: range) -> Row:
         return {
-            block: self._write.row(pointer, k * self._lanes + block * LANES, LANES)[0] for block in blocks
+            vector: self._write.row(pointer, k * self._lanes + vector * WIDTH, WIDTH)[0] for vector in vectors
         }
 
     def _times(self, factor: ir.Value, row: Row) -> Row:
-        return {block: self._write.product(factor, value) for block, value in row.items()}
+        return {vector: self._write.product(factor, value) for vector, value in row.items()}
 
     def _sum(self, *rows: Row) -> Row:
-        blocks = sorted(set().union(*rows))
-        return {block: self._write.total([row[block] for row in rows if block in row]) for block in blocks}
+        vectors = sorted(set().union(*rows))
+        return {
+            vector: self._write.total([row[vector] for row in rows if vector in row]) for vector in vectors
+        }
 
     def _store(self, row: Row, k: int) -> None:
-        zero = constant([0.0] * LANES)
-        blocks = [row.get(block, zero) for block in range(self._lanes // LANES)]
-        self._write.store(blocks, self._response, k * self._lanes)
+        zero = constant([0.0] * WIDTH)
+        vectors = [row.get(vector, zero) for vector in range(self._lanes // WIDTH)]
+        self._write.store(vectors, self._response, k * self._lanes)
 
 
 class EliminationOfRows(Elimination):

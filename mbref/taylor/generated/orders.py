@@ -1,7 +1,7 @@
 """Machine code of the orders of a scene's series: the loop over them, and the products of series.
 
 The orders are a loop of few instructions, so that code fetched once serves all of them.  The numbers that
-meet in a product are known, so that blocks are shuffled in registers.  A sum may take a product in before it
+meet in a product are known, so that vectors are shuffled in registers.  A sum may take a product in before it
 is rounded, as in the kernels.  ``multiplier_orders``, ``driven_orders`` and ``power_orders`` find each order.
 """
 
@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from llvmlite import ir
 
-from mbref.taylor.generated.instructions import WHOLE, Blocks, Instructions, constant
-from mbref.taylor.lanes import LANES
+from mbref.taylor.generated.instructions import WHOLE, Instructions, Vectors, constant
 from mbref.taylor.layout import Products, TaylorMemory
+from mbref.taylor.simd import WIDTH
 
 Sums = dict[int, ir.Value]
 """Sums of products of a slot, by its place."""
@@ -47,7 +47,7 @@ class Orders(ABC):
         self._taylor, self._write, self._products, self._slots = taylor, write, products, slots
         self._terms, self._response, self._left, self._right = write.pointers[:4]
         self._lanes = taylor.series.terms.shape[1]
-        self._weights = products.weight.reshape(-1, LANES)
+        self._weights = products.weight.reshape(-1, WIDTH)
         (self._last,) = write.counts
 
     @abstractmethod
@@ -56,16 +56,16 @@ class Orders(ABC):
 
     @abstractmethod
     def _order(
-        self, k: ir.Value, row: Blocks, factors: dict[int, Factors], inner: Sums, is_second: bool = False
-    ) -> Blocks:
+        self, k: ir.Value, row: Vectors, factors: dict[int, Factors], inner: Sums, is_second: bool = False
+    ) -> Vectors:
         """Order k + 2 of the variables, from the row of terms before, its factors, and the sums of products
         of earlier ones; the second one of a pair lacks two more."""
 
-    def _factors(self, k: ir.Value, row: Blocks) -> dict[int, Factors]:
+    def _factors(self, k: ir.Value, row: Vectors) -> dict[int, Factors]:
         """The factors of order k by the places of their slots, kept for later orders."""
         return self._factors_of_products(k, row)
 
-    def _repeat(self, row: Blocks) -> None:
+    def _repeat(self, row: Vectors) -> None:
         """All orders but the first, from the row of terms before."""
         write = self._write
         pairs, alone = write.halved(self._last)
@@ -77,7 +77,7 @@ class Orders(ABC):
             0, pairs, row, lambda pair, row: self._pair(write.plus(write.multiplied(pair, 2), first), row)
         )
 
-    def _pair(self, k: ir.Value, row: Blocks) -> Blocks:
+    def _pair(self, k: ir.Value, row: Vectors) -> Vectors:
         """Orders k and k + 1, from the row of terms before."""
         factors, following = self._factors(k, row), self._write.plus(k, 1)
         products, ahead = self._inner(k, factors)
@@ -85,18 +85,18 @@ class Orders(ABC):
         return self._order(following, row, self._factors(following, row), ahead, is_second=True)
 
     # --- products -----------------------------------------------------------------------------------------
-    def _factors_of_products(self, k: ir.Value, row: Blocks) -> dict[int, Factors]:
+    def _factors_of_products(self, k: ir.Value, row: Vectors) -> dict[int, Factors]:
         """Those of ``products``."""
         write, products, known = self._write, self._products, {}
         place, factors = write.multiplied(k, self._slots), {}
-        for c in range(0, products.weight.size, LANES):
-            weight = self._weights[c // LANES]
+        for c in range(0, products.weight.size, WIDTH):
+            weight = self._weights[c // WIDTH]
             one, other = (
-                tuple(np.where(weight, lanes[c : c + LANES], -1).tolist())
+                tuple(np.where(weight, lanes[c : c + WIDTH], -1).tolist())
                 for lanes in (products.left, products.right)
             )
             for lanes in {one, other} - known.keys():
-                known[lanes] = write.gathered(row, lanes)
+                known[lanes] = write.gather(row, lanes)
             factors[c] = Factors(known[one], known[other], write.times(weight, known[one]))
             write.store([factors[c].weighted], self._left, write.plus(place, c))
             write.store([factors[c].right], self._right, write.plus(place, c))
@@ -107,7 +107,7 @@ class Orders(ABC):
         write, products, ahead, slots = self._write, {}, {}, sorted(factors)
         for first in range(0, len(slots), AT_ONCE):
             group = slots[first : first + AT_ONCE]
-            size, zero = len(group), constant([0.0] * LANES)
+            size, zero = len(group), constant([0.0] * WIDTH)
             begun = [zero] * (2 * size) + [factors[c].right for c in group]
             found = write.repeat(1, k, begun, functools.partial(self._multiply, k, group))
             for c, total, other, factor in zip(
@@ -117,27 +117,33 @@ class Orders(ABC):
                 ahead[c] = write.total([other, write.product(factors[c].weighted, factor)])
         return products, ahead
 
-    def _multiply(self, k: ir.Value, group: Sequence[int], i: ir.Value, blocks: Blocks) -> Blocks:
-        """Add the products with factor i to the sums of both orders; the last blocks are the other factors of
-        the order ahead."""
+    def _multiply(self, k: ir.Value, group: Sequence[int], i: ir.Value, vectors: Vectors) -> Vectors:
+        """Add the products with factor i to the sums of both orders.
+
+        The last vectors are the other factors of the order ahead.
+        """
         write, size = self._write, len(group)
         one, other = write.multiplied(i, self._slots), write.multiplied(write.less(k, i), self._slots)
         sums, ahead, factors = [], [], []
         for n, c in enumerate(group):
-            left, right = write.block(self._left, one, c), write.block(self._right, other, c)
-            sums.append(write.total([blocks[n], write.product(left, right)]))
-            ahead.append(write.total([blocks[size + n], write.product(left, blocks[2 * size + n])]))
+            left, right = write.vector(self._left, one, c), write.vector(self._right, other, c)
+            sums.append(write.total([vectors[n], write.product(left, right)]))
+            ahead.append(write.total([vectors[size + n], write.product(left, vectors[2 * size + n])]))
             factors.append(right)
         return [*sums, *ahead, *factors]
 
 
 def terms_of_rows(taylor: TaylorMemory) -> list[list[Term]]:
     """The products of each row."""
-    products, nz, nr = taylor.polynomials.products, taylor.solver.order.size, taylor.solver.row.size
+    products, nz, nr = (
+        taylor.polynomials.products,
+        taylor.solver.pivot_columns.size,
+        taylor.solver.pivot_rows.size,
+    )
     terms: list[list[Term]] = [[] for _ in range(nr)]
-    for block, (start, end) in enumerate(zip(products.start[:-1], products.start[1:], strict=True)):
+    for vector, (start, end) in enumerate(zip(products.start[:-1], products.start[1:], strict=True)):
         for c in range(start, end):
-            row = block * LANES + (c - start) % LANES - nz
+            row = vector * WIDTH + (c - start) % WIDTH - nz
             if products.weight[c] and 0 <= row < nr:
                 terms[row].append((int(products.left[c]), int(products.right[c]), -products.weight[c]))
     return terms

@@ -18,40 +18,44 @@ from __future__ import annotations
 import numpy as np
 from llvmlite import ir
 
-from mbref.taylor.generated.instructions import WHOLE, Blocks, Instructions, constant, levels
+from mbref.taylor.generated.instructions import WHOLE, Instructions, Vectors, constant, levels
 from mbref.taylor.generated.orders import Factors, Orders, Sums, terms_of_rows
-from mbref.taylor.lanes import LANES, filled
 from mbref.taylor.layout import Inertia, Products, TaylorMemory
 from mbref.taylor.polynomials import products_of_lanes
+from mbref.taylor.simd import WIDTH, padded_size
 
 POINTERS = 5  # terms, response, left, right, sums
-ZERO, HALF = constant([0.0] * LANES), constant([0.5] * LANES)
+ZERO, HALF = constant([0.0] * WIDTH), constant([0.5] * WIDTH)
 
 
 def serves(taylor: TaylorMemory) -> bool:
     """Whether a scene has one freedom and no drivers, and power takes no more products than multipliers."""
     if taylor.progress.freedoms != 1 or taylor.polynomials.given.driver.size:
         return False
-    products, nz, nr = taylor.polynomials.products, taylor.solver.order.size, taylor.solver.row.size
-    blocks = np.split(products.weight, products.start[1:-1])
-    counts = np.concatenate([np.count_nonzero(block.reshape(-1, LANES), axis=0) for block in blocks])
-    of_rows = np.maximum.reduceat(counts[nz : nz + nr], np.arange(0, nr, LANES)).sum() * LANES
-    return bool(of_rows + filled(nz) <= products.weight.size)
+    products, nz, nr = (
+        taylor.polynomials.products,
+        taylor.solver.pivot_columns.size,
+        taylor.solver.pivot_rows.size,
+    )
+    vectors = np.split(products.weight, products.start[1:-1])
+    counts = np.concatenate([np.count_nonzero(vector.reshape(-1, WIDTH), axis=0) for vector in vectors])
+    of_rows = np.maximum.reduceat(counts[nz : nz + nr], np.arange(0, nr, WIDTH)).sum() * WIDTH
+    return bool(of_rows + padded_size(nz) <= products.weight.size)
 
 
 def products_of_rows(taylor: TaylorMemory) -> Products:
     """Minus the products of rows, a row in each lane."""
-    terms, nr = terms_of_rows(taylor), taylor.solver.row.size
-    return products_of_lanes([*terms, *[[]] * (filled(nr) - nr)])
+    terms, nr = terms_of_rows(taylor), taylor.solver.pivot_rows.size
+    return products_of_lanes([*terms, *[[]] * (padded_size(nr) - nr)])
 
 
 def moments_of(inertia: Inertia, nz: int) -> np.ndarray:
     """The matrix (nz, nz) of the forces that are linear in the variables."""
     matrix = np.zeros((nz, nz))
-    for block in range(filled(nz) // LANES):
-        for c in range(inertia.start[block], inertia.start[block + 1]):
+    for vector in range(padded_size(nz) // WIDTH):
+        for c in range(inertia.start[vector], inertia.start[vector + 1]):
             if inertia.weight[c]:
-                matrix[block * LANES + c % LANES, inertia.source[c]] += inertia.weight[c]
+                matrix[vector * WIDTH + c % WIDTH, inertia.source[c]] += inertia.weight[c]
     return matrix
 
 
@@ -62,16 +66,16 @@ class PowerOrders(Orders):
     """
 
     def __init__(self, taylor: TaylorMemory, write: Instructions):
-        self._nr, self._nz = taylor.solver.row.size, taylor.solver.order.size
+        self._nr, self._nz = taylor.solver.pivot_rows.size, taylor.solver.pivot_columns.size
         products = products_of_rows(taylor)
-        self._power = range(products.weight.size, products.weight.size + filled(self._nz), LANES)
+        self._power = range(products.weight.size, products.weight.size + padded_size(self._nz), WIDTH)
         super().__init__(taylor, write, products, self._power.stop)
         self._sums = write.pointers[4]
-        self._blocks = range(filled(self._nz) // LANES)
+        self._vectors = range(padded_size(self._nz) // WIDTH)
         inertia = taylor.polynomials.inertia
         self._mass, self._moments = inertia.mass[:, : self._nz], moments_of(inertia, self._nz)
         self._has_moments = bool(self._moments.any())
-        self._force = [constant(inertia.force[b * LANES : (b + 1) * LANES]) for b in self._blocks]
+        self._force = [constant(inertia.force[b * WIDTH : (b + 1) * WIDTH]) for b in self._vectors]
 
     def put(self) -> None:
         """Write all orders, and v · Q / (v · M v), the rate at which the speed grows, into the sums."""
@@ -93,15 +97,15 @@ class PowerOrders(Orders):
         write.store([write.product(power, inverse)], self._sums, 0)
 
     def _order(
-        self, k: ir.Value, row: Blocks, factors: dict[int, Factors], inner: Sums, is_second: bool = False
-    ) -> Blocks:
+        self, k: ir.Value, row: Vectors, factors: dict[int, Factors], inner: Sums, is_second: bool = False
+    ) -> Vectors:
         """Order k + 2: of the power v_k · w_0 is not yet in the sums, nor v_1 · w_{k-1} of a second order."""
-        write, one = self._write, real_block(self._write, k, 1)
+        write, one = self._write, real_vector(self._write, k, 1)
         newest = self._scaled(one, self._lost_force)
         known = [write.minus(inner[c]) for c in self._power if c in inner]
         known += self._power_of_moments(self._velocity_moments, k)
         if is_second:
-            both = write.product(one, real_block(write, k, 0))
+            both = write.product(one, real_vector(write, k, 0))
             newest = self._plus(newest, self._scaled(both, self._inertia_of_rate))
             known += self._power_of_moments(self._rate_moments, write.less(k, WHOLE(1)))
         lost = (write.minus(write.product(n, z)) for n, z in zip(newest, row, strict=True))
@@ -112,11 +116,11 @@ class PowerOrders(Orders):
         return self._put(k, turned, power, self._inverse_of_growth(k))
 
     # --- power --------------------------------------------------------------------------------------------
-    def _factors(self, k: ir.Value, row: Blocks) -> dict[int, Factors]:
+    def _factors(self, k: ir.Value, row: Vectors) -> dict[int, Factors]:
         """Those of rows, and v_k and w_{k-1}."""
         write, before = self._write, self._write.less(k, WHOLE(1))
-        factors, one = self._factors_of_products(k, row), real_block(self._write, k, 1)
-        force = self._scaled(write.product(one, real_block(write, k, 0)), self._times(self._mass, row))
+        factors, one = self._factors_of_products(k, row), real_vector(self._write, k, 1)
+        force = self._scaled(write.product(one, real_vector(write, k, 0)), self._times(self._mass, row))
         if self._has_moments:
             force = list(map(write.difference, force, self._times(self._moments, self._row(before))))
         for c, velocity, lost in zip(self._power, self._scaled(one, row), force, strict=True):
@@ -125,7 +129,7 @@ class PowerOrders(Orders):
             factors[c] = Factors(velocity, ZERO, velocity)
         return factors
 
-    def _power_of_moments(self, along: Blocks, k: ir.Value) -> Blocks:
+    def _power_of_moments(self, along: Vectors, k: ir.Value) -> Vectors:
         """The power of the moments of order k along the velocity or its rate, times their matrix."""
         if not self._has_moments:
             return []
@@ -134,46 +138,46 @@ class PowerOrders(Orders):
     def _inverse_of_growth(self, k: ir.Value) -> ir.Value:
         """1 / ((k + 1) (k + 2))."""
         write = self._write
-        growth = write.product(real_block(write, k, 1), real_block(write, k, 2))
+        growth = write.product(real_vector(write, k, 1), real_vector(write, k, 2))
         return write.everywhere(write.inverse(write.first(growth)))
 
     # --- rows ---------------------------------------------------------------------------------------------
-    def _turning_by(self, velocity: Blocks) -> list[Blocks]:
-        """B: the response to the rate of G, a row of blocks for each variable."""
+    def _turning_by(self, velocity: Vectors) -> list[Vectors]:
+        """B: the response to the rate of G, a row of vectors for each variable."""
         write, rows = self._write, self._taylor.polynomials.rows
         numbers = [write.repeated(velocity, i) for i in range(self._nz)]
         turning = []
         for i in range(self._nz):
             entries = np.flatnonzero(rows.lane == i)
-            rates = [write.times(np.full(LANES, -rows.weight[e]), numbers[rows.other[e]]) for e in entries]
+            rates = [write.times(np.full(WIDTH, -rows.weight[e]), numbers[rows.other[e]]) for e in entries]
             turning.append(
                 [
                     self._combined(rates, [self._of_row(int(rows.row[e]), b) for e in entries])
-                    for b in self._blocks
+                    for b in self._vectors
                 ]
             )
         return turning
 
-    def _turned(self, row: Blocks) -> Blocks:
+    def _turned(self, row: Vectors) -> Vectors:
         """B times a row of terms."""
         numbers = [self._write.repeated(row, i) for i in range(self._nz)]
-        return [self._combined(numbers, [blocks[b] for blocks in self._turning]) for b in self._blocks]
+        return [self._combined(numbers, [vectors[b] for vectors in self._turning]) for b in self._vectors]
 
-    def _response_to(self, products: Sums) -> Blocks:
+    def _response_to(self, products: Sums) -> Vectors:
         """The response to minus sums of products of rows."""
         write, start, sums = self._write, self._products.start, []
         for b in range(start.size - 1):
-            parts = [products[c] for c in range(start[b], start[b + 1], LANES)]
+            parts = [products[c] for c in range(start[b], start[b + 1], WIDTH)]
             sums.append(write.total(parts))
         write.store(sums, self._sums, 0)
         numbers = [write.everywhere(write.number(self._sums, e)) for e in range(self._nr)]
-        return [self._combined(numbers, [self._of_row(e, b) for e in range(self._nr)]) for b in self._blocks]
+        return [self._combined(numbers, [self._of_row(e, b) for e in range(self._nr)]) for b in self._vectors]
 
     def _of_row(self, e: int, b: int) -> ir.Value:
-        """A block of the response to row e."""
-        return self._write.block(self._response, (self._nz + e) * self._lanes + b * LANES)
+        """A vector of the response to row e."""
+        return self._write.vector(self._response, (self._nz + e) * self._lanes + b * WIDTH)
 
-    def _put(self, k: ir.Value, row: Blocks, power: ir.Value, factor: ir.Value) -> Blocks:
+    def _put(self, k: ir.Value, row: Vectors, power: ir.Value, factor: ir.Value) -> Vectors:
         """Order k + 2 with the share of the motion in a power, times a factor, stored."""
         write = self._write
         moved = (write.product(power, share) for share in self._scaled(factor, self._share))
@@ -181,37 +185,37 @@ class PowerOrders(Orders):
         write.store(row, self._terms, write.multiplied(write.plus(k, 2), self._lanes))
         return row
 
-    # --- blocks of variables ------------------------------------------------------------------------------
-    def _row(self, k: ir.Value) -> Blocks:
+    # --- vectors of variables ------------------------------------------------------------------------------
+    def _row(self, k: ir.Value) -> Vectors:
         """Order k of the variables."""
         place = self._write.multiplied(k, self._lanes)
-        return self._write.row(self._terms, place, filled(self._nz))
+        return self._write.row(self._terms, place, padded_size(self._nz))
 
-    def _times(self, matrix: np.ndarray, row: Blocks) -> Blocks:
+    def _times(self, matrix: np.ndarray, row: Vectors) -> Vectors:
         """A matrix (nz, nz) of numbers known times a row."""
-        write, blocks = self._write, []
-        for b in self._blocks:
-            lines = matrix[b * LANES : (b + 1) * LANES]
+        write, vectors = self._write, []
+        for b in self._vectors:
+            lines = matrix[b * WIDTH : (b + 1) * WIDTH]
             terms = [[(line[i], int(i)) for i in np.flatnonzero(line)] for line in lines]
-            parts = [write.times(weights, write.gathered(row, lanes)) for weights, lanes in levels(terms)]
-            blocks.append(write.total(parts))
-        return blocks
+            parts = [write.times(weights, write.gather(row, lanes)) for weights, lanes in levels(terms)]
+            vectors.append(write.total(parts))
+        return vectors
 
-    def _scaled(self, factor: ir.Value, row: Blocks) -> Blocks:
-        return [self._write.product(factor, block) for block in row]
+    def _scaled(self, factor: ir.Value, row: Vectors) -> Vectors:
+        return [self._write.product(factor, vector) for vector in row]
 
-    def _plus(self, one: Blocks, other: Blocks) -> Blocks:
+    def _plus(self, one: Vectors, other: Vectors) -> Vectors:
         return [self._write.total(pair) for pair in zip(one, other, strict=True)]
 
-    def _combined(self, factors: Blocks, blocks: Blocks) -> ir.Value:
-        """The sum of the products of factors and blocks."""
-        return self._write.total(list(map(self._write.product, factors, blocks)))
+    def _combined(self, factors: Vectors, vectors: Vectors) -> ir.Value:
+        """The sum of the products of factors and vectors."""
+        return self._write.total(list(map(self._write.product, factors, vectors)))
 
-    def _inner_product(self, one: Blocks, other: Blocks) -> ir.Value:
-        """A block of the inner product of two rows."""
+    def _inner_product(self, one: Vectors, other: Vectors) -> ir.Value:
+        """A vector of the inner product of two rows."""
         return self._write.summed(self._combined(one, other))
 
 
-def real_block(write: Instructions, k: ir.Value, more: int) -> ir.Value:
-    """A block of the number k + more."""
+def real_vector(write: Instructions, k: ir.Value, more: int) -> ir.Value:
+    """A vector of the number k + more."""
     return write.everywhere(write.real(write.plus(k, more)))

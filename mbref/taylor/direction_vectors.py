@@ -11,12 +11,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mbref.taylor.layout import Readings
+from mbref.taylor.layout import PoseMaps
 
 NO_DRIVER = -1
 
 
-class Images:
+class DirectionVectors:
     """All variables and where they come from."""
 
     def __init__(self, length: float):
@@ -40,15 +40,15 @@ class Images:
         self._across += list(np.zeros((count, 12)) if across is None else across)
         return tuple(range(first, first + count))
 
-    def of(self, wanted: Sequence[int]) -> Readings:
+    def pose_maps(self, wanted: Sequence[int]) -> PoseMaps:
         """The forms of the variables wanted, by which kernels read their values from states."""
         chosen = list(wanted)
         body, driver = (np.array(each, np.int64)[chosen] for each in (self._bodies, self._turned_by))
         forms = (np.array(each, float).reshape(-1, 12)[chosen] for each in (self._along, self._across))
         unit = np.repeat([1.0 / self.length, 1.0], [3, 9])
-        return Readings(body, driver, *(each * unit for each in forms))
+        return PoseMaps(body, driver, *(each * unit for each in forms))
 
 
-def image_forms(axes: np.ndarray, local: np.ndarray) -> np.ndarray:
+def direction_forms(axes: np.ndarray, local: np.ndarray) -> np.ndarray:
     """Forms (k, 12) of the components along axes at rest (k, 3) of a direction (3,) in a body's own frame."""
     return np.array([np.concatenate([np.zeros(3), np.outer(axis, local).ravel()]) for axis in axes])

@@ -7,22 +7,22 @@ from mbref.linear_algebra.vectors import copy
 
 
 @kernel
-def take_snapshot(run, snapshot):
+def save_state(run, saved):
     """Keep the state of a run, its time, the samples taken and the singular positions passed."""
-    clock, instant = run.loop.clock, snapshot.instant
+    clock, instant = run.loop.clock, saved.instant
     instant.time, instant.sample = clock.time, clock.sample
     instant.crossings = run.equations.system.counts.crossings
-    copy(run.state.coordinates, snapshot.coordinates)
-    copy(run.state.velocities, snapshot.velocities)
-    copy(run.equations.angles, snapshot.angles)
+    copy(run.state.coordinates, saved.coordinates)
+    copy(run.state.velocities, saved.velocities)
+    copy(run.equations.angles, saved.angles)
 
 
 @kernel
-def return_to_snapshot(snapshot, run):
+def restore_state(saved, run):
     """Bring a run back to the state that was kept."""
-    clock, instant = run.loop.clock, snapshot.instant
+    clock, instant = run.loop.clock, saved.instant
     clock.time, clock.sample = instant.time, instant.sample
     run.equations.system.counts.crossings = instant.crossings
-    copy(snapshot.coordinates, run.state.coordinates)
-    copy(snapshot.velocities, run.state.velocities)
-    copy(snapshot.angles, run.equations.angles)
+    copy(saved.coordinates, run.state.coordinates)
+    copy(saved.velocities, run.state.velocities)
+    copy(saved.angles, run.equations.angles)

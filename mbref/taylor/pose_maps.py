@@ -12,16 +12,16 @@ from mbref.kernels.compilation import kernel
 @kernel
 def read_variables(t, memory):
     """Values and rates of all variables at time t from the state in memory: first terms of the series."""
-    run, readings, terms = memory.run, memory.readings, memory.series.terms
+    run, pose_maps, terms = memory.run, memory.pose_maps, memory.series.terms
     frames = run.equations.frames
     set_poses(run.state.coordinates, frames)
     set_velocities(run.state.velocities, frames)
     terms[0], terms[1] = 0.0, 0.0
-    for i in range(readings.body.shape[0]):
-        body, driver = readings.body[i], readings.driver[i]
-        x, x_rate = of_body(i, readings.along, body, frames)
+    for i in range(pose_maps.body.shape[0]):
+        body, driver = pose_maps.body[i], pose_maps.driver[i]
+        x, x_rate = value_and_rate(i, pose_maps.along, body, frames)
         if driver >= 0:
-            y, y_rate = of_body(i, readings.across, body, frames)
+            y, y_rate = value_and_rate(i, pose_maps.across, body, frames)
             angle, speed, _ = driver_value(run.equations.scene.drivers, driver, t)
             c, s = cos(angle), sin(angle)
             turned = s * x + c * y
@@ -30,7 +30,7 @@ def read_variables(t, memory):
 
 
 @kernel
-def of_body(i, forms, body, frames):
+def value_and_rate(i, forms, body, frames):
     """Value and rate of the linear form in row i (12,) of a body's pose: position, rotation matrix R by rows.
 
     A row a of R turns by a × ω', ω' in the body's frame.
