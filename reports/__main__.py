@@ -17,13 +17,13 @@ from mbref.scene import SceneError
 from reports.blocks import Block
 from reports.runs import Run, by_scene
 
-NEEDS = ("matplotlib", "jinja2")
+NEEDS = {"matplotlib": "matplotlib", "jinja2": "jinja2", "resvg_py": "resvg-py"}  # package by module
 PAPER, STABILITY = "paper", "stability"  # the sections whose runs are their own
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Write the report; returns 0, or 2 when something is missing, or 130 when interrupted."""
-    if missing := [package for package in NEEDS if find_spec(package) is None]:
+    if missing := [package for module, package in NEEDS.items() if find_spec(module) is None]:
         _notice(f"the report needs {' and '.join(missing)}: pip install 'mbref[report]'")
         return 2
     from reports.sections import NAMES
@@ -52,11 +52,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _picture(path: Path) -> int:
     """Write the README's moving picture."""
-    from reports import animation
+    from reports import mechanisms
 
     found = passage()
-    panels = [animation.panel(Run(record)) for record in found.records]
-    path.write_text(animation.animated(found.scene, found.exact, panels, found.singular))
+    runs = [Run(record) for record in found.records]
+    path.write_text(mechanisms.compared(found.scene, found.exact, runs, found.singular))
     _notice(f"written: {path}")
     return 0
 

@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
+    from matplotlib.figure import Figure as PlotFigure
+
+    Drawing = PlotFigure | str  # a figure of matplotlib, or a mechanism as SVG
 
 
 @dataclass(frozen=True)
@@ -65,23 +67,21 @@ class Linked(str):
 
 @dataclass(frozen=True)
 class Opening:
-    """The first screen: a headline, sentences by what they answer, and a mechanism that moves (SVG and style
-    sheet, empty without one)."""
+    """The first screen: a headline, sentences by what they answer, and a mechanism that moves (SVG, or
+    empty)."""
 
     headline: str
     sentences: Mapping[str, str]
     svg: str
-    css: str
     caption: str
 
 
 @dataclass(frozen=True)
 class Moving:
-    """Mechanisms that move beside one another: title and SVG of each, and their style sheet."""
+    """Mechanisms that move side by side: title and SVG of each."""
 
     caption: str
     panels: Sequence[tuple[str, str]]
-    css: str
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from crosscheck.engine import engine_names
+from mbref.drawing import png as mbref_png
 from mbref.drawing.svg import COLOURS, GREY, INK
 from reports.runs import Curve
 
@@ -75,8 +76,10 @@ def legend_below(figure: Figure, axes: Axes, columns: int = 3) -> None:
             figure.legend(handles, labels, loc="outside lower left", ncols=columns, handlelength=3.2)
 
 
-def svg(figure: Figure, name: str) -> str:
-    """The picture as an SVG element; ``name`` makes its ids unique in a page."""
+def svg(figure: Figure | str, name: str) -> str:
+    """Return the picture as an SVG element; ``name`` makes its ids unique in a page."""
+    if isinstance(figure, str):
+        return figure
     out = io.StringIO()
     with matplotlib.rc_context({**STYLE, "svg.hashsalt": name, "svg.id": name}):
         figure.savefig(out, format="svg", metadata={"Date": None, "Creator": None})
@@ -84,8 +87,10 @@ def svg(figure: Figure, name: str) -> str:
     return text[text.index("<svg") :]
 
 
-def png(figure: Figure) -> bytes:
-    """The picture as PNG."""
+def png(figure: Figure | str) -> bytes:
+    """Return the picture as PNG."""
+    if isinstance(figure, str):
+        return mbref_png.png(figure)
     out = io.BytesIO()
     with matplotlib.rc_context(STYLE):
         figure.savefig(out, format="png", dpi=110, metadata={"Software": None})

@@ -62,7 +62,6 @@ def html(blocks: Sequence[Block], drawn: dict[str, str]) -> str:
         chapters=[b.text for b in blocks if isinstance(b, Heading) and b.level == 2],
         blocks=[(type(b).__name__.lower(), b) for b in blocks],
         has_opening=any(isinstance(b, Opening) for b in blocks),
-        motions=Markup("".join(b.css for b in blocks if isinstance(b, Opening | Moving))),
         drawn={name: Markup(text) for name, text in drawn.items()},
     )
 

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from mbref.drawing import svg
-from mbref.drawing.shapes import anchors, attached, attack
+from mbref.drawing.shapes import attached, attack
 from mbref.drawing.svg import GREY, INK, PAPER
+from mbref.drawing.timeline import Timeline
 from mbref.drawing.view import Page
 from mbref.scene import GROUND, Driver, Joint, Load, Scene
 from mbref.trajectory import Trajectory
@@ -17,17 +18,16 @@ from mbref.trajectory import Trajectory
 ACTION = "#b3261e"  # of loads and drivers
 STUB = 20.0  # px, half of an axis drawn at a joint
 ARROW = 52.0  # px
-LETTER = 6.0  # px
 FACING = 0.7  # cosine to the line of sight above which an axis is seen as a point
 
 
 class Stage(NamedTuple):
-    """A scene, its motion, the page it is drawn on, and the time (s) that one round of the motion takes."""
+    """Scene, motion, page and timeline of a drawing; without a timeline the first sample is drawn."""
 
     scene: Scene
     motion: Trajectory
     page: Page
-    seconds: float
+    timeline: Timeline | None
 
     def place(self, body: str, point: tuple[float, float, float]) -> np.ndarray:
         """Pixels (k, 2) of a point (world, t = 0) of a body."""
@@ -56,7 +56,9 @@ def ground_mark(stage: Stage, joint: Joint) -> Iterator[str]:
     side = joint.bodies.index(GROUND)
     point = joint.anchor_pair[side]
     if joint.facts.free_translations == 1 and joint.directions:
-        yield svg.line(_guide(stage, joint, side), f'stroke="{GREY}" stroke-dasharray="6 5" fill="none"', 0.0)
+        yield svg.line(
+            _guide(stage, joint, side), f'stroke="{GREY}" stroke-dasharray="6 5" fill="none"', None
+        )
         return
     x, y = stage.place(GROUND, point)[0]
     hatch = "".join(f"M{x + dx:.1f} {y + 16:.1f}l-5 6" for dx in (-9, -3, 3, 9))
@@ -79,7 +81,7 @@ def joint_mark(stage: Stage, joint: Joint) -> Iterator[str]:
     if joint.type == "distance":
         ends = np.stack([stage.place(names[0], first), stage.place(names[1], second)], axis=1)
         yield svg.line(
-            ends, f'stroke="{INK}" stroke-width="2" stroke-dasharray="9 3 2 3" fill="none"', stage.seconds
+            ends, f'stroke="{INK}" stroke-width="2" stroke-dasharray="9 3 2 3" fill="none"', stage.timeline
         )
     sliding = joint.facts.free_translations == 1 and bool(joint.directions)
     for k, axis in enumerate(map(_unit, joint.directions)):
@@ -91,19 +93,19 @@ def joint_mark(stage: Stage, joint: Joint) -> Iterator[str]:
             yield svg.line(
                 ends,
                 f'stroke="{INK}" stroke-width="1.2" stroke-dasharray="7 2 1 2" fill="none"',
-                stage.seconds,
+                stage.timeline,
             )
     if joint.type == "planar":
         yield from _plane(stage, names[0], first, _unit(joint.directions[0]))
-    yield svg.follow(stage.place(names[1], second), SIGNS[joint.type](), stage.seconds)
+    yield svg.follow(stage.place(names[1], second), SIGNS[joint.type](), stage.timeline)
 
 
 def _sleeve(stage: Stage, body: str, point: tuple[float, float, float], axis: np.ndarray) -> Iterator[str]:
     ends = _along(stage, body, point, axis, 15.0)
     butt = 'fill="none" stroke-linecap="butt"'
-    yield svg.line(ends, f'{butt} stroke="{INK}" stroke-width="15"', stage.seconds)
+    yield svg.line(ends, f'{butt} stroke="{INK}" stroke-width="15"', stage.timeline)
     inner = ends + (ends.mean(axis=1, keepdims=True) - ends) * 0.11
-    yield svg.line(inner, f'{butt} stroke="{PAPER}" stroke-width="11.6"', stage.seconds)
+    yield svg.line(inner, f'{butt} stroke="{PAPER}" stroke-width="11.6"', stage.timeline)
 
 
 def _plane(stage: Stage, body: str, point: tuple[float, float, float], normal: np.ndarray) -> Iterator[str]:
@@ -114,7 +116,7 @@ def _plane(stage: Stage, body: str, point: tuple[float, float, float], normal: n
         [across + other, across - other, -across - other, other - across]
     )
     look = f'stroke="{GREY}" fill="{GREY}" fill-opacity="0.15"'
-    yield svg.line(stage.points(body, corners), look, stage.seconds, closed=True)
+    yield svg.line(stage.points(body, corners), look, stage.timeline, closed=True)
 
 
 def _ball(fill: str, radius: float = 5.5) -> str:
@@ -143,7 +145,7 @@ def driver_mark(stage: Stage, driver: Driver) -> str:
         sign = _turning(stage, axis * sense, 15.0)
     else:
         sign = _arrow_from_origin(stage, axis * sense)
-    return svg.follow(stage.place(joint.bodies[1], point), sign, stage.seconds)
+    return svg.follow(stage.place(joint.bodies[1], point), sign, stage.timeline)
 
 
 def load_mark(stage: Stage, load: Load) -> str:
@@ -152,18 +154,18 @@ def load_mark(stage: Stage, load: Load) -> str:
         return svg.follow(
             stage.place(load.body, load.point),
             _arrow_from_origin(stage, _unit_or_zero(load.force)),
-            stage.seconds,
+            stage.timeline,
         )
     if load.type == "moment":
         body = stage.scene.body[stage.scene.body_index(load.body)]
         sign = _turning(stage, _unit_or_zero(load.moment), 20.0)
-        return svg.follow(stage.place(load.body, body.position), sign, stage.seconds)
+        return svg.follow(stage.place(load.body, body.position), sign, stage.timeline)
     if load.type == "spring":
         first, second = (stage.place(*end) for end in attack(load))
         look = f'stroke="{ACTION}" stroke-width="1.6" fill="none"'
-        return svg.line(_zigzag(first, second), look, stage.seconds)
+        return svg.line(_zigzag(first, second), look, stage.timeline)
     joint = stage.scene.joint_named(load.joint)
-    return svg.follow(stage.place(joint.bodies[1], joint.anchor_pair[1]), _spiral(), stage.seconds)
+    return svg.follow(stage.place(joint.bodies[1], joint.anchor_pair[1]), _spiral(), stage.timeline)
 
 
 def _unit_or_zero(vector: tuple[float, ...]) -> np.ndarray:
@@ -202,20 +204,3 @@ def _spiral() -> str:
         f"{x:.1f},{y:.1f}" for x, y in zip(radius * np.cos(angle), radius * np.sin(angle), strict=True)
     )
     return f'<polyline points="{points}" stroke="{ACTION}" stroke-width="1.5" fill="none"/>'
-
-
-def joint_names(stage: Stage) -> Iterator[str]:
-    """The joints' names, up and to the left of their second bodies' anchors; joints that stay at one place
-    are named together."""
-    places = {joint.name: stage.place(*anchors(joint)[1]) for joint in stage.scene.joint}
-    while places:
-        place = next(iter(places.values()))
-        near = [name for name, other in places.items() if other is place or _stay_together(place, other)]
-        words = svg.text(-9, -10, ", ".join(near), f'fill="{INK}" font-weight="600"', "end")
-        yield svg.follow(place, words, stage.seconds)
-        places = {name: other for name, other in places.items() if name not in near}
-
-
-def _stay_together(place: np.ndarray, other: np.ndarray) -> bool:
-    """Whether two paths (k, 2), px, are nowhere as far apart as a letter is wide."""
-    return float(np.abs(place - other).max()) < LETTER

@@ -1,212 +1,274 @@
-"""The picture of a scene, still or moving: bodies, joints, ground and loads, and axes with a length."""
+"""Pictures of a mechanism as SVG, still or moving: panels of motions drawn over one another."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mbref.drawing import svg
-from mbref.drawing.marks import Stage, driver_mark, ground_mark, joint_mark, joint_names, load_mark
+from mbref.drawing.labels import names
+from mbref.drawing.marks import Stage, driver_mark, ground_mark, joint_mark, load_mark
 from mbref.drawing.shapes import Shape, anchors, at_rest, attack, moved, shapes
 from mbref.drawing.svg import COLOURS, GREY, INK
+from mbref.drawing.timeline import Timeline
 from mbref.drawing.view import Page, View, view_of
 from mbref.scene import GROUND, Scene
 from mbref.trajectory import Trajectory
 
-WIDTH, TALLEST, MARGIN, FOOT = 720.0, 520.0, 64.0, 30.0  # px
-PANEL, NARROW, HEAD, LARGE, COLUMNS = 360.0, 44.0, 34.0, 20, 2  # of a picture side by side, px; panels a row
-FRAMES = 120  # of a moving picture at most
-SHORTEST, LONGEST = 4.0, 12.0  # s of one round of a moving picture
+FOOT, CLOCK = 30.0, 42.0  # px, heights of the rows for axes and scale, and for the line of time
+LEADING = 1.5  # height of a line of a title, relative to its letters
 
 
-def still(scene: Scene, view: View | None = None, width: float = WIDTH) -> str:
-    """The scene at t = 0 as SVG, across its plane unless a view is given."""
-    return _picture(scene, at_rest(scene), view, width, 0.0)
+def signs(stage: Stage) -> Iterator[str]:
+    """Yield the signs of loads, joints and drivers."""
+    yield from (load_mark(stage, load) for load in stage.scene.load)
+    for joint in stage.scene.joint:
+        yield from joint_mark(stage, joint)
+    yield from (driver_mark(stage, driver) for driver in stage.scene.driver)
 
 
-def moving(scene: Scene, motion: Trajectory, view: View | None = None, width: float = WIDTH) -> str:
-    """The motion as SVG that moves by itself, in real time where one round of it takes 4 to 12 s.
+class Look(NamedTuple):
+    """Look of bodies: one colour, or each body's own; thickness of bars, px; opacity from 0 to 1."""
 
-    Samples are shown as they are, at most 120 of them, evenly in time where the trajectory is.
-    Raises ValueError where the trajectory has no sample.
+    colour: str = ""
+    thickness: float = 6.0
+    opacity: float = 1.0
+
+
+class Layer(NamedTuple):
+    """Bodies of a motion in a look, and what else is drawn with them, such as ``signs`` and ``names``."""
+
+    motion: Trajectory
+    look: Look = Look()
+    more: Sequence[Callable[[Stage], Iterable[str]]] = (signs,)
+
+
+class Panel(NamedTuple):
+    """Layers over one another, below the lines of a title, and paths (n, 3) in space, m, drawn in grey."""
+
+    layers: Sequence[Layer]
+    title: Sequence[str] = ()
+    paths: Sequence[np.ndarray] = ()
+
+
+class Form(NamedTuple):
+    """Sizes of a picture, px: width, margin and greatest height of a panel, letters; and panels in a row."""
+
+    width: float = 720.0
+    margin: float = 64.0
+    tallest: float = 520.0
+    letters: int = 12
+    columns: int = 1
+
+
+BESIDE = Form(width=360.0, margin=44.0, letters=20, columns=2)  # of motions side by side
+
+
+def still(scene: Scene, view: View | None = None, width: float = Form().width) -> str:
+    """Return the scene at t = 0 as SVG, seen across its plane unless a view is given."""
+    panel = Panel([Layer(at_rest(scene), more=(signs, names))])
+    return picture(scene, [panel], _title(scene), view=view, form=Form(width))
+
+
+def moving(scene: Scene, motion: Trajectory, view: View | None = None, width: float = Form().width) -> str:
+    """Return the motion as SVG that moves by itself, in real time if one round of it takes 4 to 12 s.
+
+    It shows every n-th sample, at most 120 of them.  Raises ValueError if the trajectory has no sample.
     """
-    _check(motion)
-    return _picture(scene, thinned(motion), view, width, _round(motion.times))
+    _check([motion])
+    panel, timeline = Panel([Layer(motion, more=(signs, names))]), Timeline.of(motion.times)
+    return picture(scene, [panel], _title(scene), timeline, view, Form(width))
 
 
 def side_by_side(
     scene: Scene, motions: Mapping[str, Trajectory], words: str, view: View | None = None
 ) -> str:
-    """Motions over the same time as one SVG that moves by itself, two in a row, each below its title.
+    """Return motions over one span of time as one SVG that moves by itself, two in a row, below their titles.
 
-    All show the same part of space.  A motion that ended early stays at its last sample; where the reader
-    asks for no motion, all stand where one is furthest from the first.  Raises ValueError where a trajectory
-    has no sample.
+    A motion that ended early stays at its last sample.  Raises ValueError if a trajectory has no sample.
     """
-    for motion in motions.values():
-        _check(motion)
-    times = max((motion.times for motion in motions.values()), key=len)
-    held = [
-        thinned(_samples(m, np.minimum(np.arange(len(times)), len(m.times) - 1))) for m in motions.values()
-    ]
-    page, apart = _page(scene, held, view, PANEL, NARROW), [_furthest(held)]
-    moving = [list(_parts(Stage(scene, motion, page, _round(times)))) for motion in held]
-    resting = [list(_parts(Stage(scene, _samples(motion, apart), page, 0.0))) for motion in held]
-    parts = svg.moving_or_still(_placed(moving, page.height), _placed(resting, page.height))
-    for k, title in enumerate(motions):
-        x, y = _corner(k, page.height)
-        parts.append(svg.text(x + PANEL / 2, y + HEAD - 10, title, f'fill="{INK}" font-size="{LARGE}"'))
-    width, height = PANEL * COLUMNS, _corner(len(held) + COLUMNS - 1, page.height)[1]
-    parts += _caption(page.scale, width, height, times, _round(times), LARGE)
-    return svg.document(width, height + FOOT, parts, words)
+    _check(motions.values())
+    panels = [Panel([Layer(motion)], [title]) for title, motion in motions.items()]
+    return picture(scene, panels, words, Timeline.of(longest(motions.values())), view, BESIDE)
 
 
-def _placed(panels: Sequence[Sequence[str]], height: float) -> Iterator[str]:
-    """Panels of a height (px) in rows, each below room for its title."""
-    for k, parts in enumerate(panels):
-        x, y = _corner(k, height)
-        yield f'<g transform="translate({x:g} {y + HEAD:.1f})">{"".join(parts)}</g>'
+def longest(motions: Iterable[Trajectory]) -> np.ndarray:
+    """Return the times (k,) of the motion with most samples."""
+    return max((motion.times for motion in motions), key=len)
 
 
-def _corner(k: int, height: float) -> tuple[float, float]:
-    """The upper left corner, px, of the k-th panel, from 0."""
-    return PANEL * (k % COLUMNS), (HEAD + height) * (k // COLUMNS)
+def picture(
+    scene: Scene,
+    panels: Sequence[Panel],
+    words: str,
+    timeline: Timeline | None = None,
+    view: View | None = None,
+    form: Form = BESIDE,
+    shown: Sequence[Trajectory] = (),
+) -> str:
+    """Return panels of a scene as SVG, described by ``words``; still without a timeline.
+
+    All panels show the same part of space: all of the motions ``shown``, by default of the layers.
+    Readers who ask for no motion see all panels at the sample where a body is furthest from its place in
+    the first layer.
+    """
+    space = _joined(shown or [layer.motion for panel in panels for layer in panel.layers])
+    page = _page(scene, space, view, form)
+    rows = max(len(panel.title) for panel in panels)
+    grid = _Grid(page, form, rows * LEADING * form.letters + 6.0 * bool(rows), len(panels))
+    if timeline is None:
+        parts = [*_drawn(scene, space, panels, grid, None)]
+    else:
+        frames = [_with_motions(panel, lambda motion: _at(motion, timeline.samples)) for panel in panels]
+        rest = _furthest([layer.motion for panel in frames for layer in panel.layers])
+        stands = [_with_motions(panel, lambda motion: _at(motion, [rest])) for panel in frames]
+        parts = svg.moving_or_still(
+            [*_drawn(scene, space, frames, grid, timeline), *_clock(grid, timeline, timeline.times)],
+            [*_drawn(scene, space, stands, grid, None), *_clock(grid, timeline, timeline.times[[rest]])],
+        )
+    parts += [*_titles(panels, grid), *_axes(page, grid), *_scale(grid), *_pace(grid, timeline)]
+    height = grid.bottom + FOOT + CLOCK * bool(timeline and timeline.marks)
+    return svg.document(grid.width, height, parts, words)
 
 
-def _check(motion: Trajectory) -> None:
-    if not motion.times.size:
-        raise ValueError(f"the motion of {motion.scene!r} has no sample to draw: {motion.outcome.sentence}")
+def _title(scene: Scene) -> str:
+    return f"{scene.name}: {len(scene.body)} bodies, {len(scene.joint)} joints"
 
 
-def thinned(motion: Trajectory) -> Trajectory:
-    """The trajectory with every n-th of its samples only, at most 120."""
-    return _samples(motion, slice(None, None, math.ceil(len(motion.times) / FRAMES)))
+def _check(motions: Iterable[Trajectory]) -> None:
+    for motion in motions:
+        if not motion.times.size:
+            raise ValueError(
+                f"the motion of {motion.scene!r} has no sample to draw: {motion.outcome.sentence}"
+            )
 
 
-def _samples(motion: Trajectory, chosen: Any) -> Trajectory:
-    """The poses and velocities of a trajectory at some of its samples, given as an index of arrays."""
-    keys = ("times", "position", "orientation", "velocity", "angular_velocity")
-    return Trajectory(
-        scene=motion.scene, engine=motion.engine, version=motion.version, method=motion.method, settings={},
-        bodies=motion.bodies, outcome=motion.outcome, t_end=motion.t_end,
-        **{key: getattr(motion, key)[chosen] for key in keys},
-    )  # fmt: skip
+class _Grid(NamedTuple):
+    """Places of panels in a picture: the page of each, sizes, height of titles (px), number of panels."""
+
+    page: Page
+    form: Form
+    head: float
+    number: int
+
+    def corner(self, k: int) -> tuple[float, float]:
+        """Return the upper left corner, px, of the k-th panel, from 0, with its title."""
+        row, column = divmod(k, self.form.columns)
+        return self.form.width * column, (self.head + self.page.height) * row
+
+    @property
+    def width(self) -> float:
+        """Width of all panels, px."""
+        return self.form.width * self.form.columns
+
+    @property
+    def bottom(self) -> float:
+        """Height of all panels, px."""
+        return self.corner(self.number + self.form.columns - 1)[1]
+
+
+def _page(scene: Scene, shown: Trajectory, view: View | None, form: Form) -> Page:
+    """Return the page that shows all of a motion, and anchors and ends of springs on the ground."""
+    fixed = [a for joint in scene.joint for name, a in anchors(joint) if name == GROUND]
+    fixed += [p for load in scene.load for name, p in attack(load) if name == GROUND]
+    bodies = [moved(shape, shown, b).reshape(-1, 3) for b, shape in enumerate(shapes(scene))]
+    points = np.concatenate([*bodies, np.array(fixed).reshape(-1, 3)])
+    axes = [joint.axis for joint in scene.joint if joint.type == "revolute"]
+    return Page.around(points, view or view_of(points, axes), form.width, form.margin, form.tallest)
+
+
+def _with_motions(panel: Panel, change: Callable[[Trajectory], Trajectory]) -> Panel:
+    """Return the panel with the motion of each layer replaced."""
+    return panel._replace(layers=[layer._replace(motion=change(layer.motion)) for layer in panel.layers])
+
+
+def _at(motion: Trajectory, samples: Any) -> Trajectory:
+    """Return the motion at samples given by number, (k,); its last sample stands for those that it lacks."""
+    return _samples([motion], lambda values: values[0][np.minimum(samples, len(motion.times) - 1)])
+
+
+def _joined(motions: Sequence[Trajectory]) -> Trajectory:
+    """Return the samples of several motions as one trajectory."""
+    return _samples(motions, np.concatenate)
+
+
+def _samples(motions: Sequence[Trajectory], choose: Callable[[list[np.ndarray]], np.ndarray]) -> Trajectory:
+    """Return poses and velocities chosen from those of motions."""
+    fields = ("times", "position", "orientation", "velocity", "angular_velocity")
+    chosen: dict[str, Any] = {name: choose([getattr(motion, name) for motion in motions]) for name in fields}
+    first = motions[0]
+    return Trajectory(first.scene, first.engine, first.version, "", {}, bodies=first.bodies, **chosen)
 
 
 def _furthest(motions: Sequence[Trajectory]) -> int:
-    """The sample at which a body is furthest from its place in the first motion."""
+    """Return the sample at which a body is furthest from its place in the first motion."""
     places = np.array([motion.position for motion in motions])
     return int(np.linalg.norm(places - places[0], axis=-1).max(axis=(0, 2)).argmax())
 
 
-def _round(times: np.ndarray) -> float:
-    """Seconds of one round of a motion over times (k,)."""
-    return float(np.clip(times[-1] - times[0], SHORTEST, LONGEST))
+def _drawn(
+    scene: Scene, shown: Trajectory, panels: Sequence[Panel], grid: _Grid, timeline: Timeline | None
+) -> Iterator[str]:
+    """Yield the panels, each cut off at its edges."""
+    ground = [part for part in _ground(Stage(scene, shown, grid.page, None))]
+    for k, panel in enumerate(panels):
+        x, y = grid.corner(k)
+        parts = [*ground, *(svg.line(grid.page.pixels(path)[None], PATH, None) for path in panel.paths)]
+        for layer in panel.layers:
+            stage = Stage(scene, layer.motion, grid.page, timeline)
+            parts += _bodies(stage, layer.look)
+            parts += [part for more in layer.more for part in more(stage)]
+        size = f'width="{grid.form.width:g}" height="{grid.page.height:.1f}"'
+        yield f'<svg x="{x:g}" y="{y + grid.head:.1f}" {size}>{"".join(parts)}</svg>'
 
 
-def _picture(scene: Scene, motion: Trajectory, view: View | None, width: float, seconds: float) -> str:
-    page = _page(scene, [motion], view, width, MARGIN)
-    parts = _with_names(Stage(scene, motion, page, seconds))
-    if seconds:
-        parts = svg.moving_or_still(parts, _with_names(Stage(scene, _samples(motion, [0]), page, 0.0)))
-    parts += [*_axes(page), *_caption(page.scale, width, page.height, motion.times, seconds)]
-    words = f"{scene.name}: {len(scene.body)} bodies, {len(scene.joint)} joints"
-    return svg.document(width, page.height + FOOT, parts, words)
+PATH = f'fill="none" stroke="{GREY}" stroke-width="0.8"'
 
 
-def _page(
-    scene: Scene, motions: Sequence[Trajectory], view: View | None, width: float, margin: float
-) -> Page:
-    """The page that shows all that moves and what stands."""
-    bodies = list(enumerate(shapes(scene)))
-    moving = [moved(shape, motion, b).reshape(-1, 3) for motion in motions for b, shape in bodies]
-    shown = np.concatenate([*moving, np.array(_fixed_points(scene)).reshape(-1, 3)])
-    return Page.around(shown, view or view_of(shown, _turning_axes(scene)), width, margin, TALLEST)
-
-
-def _fixed_points(scene: Scene) -> list[tuple[float, float, float]]:
-    """Anchors on the ground and ends of springs there."""
-    found = [a for joint in scene.joint for name, a in anchors(joint) if name == GROUND]
-    return found + [p for load in scene.load for name, p in attack(load) if name == GROUND]
-
-
-def _turning_axes(scene: Scene) -> list[tuple[float, float, float]]:
-    """The axes of the revolute joints."""
-    return [joint.axis for joint in scene.joint if joint.type == "revolute"]
-
-
-def _parts(stage: Stage) -> Iterator[str]:
-    scene = stage.scene
-    for joint in scene.joint:
+def _ground(stage: Stage) -> Iterator[str]:
+    for joint in stage.scene.joint:
         if GROUND in joint.bodies:
             yield from ground_mark(stage, joint)
-    for b, (shape, frames) in enumerate(_lines(stage)):
-        yield _body(shape, frames, COLOURS[b % len(COLOURS)], stage.seconds)
-    yield from (load_mark(stage, load) for load in scene.load)
-    for joint in scene.joint:
-        yield from joint_mark(stage, joint)
-    yield from (driver_mark(stage, driver) for driver in scene.driver)
 
 
-def _with_names(stage: Stage) -> list[str]:
-    """All parts, and over them the names of joints and bodies."""
-    names = [
-        _body_name(shape.name, frames, COLOURS[b % len(COLOURS)], stage.seconds)
-        for b, (shape, frames) in enumerate(_lines(stage))
-    ]
-    return [*_parts(stage), *joint_names(stage), *names]
+def _bodies(stage: Stage, look: Look) -> Iterator[str]:
+    """Yield the bodies of a layer."""
+    opacity = f' opacity="{look.opacity:.3g}"' * (look.opacity < 1)
+    for b, shape in enumerate(shapes(stage.scene)):
+        frames = stage.page.pixels(moved(shape, stage.motion, b))
+        yield _body(shape, frames, look.colour or COLOURS[b % len(COLOURS)], look.thickness, opacity, stage)
 
 
-def _lines(stage: Stage) -> list[tuple[Shape, np.ndarray]]:
-    """The bodies' shapes and their pixels (k, n, 2)."""
-    return [
-        (shape, stage.page.pixels(moved(shape, stage.motion, b)))
-        for b, shape in enumerate(shapes(stage.scene))
-    ]
-
-
-def _body(shape: Shape, frames: np.ndarray, colour: str, seconds: float) -> str:
-    """A plate, a bar, or a block where the body has one point only."""
+def _body(shape: Shape, frames: np.ndarray, colour: str, thickness: float, opacity: str, stage: Stage) -> str:
+    """Return a plate, a bar, or a block if the body has one point only."""
+    area = f'fill="{colour}" fill-opacity="0.18" stroke="{colour}"{opacity}'
     if shape.is_plate:
-        look = f'fill="{colour}" fill-opacity="0.18" stroke="{colour}" stroke-width="4"'
-        return svg.line(frames[:, :-1], look, seconds, closed=True)
+        look = f'{area} stroke-width="{thickness / 1.5:.3g}"'
+        return svg.line(frames[:, :-1], look, stage.timeline, closed=True)
     if frames.shape[1] == 1:
-        look = f'x="-17" y="-12" width="34" height="24" rx="3" stroke="{colour}" stroke-width="3"'
-        return svg.follow(frames[:, 0], f'<rect {look} fill="{colour}" fill-opacity="0.18"/>', seconds)
-    return svg.line(frames, f'fill="none" stroke="{colour}" stroke-width="6"', seconds)
+        look = f'x="-17" y="-12" width="34" height="24" rx="3" stroke-width="{thickness / 2:.3g}"'
+        return svg.follow(frames[:, 0], f"<rect {look} {area}/>", stage.timeline)
+    look = f'fill="none" stroke="{colour}"{opacity} stroke-width="{thickness:g}"'
+    return svg.line(frames, look, stage.timeline)
 
 
-def _body_name(name: str, frames: np.ndarray, colour: str, seconds: float) -> str:
-    """The name beside the longest part of a bar, in the middle of a plate, below a block."""
-    is_plate = frames.shape[1] > 3 and bool((frames[0, 0] == frames[0, -1]).all())
-    points = frames[:, :-1] if is_plate else _longest_part(frames)
-    places = points.mean(axis=1) + 4.0 * np.array([0.0, 1.0])
-    if frames.shape[1] == 1:
-        places = places + np.array([0.0, 26.0])
-    elif not is_plate:
-        along = frames[:, -1] - frames[:, 0]
-        across = np.stack([along[:, 1], -along[:, 0]], axis=1)
-        reach = np.array([8.0 + 3.5 * len(name), 13.0])  # half of the name's width and height
-        places = places + reach * across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
-    return svg.follow(places, svg.text(0, 0, name, f'fill="{colour}"'), seconds)
+def _titles(panels: Sequence[Panel], grid: _Grid) -> Iterator[str]:
+    """Yield the titles above the panels, the first line of each in bold if it has several."""
+    size = grid.form.letters
+    for k, panel in enumerate(panels):
+        x, y = grid.corner(k)
+        for i, words in enumerate(panel.title):
+            weight = ' font-weight="600"' * (i == 0 and len(panel.title) > 1)
+            look = f'fill="{INK}" font-size="{size}"{weight}'
+            yield svg.text(x + grid.form.width / 2, y + (i + 1) * LEADING * size, words, look)
 
 
-def _longest_part(frames: np.ndarray) -> np.ndarray:
-    """Of a line (k, n, 2) the two neighbours (k, 2, 2) that are the furthest apart at first, so that names
-    of bars that cross at their middles do not."""
-    if frames.shape[1] < 3:
-        return frames
-    parts = np.hypot(*np.diff(frames[0], axis=0).T)
-    i = int(np.argmax(parts > 0.99 * parts.max()))
-    return frames[:, i : i + 2]
-
-
-def _axes(page: Page) -> Iterator[str]:
-    """Arrows of x, y and z in the lower left corner, without the one along the line of sight."""
-    corner = np.array([30.0, page.height + FOOT - 26])
+def _axes(page: Page, grid: _Grid) -> Iterator[str]:
+    """Yield arrows of x, y and z in the lower left corner, except one along the line of sight."""
+    corner = np.array([30.0, grid.bottom + FOOT - 26])
     for name, seen in zip("xyz", page.directions(np.eye(3)), strict=True):
         if np.hypot(*seen) > 0.2:
             end = corner + 30 * seen
@@ -215,21 +277,49 @@ def _axes(page: Page) -> Iterator[str]:
             yield svg.text(x, y + 4, name, f'fill="{GREY}" font-size="12"')
 
 
-def _caption(
-    scale: float, width: float, height: float, times: np.ndarray, seconds: float, size: int = 12
-) -> Iterator[str]:
-    """A bar of a round length, and of a moving picture how its time runs."""
-    length, look = _round_length(110 / scale), f'fill="{INK}" font-size="{size}"'
-    left, y = width - 40 - length * scale, height + FOOT - 20
+def _scale(grid: _Grid) -> Iterator[str]:
+    """Yield a bar of a round length."""
+    scale = grid.page.scale
+    length = _round_length(110 / scale)
+    left, y = grid.width - 40 - length * scale, grid.bottom + FOOT - 20
     ends = f"M{left:.1f} {y - 4:.1f}v8m0 -4h{length * scale:.1f}m0 -4v8"
     yield f'<path d="{ends}" stroke="{INK}" fill="none"/>'
-    yield svg.text(left + length * scale / 2, y - 7, f"{length:g} m", look)
-    if seconds:
-        words = f"{times[-1] - times[0]:.4g} s in {seconds:.3g} s"
-        yield svg.text(width / 2, y + 4, words, look)
+    yield svg.text(left + length * scale / 2, y - 7, f"{length:g} m", _words(grid))
+
+
+def _pace(grid: _Grid, timeline: Timeline | None) -> Iterator[str]:
+    """Yield how fast the time of a moving picture runs."""
+    if timeline:
+        words = f"{timeline.times[-1] - timeline.times[0]:.4g} s in {timeline.seconds:.3g} s"
+        yield svg.text(grid.width / 2, grid.bottom + FOOT - 16, words, _words(grid))
+
+
+def _words(grid: _Grid) -> str:
+    return f'fill="{INK}" font-size="{grid.form.letters}"'
+
+
+def _clock(grid: _Grid, timeline: Timeline, times: np.ndarray) -> Iterator[str]:
+    """Yield the line of time with its marks, and a dot at times (k,), s, if there is anything to mark."""
+    if not timeline.marks:
+        return
+    y, size = grid.bottom + FOOT + 14.0, grid.form.letters
+    left = 40.0 + 0.56 * size * len(timeline.label)
+    right = grid.width - 60.0
+    ticks, dot, ends = (
+        left + (right - left) * timeline.fractions(np.array(instants))
+        for instants in (timeline.marks, times, timeline.times[[0, -1]])
+    )
+    path = f"M{left:.1f} {y:.1f}H{right:.1f}" + "".join(f"M{x:.1f} {y - 7:.1f}v14" for x in ticks)
+    yield f'<path d="{path}" stroke="{INK}" fill="none"/>'
+    yield svg.text(14, y + 4, timeline.label, _words(grid), "start")
+    for x, time in zip(ends, timeline.times[[0, -1]], strict=True):
+        yield svg.text(x, y + 20, f"{round(time, 12):.4g} s", _words(grid))
+    places = np.stack([dot, np.full_like(dot, y)], axis=1)
+    moves = timeline if len(times) > 1 else None
+    yield svg.follow(places, f'<circle r="5" fill="{COLOURS[1]}"/>', moves)
 
 
 def _round_length(longest: float) -> float:
-    """The largest of 1, 2 or 5 times a power of ten that is not longer."""
+    """Return the largest of 1, 2 or 5 times a power of ten that is not longer."""
     power = 10.0 ** math.floor(math.log10(longest))
     return float(f"{max(k for k in (1, 2, 5) if k * power <= longest * (1 + 1e-9)) * power:.6g}")

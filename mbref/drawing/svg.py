@@ -1,4 +1,4 @@
-"""SVG elements that may move: lines through frames of points, and groups that follow a point (SMIL)."""
+"""SVG elements: lines and groups, which move along a timeline, words and arrows."""
 
 from __future__ import annotations
 
@@ -7,38 +7,40 @@ from html import escape
 
 import numpy as np
 
+from mbref.drawing.timeline import Timeline
+
 # Okabe and Ito's colours, distinguishable with every common colour blindness; yellow is left out
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 INK, GREY, PAPER = "#222222", "#8a8a8a", "#ffffff"
 
 
-def line(frames: np.ndarray, look: str, seconds: float, closed: bool = False) -> str:
-    """A line, or an outline, through points (k, n, 2), px, that passes its k frames in a time (s)."""
+def line(frames: np.ndarray, look: str, timeline: Timeline | None, closed: bool = False) -> str:
+    """Return a line, or an outline, through points (k, n, 2), px, in k frames of a timeline."""
     texts = [" ".join(f"{x:.1f},{y:.1f}" for x, y in frame) for frame in frames]
     kind = "polygon" if closed else "polyline"
-    return f'<{kind} points="{texts[0]}" {look}>{_animate("points", texts, seconds)}</{kind}>'
+    return f'<{kind} points="{texts[0]}" {look}>{_animate(timeline, "points", texts)}</{kind}>'
 
 
-def follow(places: np.ndarray, content: str, seconds: float) -> str:
-    """Content drawn about the origin, carried along places (k, 2), px."""
+def follow(places: np.ndarray, content: str, timeline: Timeline | None) -> str:
+    """Return content drawn about the origin, carried along places (k, 2), px."""
     texts = [f"{x:.1f},{y:.1f}" for x, y in places]
-    moving = _animate("transform", texts, seconds, "animateTransform", ' type="translate"')
+    moving = _animate(timeline, "transform", texts, "animateTransform", ' type="translate"')
     return f'<g transform="translate({texts[0]})">{content}{moving}</g>'
 
 
 def text(x: float, y: float, words: str, look: str = "", anchor: str = "middle") -> str:
-    """Words at a place, with a halo that keeps them legible over lines."""
+    """Return words at a place, with a halo that keeps them legible over lines."""
     halo = f'stroke="{PAPER}" stroke-width="3" paint-order="stroke" stroke-linejoin="round"'
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" {halo} {look}>{printable(words)}</text>'
 
 
 def printable(words: str) -> str:
-    """Words as SVG can hold them: escaped, characters that are not shown replaced."""
+    """Return words escaped for SVG, with characters that cannot be shown replaced."""
     return escape("".join(c if c.isprintable() else "\ufffd" for c in words))
 
 
 def arrow(start: np.ndarray, end: np.ndarray, colour: str, width: float = 2.2) -> str:
-    """An arrow between two places (2,), px; a dot where it points along the line of sight."""
+    """Return an arrow between two places (2,), px; a dot where it points along the line of sight."""
     along, length = end - start, float(np.hypot(*(end - start)))
     if length < 1.0:
         return f'<circle cx="{start[0]:.1f}" cy="{start[1]:.1f}" r="3" fill="{colour}"/>'
@@ -53,7 +55,7 @@ def arrow(start: np.ndarray, end: np.ndarray, colour: str, width: float = 2.2) -
 
 
 def turn(radius: float, sense: float, colour: str, width: float = 2.2) -> str:
-    """Three quarters of a circle about the origin with an arrowhead; anticlockwise where sense > 0."""
+    """Return three quarters of a circle about the origin with an arrowhead; anticlockwise where sense > 0."""
     r, flip = radius, 1 if sense < 0 else -1
     head = f"{-r - 5:.1f},{-1 * flip:.1f} {-r + 5:.1f},{-1 * flip:.1f} {-r:.1f},{-9 * flip:.1f}"
     arc = f"M0 {-r * flip:.1f}A{r:g} {r:g} 0 1 {1 if flip > 0 else 0} {-r:.1f} 0"
@@ -64,9 +66,9 @@ def turn(radius: float, sense: float, colour: str, width: float = 2.2) -> str:
 
 
 def moving_or_still(moving: Iterable[str], still: Iterable[str]) -> list[str]:
-    """Parts that move, and those that stand in for them where the reader asks for less motion."""
+    """Return parts that move, and their substitutes for paper and for readers who ask for less motion."""
     style = (
-        "<style>.mbref-still{display:none}@media(prefers-reduced-motion:reduce)"
+        "<style>.mbref-still{display:none}@media print,(prefers-reduced-motion:reduce)"
         "{.mbref-still{display:inline}.mbref-moving{display:none}}</style>"
     )
     groups = {"mbref-moving": moving, "mbref-still": still}
@@ -74,11 +76,12 @@ def moving_or_still(moving: Iterable[str], still: Iterable[str]) -> list[str]:
 
 
 def document(width: float, height: float, parts: list[str], title: str) -> str:
-    """The picture with a title for readers and screen readers, on white."""
+    """Return the whole picture, on white; the title is what screen readers read out."""
     return "\n".join(
         [
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" '
-            f'width="{width:.0f}" height="{height:.0f}" role="img" style="max-width:100%;height:auto" '
+            f'width="{width:.0f}" height="{height:.0f}" class="mechanism" role="img" '
+            'style="max-width:100%;height:auto" '
             'font-family="system-ui, DejaVu Sans, sans-serif" font-size="13" '
             'stroke-linecap="round" stroke-linejoin="round">',
             f"<title>{printable(title)}</title>",
@@ -89,8 +92,5 @@ def document(width: float, height: float, parts: list[str], title: str) -> str:
     )
 
 
-def _animate(attribute: str, values: list[str], seconds: float, tag: str = "animate", more: str = "") -> str:
-    if len(set(values)) == 1:
-        return ""
-    once = f'attributeName="{attribute}"{more} dur="{seconds:g}s" values="{";".join(values)}"'
-    return f'<{tag} {once} repeatCount="indefinite"/>'
+def _animate(timeline: Timeline | None, attribute: str, values: list[str], *tag: str) -> str:
+    return "" if timeline is None else timeline.animate(attribute, values, *tag)

@@ -9,9 +9,8 @@ import numpy as np
 from crosscheck.engine import BRANCHES
 from crosscheck.study.grid import Record
 from mbref.trajectory import Outcome
-from reports import motion_picture, places
+from reports import mechanisms
 from reports.blocks import Block, Heading, Moving, Table, Text
-from reports.engine_looks import tone
 from reports.runs import Run, SceneRuns, plain
 
 DIGITS = 12  # of the times shown, behind the point, s
@@ -67,9 +66,8 @@ def _pictures(scene_runs: SceneRuns) -> Iterator[Moving]:
 
 def _beside(scene_runs: SceneRuns, number: int, records: Sequence[Record]) -> Moving:
     scene, crossing = scene_runs.scene, records[0]["crossings"][number - 1]
-    motions = {_title(record): motion_picture.poses(scene, record) for record in records}
-    name = places.of_family(scene.name, (str(number), "")).replace("r-", "b-")
-    pictures = motion_picture.branches(name, scene, motions, crossing["time"], tone(records[0]["engine"]))
+    motions = {_title(record): mechanisms.motion_of(scene, record) for record in records}
+    pictures = mechanisms.branches(scene, motions, crossing["time"], records[0]["engine"])
     start, *_, end = (round(time, DIGITS) for time in records[0]["times"])
     caption = BESIDE.format(
         number=number,
@@ -79,8 +77,7 @@ def _beside(scene_runs: SceneRuns, number: int, records: Sequence[Record]) -> Mo
         end=end,
         scene=scene.name,
     )
-    panels = [(title, picture.svg) for title, picture in pictures.items()]
-    return Moving(caption, panels, "".join(picture.css for picture in pictures.values()))
+    return Moving(caption, list(pictures.items()))
 
 
 def _asked(record: Record) -> tuple[int, int]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from reports import drawing
+from reports import mechanisms
 from reports.blocks import Block, Figure, Heading, Table, Text
 from reports.runs import Run, SceneRuns
 
@@ -20,9 +20,9 @@ def render(scene_runs: SceneRuns) -> list[Block]:
         f"error {shown.said}) from t = {shown.trajectory.times[0]:g} s to "
         f"{shown.trajectory.times[-1]:g} s, the last darkest; "
         f"triangles are joints to the ground, dashed lines their guides, thin grey lines the paths of the "
-        f"centres of mass. Seen along z if the motion is planar, else obliquely with y to the back."
+        f"centres of mass."
     )
-    draw = partial(drawing.mechanism, scene_runs.scene, shown.trajectory)
+    draw = partial(mechanisms.poses, scene_runs.scene, shown.trajectory)
     return [*blocks, Figure(f"{scene_runs.scene.name}-mechanism", caption, draw)]
 
 

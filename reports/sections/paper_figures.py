@@ -25,9 +25,8 @@ from crosscheck.paper.runs import (
 from crosscheck.paper.settings import BASE
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
-from reports import figures
+from reports import figures, mechanisms
 from reports.blocks import Block, Figure, Heading
-from reports.drawing import moved, shapes
 from reports.runs import Run
 
 HALF = "θ₂ = π/2"
@@ -93,29 +92,15 @@ def _poses(
     return Figure(f"paper-figure-{paper}", caption, partial(plot_poses, scene, runs, span))
 
 
-def plot_poses(scene: Scene, runs: Named, span: tuple[float, float] | None) -> Drawing:
-    """Poses of the links side by side, one picture a method."""
-    drawing, [first] = figures.canvas(7.4, 2.0 if len(runs) > 3 else 3.0)
-    first.remove()
-    axes = drawing.subplots(1, len(runs), sharex=True, sharey=True, squeeze=False)[0]
-    for panel, (name, run) in zip(axes, runs.items(), strict=True):
-        t = run.trajectory.times
-        low, high = span or (0.0, t[-1])
-        inside = np.flatnonzero((t >= low) & (t <= high))
-        chosen = np.unique(inside[np.linspace(0, len(inside) - 1, POSES).astype(int)])
-        for b, shape in enumerate(shapes(scene)):
-            points = moved(shape, run.trajectory, b)[..., :2]
-            colour = figures.COLOURS[b % len(figures.COLOURS)]
-            for i, k in enumerate(chosen):
-                alpha = 1.0 if i == len(chosen) - 1 else 0.12 + 0.4 * i / len(chosen)
-                mark = "o" if points.shape[1] > 1 else "s"
-                panel.plot(*points[k].T, color=colour, marker=mark, markersize=3, linewidth=1.4, alpha=alpha)
-        panel.set(aspect="equal", title=f"{name}\nto {t[chosen[-1]]:.4g} s", xlabel="x (m)")
-        panel.title.set_fontsize(8.5)
-        panel.grid(False)
-        panel.spines[["top", "right"]].set_visible(False)
-    axes[0].set_ylabel("y (m)")
-    return drawing
+def plot_poses(scene: Scene, runs: Named, span: tuple[float, float] | None) -> str:
+    """Return poses of the links side by side as SVG, one panel a method, within a span of time (s)."""
+    shown = {}
+    for name, run in runs.items():
+        low, high = span or (0.0, run.trajectory.times[-1])
+        first, end = np.searchsorted(run.trajectory.times, [low, np.nextafter(high, np.inf)])
+        motion = mechanisms.sample(run.trajectory, slice(int(first), int(end)))
+        shown[name] = f"to {motion.times[-1]:.4g} s", motion
+    return mechanisms.poses_side_by_side(scene, shown, POSES)
 
 
 def _violations(paper: int, scene: Scene, runs: Named, what: str) -> Figure:

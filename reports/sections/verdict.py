@@ -11,7 +11,7 @@ from crosscheck.study.verdict import DEFAULTS, Judged, grade
 from reports import places
 from reports.blocks import Block, Heading, Matrix, Opening, Verdict
 from reports.engine_looks import SIGNS, mark, named, tone
-from reports.motion_picture import Picture, picture, poses
+from reports.mechanisms import motion_of, over_truth
 from reports.runs import Run, SceneRuns, duration, power, short
 from reports.sections import speed
 
@@ -33,7 +33,7 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
         return [*chapter]
     said, group = verdict(known), _shown(groups)
     shown, caption = motion(group)
-    opening = Opening(said.headline, said.labelled(), shown.svg, shown.css, caption)
+    opening = Opening(said.headline, said.labelled(), shown, caption)
     return [opening, *chapter, *([] if group is None else _figure(group))]
 
 
@@ -49,15 +49,14 @@ def judged(group: SceneRuns) -> Judged:
     return Judged(group.scene, group.truth, [run.record for run in group.runs])
 
 
-def motion(group: SceneRuns | None) -> tuple[Picture, str]:
+def motion(group: SceneRuns | None) -> tuple[str, str]:
     """The picture of a scene's true motion with its worst run, and its caption; empty without a truth."""
     if group is None or not (group.truth and group.truth["motion"]):
-        return Picture("", ""), ""
-    exact = poses(group.scene, group.truth["motion"])
+        return "", ""
+    exact = motion_of(group.scene, group.truth["motion"])
     worst = group.motion if group.motion and len(group.motion["times"]) == len(exact.times) else None
-    name = places.of_family(group.scene.name, ("", "")).replace("r-", "m-")
-    shown = picture(name, group.scene, exact, poses(group.scene, worst) if worst else None,
-                    tone(worst["engine"]) if worst else 0)  # fmt: skip
+    run, engine = (motion_of(group.scene, worst), worst["engine"]) if worst else (None, "")
+    shown = over_truth(group.scene, exact, run, engine)
     end = exact.times[-1]
     part = f"the first {end:.3g} s" if end < 0.999 * group.scene.duration else f"{end:.3g} s"
     caption = f"{group.scene.name}, {part} of its true motion as thick lines."

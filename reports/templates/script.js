@@ -54,6 +54,15 @@
     });
   }
 
+  // mechanisms: their motion is held and goes on
+  all('.hold input').forEach(function (box) {
+    box.addEventListener('change', function () {
+      all('svg.mechanism', box.closest('figure')).forEach(function (svg) {
+        if (box.checked) { svg.pauseAnimations(); } else { svg.unpauseAnimations(); }
+      });
+    });
+  });
+
   // figures: the run pointed at is read out, engines are switched
   all('figure.asked').forEach(function (figure) {
     var read = figure.querySelector('.read');

@@ -13,9 +13,7 @@ DOORS = (
 )
 ALLOWED = {  # package → the names of mbref that it may import
     "crosscheck": re.compile(rf"mbref(\.({DOORS})(\.\w+)?)?"),
-    "reports": re.compile(
-        r"mbref(\.(command_line|scene|trajectory|rotations|records|drawing\.(shapes|svg))(\.\w+)?)?"
-    ),
+    "reports": re.compile(r"mbref(\.(command_line|scene|trajectory|rotations|records|drawing)(\.\w+)?)?"),
 }
 ADAPTER = "crosscheck.engines.mbref"  # the one module that may import all of mbref
 
@@ -35,8 +33,8 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["__main__"],
     ),
     "reports": (
-        ["blocks"], ["runs"], ["places", "engine_looks"], ["figures"], ["drawing"],
-        ["animation", "motion_picture", "speed_figure", "time_series", "benchmark_plot"],
+        ["blocks"], ["runs"], ["places", "engine_looks"], ["figures"],
+        ["mechanisms", "speed_figure", "time_series", "benchmark_plot"],
         ["sections"], ["render", "stored"], ["__main__"],
     ),
 }  # fmt: skip

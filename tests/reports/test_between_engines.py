@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from drawn import bars
 
 from crosscheck.engine import Setting
 from crosscheck.judge.gauss_principle import gauss
@@ -112,10 +112,13 @@ def test_branches_move_side_by_side(parted):
         and "--branches --crossing 2" in block.caption
     )
     smooth, fold = (svg for _, svg in block.panels)
-    assert block.css.count("@keyframes") == 2 * (3 + 3 + 1), "three bodies twice and the line of time"
-    places = [re.findall(r'class="[^"]*r1" style="transform:([^"]+)"', svg) for svg in (smooth, fold)]
-    assert places[0] != places[1], "without motion the couplers of both branches stand apart"
-    assert 'aria-label="four_bar: Branch 2"' in fold and "<script" not in fold
+    (behind, ahead), (also_behind, apart) = ((bars(svg, 9.0), bars(svg)) for svg in (smooth, fold))
+    assert len(behind) == len(apart) == 3
+    for first, same, second, other in zip(behind, ahead, also_behind, apart, strict=True):
+        assert (first == same).all() and (first == second).all(), "the smooth branch is behind both"
+        assert (first[0] == other[0]).all(), "branches begin together"
+    assert (behind[1][-1] != apart[1][-1]).any(), "the couplers of both branches end apart"
+    assert "<title>four_bar: Branch 2</title>" in fold and "<script" not in fold
 
 
 def test_a_branch_whose_run_ended_early_says_so_and_stays(parted):
@@ -127,9 +130,9 @@ def test_a_branch_whose_run_ended_early_says_so_and_stays(parted):
         b for b in crossings.render(replace(parted, branches=[first, early])) if isinstance(b, Moving)
     ]
     assert block.panels[1][0] == f"Branch 2; ended at t = {early['t_end']:.4g} s: STEP_FAILED"
-    (of_coupler,) = re.findall(r"@keyframes \S+-1r1\{(.*?\})\}", block.css)
-    frames = re.findall(r"([\d.]+)%\{transform:([^}]+)\}", of_coupler)
-    assert frames[-1][0] == "100" and frames[-1][1] == frames[-2][1] and len(frames) == 41
+    _, coupler, _ = bars(block.panels[1][1])
+    assert len(coupler) == len(first["times"]) > 41
+    assert (coupler[39] == coupler[-1]).all() and (coupler[38] != coupler[39]).any()
 
 
 def test_no_table_of_singular_positions_where_none_is_passed():

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import functools
-import itertools
 import struct
 import zlib
 
 import numpy as np
 import pytest
-from synthetic import exact, groups, scene
+from synthetic import groups
 
 from crosscheck.engine import BUILT_IN
-from mbref.scenes import SCENES
-from reports import drawing, figures, time_series
+from reports import figures, time_series
 from reports.blocks import Figure, Plot
 from reports.sections import blocks, speed
 
@@ -50,7 +48,7 @@ def test_picture_is_not_blank_and_is_the_same_each_time(name):
     picture = pictures()[name]
     once, again = figures.svg(picture.draw(), name), figures.svg(picture.draw(), name)
     assert once == again, f"{name} changes from one drawing to the next"
-    assert once.count("<path") > 10, f"{name} has {once.count('<path')} paths"
+    assert once.count("<path") + once.count("<poly") > 10, f"{name} has few lines"
     assert pixels(figures.png(picture.draw())) > 60, f"{name} is nearly blank"
 
 
@@ -89,40 +87,3 @@ def test_curves_of_an_engine_and_different_looks():
     kinds = {(str(look["linestyle"]), look["marker"]) for look in looks.values()}
     assert len(kinds) == 12, kinds
     assert {look["color"] for look in looks.values()} == {figures.colour("mbref")}
-
-
-@pytest.mark.parametrize("name", ["spatial_slider_crank", "planar_slider_crank", "four_bar", "five_bar"])
-def test_bodies_of_a_joint_and_one_point(name):
-    """Both bodies of every joint that keeps its points together are drawn through a common point."""
-    a_scene = SCENES[name]().with_(duration=0.02)
-    trajectory = exact(a_scene)
-    parts = {s.name: drawing.moved(s, trajectory, b) for b, s in enumerate(drawing.shapes(a_scene))}
-    for joint in a_scene.joint:
-        if "ground" in joint.bodies:
-            continue
-        first, second = (parts[body] for body in joint.bodies)
-        gap = np.linalg.norm(first[:, :, None] - second[:, None], axis=-1).min(axis=(1, 2)).max()
-        assert gap < 1e-9, f"{name} {joint.name}: {gap} m between the bodies"
-
-
-def test_links_and_their_lengths():
-    lengths = {s.name: np.ptp(s.points, axis=0) for s in drawing.shapes(scene("planar_slider_crank"))}
-    assert lengths["crank"] == pytest.approx([0.304, 0, 0], abs=1e-12), lengths
-    assert lengths["rod"] == pytest.approx([0.4048, 0, 0], abs=1e-12), lengths
-    assert lengths["slider"] == pytest.approx([0, 0, 0], abs=1e-12), lengths
-
-
-def test_path_and_the_truth_between_samples():
-    coarse, fine = exact(scene(), 49), exact(scene(), 12 * 49)
-    error = abs(drawing.path(coarse, 0) - fine.position[:, 0]).max()
-    assert error < 1e-5, f"{error} m off the path of the crank"
-
-
-def test_projection_and_the_directions_on_the_page():
-    x, y, z = (drawing.project(np.eye(3)[i], False) for i in range(3))
-    assert x == pytest.approx([1, 0]) and z == pytest.approx([0, 1]), (x, z)
-    assert np.linalg.norm(y) == pytest.approx(drawing.DEPTH) and (y > 0).all(), y
-    points = np.array([[0.0, 0, 3], [1, 2, 3]])
-    assert drawing.is_planar(points) and not drawing.is_planar(points[:, ::-1]), "planar is: constant z"
-    for a, b in itertools.pairwise(points):
-        assert drawing.project(b, True) - drawing.project(a, True) == pytest.approx([1, 2])

@@ -171,6 +171,6 @@ def test_figures_and_no_simulation(blocks, monkeypatch):
         (mbref.simulation.simulate, "simulate"), (crosscheck.study.grid, "run_isolated"),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, simulated)
-    drawn = [block.name for block in blocks if isinstance(block, Figure) and block.draw().axes]
+    drawn = [block.name for block in blocks if isinstance(block, Figure) and block.draw()]
     for number in (4, 5, 6, 8, 11, 12, 13, 14, 15, 16):
         assert f"paper-figure-{number}" in drawn, f"Figure {number} is missing of {drawn}"

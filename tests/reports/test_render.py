@@ -48,7 +48,7 @@ def test_page_and_every_block(written, parts):
         if isinstance(block, Heading):
             assert f">{block.text}</h{block.level}>" in page, block
     assert page.count('class="wide"') == len(list((written / "figures").glob("*.svg"))) - 2 == 6
-    assert page.count('class="plot"') == 3 and page.count('class="moving"') == 1
+    assert page.count('class="plot"') == 3 and page.count('mbref-moving">') == 1
     assert page.count('<table class="cards">') == sum(isinstance(b, Table) for b in parts)
     assert "SIGSEGV" in page and "NOT_CONVERGED" in page, "a failed run is missing"
 

@@ -1,0 +1,119 @@
+"""Mechanisms of the report and the README: what is drawn / the trajectories that it was made of."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from drawn import SVG, bars
+from synthetic import exact, motion, record, scene, truths
+
+from crosscheck.cli.passage import singular_instants
+from crosscheck.study.truths import FRAMES, TURN, truth_record
+from mbref.drawing.shapes import moved, shapes
+from mbref.scenes import SCENES
+from reports import mechanisms
+from reports.figures import colour
+from reports.runs import Run
+
+
+def test_bodies_of_an_exact_run_lie_on_the_exact_motion():
+    crank = scene("planar_slider_crank")
+    true = exact(crank)
+    picture = mechanisms.over_truth(crank, true, true, "mujoco")
+    behind, before = bars(picture, 9.0), bars(picture)
+    assert len(before) == 2 and colour("mujoco") in picture
+    for a, b in zip(behind, before, strict=True):
+        assert (a == b).all() and len(a) == len(true.times)
+    lengths = np.hypot(*(before[0][:, 1] - before[0][:, 0]).T)
+    assert np.ptp(lengths) < 0.3, f"the crank changes its length, in pixels: {lengths}"
+
+
+def test_a_run_that_ended_early_stays_at_its_last_sample():
+    crank = scene("planar_slider_crank")
+    true, part = exact(crank), exact(crank, share=0.5)
+    early = bars(mechanisms.over_truth(crank, true, part, "mujoco"))[0]
+    assert (early[len(part.times) - 1] == early[-1]).all() and (early[-1] != early[0]).any()
+
+
+def test_title_and_error_of_a_run_and_the_marks():
+    shown = Run(record("mujoco", "defaults", 0.5, 0.1, step=0.1, margin=3))
+    picture = mechanisms.compared(scene(), exact(scene()), [shown, shown], [0.01])
+    texts = [node.text for node in ET.fromstring(picture).iter(f"{SVG}text")]
+    assert texts.count("mujoco defaults, step 0.1") == texts.count("largest error 5.0e-01") == 2, texts
+    assert "singular positions" in texts and "<script" not in picture
+
+
+def test_motion_stands_still_where_it_differs_most():
+    true, run = (mechanisms.motion_of(scene(), r) for r in (truths()[0]["motion"], motion()))
+    picture = mechanisms.over_truth(scene(), true, run, "mujoco")
+    stands = ET.fromstring(picture).findall(f"{SVG}g")[1]
+    drawn = [n.get("points") for n in stands.iter(f"{SVG}polyline")]
+    assert not list(stands.iter(f"{SVG}animate")) and "nan" not in picture
+    apart = int(np.linalg.norm(true.position - run.position, axis=-1).max(axis=1).argmax())
+    frames = bars(picture)
+    middle = [" ".join(f"{x:.1f},{y:.1f}" for x, y in frame[apart]) for frame in frames]
+    assert len(middle) == 2 and set(middle) <= set(drawn), (middle, drawn)
+
+
+def test_planar_bodies_turn_without_a_jump_from_frame_to_frame():
+    planar = SCENES["planar_slider_crank"]().with_(duration=0.05)
+    true = mechanisms.motion_of(planar, truth_record(planar, np.linspace(0, 0.05, 3), 20.0)["motion"])
+    crank, *_ = bars(mechanisms.over_truth(planar, true, None, ""), 9.0)
+    along = crank[:, 1] - crank[:, 0]
+    angles = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
+    assert len(angles) <= FRAMES + 1 and max(abs(np.diff(angles))) < 2 * TURN, angles
+
+
+def test_branches_share_one_part_of_space_and_have_a_mark():
+    crank = scene("planar_slider_crank")
+    true = exact(crank)
+    other = exact(crank, share=0.5)
+    shown = mechanisms.branches(crank, {"Branch 1": true, "Branch 2": other}, float(true.times[3]), "mbref")
+    assert list(shown) == ["Branch 1", "Branch 2"]
+    first, second = (bars(picture, 9.0) for picture in shown.values())
+    assert all((a == b).all() for a, b in zip(first, second, strict=True))
+    assert all(picture.count("v14") == 2 for picture in shown.values()), "one mark, moving and still"
+
+
+@pytest.mark.parametrize("name", ["spatial_slider_crank", "planar_slider_crank", "four_bar", "five_bar"])
+def test_bodies_of_a_joint_and_one_point(name):
+    """Both bodies of every joint that keeps its points together are drawn through a common point."""
+    a_scene = SCENES[name]().with_(duration=0.02)
+    trajectory = exact(a_scene)
+    parts = {s.name: moved(s, trajectory, b) for b, s in enumerate(shapes(a_scene))}
+    for joint in a_scene.joint:
+        if "ground" in joint.bodies:
+            continue
+        first, second = (parts[body] for body in joint.bodies)
+        gap = np.linalg.norm(first[:, :, None] - second[:, None], axis=-1).min(axis=(1, 2)).max()
+        assert gap < 1e-9, f"{name} {joint.name}: {gap} m between the bodies"
+
+
+def test_links_and_their_lengths():
+    lengths = {s.name: np.ptp(s.points, axis=0) for s in shapes(scene("planar_slider_crank"))}
+    assert lengths["crank"] == pytest.approx([0.304, 0, 0], abs=1e-12), lengths
+    assert lengths["rod"] == pytest.approx([0.4048, 0, 0], abs=1e-12), lengths
+    assert lengths["slider"] == pytest.approx([0, 0, 0], abs=1e-12), lengths
+
+
+def test_poses_are_more_opaque_towards_the_last():
+    picture = ET.fromstring(mechanisms.poses(scene(), exact(scene())))
+    opacity = [float(n.get("opacity", 1)) for n in picture.iter(f"{SVG}polyline")]
+    seen = [o for o in opacity if o < 1]
+    assert len(set(seen)) == mechanisms.POSES - 1 and seen == sorted(seen)
+
+
+def test_path_and_the_truth_between_samples():
+    coarse, fine = exact(scene(), 49), exact(scene(), 12 * 49)
+    error = abs(mechanisms.path(coarse, 0) - fine.position[:, 0]).max()
+    assert error < 1e-5, f"{error} m off the path of the crank"
+
+
+@pytest.mark.parametrize(("name", "count"), [("planar_slider_crank_equal", 4), ("planar_slider_crank", 0)])
+def test_singular_positions_of_a_slider_crank(name, count):
+    """With equal lengths the crank passes θ = ±π/2; with unequal ones nothing is singular."""
+    crank = SCENES[name]()
+    found = singular_instants(crank)
+    assert len(found) == count, found
