@@ -13,7 +13,9 @@ DOORS = (
 )
 ALLOWED = {  # package → the names of mbref that it may import
     "crosscheck": re.compile(rf"mbref(\.({DOORS})(\.\w+)?)?"),
-    "reports": re.compile(r"mbref(\.(command_line|scene|trajectory|rotations|records|drawing)(\.\w+)?)?"),
+    "reports": re.compile(
+        r"mbref(\.(command_line|scene|trajectory|rotations|records|drawing(\.\w+)?)(\.\w+)?)?"
+    ),
 }
 ADAPTER = "crosscheck.engines.mbref"  # the one module that may import all of mbref
 
