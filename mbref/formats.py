@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Protocol
@@ -10,6 +11,28 @@ from typing import Protocol
 from mbref.scene import Scene
 
 GROUP = "mbref.formats"
+
+
+@dataclass(frozen=True)
+class ImportOptions:
+    """How a file is read.
+
+    Attributes
+    ----------
+    without : collection of str
+        Kinds of parts that may be left out although they change the motion, such as ``armature``.
+    keyframe : str
+        Name of the pose to begin at; the reference pose if empty.
+    pose : mapping of str to float
+        Joint coordinates to begin at (rad or m), by joint.
+    close : sequence of str
+        Pairs of frames that close a loop, such as ``frame_a=frame_b:revolute:y``.
+    """
+
+    without: Collection[str] = ()
+    keyframe: str = ""
+    pose: Mapping[str, float] = field(default_factory=dict)
+    close: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -22,10 +45,13 @@ class Imported:
         The scene.
     left_out : tuple of str
         One sentence for each part of the file that the scene does not represent.
+    notes : tuple of str
+        One sentence for each decision made while the file was read, such as a loop that was closed.
     """
 
     scene: Scene
     left_out: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -50,16 +76,16 @@ class Format(Protocol):
     reads: tuple[str, ...]
     writes: tuple[str, ...]
 
-    def read(self, path: Path) -> Imported:
-        """The scene of a file; raises SceneError where none can be made, OSError."""
+    def read(self, path: Path, options: ImportOptions) -> Imported:
+        """The scene of a file; raises SceneError, ValueError for an option, OSError."""
 
     def write(self, scene: Scene) -> Exported:
         """The scene as text."""
 
 
-def read(path: str | Path) -> Imported:
+def read(path: str | Path, options: ImportOptions | None = None) -> Imported:
     """The scene of a file, by the format of its ending; raises ValueError, SceneError, OSError."""
-    return _found(path, "reads").read(Path(path))
+    return _found(path, "reads").read(Path(path), options or ImportOptions())
 
 
 def write(scene: Scene, path: str | Path) -> tuple[str, ...]:

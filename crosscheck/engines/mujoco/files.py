@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from crosscheck.engines.mujoco.reading import read
+from crosscheck.engines.mujoco.importing.reading import read
 from crosscheck.engines.mujoco.writing import write
-from mbref.formats import Exported, Imported
+from mbref.formats import Exported, Imported, ImportOptions
 from mbref.scene import Scene, SceneError
 
 
@@ -16,10 +16,10 @@ class MujocoFiles:
     reads = (".xml", ".urdf")
     writes = (".xml",)
 
-    def read(self, path: Path) -> Imported:
-        """The scene of a .xml or .urdf file; raises SceneError, OSError."""
+    def read(self, path: Path, options: ImportOptions) -> Imported:
+        """The scene of a .xml or .urdf file; raises SceneError, ValueError, OSError."""
         _need_mujoco()
-        return read(path)
+        return read(path, options)
 
     def write(self, scene: Scene) -> Exported:
         """The scene as MJCF; raises SceneError where a body has no mass."""

@@ -1,0 +1,1 @@
+"""MJCF and URDF files as scenes: compiled by MuJoCo, posed, read, and compared with the compiled model."""

@@ -1,0 +1,134 @@
+"""Loops that the user closes: pairs of frames, from ``--close`` or a YAML file; and frames that coincide."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.mujoco.importing.closures import TYPES, Closure, Frame, of_site
+from crosscheck.engines.mujoco.importing.groups import WORLD, Groups
+from crosscheck.engines.mujoco.importing.urdf import along
+from mbref.scene import GROUND, SceneError
+
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+SHORT = {"3d": "spherical", "6d": "fixed"}  # numbers of equations, as YAML files of parallel robots name them
+COINCIDENT = 1e-6  # of the model's extent
+GRAMMAR = "frame_a=frame_b[:type[:axis]] or a .yaml file"
+
+
+class Frames:
+    """The named frames of a model: bodies and sites."""
+
+    def __init__(self, mujoco: Any, model: Any, root: str):
+        self.mujoco, self.model, self.root = mujoco, model, root
+        kinds = mujoco.mjtObj
+        self._kinds = (kinds.mjOBJ_SITE, kinds.mjOBJ_BODY)
+
+    def find(self, name: str) -> Frame:
+        """The frame of a site, body or link; raises SceneError that names the nearest."""
+        if name in (GROUND, "world", self.root):
+            return Frame(WORLD, np.zeros(3), np.eye(3))
+        site, body = (self.mujoco.mj_name2id(self.model, kind, name) for kind in self._kinds)
+        if site >= 0:
+            return of_site(self.model, site)
+        if body < 0:
+            known = list(self.names())
+            near = difflib.get_close_matches(name, known, 1)
+            meant = f"; did you mean {near[0]!r}?" if near else f"; known: {', '.join(known)}"
+            raise SceneError([f"--close: no link, body or site {name!r}{meant}"])
+        return Frame(int(body), np.zeros(3), np.eye(3))
+
+    def names(self) -> Iterator[str]:
+        """The names of all bodies, then of all sites."""
+        model = self.model
+        for kind, count in zip(reversed(self._kinds), (model.nbody, model.nsite), strict=True):
+            yield from filter(None, (self.mujoco.mj_id2name(model, kind, k) for k in range(count)))
+
+
+def asked(options: Sequence[str], frames: Frames) -> Iterator[Closure]:
+    """The closures of ``--close`` options; raises SceneError, OSError."""
+    for text in options:
+        if text.endswith((".yaml", ".yml")):
+            yield from _of_yaml(Path(text), frames)
+        else:
+            yield _of_text(text, frames)
+
+
+def _of_text(text: str, frames: Frames) -> Closure:
+    pair, _, rest = text.partition(":")
+    kind, _, axis = rest.partition(":")
+    first, equals, second = pair.partition("=")
+    if not equals or not first or not second:
+        raise SceneError([f"--close {text}: must be {GRAMMAR}"])
+    return _closure(first, second, kind or "spherical", axis or "z", frames)
+
+
+def _closure(first: str, second: str, kind: str, axis: str, frames: Frames) -> Closure:
+    name, kind = f"{first}={second}", SHORT.get(kind.lower(), kind)
+    if kind not in TYPES:
+        raise SceneError([f"--close {name}: type {kind!r} is none of {', '.join((*TYPES, *SHORT))}"])
+    if axis not in AXES:
+        raise SceneError([f"--close {name}: axis {axis!r} is none of x, y, z (of both frames)"])
+    turn = along(np.array(AXES[axis]))
+    ends = [frames.find(end) for end in (first, second)]
+    a, b = (Frame(end.body, end.origin, end.axes @ turn) for end in ends)
+    return Closure(name, TYPES[kind], (a, b))
+
+
+def _of_yaml(path: Path, frames: Frames) -> Iterator[Closure]:
+    """``closed_loop: [[frame_a, frame_b], …]`` with ``type: [3d, …]`` and ``axis: [z, …]``, both optional."""
+    try:
+        import yaml
+    except ImportError:
+        raise SceneError([f"{path}: reading YAML needs pip install pyyaml"]) from None
+    try:
+        found = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except yaml.YAMLError as error:
+        raise SceneError([f"{path}: is no YAML: {' '.join(str(error).split())}"]) from None
+    pairs = found.get("closed_loop") if isinstance(found, dict) else None
+    if not isinstance(pairs, list) or not all(isinstance(p, list) and len(p) == 2 for p in pairs):
+        raise SceneError([f"{path}: closed_loop must be a list of pairs of frames"])
+    kinds = _as_many(found.get("type"), len(pairs), "spherical", path, "type")
+    axes = _as_many(found.get("axis"), len(pairs), "z", path, "axis")
+    for (first, second), kind, axis in zip(pairs, kinds, axes, strict=True):
+        yield _closure(str(first), str(second), str(kind), str(axis), frames)
+
+
+def _as_many(value: Any, count: int, default: str, path: Path, key: str) -> list[Any]:
+    value = [default] * count if value is None else value if isinstance(value, list) else [value] * count
+    if len(value) != count:
+        raise SceneError([f"{path}: {key} has {len(value)} entries for {count} loops"])
+    return list(value)
+
+
+def unclosed(
+    groups: Groups, data: Any, frames: Frames, closed: Sequence[Closure], extent: float
+) -> Iterator[str]:
+    """A sentence for every two frames without mass that coincide on bodies that nothing joins there."""
+    places = [(name, int(groups.of[f.body]), f.place(data)) for name, f in _marks(groups, frames)]
+    taken = [c.frames[0].place(data) for c in closed] + list(data.xanchor)
+    for i, (first, a, place) in enumerate(places):
+        for second, b, other in places[i + 1 :]:
+            near = COINCIDENT * extent
+            apart = a != b and np.linalg.norm(place - other) <= near
+            if apart and all(np.linalg.norm(place - t) > near for t in taken):
+                yield (
+                    f"frames {first!r} (on {groups.names[a]!r}) and {second!r} (on {groups.names[b]!r}) "
+                    f"coincide and nothing joins them; --close {first}={second} closes the loop"
+                )
+
+
+def _marks(groups: Groups, frames: Frames) -> Iterator[tuple[str, Frame]]:
+    """Named sites, and named bodies without mass or children that are fixed to another body."""
+    model = groups.model
+    parents = set(model.body_parentid[1:].tolist())
+    for b in range(1, model.nbody):
+        if model.body_mass[b] == 0 and not model.body_jntnum[b] and b not in parents and model.body(b).name:
+            yield model.body(b).name, Frame(b, np.zeros(3), np.eye(3))
+    for s in range(model.nsite):
+        if model.site(s).name:
+            yield model.site(s).name, of_site(model, s)

@@ -1,0 +1,231 @@
+"""Elementary motions between two bodies with mass, and the scene's joints with exactly these motions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.mujoco.importing.groups import WORLD, Groups
+from mbref.scene import (
+    Cylindrical,
+    Distance,
+    Joint,
+    Planar,
+    Revolute,
+    SceneError,
+    Spherical,
+    Translational,
+    Universal,
+)
+
+ALIGNED = 1e-9  # between unit vectors; and between points, of the model's extent
+RANK = 1e-9  # of the largest singular value of the motions: less is no further motion
+Made = list[tuple[type[Any], dict[str, Any]]]
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The motions of a group relative to the next group with mass that carries it.
+
+    ``kinds`` are free, ball, slide or hinge; ``anchors`` and ``axes`` (n, 3) are in the world, from the
+    carrying group to the carried one; ``joints`` are MuJoCo's numbers.
+    """
+
+    groups: tuple[int, int]
+    joints: tuple[int, ...]
+    kinds: tuple[str, ...]
+    anchors: np.ndarray
+    axes: np.ndarray
+
+
+def chains(mujoco: Any, groups: Groups, data: Any) -> Iterator[Chain]:
+    """The chain of every group with mass; raises SceneError where a group without mass carries several."""
+    for group in groups.massive:
+        joints, parent = groups.joints(group), groups.parent(group)
+        while not groups.mass[parent] > 0:
+            _refuse_branch(groups, parent)
+            joints, parent = [*groups.joints(parent), *joints], groups.parent(parent)
+        kinds = tuple(kind_of(mujoco, groups.model, j) for j in joints)
+        yield Chain((parent, group), tuple(joints), kinds, data.xanchor[joints], data.xaxis[joints])
+
+
+def kind_of(mujoco: Any, model: Any, joint: int) -> str:
+    """free, ball, slide or hinge."""
+    return str(mujoco.mjtJoint(model.jnt_type[joint]).name.removeprefix("mjJNT_").lower())
+
+
+def without_effect(groups: Groups) -> list[int]:
+    """Groups without mass that carry none, whose motion nothing determines."""
+
+    def carries(group: int) -> bool:
+        return any(groups.mass[child] > 0 or carries(child) for child in groups.children(group))
+
+    return [g for g in groups.members if g != WORLD and not groups.mass[g] > 0 and not carries(g)]
+
+
+def _refuse_branch(groups: Groups, group: int) -> None:
+    idle = without_effect(groups)
+    carried = [g for g in groups.children(group) if g not in idle]
+    if len(carried) > 1:
+        names = " and ".join(repr(groups.names[g]) for g in carried)
+        raise SceneError(
+            [f"body {groups.names[group]!r}: has no mass and carries {names}; a scene needs its mass"]
+        )
+
+
+def joints_of(chain: Chain, groups: Groups, extent: float) -> list[Joint]:
+    """The scene's joints with the motions of a chain; none for a free body.
+
+    Raises SceneError for motions that no joints of a scene have.
+    """
+    pair = (groups.names[chain.groups[0]], groups.names[chain.groups[1]])
+    made = _recognised(chain, extent)
+    if made is None:
+        raise SceneError([_refusal(chain, pair)])
+    own = [groups.model.joint(j).name for j in chain.joints]
+    name = next((n for n in own if n), f"{pair[1]} joint")
+    found: list[Joint] = []
+    for kind, places in made:
+        found.append(kind.at(name if not found else f"{name} {kind.__name__.lower()}", pair, **places))
+    return found
+
+
+def _refusal(chain: Chain, pair: tuple[str, str]) -> str:
+    between = "" if pair[0] == "ground" else f" on {pair[0]!r}"
+    return (
+        f"body {pair[1]!r}{between}: joints {', '.join(chain.kinds)} in a row have links without mass "
+        "between them, which no joints of a scene describe exactly; give each of these links its own mass"
+    )
+
+
+def _recognised(chain: Chain, extent: float) -> Made | None:
+    """Types of joints and their places; None where a scene has none."""
+    if _rank(chain, extent) < _freedoms(chain):
+        return None
+    for recognise in (_free, _single, _cylindrical, _universal, _spherical, _planar, _two_hinges, _rod):
+        found = recognise(chain, extent)
+        if found is not None:
+            return found
+    return None
+
+
+def _freedoms(chain: Chain) -> int:
+    return sum({"free": 6, "ball": 3}.get(kind, 1) for kind in chain.kinds)
+
+
+def _rank(chain: Chain, extent: float) -> int:
+    """Number of independent motions at the pose."""
+    twists: list[np.ndarray] = []
+    for kind, anchor, axis in zip(chain.kinds, chain.anchors, chain.axes, strict=True):
+        if kind in ("free", "slide"):
+            twists += [np.concatenate([v, np.zeros(3)]) for v in (np.eye(3) if kind == "free" else [axis])]
+        if kind != "slide":
+            turns = [axis] if kind == "hinge" else list(np.eye(3))
+            arm = (anchor - chain.anchors[0]) / extent
+            twists += [np.concatenate([np.cross(arm, w), w]) for w in turns]
+    sizes = np.linalg.svd(np.array(twists), compute_uv=False)
+    return int(np.sum(sizes > RANK * sizes[0]))
+
+
+def _free(chain: Chain, extent: float) -> Made | None:
+    return [] if _freedoms(chain) == 6 else None
+
+
+def _single(chain: Chain, extent: float) -> Made | None:
+    kinds: dict[str, type[Any]] = {"hinge": Revolute, "slide": Translational, "ball": Spherical}
+    if len(chain.kinds) != 1 or chain.kinds[0] not in kinds:
+        return None
+    return [(kinds[chain.kinds[0]], {"anchor": chain.anchors[0].tolist(), "axis": chain.axes[0].tolist()})]
+
+
+def _cylindrical(chain: Chain, extent: float) -> Made | None:
+    if sorted(chain.kinds) != ["hinge", "slide"] or not _parallel(chain.axes):
+        return None
+    turn = chain.kinds.index("hinge")
+    return [(Cylindrical, {"anchor": chain.anchors[turn].tolist(), "axis": chain.axes[turn].tolist()})]
+
+
+def _universal(chain: Chain, extent: float) -> Made | None:
+    if chain.kinds != ("hinge", "hinge") or abs(chain.axes[0] @ chain.axes[1]) > ALIGNED:
+        return None
+    point = _meeting(chain, slice(0, 2), extent)
+    return None if point is None else [(Universal, {"anchor": point, "axes": chain.axes.tolist()})]
+
+
+def _spherical(chain: Chain, extent: float) -> Made | None:
+    if chain.kinds != ("hinge",) * 3:
+        return None
+    point = _meeting(chain, slice(0, 3), extent)
+    return None if point is None else [(Spherical, {"anchor": point})]
+
+
+def _planar(chain: Chain, extent: float) -> Made | None:
+    """Three independent motions in a plane: hinges along its normal, slides across."""
+    turns = [k for k, kind in enumerate(chain.kinds) if kind == "hinge"]
+    slides = [k for k, kind in enumerate(chain.kinds) if kind == "slide"]
+    if len(chain.kinds) != 3 or len(turns) + len(slides) != 3 or not turns:
+        return None
+    normal = chain.axes[turns[0]]
+    across = np.abs(chain.axes[slides] @ normal).max(initial=0.0) <= ALIGNED
+    if not across or not _parallel(chain.axes[turns]):
+        return None
+    return [(Planar, {"anchor": chain.anchors[turns[-1]].tolist(), "axis": normal.tolist()})]
+
+
+def _two_hinges(chain: Chain, extent: float) -> Made | None:
+    """Parallel hinges apart: a rod without mass in a plane, which keeps their distance."""
+    if chain.kinds != ("hinge", "hinge") or not _parallel(chain.axes):
+        return None
+    first, second = chain.anchors
+    normal = chain.axes[0]
+    second = second - normal * (normal @ (second - first))
+    if np.linalg.norm(second - first) <= ALIGNED * extent:
+        return None
+    places = {"anchor": chain.anchors[1].tolist(), "axis": normal.tolist()}
+    return [(Planar, places), (Distance, {"anchors": (first.tolist(), second.tolist())})]
+
+
+def _rod(chain: Chain, extent: float) -> Made | None:
+    """Five rotations about two points: a rod without mass between them that keeps their distance."""
+    for turns in (2, 3):
+        points = [_centre(chain, part, extent) for part in _halves(chain, turns)]
+        if len(points) == 2 and points[0] is not None and points[1] is not None:
+            return [(Distance, {"anchors": (points[0], points[1])})]
+    return None
+
+
+def _halves(chain: Chain, turns: int) -> list[slice]:
+    """The first ``turns`` rotations of five and the rest, where no ball is divided."""
+    sizes = [{"hinge": 1, "ball": 3}.get(kind, 9) for kind in chain.kinds]
+    ends = np.cumsum(sizes)
+    if not len(ends) or ends[-1] != 5 or turns not in ends:
+        return []
+    k = int(np.flatnonzero(ends == turns)[0]) + 1
+    return [slice(0, k), slice(k, len(sizes))]
+
+
+def _centre(chain: Chain, part: slice, extent: float) -> list[float] | None:
+    kinds = chain.kinds[part]
+    return chain.anchors[part][0].tolist() if kinds == ("ball",) else _meeting(chain, part, extent)
+
+
+def _parallel(axes: np.ndarray) -> bool:
+    return bool(np.linalg.norm(np.cross(axes, axes[0]), axis=1).max() <= ALIGNED)
+
+
+def _meeting(chain: Chain, part: slice, extent: float) -> list[float] | None:
+    """The point (3,) where the lines of several hinges meet; None where they miss each other."""
+    axes, anchors = chain.axes[part], chain.anchors[part]
+    if len(axes) < 2:
+        return None
+    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    total = across.sum(axis=0)
+    if np.linalg.svd(total, compute_uv=False)[-1] <= ALIGNED:
+        return None
+    point = np.linalg.solve(total, np.einsum("kij,kj->i", across, anchors - anchors[0])) + anchors[0]
+    missed = np.linalg.norm(np.einsum("kij,kj->ki", across, anchors - point), axis=1).max()
+    found: list[float] = point.tolist()
+    return found if missed <= ALIGNED * extent else None

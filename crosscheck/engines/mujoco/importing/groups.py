@@ -1,0 +1,103 @@
+"""Bodies of a compiled model that are fixed to each other, as one body of a scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mbref import rotations
+from mbref.scene import GROUND, Body
+
+WORLD = 0  # MuJoCo's number of the world, and of the group that is fixed to it
+PLAIN = 1e-15  # of the largest moment: products of inertia below it are rounding
+
+
+@dataclass(frozen=True)
+class Placed:
+    """Centre of mass (3,), orientation (4,) and twist Jacobian (6, nv), world, of a group at a pose."""
+
+    position: np.ndarray
+    orientation: np.ndarray
+    jacobian: np.ndarray
+
+
+class Groups:
+    """The groups of bodies that no joint separates, by the number of their first body."""
+
+    def __init__(self, mujoco: Any, model: Any):
+        self.mujoco, self.model = mujoco, model
+        self.of = model.body_weldid.astype(int)
+        self.members: dict[int, list[int]] = {}
+        for b in range(model.nbody):
+            self.members.setdefault(int(self.of[b]), []).append(b)
+        self.mass = {g: float(model.body_mass[m].sum()) for g, m in self.members.items()}
+        self.mass[WORLD] = np.inf
+        self.names = {g: self._name(g) for g in self.members}
+
+    @property
+    def massive(self) -> list[int]:
+        """The groups with mass, without the world: the bodies of the scene."""
+        return [g for g in self.members if g != WORLD and self.mass[g] > 0]
+
+    def parent(self, group: int) -> int:
+        """The group that carries another."""
+        return int(self.of[self.model.body_parentid[group]])
+
+    def children(self, group: int) -> list[int]:
+        """The groups that one carries."""
+        return [g for g in self.members if g != WORLD and self.parent(g) == group]
+
+    def joints(self, group: int) -> list[int]:
+        """MuJoCo's joints between a group and its parent, in order."""
+        first = int(self.model.body_jntadr[group])
+        return list(range(first, first + int(self.model.body_jntnum[group])))
+
+    def name_of(self, body: int) -> str:
+        """The scene's body that holds MuJoCo's body."""
+        return self.names[int(self.of[body])]
+
+    def main(self, group: int) -> int:
+        """The body that names a group: its first if that has mass, otherwise its heaviest."""
+        masses = self.model.body_mass
+        heaviest = max(self.members[group], key=lambda b: float(masses[b]))
+        return group if masses[group] > 0 else int(heaviest)
+
+    def _name(self, group: int) -> str:
+        if group == WORLD:
+            return GROUND
+        b = self.main(group)
+        return self.model.body(b).name or f"body {b}"
+
+    def placed(self, data: Any, group: int) -> Placed:
+        """A group at the pose of the data, whose kinematics and centres MuJoCo has computed."""
+        masses = self.model.body_mass[self.members[group]]
+        centre = masses @ data.xipos[self.members[group]] / masses.sum()
+        jacobian = np.zeros((6, self.model.nv))
+        self.mujoco.mj_jac(self.model, data, jacobian[:3], jacobian[3:], centre, group)
+        return Placed(centre, data.xquat[self.main(group)].copy(), jacobian)
+
+    def body(self, data: Any, group: int, twist: np.ndarray | None) -> Body:
+        """A group as a body of a scene, with the velocities of a twist (6,) where one is given."""
+        at = self.placed(data, group)
+        turn = rotations.to_matrix(at.orientation)
+        inertia = turn.T @ self._inertia(data, group, at.position) @ turn
+        inertia = (inertia + inertia.T) / 2
+        plain = np.abs(inertia - np.diag(np.diag(inertia))).max() <= PLAIN * np.abs(inertia).max()
+        return Body(
+            name=self.names[group], mass=self.mass[group],
+            inertia=(np.diag(inertia) if plain else inertia).tolist(),
+            position=at.position.tolist(), orientation=at.orientation.tolist(),
+            velocity=None if twist is None else twist[:3].tolist(),
+            angular_velocity=None if twist is None else twist[3:].tolist(),
+        )  # fmt: skip
+
+    def _inertia(self, data: Any, group: int, centre: np.ndarray) -> np.ndarray:
+        """World inertia (3, 3) about the group's centre of mass, by Steiner's theorem."""
+        total = np.zeros((3, 3))
+        for b in self.members[group]:
+            axes, arm = data.ximat[b].reshape(3, 3), data.xipos[b] - centre
+            total += axes @ np.diag(self.model.body_inertia[b]) @ axes.T
+            total += self.model.body_mass[b] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+        return total

@@ -1,0 +1,127 @@
+"""Parts of a model that a scene does not have: those that change the motion, by kind, and mere notes."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mbref.scene import SceneError
+
+KINDS = {  # of parts that change the motion → what they are
+    "armature": "inertia of rotors, reflected to joint coordinates or tendons",
+    "couplings": "joint coordinates or tendons that follow others",
+    "damping": "dampers of joints and tendons that no load of a scene describes",
+    "flexible-bodies": "bodies that deform",
+    "fluid": "forces of a fluid around the bodies",
+    "friction": "dry friction of joints and tendons",
+    "gravity-compensation": "bodies whose weight is compensated",
+    "motors": "actuators with a control value",
+    "springs": "springs of joints and tendons that no load of a scene describes",
+}
+EVERYTHING = "everything"
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part that changes the motion and that the scene does not have: its kind and a sentence."""
+
+    kind: str
+    sentence: str
+
+
+def checked(without: Collection[str]) -> frozenset[str]:
+    """The kinds of parts to leave out; ValueError names an unknown one."""
+    for kind in without:
+        if kind not in (*KINDS, EVERYTHING):
+            raise ValueError(f"--without: {kind!r} is none of {', '.join((*KINDS, EVERYTHING))}")
+    return frozenset(KINDS) if EVERYTHING in without else frozenset(without)
+
+
+def refuse_others(parts: Collection[Part], without: frozenset[str]) -> None:
+    """Raises SceneError with every part whose kind is not to be left out."""
+    faults = [
+        f"{part.sentence}: it changes the motion; --without {part.kind} leaves it out"
+        for part in parts
+        if part.kind not in without
+    ]
+    if faults:
+        raise SceneError(faults)
+
+
+def of_model(mujoco: Any, model: Any, keyframe: int) -> Iterator[Part]:
+    """Armature, friction, fluid, compensation, flexible bodies, and motors that a keyframe controls."""
+    for kind, numbers in (("armature", model.dof_armature), ("friction", model.dof_frictionloss)):
+        if found := _joint_names(model, numbers):
+            yield Part(kind, f"{kind.replace('friction', 'dry friction')} of {_listed(found)}")
+    for kind, numbers in (("armature", model.tendon_armature), ("friction", model.tendon_frictionloss)):
+        if found := [model.tendon(int(k)).name or f"tendon {k}" for k in np.flatnonzero(numbers)]:
+            yield Part(kind, f"{kind} of tendons {_listed(found)}")
+    if model.opt.density or model.opt.viscosity:
+        yield Part("fluid", "the fluid around the bodies")
+    if found := [model.body(int(b)).name for b in np.flatnonzero(model.body_gravcomp)]:
+        yield Part("gravity-compensation", f"compensation of the weight of {_listed(found)}")
+    if model.nflex:
+        yield Part("flexible-bodies", f"{model.nflex} flexible bodies")
+    if keyframe >= 0 and (found := _controlled(model, keyframe)):
+        yield Part("motors", f"control values of {_listed(found)} in the keyframe")
+
+
+def _controlled(model: Any, keyframe: int) -> list[str]:
+    return [model.actuator(int(a)).name or f"actuator {a}" for a in np.flatnonzero(model.key_ctrl[keyframe])]
+
+
+def _joint_names(model: Any, numbers: np.ndarray) -> list[str]:
+    """Names of the joints whose coordinates (nv,) have a number that is not zero."""
+    joints = dict.fromkeys(int(j) for j in model.dof_jntid[np.flatnonzero(numbers)])
+    return [joint_name(model, j) for j in joints]
+
+
+def joint_name(model: Any, j: int) -> str:
+    """Name of a joint, or of its body and number where it has none."""
+    body = model.body(int(model.jnt_bodyid[j])).name or f"body {int(model.jnt_bodyid[j])}"
+    return repr(model.joint(j).name) if model.joint(j).name else f"joint {j} (of body {body!r})"
+
+
+def _listed(names: list[str], most: int = 6) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
+def notes(mujoco: Any, model: Any) -> Iterator[str]:
+    """Sentences about parts that a scene does not have and that do not change a motion without them."""
+    touching = int(np.sum((model.geom_contype != 0) | (model.geom_conaffinity != 0)))
+    servos = int(np.sum(np.any(model.actuator_biasprm != 0, axis=1))) if model.nu else 0
+    counts = {
+        "contact pairs": model.npair, "plugins": model.nplugin, "motion-capture bodies": model.nmocap,
+        "geoms that could touch others": touching if touching > 1 else 0, "sensors": model.nsensor,
+        "sites that hold nothing": model.nsite - len(_holding_sites(mujoco, model)),
+        "limits of tendons": int(np.sum(model.tendon_limited != 0)),
+        "limits of joints": int(np.sum(model.jnt_limited != 0)),
+    }  # fmt: skip
+    if model.nu:
+        yield f"{model.nu} actuators{f', {servos} of them servos' if servos else ''}: the scene has no motors"
+    yield from (f"{number} {what}" for what, number in counts.items() if number)
+    if model.neq:
+        yield "the softness of equalities (solref, solimp): a scene's joints are exact"
+    if model.nkey:
+        yield f"{model.nkey} keyframes: --keyframe NAME begins at one"
+
+
+def _holding_sites(mujoco: Any, model: Any) -> set[int]:
+    """The sites at the ends of equalities and tendons."""
+    ends = model.eq_objtype == int(mujoco.mjtObj.mjOBJ_SITE)
+    wrapped = model.wrap_type == int(mujoco.mjtWrap.mjWRAP_SITE)
+    return {*model.eq_obj1id[ends], *model.eq_obj2id[ends], *model.wrap_objid[wrapped]}
+
+
+def stripped(model: Any) -> None:
+    """Take out of the model, in place, the parts of ``of_model`` that its matrices contain."""
+    for numbers in (
+        model.dof_armature, model.tendon_armature, model.dof_frictionloss, model.tendon_frictionloss,
+        model.body_gravcomp,
+    ):  # fmt: skip
+        numbers[...] = 0
+    model.opt.density = model.opt.viscosity = 0.0

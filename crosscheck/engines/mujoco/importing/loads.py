@@ -1,0 +1,88 @@
+"""Springs and dampers of joints and tendons as loads of a scene, and those that no load describes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.mujoco.importing.chains import kind_of
+from crosscheck.engines.mujoco.importing.groups import Groups
+from crosscheck.engines.mujoco.importing.left_out import Part, joint_name
+from mbref.scene import Joint, Load, Spring, TorsionSpring
+
+
+def of_joints(mujoco: Any, model: Any, data: Any, joint_of: Mapping[int, Joint]) -> Iterator[Load | Part]:
+    """A torsion spring of every hinge with stiffness or damping; others are parts to leave out.
+
+    ``joint_of`` has the scene's joint of a MuJoCo joint, where it is the whole of it.
+    """
+    for j in range(model.njnt):
+        stiffness, damping = _springs(mujoco, model, j)
+        if not stiffness and not damping:
+            continue
+        q, joint = int(model.jnt_qposadr[j]), joint_of.get(j)
+        if joint is None or not joint.facts.takes_torsion_spring or kind_of(mujoco, model, j) != "hinge":
+            yield from _unknown(model, j, bool(stiffness), bool(damping))
+            model.jnt_stiffness[j] = 0
+            model.dof_damping[_dofs(model, j)] = 0
+            continue
+        angle = float(model.qpos_spring[q] - data.qpos[q]) if stiffness else 0.0
+        yield TorsionSpring(joint=joint.name, stiffness=stiffness, damping=damping, natural_angle=angle)
+    yield from _polynomials(model)
+
+
+def _springs(mujoco: Any, model: Any, j: int) -> tuple[float, float]:
+    """Stiffness and damping of a joint, zero where the file disables them."""
+    flags, disabled = mujoco.mjtDisableBit, model.opt.disableflags
+    stiffness = 0.0 if disabled & flags.mjDSBL_SPRING else float(model.jnt_stiffness[j])
+    damping = 0.0 if disabled & flags.mjDSBL_DAMPER else float(model.dof_damping[model.jnt_dofadr[j]])
+    return stiffness, damping
+
+
+def _unknown(model: Any, j: int, stiff: bool, damped: bool) -> Iterator[Part]:
+    if stiff:
+        yield Part("springs", f"stiffness of joint {joint_name(model, j)}")
+    if damped:
+        yield Part("damping", f"damping of joint {joint_name(model, j)}")
+
+
+def _dofs(model: Any, j: int) -> slice:
+    first = int(model.jnt_dofadr[j])
+    return slice(first, first + int(np.sum(model.dof_jntid == j)))
+
+
+def _polynomials(model: Any) -> Iterator[Part]:
+    """Stiffness and damping that are no constants."""
+    for kind, numbers, joint in (
+        ("springs", model.jnt_stiffnesspoly, np.arange(model.njnt)),
+        ("damping", model.dof_dampingpoly, model.dof_jntid),
+    ):
+        found = np.any(np.reshape(numbers, (len(numbers), -1)), axis=1) if len(numbers) else np.zeros(0, bool)
+        for j in dict.fromkeys(int(j) for j in joint[found]):
+            yield Part(kind, f"polynomial {kind} of joint {joint_name(model, j)}")
+        numbers[...] = 0
+
+
+def of_tendons(mujoco: Any, model: Any, data: Any, groups: Groups) -> Iterator[Load | Part]:
+    """A spring of every tendon between two sites that has stiffness or damping."""
+    for k in range(model.ntendon):
+        stiffness, damping = float(model.tendon_stiffness[k]), float(model.tendon_damping[k])
+        if not stiffness and not damping:
+            continue
+        wraps = range(int(model.tendon_adr[k]), int(model.tendon_adr[k] + model.tendon_num[k]))
+        low, high = model.tendon_lengthspring[k]
+        plain = all(model.wrap_type[w] == mujoco.mjtWrap.mjWRAP_SITE for w in wraps)
+        name = model.tendon(k).name or f"tendon {k}"
+        if len(wraps) != 2 or not plain or (low != high and stiffness):
+            kind = "springs" if stiffness else "damping"
+            yield Part(kind, f"tendon {name!r}, which is no spring between two sites")
+            model.tendon_stiffness[k] = model.tendon_damping[k] = 0
+            continue
+        sites = [int(model.wrap_objid[w]) for w in wraps]
+        bodies: Any = tuple(groups.name_of(int(model.site_bodyid[s])) for s in sites)
+        yield Spring(
+            bodies=bodies, points=tuple(data.site_xpos[s].tolist() for s in sites),
+            natural_length=float(low), stiffness=stiffness, damping=damping,
+        )  # fmt: skip

@@ -1,0 +1,156 @@
+"""The pose at which a model is read: its reference, a keyframe or given coordinates, with closed loops."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.mujoco.importing.chains import kind_of
+from crosscheck.engines.mujoco.importing.closures import Closure
+from mbref.scene import SceneError
+
+CLOSED = 1e-12  # of the model's extent, and rad: loops are closed
+ROUNDED = 1e-9  # the same where Newton's method ends above CLOSED, at a position that is nearly singular
+ITERATIONS = 200
+LONGEST = 0.2  # rad, and m of the extent: largest change of a coordinate in an iteration
+RANK = 1e-9  # of the largest singular value: smaller ones belong to redundant rows
+
+
+@dataclass(frozen=True)
+class JointRow:
+    """A joint coordinate that follows another one: q = offset + ratio · q₂, both from the reference."""
+
+    name: str
+    joints: tuple[int, int]  # MuJoCo's numbers; the second is -1 for a constant
+    offset: float
+    ratio: float
+
+
+class Poses:
+    """Poses of a model: every one with its loops closed."""
+
+    def __init__(
+        self, mujoco: Any, model: Any, closures: Sequence[Closure], rows: Sequence[JointRow], extent: float
+    ):
+        self.mujoco, self.model, self.data = mujoco, model, mujoco.MjData(model)
+        self.closures, self.joint_rows, self.extent = closures, rows, extent
+        self.held: list[int] = []  # velocities' numbers of coordinates that a pose gives
+
+    def start(self, keyframe: str, pose: Mapping[str, float]) -> None:
+        """Begin at a keyframe, or the reference, with given joint coordinates; raises SceneError."""
+        model, data = self.model, self.data
+        data.qpos[:] = model.qpos0
+        if keyframe:
+            k = _found(self.mujoco, model, self.mujoco.mjtObj.mjOBJ_KEY, "keyframe", keyframe, model.nkey)
+            data.qpos[:], data.qvel[:] = model.key_qpos[k], model.key_qvel[k]
+        for name, value in pose.items():
+            j = _found(self.mujoco, model, self.mujoco.mjtObj.mjOBJ_JOINT, "joint", name, model.njnt)
+            if kind_of(self.mujoco, model, j) not in ("hinge", "slide"):
+                raise SceneError([f"--pose {name}: has several coordinates; only hinges and slides have one"])
+            data.qpos[model.jnt_qposadr[j]] = value
+            self.held.append(int(model.jnt_dofadr[j]))
+        self.place()
+
+    def place(self) -> None:
+        """Compute places of bodies and joints at the data's coordinates."""
+        self.mujoco.mj_kinematics(self.model, self.data)
+        self.mujoco.mj_comPos(self.model, self.data)
+
+    def gaps(self) -> dict[str, float]:
+        """Largest residual (m or rad) of every closure and coupled coordinate at the pose."""
+        found = {c.name: float(np.abs(c.gap(self.data)).max()) for c in self.closures}
+        return found | {row.name: abs(self._residual(row)) for row in self.joint_rows}
+
+    def close(self) -> None:
+        """Move the coordinates, in the metric of the masses, until all loops are closed.
+
+        Coordinates of ``--pose`` stay where the loops allow it.  Raises SceneError with the gap that is left.
+        """
+        start = self.data.qpos.copy()
+        if self._newton(self.held):
+            return
+        if self.held:
+            self.data.qpos[:] = start
+            self.place()
+            if self._newton([]):
+                return
+        name, gap = max(self.gaps().items(), key=lambda item: item[1])
+        raise SceneError(
+            [
+                f"closure {name!r}: cannot be closed from this pose; the least gap found is {gap:.3g} m "
+                "or rad; begin at another pose with --pose joint=value or --keyframe NAME"
+            ]
+        )
+
+    def _newton(self, held: list[int]) -> bool:
+        for _ in range(ITERATIONS):
+            r, rows = self.residuals(), self.jacobian()
+            if not np.abs(r).max(initial=0.0) > CLOSED * max(self.extent, 1.0):
+                return True
+            step = self._step(r, rows, held)
+            size = np.abs(step).max()
+            if not size > 1e-15:
+                break
+            step *= min(1.0, LONGEST * min(1.0, self.extent) / size)
+            self.mujoco.mj_integratePos(self.model, self.data.qpos, step, 1.0)
+            self.place()
+        return bool(np.abs(self.residuals()).max() <= ROUNDED * max(self.extent, 1.0))
+
+    def _step(self, r: np.ndarray, rows: np.ndarray, held: list[int]) -> np.ndarray:
+        """The least change (nv,) in the metric of the masses that closes the linearised loops."""
+        free = [k for k in range(self.model.nv) if k not in held]
+        mass = self.mass()[np.ix_(free, free)]
+        root = np.linalg.cholesky(mass + 1e-9 * np.trace(mass) / len(free) * np.eye(len(free)))
+        weighted = np.linalg.solve(root, rows[:, free].T).T
+        step = np.zeros(self.model.nv)
+        step[free] = np.linalg.solve(root.T, -np.linalg.pinv(weighted, rcond=RANK) @ r)
+        return step
+
+    def mass(self) -> np.ndarray:
+        """MuJoCo's mass matrix (nv, nv) at the pose."""
+        self.mujoco.mj_makeM(self.model, self.data)
+        found = np.zeros((self.model.nv, self.model.nv))
+        self.mujoco.mj_fullM(self.model, self.data, found)
+        return found
+
+    def residuals(self) -> np.ndarray:
+        """Residuals of all closures and coupled coordinates, m and rad."""
+        parts = [c.gap(self.data) for c in self.closures] + [[self._residual(r)] for r in self.joint_rows]
+        return np.concatenate([np.zeros(0), *parts])
+
+    def jacobian(self) -> np.ndarray:
+        """Jacobian (rows, nv) of the residuals."""
+        found = [c.rows(self.mujoco, self.model, self.data) for c in self.closures]
+        return np.vstack([np.zeros((0, self.model.nv)), *found, *map(self.joint_row, self.joint_rows)])
+
+    def joint_row(self, row: JointRow) -> np.ndarray:
+        """Jacobian (1, nv) of a coupled coordinate."""
+        found, (first, second) = np.zeros((1, self.model.nv)), row.joints
+        found[0, self.model.jnt_dofadr[first]] = 1.0
+        if second >= 0:
+            found[0, self.model.jnt_dofadr[second]] -= row.ratio
+        return found
+
+    def _residual(self, row: JointRow) -> float:
+        first, second = row.joints
+        return self._moved(first) - row.offset - (row.ratio * self._moved(second) if second >= 0 else 0.0)
+
+    def _moved(self, joint: int) -> float:
+        address = self.model.jnt_qposadr[joint]
+        return float(self.data.qpos[address] - self.model.qpos0[address])
+
+
+def _found(mujoco: Any, model: Any, kind: Any, what: str, name: str, count: int) -> int:
+    """Number of a named object; SceneError lists the names."""
+    number = int(mujoco.mj_name2id(model, kind, name))
+    if number < 0:
+        known = [str(mujoco.mj_id2name(model, kind, k) or "") for k in range(count)]
+        near = difflib.get_close_matches(name, known, 1)
+        meant = f"; did you mean {near[0]!r}?" if near else ""
+        listed = ", ".join(filter(None, known)) or "none"
+        raise SceneError([f"--{what.replace('joint', 'pose')}: no {what} {name!r}; known: {listed}{meant}"])
+    return number

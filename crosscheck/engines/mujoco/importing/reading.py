@@ -1,0 +1,270 @@
+"""MJCF and URDF as scenes: bodies, joints, closures, springs and gravity of the compiled model.
+
+Bodies that are fixed to each other are one body of the scene.  Its frame has the origin at the centre of mass
+and the axes of the file's body.  A scene is given back only after its matrices agree with the model's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.mujoco.importing import left_out, loads, urdf
+from crosscheck.engines.mujoco.importing.agreement import Agreement
+from crosscheck.engines.mujoco.importing.asked_closures import Frames, asked, unclosed
+from crosscheck.engines.mujoco.importing.chains import chains, joints_of, without_effect
+from crosscheck.engines.mujoco.importing.closures import Closure, of_equalities
+from crosscheck.engines.mujoco.importing.groups import Groups
+from crosscheck.engines.mujoco.importing.left_out import Part
+from crosscheck.engines.mujoco.importing.posing import JointRow, Poses
+from mbref.formats import Imported, ImportOptions
+from mbref.scene import GROUND, Body, Driver, Joint, Scene, SceneError
+
+OPEN = 1e-6  # of the model's extent: a closure that was open wider at the start is reported
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file that was read: the scene, and MuJoCo's model of it at the pose of the scene.
+
+    ``model`` is without the parts that were left out; ``qpos`` and ``qvel`` are its coordinates.
+    """
+
+    imported: Imported
+    model: Any
+    qpos: np.ndarray
+    qvel: np.ndarray
+
+
+def read(path: Path, options: ImportOptions) -> Imported:
+    """The scene of a .xml (MJCF) or .urdf file; raises as ``source``."""
+    return source(path, options).imported
+
+
+def source(path: Path, options: ImportOptions) -> Source:
+    """The scene and the model of a .xml (MJCF) or .urdf file; raises SceneError, ValueError, OSError.
+
+    SceneError names a part that changes the motion and that a scene does not have, a loop that cannot be
+    closed, or a part in which the scene and the compiled model disagree.
+    """
+    import mujoco
+
+    without = left_out.checked(options.without)
+    model, text = _compiled(mujoco, path)
+    if model.nbody < 2:  # the first is the world
+        raise SceneError([f"{path}: has no body"])
+    reader = _Reader(mujoco, model, text, options)
+    if not reader.groups.massive:
+        raise SceneError([f"{path}: has no body that moves"])
+    reader.read()
+    left_out.refuse_others(reader.parts, without)
+    scene, data = reader.scene(path.stem), reader.poses.data
+    state = data.qpos.copy(), data.qvel.copy()
+    left_out.stripped(model)
+    Agreement(mujoco, model, reader.groups, reader.poses).check(scene, reader.tree)
+    wanted = tuple(f"{part.sentence} (--without {part.kind})" for part in reader.parts)
+    imported = Imported(scene, (*wanted, *left_out.notes(mujoco, model)), tuple(reader.notes))
+    return Source(imported, model, *state)
+
+
+def _compiled(mujoco: Any, path: Path) -> tuple[Any, urdf.Text | None]:
+    """The compiled model, and the text of a URDF."""
+    try:
+        if path.suffix != ".urdf":
+            path.read_bytes()  # raises OSError, which MuJoCo does not
+            return mujoco.MjModel.from_xml_path(str(path)), None
+        text = urdf.prepared(path.read_text(encoding="utf-8"))
+        model = mujoco.MjModel.from_xml_string(text.text)
+    except ValueError as error:
+        raise SceneError([f"{path}: MuJoCo cannot read it: {' '.join(str(error).split())}"]) from None
+    text.take_back(mujoco, model)
+    return model, text
+
+
+def _renamed(joints: list[Joint]) -> Iterator[Joint]:
+    """Joints with names of their own: a second one of a name gets a number."""
+    seen: set[str] = set()
+    for joint in joints:
+        name, number = joint.name, 2
+        while name in seen:
+            name, number = f"{joint.name} {number}", number + 1
+        seen.add(name)
+        yield joint.model_copy(update={"name": name})
+
+
+@dataclass
+class _Reader:
+    """A compiled model, and what was read of it."""
+
+    mujoco: Any
+    model: Any
+    text: urdf.Text | None
+    options: ImportOptions
+    parts: list[Part] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    rows: list[JointRow] = field(default_factory=list)
+    joints: list[Joint] = field(default_factory=list)
+    drivers: list[Driver] = field(default_factory=list)
+    loads: list[Any] = field(default_factory=list)
+    tree: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.groups = Groups(self.mujoco, self.model)
+
+    def read(self) -> None:
+        """Read everything, at a pose with closed loops."""
+        mujoco, model = self.mujoco, self.model
+        closures = self._closures()
+        self.poses = Poses(mujoco, model, closures, self.rows, _extent(mujoco, model))
+        self.poses.start(self.options.keyframe, self.options.pose)
+        self._close()
+        self._read_joints(closures)
+        self._read_loads()
+        key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, self.options.keyframe or "\0")
+        self.parts += left_out.of_model(mujoco, model, key)
+        if self.text is not None:
+            self.parts += urdf.couplings(self.text.root)
+        self.notes += unclosed(self.groups, self.poses.data, self.frames, closures, self.poses.extent)
+
+    def scene(self, name: str) -> Scene:
+        """The scene of the parts that were read."""
+        gravity_off = self.model.opt.disableflags & self.mujoco.mjtDisableBit.mjDSBL_GRAVITY
+        return Scene(
+            name=name, gravity=(0.0, 0.0, 0.0) if gravity_off else self.model.opt.gravity.tolist(),
+            body=tuple(self._bodies()), joint=tuple(self.joints), driver=tuple(self.drivers),
+            load=tuple(self.loads),
+        )  # fmt: skip
+
+    def _bodies(self) -> Iterator[Body]:
+        data = self.poses.data
+        for g in self.groups.massive:
+            twist = self.groups.placed(data, g).jacobian @ data.qvel if np.any(data.qvel) else None
+            yield self.groups.body(data, g, twist)
+
+    def _closures(self) -> list[Closure]:
+        """The closures of the file and of the user; joint rows are noted beside."""
+        reference = self.mujoco.MjData(self.model)
+        self.mujoco.mj_kinematics(self.model, reference)
+        root = _root_link(self.text)
+        self.frames = Frames(self.mujoco, self.model, root)
+        found = [] if self._disabled("EQUALITY") else list(of_equalities(self.mujoco, self.model))
+        if self.text is not None:
+            found += urdf.loops(self.text.root, lambda name: self.frames.find(name).body, reference)
+        found += asked(self.options.close, self.frames)
+        if not self._disabled("EQUALITY"):
+            self._read_equalities()
+        return [c for c in found if self._between_groups(c)]
+
+    def _disabled(self, what: str) -> bool:
+        bits = self.mujoco.mjtDisableBit
+        flags = bits.mjDSBL_CONSTRAINT | getattr(bits, f"mjDSBL_{what}")
+        return bool(self.model.opt.disableflags & flags)
+
+    def _between_groups(self, closure: Closure) -> bool:
+        first, second = (int(self.groups.of[frame.body]) for frame in closure.frames)
+        if first == second:
+            self.notes.append(f"closure {closure.name!r}: both sides are on {self.groups.names[first]!r}")
+        return first != second
+
+    def _read_equalities(self) -> None:
+        """Equalities of joints and others: locked coordinates are rows, all others are parts to leave out."""
+        kinds, model = self.mujoco.mjtEq, self.model
+        for e in range(model.neq):
+            name, kind = model.equality(e).name or f"equality {e}", model.eq_type[e]
+            if not model.eq_active0[e]:
+                self.notes.append(f"equality {name!r} is not active: it is no part of the scene")
+            elif kind == kinds.mjEQ_JOINT and model.eq_obj2id[e] < 0:
+                self.rows.append(
+                    JointRow(name, (int(model.eq_obj1id[e]), -1), float(model.eq_data[e, 0]), 0.0)
+                )
+            elif kind != kinds.mjEQ_CONNECT and kind != kinds.mjEQ_WELD:
+                what = kinds(kind).name.removeprefix("mjEQ_").lower()
+                self.parts.append(Part("couplings", f"equality {name!r} of type {what}"))
+                model.eq_active0[e] = 0
+
+    def _close(self) -> None:
+        """Close the loops and report how wide they were open."""
+        wide = {n: gap for n, gap in self.poses.gaps().items() if gap > OPEN * self.poses.extent}
+        self.poses.close()
+        for name, gap in wide.items():
+            self.notes.append(
+                f"closure {name!r} was open by {gap:.3g} m or rad; the joints moved to close it"
+            )
+        self._keep_velocities()
+
+    def _keep_velocities(self) -> None:
+        """Velocities of a keyframe, less the parts that the closures forbid."""
+        data = self.poses.data
+        if np.any(data.qvel):
+            rows = self.poses.jacobian()
+            data.qvel[:] -= np.linalg.pinv(rows, rcond=1e-9) @ (rows @ data.qvel) if len(rows) else 0.0
+
+    def _read_joints(self, closures: list[Closure]) -> None:
+        data, extent = self.poses.data, self.poses.extent
+        self.joint_of: dict[int, Joint] = {}
+        idle = without_effect(self.groups)
+        for g in idle:
+            self.notes.append(
+                f"body {self.groups.names[g]!r} has no mass and carries none: its motion has no effect"
+            )
+        found: list[Joint] = []
+        whole: dict[int, int] = {}
+        for chain in chains(self.mujoco, self.groups, data):
+            joints = joints_of(chain, self.groups, extent)
+            whole.update({j: len(found) for j in chain.joints if len(joints) == 1})
+            found += joints
+        count = len(found)
+        found += [c.joint(data, self.groups) for c in closures]
+        self.joints = list(_renamed(found))
+        self.tree = [joint.name for joint in self.joints[:count]]
+        self.joint_of = {j: self.joints[k] for j, k in whole.items()}
+        self._read_merged()
+        self._lock()
+
+    def _read_merged(self) -> None:
+        for members in self.groups.members.values():
+            main = self.groups.main(members[0])
+            heavy = [b for b in members if b != main and self.model.body_mass[b] > 0 and members[0]]
+            if heavy:
+                names = ", ".join(repr(self.model.body(b).name) for b in heavy)
+                self.notes.append(f"fixed to {self.groups.name_of(main)!r} and part of it: {names}")
+
+    def _lock(self) -> None:
+        """A locked coordinate is a driver that stands still; raises SceneError where a scene has none."""
+        for row in self.rows:
+            joint = self.joint_of.get(row.joints[0])
+            driven = joint is not None and joint.facts.driven and joint.type != "cylindrical"
+            if joint is None or not driven:
+                name = left_out.joint_name(self.model, row.joints[0])
+                raise SceneError(
+                    [f"equality {row.name!r}: locks {name}, which is no hinge or slide of its own"]
+                )
+            self.drivers.append(Driver(joint=joint.name))
+
+    def _read_loads(self) -> None:
+        mujoco, model, data = self.mujoco, self.model, self.poses.data
+        both = [
+            *loads.of_joints(mujoco, model, data, self.joint_of),
+            *loads.of_tendons(mujoco, model, data, self.groups),
+        ]
+        self.parts += [part for part in both if isinstance(part, Part)]
+        self.loads += [load for load in both if not isinstance(load, Part)]
+
+
+def _root_link(text: urdf.Text | None) -> str:
+    """The link of a URDF that no joint carries, which MuJoCo fixes to the world."""
+    if text is None:
+        return GROUND
+    carried = {child.get("link") for child in text.root.iter("child")}
+    return next((str(k.get("name")) for k in text.root.iter("link") if k.get("name") not in carried), GROUND)
+
+
+def _extent(mujoco: Any, model: Any) -> float:
+    """Largest distance along an axis between centres of mass at the reference position (m)."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return max(float(np.ptp(data.xipos, axis=0).max()), 1e-3)

@@ -1,0 +1,145 @@
+"""URDF: a text that MuJoCo can compile, links with too little inertia for it, loops and coupled joints."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.mujoco.importing.closures import TYPES, Closure, Frame
+from crosscheck.engines.mujoco.importing.left_out import Part
+from mbref.scene import SceneError
+
+PARTS = (
+    "visual", "collision", "loop", "coupling", "transmission", "gazebo", "ros2_control", "mimic", "mujoco",
+)  # fmt: skip
+LEAST = 1e-12  # kg and kg m²: MuJoCo compiles no moving body with less
+BodyOf = Callable[[str], int]
+
+
+@dataclass(frozen=True)
+class Text:
+    """A URDF for MuJoCo, and the inertia that was added to links, by link: mass and moments."""
+
+    text: str
+    added: dict[str, tuple[float, float]]
+    root: ET.Element
+
+    def take_back(self, mujoco: Any, model: Any) -> None:
+        """Take the added masses and moments out of the compiled model."""
+        for link, (mass, moment) in self.added.items():
+            b = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, link)
+            if b > 0:
+                model.body_mass[b] = max(model.body_mass[b] - mass, 0.0)
+                model.body_inertia[b] = np.maximum(model.body_inertia[b] - moment, 0.0)
+        model.body_subtreemass[:] = model.body_mass
+        for b in range(model.nbody - 1, 0, -1):
+            model.body_subtreemass[model.body_parentid[b]] += model.body_subtreemass[b]
+
+
+def prepared(text: str) -> Text:
+    """The URDF without shapes, loops and actuators; links are not merged."""
+    try:
+        root, whole = ET.fromstring(text), ET.fromstring(text)
+    except ET.ParseError as error:
+        raise SceneError([f"URDF: is no XML: {error}"]) from None
+    for parent in list(root.iter()):
+        for child in [c for c in parent if c.tag in PARTS]:
+            parent.remove(child)
+    added = {str(link.get("name")): _enough(link) for link in root.iter("link")}
+    options = ET.SubElement(ET.SubElement(root, "mujoco"), "compiler")
+    options.attrib.update(fusestatic="false", discardvisual="true", balanceinertia="false")
+    moved = {name: more for name, more in added.items() if more != (0.0, 0.0)}
+    return Text(ET.tostring(root, encoding="unicode"), moved, whole)
+
+
+def _enough(link: ET.Element) -> tuple[float, float]:
+    """Add inertia to a link that MuJoCo would refuse; the mass and the moment about every axis added."""
+    inertial = link.find("inertial")
+    inertial = ET.SubElement(link, "inertial") if inertial is None else inertial
+    mass = _part(inertial, "mass", {"value": "0"})
+    inertia = _part(inertial, "inertia", dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), "0"))
+    x, y, z = "ixx", "iyy", "izz"
+    matrix = np.array(
+        [[float(inertia.get("".join(("i", *sorted(a + b)))) or 0.0) for b in "xyz"] for a in "xyz"]
+    )
+    moments = np.linalg.eigvalsh(matrix)
+    heavy = float(mass.get("value") or 0.0)
+    more = 1.0 if heavy < LEAST else 0.0
+    moment = (float(moments[-1]) or 1.0) if moments[0] < max(LEAST, 1e-9 * moments[-1]) else 0.0
+    mass.set("value", repr(heavy + more))
+    for k, key in enumerate((x, y, z)):
+        inertia.set(key, repr(float(matrix[k, k]) + moment))
+    return more, moment
+
+
+def _part(element: ET.Element, tag: str, default: dict[str, str]) -> ET.Element:
+    found = element.find(tag)
+    return ET.SubElement(element, tag, default) if found is None else found
+
+
+def couplings(root: ET.Element) -> Iterator[Part]:
+    """Joints that follow others: ``<mimic>``, and ``<coupling>`` of URDF+."""
+    for joint in root.iter("joint"):
+        if (mimic := joint.find("mimic")) is not None:
+            ratio, offset = mimic.get("multiplier", "1"), mimic.get("offset", "0")
+            says = f"joint {joint.get('name')!r} mimics {mimic.get('joint')!r} ({ratio} q + {offset})"
+            yield Part("couplings", says)
+    for coupling in root.iter("coupling"):
+        yield Part("couplings", f"coupling {coupling.get('name', '')!r}")
+
+
+def loops(root: ET.Element, body_of: BodyOf, data: Any) -> Iterator[Closure]:
+    """The closures of the loops, at their predecessors' origins, as the reference position has them.
+
+    ``<loop name type><predecessor link><origin/></predecessor><successor link>…</successor><axis/></loop>``,
+    the axis in the predecessor's origin frame.  Raises SceneError for an unknown type or link.
+    """
+    for loop in root.iter("loop"):
+        name, kind = loop.get("name", "loop"), loop.get("type", "")
+        if kind not in TYPES:
+            raise SceneError([f"loop {name!r}: type {kind!r} is none of {', '.join(TYPES)}"])
+        first, second = (_end(loop, side, body_of, name) for side in ("predecessor", "successor"))
+        axis = first.axes @ _numbers(loop.find("axis"), "xyz", (1.0, 0.0, 0.0))
+        first = Frame(first.body, first.origin, along(axis))
+        turn = data.xmat[second.body].reshape(3, 3).T @ first.turn(data)
+        yield Closure(name, TYPES[kind], (first, Frame(second.body, second.origin, turn)))
+
+
+def along(axis: np.ndarray) -> np.ndarray:
+    """Axes (3, 3) of a frame whose z is along an axis."""
+    z = axis / np.linalg.norm(axis)
+    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def _end(loop: ET.Element, side: str, body_of: BodyOf, name: str) -> Frame:
+    """The frame of one side of a loop."""
+    found = loop.find(side)
+    if found is None or not found.get("link"):
+        raise SceneError([f"loop {name!r}: names no {side}"])
+    origin = found.find("origin")
+    turn = _roll_pitch_yaw(_numbers(origin, "rpy", (0.0, 0.0, 0.0)))
+    return Frame(body_of(str(found.get("link"))), _numbers(origin, "xyz", (0.0, 0.0, 0.0)), turn)
+
+
+def _numbers(element: Any, key: str, default: tuple[float, float, float]) -> np.ndarray:
+    text = element.get(key) if element is not None else None
+    return np.array([float(word) for word in text.split()] if text else default)
+
+
+def _roll_pitch_yaw(angles: np.ndarray) -> np.ndarray:
+    """Rotation matrix of fixed-axis angles about x, y, z."""
+    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a), math.sin(a)) for a in angles)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )

@@ -1,0 +1,317 @@
+"""Imported scenes / the file's own compiled model: accelerations, idioms of robot files, open loops."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from crosscheck.engines.mujoco.importing.agreement import Agreement
+from crosscheck.engines.mujoco.importing.reading import Source, _Reader, source
+from crosscheck.judge.gauss_principle import gauss, rank
+from mbref.formats import ImportOptions
+from mbref.scene import SceneError
+from tests.crosscheck import random_models
+
+SAME = 1e-8  # of the largest acceleration; worst measured 2e-10
+
+
+def accelerations(found: Source, loops=()) -> np.ndarray:
+    """(2 nb, 3) of the scene's bodies at its pose, by MuJoCo's matrices; ``loops`` are spherical closures."""
+    model, data = found.model, mujoco.MjData(found.model)
+    data.qpos[:], data.qvel[:] = found.qpos, found.qvel
+    for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_tendon, mujoco.mj_makeM):
+        stage(model, data)
+    mujoco.mj_makeConstraint(model, data)
+    mujoco.mj_fwdVelocity(model, data)
+    rows = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
+    jacobian = [data.efc_J[: data.nefc * model.nv].reshape(data.nefc, model.nv)[rows]]
+    for first, a, second, b in loops:
+        ends = [point_jacobian(model, data, name, local=p) for name, p in ((first, a), (second, b))]
+        jacobian.append(ends[1] - ends[0])
+    held = constrained(model, data, np.vstack(jacobian))
+    linear, angular = [], []
+    for body in found.imported.scene.body:
+        to_point = point_jacobian(model, data, body.name, world=np.array(body.position), turns=True)
+        linear.append(to_point[:3] @ held)
+        angular.append(to_point[3:] @ held)
+    return np.array([*linear, *angular])
+
+
+def point_jacobian(model, data, name, local=None, world=None, turns=False) -> np.ndarray:
+    b = model.body(name).id
+    world = data.xpos[b] + data.xmat[b].reshape(3, 3) @ local if world is None else world
+    found = np.zeros((6, model.nv))
+    mujoco.mj_jac(model, data, found[:3], found[3:], world, b)
+    return found if turns else found[:3]
+
+
+def constrained(model, data, rows) -> np.ndarray:
+    """q̈ at rest: the least in the metric of the masses beside the free one, with rows q̈ = 0."""
+    rows = rows[np.linalg.norm(rows, axis=1) > 1e-10]  # others are rounding, of parts fixed together
+    mass = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    idle = np.diag(mass) == 0
+    mass[idle, idle] = 1.0
+    free = np.linalg.solve(mass, data.qfrc_passive - data.qfrc_bias)
+    inverse = np.linalg.solve(mass, rows.T)
+    return free - inverse @ np.linalg.pinv(rows @ inverse, rcond=1e-9) @ (rows @ free)
+
+
+def same(found: Source, loops=()) -> None:
+    from crosscheck.judge.constraints import scene_length
+
+    scene, theirs = found.imported.scene, accelerations(found, loops)
+    theirs[len(scene.body) :] *= scene_length(scene)
+    ours = gauss(scene)
+    scale = max(np.abs(theirs).max(), 1.0)  # m/s²: rounding of the weight, where the loops leave no motion
+    assert np.abs(ours - theirs).max() < SAME * scale, (np.abs(ours - theirs).max(), scale)
+
+
+def read(tmp_path: Path, text: str, name: str = "model.xml", **options) -> Source:
+    (tmp_path / name).write_text(text)
+    return source(tmp_path / name, ImportOptions(**options))
+
+
+def hinge(name: str, axis: str = "0 1 0", more: str = "") -> str:
+    return f'<joint name="{name}" type="hinge" axis="{axis}" {more}/>'
+
+
+LUMP = '<inertial pos="0.1 0.02 0" mass="0.7" diaginertia="0.002 0.003 0.004"/>'
+OPEN_LOOP = f"""<mujoco><worldbody>
+<body name="left" pos="0 0 1">{hinge("A")}<inertial pos="0.1 0 0" mass="0.3" diaginertia="1e-4 1e-3 1e-3"/>
+<body name="bar" pos="0.25 0 0">{hinge("B")}<inertial pos="0.3 0 0" mass="0.5" diaginertia="1e-4 1e-2 1e-2"/>
+<site name="tip" pos="0.6 0 0"/></body></body>
+<body name="right" pos="0.7 0 1">{hinge("D")}
+<inertial pos="0 0 -0.2" mass="0.4" diaginertia="5e-3 5e-3 1e-4"/>
+<site name="toe" pos="0 0 -0.5"/></body></worldbody>
+<equality>EQUALITY</equality><keyframe><key name="low" qpos="0.5 0.6 0.1"/></keyframe></mujoco>"""
+CONNECT = '<connect name="C" site1="tip" site2="toe"/>'
+
+
+def test_an_open_site_connect_keeps_both_anchors(tmp_path):
+    found = read(tmp_path, OPEN_LOOP.replace("EQUALITY", CONNECT))
+    scene = found.imported.scene
+    at = np.array(scene.joint_named("C").anchor)
+    for other, length in (("B", 0.6), ("D", 0.5)):
+        assert np.linalg.norm(at - scene.joint_named(other).anchor) == pytest.approx(length, abs=1e-11)
+    assert np.linalg.norm(np.subtract(scene.joint_named("B").anchor, (0, 0, 1))) == pytest.approx(0.25)
+    assert any("'C' was open by 0.5" in note for note in found.imported.notes)
+    assert 6 * len(scene.body) - rank(scene) == 1
+    same(found)
+
+
+def test_loops_close_from_a_keyframe_or_a_given_pose(tmp_path):
+    text = OPEN_LOOP.replace("EQUALITY", CONNECT)
+    by_key = read(tmp_path, text, keyframe="low")
+    by_pose = read(tmp_path, text, pose={"A": 0.4})
+    assert by_pose.qpos[0] == 0.4 and abs(by_key.qpos[0] - 0.5) < 0.3
+    for found in (by_key, by_pose):
+        same(found)
+    with pytest.raises(SceneError, match="no keyframe 'lo'; known: low; did you mean 'low'"):
+        read(tmp_path, text, keyframe="lo")
+    with pytest.raises(SceneError, match="--pose: no joint 'E'; known: A, B, D"):
+        read(tmp_path, text, pose={"E": 1.0})
+
+
+def test_a_loop_that_cannot_be_closed_is_refused_with_its_gap(tmp_path):
+    text = OPEN_LOOP.replace("EQUALITY", CONNECT).replace('pos="0.7 0 1"', 'pos="1.6 0 1"')
+    with pytest.raises(SceneError, match=r"'C': cannot be closed.*least gap found is 0.2[0-9]* m or rad"):
+        read(tmp_path, text)
+
+
+def test_a_weld_without_torque_is_a_ball_and_one_with_relative_pose_is_assembled(tmp_path):
+    weld = '<weld name="C" site1="tip" site2="toe" torquescale="0"/>'
+    found = read(tmp_path, OPEN_LOOP.replace("EQUALITY", weld))
+    assert found.imported.scene.joint_named("C").type == "spherical"
+    same(found)
+    two = f"""<mujoco><worldbody><body name="a" pos="0 0 1">{hinge("A")}{hinge("A2", "1 0 0")}{LUMP}</body>
+    <body name="b" pos="0.4 0 1"><freejoint/>{LUMP}</body></worldbody>
+    <equality><weld name="W" body1="a" body2="b"
+    relpose="0.3 0.1 0 0.9689124217106447 0 0.24740395925452294 0"/>
+    </equality></mujoco>"""
+    held = read(tmp_path, two)
+    joint = held.imported.scene.joint_named("W")
+    assert joint.type == "fixed" and any("'W' was open by" in note for note in held.imported.notes)
+    a, b = held.imported.scene.body
+    angle = 2 * np.arccos(abs(np.dot(a.orientation, b.orientation)))
+    assert angle == pytest.approx(0.5, abs=1e-9)
+    same(held)
+
+
+def test_links_fixed_together_are_one_body(tmp_path):
+    text = """<robot name="r"><link name="base"/><link name="frame"/>
+    <link name="arm"><inertial><origin xyz="0.2 0 0"/><mass value="0.5"/>
+    <inertia ixx="0.0002" iyy="0.004" izz="0.004" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <link name="lamp"><inertial><mass value="0.1"/>
+    <inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <link name="mark"/>
+    <joint name="j" type="continuous"><parent link="base"/><child link="frame"/><axis xyz="0 1 0"/></joint>
+    <joint name="k" type="fixed"><parent link="frame"/><child link="arm"/><origin xyz="0.1 0 0"/></joint>
+    <joint name="m" type="fixed"><parent link="arm"/><child link="lamp"/><origin xyz="0.4 0 0"/></joint>
+    <joint name="n" type="fixed"><parent link="lamp"/><child link="mark"/></joint></robot>"""
+    found = read(tmp_path, text, "lamp.urdf")
+    (body,) = found.imported.scene.body
+    assert body.name == "arm" and body.mass == pytest.approx(0.6)
+    assert body.position == pytest.approx(((0.5 * 0.3 + 0.1 * 0.5) / 0.6, 0.0, 0.0))
+    about = 0.004 + 0.5 * 0.3**2 + 0.1 * 0.5**2 - 0.6 * body.position[0] ** 2
+    assert np.array(body.inertia).ravel()[4 if len(np.shape(body.inertia)) == 2 else 1] == pytest.approx(
+        about
+    )
+    same(found)
+
+
+def middle(first: str, second: str, apart: str = "0 0 0", more: str = "") -> str:
+    return f"""<robot name="r"><link name="base"/><link name="mid"/>{more}
+    <link name="l"><inertial><origin xyz="0.15 0 0.02"/><mass value=".4"/>
+    <inertia ixx=".0001" iyy=".003" izz=".003" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <joint name="j1" type="continuous"><parent link="base"/><child link="mid"/><axis xyz="{first}"/></joint>
+    <joint name="j2" type="continuous"><parent link="mid"/><child link="l"/><origin xyz="{apart}"/>
+    <axis xyz="{second}"/></joint></robot>"""
+
+
+def test_hinges_about_a_link_without_mass(tmp_path):
+    crossing = read(tmp_path, middle("0 1 0", "0 0 1"), "u.urdf")
+    assert [joint.type for joint in crossing.imported.scene.joint] == ["universal"]
+    same(crossing)
+    apart = read(tmp_path, middle("0 1 0", "0 1 0", "0.3 0 0"), "p.urdf")
+    assert [joint.type for joint in apart.imported.scene.joint] == ["planar", "distance"]
+    assert 6 - rank(apart.imported.scene) == 2
+    same(apart)
+    with pytest.raises(SceneError, match="body 'l': joints hinge, hinge in a row have links without mass"):
+        read(tmp_path, middle("0 1 0", "0 0 1", "0.3 0 0"), "s.urdf")
+
+
+def test_a_link_without_mass_that_carries_two_is_refused_and_one_that_carries_none_is_named(tmp_path):
+    more = """<link name="o"><inertial><mass value="1"/>
+    <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>
+    </inertial></link>
+    <joint name="j3" type="continuous"><parent link="mid"/><child link="o"/><axis xyz="1 0 0"/></joint>"""
+    with pytest.raises(SceneError, match="body 'mid': has no mass and carries 'o' and 'l'"):
+        read(tmp_path, middle("0 1 0", "0 0 1", more=more), "two.urdf")
+    idle = """<link name="horn"/>
+    <joint name="j3" type="continuous"><parent link="l"/><child link="horn"/></joint>"""
+    found = read(tmp_path, middle("0 1 0", "0 0 1", more=idle), "idle.urdf")
+    assert any("'horn' has no mass and carries none" in note for note in found.imported.notes)
+    same(found)
+
+
+@pytest.mark.parametrize(
+    "turn", ['<joint type="ball"/>', hinge("r") + hinge("p", "0 0 1") + hinge("y", "1 0 0")]
+)
+def test_three_slides_and_turns_at_the_root_are_a_free_body(turn, tmp_path):
+    slides = "".join(f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1"))
+    text = (
+        f'<mujoco><worldbody><body name="pelvis" pos="0 0 1">{slides}{turn}{LUMP}</body></worldbody></mujoco>'
+    )
+    found = read(tmp_path, text)
+    assert not found.imported.scene.joint
+    same(found)
+
+
+def test_coincident_frames_are_named_and_closed_on_request(tmp_path):
+    text = """<robot name="r"><link name="base"/><link name="end_a"/><link name="end_b"/>
+    LINKS<joint name="A" type="continuous"><parent link="base"/><child link="one"/><axis xyz="0 1 0"/></joint>
+    <joint name="B" type="continuous"><parent link="one"/><child link="two"/>
+    <origin xyz="0.2 0 0"/><axis xyz="0 1 0"/></joint>
+    <joint name="D" type="continuous"><parent link="base"/><child link="three"/>
+    <origin xyz="0.5 0 0.4"/><axis xyz="0 1 0"/></joint>
+    <joint name="a" type="fixed"><parent link="two"/><child link="end_a"/><origin xyz="0.3 0 0"/></joint>
+    <joint name="b" type="fixed"><parent link="three"/><child link="end_b"/>
+    <origin xyz="0 0 -0.4"/></joint></robot>"""
+    link = """<link name="{}"><inertial><origin xyz="0.1 0 0"/><mass value=".3"/>
+    <inertia ixx=".001" iyy=".002" izz=".0015" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+    text = text.replace("LINKS", "".join(link.format(n) for n in ("one", "two", "three")))
+    loose = read(tmp_path, text, "loose.urdf")
+    assert any(
+        "'end_a' (on 'two') and 'end_b' (on 'three') coincide" in note for note in loose.imported.notes
+    )
+    closed = read(tmp_path, text, "closed.urdf", close=["end_a=end_b"])
+    assert 18 - rank(closed.imported.scene) == 1 and not closed.imported.notes
+    same(closed, [("end_a", np.zeros(3), "end_b", np.zeros(3))])
+    about = read(tmp_path, text, "about.urdf", close=["end_a=end_b:revolute:y"]).imported.scene
+    assert about.joint[-1].type == "revolute" and about.joint[-1].axis == pytest.approx((0.0, 1.0, 0.0))
+    (tmp_path / "loops.yaml").write_text("closed_loop: [[end_a, end_b]]\ntype: [3d]\n")
+    assert read(tmp_path, text, "y.urdf", close=[str(tmp_path / "loops.yaml")]).imported.scene.joint == (
+        closed.imported.scene.joint
+    )
+    for wish, says in (
+        ("end_a", "must be frame_a=frame_b"), ("end_a=end_c", "did you mean 'end_b'"),
+        ("end_a=end_b:gear", "type 'gear' is none of"), ("end_a=end_b:revolute:w", "axis 'w' is none of"),
+    ):  # fmt: skip
+        with pytest.raises(SceneError, match=says):
+            read(tmp_path, text, "wish.urdf", close=[wish])
+
+
+def test_mimic_joints_are_refused_unless_left_out(tmp_path):
+    text = middle("0 1 0", "0 0 1").replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><mimic joint="j1"/>')
+    with pytest.raises(SceneError, match=r"joint 'j2' mimics 'j1'.*--without couplings"):
+        read(tmp_path, text, "mimic.urdf")
+    assert read(tmp_path, text, "mimic.urdf", without=["couplings"]).imported.left_out
+
+
+def reread(path: Path) -> tuple[Agreement, list[str]]:
+    """The comparison with a file's model, and the names of the joints of its tree."""
+    reader = _Reader(mujoco, mujoco.MjModel.from_xml_path(str(path)), None, ImportOptions())
+    reader.read()
+    return Agreement(mujoco, reader.model, reader.groups, reader.poses), reader.tree
+
+
+def test_velocities_of_a_keyframe_are_the_scene_s(tmp_path):
+    text = OPEN_LOOP.replace("EQUALITY", CONNECT).replace('0.1"/></key', '0.1" qvel="1 2 3"/></key')
+    found = read(tmp_path, text, keyframe="low")
+    crank = found.imported.scene.body[0]
+    assert crank.angular_velocity == pytest.approx((0.0, found.qvel[0], 0.0)) and found.qvel[0] != 0
+
+
+def test_agreement_names_the_part_that_differs(tmp_path):
+    """Each field of a scene that is changed after it was read is found by the comparison with the model."""
+    text = OPEN_LOOP.replace("EQUALITY", CONNECT).replace(
+        hinge("A"), hinge("A", more='stiffness="2" damping="0.1"')
+    )
+    (tmp_path / "model.xml").write_text(text)
+    scene = source(tmp_path / "model.xml", ImportOptions()).imported.scene
+    agreement, tree = reread(tmp_path / "model.xml")
+    agreement.check(scene, tree)
+    x, y, z = scene.joint_named("B").axis
+    for changed, says in (
+        (scene.with_("body[bar].mass", 0.5001), "joint 'A': the scene's mass matrix"),
+        (scene.with_("body[right].inertia", (5e-3, 6e-3, 1.1e-3)), "joint 'D': the scene's mass matrix"),
+        (scene.with_(gravity=(0.0, 0.0, -9.8)), "bias forces"),
+        (scene.with_("load[0].stiffness", 2.01), "joint 'A': the scene's bias forces"),
+        (scene.with_("load[0].damping", 0.11), "joint 'A': the scene's bias forces"),
+        (scene.with_("load[0].natural_angle", 0.01), "joint 'A': the scene's bias forces"),
+        (scene.with_("joint[B].axis", (x, y, z + 1e-4)), "'B'|forbid"),
+        (scene.with_(joint=[j for j in scene.joint if j.name != "D"]), "allow 8 motions without loops"),
+        (scene.with_(joint=scene.joint[:-1]), "loops: the scene's rows have rank 0, the file's 2"),
+        (scene.with_("joint[C].anchor", tuple(np.add(scene.joint_named("C").anchor, (1e-3, 0, 0)))), "loops"),
+    ):  # fmt: skip
+        with pytest.raises(SceneError, match=says):
+            agreement.check(changed, tree)
+
+
+REFUSALS = ("cannot be closed", "joints hinge, hinge in a row", "no body that moves")
+
+
+def agree_or_refuse(tmp_path, file: random_models.File) -> bool:
+    try:
+        found = read(
+            tmp_path,
+            file.text,
+            f"random{file.suffix}",
+            without=file.options.without,
+            close=file.options.close,
+        )
+    except SceneError as error:
+        assert any(says in str(error) for says in REFUSALS), str(error)
+        return False
+    same(found, file.loops)
+    return True
+
+
+@pytest.mark.parametrize("make", [random_models.mjcf, random_models.urdf], ids=["mjcf", "urdf"])
+def test_random_files_agree_with_the_compiled_model_or_are_refused(make, tmp_path):
+    agreed = [agree_or_refuse(tmp_path, make(seed)) for seed in range(100)]
+    assert sum(agreed) >= 60, sum(agreed)
