@@ -4,9 +4,8 @@
 
 The first table is of CPU time of simulations one after another in this process: construction of a run,
 stepping, and the rest, which is samples and the trajectory; the least of REPEATS rounds, in which scenes take
-turns.  The second is of the same simulations together, as an ensemble gives them to a process, on the general
-kernels and by code that takes the numbers in which the scenes differ, which is made before.  The third is of
-wall time of whole ensembles after the processes have started, with the passing of scenes and trajectories
+turns.  The second is of the same simulations together, as an ensemble gives them to a process.  The third is
+of wall time of whole ensembles after the processes have started, with the passing of scenes and trajectories
 between them; the median of as many rounds.
 """
 
@@ -28,7 +27,7 @@ from mbref.scenes import SCENES
 from mbref.simulation.ensemble import MOST_AT_ONCE, ensemble
 from mbref.simulation.processes import processes
 from mbref.simulation.simulate import Limits, simulate
-from mbref.simulation.together import STEPS_WORTH_SHARED_CODE, run_all
+from mbref.simulation.together import run_all
 from mbref.variation import Variation, variants
 
 REPEATS = 5
@@ -71,17 +70,11 @@ def _show_parts(scenes: Mapping[str, Sequence[Scene]]) -> None:
 
 def _show_together(scenes: Mapping[str, Sequence[Scene]]) -> None:
     """Milliseconds of a simulation together with others in one process: all, and stepping alone."""
-    rounds = [
-        {
-            name: [*_together(each, 0), *_together(each, STEPS_WORTH_SHARED_CODE)]
-            for name, each in scenes.items()
-        }
-        for _ in range(REPEATS)
-    ]
-    heads = ("stepping", "all", "by code", "all", "a second")
+    rounds = [{name: _together(each) for name, each in scenes.items()} for _ in range(REPEATS)]
+    heads = ("stepping", "all", "a second")
     print(f"{'ms a simulation, together':32}" + "".join(f"{head:>14}" for head in heads))
     for name, each in scenes.items():
-        found = [1e3 / len(each) * min(numbers[name][k] for numbers in rounds) for k in range(4)]
+        found = [1e3 / len(each) * min(numbers[name][k] for numbers in rounds) for k in range(2)]
         _show(name, found, 1e3 / found[-1])
 
 
@@ -89,12 +82,12 @@ def _show(name: str, milliseconds: Sequence[float], rate: float) -> None:
     print(f"{name:32}" + "".join(f"{part:>14.3f}" for part in milliseconds) + f"{rate:>14.0f}")
 
 
-def _together(scenes: Sequence[Scene], others: int) -> tuple[float, float]:
-    """Seconds of CPU time of stepping, and of all, with so many steps of other scenes by the same code."""
+def _together(scenes: Sequence[Scene]) -> tuple[float, float]:
+    """Seconds of CPU time of stepping, and of all."""
     began, stepping = time.process_time(), 0.0
     for first in range(0, len(scenes), MOST_AT_ONCE):
         given = scenes[first : first + MOST_AT_ONCE]
-        runs = run_all(given, DEFAULT, TIMES, LIMITS, others).motions(given)
+        runs = run_all(given, DEFAULT, TIMES, LIMITS).motions(given)
         stepping += sum(run.cost.seconds for _, run in runs)
     return stepping, time.process_time() - began
 

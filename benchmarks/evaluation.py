@@ -22,8 +22,7 @@ from mbref.kernels.layout import MEMORY, OK
 from mbref.method import Method
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.simulation.run import SPECIALISED, Limits, Run
-from mbref.simulation.simulate import why_no_code
+from mbref.simulation.run import Limits, Run
 
 SCENE_NAMES = ("spatial_slider_crank", "planar_slider_crank", "four_bar", "five_bar")
 CALLS, REPEATS = 2000, 15
@@ -43,7 +42,7 @@ def main(names: Sequence[str]) -> None:
         (what, name): call
         for name in names
         for scene in [SCENES[name]()]
-        for what, call in (*_formulations(scene), *_specialised(scene), *timed_calls(scene))
+        for what, call in (*_formulations(scene), *timed_calls(scene))
     }
     seconds = {key: np.median(rounds) for key, rounds in _in_turns(calls).items()}
     print(f"{'µs per right-hand side':32}" + "".join(f"{name:>24}" for name in names))
@@ -69,15 +68,6 @@ def _formulations(scene: Scene) -> Iterator[tuple[str, Callable[[], float]]]:
     for formulation in FORMULATIONS:
         run = Run(scene, Method.parse(f"{formulation}+none"), np.array([1.0]), Limits())
         yield formulation, functools.partial(_timed, run)
-
-
-def _specialised(scene: Scene) -> Iterator[tuple[str, Callable[[], float]]]:
-    """The same by specialised code, where a formulation has it."""
-    for formulation in FORMULATIONS:
-        method = Method.parse(f"{formulation}+projection")
-        if not why_no_code(scene, method):
-            run = Run(scene, method, np.array([1.0]), Limits(code=SPECIALISED))
-            yield f"{formulation}, specialised", functools.partial(_timed, run)
 
 
 def _timed(run: Run) -> float:

@@ -155,7 +155,7 @@ def main() -> None:
     parser.add_argument("sweep", nargs="*", metavar="SWEEP", default=list(SWEEPS))
     parser.add_argument("--count", type=int)
     parser.add_argument("--method", default="alf-dual+projection")
-    parser.add_argument("--code", default="auto", help="generic, specialised or auto, the default")
+    parser.add_argument("--code", default="auto", help="generic, generated or auto, the default")
     parser.add_argument("--rtol", type=float, default=1e-9)
     given = parser.parse_args()
     limits = Limits(rtol=given.rtol, most_steps=100_000, code=given.code)

@@ -32,7 +32,6 @@ from rich.console import Console
 from rich.table import Table
 
 from crosscheck.engine import Setting, engine, installed
-from crosscheck.engines.mbref import SPECIALISED
 from crosscheck.judge.metrics import cost_at_error, measure
 from crosscheck.judge.tolerances import ERROR_LEVELS
 from crosscheck.judge.truth import truth_for
@@ -90,8 +89,7 @@ OPPONENTS = {  # engines and kinds of integrators
 }
 OURSELVES: dict[str, Callable[[str], bool]] = {  # of the families' names
     "series": lambda family: family.startswith(SERIES),
-    "specialised code": lambda family: family.endswith(SPECIALISED) and not family.startswith(SERIES),
-    "general kernels": lambda family: not family.endswith(SPECIALISED) and not family.startswith(SERIES),
+    "other methods": lambda family: not family.startswith(SERIES),
 }
 
 
@@ -272,7 +270,7 @@ def show(console: Console, scene: Scene, table: Sequence[dict[str, Any]]) -> Non
 
 
 def summary(console: Console, tables: dict[str, Sequence[dict[str, Any]]]) -> None:
-    """mbref's series, specialised code and general kernels, against the best of the others."""
+    """mbref's series and its other methods, against the best of the others."""
     shown = Table(title="The best of others, as a multiple of mbref's best, at errors of …")
     shown.add_column("scene", no_wrap=True)
     shown.add_column("mbref by", no_wrap=True)

@@ -1,10 +1,10 @@
-"""Cost at errors of 1e-3, 1e-6 and 1e-9: other families over the Taylor method by specialised code.
+"""Cost at errors of 1e-3, 1e-6 and 1e-9: other families over the Taylor method with generated code.
 
     python benchmarks/taylor.py [SCENE …]
 
 Each family is swept over half-decades of the tolerance; then the runs nearest to the levels take turns in
 ROUNDS rounds of this process.  Process CPU seconds of stepping, medians; samples count, construction and the
-making of specialised code do not.  Above 1 the Taylor method is the cheaper.
+making of generated code do not.  Above 1 the Taylor method is the cheaper.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from mbref.simulation.simulate import Limits, simulate
 from mbref.trajectory import Outcome
 
 FAMILIES = (
-    ("taylor", "specialised"), ("taylor", "generic"), ("lm2+projection", "specialised"),
-    ("alf-dual+projection", "specialised"), ("alf-dual+projection", "generic"),
+    ("taylor", "generated"), ("taylor", "generic"), ("lm2+projection", "generic"),
+    ("alf-dual+projection", "generic"),
 )  # fmt: skip
 NAMES = (
     "planar_slider_crank", "spatial_slider_crank", "planar_slider_crank_gravity",

@@ -2,8 +2,8 @@
 
     python benchmarks/speed.py SCENE … --out FILE.json && python benchmarks/whole_process.py FILE.json
 
-Of every scene in the file: the best setting at an error of 1e-6 of mbref by its series, by specialised code
-and by general kernels, and of every other engine by its own integrator and by crosscheck's.  Each runs the
+Of every scene in the file: the best setting at an error of 1e-6 of mbref by its series and
+by its other methods, and of every other engine by its own integrator and by crosscheck's.  Each runs the
 scene in fresh processes with warm caches, PROCESSES times, medians of process CPU time.  Stepping and
 construction are those of a second run; start-up is the rest of the first: interpreter, imports, loading of
 code.  An engine's are those of crosscheck's adapter; a program written for one mechanism needs less.

@@ -1,5 +1,5 @@
-"""mbref as an engine: a family is a method, by the general kernels or by specialised code, or the Taylor
-method; it is swept over the relative tolerance."""
+"""mbref as an engine: a family is a method, `taylor` also with generated code, swept over the relative
+tolerance."""
 
 from __future__ import annotations
 
@@ -18,12 +18,9 @@ if TYPE_CHECKING:
     from mbref.method import Method
 
 METHODS = (
-    "alf-dual+projection, specialised",
-    "alf-dual+projection",
-    "taylor, specialised",
     "taylor",
-    "lm2+projection, specialised",
-    "kinematic, specialised",
+    "taylor, generated",
+    "alf-dual+projection",
     "kinematic",
     "mpi-svd+partitioning",
     "mpi-svd+projection",
@@ -33,7 +30,7 @@ METHODS = (
 )
 WITH_SINGULAR_MASS = ("lm1+projection", "alf+projection")  # of bodies without some moment of inertia
 KINEMATIC = "kinematic"  # of driven scenes; integrates nothing, so has no tolerance
-SPECIALISED = ", specialised"  # machine code of the scene, made before the clock runs
+GENERATED = ", generated"  # by machine code for the scene, made before the clock runs
 FAMILIES = {
     "alf-dual+projection": "augmented Lagrangian in dual form, projection, DOP853; the default method",
     "lm2+projection": "Lagrange multipliers eliminated by blocks, projection, DOP853",
@@ -45,7 +42,7 @@ FAMILIES = {
     "mpi-svd+projection": "Moore-Penrose inverse by SVD, projection, DOP853",
     "mpi-svd+none": "Moore-Penrose inverse by SVD without stabilisation, DOP853",
     "mpi-qr+projection": "Moore-Penrose inverse by QR, projection, DOP853",
-    "… , specialised": "the method before the comma as machine code of the scene, made before the clock runs",
+    "taylor, generated": "Taylor series by machine code generated for the scene before the clock runs",
 }
 OPTIONS = {
     "rtol": "relative tolerance of a step",
@@ -108,7 +105,7 @@ class Mbref(Engine):
             return False
         if _has_singular_mass(scene) and not method.formulation.handles_singular_mass:
             return False
-        if family.endswith(SPECIALISED):
+        if family.endswith(GENERATED):
             return not why_no_code(scene, method)
         return scene.counts().redundant == 0 or method.formulation.handles_redundancy
 
@@ -141,7 +138,7 @@ class Mbref(Engine):
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         from mbref.simulation.simulate import Limits, simulate
 
-        code = "specialised" if setting.family.endswith(SPECIALISED) else "generic"
+        code = "generated" if setting.family.endswith(GENERATED) else "generic"
         return simulate(scene, _method(setting.family), times, Limits(code=code, **setting.options))
 
 
@@ -155,7 +152,7 @@ def _has_singular_mass(scene: Scene) -> bool:
 def _method(family: str) -> Method:
     from mbref.method import Method
 
-    return Method.parse(family.removesuffix(SPECIALISED))
+    return Method.parse(family.removesuffix(GENERATED))
 
 
 ENGINE = Mbref()

@@ -36,9 +36,9 @@ def add_method_options(parser: argparse.ArgumentParser, json: bool = True) -> No
     add_time_options(parser)
     parser.add_argument("--rtol", type=float, default=1e-9, help="relative tolerance per step (default 1e-9)")
     parser.add_argument(
-        "--code", choices=("auto", "generic", "specialised"), default="auto",
-        help="generic: the kernels that serve every scene; specialised: machine code made for this scene;\n"
-        "auto (default): specialised code once 20 000 steps are ahead.  Both agree to rounding",
+        "--code", choices=("auto", "generic", "generated"), default="auto",
+        help="of the method taylor: generic, the kernels that serve every scene; generated, machine code\n"
+        "for this scene; auto (default), generated once 20 000 steps are ahead.  Both agree to rounding",
     )  # fmt: skip
     parser.add_argument("--max-step", type=float, default=0.0, help="largest step, s (default: the duration)")
     if json:

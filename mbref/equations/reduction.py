@@ -43,12 +43,6 @@ class Reduction:
     static: StaticRows
     evidence: Evidence
 
-    @cached_property
-    def identity(self) -> bytes:
-        """All that code of a scene takes for constant, but numbers."""
-        arrays = *self.active, *self.symbolic, *self.static
-        return b"".join(part for a in arrays for part in (str(a.shape).encode(), a.tobytes()))
-
     def factor(self) -> SparseFactor:
         """Memory of the factor."""
         return sparse_factor(self.symbolic, self.static)

@@ -92,7 +92,6 @@ class Formulation:
     handles_singular_mass: bool
     needs_independent_columns: bool = False  # works only where no freedom is left
     needs_all_rows: bool = False  # rows that depend on others, too: it chooses or weighs rows itself
-    pivots_by_size: bool = False  # its operations depend on the state and cannot be recorded beforehand
     numbers: type = NoOptions  # the method's own numbers, a record with their defaults
     feedback: Callable[[Mapping[str, float]], tuple[float, float]] | None = None  # gains of Φ' and Φ in γ
 

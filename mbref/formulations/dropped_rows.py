@@ -120,7 +120,6 @@ LM2_FIRST_ROWS = Formulation(
     accelerate=accelerate_by_first_rows,
     linear_algebra=Dense(Scratch),
     needs_all_rows=True,
-    pivots_by_size=True,
     handles_redundancy=True,
     handles_singular_mass=False,
 )
@@ -130,7 +129,6 @@ LM2_STEP_ROWS = Formulation(
     accelerate=accelerate_by_step_rows,
     linear_algebra=Dense(Scratch),
     needs_all_rows=True,
-    pivots_by_size=True,
     handles_redundancy=True,
     handles_singular_mass=False,
 )

@@ -65,7 +65,6 @@ LM1 = Formulation(
     equations="Eq. 5",
     accelerate=accelerate,
     linear_algebra=Dense(Scratch),
-    pivots_by_size=True,
     handles_redundancy=False,
     handles_singular_mass=True,
 )

@@ -52,7 +52,6 @@ MPI_GS = Formulation(
     equations="Eqs. 26, 29, 30",
     accelerate=accelerate,
     linear_algebra=Dense(Scratch),
-    pivots_by_size=True,
     handles_redundancy=True,
     handles_singular_mass=False,
 )

@@ -64,7 +64,6 @@ MPI_GS_LITERAL = Formulation(
     equations="Eqs. 26, 29, 30 as printed",
     accelerate=accelerate,
     linear_algebra=Dense(Scratch),
-    pivots_by_size=True,
     handles_redundancy=True,
     handles_singular_mass=False,
     needs_independent_columns=True,

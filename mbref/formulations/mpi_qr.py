@@ -53,7 +53,6 @@ MPI_QR = Formulation(
     equations="Eq. 26 with a pivoted QR",
     accelerate=accelerate,
     linear_algebra=Dense(Scratch),
-    pivots_by_size=True,
     handles_redundancy=True,
     handles_singular_mass=False,
 )

@@ -45,7 +45,6 @@ MPI_SVD = Formulation(
     equations="Eqs. 26-28",
     accelerate=accelerate,
     linear_algebra=Dense(Scratch),
-    pivots_by_size=True,
     handles_redundancy=True,
     handles_singular_mass=False,
 )

@@ -41,7 +41,7 @@ INT = i8
 
 WITH_KERNELS = (
     "kernels", "linear_algebra", "equations", "formulations", "stabilisation", "integrators", "simulation",
-    "specialised", "taylor",
+    "taylor",
 )  # fmt: skip
 
 

@@ -25,7 +25,7 @@ KEPT = 48  # states in a history
 
 # status of an evaluation or of a step
 OK, SINGULAR, NOT_CONVERGED, NOT_FINITE = range(4)
-CHANGED, GUARD_FAILED = 4, 5  # the chart chose new coordinates; specialised code does not hold here
+CHANGED = 4  # the chart chose new coordinates
 
 
 class Frames(NamedTuple):
@@ -257,25 +257,8 @@ class Kernels(NamedTuple):
     propose: Annotated[Kernel, PROPOSE]
     rates: Annotated[Kernel, RATES]
     rates_with_outputs: Annotated[Kernel, RATES]
-    fallback_rates: Annotated[Kernel, RATES]
     accept: Annotated[Kernel, ACCEPT]
     accelerate: Annotated[Kernel, ACCELERATE]
-
-
-class Addresses(NamedTuple):
-    """Addresses of the machine code made for the scene; 0 without."""
-
-    rates: int = 0
-    project: int = 0
-
-
-class SpecialisedCode(NamedTuple):
-    """Machine code made for the scene, the numbers that it takes, and the results of its projection."""
-
-    addresses: Addresses
-    numbers: Annotated[Vector, "numbers"]  # of code for many scenes: those in which they differ
-    y: Annotated[Vector, "14*nb"]  # after one Newton step
-    outputs: Annotated[Vector, "m + 1"]  # the largest |Φ| before the step, and the squared pivots
 
 
 class Memory(NamedTuple):
@@ -291,7 +274,6 @@ class Memory(NamedTuple):
     pivots: Annotated[Vector, "pivots"]  # of every row, last watched
     loop: Loop
     kernels: Kernels
-    code: SpecialisedCode
     chart: Address  # the stabilisation's own memory
     chart_options: Address  # and its numbers
     integrator: Address  # the integrator's own memory

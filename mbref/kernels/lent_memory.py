@@ -13,7 +13,7 @@ from typing import Any
 
 from mbref.kernels.aligned import aligned_copy
 from mbref.kernels.copying import Bytes, copy_rows, table_of
-from mbref.kernels.named_memory import Packed, packed
+from mbref.kernels.named_memory import packed
 from mbref.kernels.records import Numbers
 
 MOST_KEYS, MOST_OF_A_KEY, MOST_BYTES = 64, 4, 1 << 20  # kept for later; larger memory is not kept
@@ -31,16 +31,6 @@ class Lent:
         self._first = Bytes(values if part is None else tuple(v for v in values if v is not part.values))
         self.size = self._first.size + (part.size if part else 0)  # bytes in arrays and records
         self._table = table_of(self._first.copies)
-        self._others: dict[Hashable, Packed] = {}
-
-    def packed_as(self, key: Hashable, change: Callable[[Any], Any], part: Packed | None = None) -> Packed:
-        """Its arrays and records packed with a change that a key says all of, such as with other kernels.
-
-        ``part`` is the part of the changed memory that is packed already.
-        """
-        if key not in self._others:
-            self._others[key] = packed(change(self.values), part)
-        return self._others[key]
 
     def restore(self) -> None:
         """Have all arrays and records as they were made."""

@@ -8,8 +8,8 @@ A field of a schema is an array, a record of numbers, a kernel, another schema, 
         step: Annotated[Kernel, STEP]
 
 Kernels write ``rows.phi[i]`` and ``limits.steps += 1``.  Compiled, a schema is one pointer to a table of
-addresses, and only the fields that a kernel names are loaded.  Without compilation and while tracing, it is
-the NamedTuple itself.  The table and its arrays stay in place while kernels run.
+addresses, and only the fields that a kernel names are loaded.  Without compilation it is the NamedTuple
+itself.  The table and its arrays stay in place while kernels run.
 """
 
 from __future__ import annotations
@@ -293,7 +293,6 @@ def opener(schema: type) -> Callable[[Any], Any]:
 
         return kind(types.intp), generate
 
-    opened.function = _as_it_is  # for tracing
     return _as_it_is if PLAIN else opened
 
 

@@ -96,7 +96,6 @@ class Work:
         self._since = 0.0  # s, when the first of them began to wait
         self._at_once = 0  # runs that are given at a time; 0 before the first has told how long it takes
         self._cores = os.cpu_count() or 1
-        self._steps = 0  # of runs that have ended
         self.error: Exception | None = None
 
     def add(self, job: Job) -> None:
@@ -116,7 +115,7 @@ class Work:
 
     def _submit(self, jobs: list[Job]) -> None:
         scenes = [job.scene for job in jobs]
-        arguments = self._method, self._times, self._limits, self._steps
+        arguments = self._method, self._times, self._limits
         future = self._executor.submit(run_all, scenes, *arguments)
         self.pending[future] = jobs
         future.add_done_callback(self._done.put)
@@ -142,11 +141,7 @@ class Work:
             return self._without_process(jobs)
         self._at_once = int(max(1, min(MOST_AT_ONCE, SECONDS * len(jobs) / max(found.seconds, 1e-9))))
         self.error = found.error
-        runs: list[tuple[Job, Trajectory]] = [
-            (jobs[place], run) for place, run in found.motions([job.scene for job in jobs])
-        ]
-        self._steps += sum(run.cost.steps for _, run in runs)
-        return runs
+        return [(jobs[place], run) for place, run in found.motions([job.scene for job in jobs])]
 
     def _without_process(self, jobs: list[Job]) -> list[tuple[Job, Trajectory]]:
         """Runs whose process was killed: one alone has crashed, several are handed over one by one."""

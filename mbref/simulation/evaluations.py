@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,6 @@ from mbref.kernels.copying import Bytes, copy_rows, rows_to, table_of
 from mbref.kernels.layout import Equations
 from mbref.kernels.scene_layout import SceneData
 from mbref.scene import SceneError
-from mbref.specialised import arrays_of
 
 
 class Evaluations:
@@ -78,3 +77,12 @@ def numbers_of(equations: Equations, data: SceneData, packs: Packs) -> list[tupl
     system = equations.system
     masses = (system.mass, packs.mass), (system.inverse_root, packs.inverse_root)
     return [*zip(arrays_of(equations.scene), arrays_of(data), strict=True), *masses]
+
+
+def arrays_of(values: Sequence[Any]) -> Iterator[np.ndarray]:
+    """All arrays of nested tuples."""
+    for value in values:
+        if isinstance(value, np.ndarray):
+            yield value
+        else:
+            yield from arrays_of(value)

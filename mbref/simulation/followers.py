@@ -3,8 +3,7 @@
 All of them are set up at once, in arrays whose first axis counts them.  A follower must give the answers on
 which the run's choice of rows and columns rests, begin on no singular position, pass those ahead briefly and
 end without anything unusual, as the run itself; every other scene is left to a run of its own.  The results
-are those of runs of their own, to the bit, or but for rounding by code that takes the numbers in which the
-scenes differ.
+are those of runs of their own, to the bit.
 """
 
 from __future__ import annotations
@@ -18,11 +17,9 @@ import numpy as np
 from mbref.equations.initial_state import LARGE
 from mbref.equations.joint_reactions import Balance
 from mbref.equations.model import motion_of
-from mbref.equations.packing import row_of
 from mbref.kernels.compilation import Entry
 from mbref.kernels.copying import Bytes, copy_rows, rows_from, table_of
-from mbref.kernels.layout import Counts, Memory
-from mbref.kernels.named_memory import packed
+from mbref.kernels.layout import Counts
 from mbref.motion import Motion
 from mbref.scene import Scene
 from mbref.simulation.control import STEPS_PER_CALL
@@ -33,7 +30,6 @@ from mbref.simulation.passages import Passages
 from mbref.simulation.run import NEARLY, Run
 from mbref.simulation.singular_start import begins_at_rest, begins_in_motion
 from mbref.simulation.stepping import DONE, SINGULAR_AHEAD, advance_to_end
-from mbref.specialised import Untraceable, Varied
 from mbref.taylor.passing import advance_over
 from mbref.taylor.run import CrossingRun
 from mbref.trajectory import Crossing
@@ -42,7 +38,7 @@ from mbref.trajectory import Crossing
 def may_lead(run: CrossingRun) -> bool:
     """Whether a run that has ended was so ordinary that others may follow it."""
     counts = run.memory.equations.system.counts
-    ordinary = run.reduction is not None and run.model.m <= LARGE and run.specialised is None
+    ordinary = run.reduction is not None and run.model.m <= LARGE
     short = counts.steps <= STEPS_PER_CALL and run.passes_briefly
     completed = run.memory.loop.clock.sample == run.times.size and not run.limits.branches
     return bool(ordinary and short and completed and run.ranks.least >= NEARLY)
@@ -90,14 +86,11 @@ class Followed(NamedTuple):
             )
 
 
-def follow(run: Run, scenes: Sequence[Scene], by_code: bool = False) -> Followed:
-    """The scenes that followed a run that may lead them; its memory is theirs from now on.
-
-    ``by_code``: on machine code that takes the numbers in which they differ, where they can have it.
-    """
+def follow(run: Run, scenes: Sequence[Scene]) -> Followed:
+    """The scenes that followed a run that may lead them; its memory is theirs from now on."""
     began = time.process_time()
     group = group_of(run, scenes)
-    ended = Runs(run, group, by_code)
+    ended = Runs(run, group)
     places = ended.run()
     return ended.followed(places, time.process_time() - began)
 
@@ -105,13 +98,12 @@ def follow(run: Run, scenes: Sequence[Scene], by_code: bool = False) -> Followed
 class Runs:
     """Runs of a group of scenes in the memory of one run."""
 
-    def __init__(self, run: Run, group: Group, by_code: bool):
+    def __init__(self, run: Run, group: Group):
         self._run, self._group = run, group
         self._rank = self._begin()
-        self._memory, values = (self._coded() if by_code else None) or (run.memory_of_kernels, [])
-        self._packed, count, memory = packed(self._memory), len(group.q), self._memory
+        count, memory = len(group.q), run.memory
         self._passages = Passages(run, group)
-        self._begins = Rows([*group.numbers(run, memory), *values], Bytes(memory))
+        self._begins = Rows(group.numbers(run, memory), Bytes(memory))
         self._samples = [np.empty((count, *each.shape)) for each in memory.loop.samples]
         self._counts = np.empty((count, len(Counts._fields)), dtype=np.int64)
         sources: list[Any] = [*memory.loop.samples, memory.equations.system.counts]
@@ -128,38 +120,23 @@ class Runs:
         run.begin_again()
         return -1 if extraordinary else rank
 
-    def _coded(self) -> tuple[Memory, list[tuple[Any, ...]]] | None:
-        """Memory with code of all scenes that fit, and the numbers that it takes; None where it has none."""
-        run, (packs, q, v, starts, _, fit) = self._run, self._group
-        if not fit:
-            return None
-        data = row_of(run.reduced(packs.data, axis=1, all_move=True), fit)
-        varied = Varied(data, packs.mass[fit], packs.inverse_root[fit], q[fit], v[fit])
-        try:
-            memory = run.with_code(self._group.model(fit[0]), starts[fit[0]], varied)
-        except Untraceable:
-            return None
-        numbers = np.zeros((len(q), varied.numbers.shape[1]))
-        numbers[fit] = varied.numbers
-        return memory, [(memory.code.numbers, numbers)]
-
     def _rows(self) -> list[np.ndarray]:
         """Arrays that take samples and counts."""
         return [*self._samples, self._counts]
 
     def run(self) -> list[int]:
         """Run the scenes that fit; the places of those that completed, over brief passages alone."""
-        memory, completed = self._memory, []
+        memory, argument, completed = self._run.memory, self._run.packed.argument, []
         clock: Any = memory.loop.clock
         enter = self._run.method.stabilisation.enter.callable
         for k in self._group.fit:
             self._begins.copy(k)
-            clock.y_size = enter(clock.time, memory.loop.y, self._packed.argument)
+            clock.y_size = enter(clock.time, memory.loop.y, argument)
             if memory.watch.generic_rank != self._rank:
                 continue
-            status = self._timed(k, advance_to_end, self._packed.argument)
+            status = self._timed(k, advance_to_end, argument)
             if status == SINGULAR_AHEAD and (series := self._passages.series_of(k)):
-                status = self._timed(k, advance_over, status, self._packed.argument, series.argument)
+                status = self._timed(k, advance_over, status, argument, series.argument)
                 self._passages.record(k)
             if status == DONE:
                 copy_rows(self._ends, k)

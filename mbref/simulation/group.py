@@ -57,7 +57,7 @@ def group_of(run: Run, scenes: Sequence[Scene]) -> Group:
     durations = np.array([scene.duration for scene in scenes])
     terms = evaluations.terms(np.arange(len(q)), durations[:, None] * part, places, velocities)
     agree = evidence.which_agree(run.model, q, v, packs.mass, terms)
-    symbolic, tolerance = run.part.factor.symbolic, run.limits.rank_tolerance
+    symbolic, tolerance = run.memory.factor.symbolic, run.limits.rank_tolerance
     ranks = all_ranks(run.model, terms.jacobian[:, 0], packs.data.metric_root, symbolic, tolerance)
     alike = [rank.rank == run.ranks.rank and rank.least >= NEARLY for rank in ranks]
     return Group(packs, q, v, starts, ranks, [k for k in starts if agree[k] and alike[k]])

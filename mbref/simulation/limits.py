@@ -1,4 +1,4 @@
-"""Limits: the numbers of a run that belong to no part of the method, checked where they enter."""
+"""Limits: options of a run that belong to no part of the method, checked on construction."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 
 from mbref.scene_fields import LARGEST, SMALLEST, shown
 
-AUTO, GENERIC, SPECIALISED = "auto", "generic", "specialised"
-CODES = (AUTO, GENERIC, SPECIALISED)
+AUTO, GENERIC, GENERATED = "auto", "generic", "generated"
+CODES = (AUTO, GENERIC, GENERATED)
 FINEST = 1e-16  # relative tolerance; a number has no more digits
 MOST = 2**62  # of what is counted
 
@@ -52,7 +52,7 @@ class Limits:
     most_steps: int = 5_000_000
     compared: bool = True  # whether a run that projection does not hold is compared with one that it holds
     branches: Branches = ()  # to take at crossings, both counted from 1; else the smooth one
-    code: str = AUTO  # GENERIC kernels, SPECIALISED to the scene, or AUTO: where many steps are ahead
+    code: str = AUTO  # of `taylor`: GENERIC kernels, GENERATED for the scene, or AUTO: where it pays
 
     def __post_init__(self) -> None:
         for field in fields(self):

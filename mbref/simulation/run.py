@@ -1,8 +1,7 @@
-"""Run: one simulation in the compiled loop, on the general kernels or on code specialised for the scene."""
+"""Run: one simulation in the compiled loop."""
 
 from __future__ import annotations
 
-import contextlib
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -24,7 +23,6 @@ from mbref.kernels.layout import (
     Loop,
     Memory,
     SparseFactor,
-    SpecialisedCode,
     State,
     Watch,
 )
@@ -36,18 +34,16 @@ from mbref.linear_algebra.symbolic_factorisation import empty_factor, no_static_
 from mbref.method import Method
 from mbref.scene import Scene, SceneError
 from mbref.simulation.control import control_of
-from mbref.simulation.limits import AUTO, SPECIALISED, Limits
+from mbref.simulation.limits import Limits
 from mbref.simulation.preparation import prepare
 from mbref.simulation.ranks import NO_RANKS, Ranks, ranks_at
 from mbref.simulation.stepping import CREEPING, PAUSED, SINGULAR_AHEAD, UNDECIDED, advance_to_end
-from mbref.specialised import Part, Specialised, Untraceable, Varied, specialise, with_specialised_code
 from mbref.stabilisation.all_coordinates import rates as rates_of_all_rows
 from mbref.stabilisation.base import Stabilisation
 
 OUT_OF_REACH, PACE_STEPS = 100.0, 20_000  # limits of steps that the end is away, at the pace of so many
 NEARLY = 1e-5  # least singular value below which rows are nearly dependent
 MOST_COMPARED = 60  # rows whose gradients at both ends of a step are compared
-STEPS_WORTH_CODE = 20_000  # steps ahead from which on specialised code saves more than it takes to make
 
 
 class Run:
@@ -61,18 +57,12 @@ class Run:
         prepare(method)  # so that the run alone is timed
         self._lent = self._lend_memory()
         self.memory, self.packed = self._lent.values, self._lent.packed
-        if method.stabilisation.projects and self.reduction:
-            self.part = Part(self.memory.active, self.memory.factor, self.reduction.identity)
         self.put_start()
         self.enter_state()
-        self.specialised: Specialised | None = None
-        self.wants_code = limits.code == AUTO
         self.crossings: list[Passed] = []
-        self.making = 0.0  # s of CPU time spent on specialised code
-        self.built = 0.0  # and on all else before the first step
+        self.making = 0.0  # s of CPU time, within ``advance``, that is construction
+        self.built = 0.0  # s of CPU time before the first step
         self._judged = 0.0, 0  # time (s) and steps when the pace was last judged
-        if limits.code == SPECIALISED:
-            self._specialise()
 
     def give_back(self) -> None:
         """Leave the memory to the next run; this one cannot be read any more."""
@@ -150,7 +140,6 @@ class Run:
         pivots = factor.symbolic.row.size
         algebra = formulation.linear_algebra
         sizes = {**model.sizes, "k": self.times.size, "dense_rows": algebra.rows(model.m), "pivots": pivots}
-        sizes["numbers"] = 0
         compared = pivots <= MOST_COMPARED
         sizes["compared_rows"] = pivots if compared else 0
         sizes["compared_entries"] = factor.d.size if compared else 0
@@ -173,7 +162,6 @@ class Run:
             pivots=np.ones(pivots),
             loop=allocate(Loop, sizes),
             kernels=self._kernels_on(stabilisation),
-            code=allocate(SpecialisedCode, sizes),
             chart=packed(allocate(stabilisation.memory, sizes)) if stabilisation.memory else None,
             chart_options=method.packed_options(stabilisation),
             integrator=packed(allocate(integrator.schema, sizes)),
@@ -194,7 +182,6 @@ class Run:
             propose=integrator.propose,
             rates=rates_of_all_rows if formulation.needs_all_rows and chart.projects else chart.rates,
             rates_with_outputs=chart.rates_with_outputs,
-            fallback_rates=chart.fallback_rates,
             accept=chart.accept,
             accelerate=formulation.accelerate,
         )
@@ -211,7 +198,7 @@ class Run:
         if self.method.stabilisation.projects:
             self.ranks = ranks
             memory.watch.generic_rank = ranks.rank
-            freedoms = self.part.active.velocities.size - ranks.rank  # more may be a singular position's
+            freedoms = memory.active.velocities.size - ranks.rank  # more may be a singular position's
             memory.watch.regular = freedoms <= (0 if self.scene.driver else 1)
             settings.nearly_dependent = self.ranks.least < NEARLY
             settings.rounding *= min(1.0, self.model.length)
@@ -235,7 +222,6 @@ class Run:
             if status == SINGULAR_AHEAD or self._fails_at_start(status):
                 status = self.pass_singular_position(status)
             status = self._judge_pace(status)
-            self.specialise_where_it_pays(status)
             if progress is not None:
                 progress(float(self.memory.loop.clock.time))
         return status, time.process_time() - began - (self.making - before)
@@ -266,56 +252,6 @@ class Run:
         ``status`` says why the steps ended.
         """
         return UNDECIDED if status == SINGULAR_AHEAD else status
-
-    def specialise_where_it_pays(self, status: int) -> None:
-        """Go on with machine code of the scene's own where many steps are ahead of a run that is PAUSED.
-
-        General kernels leave out rows that depend on others, and take fewer steps where there are any.
-        """
-        independent = self.memory.equations.system.settings.independent
-        worth = self.wants_code and independent and status == PAUSED
-        if worth and self._steps_ahead() >= STEPS_WORTH_CODE:
-            self.wants_code = False
-            with contextlib.suppress(Untraceable):  # then the general kernels go on
-                self._specialise()
-
-    def _steps_ahead(self) -> float:
-        """Steps to the end at the pace so far, or to the limit of steps."""
-        taken, reached = self.memory.equations.system.counts.steps, self.memory.loop.clock.time
-        return min(taken * (self.times[-1] / reached - 1.0), self.limits.most_steps - taken)
-
-    def _specialise(self) -> None:
-        """Go on with code specialised for the scene, made or loaded; raises Untraceable."""
-        began = time.process_time()
-        kernels = self._make_code(self.model, self.start)
-        write(self._lent.values.code.addresses, self.specialised.addresses)
-        self.packed = self._lent.packed_as(kernels, lambda memory: memory._replace(kernels=kernels))
-        self.memory = self.packed.values
-        self.making += time.process_time() - began
-
-    def with_code(self, model: Model, start: Start, varied: Varied) -> Memory:
-        """Memory of this run with code for all scenes that differ from one in the numbers ``varied``; raises
-        Untraceable."""
-        kernels, general = self._make_code(model, start, varied), self._lent.values
-        addresses, numbers = record(self.specialised.addresses), varied.numbers[0].copy()
-        code = general.code._replace(addresses=addresses, numbers=numbers)
-        return general._replace(code=code, kernels=kernels)
-
-    def _make_code(self, model: Model, start: Start, varied: Varied | None = None) -> Kernels:
-        """The kernels of a run on code that is now ``specialised`` for a scene of the structure of this one;
-        raises Untraceable."""
-        stabilisation = self.method.stabilisation
-        if not stabilisation.projects:
-            raise Untraceable(f"{stabilisation.name} has no specialised code")
-        tolerance = self.limits.rank_tolerance
-        self.specialised = specialise(model, self.method, tolerance, start, self.part, varied)
-        return self._kernels_on(with_specialised_code(stabilisation))
-
-    @property
-    def memory_of_kernels(self) -> Memory:
-        """Memory of this run on the general kernels."""
-        memory: Memory = self._lent.values
-        return memory
 
 
 def missing_masses(scene: Scene) -> list[str]:

@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from mbref.kernels.beside import compiled_beside
+from mbref.kernels.machine_code import NoGeneratedCode
 from mbref.method import DEFAULT, Method, MethodError
 from mbref.motion import Motion
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 from mbref.simulation import preparation
-from mbref.simulation.limits import SPECIALISED, Limits
+from mbref.simulation.limits import GENERATED, Limits
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.run import Run
 from mbref.simulation.stepping import DONE
-from mbref.specialised import Untraceable
 from mbref.taylor.check import compare_with_default
 from mbref.taylor.run import CrossingRun, TaylorRun
 from mbref.taylor.series_run import KERNELS_OF_SERIES, prepare_series
@@ -43,7 +43,7 @@ def simulate(
     Returns the states reached, with accelerations and reactions; a failure of the method is the
     motion's outcome.  Raises SceneError for a scene that cannot be simulated, ValueError for times
     that do not increase or an order the integrator does not have, MethodError for an unknown method name
-    and where ``limits`` ask for machine code that the method or the scene cannot have, or for a branch of a
+    and where ``limits`` ask for generated code that the method or the scene cannot have, or for a branch of a
     method that does not look for singular positions.
     """
     scene = scene if isinstance(scene, Scene) else find_scene(str(scene))
@@ -63,10 +63,12 @@ def simulate(
 def begun(scene: Scene, method: Method, times: np.ndarray, limits: Limits) -> Run:
     """The run of a scene, ready to be advanced."""
     began = time.process_time()
+    if limits.code == GENERATED and not is_series(method):
+        raise MethodError(f"code: {method} has no generated code; taylor has")
     try:
         run = kind_of(method)(scene, method, times, limits)
-    except Untraceable as reason:
-        raise MethodError(f"no machine code for {scene.name!r} by {method}: {reason}") from None
+    except NoGeneratedCode as reason:
+        raise MethodError(f"code: no generated code for {scene.name!r} by {method}: {reason}") from None
     run.built = time.process_time() - began - run.making
     return run
 
@@ -90,9 +92,14 @@ def _check_branches(run: Run) -> None:
         )
 
 
+def is_series(method: Method) -> bool:
+    """Whether the method integrates by Taylor series, the only one with generated code."""
+    return not method.integrator.step
+
+
 def kind_of(method: Method) -> type[Run]:
     """How a run of the method treats singular positions."""
-    if not method.integrator.step:
+    if is_series(method):
         return TaylorRun
     return CrossingRun if method.stabilisation.projects else Run
 
@@ -114,14 +121,14 @@ def are_compiled(method: Method) -> bool:
 
 
 def why_no_code(scene: Scene, method: Method) -> str:
-    """Why a scene cannot have machine code of its own by this method; empty where it can, and now has it.
+    """The reason why a scene cannot have generated code by `taylor`; empty where it can, and now has it.
 
-    The kernels of the method are compiled.
+    Compiles the kernels of the method.
     """
     prepare(method)
     try:
-        kind_of(method)(scene, method, np.array([scene.duration]), Limits(code=SPECIALISED))
-    except Untraceable as reason:
+        TaylorRun(scene, method, np.array([scene.duration]), Limits(code=GENERATED))
+    except NoGeneratedCode as reason:
         return str(reason)
     return ""
 

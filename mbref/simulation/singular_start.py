@@ -52,7 +52,7 @@ def freedoms_of_first_order(run: Run) -> int:
     """Freedoms that Φ_q leaves at the start of a run that projects; 0 where ranks are not looked at."""
     if not run.method.stabilisation.projects or run.model.m > MOST_ROWS:
         return 0
-    return int(run.part.active.velocities.size - run.memory.watch.generic_rank)
+    return int(run.memory.active.velocities.size - run.memory.watch.generic_rank)
 
 
 def begins_at_rest(run: Run) -> bool:

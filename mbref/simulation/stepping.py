@@ -5,7 +5,7 @@ from __future__ import annotations
 from mbref.equations.coordinates import copy_state, fastest_turn
 from mbref.equations.loads import remember_angles
 from mbref.kernels.compilation import INT, entry, kernel
-from mbref.kernels.layout import CHANGED, GUARD_FAILED, MEMORY, NOT_FINITE, OK
+from mbref.kernels.layout import CHANGED, MEMORY, NOT_FINITE, OK
 from mbref.linear_algebra.vectors import all_finite, copy
 from mbref.simulation.samples import take_sample
 from mbref.simulation.singular_crossing import (
@@ -149,8 +149,6 @@ def evaluate_state(y, y_rate, memory):
         status = kernels.rates_with_outputs(t, y, y_rate, memory)
     else:
         status = kernels.rates(t, y, y_rate, memory)
-    if status == GUARD_FAILED:
-        status = kernels.fallback_rates(t, y, y_rate, memory)
     if status == OK:
         status = check_state(y, y_rate, memory)
     if status == OK:
@@ -162,10 +160,7 @@ def evaluate_state(y, y_rate, memory):
 def attempt(t, h, y, y_rate, y_new, memory):
     """One attempt at a step: its error ratio, or minus the status of an evaluation that failed."""
     step, kernels = memory.kernels.step, memory.kernels
-    ratio = step(kernels.rates, t, h, y, y_rate, y_new, memory)
-    if ratio == -float(GUARD_FAILED):
-        ratio = step(kernels.fallback_rates, t, h, y, y_rate, y_new, memory)
-    return ratio
+    return step(kernels.rates, t, h, y, y_rate, y_new, memory)
 
 
 @kernel

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -14,13 +13,12 @@ from mbref.method import Method
 from mbref.motion import Motion
 from mbref.scene import Scene
 from mbref.simulation.followers import Followed, follow, may_lead
-from mbref.simulation.limits import GENERIC, SPECIALISED, Limits
+from mbref.simulation.limits import Limits
 from mbref.simulation.run import Run
 from mbref.simulation.simulate import begun, completed, kind_of, simulate
 from mbref.taylor.check import DROPS
 from mbref.taylor.run import CrossingRun
 
-STEPS_WORTH_SHARED_CODE = 5_000  # steps from which on code for many scenes saves more than it takes to make
 FEW = 0.5  # of the scenes of a shape, that follow a run: the others are left to runs of their own
 
 
@@ -52,10 +50,7 @@ class Ended:
 def simulate_all(
     scenes: Sequence[Scene], method: Method | str, times: np.ndarray, limits: Limits
 ) -> list[Motion]:
-    """The motions of the scenes, as ``simulate`` gives them one by one; raises its errors.
-
-    Where many steps are ahead, they are those of machine code, equal but for rounding.
-    """
+    """The motions of the scenes, as ``simulate`` gives them one by one; raises its errors."""
     ended = run_all(scenes, method, times, limits)
     if ended.error:
         raise ended.error
@@ -63,13 +58,11 @@ def simulate_all(
     return [found[place] for place in range(len(scenes))]
 
 
-def run_all(
-    scenes: Sequence[Scene], method: Method | str, times: np.ndarray, limits: Limits, others: int = 0
-) -> Ended:
-    """The runs of the scenes; so many steps of ``others`` of their shape could be by the same code."""
+def run_all(scenes: Sequence[Scene], method: Method | str, times: np.ndarray, limits: Limits) -> Ended:
+    """Simulate the scenes."""
     began = time.perf_counter()
     method = Method.parse(method) if isinstance(method, str) else method
-    runs = _Runs(scenes, method, times, limits, others)
+    runs = _Runs(scenes, method, times, limits)
     for places in _by_shape(scenes):
         if len(places) > 1 and _can_lead(method, limits):
             runs.one_behind_the_other(places)
@@ -89,18 +82,15 @@ def _by_shape(scenes: Sequence[Scene]) -> Sequence[list[int]]:
 
 def _can_lead(method: Method, limits: Limits) -> bool:
     """Whether runs of a method can be followed: those in steps that projection holds to their motion."""
-    held = limits.rank_tolerance <= DROPS and not limits.branches and limits.code != SPECIALISED
+    held = limits.rank_tolerance <= DROPS and not limits.branches
     return kind_of(method) is CrossingRun and method.integrator.integrates and held
 
 
 class _Runs:
     """Runs of scenes, those of one shape behind the first run that may lead and that they can follow."""
 
-    def __init__(
-        self, scenes: Sequence[Scene], method: Method, times: np.ndarray, limits: Limits, others: int
-    ):
+    def __init__(self, scenes: Sequence[Scene], method: Method, times: np.ndarray, limits: Limits):
         self.ended, self._scenes, self._arguments = Ended(), scenes, (method, times, limits)
-        self._others = others if limits.code != GENERIC else -math.inf
 
     def alone(self, places: Iterable[int]) -> None:
         """Run the scenes at these places one by one."""
@@ -127,10 +117,8 @@ class _Runs:
         """The places of scenes that are left once others have followed a run."""
         if not places or not isinstance(run, CrossingRun) or not may_lead(run):
             return places
-        steps = self._others + int(run.memory.equations.system.counts.steps) * len(places)
-        by_code = steps >= STEPS_WORTH_SHARED_CODE
         try:
-            followed = follow(run, [self._scenes[place] for place in places], by_code)
+            followed = follow(run, [self._scenes[place] for place in places])
         except np.linalg.LinAlgError:  # which the numbers of one scene have caused
             self.alone(places)
             return []

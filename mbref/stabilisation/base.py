@@ -22,7 +22,7 @@ class Stabilisation:
     ``rates(t, y, y', memory) -> status`` evaluates y' and leaves the state in ``memory.state``;
     ``accept(t, y, memory) -> status`` corrects y after an accepted step (CHANGED: new coordinates, new
     length); ``rates_with_outputs`` is ``rates`` where a sample is taken: it leaves accelerations and
-    multipliers as well; ``fallback_rates`` serves where ``rates`` returns GUARD_FAILED.
+    multipliers as well.
     ``memory`` is the schema of the chart's own memory, in ``Memory.chart``.
     """
 
@@ -31,7 +31,6 @@ class Stabilisation:
     enter: Exchangeable
     rates: Exchangeable
     rates_with_outputs: Exchangeable
-    fallback_rates: Exchangeable
     accept: Exchangeable
     memory: type | None = None
     numbers: type = NoOptions  # the method's own numbers, a record with their defaults

@@ -19,5 +19,5 @@ def _feedback(options: Mapping[str, float]) -> tuple[float, float]:
 
 
 BAUMGARTE = Stabilisation(
-    "baumgarte", "Eq. 9", enter, rates, rates, rates, accept, numbers=Options, feedback=_feedback
+    "baumgarte", "Eq. 9", enter, rates, rates, accept, numbers=Options, feedback=_feedback
 )

@@ -193,5 +193,5 @@ def accept(t, y, memory):
 
 
 NULL_SPACE = Stabilisation(
-    "null-space", "Kim & Vanderploeg 1986", enter, rates, rates, rates, accept, memory=Scratch
+    "null-space", "Kim & Vanderploeg 1986", enter, rates, rates, accept, memory=Scratch
 )

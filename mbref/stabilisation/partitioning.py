@@ -279,5 +279,5 @@ def accept(t, y, memory):
 
 
 PARTITIONING = Stabilisation(
-    "partitioning", "Eqs. 10-16", enter, rates, rates, rates, accept, memory=Scratch, numbers=Options
+    "partitioning", "Eqs. 10-16", enter, rates, rates, accept, memory=Scratch, numbers=Options
 )

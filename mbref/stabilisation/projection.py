@@ -10,7 +10,6 @@ exchange their roles, the larger of their pivots is still about α^(-1/4).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Annotated, NamedTuple
 
 from numpy import sqrt
@@ -115,7 +114,7 @@ def remove_violation(violation, iterations, factor, target):
 
 
 @kernel
-def newton_step(t, y, before, memory):
+def newton_step(t, before, memory):
     """One step of Newton's method for Φ(q, t) = 0 in ``memory.state``; the largest |Φ| before it.
 
     The last factor serves again while the violation ``before`` was small and shrinks well.  Positions whose
@@ -143,42 +142,22 @@ def correct_positions(memory):
 
 
 @kernel
-def whole_newton_step(t, memory):
-    """As ``newton_step``, always with a factor of its own and a correction: for specialised code."""
-    state, equations, scratch = memory.state, memory.equations, scratch_of(memory.chart)
-    evaluate(t, state.coordinates, state.velocities, equations)
-    violation = largest(equations.rows.phi)
-    if not factorise_constraints(memory):
-        return FACTOR_FAILED
-    scratch.correction[:] = 0.0
-    correct_positions(memory)
-    return violation
+def project_positions(t, memory):
+    """Repeat Newton steps until the violation is rounding.
 
-
-def newton_loop(step: Callable) -> Callable:
-    """A kernel (t, y, memory) -> status that repeats the Newton step until the violation is rounding.
-
-    A negative violation ends it as SINGULAR: no factor exists, or a guard of specialised code failed.
+    Return OK, SINGULAR where no factor exists, or NOT_CONVERGED.
     """
-
-    @kernel
-    def loop(t, y, memory):
-        system, before = memory.equations.system, NEVER
-        tolerance = system.settings.newton_tolerance
-        for _ in range(MOST_ITERATIONS):
-            system.counts.newton += 1
-            violation = step(t, y, before, memory)
-            if violation < 0.0:
-                return SINGULAR
-            if violation <= tolerance or before <= violation <= ROUNDING * tolerance:
-                return OK
-            before = violation
-        return OK if before <= ROUNDING * tolerance else NOT_CONVERGED
-
-    return loop
-
-
-project_positions = newton_loop(newton_step)
+    system, before = memory.equations.system, NEVER
+    tolerance = system.settings.newton_tolerance
+    for _ in range(MOST_ITERATIONS):
+        system.counts.newton += 1
+        violation = newton_step(t, before, memory)
+        if violation < 0.0:
+            return SINGULAR
+        if violation <= tolerance or before <= violation <= ROUNDING * tolerance:
+            return OK
+        before = violation
+    return OK if before <= ROUNDING * tolerance else NOT_CONVERGED
 
 
 @kernel
@@ -186,7 +165,7 @@ def project(t, y, memory):
     """Project y; OK, SINGULAR or NOT_CONVERGED."""
     state = memory.state
     expand(y, memory.active, state)
-    status = project_positions(t, y, memory)
+    status = project_positions(t, memory)
     if status != OK or not follow_last_correction(t, memory):
         return SINGULAR if status == OK else status
     watch_pivots(memory)
@@ -293,6 +272,6 @@ def whole_rates(t, y, y_rate, memory):
 
 
 PROJECTION = Stabilisation(
-    "projection", "Bayo & Ledesma 1996", enter, rates, whole_rates, whole_rates, accept, memory=Scratch,
+    "projection", "Bayo & Ledesma 1996", enter, rates, whole_rates, accept, memory=Scratch,
     projects=True, largest_turn=LARGEST_TURN,
 )  # fmt: skip

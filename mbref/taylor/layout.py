@@ -220,7 +220,7 @@ class SeriesKernels(NamedTuple):
 
 
 class SceneCode(NamedTuple):
-    """Addresses of machine code of the scene's own, for a rank of its rows; 0 for none."""
+    """Addresses of the functions generated for the scene at a rank of its rows; 0 for none."""
 
     rank: int = 0
     expand: int = 0  # finds all orders

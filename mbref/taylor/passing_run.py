@@ -15,13 +15,13 @@ from mbref.equations.reduction import Reduction
 from mbref.kernels.compilation import Entry
 from mbref.kernels.layout import OK
 from mbref.kernels.lent_memory import take_back
+from mbref.kernels.machine_code import NoGeneratedCode
 from mbref.method import Method
-from mbref.simulation.limits import GENERIC, SPECIALISED
+from mbref.simulation.limits import GENERATED, GENERIC
 from mbref.simulation.ranks import Ranks
 from mbref.simulation.run import Run
 from mbref.simulation.singular_start import Leaving
 from mbref.simulation.stepping import DONE, PAUSED, UNDECIDED
-from mbref.specialised import Untraceable
 from mbref.taylor.layout import Polynomials
 from mbref.taylor.passing import (
     advance_over,
@@ -51,8 +51,8 @@ class PassingRun(SeriesRun):
         limits = replace(run.limits, rtol=EXACT, atol=EXACT, code=GENERIC)
         super().__init__(run.scene, Method.parse(SERIES), run.times, limits)
         self.taylor.progress.passing = True
-        if run.limits.code == SPECIALISED:
-            with contextlib.suppress(Untraceable):  # then the series are by the kernels
+        if run.limits.code == GENERATED:
+            with contextlib.suppress(NoGeneratedCode):  # then the series are by the kernels
                 self._put_code()
 
     def _posed(self) -> tuple[Model, Start, Reduction | None]:

@@ -126,7 +126,7 @@ class TaylorRun(SeriesRun):
             began = time.process_time()
             if status != DONE:
                 status = self._over(status)
-                self.specialise_where_it_pays(status)
+                self.generate_where_it_pays(status)
             if progress is not None:
                 progress(float(self.memory.loop.clock.time))
         seconds += time.process_time() - began - (self.making - before)

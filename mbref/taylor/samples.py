@@ -10,7 +10,7 @@ from numpy import sqrt
 from mbref.equations.coordinates import contract, copy_state
 from mbref.equations.evaluation import add_resting_rows, assemble_system
 from mbref.kernels.compilation import INT, entry, inlined, kernel
-from mbref.kernels.layout import GUARD_FAILED, NOT_CONVERGED, OK
+from mbref.kernels.layout import NOT_CONVERGED, OK
 from mbref.linear_algebra.vectors import copy, larger
 from mbref.simulation.samples import take_sample as record_sample
 from mbref.taylor.layout import SERIES
@@ -172,8 +172,7 @@ def accelerate(t, run):
     loop, kernels = run.loop, run.kernels
     y, y_rate = loop.y[: loop.clock.y_size], loop.y_rate[: loop.clock.y_size]
     contract(run.state.coordinates, run.state.velocities, run.active, y)
-    status = kernels.rates_with_outputs(t, y, y_rate, run)
-    return kernels.fallback_rates(t, y, y_rate, run) if status == GUARD_FAILED else status
+    return kernels.rates_with_outputs(t, y, y_rate, run)
 
 
 @kernel

@@ -18,8 +18,9 @@ from mbref.kernels.machine_code import NoGeneratedCode
 from mbref.kernels.named_memory import Packed, allocate
 from mbref.method import Method
 from mbref.scene import Scene
-from mbref.simulation.limits import AUTO, GENERIC, SPECIALISED, Limits
+from mbref.simulation.limits import AUTO, GENERATED, GENERIC, Limits
 from mbref.simulation.run import Run
+from mbref.simulation.stepping import PAUSED
 from mbref.taylor.advance import advance_series, enter
 from mbref.taylor.driven import follow_drivers
 from mbref.taylor.geometry import geometry_of
@@ -54,8 +55,9 @@ KERNELS_OF_SERIES = (
     cross, pass_on, give_back, look_along,
 )  # fmt: skip
 ROUNDING = 1e-16  # of a singular value
+STEPS_WORTH_CODE = 20_000  # steps ahead from which on generated code saves more time than it takes
 LEAST_ORDER, MOST_ORDER = 4, 30
-CHEAPEST = {GENERIC: (6.0, 1.2), SPECIALISED: (7.0, 1.6)}  # order: at a tolerance of 1, and more per digit
+CHEAPEST = {GENERIC: (6.0, 1.2), GENERATED: (7.0, 1.6)}  # order: at a tolerance of 1, and more per digit
 
 
 def order_of(tolerance: float, wanted: float, code: str) -> int:
@@ -83,7 +85,7 @@ class SeriesRun(Run):
         self.memory.equations.system.settings.independent = True  # at samples, where states are exact
         self._decide_rank()
         prepare_series()
-        self.is_driven = self.ranks.rank == self.part.active.velocities.size and not self.model.has_angles
+        self.is_driven = self.ranks.rank == self.memory.active.velocities.size and not self.model.has_angles
         tolerance, order = self._tolerance_and_order(limits)
         self.geometry, self.polynomials = self._equations()
         exact_order = max(order, EXACT_ORDER) if self.model.closed_loops else order
@@ -97,16 +99,16 @@ class SeriesRun(Run):
         progress.end = self.times[-1]
         progress.farthest = OFF * max(1.0, self.model.length)
         progress.striding = self.strides
-        progress.freedoms = self.part.active.velocities.size - self.ranks.rank
+        progress.freedoms = self.memory.active.velocities.size - self.ranks.rank
         self.wants_code = limits.code == AUTO
-        if limits.code == SPECIALISED:
-            self._specialise()
+        if limits.code == GENERATED:
+            self._put_code()
 
     def _tolerance_and_order(self, limits: Limits) -> tuple[float, int]:
         """Of the steps of the series."""
         control, method = self.memory.control, self.method
         tolerance = SHARE * (control.rtol + control.atol)
-        code = SPECIALISED if limits.code == SPECIALISED else GENERIC
+        code = GENERATED if limits.code == GENERATED else GENERIC
         return tolerance, order_of(tolerance, method.options_of(method.integrator)["order"], code)
 
     def _decide_rank(self) -> None:
@@ -122,7 +124,7 @@ class SeriesRun(Run):
     def equations_of(self, model: Model, start: Start) -> tuple[Geometry, Polynomials]:
         """Those of a scene that differs from this one in numbers alone, from its start."""
         moving = np.zeros(model.n, dtype=bool)
-        moving[self.part.active.velocities] = True
+        moving[self.memory.active.velocities] = True
         geometry = geometry_of(model, start, moving, self.strides)
         return geometry, geometry.polynomials(model)
 
@@ -174,29 +176,27 @@ class SeriesRun(Run):
             parting=np.array(parting, np.int64),
         )
 
-    def _specialise(self) -> None:
-        """Expand, and take samples, by code of the scene's own from now on, made or loaded.
+    def generate_where_it_pays(self, status: int) -> None:
+        """Go on with generated code where many steps are ahead of a run that is PAUSED."""
+        if self.wants_code and status == PAUSED and self._steps_ahead() >= STEPS_WORTH_CODE:
+            self.wants_code = False
+            with contextlib.suppress(NoGeneratedCode):  # then the generic kernels go on
+                self._put_code()
 
-        Raises NoGeneratedCode where the series cannot have any.
-        """
-        began = time.process_time()
-        self._put_code()
-        self.making += time.process_time() - began
-        with contextlib.suppress(NoGeneratedCode):  # then samples are taken by the general kernels
-            super()._specialise()
-            run = self.memory
-            self._packed_taylor = self._lent_series.packed_as(
-                run.kernels, lambda taylor: taylor._replace(run=run), self.packed
-            )
-            self.taylor = self._packed_taylor.values
+    def _steps_ahead(self) -> float:
+        """Steps to the end at the pace so far, or to the limit of steps."""
+        taken, reached = self.memory.equations.system.counts.steps, self.memory.loop.clock.time
+        return min(taken * (self.times[-1] / reached - 1.0), self.limits.most_steps - taken)
 
     def _put_code(self) -> None:
-        """Have the series made by code of the scene's own from now on; raises NoGeneratedCode without any."""
+        """Expand the series by generated code from now on; raises NoGeneratedCode where there is none."""
+        began = time.process_time()
         try:
             from mbref.taylor.generated.build import put_code  # optional, and not needed by most runs
         except ModuleNotFoundError:
             raise NoGeneratedCode("the subpackage mbref.taylor.generated is not installed") from None
         self._code = put_code(self.taylor)
+        self.making += time.process_time() - began
 
     def expand(self) -> int:
         """Expand at the present time and state, for steps until the end: OK or why that cannot be."""

@@ -84,9 +84,7 @@ def test_second_rate_of_a_distance_that_is_not_kept():
     assert found["J"] == pytest.approx([8.5])
 
 
-@pytest.mark.parametrize(
-    ("family", "code"), [("lm2+projection", "generic"), ("lm2+projection, specialised", "specialised")]
-)
+@pytest.mark.parametrize(("family", "code"), [("taylor", "generic"), ("taylor, generated", "generated")])
 def test_code_of_a_family_of_mbref(family, code, monkeypatch):
     asked = []
     monkeypatch.setattr(

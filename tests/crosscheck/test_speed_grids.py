@@ -70,9 +70,9 @@ def test_every_family_says_whose_integrator_it_has(monkeypatch: pytest.MonkeyPat
     assert _integrator("pinocchio", "tuned") not in (OWN, COMPILED_HERE)
     assert OPPONENTS["own integrators"][1] == (OWN,) and OPPONENTS["engines"][1] == ()
     ours = {family: [w for w, belongs in OURSELVES.items() if belongs(family)] for family in
-            ("taylor", "taylor, specialised", "kinematic", "lm2+projection, specialised")}  # fmt: skip
-    assert ours == {"taylor": ["series"], "taylor, specialised": ["series"], "kinematic": ["general kernels"],
-                    "lm2+projection, specialised": ["specialised code"]}  # fmt: skip
+            ("taylor", "taylor, generated", "kinematic", "lm2+projection")}  # fmt: skip
+    assert ours == {"taylor": ["series"], "taylor, generated": ["series"], "kinematic": ["other methods"],
+                    "lm2+projection": ["other methods"]}  # fmt: skip
 
 
 def test_a_whole_process_pays_after_the_construction_is_earned(monkeypatch: pytest.MonkeyPatch):

@@ -313,7 +313,7 @@ def test_tables_of_eighty_columns_and_whole_numbers():
         )
         for s, end in ((0.0001, "COMPLETED"), (7.8125e-06, "NOT_CONVERGED"))
     ]
-    long.append(failed("exudyn", "alf-dual+projection, specialised"))
+    long.append(failed("exudyn", "alf-dual+projection, compiled"))
     console = Console(width=80, record=True, file=io.StringIO())
     long.append({**failed("exudyn", "defaults"), "t_end": -1e-08})
     tables.print_comparison(console, group(long), verdict([group(long)]), "my.toml", with_ratio=True)

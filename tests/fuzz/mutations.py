@@ -160,7 +160,7 @@ LIMITS = (
     "largest_step", "largest_turn", "most_steps", "code",
 )  # fmt: skip
 PATHS = ("body[0].mass", "gravity[1]", "joint[0].anchor[2]", "body[", "x", "")
-CODES = ("auto", "generic", "specialised")
+CODES = ("auto", "generic", "generated")
 RATHER = (1e-3, 1e-6, 1e-9, 1e-12, 0.01, 0.1, 0.5, 1, 100)  # numbers that a user may well give
 
 

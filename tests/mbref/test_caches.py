@@ -40,16 +40,15 @@ import sys
 sys.path.insert(0, {root!r})
 from pathlib import Path
 from mbref.kernels.machine_code import code_at
-from mbref.specialised.assembly import Piece, text_of
-from mbref.specialised.tracing import Record, inputs
 
-def text():
-    record = Record()
-    (x,) = inputs(record, "y", [2.0])
-    return text_of([Piece("rates", record, [x * 3.0])])
-
-code = code_at(Path(sys.argv[1]) / "scene.code", text)
-print(code.address("rates") != 0)
+THREE_TIMES = '''
+define double @three_times(double %x) {{
+  %product = fmul double %x, 3.0
+  ret double %product
+}}
+'''
+code = code_at(Path(sys.argv[1]) / "scene.code", lambda: THREE_TIMES)
+print(code.address("three_times") != 0)
 """
 
 

@@ -31,7 +31,7 @@ def error(scene, run):
     return measure(scene, run, truth_for(scene))["error"]
 
 
-@pytest.mark.parametrize("code", ["generic", "specialised"])
+@pytest.mark.parametrize("code", ["generic", "generated"])
 @pytest.mark.parametrize("name", LINKAGES)
 def test_every_singular_position_is_recorded_at_its_time(name, code):
     scene = SCENES[name]()
@@ -52,7 +52,7 @@ def test_singular_positions_are_those_of_the_kinematic_analysis(name):
         assert np.abs(np.array(one.velocity) - other.velocity).max() < 1e-6 * CRANK_RATE
 
 
-@pytest.mark.parametrize("code", ["generic", "specialised"])
+@pytest.mark.parametrize("code", ["generic", "generated"])
 def test_accelerations_between_singular_positions_are_exact(code):
     """Every centre of a crank at rate ω with a rod of its length moves by cos ωt and sin ωt.  Masses off the
     axes and rows of parallel hinges make a redundant row look independent, so that all places seem to be

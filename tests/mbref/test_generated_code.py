@@ -43,7 +43,7 @@ def terms(scene, code):
 
 def agree(scene):
     """Whether the terms of a scene's code are those of the kernels; by power it gives those of variables."""
-    (expected, _), (found, run) = (terms(scene, code) for code in ("generic", "specialised"))
+    (expected, _), (found, run) = (terms(scene, code) for code in ("generic", "generated"))
     by_power = run.taylor.progress.slowing > 0.0
     lanes = slice(run.taylor.solver.pivot_columns.size if by_power else None)
     return np.abs(found - expected)[:, lanes].max() <= 1e-11 * np.abs(expected).max()
@@ -97,7 +97,7 @@ def test_power_gives_the_terms_of_one_freedom(name, duration):
     duration ago, which is how far the terms can be told."""
     scene, found = SCENES[name](), []
     state = in_motion(scene, duration)
-    for code in ("generic", "specialised"):
+    for code in ("generic", "generated"):
         run = TaylorRun(scene, ORDER_16, np.array([0.1]), Limits(code=code))
         run.memory.state.coordinates[:], run.memory.state.velocities[:] = state
         run.memory.loop.clock.length = duration
@@ -116,7 +116,7 @@ def test_a_motion_that_turns_back_is_that_of_the_kernels(name):
     times = np.linspace(0.0, 4.0, 41)
     generic, own = (
         simulate(SCENES[name](), "taylor", times, Limits(rtol=1e-11, code=code))
-        for code in ("generic", "specialised")
+        for code in ("generic", "generated")
     )
     along = (own.velocity * own.velocity[1]).sum(axis=(1, 2))
     assert own.outcome == Outcome.COMPLETED and along.min() < 0.0 < along.max(), "it turns back"
@@ -131,7 +131,7 @@ def test_runs_agree_with_the_kernels(name):
     times = np.linspace(0.0, 0.2, 5)
     generic, own = (
         simulate(SCENES[name](), ORDER_16, times, Limits(rtol=1e-11, code=code))
-        for code in ("generic", "specialised")
+        for code in ("generic", "generated")
     )
     assert generic.outcome == own.outcome and len(own.times) == len(times), own.message
     assert np.abs(generic.position - own.position).max() < 1e-9
@@ -144,12 +144,6 @@ def test_runs_agree_with_the_kernels(name):
 def _reactions(one, other):
     """The reactions of each joint in two runs; none without masses."""
     return [(one.reactions[joint], other.reactions[joint]) for joint in one.reactions or ()]
-
-
-def test_samples_are_taken_by_code_of_the_scene():
-    run = TaylorRun(SCENES["spatial_slider_crank"](), TAYLOR, np.array([0.1]), Limits(code="specialised"))
-    assert run.taylor.run is run.memory
-    assert run.memory.code.addresses.rates and run.memory.code.addresses.project
 
 
 @pytest.mark.parametrize("name", ("spatial_slider_crank_gravity", "four_bar_gravity", "four_bar"))
@@ -180,9 +174,9 @@ def test_auto_takes_the_code_where_many_steps_are_ahead():
 
 def test_one_process_loads_the_code_of_a_scene_once():
     crank = SCENES["planar_slider_crank"]()
-    first, again = (TaylorRun(crank, TAYLOR, np.array([0.1]), Limits(code="specialised")) for _ in "ab")
+    first, again = (TaylorRun(crank, TAYLOR, np.array([0.1]), Limits(code="generated")) for _ in "ab")
     assert first.taylor.code.expand == again.taylor.code.expand != 0
-    finer = TaylorRun(crank, TAYLOR, np.array([0.1]), Limits(rtol=1e-12, code="specialised"))
+    finer = TaylorRun(crank, TAYLOR, np.array([0.1]), Limits(rtol=1e-12, code="generated"))
     assert finer.taylor.progress.order > first.taylor.progress.order
     assert finer.taylor.code.expand == first.taylor.code.expand, "one code serves all orders"
 
@@ -190,7 +184,7 @@ def test_one_process_loads_the_code_of_a_scene_once():
 def test_springs_are_left_to_the_kernels_and_long_eliminations_too():
     names = {}
     for scene in ("planar_slider_crank", "andrews_squeezer", "bricard"):
-        run = TaylorRun(SCENES[scene](), TAYLOR, np.array([0.01]), Limits(code="specialised"))
+        run = TaylorRun(SCENES[scene](), TAYLOR, np.array([0.01]), Limits(code="generated"))
         names[scene] = {name for name in build.NAMES if run.taylor.code[name]}
     corrections = {"violation", "close", "close_rate"}
     assert names["planar_slider_crank"] == {"expand", "factorise", *corrections}
@@ -203,7 +197,7 @@ def test_every_order_is_that_of_the_kernels(order):
     method = Method.parse(f"taylor[order={order}]")
     generic, own = (
         TaylorRun(SCENES["spatial_slider_crank_gravity"](), method, np.array([0.1]), Limits(code=code))
-        for code in ("generic", "specialised")
+        for code in ("generic", "generated")
     )
     assert own.expand() == generic.expand() == OK
     variables = own.taylor.solver.pivot_columns.size
@@ -218,7 +212,7 @@ def test_springs_with_code_move_as_by_the_kernels(name):
     times = np.linspace(0.0, 0.02, 5)
     generic, own = (
         simulate(SCENES[name](), ORDER_16, times, Limits(rtol=1e-11, code=code))
-        for code in ("generic", "specialised")
+        for code in ("generic", "generated")
     )
     assert generic.outcome == own.outcome and len(own.times) == len(times), own.message
     assert np.abs(generic.position - own.position).max() < 1e-9
@@ -228,10 +222,10 @@ def test_a_scene_that_has_no_code_is_told_why(monkeypatch):
     assert why_no_code(SCENES["four_bar"](), TAYLOR) == ""
     assert why_no_code(SCENES["andrews_squeezer"](), TAYLOR) == ""
     with pytest.raises(MethodError, match="products of blocks, more than 2000"):
-        simulate(find_scene("four_bar_chain[40]"), "taylor", [0.01], Limits(code="specialised"))
+        simulate(find_scene("four_bar_chain[40]"), "taylor", [0.01], Limits(code="generated"))
     monkeypatch.setattr(build, "PLAIN", True)
     with pytest.raises(MethodError, match="without the JIT"):
-        simulate(SCENES["four_bar"](), "taylor", [0.01], Limits(code="specialised"))
+        simulate(SCENES["four_bar"](), "taylor", [0.01], Limits(code="generated"))
 
 
 WITHOUT = """
@@ -245,7 +239,7 @@ for code in ("auto", "generic"):
     motion = simulate(SCENES["four_bar"](), "taylor", [0.0, 0.01], Limits(code=code))
     assert motion.outcome == Outcome.COMPLETED, motion.message
 try:
-    simulate(SCENES["four_bar"](), "taylor", [0.1], Limits(code="specialised"))
+    simulate(SCENES["four_bar"](), "taylor", [0.1], Limits(code="generated"))
 except MethodError as reason:
     assert "mbref.taylor.generated is not installed" in str(reason)
 else:

@@ -35,9 +35,9 @@ def test_kinematic_analysis_and_truth(name):
 
 @pytest.mark.parametrize("samples", (2, 31, 101))
 @pytest.mark.parametrize("name", DRIVEN)
-def test_kinematic_analysis_by_code_of_its_own_and_any_samples(name, samples):
+def test_kinematic_analysis_with_any_samples(name, samples):
     scene, times = SCENES[name](), np.linspace(0, 0.1, samples)  # of 101 some are singular but for rounding
-    trajectory = simulate(scene, "kinematic", times, Limits(code="specialised"))
+    trajectory = simulate(scene, "kinematic", times)
     assert trajectory.outcome.name == "COMPLETED", trajectory.message
     assert trajectory.cost.steps < max(100, 2 * samples), f"{trajectory.cost.steps} steps"
     assert measure(scene, trajectory, truth_for(scene))["error"] < 1e-12

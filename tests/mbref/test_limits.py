@@ -43,7 +43,7 @@ def test_steps_are_counted_in_whole_numbers(value):
 
 
 def test_code_is_one_of_three():
-    with pytest.raises(ValueError, match=r"^code: must be one of auto, generic, specialised, got 'fast'"):
+    with pytest.raises(ValueError, match=r"^code: must be one of auto, generic, generated, got 'fast'"):
         Limits(code="fast")
 
 

@@ -10,11 +10,10 @@ import pytest
 
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from mbref.equations.packing import shape_of
-from mbref.kernels import machine_code
 from mbref.scene import Scene, SceneError, Spring
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
-from mbref.simulation.together import STEPS_WORTH_SHARED_CODE, run_all, simulate_all
+from mbref.simulation.together import run_all, simulate_all
 from mbref.trajectory import Crossing
 from mbref.variation import Variation, variants
 from tests.mbref.scenes_of_one_structure import CRANK, NUMBERS_DECIDE, results
@@ -129,45 +128,6 @@ def test_springs_and_products_of_inertia_together_and_alone_agree():
 )
 def test_other_methods_together_and_alone_agree(method):
     agree(list(variants(CRANK, [MASS, LENGTH], 3)), np.linspace(0.0, 0.01, 3), method=method)
-
-
-MOMENT, FALL = Variation("load[0].moment[2]", 50.0, 150.0), Variation("gravity[1]", -10.0, 10.0)
-SPEED, PIN = Variation("driver[0].polynomial[1]", 100.0, 200.0), Variation("joint[B].anchor[0]", 0.09, 0.11)
-STIFF, WEIGHT = Variation("load[0].stiffness", 7e3, 9e3), Variation("gravity[2]", -10.0, -9.0)
-SHARED_CODE = [
-    (CRANK, [MASS, LENGTH, FALL, MOMENT]),
-    (DRIVEN, [SPEED, PIN]),
-    (SCENES["flyball_governor"](), [STIFF, WEIGHT]),
-]
-
-
-@pytest.mark.parametrize(("scene", "varied"), SHARED_CODE, ids=lambda each: getattr(each, "name", ""))
-def test_code_for_all_variants_and_runs_alone_agree(scene, varied):
-    """One piece of code serves both halves of the scenes, which were drawn apart."""
-    scenes, limits = list(variants(scene, varied, 40)), Limits(rtol=1e-10)
-    machine_code._loaded.clear()
-    found = {}
-    for half in (range(20), range(20, 40)):
-        ended = run_all([scenes[k] for k in half], METHOD, TIMES, limits, STEPS_WORTH_SHARED_CODE)
-        assert sum(len(followed.places) for _, followed in ended.followed) >= 15
-        found.update((half[k], run) for k, run in ended.motions([scenes[k] for k in half]))
-    assert len(machine_code._loaded) == 1, list(machine_code._loaded)
-    for k, each in enumerate(scenes):
-        alone, scale = simulate(each, METHOD, TIMES, limits), np.abs(found[k].velocity).max()
-        off = (
-            np.abs(found[k].position - alone.position).max(),
-            np.abs(found[k].velocity - alone.velocity).max(),
-        )
-        assert off[0] < 1e-9 and off[1] < 1e-8 * scale, f"variant {k}: {off}"
-        assert (found[k].outcome, found[k].message) == (alone.outcome, alone.message)
-
-
-def test_code_is_made_where_many_steps_are_ahead_and_not_forbidden():
-    scenes = list(variants(CRANK, [MASS], 6))
-    for others, code, made in ((0, "auto", 0), (10**6, "generic", 0), (10**6, "auto", 1)):
-        machine_code._loaded.clear()
-        run_all(scenes, METHOD, TIMES, Limits(rtol=1e-6, code=code), others)
-        assert len(machine_code._loaded) == made, (others, code)
 
 
 def test_scenes_whose_numbers_defy_an_array_operation_run_alone(monkeypatch: pytest.MonkeyPatch):

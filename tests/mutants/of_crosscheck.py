@@ -157,7 +157,7 @@ DEFECTS = (  # adapters and processes
     ),
     Defect(
         "crosscheck/engines/mbref.py",
-        'code = "specialised" if setting.family.endswith(SPECIALISED) else "generic"',
+        'code = "generated" if setting.family.endswith(GENERATED) else "generic"',
         'code = "generic"',
         BY_HAND,
     ),
