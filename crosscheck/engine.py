@@ -23,9 +23,10 @@ from mbref.scene_fields import meant
 from mbref.trajectory import Cost, Outcome, Trajectory
 
 __all__ = [
-    "BUILT_IN", "ENTRY_POINTS", "GROUND", "ON_REQUEST", "OPTIONAL", "Cannot", "Cost", "Engine", "Outcome",
-    "Owner", "Scene", "Setting", "Supports", "Trajectory", "default_engines", "engine", "engine_names",
-    "inertia_matrices", "initial_poses", "initial_twists", "installed", "rotations",
+    "ALL", "BUILT_IN", "ENTRY_POINTS", "GENERATORS", "GROUND", "ON_REQUEST", "OPTIONAL", "Cannot",
+    "Cost", "Engine", "Outcome", "Owner", "Scene", "Setting", "Supports", "Trajectory", "all_engines",
+    "default_engines", "engine", "engine_names", "inertia_matrices", "initial_poses", "initial_twists",
+    "installed", "rotations",
 ]  # fmt: skip
 
 BRANCHES = "branches"  # the option that chooses branches at singular positions, where an engine has one
@@ -226,7 +227,10 @@ class Engine(ABC):
 
 BUILT_IN = ("mbref", "mujoco", "pinocchio", "exudyn")
 OPTIONAL = ("simbody", "sundials", "ondsel")  # take part where their packages are installed
-ON_REQUEST = ("casadi", "heyoka")  # take part where they are named: each scene is compiled first
+GENERATORS = ("casadi", "heyoka")  # take part where they are named: each scene is compiled first
+LARGE = ("drake", "dart", "bullet")  # take part where they are named: their packages are large
+ON_REQUEST = (*GENERATORS, *LARGE)
+ALL = "all"  # names every engine that is installed
 ENTRY_POINTS = "crosscheck.engines"
 
 
@@ -247,6 +251,11 @@ def default_engines() -> tuple[str, ...]:
     """
     asked = (name for name in engine_names() if name not in ON_REQUEST)
     return tuple(name for name in asked if name not in OPTIONAL or installed(name))
+
+
+def all_engines() -> tuple[str, ...]:
+    """Every engine that is installed, also those that run on request."""
+    return tuple(name for name in engine_names() if installed(name))
 
 
 def installed(name: str) -> bool:

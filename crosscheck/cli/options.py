@@ -6,7 +6,7 @@ import argparse
 import math
 from typing import Any
 
-from crosscheck.engine import ON_REQUEST, engine_names
+from crosscheck.engine import ALL, ON_REQUEST, engine_names
 from crosscheck.judge.reference.certify import FEWEST_DIGITS, MOST_DIGITS
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.study.command import parsed_option
@@ -58,7 +58,8 @@ def add_engines(parser: argparse.ArgumentParser) -> None:
     """The engines that run."""
     parser.add_argument(
         "--engine", action="append", metavar="E",
-        help=f"{', '.join(engine_names())}; may repeat; default: all but {' and '.join(ON_REQUEST)}",
+        help=f"{', '.join(engine_names())}, or {ALL} for every installed one; may repeat; "
+        f"default: all but {', '.join(ON_REQUEST)}",
     )  # fmt: skip
 
 

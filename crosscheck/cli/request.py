@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from crosscheck.conformance.trial import Specimen, specimens
-from crosscheck.engine import BUILT_IN, Setting, default_engines, engine
+from crosscheck.engine import ALL, BUILT_IN, Setting, all_engines, default_engines, engine
 from crosscheck.judge.constraints import initial_twists
 from crosscheck.study.grid import Case, default_cases
 from crosscheck.study.scouting import scout, settings
@@ -76,11 +76,13 @@ def find_certifiable(name: str) -> Scene:
 
 
 def find_engines(names: Sequence[str] | None, notice: Notice) -> list[str]:
-    """The named engines, or the default ones; one whose package is missing is left out with a ``notice``.
+    """The named engines, every installed one for "all", or the default ones; one whose package is missing is
+    left out with a ``notice``.
 
     Raises RequestError for an unknown name, and when nothing is left.
     """
-    wanted = list(dict.fromkeys(names or default_engines()))
+    named = [name for given in names or () for name in (all_engines() if given == ALL else [given])]
+    wanted = list(dict.fromkeys(named or default_engines()))
     faults = [fault for name in wanted if (fault := _unknown_engine(name))]
     if faults:
         raise RequestError(*faults)

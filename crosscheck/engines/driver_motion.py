@@ -29,6 +29,11 @@ def motion(driver: Driver, t: float) -> tuple[float, float, float]:
     return value, rate, acceleration
 
 
+def mean_rate(driver: Driver, t: float, h: float) -> float:
+    """Mean rate of a driver from time t over h (s): steps that end with it meet the prescribed values."""
+    return (motion(driver, t + h)[0] - motion(driver, t)[0]) / h
+
+
 def moving(driver: Driver) -> Callable[[float], tuple[float, float, float]]:
     """`motion` of a driver as a function of time that keeps its last result: iterations of a step and its
     rows ask for the same time again and again."""

@@ -18,6 +18,8 @@ WIDTHS = {"position": 3, "orientation": 4, "velocity": 3, "angular_velocity": 3,
           "angular_acceleration": 3}  # fmt: skip
 MAX_STEPS = 10**6  # of one interval; beyond it the run is not going to end
 
+UNKNOWN = np.zeros((0, 3))  # accelerations of an engine that gives none
+
 STRETCH = 1.01  # by which a step may be longer to end at a sample
 JUMPS = np.linspace(1.0, 4.0, 16)  # shortest steps, tried where the shortest one fails
 
@@ -45,7 +47,8 @@ class Counts:
 
 @dataclass(frozen=True)
 class Sample:
-    """The scene's bodies at one time, as a Trajectory has them: (nb, 3), orientations (nb, 4)."""
+    """The scene's bodies at one time, as a Trajectory has them: (nb, 3), orientations (nb, 4); accelerations
+    are UNKNOWN where the engine has none."""
 
     position: np.ndarray
     orientation: np.ndarray
@@ -98,7 +101,10 @@ def _finite(sample: Sample) -> bool:
     return all(np.isfinite(getattr(sample, name)).all() for name in WIDTHS)
 
 
-def _stacked(samples: list[Sample], name: str, bodies: int, width: int) -> np.ndarray:
+def _stacked(samples: list[Sample], name: str, bodies: int, width: int) -> Any:
+    """The samples' arrays of a name (k, bodies, width); None where the engine gives none."""
+    if samples and getattr(samples[0], name) is UNKNOWN:
+        return None
     return np.array([getattr(s, name) for s in samples], dtype=float).reshape(len(samples), bodies, width)
 
 

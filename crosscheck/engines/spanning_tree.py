@@ -4,6 +4,7 @@ Nodes are the bodies and the ground, edges the joints.  A maximum-weight spannin
 keeps the stiff joints, and every driven one; every joint that is cut closes a loop:
 
 - a cut spherical joint is a point that two links share;
+- a cut joint of another type that the engine closes by itself is a closure of that type;
 - any other cut joint carries a *ghost*: its second body's mass and inertia are divided in equal shares
   between the body and its ghosts, the ghost hangs from the first body by the joint itself, and a weld
   holds it to its body.  The motion is exactly that of the undivided body.
@@ -15,6 +16,7 @@ about its own axis is arbitrary, because a rod that starts without spin never sp
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -84,7 +86,8 @@ class Link:
 
 @dataclass(frozen=True)
 class Closure:
-    """A loop closure: a ``point`` that two links share, or a ``weld`` of a link and its ghost."""
+    """A loop closure: a ``point`` that two links share, a ``weld`` of a link and its ghost, or the type of a
+    joint that the engine closes by itself."""
 
     kind: str
     joint: int
@@ -128,8 +131,11 @@ class _Edge:
     weight: int
 
 
-def spanning_tree(scene: Scene) -> Tree:
-    """The scene as links and closures; bodies without mass (kinematics) count 1 kg and 1 kg m²."""
+def spanning_tree(scene: Scene, closes: Collection[str] = (ROD_END,)) -> Tree:
+    """The scene as links and closures; bodies without mass (kinematics) count 1 kg and 1 kg m².
+
+    ``closes`` are the types of joints that the engine closes by itself, without a ghost.
+    """
     nodes = [_body_link(b, body) for b, body in enumerate(scene.body)]
     edges = []
     for j, joint in enumerate(scene.joint):
@@ -143,7 +149,7 @@ def spanning_tree(scene: Scene) -> Tree:
             anchor = np.array(joint.anchor_pair[0])
             edges.append(_Edge(joint.type, joint.facts, j, pair, anchor, _axes(joint), weight))
     kept, cut = _kruskal(len(nodes), edges)
-    closures = _cut_open(nodes, kept, cut)
+    closures = _cut_open(nodes, kept, cut, closes)
     return _depth_first(nodes, kept, closures, len(scene.body))
 
 
@@ -208,13 +214,16 @@ def _kruskal(count: int, edges: list[_Edge]) -> tuple[list[_Edge], list[_Edge]]:
     return kept, cut
 
 
-def _cut_open(nodes: list[Link], kept: list[_Edge], cut: list[_Edge]) -> list[Closure]:
+def _cut_open(
+    nodes: list[Link], kept: list[_Edge], cut: list[_Edge], closes: Collection[str]
+) -> list[Closure]:
     """Closures of the cut edges; adds the ghosts to the nodes and their joints to the kept edges."""
     closures: list[Closure] = []
     ghosts: dict[int, list[int]] = {}
     for edge in cut:
-        if edge.facts == BALL:
-            closures.append(Closure("point", edge.joint, edge.nodes, edge.anchor))
+        if edge.kind in closes:
+            kind = "point" if edge.facts == BALL else edge.kind
+            closures.append(Closure(kind, edge.joint, edge.nodes, edge.anchor))
             continue
         end = 1 if edge.nodes[1] != GROUND_LINK else 0
         body, ghost = edge.nodes[end], len(nodes)

@@ -11,7 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from crosscheck.engines.sampling import UNKNOWN, Sample
 from crosscheck.engines.spanning_tree import GROUND_LINK, Tree
+from mbref import rotations
 from mbref.rotations import cross
 from mbref.scene import Distance, Force, Load, Moment, Scene, Spring, TorsionSpring
 
@@ -22,6 +24,7 @@ ZERO = np.zeros(3)
 class LinkMotion:
     """Motion of the links' frames in the world: rotation since t = 0 (n, 3, 3); the rest (n, 3).
 
+    Accelerations are UNKNOWN where the engine has none;
     ``coordinates`` and ``rates`` (nv,) are the joint coordinates, meaningful where a joint has one angle.
     """
 
@@ -38,6 +41,34 @@ class LinkMotion:
 def wrench(force: np.ndarray, point: np.ndarray, moment: np.ndarray = ZERO) -> np.ndarray:
     """(6,): a force at a point and a moment."""
     return np.concatenate([force, moment + cross(point, force)])
+
+
+def sample_of(scene: Scene, tree: Tree, motion: LinkMotion, closing: Sequence[np.ndarray] | None) -> Sample:
+    """The scene's bodies and joints in a motion of the links; without reactions where ``closing`` is None or
+    the scene has no masses."""
+    own = list(tree.own)
+    start = np.array([body.orientation for body in scene.body])
+    weighed = closing is not None and scene.has_mass()
+    return Sample(
+        position=motion.position[own],
+        orientation=rotations.multiply(rotations.from_matrix(motion.rotation[own]), start),
+        velocity=motion.velocity[own],
+        angular_velocity=motion.angular_velocity[own],
+        acceleration=motion.acceleration[own] if motion.acceleration.size else UNKNOWN,
+        angular_acceleration=motion.angular_acceleration[own] if motion.acceleration.size else UNKNOWN,
+        reactions=joint_reactions(scene, tree, motion, closing or ()) if weighed else {},
+    )
+
+
+def applied(scene: Scene, tree: Tree, motion: LinkMotion) -> list[tuple[int, np.ndarray, np.ndarray]]:
+    """The links that loads act on, each with a force and a moment about the origin of its frame, world."""
+    loads = scene.load if scene.has_mass() else ()
+    found = [pair for load in loads for pair in _applied(scene, tree, motion, load)]
+    return [
+        (link, on_link[:3], on_link[3:] - cross(motion.position[link], on_link[:3]))
+        for link, on_link in found
+        if link != GROUND_LINK
+    ]
 
 
 def joint_reactions(

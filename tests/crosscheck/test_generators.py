@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from crosscheck.engine import ON_REQUEST, Owner, Setting, default_engines, engine
+from crosscheck.engine import GENERATORS, Owner, Setting, default_engines, engine
 from crosscheck.engines import kept
 from crosscheck.engines.casadi import library
 from crosscheck.engines.symbolic.equations import TreeEquations
@@ -85,7 +85,7 @@ def test_generated_code_and_truth_agree(name: str, setting: Setting) -> None:
         assert found[metric] < ERROR, f"{metric}: off by {found[metric]:.1e}, allowed {ERROR:.0e}"
 
 
-@pytest.mark.parametrize("name", ON_REQUEST)
+@pytest.mark.parametrize("name", GENERATORS)
 def test_samples_need_not_begin_at_the_start(name: str) -> None:
     times, setting = np.array([0.1, 0.25]), SETTINGS[name][0]
     run = run_of(name, "planar_slider_crank_gravity", times, setting)
@@ -96,7 +96,7 @@ def test_samples_need_not_begin_at_the_start(name: str) -> None:
     assert np.allclose(start.position[0], whole.position[0], atol=1e-15), "a run that ends where it starts"
 
 
-@pytest.mark.parametrize("name", ON_REQUEST)
+@pytest.mark.parametrize("name", GENERATORS)
 def test_sweeps_have_every_family_coarse_to_fine(name: str) -> None:
     needs(name)
     simulator, scene = engine(name), SCENES["planar_slider_crank_gravity"]()
@@ -109,7 +109,7 @@ def test_sweeps_have_every_family_coarse_to_fine(name: str) -> None:
         simulator.run(scene, np.array([0.0]), Setting("best", {"rtol": 1e-6}))
 
 
-@pytest.mark.parametrize("name", ON_REQUEST)
+@pytest.mark.parametrize("name", GENERATORS)
 @pytest.mark.parametrize(("scene", "reason"), [
     ("four_bar", "driver"), ("flyball_governor", "'spring'"), ("heavy_top", "ball joints"),
     ("five_bar_gravity", "depend on each other"),
@@ -120,7 +120,7 @@ def test_scenes_whose_equations_are_not_derived_are_refused(name: str, scene: st
 
 
 def test_nothing_runs_unasked() -> None:
-    assert not set(ON_REQUEST) & set(default_engines())
+    assert not set(GENERATORS) & set(default_engines())
 
 
 def test_scenes_are_refused_where_there_is_no_c_compiler(monkeypatch: pytest.MonkeyPatch) -> None:

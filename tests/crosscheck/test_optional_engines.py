@@ -6,6 +6,7 @@ from importlib import metadata
 
 import pytest
 
+import crosscheck.engine as engine_module
 from crosscheck.cli.request import RequestError, find_engines, missing_package
 from crosscheck.engine import BUILT_IN, ON_REQUEST, OPTIONAL, default_engines, engine, engine_names, installed
 
@@ -44,3 +45,10 @@ def test_what_is_asked_for_and_what_to_install(nothing_more: None, name: str) ->
 def test_installed_engines_run_by_default(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(metadata, "version", lambda package: "1.0")
     assert installed(name) and name in default_engines(), f"default: {default_engines()}"
+
+
+def test_all_is_every_installed_engine(monkeypatch: pytest.MonkeyPatch) -> None:
+    known = {"mujoco", "drake", "casadi"}
+    monkeypatch.setattr(engine_module, "installed", lambda name: name in known)
+    assert set(find_engines(["all"], print)) == known, find_engines(["all"], print)
+    assert find_engines(["mujoco", "all"], print)[0] == "mujoco"

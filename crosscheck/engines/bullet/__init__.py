@@ -1,0 +1,5 @@
+"""Bullet as an engine."""
+
+from crosscheck.engines.bullet.adapter import ENGINE
+
+__all__ = ["ENGINE"]

@@ -1,0 +1,129 @@
+"""Bullet, through PyBullet: joint coordinates of multibodies; closures are impulses, solved iteratively.
+
+Its step is semi-implicit and of first order.  A driver is a motor of prescribed velocity: the mean one of a
+step, by which positions are met.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import metadata
+
+import numpy as np
+
+from crosscheck.engine import Cannot, Engine, Setting
+from crosscheck.engines.bullet.model import STRONGEST, Mechanism
+from crosscheck.engines.driver_motion import mean_rate
+from crosscheck.engines.fixed_steps import FixedSteps, is_constant, scouted_rate, simulated, steps
+from crosscheck.engines.initial_velocities import lacks_mass
+from crosscheck.engines.pieces import EVERYTHING
+from crosscheck.engines.planar_scene import planar_scene
+from crosscheck.engines.spanning_tree import spanning_tree
+from crosscheck.engines.tree_reactions import LinkMotion, applied
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+
+DEFAULT_STEP, DEFAULT_ITERATIONS = 1 / 240, 50
+ITERATIONS = 1000
+FINER = 1  # steps more, each a third of the one before: the method is of first order
+CLOSES = ("spherical", "revolute")
+FAMILIES = {
+    "iterated": "1000 iterations of the solver; a cut hinge held by two points, by one in a plane",
+    "defaults": "50 iterations, the library's number; a cut hinge held by two points",
+}
+OPTIONS = {"step": "time step, s", "iterations": "iterations of the solver in a step"}
+
+
+class Bullet(Engine):
+    """Bullet (PyPI ``pybullet``)."""
+
+    name = "bullet"
+    package = "pybullet"
+    supports = EVERYTHING
+    families, options = FAMILIES, OPTIONS
+
+    def version(self) -> str:
+        """Version of PyBullet; raises ImportError when it is not installed."""
+        return metadata.version(self.package)
+
+    def prepare(self, families: Sequence[str]) -> None:
+        import pybullet  # noqa: F401
+
+    def refuses(self, scene: Scene) -> Cannot | None:
+        """Scenes without masses whose motion is not prescribed in full."""
+        return lacks_mass(scene)
+
+    def settings(self, scene: Scene) -> Sequence[Setting]:
+        """Steps by the angle turned in one."""
+        rate = scouted_rate(self, scene, "defaults", iterations=DEFAULT_ITERATIONS)
+        fine = steps(scene, rate, finer=FINER)
+        plain = sorted({*fine, DEFAULT_STEP}, reverse=True)
+        return [
+            *(Setting("iterated", {"step": h, "iterations": ITERATIONS}) for h in fine),
+            *(Setting("defaults", {"step": h, "iterations": DEFAULT_ITERATIONS}) for h in plain),
+        ]
+
+    def serves(self, scene: Scene, family: str) -> bool:
+        """Every family serves every scene."""
+        return family in FAMILIES
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        """Simulate; raises ValueError for a family it does not have."""
+        import pybullet
+
+        if setting.family == "iterated":
+            scene = planar_scene(scene)
+        client = pybullet.connect(pybullet.DIRECT)
+        try:
+            pybullet.resetSimulation()
+            return simulated(self, scene, times, setting, lambda: _simulation(scene, setting))
+        finally:
+            pybullet.disconnect(client)
+
+
+def _simulation(scene: Scene, setting: Setting) -> FixedSteps:
+    tree = spanning_tree(scene, CLOSES)
+    world = _World(Mechanism(scene, tree), setting.options["iterations"])
+    return FixedSteps(scene, tree, world, setting.options["step"])
+
+
+class _World:
+    """A mechanism in PyBullet's world, with its loads and drivers."""
+
+    def __init__(self, mechanism: Mechanism, iterations: int):
+        self.mechanism, self.scene, self.tree = mechanism, mechanism.scene, mechanism.tree
+        self.p = mechanism.p
+        left = {} if iterations == DEFAULT_ITERATIONS else {"solverResidualThreshold": 0.0}
+        self.p.setPhysicsEngineParameter(numSolverIterations=iterations, numSubSteps=0, **left)
+        self.driven = [
+            (mechanism.joints[self.tree.coordinate(self.scene, d.joint)], d) for d in self.scene.driver
+        ]
+        self.constant = applied(self.scene, self.tree, self.motion()) if is_constant(self.scene) else None
+
+    def step(self, t: float, h: float, count: int) -> None:
+        """Takes steps of length h (s) from time t."""
+        p = self.p
+        p.setTimeStep(h)
+        for n in range(count):
+            for joint, driver in self.driven:
+                speed = mean_rate(driver, t + n * h, h)
+                p.setJointMotorControl2(*joint, p.VELOCITY_CONTROL, targetVelocity=speed, force=STRONGEST)
+            self._load()
+            p.stepSimulation()
+
+    def _load(self) -> None:
+        now = self.motion() if self.constant is None else None
+        loads = self.constant if now is None else applied(self.scene, self.tree, now)
+        for link, force, moment in loads or ():
+            place = self.mechanism.places[link]
+            if now is not None:
+                at = now.position[link].tolist()
+                self.p.applyExternalForce(place.body, place.link, force.tolist(), at, self.p.WORLD_FRAME)
+            self.p.applyExternalTorque(place.body, place.link, moment.tolist(), self.p.WORLD_FRAME)
+
+    def motion(self) -> LinkMotion:
+        """The motion of the links."""
+        return self.mechanism.motion()
+
+
+ENGINE = Bullet()

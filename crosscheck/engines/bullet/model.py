@@ -1,0 +1,175 @@
+"""A scene's tree as multibodies of PyBullet: one for every link that hangs from the ground or floats.
+
+A link's frame has its origin at the joint's anchor and world-aligned axes at t = 0; states are of the frame
+of its centre of mass and principal axes.  Links are listed depth first: others are renumbered silently.
+Inertias are set alone and last, because together with damping they are dropped, silently too.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from crosscheck.engines.fixed_steps import held_points
+from crosscheck.engines.geometry import unit
+from crosscheck.engines.initial_velocities import initial_rates
+from crosscheck.engines.pieces import Piece, pieces
+from crosscheck.engines.sampling import UNKNOWN
+from crosscheck.engines.spanning_tree import BALL_JOINT, FREE, GROUND_LINK, SLIDE, TURN, Closure, Tree
+from crosscheck.engines.tree_reactions import LinkMotion
+from mbref import rotations
+from mbref.scene import Scene
+
+NEGLIGIBLE = 1e-12  # mass of bodies in chains of joints, of their links
+STRONGEST, FASTEST = 1e9, 1e9  # N of a closure; rad/s or m/s of a joint
+BASE = -1  # PyBullet's number of a multibody's base
+O, UNIT = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]
+
+
+class Place(NamedTuple):
+    """A link in PyBullet: its multibody and number there, the offset of its centre of mass from the link's
+    frame (3,), and its principal axes (3, 3)."""
+
+    body: int
+    link: int
+    offset: np.ndarray
+    axes: np.ndarray
+
+
+class Mechanism:
+    """A scene in PyBullet: the ``places`` of the tree's links, and the numbers of slides and turns."""
+
+    def __init__(self, scene: Scene, tree: Tree):
+        import pybullet
+
+        self.p, self.scene, self.tree = pybullet, scene, tree
+        self.places: dict[int, Place] = {}
+        self.joints: dict[int, tuple[int, int]] = {}  # of slides and turns, by velocity of the tree
+        self.rates = initial_rates(scene, tree)
+        pybullet.setGravity(*scene.gravity)
+        parts = pieces(tree, NEGLIGIBLE)
+        roots = [n for n, piece in enumerate(parts) if piece.parent < 0]
+        for start, end in zip(roots, [*roots[1:], len(parts)], strict=True):
+            self._add(parts[start:end], start)
+        for closure in tree.closures:
+            self._close(closure)
+
+    def _add(self, parts: list[Piece], start: int) -> None:
+        """A multibody of the pieces that hang together; the first of them has the number ``start``."""
+        floats = parts[0].mobility is not None and parts[0].mobility.kind == FREE
+        first, links = (parts[0], parts[1:]) if floats else (None, parts)
+        up = start if floats else start - 1  # from pieces to links of PyBullet
+        base: dict[str, Any] = {"baseMass": 0.0}
+        if first:
+            centre = (first.origin + first.offset).tolist()
+            base = {"baseMass": first.mass, "basePosition": centre, "baseOrientation": _xyzw(_axes(first))}
+        body = self.p.createMultiBody(**base, **self._links(links, up, first))
+        for j in range(BASE, len(links)):
+            self.p.changeDynamics(body, j, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0)
+            self.p.changeDynamics(body, j, maxJointVelocity=FASTEST)
+        for j, piece in enumerate(links):
+            self._settle(body, j, piece)
+        if first:
+            self._settle(body, BASE, first)
+            v = self.rates[first.velocity :][:6]
+            linear = v[:3] + np.cross(v[3:], first.offset)
+            self.p.resetBaseVelocity(body, linear.tolist(), v[3:].tolist())
+
+    def _links(self, links: list[Piece], up: int, base: Piece | None) -> dict[str, Any]:
+        """PyBullet's arguments of links; on a floating base they are placed in the frame of its centre."""
+        p = self.p
+        kinds = {SLIDE: p.JOINT_PRISMATIC, TURN: p.JOINT_REVOLUTE, BALL_JOINT: p.JOINT_SPHERICAL}
+        starts, turns = [], []
+        for piece in links:
+            on_base = piece.parent - up - 1 < 0
+            axes = _axes(base) if base and on_base else np.eye(3)
+            from_place = np.zeros(3) if on_base else links[piece.parent - up - 1].anchor
+            if base and on_base:
+                from_place = base.origin + base.offset
+            starts.append((axes.T @ (piece.anchor - from_place)).tolist())
+            turns.append(_xyzw(axes.T))
+        moved = [piece.mobility for piece in links]
+        return {
+            "linkMasses": [piece.mass for piece in links],
+            "linkCollisionShapeIndices": [-1] * len(links),
+            "linkVisualShapeIndices": [-1] * len(links),
+            "linkPositions": starts,
+            "linkOrientations": turns,
+            "linkInertialFramePositions": [(k.origin + k.offset - k.anchor).tolist() for k in links],
+            "linkInertialFrameOrientations": [_xyzw(_axes(piece)) for piece in links],
+            "linkParentIndices": [max(0, piece.parent - up) for piece in links],
+            "linkJointTypes": [kinds[m.kind] if m else p.JOINT_FIXED for m in moved],
+            "linkJointAxis": [
+                unit(m.axis).tolist() if m and m.kind in (SLIDE, TURN) else O for m in moved
+            ],
+        }  # fmt: skip
+
+    def _settle(self, body: int, j: int, piece: Piece) -> None:
+        """Inertia, no motor, velocity at t = 0."""
+        p, kind = self.p, piece.mobility.kind if piece.mobility else ""
+        moments = np.linalg.eigvalsh(piece.inertia)
+        p.changeDynamics(body, j, localInertiaDiagonal=moments.tolist())
+        kept = p.getDynamicsInfo(body, j)[2]
+        if not np.allclose(kept, moments, rtol=1e-12, atol=0.0):
+            raise AssertionError(f"PyBullet keeps the moments of inertia {kept} instead of {moments}")
+        if piece.link >= 0:
+            self.places[piece.link] = Place(body, j, piece.offset, _axes(piece))
+        if kind == BALL_JOINT:
+            p.setJointMotorControlMultiDof(body, j, p.POSITION_CONTROL, targetPosition=UNIT, force=O)
+            spin = _axes(piece).T @ self.rates[piece.velocity :][:3]  # a ball's frame has the principal axes
+            p.resetJointStateMultiDof(body, j, UNIT, spin.tolist())
+        elif kind in (SLIDE, TURN):
+            p.setJointMotorControl2(body, j, p.VELOCITY_CONTROL, force=0.0)
+            p.resetJointState(body, j, 0.0, float(self.rates[piece.velocity]))
+            self.joints[piece.velocity] = (body, j)
+
+    def _close(self, closure: Closure) -> None:
+        p, links = self.p, closure.links
+        first, second = links if links[0] != GROUND_LINK else links[::-1]
+        weld = closure.kind == "weld"
+        points = [closure.anchor] if weld else held_points(self.scene, closure)
+        frames = [_xyzw(self.places[k].axes.T) for k in (first, second)] if weld else []
+        for point in points:
+            one, other = self._end(first, point), self._end(second, point)
+            kind = p.JOINT_FIXED if weld else p.JOINT_POINT2POINT
+            c = p.createConstraint(*one[0], *other[0], kind, O, one[1], other[1], *frames)
+            p.changeConstraint(c, maxForce=STRONGEST)
+
+    def _end(self, link: int, point: np.ndarray) -> tuple[tuple[int, int], list[float]]:
+        """Multibody and link, and a point (world at t = 0) in the frame of its centre of mass."""
+        if link == GROUND_LINK:
+            return (-1, -1), point.tolist()
+        place, tree = self.places[link], self.tree.links[link]
+        return (place.body, place.link), (place.axes.T @ (point - tree.position - place.offset)).tolist()
+
+    def motion(self) -> LinkMotion:
+        """The motion of the links."""
+        found = [self._state(self.places[k]) for k in range(len(self.tree.links))]
+        rotation, position, velocity, omega = (np.array(part) for part in zip(*found, strict=True))
+        coordinates, rates = np.zeros((2, self.tree.nv))
+        for v, (body, j) in self.joints.items():
+            coordinates[v], rates[v] = self.p.getJointState(body, j)[:2]
+        return LinkMotion(rotation, position, velocity, omega, UNKNOWN, UNKNOWN, coordinates, rates)
+
+    def _state(self, place: Place) -> tuple[np.ndarray, ...]:
+        if place.link == BASE:
+            centre, turn = self.p.getBasePositionAndOrientation(place.body)
+            velocity, omega = self.p.getBaseVelocity(place.body)
+        else:
+            state = self.p.getLinkState(place.body, place.link, 1, 1)
+            centre, turn, velocity, omega = state[0], state[1], state[6], state[7]
+        rotation = rotations.to_matrix(np.roll(turn, 1)) @ place.axes.T
+        arm = rotation @ place.offset
+        return rotation, np.array(centre) - arm, np.array(velocity) - np.cross(omega, arm), np.array(omega)
+
+
+def _axes(piece: Piece) -> np.ndarray:
+    """Principal axes (3, 3) of a piece, right-handed, by increasing moments."""
+    axes = np.linalg.eigh(piece.inertia)[1]
+    axes[:, 2] *= np.sign(np.linalg.det(axes))
+    return axes
+
+
+def _xyzw(matrix: np.ndarray) -> list[float]:
+    return np.roll(rotations.from_matrix(matrix), -1).tolist()

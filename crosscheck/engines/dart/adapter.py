@@ -1,0 +1,144 @@
+"""DART: joint coordinates, loops closed by constraints on velocities that are solved as an LCP.
+
+DART's step is semi-implicit and of first order.  The error reduction parameter of closures is one number of
+each class of constraint in the process, so that every run sets it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from importlib import metadata
+
+import numpy as np
+
+from crosscheck.engine import Cannot, Engine, Setting
+from crosscheck.engines import terms
+from crosscheck.engines.dart.model import Mechanism
+from crosscheck.engines.driver_motion import mean_rate, motion
+from crosscheck.engines.fixed_steps import FixedSteps, Simulation, is_constant, scouted_rate, simulated, steps
+from crosscheck.engines.initial_velocities import lacks_mass
+from crosscheck.engines.pieces import EVERYTHING
+from crosscheck.engines.planar_scene import planar_scene
+from crosscheck.engines.spanning_tree import spanning_tree
+from crosscheck.engines.tree_reactions import LinkMotion, applied
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+
+DEFAULT_STEP = 1e-3  # s
+DEFAULT_ERP, STRONG_ERP = 0.01, 0.5  # of a closure error, removed in a step
+FINER = 2  # steps more, each a third of the one before: the method is of first order
+CLOSES = ("spherical", "revolute")
+FAMILIES = {
+    terms.FAMILY: terms.ABOUT,
+    "defaults": "DART's step and its own constraint for every cut joint, the library's parameters",
+    "balls": "DART's step; cut hinges held by balls, and half of a closure error removed in a step",
+}
+OPTIONS = {
+    "step": "time step, s",
+    "erp": "part of a closure error that a step removes",
+    "rtol": "relative tolerance of a step",
+    "min_step": "shortest step, s",
+}
+
+
+class Dart(Engine):
+    """DART (PyPI ``dartpy``)."""
+
+    name = "dart"
+    package = "dartpy"
+    supports = EVERYTHING
+    families, options, integrated_here = FAMILIES, OPTIONS, (terms.FAMILY,)
+
+    def version(self) -> str:
+        """Version of dartpy; raises ImportError when it is not installed."""
+        return metadata.version(self.package)
+
+    def prepare(self, families: Sequence[str]) -> None:
+        import dartpy  # noqa: F401
+
+    def refuses(self, scene: Scene) -> Cannot | None:
+        """Scenes without masses whose motion is not prescribed in full."""
+        return lacks_mass(scene)
+
+    def settings(self, scene: Scene) -> Sequence[Setting]:
+        """Tolerances, and steps by the angle turned in one."""
+        rate = scouted_rate(self, scene, "defaults", erp=DEFAULT_ERP)
+        fine = steps(scene, rate, finer=FINER)
+        return [
+            *terms.sweep(rate),
+            *(
+                Setting("defaults", {"step": h, "erp": DEFAULT_ERP})
+                for h in sorted({*fine, DEFAULT_STEP}, reverse=True)
+            ),
+            *(Setting("balls", {"step": h, "erp": STRONG_ERP}) for h in fine),
+        ]
+
+    def serves(self, scene: Scene, family: str) -> bool:
+        """Every family serves every scene."""
+        return family in FAMILIES
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        """Simulate; raises ValueError for a family it does not have."""
+        if setting.family == "balls" and (planar := planar_scene(scene)) is not scene:
+            return replace(self.run(planar, times, setting), reactions=None)
+        return simulated(self, scene, times, setting, lambda: _simulation(scene, setting))
+
+
+def _simulation(scene: Scene, setting: Setting) -> Simulation:
+    if setting.family == terms.FAMILY:
+        return terms.Simulation(Mechanism(scene, spanning_tree(scene)), setting)
+    mechanism = Mechanism(scene, spanning_tree(scene, CLOSES))
+    stepper = _World(mechanism, setting.family, setting.options["erp"])
+    return FixedSteps(scene, mechanism.tree, stepper, setting.options["step"])
+
+
+class _World:
+    """A mechanism in DART's world, with its closures and loads."""
+
+    def __init__(self, mechanism: Mechanism, family: str, erp: float):
+        self.mechanism, self.scene, self.tree = mechanism, mechanism.scene, mechanism.tree
+        dart = mechanism.dart
+        self.world = dart.simulation.World()
+        self.world.addSkeleton(mechanism.skeleton)
+        self.world.setGravity(np.array(self.scene.gravity))
+        for closure in self.tree.closures:
+            for constraint in mechanism.constraints(closure, as_balls=family == "balls"):
+                constraint.setErrorReductionParameter(erp)
+                self.world.getConstraintSolver().addConstraint(constraint)
+        if family != "defaults":
+            asleep = self.world.getDeactivationOptions()
+            asleep.mEnabled = False
+            self.world.setDeactivationOptions(asleep)
+        self.driven = [
+            (mechanism.joints[self.tree.coordinate(self.scene, d.joint)], d) for d in self.scene.driver
+        ]
+        for joint, driver in self.driven:
+            joint.setActuatorType(dart.dynamics.ActuatorType.ACCELERATION)
+            joint.setVelocity(0, motion(driver, 0.0)[1])
+        self.constant = applied(self.scene, self.tree, self.motion()) if is_constant(self.scene) else None
+
+    def step(self, t: float, h: float, count: int) -> None:
+        """Takes steps of length h (s) from time t."""
+        self.world.setTimeStep(h)
+        for n in range(count):
+            for joint, driver in self.driven:
+                joint.setCommand(0, (mean_rate(driver, t + n * h, h) - joint.getVelocity(0)) / h)
+            self._load()
+            self.world.step()
+
+    def _load(self) -> None:
+        loads = self.constant
+        if loads is None:
+            loads = applied(self.scene, self.tree, self.motion())
+        for link, force, moment in loads:
+            node = self.mechanism.nodes[link]
+            node.addExtForce(force, np.zeros(3), False, True)
+            node.addExtTorque(moment, False)
+
+    def motion(self) -> LinkMotion:
+        """The motion of the links."""
+        return self.mechanism.motion()
+
+
+ENGINE = Dart()

@@ -1,0 +1,125 @@
+"""A scene's tree as a DART skeleton: bodies, joints of single freedoms, closures.
+
+Every body frame has the link's origin and world-aligned axes at t = 0.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.fixed_steps import held_points
+from crosscheck.engines.geometry import unit
+from crosscheck.engines.initial_velocities import initial_rates
+from crosscheck.engines.joint_coordinates import joint_coordinates, rotation_vector
+from crosscheck.engines.pieces import Piece, origin, pieces
+from crosscheck.engines.sampling import UNKNOWN
+from crosscheck.engines.spanning_tree import BALL_JOINT, FREE, GROUND_LINK, SLIDE, TURN, Closure, Tree
+from crosscheck.engines.terms import Terms
+from crosscheck.engines.tree_reactions import LinkMotion
+from mbref.scene import Scene
+
+NEGLIGIBLE = 1e-24  # mass of bodies in chains of joints, of their links
+PAIRS = {SLIDE: "Prismatic", TURN: "Revolute", BALL_JOINT: "Ball", FREE: "Free"}
+
+
+class Mechanism:
+    """A scene in DART: ``skeleton``, the ``nodes`` of the tree's links, and the state at t = 0."""
+
+    def __init__(self, scene: Scene, tree: Tree):
+        import dartpy
+
+        self.dart, self.scene, self.tree = dartpy, scene, tree
+        self.coordinates = joint_coordinates(tree, in_child=True)
+        self.skeleton = dartpy.dynamics.Skeleton(scene.name)
+        self.joints: dict[int, Any] = {}  # by joint velocity of the tree
+        parts = pieces(tree, NEGLIGIBLE)
+        built: list[Any] = []
+        for piece in parts:
+            built.append(self._add(parts, built, piece))
+        self.nodes = [node for piece, node in zip(parts, built, strict=True) if piece.link >= 0]
+        self.skeleton.setGravity(np.array(scene.gravity))
+        self.order = self._order()
+        self.skeleton.setVelocities(self._in_order(initial_rates(scene, tree)))
+
+    def _in_order(self, v: np.ndarray) -> np.ndarray:
+        found = np.empty_like(v)
+        found[self.order] = v
+        return found
+
+    def _order(self) -> np.ndarray:
+        """DART's index of every velocity of the tree: it has angular before linear velocities."""
+        order = np.arange(self.tree.nv)
+        for _, iv in self.coordinates.places:
+            order[iv : iv + 6] = [*range(iv + 3, iv + 6), *range(iv, iv + 3)]
+        return order
+
+    def _add(self, parts: list[Piece], built: list[Any], piece: Piece) -> Any:
+        kind = PAIRS[piece.mobility.kind] if piece.mobility else "Weld"
+        create = getattr(self.skeleton, f"create{kind}JointAndBodyNodePair")
+        joint, node = create(built[piece.parent]) if piece.parent >= 0 else create()
+        if piece.mobility:
+            self.joints[piece.velocity] = joint
+            if piece.mobility.kind in (SLIDE, TURN):
+                joint.setAxis(unit(piece.mobility.axis))
+        joint.setTransformFromParentBodyNode(self._place(piece.anchor - origin(parts, piece.parent)))
+        joint.setTransformFromChildBodyNode(self._place(piece.anchor - piece.origin))
+        node.setCollidable(False)
+        node.setInertia(self.dart.dynamics.Inertia(piece.mass, piece.offset, piece.inertia))
+        return node
+
+    def _place(self, place: np.ndarray) -> Any:
+        frame = self.dart.math.Isometry3()
+        frame.set_translation(place)
+        return frame
+
+    def constraints(self, closure: Closure, as_balls: bool) -> list[Any]:
+        """DART's constraints of a closure; a hinge as two balls on its axis where ``as_balls``."""
+        constraint, anchor = self.dart.constraint, closure.anchor
+        pair = [self.nodes[k] for k in closure.links if k != GROUND_LINK]
+        if closure.kind == "weld":
+            return [constraint.WeldJointConstraint(*pair)]
+        if closure.kind == "point" or as_balls:
+            points = held_points(self.scene, closure)
+            return [constraint.BallJointConstraint(*pair, point) for point in points]
+        axis = unit(np.array(self.scene.joint[closure.joint].directions[0]))
+        return [constraint.RevoluteJointConstraint(*pair, anchor, *[axis] * len(pair))]
+
+    def terms(self, q: np.ndarray, v: np.ndarray) -> Terms:
+        """DART's terms, velocities in the tree's order."""
+        self._put(q, v)
+        skeleton, order = self.skeleton, self.order
+        skeleton.setAccelerations(np.zeros(self.tree.nv))
+        jacobian = np.zeros((len(self.nodes), 6, self.tree.nv))
+        drift = np.zeros((len(self.nodes), 6))
+        for k, node in enumerate(self.nodes):
+            own = [node.getDependentGenCoordIndex(i) for i in range(node.getNumDependentGenCoords())]
+            jacobian[k][:, own] = np.vstack([node.getLinearJacobian(), node.getAngularJacobian()])
+            drift[k] = np.concatenate([node.getLinearAcceleration(), node.getAngularAcceleration()])
+        mass = skeleton.getMassMatrix()[np.ix_(order, order)]
+        bias = skeleton.getCoriolisAndGravityForces()[order]
+        return Terms(mass, bias, *self._poses(), jacobian[:, :, order], drift)
+
+    def _put(self, q: np.ndarray, v: np.ndarray) -> None:
+        at, positions = self.coordinates, np.empty(self.tree.nv)
+        positions[at.single] = q[at.single_q]
+        for iq, iv in at.quaternions:
+            positions[iv : iv + 3] = rotation_vector(q[iq : iq + 4])
+        for iq, iv in at.places:  # DART has the rotation vector first
+            positions[iv : iv + 6] = [*positions[iv + 3 : iv + 6], *q[iq : iq + 3]]
+        self.skeleton.setPositions(positions)
+        self.skeleton.setVelocities(self._in_order(v))
+
+    def _poses(self) -> tuple[np.ndarray, np.ndarray]:
+        frames = [node.getWorldTransform() for node in self.nodes]
+        return np.array([f.rotation() for f in frames]), np.array([f.translation() for f in frames])
+
+    def motion(self) -> LinkMotion:
+        """The motion of the links."""
+        single, coordinates = self.coordinates.single, np.zeros(self.tree.nv)
+        coordinates[single] = self.skeleton.getPositions()[single]
+        linear = np.array([node.getLinearVelocity() for node in self.nodes])
+        angular = np.array([node.getAngularVelocity() for node in self.nodes])
+        rates = self.skeleton.getVelocities()[self.order]
+        return LinkMotion(*self._poses(), linear, angular, UNKNOWN, UNKNOWN, coordinates, rates)

@@ -1,0 +1,5 @@
+"""Drake as an engine."""
+
+from crosscheck.engines.drake.adapter import ENGINE
+
+__all__ = ["ENGINE"]

@@ -1,0 +1,120 @@
+"""Engines that step by themselves: their steps for a scene, and runs from sample to sample."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+
+from crosscheck.engine import Engine, Setting
+from crosscheck.engines.driver_motion import fastest_rate
+from crosscheck.engines.sampling import Counts, Failed, Sample, run_through, step_count
+from crosscheck.engines.spanning_tree import Closure, Tree
+from crosscheck.engines.tree_reactions import LinkMotion, sample_of
+from crosscheck.judge.constraints import scene_length
+from mbref.scene import Moment, Scene
+from mbref.trajectory import Outcome, Trajectory
+
+ANGLES = (0.15, 0.05, 0.015, 0.005, 0.0015)  # rad turned per step
+MOST_STEPS = 250_000
+SCOUT_SAMPLES = 41  # of the coarse run that finds how fast a scene turns
+ARM = 0.1  # of the scene's length: half the distance of two points that hold a hinge
+
+
+class Simulation(Protocol):
+    """One simulation of a scene at a setting."""
+
+    counts: Counts
+
+    def advance(self, t0: float, t1: float) -> None:
+        """Moves the state from t0 to t1 (s); raises Failed."""
+
+    def sample(self, t: float) -> Sample:
+        """The scene's bodies at the state."""
+
+
+class Stepper(Protocol):
+    """An engine with a scene's tree."""
+
+    def step(self, t: float, h: float, count: int) -> None:
+        """Takes steps of length h (s) from time t."""
+
+    def motion(self) -> LinkMotion:
+        """The motion of the links, without accelerations where the engine has none."""
+
+
+class FixedSteps:
+    """A simulation in equal steps from sample to sample, none longer than ``longest`` (s)."""
+
+    def __init__(self, scene: Scene, tree: Tree, stepper: Stepper, longest: float):
+        self.scene, self.tree, self.stepper, self.longest = scene, tree, stepper, longest
+        self.counts = Counts()
+
+    def advance(self, t0: float, t1: float) -> None:
+        """Moves the state from t0 to t1; raises Failed."""
+        n = step_count(t0, t1, self.longest)
+        self.stepper.step(t0, (t1 - t0) / n, n)
+        self.counts.steps += n
+        self.counts.rhs += n
+        if not np.isfinite(self.stepper.motion().position).all():
+            message = f"the state stopped being finite between {t0:.6g} s and {t1:.6g} s"
+            raise Failed(Outcome.NOT_FINITE, t0, message)
+
+    def sample(self, t: float) -> Sample:
+        """Poses and velocities."""
+        return sample_of(self.scene, self.tree, self.stepper.motion(), None)
+
+
+def simulated(
+    engine: Engine, scene: Scene, times: np.ndarray, setting: Setting, make: Callable[[], Simulation]
+) -> Trajectory:
+    """The trajectory of a simulation that ``make`` constructs; raises ValueError for a family that the engine
+    does not have."""
+    if setting.family not in engine.families:
+        raise ValueError(f"{engine.name} has no family {setting.family!r}")
+    start = time.process_time()
+    with np.errstate(all="ignore"):
+        run = make()
+        labels: dict[str, Any] = {"engine": engine.name, "version": engine.version(),
+                                  "method": setting.family, "settings": dict(setting.options)}  # fmt: skip
+        built = time.process_time() - start
+        return run_through(scene, times, run.advance, run.sample, run.counts, built, labels)
+
+
+def scouted_rate(engine: Engine, scene: Scene, family: str, **options: Any) -> float:
+    """The fastest angular velocity (rad/s) of a scene by a coarse run of an engine."""
+
+    def coarse(step: float) -> Trajectory:
+        times = np.linspace(0, scene.duration, SCOUT_SAMPLES)
+        return engine.run(scene, times, Setting(family, {"step": step, **options}))
+
+    return fastest_rate(scene, coarse)
+
+
+def steps(scene: Scene, rate: float, default: float | None = None, finer: int = 0) -> list[float]:
+    """Steps (s), coarse to fine, that turn by ANGLES at a rate (rad/s) and by ``finer`` more, each a third of
+    the one before, as far as they are not too many; the engine's own ``default`` among them."""
+    angles = [*ANGLES, *(ANGLES[-1] / 3.0 ** (k + 1) for k in range(finer))]
+    found = [float(f"{angle / rate:.2g}") for angle in angles]
+    kept = [h for h in found if scene.duration / h <= MOST_STEPS] or found[:1]
+    return sorted({*kept, *([default] if default else [])}, reverse=True)
+
+
+def is_constant(scene: Scene) -> bool:
+    """Whether the loads on the links never change: moments are constant in the world."""
+    return all(isinstance(load, Moment) for load in scene.load)
+
+
+def held_points(scene: Scene, closure: Closure) -> Sequence[np.ndarray]:
+    """Points (world at t = 0) that hold a closure where they coincide: one of a spherical joint, two on the
+    axis of a hinge, three, not in a line, of a weld."""
+    if closure.kind == "point":
+        return [closure.anchor]
+    arm = ARM * scene_length(scene)
+    if closure.kind == "weld":
+        return [closure.anchor + arm * e for e in np.eye(3)]
+    axis = np.array(scene.joint[closure.joint].directions[0])
+    along = arm * axis / np.linalg.norm(axis)
+    return [closure.anchor - along, closure.anchor + along]

@@ -1,0 +1,108 @@
+"""Coordinates of a tree for the integrators outside engines: one number of a slide or turn, quaternions else.
+
+Positions q start at zero, with unit quaternions; velocities v are the tree's.  Angular velocities of balls
+and the twists (v, ω) of free links are relative to the parent, in the axes of the parent or of the child, as
+the engine has them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.engines.spanning_tree import BALL_JOINT, COORDINATES, FREE, Tree
+from mbref import rotations
+
+UNIT = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True)
+class JointCoordinates:
+    """``single`` (n,) are the velocities of slides and turns, and ``single_q`` their positions;
+    ``quaternions`` and ``places`` have pairs of the first position and the first velocity of a quaternion or
+    a free link's displacement.  ``in_child`` says in whose axes velocities are."""
+
+    nv: int
+    nq: int
+    single: np.ndarray
+    single_q: np.ndarray
+    quaternions: tuple[tuple[int, int], ...]
+    places: tuple[tuple[int, int], ...]
+    in_child: bool
+
+    def start(self) -> np.ndarray:
+        """The positions (nq,) at t = 0."""
+        q = np.zeros(self.nq)
+        for iq, _ in self.quaternions:
+            q[iq : iq + 4] = UNIT
+        return q
+
+    def of_velocities(self, q: np.ndarray) -> np.ndarray:
+        """Coordinates (nv,) by the velocity they belong to; zero where a joint has no single angle."""
+        found = np.zeros(self.nv)
+        found[self.single] = q[self.single_q]
+        return found
+
+    def rates(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Rates (nq,) of the positions."""
+        out = np.empty(self.nq)
+        out[self.single_q] = v[self.single]
+        for iq, iv in self.quaternions:
+            unit, spin = _unit(q[iq : iq + 4]), np.concatenate([[0.0], v[iv : iv + 3]])
+            turned = rotations.multiply(unit, spin) if self.in_child else rotations.multiply(spin, unit)
+            out[iq : iq + 4] = turned / 2
+        for iq, iv in self.places:
+            speed = v[iv : iv + 3]
+            out[iq : iq + 3] = rotations.rotate(_unit(q[iq + 3 : iq + 7]), speed) if self.in_child else speed
+        return out
+
+    def normalised(self, q: np.ndarray) -> np.ndarray:
+        """The positions with unit quaternions."""
+        if not self.quaternions:
+            return q
+        q = q.copy()
+        for iq, _ in self.quaternions:
+            q[iq : iq + 4] = _unit(q[iq : iq + 4])
+        return q
+
+    def moved(self, q: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """The positions after a small step (nv,), in the directions of the velocities."""
+        out = q + self.rates(q, step)
+        for iq, iv in self.quaternions:
+            turn, unit = rotations.from_vector(step[iv : iv + 3]), _unit(q[iq : iq + 4])
+            out[iq : iq + 4] = (
+                rotations.multiply(unit, turn) if self.in_child else rotations.multiply(turn, unit)
+            )
+        return out
+
+
+def joint_coordinates(tree: Tree, in_child: bool) -> JointCoordinates:
+    """The coordinates of a tree."""
+    nq = nv = 0
+    single, quaternions, places = [], [], []
+    for link in tree.links:
+        for mobility in link.mobilities:
+            if mobility.kind == FREE:
+                places.append((nq, nv))
+                quaternions.append((nq + 3, nv + 3))
+                nq += 7
+            elif mobility.kind == BALL_JOINT:
+                quaternions.append((nq, nv))
+                nq += 4
+            else:
+                single.append((nq, nv))
+                nq += 1
+            nv += COORDINATES[mobility.kind]
+    at = np.array(single, dtype=int).reshape(-1, 2)
+    return JointCoordinates(nv, nq, at[:, 1], at[:, 0], tuple(quaternions), tuple(places), in_child)
+
+
+def rotation_vector(quaternion: np.ndarray) -> np.ndarray:
+    """Axis times angle (3,), rad, of a unit quaternion."""
+    size = np.linalg.norm(quaternion[1:])
+    return quaternion[1:] * (2 * np.arctan2(size, quaternion[0]) / size if size > 0 else 2.0)
+
+
+def _unit(quaternion: np.ndarray) -> np.ndarray:
+    return quaternion / np.sqrt(quaternion @ quaternion)

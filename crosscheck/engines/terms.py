@@ -1,0 +1,245 @@
+"""An engine's own terms of the equations of motion of a tree, in crosscheck's integrator.
+
+The engine gives the mass matrix M, the bias h of gravity and gyration, and of every link its pose, Jacobian
+and the acceleration at zero v'.  Closures and drivers are rows J v' = γ added here, loads are wrenches on the
+links, and
+
+    M v' + h = τ + Jᵀ λ
+
+is solved by least squares weighted by the mass, so that redundant rows do no harm.  States are integrated by
+DOP853 and projected onto the closures after every step, by the least kinetic energy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from crosscheck.engine import Setting
+from crosscheck.engines.driver_motion import motion, stated_rate
+from crosscheck.engines.geometry import cross_matrix
+from crosscheck.engines.initial_velocities import initial_rates
+from crosscheck.engines.joint_coordinates import JointCoordinates, rotation_vector
+from crosscheck.engines.sampling import UNKNOWN, Adaptive, Counts, Failed, Sample
+from crosscheck.engines.spanning_tree import GROUND_LINK, Tree
+from crosscheck.engines.tree_reactions import LinkMotion, applied, sample_of, wrench
+from mbref import rotations
+from mbref.rotations import cross
+from mbref.scene import Scene
+from mbref.trajectory import Outcome
+
+FAMILY = "terms"
+ABOUT = "the engine's mass matrix, bias and Jacobians; DOP853, closures solved and projected by crosscheck"
+RTOLS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
+LEAST_TURN = 0.03  # rad turned within the shortest step
+TURN_PER_STEP = 0.25  # rad a driver may move within one step: closures can fold in between
+PROJECTIONS = 10  # Newton iterations at most; two are usual
+CLOSED = 1e-13  # m and rad, where a projection ends
+CLOSED_ENOUGH = 1e-8  # m and rad, beyond which it has failed
+REDUNDANT = 1e-7  # of the largest singular value: redundant rows of states not quite closed are below
+
+
+class Terms(NamedTuple):
+    """An engine's terms at a state, velocities in the tree's order; of every link the rotation since t = 0
+    (n, 3, 3) and position (n, 3) of its frame in the world, the Jacobian (n, 6, nv) of its velocity and
+    angular velocity, and its accelerations (n, 6) at v' = 0."""
+
+    mass: np.ndarray
+    bias: np.ndarray
+    rotation: np.ndarray
+    position: np.ndarray
+    jacobian: np.ndarray
+    drift: np.ndarray
+
+
+class Mechanism(Protocol):
+    """A scene's tree in an engine."""
+
+    scene: Scene
+    tree: Tree
+    coordinates: JointCoordinates
+
+    def terms(self, q: np.ndarray, v: np.ndarray) -> Terms:
+        """The engine's terms at positions (nq,) and velocities (nv,)."""
+
+
+def sweep(rate: float) -> list[Setting]:
+    """Settings by relative tolerance for a scene that turns at a rate (rad/s)."""
+    shortest = float(f"{LEAST_TURN / rate:.2g}")
+    return [Setting(FAMILY, {"rtol": rtol, "min_step": shortest}) for rtol in RTOLS]
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Closures at a state: residuals (m,), m and rad, Jacobian (m, nv), accelerations (m,) at v' = 0, and the
+    places (world) of the closures' second anchors."""
+
+    residual: np.ndarray
+    jacobian: np.ndarray
+    drift: np.ndarray
+    places: Sequence[np.ndarray]
+
+
+class Simulation:
+    """One simulation of a mechanism at a setting of FAMILY."""
+
+    def __init__(self, mechanism: Mechanism, setting: Setting):
+        self.mechanism, self.scene, self.tree = mechanism, mechanism.scene, mechanism.tree
+        self.at = mechanism.coordinates
+        self.counts = Counts()
+        self.driven = [(self.tree.coordinate(self.scene, d.joint), d) for d in self.scene.driver]
+        places = dict(zip(self.at.single.tolist(), self.at.single_q.tolist(), strict=True))
+        self.driven_q = [places[i] for i, _ in self.driven]
+        self.free = np.setdiff1d(np.arange(self.at.nv), [i for i, _ in self.driven])
+        self.y = np.concatenate([self.at.start(), initial_rates(self.scene, self.tree)])
+        longest = TURN_PER_STEP / stated_rate(self.scene) if self.driven else np.inf
+        limits = setting.options["rtol"], setting.options["min_step"], longest
+        self.integrator = Adaptive(self.rates, self.settled, *limits, self.counts)
+
+    def advance(self, t0: float, t1: float) -> None:
+        """Moves the state from t0 to t1; raises Failed."""
+        self.y = self.integrator.advance(self.y, t0, t1)
+
+    def split(self, t: float, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions and velocities of a state; driven ones as prescribed at t, quaternions of length 1."""
+        q, v = self.at.normalised(y[: self.at.nq]), y[self.at.nq :]
+        if self.driven:
+            q, v = q.copy(), v.copy()
+            for (i, driver), iq in zip(self.driven, self.driven_q, strict=True):
+                q[iq], v[i], _ = motion(driver, t)
+        return q, v
+
+    def rates(self, t: float, y: np.ndarray) -> np.ndarray:
+        """Rates (nq + nv,) of a state."""
+        q, v = self.split(t, y)
+        return np.concatenate([self.at.rates(q, v), self.accelerations(t, q, v)[0]])
+
+    def accelerations(
+        self, t: float, q: np.ndarray, v: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, LinkMotion, _Rows]:
+        """v' (nv,), the closures' forces λ (m,), the links' motion with these accelerations, and the rows."""
+        terms = self.mechanism.terms(q, v)
+        motion_now, rows = self._motion(terms, q, v), self._rows(terms, v)
+        a = np.zeros(self.at.nv)
+        for i, driver in self.driven:
+            a[i] = motion(driver, t)[2]
+        acting = self._forces(terms, motion_now) - terms.bias - terms.mass @ a
+        gamma = -rows.drift - rows.jacobian @ a
+        root = self._root(t, terms)
+        pushed = solve_triangular(root, acting[self.free], lower=True)
+        spread = self._spread(t, root, rows.jacobian)
+        held = np.linalg.lstsq(spread, gamma - spread @ pushed, rcond=REDUNDANT)[0]
+        a[self.free] = solve_triangular(root, pushed + held, lower=True, trans="T")
+        multipliers = np.linalg.lstsq(spread.T, held, rcond=REDUNDANT)[0]
+        return a, multipliers, self._accelerated(terms, motion_now, a), rows
+
+    def settled(self, t: float, y: np.ndarray) -> np.ndarray:
+        """The state nearest to y, by kinetic energy, that satisfies closures and drivers; raises Failed."""
+        q, v = self.split(t, y)
+        if not self.tree.closures:
+            return np.concatenate([q, v])
+        terms = self.mechanism.terms(q, v)
+        root = self._root(t, terms)
+        for _ in range(PROJECTIONS):
+            rows = self._rows(terms, v)
+            if not abs(rows.residual).max() > CLOSED:
+                break
+            q = self.at.moved(q, self._least(t, root, rows.jacobian, -rows.residual))
+            terms = self.mechanism.terms(q, v)
+        if not abs(rows.residual).max() < CLOSED_ENOUGH:
+            raise Failed(Outcome.NOT_CONVERGED, t, f"the closures could not be met at {t:.6g} s")
+        return np.concatenate([q, v - self._least(t, root, rows.jacobian, rows.jacobian @ v)])
+
+    def sample(self, t: float) -> Sample:
+        """Poses, velocities, accelerations and reactions."""
+        q, v = self.split(t, self.y)
+        _, multipliers, moved, rows = self.accelerations(t, q, v)
+        return sample_of(self.scene, self.tree, moved, self._closing(multipliers, rows))
+
+    def _closing(self, multipliers: np.ndarray, rows: _Rows) -> list[np.ndarray]:
+        """Per closure, the wrench on its second link about the world's origin."""
+        found, start = [], 0
+        for closure, place in zip(self.tree.closures, rows.places, strict=True):
+            force = multipliers[start : start + 3]
+            start += 3
+            moment = np.zeros(3)
+            if closure.kind == "weld":
+                moment = multipliers[start : start + 3]
+                start += 3
+            found.append(wrench(force, place, moment))
+        return found
+
+    def _motion(self, terms: Terms, q: np.ndarray, v: np.ndarray) -> LinkMotion:
+        twists = terms.jacobian @ v
+        return LinkMotion(
+            terms.rotation, terms.position, twists[:, :3], twists[:, 3:], UNKNOWN, UNKNOWN,
+            self.at.of_velocities(q), v,
+        )  # fmt: skip
+
+    def _accelerated(self, terms: Terms, of: LinkMotion, a: np.ndarray) -> LinkMotion:
+        change = terms.jacobian @ a + terms.drift
+        return LinkMotion(
+            of.rotation, of.position, of.velocity, of.angular_velocity, change[:, :3], change[:, 3:],
+            of.coordinates, of.rates,
+        )  # fmt: skip
+
+    def _forces(self, terms: Terms, of: LinkMotion) -> np.ndarray:
+        """Generalised forces (nv,) of the loads."""
+        tau = np.zeros(self.at.nv)
+        for link, force, moment in applied(self.scene, self.tree, of):
+            tau += terms.jacobian[link].T @ np.concatenate([force, moment])
+        return tau
+
+    def _rows(self, terms: Terms, v: np.ndarray) -> _Rows:
+        residual, jacobian, drift, places = [np.zeros(0)], [np.zeros((0, self.at.nv))], [np.zeros(0)], []
+        for closure in self.tree.closures:
+            first, second = (self._end(terms, v, link, closure.anchor) for link in closure.links)
+            n = 3 if closure.kind == "point" else 6
+            gap = second[0] - first[0]
+            if n == 6:
+                turned = self._rotation(terms, closure.links[1]) @ self._rotation(terms, closure.links[0]).T
+                gap = np.concatenate([gap, rotation_vector(rotations.from_matrix(turned))])
+            residual.append(gap)
+            jacobian.append((second[1] - first[1])[:n])
+            drift.append((second[2] - first[2])[:n])
+            places.append(second[0])
+        return _Rows(np.concatenate(residual), np.vstack(jacobian), np.concatenate(drift), places)
+
+    def _rotation(self, terms: Terms, link: int) -> np.ndarray:
+        return np.eye(3) if link == GROUND_LINK else terms.rotation[link]
+
+    def _end(
+        self, terms: Terms, v: np.ndarray, link: int, anchor: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Place (3,) of a point of a link, its Jacobian (6, nv), and its accelerations (6,) at v' = 0."""
+        if link == GROUND_LINK:
+            return anchor, np.zeros((6, self.at.nv)), np.zeros(6)
+        arm = terms.rotation[link] @ (anchor - self.tree.links[link].position)
+        jacobian, drift = terms.jacobian[link].copy(), terms.drift[link].copy()
+        omega = jacobian[3:] @ v
+        jacobian[:3] -= cross_matrix(arm) @ jacobian[3:]
+        drift[:3] += cross(drift[3:], arm) + cross(omega, cross(omega, arm))
+        return terms.position[link] + arm, jacobian, drift
+
+    def _root(self, t: float, terms: Terms) -> np.ndarray:
+        """The lower Cholesky factor of the mass matrix of the coordinates that are not driven."""
+        mass = terms.mass[np.ix_(self.free, self.free)]
+        if not np.isfinite(mass).all():
+            raise Failed(Outcome.NOT_FINITE, t, f"the state is not finite at {t:.6g} s")
+        return np.linalg.cholesky(mass)
+
+    def _spread(self, t: float, root: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
+        if not np.isfinite(jacobian).all():
+            raise Failed(Outcome.NOT_FINITE, t, f"the closures are not finite at {t:.6g} s")
+        return solve_triangular(root, jacobian[:, self.free].T, lower=True).T
+
+    def _least(self, t: float, root: np.ndarray, jacobian: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+        """The change (nv,) of least kinetic energy, zero in driven coordinates, that rows want."""
+        spread, change = self._spread(t, root, jacobian), np.zeros(self.at.nv)
+        least = np.linalg.lstsq(spread, wanted, rcond=REDUNDANT)[0]
+        change[self.free] = solve_triangular(root, least, lower=True, trans="T")
+        return change

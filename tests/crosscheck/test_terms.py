@@ -1,0 +1,145 @@
+"""Drake, DART and Bullet / Gauss's principle, truths and each engine's own terms."""
+
+from __future__ import annotations
+
+import functools
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+from crosscheck.conformance.moving import moving_probes
+from crosscheck.engine import Setting, engine
+from crosscheck.judge.constraints import initial_poses, initial_twists, scene_length
+from crosscheck.judge.gauss_principle import gauss, stacked
+from crosscheck.judge.metrics import error_series, violation_series
+from crosscheck.judge.reaction_balance import balance, idle
+from crosscheck.judge.truth import truth_for
+from mbref.scene import Scene
+from mbref.scenes import SCENES
+from mbref.trajectory import Outcome, Trajectory
+from tests.crosscheck.measured import MARGIN
+from tests.crosscheck.tree_scenes import driven, every_joint, ring
+
+MODULES = {"drake": "pydrake", "dart": "dartpy", "bullet": "pybullet"}
+MISSING = {name: f"{module} is not installed" for name, module in MODULES.items() if not find_spec(module)}
+
+
+def of(name: str, *values: object) -> object:
+    """A parameter of a test, skipped where the engine is not installed."""
+    why = MISSING.get(name, "")
+    return pytest.param(name, *values, marks=pytest.mark.skipif(bool(why), reason=why))
+
+
+def own_step(name: str, step: float) -> Setting:
+    """The setting of an engine's own stepping with a step (s)."""
+    return {
+        "drake": Setting("discrete", {"step": step}),
+        "dart": Setting("balls", {"step": step, "erp": 0.5}),
+        "bullet": Setting("iterated", {"step": step, "iterations": 200}),
+    }[name]
+
+
+@functools.cache
+def scenes() -> dict[str, Scene]:
+    probes = moving_probes()
+    rings = {f"ring {kind}": ring(kind) for kind in ("revolute", "cylindrical", "universal", "spherical")}
+    return {"every joint": every_joint(), "driven": driven(), **rings, **probes}
+
+
+def simulate(name: str, scene: Scene, setting: Setting, *times: float) -> Trajectory:
+    run = engine(name).run(scene, np.array(times), setting)
+    assert run.outcome is Outcome.COMPLETED, f"{name}, {scene.name}: {run.outcome.label} {run.message}"
+    return run
+
+
+def error(scene: Scene, run: Trajectory) -> float:
+    return float(error_series(scene, run, truth_for(scene).poses(run.times)).max())
+
+
+TERMS = Setting("terms", {"rtol": 1e-9, "min_step": 1e-4})
+AT_START, PUSHES, LATER = 1e-13, 2e-11, 6e-10  # accelerations, reactions at t = 0; poses at the end
+LIGHT = 1.1e-10  # accelerations of bodies of 1e-6 of the mass of others
+
+
+@pytest.mark.parametrize("name", [of("drake"), of("dart")])
+def test_accelerations_of_terms_and_gauss_s_principle(name: str) -> None:
+    """Every joint, driver and load, between moving bodies."""
+    for label, scene in scenes().items():
+        run = simulate(name, scene, TERMS, 0.0)
+        true = gauss(scene)
+        gap = abs(stacked(scene, run, 0) - true).max() / max(1.0, abs(true).max())
+        allowed = MARGIN * (LIGHT if label == "light and heavy" else AT_START)
+        assert gap < allowed, f"{name}, {label}: accelerations off by {gap:.1e}"
+
+
+@pytest.mark.parametrize("name", [of("drake"), of("dart")])
+@pytest.mark.parametrize("label", ["every joint", "driven", "spherical joint", "spinning loop"])
+def test_motion_and_reactions_of_terms_and_truth(name: str, label: str) -> None:
+    scene = scenes()[label]
+    run = simulate(name, scene, TERMS, 0.0, scene.duration / 2, scene.duration)
+    exact = truth_for(scene).poses(run.times)
+    off = float(error_series(scene, run, exact).max())
+    assert off < MARGIN * LATER, f"{name}, {label}: poses off by {off:.1e}"
+    for measure in (balance, idle):
+        left = measure(scene, run, exact)
+        assert left < MARGIN * 1e3 * LATER, f"{name}, {label}: {measure.__name__} {left:.1e}"
+
+
+ONE_STEP, TINY = 2e-4, 1e-5  # relative error of accelerations by a step of TINY (s), of first order
+ONE_STEP_OF = (
+    "pushed body", "force load", "moment load", "spring load", "torsion_spring load", "cylindrical joint",
+    "universal joint", "planar joint", "distance joint", "floating pair", "door",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [of("drake"), of("dart"), of("bullet")])
+@pytest.mark.parametrize("label", ONE_STEP_OF)
+def test_one_step_of_an_engine_and_gauss_s_principle(name: str, label: str) -> None:
+    """Masses, frames, signs of loads, order of bodies and units, by the engine's own step; and the start."""
+    scene = scenes()[label]
+    run = simulate(name, scene, own_step(name, TINY), 0.0, TINY)
+    for found, given in zip((run.position[0], run.velocity[0], run.angular_velocity[0]),
+                            (initial_poses(scene)[0], *initial_twists(scene)), strict=True):  # fmt: skip
+        assert abs(found - given).max() < 1e-13 * max(1.0, abs(given).max()), f"{name}, {label}: {found}"
+    changes = [
+        np.diff(run.velocity, axis=0)[0],
+        scene_length(scene) * np.diff(run.angular_velocity, axis=0)[0],
+    ]
+    true = gauss(scene)
+    gap = abs(np.concatenate(changes) / TINY - true).max() / abs(true).max()
+    assert gap < ONE_STEP, f"{name}, {label}: accelerations by a step off by {gap:.1e}"
+
+
+@pytest.mark.parametrize("name", [of("drake"), of("dart"), of("bullet")])
+@pytest.mark.parametrize(("label", "measured"), [("ring revolute", 1.1e-2), ("every joint", 2.3e-2)])
+def test_steps_of_an_engine_converge_at_first_order(name: str, label: str, measured: float) -> None:
+    """Errors measured at steps of 2 ms; a revolute loop as given, and every kind of joint and load."""
+    scene, errors = scenes()[label], []
+    for step in (2e-3, 1e-3):
+        run = simulate(name, scene, own_step(name, step), 0.0, 0.2, 0.4)
+        errors.append(error(scene, run))
+    assert errors[0] < measured, f"{name}, {label}: {errors}"
+    assert 1.8 < errors[0] / errors[1] < 2.2, f"{name}, {label}: errors {errors}"
+
+
+@pytest.mark.parametrize("name", [of("dart"), of("bullet")])
+def test_a_motion_that_an_engine_s_own_joints_are_driven_to(name: str) -> None:
+    scene, errors = driven(), []
+    for step in (2e-3, 1e-3):
+        run = simulate(name, scene, own_step(name, step), 0.0, 0.2, 0.4)
+        errors.append(error(scene, run))
+        open_by = float(violation_series(scene, run).max())
+        assert open_by < MARGIN * 1.3e-4, f"{name}: joints and drivers are off by {open_by:.1e}"
+    assert errors[0] / errors[1] > 1.8, f"{name}: errors {errors}"
+
+
+@pytest.mark.parametrize("name", [of("drake"), of("dart"), of("bullet")])
+def test_a_family_that_is_unknown_or_does_not_serve(name: str) -> None:
+    scene = SCENES["four_bar"]()
+    with pytest.raises(ValueError, match="no family 'best'"):
+        engine(name).run(scene, np.array([0.0]), Setting("best", {"step": 1e-3}))
+    if name == "drake":
+        assert not engine(name).serves(scene, "discrete"), "a discrete plant would be driven"
+        with pytest.raises(ValueError, match="prescribes no motion"):
+            engine(name).run(scene, np.array([0.0]), own_step(name, 1e-3))
