@@ -8,6 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from mbref.scene_services import SERVICES
+
 if TYPE_CHECKING:
     from mbref.equations.diagnosis import Diagnosis, counts, diagnose
     from mbref.method import Method, MethodError
@@ -53,6 +55,10 @@ def __getattr__(name: str) -> Any:
     if name in _MODULE_OF:
         return getattr(import_module(_MODULE_OF[name]), name)
     raise AttributeError(f"module 'mbref' has no attribute {name!r}")
+
+
+SERVICES.counts = lambda scene: import_module("mbref.equations.diagnosis").counts(scene)
+SERVICES.picture = lambda scene: import_module("mbref.drawing.picture").still(scene)
 
 
 def __dir__() -> list[str]:

@@ -12,7 +12,7 @@ import math
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, Strict, ValidationError, field_validator, model_validator
 
@@ -33,6 +33,7 @@ from mbref.scene_joints import (
 from mbref.scene_lines import toml_hint, with_lines
 from mbref.scene_loads import LOAD_TYPES, Force, Load, Moment, Spring, TorsionSpring
 from mbref.scene_paths import replaced_at
+from mbref.scene_services import SERVICES, Counts
 from mbref.scene_text import scene_text
 from mbref.scene_validation import (
     GROUND,
@@ -42,9 +43,6 @@ from mbref.scene_validation import (
     named_paths,
     reference_faults,
 )
-
-if TYPE_CHECKING:
-    from mbref.equations.diagnosis import Counts
 
 __all__ = [
     "GROUND", "JOINT_TYPES", "LOAD_TYPES", "Body", "Cylindrical", "Distance", "Driver", "Fixed", "Force",
@@ -159,9 +157,7 @@ class Scene(Entry):
 
     def counts(self) -> Counts:
         """Coordinates, rows by joint, rank, redundant rows and degrees of freedom at t = 0."""
-        from mbref.equations.diagnosis import counts
-
-        return counts(self)
+        return SERVICES.counts(self)
 
     def with_(self, path: str | None = None, value: Any = None, /, **changes: Any) -> Scene:
         """A validated copy with some top-level fields replaced, or with the value at a path.
@@ -175,9 +171,7 @@ class Scene(Entry):
         return Scene(**{**data, **changes})
 
     def _repr_html_(self) -> str:
-        from mbref.drawing.picture import still
-
-        return still(self)
+        return SERVICES.picture(self)
 
     def to_dict(self) -> dict[str, Any]:
         """The scene as the file's nested tables; fields at their default are left out."""

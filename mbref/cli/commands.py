@@ -80,6 +80,7 @@ def parser() -> argparse.ArgumentParser:
     known = commands(whole, title="commands", required=True, metavar="COMMAND")
     for add in (add_scene_files, add_pictures, add_diagnose, add_run, add_ensemble, add_exchange, add_tables):
         add(known)
+    whole.set_defaults(grammar=parser)
     return whole
 
 

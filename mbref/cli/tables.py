@@ -101,7 +101,5 @@ TABLES: dict[str, Callable[[], Table]] = {"scenes": _scenes, "methods": _methods
 def _complete(options: argparse.Namespace) -> int:
     import shtab
 
-    from mbref.cli.commands import parser
-
-    sys.stdout.write(shtab.complete(parser(), options.shell))
+    sys.stdout.write(shtab.complete(options.grammar(), options.shell))
     return 0

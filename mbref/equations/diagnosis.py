@@ -12,38 +12,11 @@ from mbref.equations.model import Model
 from mbref.equations.units import row_lengths
 from mbref.linear_algebra.redundancy import Redundancy
 from mbref.scene import Scene
+from mbref.scene_services import Counts
 
 RANK_TOLERANCE = 1e-10  # relative to the largest singular value of the scaled Jacobian
 UNIQUE_TOLERANCE = 1e-8  # a row takes part in a redundancy when its weight in it exceeds this
 UNIQUE_SHARE = 1e-9  # the same for the squares of a large scene, where other singular values leave 1e-12
-
-
-@dataclass(frozen=True)
-class Counts:
-    """Coordinates, constraint rows and their rank at t = 0.
-
-    Attributes
-    ----------
-    coordinates : int
-        Six for each body; the ground counts if it is modelled as a body.
-    rows : int
-        Number of constraint rows.
-    rows_by_joint : dict of str to int
-        Rows by joint. Rows of a driver count under its joint, rows of a modelled ground under ``"ground"``.
-    rank : int
-        Rank of the constraint Jacobian.
-    redundant : int
-        Rows minus rank.
-    degrees_of_freedom : int
-        Coordinates minus rank.
-    """
-
-    coordinates: int  # 6 per body
-    rows: int
-    rows_by_joint: dict[str, int]  # drivers under their joint, a modelled ground under "ground"
-    rank: int
-    redundant: int
-    degrees_of_freedom: int
 
 
 @dataclass(frozen=True)

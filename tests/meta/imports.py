@@ -21,13 +21,9 @@ def sources(package: str) -> dict[str, Path]:
     return {module_name(path): path for path in sorted((ROOT / package).rglob("*.py"))}
 
 
-def imported(path: Path, everywhere: bool = True) -> Iterator[str]:
-    """Full dotted names that a file imports: of ``from a import b`` both ``a`` and ``a.b``.
-
-    Those inside functions and under TYPE_CHECKING only if ``everywhere``.
-    """
-    tree = ast.parse(path.read_text())
-    for node in ast.walk(tree) if everywhere else tree.body:
+def imported(path: Path) -> Iterator[str]:
+    """Yield the dotted names that a file imports anywhere: of ``from a import b`` both ``a`` and ``a.b``."""
+    for node in _nodes(path):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -37,18 +33,19 @@ def imported(path: Path, everywhere: bool = True) -> Iterator[str]:
 
 
 def graph(package: str) -> dict[str, set[str]]:
-    """Module → modules of its package that it imports while it is itself imported.
+    """Return module → modules of its package that it imports, also inside functions and for types alone.
 
-    The package's ``__init__`` modules count only where they are imported from by name.
+    Only an ``__init__`` may import under TYPE_CHECKING what it re-exports on first use: no arrow.  The
+    package's ``__init__`` modules count only where they are imported from by name.
     """
     modules = sources(package)
     return {name: _targets(path, modules) - {name} for name, path in modules.items()}
 
 
 def _targets(path: Path, modules: Mapping[str, Path]) -> set[str]:
-    """The modules imported; ``from a import b`` is b where b is a module, else a."""
+    """Return the modules imported; ``from a import b`` is b if b is a module, otherwise a."""
     found = set()
-    for node in ast.parse(path.read_text()).body:
+    for node in _nodes(path):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -56,6 +53,30 @@ def _targets(path: Path, modules: Mapping[str, Path]) -> set[str]:
                 whole = f"{node.module}.{alias.name}"
                 found.add(whole if whole in modules else str(node.module))
     return found & set(modules)
+
+
+def _nodes(path: Path) -> Iterator[ast.AST]:
+    """Yield the nodes of a file, in an ``__init__`` without those under TYPE_CHECKING."""
+    tree = ast.parse(path.read_text())
+    if path.name == "__init__.py":
+        tree.body = [node for node in tree.body if not _is_for_types(node)]
+    return ast.walk(tree)
+
+
+def _is_for_types(node: ast.stmt) -> bool:
+    return isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+
+
+def children(arrows: Graph, folder: str) -> dict[str, set[str]]:
+    """Return the modules and folders directly in a folder, each with those of them that it imports from."""
+    depth, inside = folder.count(".") + 1, f"{folder}."
+    found: dict[str, set[str]] = {}
+    for module, targets in arrows.items():
+        if module.startswith(inside):
+            own = module.split(".")[depth]
+            others = {target.split(".")[depth] for target in targets if target.startswith(inside)}
+            found.setdefault(own, set()).update(others - {own})
+    return found
 
 
 def circles(arrows: Graph) -> list[list[str]]:

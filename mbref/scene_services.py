@@ -1,0 +1,56 @@
+"""Services of a scene that higher parts of the package do: counting constraints and drawing.
+
+A scene is data and imports none of them.  ``mbref/__init__``, which imports everything, binds them here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Coordinates, constraint rows and their rank at t = 0.
+
+    Attributes
+    ----------
+    coordinates : int
+        Six for each body; the ground counts if it is modelled as a body.
+    rows : int
+        Number of constraint rows.
+    rows_by_joint : dict of str to int
+        Rows by joint. Rows of a driver count under its joint, rows of a modelled ground under ``"ground"``.
+    rank : int
+        Rank of the constraint Jacobian.
+    redundant : int
+        Rows minus rank.
+    degrees_of_freedom : int
+        Coordinates minus rank.
+    """
+
+    coordinates: int  # 6 per body
+    rows: int
+    rows_by_joint: dict[str, int]  # drivers under their joint, a modelled ground under "ground"
+    rank: int
+    redundant: int
+    degrees_of_freedom: int
+
+
+class Services:
+    """Functions of a scene, bound when ``mbref`` is imported.
+
+    Attributes
+    ----------
+    counts : callable
+        Returns the Counts of a scene.
+    picture : callable
+        Returns a scene at t = 0 as SVG.
+    """
+
+    counts: Callable[[Any], Counts]
+    picture: Callable[[Any], str]
+
+
+SERVICES = Services()
