@@ -259,6 +259,19 @@ def reread(path: Path) -> tuple[Agreement, list[str]]:
     return Agreement(mujoco, reader.model, reader.groups, reader.poses), reader.tree
 
 
+def test_armature_of_a_hinge_on_the_ground_is_a_part_of_its_body(tmp_path):
+    """(I + armature) θ'' = m g l; the file's matrices have the armature too."""
+    rotor = 'armature="0.005"'
+    inertial = '<inertial pos="0.05 0 0" mass="0.01" diaginertia="2e-6 2e-6 2e-6"/>'
+    body = f'<body name="f">{hinge("j", more=rotor)}{inertial}</body>'
+    text = f"<mujoco><worldbody>{body}</worldbody></mujoco>"
+    found = read(tmp_path, text)
+    same(found)
+    turning = np.linalg.norm(gauss(found.imported.scene)[0]) / 0.05
+    assert turning == pytest.approx(0.01 * 9.81 * 0.05 / (2e-6 + 0.01 * 0.05**2 + 0.005), rel=1e-12)
+    assert "armature of 'j', 0.005 kg m², is a part of the inertia of 'f'" in found.imported.notes[0]
+
+
 def test_velocities_of_a_keyframe_are_the_scene_s(tmp_path):
     text = OPEN_LOOP.replace("EQUALITY", CONNECT).replace('0.1"/></key', '0.1" qvel="1 2 3"/></key')
     found = read(tmp_path, text, keyframe="low")

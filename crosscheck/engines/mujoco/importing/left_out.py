@@ -51,9 +51,14 @@ def refuse_others(parts: Collection[Part], without: frozenset[str]) -> None:
         raise SceneError(faults)
 
 
-def of_model(mujoco: Any, model: Any, keyframe: int) -> Iterator[Part]:
-    """Armature, friction, fluid, compensation, flexible bodies, and motors that a keyframe controls."""
-    for kind, numbers in (("armature", model.dof_armature), ("friction", model.dof_frictionloss)):
+def of_model(mujoco: Any, model: Any, keyframe: int, kept: Collection[int]) -> Iterator[Part]:
+    """Armature, friction, fluid, compensation, flexible bodies, and motors that a keyframe controls.
+
+    Armature of the coordinates ``kept`` is in the scene.
+    """
+    armature = model.dof_armature.copy()
+    armature[list(kept)] = 0.0
+    for kind, numbers in (("armature", armature), ("friction", model.dof_frictionloss)):
         if found := _joint_names(model, numbers):
             yield Part(kind, f"{kind.replace('friction', 'dry friction')} of {_listed(found)}")
     for kind, numbers in (("armature", model.tendon_armature), ("friction", model.tendon_frictionloss)):
@@ -117,11 +122,13 @@ def _holding_sites(mujoco: Any, model: Any) -> set[int]:
     return {*model.eq_obj1id[ends], *model.eq_obj2id[ends], *model.wrap_objid[wrapped]}
 
 
-def stripped(model: Any) -> None:
+def stripped(model: Any, kept: Collection[int]) -> None:
     """Take out of the model, in place, the parts of ``of_model`` that its matrices contain."""
+    armature = model.dof_armature.copy()
     for numbers in (
         model.dof_armature, model.tendon_armature, model.dof_frictionloss, model.tendon_frictionloss,
         model.body_gravcomp,
     ):  # fmt: skip
         numbers[...] = 0
+    model.dof_armature[list(kept)] = armature[list(kept)]
     model.opt.density = model.opt.viscosity = 0.0

@@ -16,9 +16,9 @@ import numpy as np
 from crosscheck.engines.mujoco.importing import left_out, loads, urdf
 from crosscheck.engines.mujoco.importing.agreement import Agreement
 from crosscheck.engines.mujoco.importing.asked_closures import Frames, asked, unclosed
-from crosscheck.engines.mujoco.importing.chains import chains, joints_of, without_effect
+from crosscheck.engines.mujoco.importing.chains import Chain, chains, joints_of, without_effect
 from crosscheck.engines.mujoco.importing.closures import Closure, of_equalities
-from crosscheck.engines.mujoco.importing.groups import Groups
+from crosscheck.engines.mujoco.importing.groups import WORLD, Groups
 from crosscheck.engines.mujoco.importing.left_out import Part
 from crosscheck.engines.mujoco.importing.posing import JointRow, Poses
 from mbref.formats import Imported, ImportOptions
@@ -64,7 +64,7 @@ def source(path: Path, options: ImportOptions) -> Source:
     left_out.refuse_others(reader.parts, without)
     scene, data = reader.scene(path.stem), reader.poses.data
     state = data.qpos.copy(), data.qvel.copy()
-    left_out.stripped(model)
+    left_out.stripped(model, reader.kept)
     Agreement(mujoco, model, reader.groups, reader.poses).check(scene, reader.tree)
     wanted = tuple(f"{part.sentence} (--without {part.kind})" for part in reader.parts)
     imported = Imported(scene, (*wanted, *left_out.notes(mujoco, model)), tuple(reader.notes))
@@ -114,6 +114,7 @@ class _Reader:
 
     def __post_init__(self) -> None:
         self.groups = Groups(self.mujoco, self.model)
+        self.kept: list[int] = []  # joint velocities whose armature is in the scene
 
     def read(self) -> None:
         """Read everything, at a pose with closed loops."""
@@ -125,7 +126,7 @@ class _Reader:
         self._read_joints(closures)
         self._read_loads()
         key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, self.options.keyframe or "\0")
-        self.parts += left_out.of_model(mujoco, model, key)
+        self.parts += left_out.of_model(mujoco, model, key, self.kept)
         if self.text is not None:
             self.parts += urdf.couplings(self.text.root)
         self.notes += unclosed(self.groups, self.poses.data, self.frames, closures, self.poses.extent)
@@ -215,6 +216,7 @@ class _Reader:
         whole: dict[int, int] = {}
         for chain in chains(self.mujoco, self.groups, data):
             joints = joints_of(chain, self.groups, extent)
+            self._add_rotor(chain)
             whole.update({j: len(found) for j in chain.joints if len(joints) == 1})
             found += joints
         count = len(found)
@@ -224,6 +226,20 @@ class _Reader:
         self.joint_of = {j: self.joints[k] for j, k in whole.items()}
         self._read_merged()
         self._lock()
+
+    def _add_rotor(self, chain: Chain) -> None:
+        """Make the armature of a hinge on the ground a part of its body, which turns about a fixed axis."""
+        if chain.kinds != ("hinge",) or chain.groups[0] != WORLD:
+            return
+        dof = int(self.model.jnt_dofadr[chain.joints[0]])
+        if armature := float(self.model.dof_armature[dof]):
+            self.groups.rotors[chain.groups[1]] = (chain.joints[0], armature)
+            self.kept.append(dof)
+            joint = left_out.joint_name(self.model, chain.joints[0])
+            self.notes.append(
+                f"armature of {joint}, {armature:g} kg m², is a part of the inertia of "
+                f"{self.groups.names[chain.groups[1]]!r}, which turns about a fixed axis"
+            )
 
     def _read_merged(self) -> None:
         for members in self.groups.members.values():
