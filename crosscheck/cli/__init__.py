@@ -1,8 +1,13 @@
 """The command `crosscheck`: its options, its lists and the tables it prints."""
 
-from mbref.imports import without_collection
+import gc
 
-with without_collection():
-    from crosscheck.cli.commands import main
+collects = gc.isenabled()
+gc.disable()  # no search for garbage among imported objects
+from crosscheck.cli.commands import main  # noqa: E402
+
+gc.freeze()
+if collects:
+    gc.enable()
 
 __all__ = ["main"]

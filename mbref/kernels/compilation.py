@@ -19,12 +19,20 @@ import sys
 import types as types_of_python
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numba
 from numba import cfunc, f8, i8, njit, types, u4
 
 import mbref
-from mbref.kernels.disk_cache import folder_of, kept_in
+from mbref.kernels.disk_cache import (
+    begin,
+    cached_in,
+    files_of,
+    is_writable,
+    record_files,
+    remove_damaged,
+)
 
 # No fastmath: the same bits with and without the JIT.  Without numba's runtime (``_nrt``, undocumented there)
 # no kernel can allocate, and none counts references to its arrays, which takes time.
@@ -104,8 +112,10 @@ class Helper:
     @functools.cached_property
     def _dispatcher(self) -> Callable:
         """A closure is not kept on disk, where numba would not find it again."""
-        kept = self._options["cache"] and self.function.__closure__ is None
-        with kept_in(CACHE):
+        kept = self.function.__closure__ is None and is_writable(CACHE)
+        if kept:
+            remove_damaged(CACHE, self.function)
+        with cached_in(CACHE):
             return njit(**{**self._options, "cache": kept})(self.function)
 
 
@@ -120,9 +130,17 @@ class Exchangeable:
         """The function that kernels take: the compiled one, or the plain one without the JIT."""
         if PLAIN:
             return self.function
-        self._say_compiling()
-        with kept_in(CACHE):
-            return self._compile()
+        if not is_writable(CACHE):
+            _announce_once()
+            return self._compile(cache=False)
+        begin(CACHE)
+        remove_damaged(CACHE, self.function)
+        if not self.is_kept:
+            _announce_once()
+        compiled = self._compile()
+        if not self._is_loaded(compiled):
+            record_files(CACHE)
+        return compiled
 
     def prepare(self) -> None:
         """Compile now, or load from the cache."""
@@ -139,21 +157,22 @@ class Exchangeable:
         copy.__module__, copy.__qualname__ = f.__module__, f"{f.__qualname__}_entry"
         return Entry(copy, self.signature)
 
-    def _compile(self) -> Callable:
-        return cfunc(self.signature, **OPTIONS)(self.function)
+    def _compile(self, **options: bool) -> Callable:
+        """The compiled function, loaded where the cache has it."""
+        with cached_in(CACHE):
+            return self._decorator(**{**OPTIONS, **options})(self.function)
+
+    def _decorator(self, **options: bool) -> Callable:
+        return cfunc(self.signature, **options)
+
+    def _is_loaded(self, compiled: Any) -> bool:
+        """Whether the compiled function comes from the cache."""
+        return bool(compiled.cache_hits)
 
     @property
     def is_kept(self) -> bool:
         """Whether the cache of this machine has the compiled kernel, or none is needed."""
-        source = Path(self.function.__code__.co_filename)
-        stem = f"{source.stem}.{self.function.__name__}-"
-        return PLAIN or any(
-            name.startswith(stem) and name.endswith(".nbc") for name in _names_in(folder_of(CACHE, source))
-        )
-
-    def _say_compiling(self) -> None:
-        if not self.is_kept:
-            _announce_once()
+        return PLAIN or any(path.suffix == ".nbc" for path in files_of(CACHE, self.function))
 
 
 class Entry(Exchangeable):
@@ -162,8 +181,11 @@ class Entry(Exchangeable):
     def __call__(self, *arguments: object) -> object:
         return self.pointer(*arguments)
 
-    def _compile(self) -> Callable:
-        return njit(self.signature, **OPTIONS)(self.function)
+    def _decorator(self, **options: bool) -> Callable:
+        return njit(self.signature, **options)
+
+    def _is_loaded(self, compiled: Any) -> bool:
+        return bool(compiled.stats.cache_hits)
 
 
 def exchangeable(signature: types.Type) -> Callable[[Callable], Exchangeable]:
@@ -179,14 +201,6 @@ def entry(signature: types.Type) -> Callable[[Callable], Entry]:
 def pointer_to(signature: types.Type) -> types.Type:
     """The argument type of an exchangeable kernel."""
     return types.FunctionType(signature)
-
-
-def _names_in(folder: Path) -> list[str]:
-    """The names of the files in a folder; none where there is no folder.  A third of the time of ``glob``."""
-    try:
-        return os.listdir(folder)
-    except OSError:
-        return []
 
 
 @functools.cache

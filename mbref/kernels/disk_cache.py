@@ -1,9 +1,8 @@
-"""numba's cache of compiled kernels, kept in our folder as checked files.
+"""numba's cache of compiled kernels, in a folder for each version of the sources, with checksums.
 
-numba trusts the bytes of its own files: machine code that is damaged ends the process with a signal.  While
-one of our functions is decorated, our cache takes the place of numba's, with a locator, which says where
-files lie, a file, which stores and loads, and a library, which holds the machine code that was loaded; other
-users of numba keep theirs.
+numba does not check the bytes of its files: damaged machine code ends the process with a signal.  A list in
+the folder has the checksum of each file.  Files that differ from the list are removed before numba reads
+them, and their kernels are compiled again.
 """
 
 from __future__ import annotations
@@ -11,157 +10,128 @@ from __future__ import annotations
 import contextlib
 import functools
 import hashlib
-import pickle
+import os
+import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
-from llvmlite import binding as llvm
-from numba.core import caching, ccallback, dispatcher
-from numba.core.codegen import JITCodeLibrary
-from numba.core.runtime import rtsys
+import numba
 
-from mbref.kernels import checked_file
-
-
-def folder_of(cache: Path, source: Path) -> Path:
-    """Where the kernels of a source file are kept: in a folder named after that of the file."""
-    return cache / source.parent.name
+CHECKSUMS = "checksums.txt"  # a line a file: SHA-256, blank, path in the folder
+LINE = hashlib.sha256().digest_size * 2 + 1  # characters before the path
 
 
 @contextlib.contextmanager
-def kept_in(folder: Path) -> Iterator[None]:
-    """Functions decorated meanwhile are cached below this folder, which is touched when one is compiled."""
-    before, dispatcher.FunctionCache = dispatcher.FunctionCache, _cache_in(folder)
-    ccallback.FunctionCache = dispatcher.FunctionCache
+def cached_in(folder: Path) -> Iterator[None]:
+    """Let numba cache in the folder the functions that are decorated meanwhile (``NUMBA_CACHE_DIR``)."""
+    before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
     try:
         yield
     finally:
-        dispatcher.FunctionCache = ccallback.FunctionCache = before
-
-
-class _Cache(caching.FunctionCache):
-    """The cache of one function, which says how compiled code is found, loaded and kept."""
-
-    def __init__(self, function: Callable):
-        super().__init__(function)
-        self._cache_file = _Files(
-            self._cache_path, self._impl.filename_base, self._impl.locator.get_source_stamp()
-        )
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compiled function of this signature, or None.
-
-        numba first imports all operations that it can compile, SciPy's linear algebra among them.  Loading
-        needs none of them; a compilation imports them itself.
-        """
-        return self._load_overload(sig, target_context)
+        numba.config.CACHE_DIR = before
 
 
 @functools.cache
-def _cache_in(folder: Path) -> type[_Cache]:
-    """The cache of functions below this folder."""
-    place = type("Place", (_Place,), {"folder": folder})
-    rules = type("Rules", (_Rules,), {"_locator_classes": [place]})
-    return type("Cache", (_Cache,), {"_impl_class": rules})
+def is_writable(folder: Path) -> bool:
+    """Whether files can be kept in the folder; one line on stderr says so where they cannot."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        _report(f"nothing can be kept in {folder} ({error.strerror}); kernels are compiled each time")
+        return False
+    return True
 
 
-class _Rules(caching.CompileResultCacheImpl):
-    """numba's rules of what is kept of a compiled function, and how the function is made of it again."""
-
-    def reduce(self, compiled: Any) -> tuple[Any, ...]:
-        """The parts that are kept of a compiled function: of the functions compiled into it, some fifty, only
-        environments that hold constants.  Code never looks at the others, and to make them takes a third of
-        the time to load a kernel.
-        """
-        *parts, environments = super().reduce(compiled)
-        own = compiled.fndesc.env_name
-        return (*parts, tuple(e for e in environments if e.consts or e.env_name == own))
-
-    def rebuild(self, target_context: Any, payload: Any) -> Any:
-        """The compiled function, whose library is of our class."""
-        codegen, code = target_context.codegen(), payload[0][2][0]
-        if b"NRT_" in code:
-            rtsys.initialize(target_context)
-        before, codegen._library_class = codegen._library_class, _Loaded
-        try:
-            return super().rebuild(target_context, payload)
-        finally:
-            codegen._library_class = before
+def files_of(folder: Path, function: Callable) -> list[Path]:
+    """The files of a function in the folder: an index, and the code of each of its signatures."""
+    source = Path(function.__code__.co_filename)
+    stem = f"{source.stem}.{function.__qualname__}-".replace("<", "").replace(">", "")
+    return [
+        place / name
+        for place in _folders(folder)
+        if place.name.startswith(source.parent.name)
+        for name in _names_in(place)
+        if name.startswith(stem) and name.endswith((".nbi", ".nbc"))
+    ]
 
 
-class _Loaded(JITCodeLibrary):
-    """Machine code from the cache.  Its bitcode is parsed only when another kernel is linked with it: of the
-    time to load a kernel that takes half.
-    """
-
-    @classmethod
-    def _unserialize(cls, codegen: Any, state: Any) -> _Loaded:
-        name, _, (code, bitcode) = state
-        self = cls(codegen, name)
-        self._code, self._bitcode = code, bitcode
-        self.enable_object_caching()
-        self._set_compiled_object(code)
-        self._finalize_final_module()
-        return self
-
-    def get_pointer_to_function(self, name: str) -> int:
-        """The address of a function; 0 where the code does not name it."""
-        named = name.encode() + b"\0" in self._code
-        return self._codegen._engine.get_function_address(name) if named else 0
-
-    def _get_module_for_linking(self) -> Any:
-        if self._shared_module is None:
-            self._shared_module = llvm.parse_bitcode(self._bitcode)
-        return self._shared_module
+def remove_damaged(folder: Path, function: Callable) -> None:
+    """Remove the files of a function unless the list has all their checksums; stderr names damaged ones."""
+    paths, is_whole = files_of(folder, function), True
+    for path in paths:
+        known, found = _known(folder, path), _checksum(path)
+        is_whole = is_whole and found in known
+        if known and found not in known:
+            _report(f"{path} is damaged and is made anew")
+    for path in paths if not is_whole else ():
+        with contextlib.suppress(OSError):
+            path.unlink()
 
 
-class _Place:
-    """numba's locator, with the methods that it asks for."""
-
-    folder: Path
-
-    def __init__(self, source: str):
-        self._source = source
-
-    @classmethod
-    def from_function(cls, _function: Callable, source: str) -> _Place:
-        return cls(source)
-
-    def get_cache_path(self) -> str:
-        return str(folder_of(self.folder, Path(self._source)))
-
-    def get_source_stamp(self) -> str:
-        return _digest(self._source)
-
-    def get_disambiguator(self) -> str:
-        return "kernel"
-
-    def ensure_cache_path(self) -> None:
-        """Nothing before there is something to write."""
+def record_files(folder: Path) -> None:
+    """Add to the list the checksums of all files written since this process began to use the folder."""
+    lines, since = [], begin(folder)
+    for place in _folders(folder):
+        for name in _names_in(place):
+            path = place / name
+            if path.suffix in (".nbi", ".nbc") and _time_of(path) >= since:
+                lines.append(f"{_checksum(path)} {place.name}/{name}\n")
+    with contextlib.suppress(OSError), (folder / CHECKSUMS).open("a") as file:
+        file.write("".join(lines))
 
 
 @functools.cache
-def _digest(source: str) -> str:
-    """Of the file's text: the cache serves every copy of the same sources."""
-    return hashlib.sha256(Path(source).read_bytes()).hexdigest()
+def begin(folder: Path) -> float:
+    """Begin to use the folder; returns the time by the clock of its files (s)."""
+    with tempfile.NamedTemporaryFile(dir=folder) as file:
+        return os.stat(file.name).st_mtime
 
 
-class _Files:
-    """numba's store of a function's compiled signatures: a file each."""
+def _known(folder: Path, path: Path) -> set[str]:
+    """The checksums that the list has of a file: processes that compile at the same time write it twice."""
+    try:
+        size = (folder / CHECKSUMS).stat().st_size
+    except OSError:
+        return set()
+    return _checksums(folder, size).get(f"{path.parent.name}/{path.name}", set())
 
-    def __init__(self, cache_path: str, filename_base: str, source_stamp: Any):
-        self._stem, self._stamp = Path(cache_path) / filename_base, source_stamp
 
-    def load(self, key: Any) -> Any:
-        """The data saved under the key, or None."""
-        data = checked_file.read(self._path(key))
-        return None if data is None else pickle.loads(data)
+@functools.lru_cache(maxsize=2)
+def _checksums(folder: Path, _size: int) -> dict[str, set[str]]:
+    """The list of a folder, read again when its size has changed."""
+    found: dict[str, set[str]] = {}
+    for line in (folder / CHECKSUMS).read_text(errors="replace").splitlines():
+        found.setdefault(line[LINE:], set()).add(line[: LINE - 1])
+    return found
 
-    def save(self, key: Any, data: Any) -> None:
-        """Keep the data, where that is possible."""
-        checked_file.write(self._path(key), caching.dumps(data))
 
-    def _path(self, key: Any) -> Path:
-        digest = hashlib.sha256(repr((self._stamp, key)).encode()).hexdigest()[:16]
-        return self._stem.with_name(f"{self._stem.name}.{digest}.nbc")
+def _checksum(path: Path) -> str:
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:  # removed by another process
+        return ""
+
+
+def _time_of(path: Path) -> float:
+    try:
+        return path.stat().st_mtime
+    except OSError:  # removed by another process
+        return 0.0
+
+
+def _folders(folder: Path) -> list[Path]:
+    return [folder / name for name in _names_in(folder) if name != CHECKSUMS]
+
+
+def _names_in(folder: Path) -> list[str]:
+    """The names in a folder; none where it is missing or no folder.  A third of the time of ``glob``."""
+    try:
+        return os.listdir(folder)
+    except OSError:
+        return []
+
+
+def _report(sentence: str) -> None:
+    print(f"mbref: {sentence}", file=sys.stderr, flush=True)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.integrate
 
 from crosscheck.engine import Engine, Setting, engine
 from crosscheck.engines.compiled import dop853
@@ -467,3 +468,12 @@ def test_a_compiler_that_fails_is_said(
     monkeypatch.setenv("CXX", str(compiler))
     with pytest.raises(library.NoLibrary, match=r"the C\+\+ compiler failed: .*out of luck"):
         library._compile(tmp_path / "library.so")
+
+
+@pytest.mark.parametrize(
+    ("ours", "theirs"), [("A", "A"), ("B", "B"), ("C", "C"), ("ERROR3", "E3"), ("ERROR5", "E5")]
+)
+def test_coefficients_of_dop853_are_those_of_scipy(ours, theirs):
+    """SciPy's tables go on with rows that interpolate, and with zeros."""
+    found, expected = getattr(dop853, ours), getattr(scipy.integrate.DOP853, theirs)
+    assert np.array_equal(found, expected[tuple(slice(0, size) for size in found.shape)])

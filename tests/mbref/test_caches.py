@@ -158,7 +158,8 @@ def kept(cache: Path, pattern: str) -> list[Path]:
 
 
 @pytest.mark.parametrize(
-    ("script", "pattern", "says"), [(SMALL_KERNEL, "*.nbc", "7.0\n"), (SCENE, "*.code", "True\n")]
+    ("script", "pattern", "says"),
+    [(SMALL_KERNEL, "*.nbc", "7.0\n"), (SMALL_KERNEL, "*.nbi", "7.0\n"), (SCENE, "*.code", "True\n")],
 )
 @pytest.mark.parametrize("damage", [lambda data: data[: len(data) // 2], lambda data: b"\0" * len(data)])
 def test_damaged_code_is_made_anew(script, pattern, says, damage, tmp_path: Path):
@@ -202,13 +203,32 @@ def test_a_new_kernel_is_compiled_with_a_kept_one(tmp_path: Path):
     assert file.exists()
 
 
-def test_a_loaded_kernel_makes_no_environments_of_the_functions_in_it(tmp_path: Path):
-    script = f"""{SMALL_KERNEL}
-from numba.core.environment import Environment
-print(*(name for name in ("twice", "shifted") if any(name in known for known in Environment._memo)))
-"""
-    first, second = (ran(script, tmp_path, tmp_path / "cache")[0] for _ in range(2))
-    assert (first, second) == ("7.0\ntwice shifted\n", "7.0\nshifted\n")
+@pytest.mark.parametrize("damage", [lambda data: data[: len(data) // 2], lambda data: b"\0" * len(data)])
+def test_damage_to_every_file_of_the_cache_costs_time_alone(damage, tmp_path: Path):
+    """Checksums too: kernels without one are compiled again."""
+    cache = tmp_path / "cache"
+    ran(SMALL_KERNEL, tmp_path, cache)
+    files = [path for path in kept(cache, "*") if path.is_file()]
+    assert {path.suffix for path in files} == {".nbi", ".nbc", ".txt"}
+    for path in files:
+        path.write_bytes(damage(path.read_bytes()))
+    assert ran(SMALL_KERNEL, tmp_path, cache)[0] == "7.0\n"
+    assert "damaged" not in ran(SMALL_KERNEL, tmp_path, cache)[1]
+
+
+def test_one_changed_byte_of_machine_code_is_found(tmp_path: Path):
+    cache = tmp_path / "cache"
+    ran(SMALL_KERNEL, tmp_path, cache)
+    (file,) = kept(cache, "*.shifted*.nbc")
+    data = file.read_bytes()
+    file.write_bytes(data[:-1000] + bytes([data[-1000] ^ 1]) + data[-999:])
+    out, error = ran(SMALL_KERNEL, tmp_path, cache)
+    assert (out, f"{file} is damaged" in error) == ("7.0\n", True), error
+
+
+def test_other_functions_are_cached_where_numba_keeps_them(tmp_path: Path):
+    program = f"{SMALL_KERNEL}\nimport numba\nprint(numba.config.CACHE_DIR)\n"
+    assert ran(program, tmp_path, tmp_path / "cache")[0] == f"7.0\n{tmp_path / 'cache'}\n"
 
 
 @pytest.mark.parametrize("program", ["mbref", "crosscheck"])

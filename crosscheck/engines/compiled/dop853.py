@@ -13,14 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from scipy.integrate._ivp import dop853_coefficients as tableau
 
+from crosscheck.engines.compiled import dop853_coefficients as tableau
 from crosscheck.engines.compiled.calls import rates_of
 
-STAGES = tableau.N_STAGES
-A = np.ascontiguousarray(tableau.A[:STAGES, :STAGES])
-B, C = tableau.B.copy(), tableau.C[:STAGES].copy()
-ERROR3, ERROR5 = tableau.E3[:STAGES].copy(), tableau.E5[:STAGES].copy()
+STAGES = tableau.STAGES
+A = np.array([[*row, *(0.0,) * (STAGES - len(row))] for row in tableau.A])
+B, C, ERROR3, ERROR5 = map(np.array, (tableau.B, tableau.C, tableau.ERROR3, tableau.ERROR5))
 
 SAFETY, SHRINK, GROW, RETRY = 0.8, 0.2, 100.0, 0.25
 ORDER = 8
