@@ -9,7 +9,7 @@ import functools
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 import numpy as np
 
@@ -24,8 +24,12 @@ from mbref.scene_fields import meant
 from mbref.stabilisation import STABILISATIONS
 from mbref.stabilisation.base import Stabilisation
 
+if TYPE_CHECKING:
+    from mbref.scene import Scene
+
 MOST_NAMES = 256  # whose methods are remembered
-DEFAULT = "alf-dual+projection/dop853"
+SERIES, SPARSE = "taylor", "alf-dual+projection/dop853"  # the default methods of few and of many bodies
+MOST_BODIES = 40  # of which ``taylor`` with its dense matrix is the cheaper one (``benchmarks/scaling.py``)
 SHORT = {
     "kinematic": "alf-dual+projection/predictor",  # Newton–Raphson on Eqs. 1 to 3: integrators/predictor.py
     "ali3-p": "mpi-qr+none/ali3",  # see integrators/ali3.py
@@ -34,6 +38,13 @@ SHORT = {
 
 
 Part = TypeVar("Part", Formulation, Stabilisation, Integrator)
+
+
+def default_method(scene: Scene) -> str:
+    """Return the name of the method of a scene for which none is asked: ``taylor``, which crosses singular
+    positions; for more than MOST_BODIES bodies the sparse ``alf-dual+projection/dop853``, which does not.
+    """
+    return SERIES if len(scene.body) <= MOST_BODIES else SPARSE
 
 
 class MethodError(Exception):
@@ -69,6 +80,18 @@ class Method:
     def parts(self) -> tuple[Formulation, Stabilisation, Integrator]:
         """Formulation, stabilisation, integrator."""
         return self.formulation, self.stabilisation, self.integrator
+
+    @property
+    def crosses(self) -> Literal["no", "by regularisation", "by series"]:
+        """Whether a run integrates across a singular position, and how."""
+        if self.integrator.crosses != "no":
+            return self.integrator.crosses
+        return "no" if self.stabilisation.watches_rank else self.formulation.crosses
+
+    @property
+    def is_series(self) -> bool:
+        """Whether the method integrates by Taylor series instead of an explicit integrator."""
+        return self.integrator.step is None
 
     def options_of(self, part: Formulation | Stabilisation | Integrator) -> dict[str, float]:
         """A part's options, its defaults overridden by the name's."""

@@ -30,6 +30,11 @@ class Outcome(enum.Enum):
     VIOLATION = ("VIOLATION", "c", "the constraint violation exceeds the allowed tolerance")
     STEP_FAILED = ("STEP_FAILED", "d", "the integrator could not take a step")
     NOT_FINITE = ("NOT_FINITE", "", "the state is not finite")
+    SINGULAR_POSITION = (
+        "SINGULAR_POSITION",
+        "",
+        "the motion comes to a singular position, which the method does not cross",
+    )
     UNDECIDED = ("UNDECIDED", "", "the branch of the motion cannot be told at a singular position")
     LEFT_MOTION = ("LEFT_MOTION", "", "the run went on along another motion than the one of its start")
     TIMED_OUT = ("TIMED_OUT", "", "the time limit was reached")

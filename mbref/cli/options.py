@@ -10,7 +10,7 @@ import numpy as np
 
 from mbref.formulations import FORMULATIONS
 from mbref.integrators import INTEGRATORS
-from mbref.method import DEFAULT, SHORT
+from mbref.method import SERIES, SHORT, SPARSE
 from mbref.scene import Scene
 from mbref.stabilisation import STABILISATIONS
 
@@ -28,10 +28,10 @@ def add_scene(parser: argparse.ArgumentParser) -> None:
 def add_method_options(parser: argparse.ArgumentParser, json: bool = True) -> None:
     """Method, times and limits of a run; --json where the command prints its result."""
     parser.add_argument(
-        "--method", default=DEFAULT,
+        "--method",
         help=f"formulation+stabilisation/integrator, or in short {', '.join(SHORT)};\n"
         f"formulations: {', '.join(FORMULATIONS)};\nstabilisations: {', '.join(STABILISATIONS)};\n"
-        f"integrators: {', '.join(INTEGRATORS)} (default: {DEFAULT})",
+        f"integrators: {', '.join(INTEGRATORS)} (default: {SERIES},\nfor many bodies {SPARSE})",
     )  # fmt: skip
     add_time_options(parser)
     parser.add_argument("--rtol", type=float, default=1e-9, help="relative tolerance per step (default 1e-9)")

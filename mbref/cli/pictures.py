@@ -13,6 +13,7 @@ from mbref.cli.output import progress_bar, warn
 from mbref.drawing.picture import moving, side_by_side, still
 from mbref.drawing.png import png
 from mbref.drawing.view import View
+from mbref.method import default_method
 from mbref.scenes import find_scene
 
 VIEW = """\
@@ -79,15 +80,16 @@ def _animate(options: argparse.Namespace) -> int:
         limits_of(options),
     )
     warn(scene)
+    method = options.method or default_method(scene)
     with (
-        simulator(options.method) as simulate,
+        simulator(method) as simulate,
         progress_bar("simulating", float(times[-1])) as progress,
     ):
-        motion = simulate(scene, options.method, times, limits, progress)
+        motion = simulate(scene, method, times, limits, progress)
         motions, picture = {"": motion}, partial(moving, scene, motion, view)
         if parted:
             number = chosen(motion, options.crossing)
-            motions = along_branches(simulate, motion, options.method, limits, number)
+            motions = along_branches(simulate, motion, method, limits, number)
             picture = partial(side_by_side, scene, motions, f"{scene.name}: {told(motion, number)}", view)
     path.write_text(picture(), encoding="utf-8")
     print(path)

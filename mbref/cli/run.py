@@ -8,6 +8,7 @@ from typing import Any
 
 from mbref.cli.options import TEXT, add_method_options, add_scene, limits_of, sample_times
 from mbref.cli.output import body_table, console, progress_bar, rounded, warn
+from mbref.method import default_method
 from mbref.records import strict_json
 from mbref.scene import Scene
 from mbref.scenes import find_scene
@@ -52,9 +53,10 @@ def _run(options: argparse.Namespace) -> int:
     from mbref.cli.first_run import simulator
 
     warn(scene)
-    with simulator(options.method) as simulate:
+    method = options.method or default_method(scene)
+    with simulator(method) as simulate:
         with progress_bar("simulating", float(times[-1])) as progress:
-            motion = simulate(scene, options.method, times, limits, progress)
+            motion = simulate(scene, method, times, limits, progress)
         if options.out:
             write(motion, options.out)
         if options.json:
@@ -95,10 +97,8 @@ def show(scene: Scene, trajectory: Trajectory) -> None:
         f"{cost.seconds:.3g} s of stepping, {cost.build_seconds:.2g} s of building"
     )
     for number, crossing in enumerate((trajectory.crossings or ())[:SHOWN], 1):
-        out.print(
-            f"singular position {number} at t = {crossing.time:.6g} s: {crossing.sentence}, "
-            f"number {crossing.taken} taken"
-        )
+        taken = f"number {crossing.taken} taken" if crossing.taken else "none taken"
+        out.print(f"singular position {number} at t = {crossing.time:.6g} s: {crossing.sentence}, {taken}")
     if not trajectory.times.size:
         return
 

@@ -136,6 +136,7 @@ ALF = Formulation(
     accelerate=accelerate,
     linear_algebra=Dense(Scratch),
     needs_all_rows=True,
+    crosses="by regularisation",
     handles_redundancy=True,
     handles_singular_mass=True,
     numbers=Options,

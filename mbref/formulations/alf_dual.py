@@ -183,6 +183,7 @@ ALF_DUAL = Formulation(
     equations="Eqs. 17-19 in the multipliers",
     accelerate=accelerate,
     linear_algebra=Sparse(),
+    crosses="by regularisation",
     handles_redundancy=True,
     handles_singular_mass=False,
     numbers=Options,

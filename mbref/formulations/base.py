@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -90,6 +90,9 @@ class Formulation:
     linear_algebra: LinearAlgebra
     handles_redundancy: bool
     handles_singular_mass: bool
+    crosses: Literal["no", "by regularisation"] = (
+        "no"  # a singular position, where no stabilisation ends the run
+    )
     needs_independent_columns: bool = False  # works only where no freedom is left
     needs_all_rows: bool = False  # rows that depend on others, too: it chooses or weighs rows itself
     numbers: type = NoOptions  # the method's own numbers, a record with their defaults

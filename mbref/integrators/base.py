@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
+from typing import Literal
 
 from mbref.kernels.compilation import Exchangeable
 
@@ -35,6 +36,7 @@ class Integrator:
     schema: type
     adaptive: bool
     options: Mapping[str, float] = field(default_factory=dict)
+    crosses: Literal["no", "by series"] = "no"  # a singular position
     holds_constraints: bool = False  # its own steps end on the constraints: it goes without stabilisation
     integrates: bool = True  # otherwise only where drivers leave no freedom
     largest_turn: float = inf  # rad that a body may turn in a step, where the stabilisation allows more

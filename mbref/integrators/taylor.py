@@ -1,7 +1,8 @@
 """Taylor: series of the motion in natural coordinates, of orders 4 to 30, in steps of their own.
 
-Steps, samples and the projection of every step are those of ``mbref.taylor``; the formulation finds the
-multipliers at the samples.  Order 0 stands for the order that costs least at the tolerance.
+Steps and samples are those of ``mbref.taylor``: accelerations and multipliers follow from the series too, so
+that the formulation has no part in them.  A series continues over singular positions.  Order 0 stands for the
+order that costs least at the tolerance.
 """
 
 from __future__ import annotations
@@ -15,4 +16,6 @@ class NoScratch(NamedTuple):
     """The series have memory of their own."""
 
 
-TAYLOR = Integrator("taylor", 30, None, None, NoScratch, adaptive=True, options={"order": 0.0})
+TAYLOR = Integrator(
+    "taylor", 30, None, None, NoScratch, adaptive=True, options={"order": 0.0}, crosses="by series"
+)

@@ -25,7 +25,10 @@ KEPT = 48  # states in a history
 
 # status of an evaluation or of a step
 OK, SINGULAR, NOT_CONVERGED, NOT_FINITE = range(4)
-CHANGED = 4  # the chart chose new coordinates
+CHANGED, SINGULAR_AHEAD = (
+    4,
+    5,
+)  # the chart chose new coordinates; the rank drops inside the step or at its end
 
 
 class Frames(NamedTuple):
@@ -186,6 +189,7 @@ class Watch(NamedTuple):
 
     smallest_pivot: float = 0.0
     past_pivot: float = 0.0  # smallest_pivot of the last accepted state
+    nearest: float = 1.0  # the least that smallest_pivot has been, over the reference at that time
     reference_pivot: float = 0.0  # the largest that smallest_pivot has been; 0 where nothing is watched
     generic_rank: int = 0
     regular: int = 0  # whether the motion begins on no singular position, where the rank is less
@@ -205,7 +209,7 @@ class Clock(NamedTuple):
     y_size: int = 0  # length of y
     sample: int = 0  # the next one to take
     restart: int = 0  # the step since which the states are one smooth piece
-    passage: float = 0.0  # s, the end of the step that may pass a singular position
+    passage: float = 0.0  # s, the end of the step that meets a singular position
     violated_row: int = -1
 
 
@@ -223,7 +227,6 @@ class History(NamedTuple):
 
     time: Annotated[Vector, KEPT]
     pivots: Annotated[Matrix, KEPT, "pivots"]  # of every row of Φ_q, see Watch
-    inside: Annotated[Matrix, 8, "pivots"]  # the same at places inside a long step
     y: Annotated[Matrix, KEPT, "14*nb"]
     y_rate: Annotated[Matrix, KEPT, "14*nb"]
     nodes: Annotated[Indices, KEPT]  # rows chosen for an extrapolation

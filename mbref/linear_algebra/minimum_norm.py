@@ -19,6 +19,7 @@ from mbref.kernels.compilation import FLOAT, INT, VECTOR, entry, inlined, kernel
 from mbref.kernels.layout import NOT_CONVERGED, OK, SparseFactor
 from mbref.kernels.named_memory import Named, packed
 from mbref.linear_algebra.sparse_cholesky import (
+    add_transpose,
     regularised_factor,
     solve,
     substitute_back,
@@ -162,6 +163,39 @@ def add_scaled(factor, target):
         change += step * step
         size += value * value
     return sqrt(change / max(1.0, size))
+
+
+@inlined
+def find_least_multipliers(factor, force, multipliers):
+    """The multipliers λ of the rows that take part for which Φ_qᵀ λ is nearest to forces (n,).
+
+    Of redundant rows they are the least in the norm of unit rows.
+
+    (S + I/α) Δ = D x, x -= Dᵀ Δ, λ += Δ, from the scaled forces x.
+    """
+    row, column, x, step, total = (
+        factor.symbolic.row, factor.symbolic.column, factor.change, factor.step, factor.total,
+    )  # fmt: skip
+    for j in range(column.shape[0]):
+        x[j] = factor.root[j] * force[column[j]]
+    total[:] = 0.0
+    before = NEVER
+    for _ in range(ITERATIONS):
+        factor.residual[:] = 0.0
+        subtract_product(factor, x, factor.residual)
+        copy(factor.residual, step)
+        solve(factor, step)
+        add_transpose(factor, step, x)
+        change, size = 0.0, 0.0
+        for i in range(row.shape[0]):
+            total[i] -= step[i]
+            change += step[i] * step[i]
+            size += total[i] * total[i]
+        if not ROUNDING * ROUNDING * size < change < before:
+            break
+        before = change
+    for i in range(row.shape[0]):
+        multipliers[row[i]] = total[i]
 
 
 @entry(INT(VECTOR, VECTOR, FACTOR))

@@ -6,6 +6,7 @@ Processes are given several runs at a time: runs of scenes of one shape are set 
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import os
 import time
@@ -19,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mbref import __version__, records
-from mbref.method import DEFAULT, Method
+from mbref.method import Method, default_method
 from mbref.scene import Scene
 from mbref.simulation.processes import processes
 from mbref.simulation.simulate import Limits, checked_times, prepare
@@ -35,13 +36,14 @@ MOST_AT_ONCE, SECONDS = 128, 0.05  # runs that a process is given at a time, and
 def ensemble(
     scenes: Iterable[Scene],
     times: Sequence[float] | np.ndarray,
-    method: str = DEFAULT,
+    method: str | None = None,
     limits: Limits | None = None,
     executor: Executor | None = None,
     path: str | Path | None = None,
 ) -> Iterator[tuple[int, Trajectory]]:
     """(place in ``scenes``, trajectory) of every scene as its run ends; times (k,) in s as for ``simulate``.
 
+    Without ``method`` all runs are by the default method of the first scene (``method.default_method``).
     ``scenes`` may be a generator: a few are drawn ahead of those that have ended.  ``executor`` is any of
     concurrent.futures; by default one process a core, for which a script needs the usual
     ``if __name__ == "__main__"``.  With ``path`` each result is appended to that file (JSON lines) before it
@@ -51,6 +53,12 @@ def ensemble(
     file that holds something else than records or cannot be written.
     """
     limits, times = limits or Limits(), checked_times(times)
+    if method is None:
+        scenes = iter(scenes)
+        first = next(scenes, None)
+        if first is None:
+            return
+        method, scenes = default_method(first), itertools.chain([first], scenes)
     if executor is None:
         with processes() as pool:
             yield from ensemble(scenes, times, method, limits, pool, path)

@@ -1,9 +1,9 @@
 """Followers: scenes that differ from that of a run in numbers alone, run one after another in its memory.
 
 All of them are set up at once, in arrays whose first axis counts them.  A follower must give the answers on
-which the run's choice of rows and columns rests, begin on no singular position, pass those ahead briefly and
-end without anything unusual, as the run itself; every other scene is left to a run of its own.  The results
-are those of runs of their own, to the bit.
+which the run's choice of rows and columns rests, begin on no singular position, and complete in one call of
+the run's stepper, as the run itself; every other scene is left to a run of its own.  The results are those of
+runs of their own, to the bit.
 """
 
 from __future__ import annotations
@@ -17,31 +17,26 @@ import numpy as np
 from mbref.equations.initial_state import LARGE
 from mbref.equations.joint_reactions import Balance
 from mbref.equations.model import motion_of
-from mbref.kernels.compilation import Entry
 from mbref.kernels.copying import Bytes, copy_rows, rows_from, table_of
 from mbref.kernels.layout import Counts
 from mbref.motion import Motion
 from mbref.scene import Scene
-from mbref.simulation.control import STEPS_PER_CALL
+from mbref.simulation.comparison import may_leave
+from mbref.simulation.crossings import Crossings
 from mbref.simulation.evaluations import Rows
 from mbref.simulation.group import Group, group_of
 from mbref.simulation.outcome import OUTCOMES, cost_of, facts_of, reactions_of, report_of
-from mbref.simulation.passages import Passages
 from mbref.simulation.run import NEARLY, Run
 from mbref.simulation.singular_start import begins_at_rest, begins_in_motion
-from mbref.simulation.stepping import DONE, SINGULAR_AHEAD, advance_to_end
-from mbref.taylor.passing import advance_over
-from mbref.taylor.run import CrossingRun
+from mbref.simulation.stepping import DONE
 from mbref.trajectory import Crossing
 
 
-def may_lead(run: CrossingRun) -> bool:
+def may_lead(run: Run) -> bool:
     """Whether a run that has ended was so ordinary that others may follow it."""
-    counts = run.memory.equations.system.counts
     ordinary = run.reduction is not None and run.model.m <= LARGE
-    short = counts.steps <= STEPS_PER_CALL and run.passes_briefly
     completed = run.memory.loop.clock.sample == run.times.size and not run.limits.branches
-    return bool(ordinary and short and completed and run.ranks.least >= NEARLY)
+    return bool(ordinary and completed and run.stepper.was_short and run.ranks.least >= NEARLY)
 
 
 class Followed(NamedTuple):
@@ -102,8 +97,9 @@ class Runs:
         self._run, self._group = run, group
         self._rank = self._begin()
         count, memory = len(group.q), run.memory
-        self._passages = Passages(run, group)
-        self._begins = Rows(group.numbers(run, memory), Bytes(memory))
+        self._crossings: dict[int, Sequence[Crossing]] = {}
+        numbers = [*group.numbers(run, memory), *run.stepper.numbers(group.packs.length)]
+        self._begins = Rows(numbers, Bytes(run.stepper.memory))
         self._samples = [np.empty((count, *each.shape)) for each in memory.loop.samples]
         self._counts = np.empty((count, len(Counts._fields)), dtype=np.int64)
         sources: list[Any] = [*memory.loop.samples, memory.equations.system.counts]
@@ -114,7 +110,7 @@ class Runs:
         """Have memory as the run begins; the independent rows there, -1 where it begins extraordinarily."""
         run = self._run
         run.begin_again()
-        run.enter_state()
+        run.stepper.enter()
         extraordinary = begins_at_rest(run) or begins_in_motion(run)
         rank = int(run.memory.watch.generic_rank)
         run.begin_again()
@@ -125,31 +121,22 @@ class Runs:
         return [*self._samples, self._counts]
 
     def run(self) -> list[int]:
-        """Run the scenes that fit; the places of those that completed, over brief passages alone."""
-        memory, argument, completed = self._run.memory, self._run.packed.argument, []
-        clock: Any = memory.loop.clock
-        enter = self._run.method.stabilisation.enter.callable
+        """Run the scenes that fit; the places of those that completed in one call."""
+        run, stepper, completed = self._run, self._run.stepper, []
         for k in self._group.fit:
             self._begins.copy(k)
-            clock.y_size = enter(clock.time, memory.loop.y, argument)
-            if memory.watch.generic_rank != self._rank:
+            run.crossings = []
+            if not stepper.takes(lambda place=k: self._group.model(place), self._group.starts[k]):
                 continue
-            status = self._timed(k, advance_to_end, argument)
-            if status == SINGULAR_AHEAD and (series := self._passages.series_of(k)):
-                status = self._timed(k, advance_over, status, argument, series.argument)
-                self._passages.record(k)
-            if status == DONE:
+            if run.memory.watch.generic_rank != self._rank:
+                continue
+            status, self._seconds[k] = stepper.advance_once()
+            if status == DONE and not may_leave(run):
                 copy_rows(self._ends, k)
                 completed.append(k)
-        self._passages.give_back()
+                if run.crossings:
+                    self._crossings[k] = Crossings(self._group.model(k), run.crossings)
         return completed
-
-    def _timed(self, place: int, kernel: Entry, *arguments: Any) -> object:
-        """The status of steps of the scene at a place, whose seconds are counted."""
-        began = time.process_time()
-        status = kernel(*arguments)
-        self._seconds[place] += time.process_time() - began
-        return status
 
     def followed(self, places: list[int], seconds: float) -> Followed:
         """The runs at these places, which all took so many seconds of CPU time."""
@@ -158,7 +145,7 @@ class Runs:
         q, v, a, multipliers = (each[places] for each in self._samples)
         q, v, a = q.reshape(*shape, 7), v.reshape(*shape, 6), a.reshape(*shape, 6)
         principal = packs.principal[places][:, None] if packs.turns_frames else None
-        stepping, crossings = self._seconds[places], [self._passages.crossings(k) for k in places]
+        stepping, crossings = self._seconds[places], [self._crossings.get(k, ()) for k in places]
         starts = ((self._group.starts[k], self._group.ranks[k]) for k in places)
         messages = [report_of(*start, len(c)) for start, c in zip(starts, crossings, strict=True)]
         return Followed(

@@ -6,15 +6,17 @@ from collections.abc import Sequence
 from typing import Any
 
 from mbref import __version__
+from mbref.equations.branches import Passed
 from mbref.equations.initial_state import Start
 from mbref.equations.joint_reactions import Balance
-from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR
+from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR, SINGULAR_AHEAD
 from mbref.motion import Motion
 from mbref.simulation.crossings import Crossings
 from mbref.simulation.dead_position import is_at_dead_position
 from mbref.simulation.ranks import Ranks
 from mbref.simulation.remedies import remedy
 from mbref.simulation.run import NEARLY, Run
+from mbref.simulation.singular_position import Met, is_near, met_by
 from mbref.simulation.singular_start import begins_at_rest, fits_no_branch
 from mbref.simulation.stepping import (
     CREEPING,
@@ -35,6 +37,7 @@ OUTCOMES = {
     VIOLATED: Outcome.VIOLATION,
     STEP_TOO_SMALL: Outcome.STEP_FAILED,
     TOO_MANY_STEPS: Outcome.STEP_FAILED,
+    SINGULAR_AHEAD: Outcome.SINGULAR_POSITION,
     UNDECIDED: Outcome.UNDECIDED,
     LEFT_MOTION: Outcome.LEFT_MOTION,
     CREEPING: Outcome.STEP_FAILED,
@@ -65,10 +68,21 @@ BESIDE = (
 )
 REDUNDANT = "rows that depend on others at the start but for {:.1e} count as redundant"
 ROUNDING = 1e-13  # a singular value that needs no mention
+NONE_TAKEN = 0  # the branch taken at a singular position at which the run ended
+
+
+SINGULAR_POSITION = (
+    "the motion comes to a singular position at t = {:.6g} s{}, which {} does not cross; taylor does"
+)
+LOSE_RANK = ", where the constraint rows of {} lose rank"
+FAILED = (STEP_TOO_SMALL, NOT_CONVERGED, SINGULAR, CREEPING)  # near a singular position, because of it
 
 
 def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion:
     """The samples reached, in the scene's frames and units."""
+    met = _singular_position(run, status)
+    if met is not None:
+        status, run.memory.loop.clock.time = SINGULAR_AHEAD, met.time
     model, loop, counts = run.model, run.memory.loop, run.memory.equations.system.counts
     reached, nb = int(loop.clock.sample), run.model.nb
     q, v, a, multipliers = (sample[:reached].copy() for sample in loop.samples)
@@ -82,8 +96,8 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion
         **reactions_of(Balance(run.scene, times, q, multipliers, model)),
         outcome=OUTCOMES[status],
         t_end=float(loop.clock.time),
-        message=_message(run, status),
-        crossings=_crossings(run),
+        message=_message(run, status) if met is None else _met(run, met),
+        crossings=_crossings(run, met),
         cost=cost_of(seconds, built, tuple(counts)),
     )
 
@@ -113,8 +127,25 @@ def cost_of(seconds: float, built: float, counts: Sequence[int]) -> Cost:
     return Cost(seconds, built, *map(int, counts[:5]))
 
 
-def _crossings(run: Run) -> Sequence[Crossing] | None:
-    """The singular positions passed; None for a method that does not look for them."""
+def _singular_position(run: Run, status: int) -> Met | None:
+    """The singular position at which a run ended that does not cross it; None where it ended elsewhere."""
+    meets = status == SINGULAR_AHEAD
+    if run.method.is_series or not (meets or (status in FAILED and is_near(run))) or is_at_dead_position(run):
+        return None
+    return met_by(run, inside=meets)
+
+
+def _met(run: Run, met: Met) -> str:
+    """One sentence on the singular position at which a run ended."""
+    where = LOSE_RANK.format(", ".join(map(repr, met.joints))) if met.joints else ""
+    return SINGULAR_POSITION.format(met.time, where, run.method.stabilisation.name)
+
+
+def _crossings(run: Run, met: Met | None) -> Sequence[Crossing] | None:
+    """The singular positions passed, or the one at which the run ended; None for a method that does not look
+    for them."""
+    if met is not None:
+        return Crossings(run.model, [Passed(met.time, met.coordinates, met.velocities, NONE_TAKEN)])
     if not run.method.stabilisation.projects:
         return None
     return Crossings(run.model, run.crossings) if run.crossings else ()
@@ -171,5 +202,6 @@ def _cause(run: Run, status: int) -> str:
         h = memory.control.smallest_step
         return f"the error estimate asks for a step below {h:.3g} s at t = {t:.6g} s"
     if status == LEFT_MOTION:
-        return f"{OUTCOMES[status].sentence}, as one that projection holds shows, by t = {t:.6g} s"
-    return f"{OUTCOMES[status].sentence} at t = {t:.6g} s ({run.method.formulation.name})"
+        return f"{OUTCOMES[status].sentence}, as a run by another method shows, by t = {t:.6g} s"
+    part = run.method.integrator if run.method.is_series else run.method.formulation
+    return f"{OUTCOMES[status].sentence} at t = {t:.6g} s ({part.name})"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from mbref.equations.diagnosis import counts
 from mbref.formulations import FORMULATIONS
 from mbref.kernels.layout import NOT_CONVERGED, SINGULAR
-from mbref.method import DEFAULT, SHORT
 from mbref.simulation.run import Run
 from mbref.simulation.stepping import (
     CREEPING,
@@ -16,13 +15,12 @@ from mbref.simulation.stepping import (
     VIOLATED,
 )
 
-FOLLOWS = "alf-dual+projection and taylor follow a motion through singular positions"
+FOLLOWS = "taylor crosses singular positions"
 BY_STATUS = {
     VIOLATED: "+projection corrects violations after every step",
     UNDECIDED: "a smaller rtol may tell the branch; --branch asks for one",
     LEFT_MOTION: FOLLOWS,
 }
-FOLLOWING = (DEFAULT, SHORT["taylor"])
 
 
 def remedy(run: Run, status: int) -> str:
@@ -74,6 +72,6 @@ def _of_iteration(run: Run) -> str:
 
 
 def _of_steps(run: Run) -> str:
-    if str(run.method) in FOLLOWING or not run.model.closed_loops:
+    if run.method.is_series or not run.model.closed_loops:
         return "mbref diagnose tells how near the motion comes to a singular position"
     return FOLLOWS

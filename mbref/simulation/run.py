@@ -1,11 +1,10 @@
-"""Run: one simulation in the compiled loop."""
+"""Run: one simulation, its memory and its stepper."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from mbref.equations.model import Model
 from mbref.equations.reduction import Reduction, reduction_of
 from mbref.equations.static_constraints import at_rest
 from mbref.kernels.layout import (
-    NOT_CONVERGED,
     Active,
     Kernels,
     Loop,
@@ -37,36 +35,77 @@ from mbref.simulation.control import control_of
 from mbref.simulation.limits import Limits
 from mbref.simulation.preparation import prepare
 from mbref.simulation.ranks import NO_RANKS, Ranks, ranks_at
-from mbref.simulation.stepping import CREEPING, PAUSED, SINGULAR_AHEAD, UNDECIDED, advance_to_end
 from mbref.stabilisation.all_coordinates import rates as rates_of_all_rows
 from mbref.stabilisation.base import Stabilisation
 
-OUT_OF_REACH, PACE_STEPS = 100.0, 20_000  # limits of steps that the end is away, at the pace of so many
 NEARLY = 1e-5  # least singular value below which rows are nearly dependent
 MOST_COMPARED = 60  # rows whose gradients at both ends of a step are compared
 
 
-class Run:
-    """One simulation: its memory, advanced to the end; then samples, counts and clock can be read."""
+class Stepper(Protocol):
+    """The loop of steps of a run: that of an explicit integrator, or that of a Taylor series."""
 
-    def __init__(self, scene: Scene, method: Method, times: np.ndarray, limits: Limits):
+    def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
+        """Run to the end; the final status and the process CPU time of the stepping alone (s).
+
+        ``progress`` is given the time reached (s).
+        """
+
+    def give_back(self) -> None:
+        """Leave memory of its own to the next run."""
+
+    @property
+    def was_short(self) -> bool:
+        """Whether the run was completed by one call of kernels."""
+
+    @property
+    def memory(self) -> Any:
+        """All memory that a run changes."""
+
+    def enter(self) -> None:
+        """Start from the time of the clock and the state in memory."""
+
+    def begin_again(self) -> None:
+        """Have memory of its own be as when the run began."""
+
+    def numbers(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
+        """Where its memory has numbers in which scenes differ, and those of scenes of ``lengths`` (s,)."""
+
+    def takes(self, model: Callable[[], Model], start: Start) -> bool:
+        """Whether memory has room for a scene whose numbers it holds: then it is ready to be advanced."""
+
+    def advance_once(self) -> tuple[int, float]:
+        """Advance by one call of kernels: the status, and the process CPU time of the stepping alone (s)."""
+
+
+class Run:
+    """One simulation: its memory, which its stepper advances; then samples, counts and clock can be read."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        method: Method,
+        times: np.ndarray,
+        limits: Limits,
+        stepper: Callable[[Run], Stepper],
+    ):
         self.scene, self.method, self.times, self.limits = scene, method, times, limits
         self._blocks: np.ndarray | None = None  # (m, 12) of Φ_q at the start, where it was asked for
         self.model, self.start, self.reduction = self._posed()
         self._control = control_of(self.model, method, times, limits)
         prepare(method)  # so that the run alone is timed
-        self._lent = self._lend_memory()
-        self.memory, self.packed = self._lent.values, self._lent.packed
+        self.lent = self._lend_memory()
+        self.memory, self.packed = self.lent.values, self.lent.packed
         self.put_start()
-        self.enter_state()
         self.crossings: list[Passed] = []
         self.making = 0.0  # s of CPU time, within ``advance``, that is construction
         self.built = 0.0  # s of CPU time before the first step
-        self._judged = 0.0, 0  # time (s) and steps when the pace was last judged
+        self.stepper = stepper(self)
 
     def give_back(self) -> None:
         """Leave the memory to the next run; this one cannot be read any more."""
-        take_back(self._lent)
+        self.stepper.give_back()
+        take_back(self.lent)
         self.model.give_back()
 
     def _posed(self) -> tuple[Model, Start, Reduction | None]:
@@ -98,9 +137,10 @@ class Run:
 
     def begin_again(self) -> None:
         """Have the memory that this run was given, with its numbers and its start."""
-        self._lent.restore()
+        self.lent.restore()
         self._put_numbers(self.memory, self.reduced(self.model.data))
         self.put_start()
+        self.stepper.begin_again()
 
     def reduced(self, data: SceneData, axis: int = 0, all_move: bool = False) -> SceneData:
         """The data of a scene with the primitives that the run needs, which ``axis`` counts; where asked all
@@ -175,8 +215,11 @@ class Run:
         return self.reduction.factor(), self.reduction.active
 
     def _kernels_on(self, chart: Stabilisation) -> Kernels:
-        """The kernels of the method on this chart; it leaves rows out that some formulations need."""
+        """The kernels of the method on this chart, which leaves rows out that some formulations need; none of
+        a series."""
         integrator, formulation = self.method.integrator, self.method.formulation
+        if self.method.is_series:
+            return Kernels(*[None] * len(Kernels._fields))
         kernels = Kernels(
             step=integrator.step,
             propose=integrator.propose,
@@ -207,51 +250,6 @@ class Run:
         """Of the constraint rows."""
         factor, tolerance = self.memory.factor, self.limits.rank_tolerance
         return ranks_at(self.model, self.start.q, factor, tolerance, self._blocks)
-
-    def enter_state(self) -> None:
-        """Start from the time of the clock and the state in memory."""
-        clock, enter = self.memory.loop.clock, self.method.stabilisation.enter.callable
-        clock.y_size = enter(clock.time, self.memory.loop.y, self.packed.argument)
-        clock.restart = self.memory.equations.system.counts.steps
-
-    def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
-        """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
-        before, began, status = self.making, time.process_time(), PAUSED
-        while status == PAUSED:
-            status = self.take_steps()
-            if status == SINGULAR_AHEAD or self._fails_at_start(status):
-                status = self.pass_singular_position(status)
-            status = self._judge_pace(status)
-            if progress is not None:
-                progress(float(self.memory.loop.clock.time))
-        return status, time.process_time() - began - (self.making - before)
-
-    def take_steps(self) -> int:
-        """As many steps as are taken at a time: PAUSED after them, DONE at the end, or why there are none."""
-        return int(advance_to_end(self.packed.argument))
-
-    def _judge_pace(self, status: int) -> int:
-        """CREEPING instead of PAUSED where at the pace of the last steps the end is out of all reach."""
-        if status != PAUSED:
-            return status
-        now, steps = float(self.memory.loop.clock.time), int(self.memory.equations.system.counts.steps)
-        before, taken = self._judged[0], steps - self._judged[1]
-        if taken < PACE_STEPS:
-            return status
-        self._judged = now, steps
-        creeps = taken * (self.times[-1] - now) > OUT_OF_REACH * self.limits.most_steps * (now - before)
-        return CREEPING if creeps else status
-
-    def _fails_at_start(self, status: int) -> bool:
-        """Whether the formulation's iteration does not converge at the first state."""
-        return status == NOT_CONVERGED and self.memory.equations.system.counts.steps == 0
-
-    def pass_singular_position(self, status: int) -> int:
-        """Go on behind the singular position that may be ahead: PAUSED, DONE or why that cannot be.
-
-        ``status`` says why the steps ended.
-        """
-        return UNDECIDED if status == SINGULAR_AHEAD else status
 
 
 def missing_masses(scene: Scene) -> list[str]:

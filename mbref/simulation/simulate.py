@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -10,18 +9,18 @@ import numpy as np
 
 from mbref.kernels.beside import compiled_beside
 from mbref.kernels.machine_code import NoGeneratedCode
-from mbref.method import DEFAULT, Method, MethodError
+from mbref.method import Method, MethodError, default_method
 from mbref.motion import Motion
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 from mbref.simulation import preparation
+from mbref.simulation.comparison import compare_with_default
 from mbref.simulation.limits import GENERATED, Limits
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.run import Run
+from mbref.simulation.start_run import start_run
 from mbref.simulation.stepping import DONE
-from mbref.taylor.check import compare_with_default
-from mbref.taylor.run import CrossingRun, TaylorRun
-from mbref.taylor.series_run import KERNELS_OF_SERIES, prepare_series
+from mbref.taylor.stepper import KERNELS_OF_SERIES, prepare_series
 
 __all__ = ["Limits", "are_compiled", "checked_times", "prepare", "simulate", "why_no_code"]
 
@@ -30,52 +29,67 @@ SAMPLES = 101  # where no times are asked for
 
 def simulate(
     scene: Scene | str | Path,
-    method: Method | str = DEFAULT,
+    method: Method | str | None = None,
     times: Sequence[float] | np.ndarray | None = None,
     limits: Limits | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Motion:
-    """Simulate from t = 0 and sample at ``times`` (k,), increasing, s; ``progress`` is told the time reached.
+    """Simulate a scene from t = 0.
 
-    ``scene`` is a Scene, the name of a built-in one or a .toml file; without ``times``, 101 equally spaced
-    ones from 0 to the scene's duration.  The method "kinematic" integrates nothing
-    (``integrators.predictor``).
-    Returns the states reached, with accelerations and reactions; a failure of the method is the
-    motion's outcome.  Raises SceneError for a scene that cannot be simulated, ValueError for times
-    that do not increase or an order the integrator does not have, MethodError for an unknown method name
-    and where ``limits`` ask for generated code that the method or the scene cannot have, or for a branch of a
-    method that does not look for singular positions.
+    Parameters
+    ----------
+    scene
+        A Scene, the name of a built-in one, or a .toml file.
+    method
+        A Method or its name; by default that of ``method.default_method``: ``taylor``, or for many bodies
+        ``alf-dual+projection/dop853``.  ``kinematic`` integrates nothing (``integrators.predictor``).
+    times
+        Sample times (k,), s, increasing; by default 101 from 0 to the scene's duration.
+    limits
+        Tolerances, steps and branches of the run.
+    progress
+        Called with the time reached (s) between steps.
+
+    Returns
+    -------
+    Motion
+        The states reached, with accelerations and reactions; a failure of the method is its outcome.
+
+    Raises
+    ------
+    SceneError
+        The scene cannot be simulated.
+    ValueError
+        Times do not increase, or the integrator does not have the order.
+    MethodError
+        The method is unknown, has no generated code, or crosses no singular position at which ``limits`` ask
+        for a branch.
     """
     scene = scene if isinstance(scene, Scene) else find_scene(str(scene))
     times = checked_times(np.linspace(0.0, scene.duration, SAMPLES) if times is None else times)
+    method = default_method(scene) if method is None else method
     method = Method.parse(method) if isinstance(method, str) else method
-    limits = limits or Limits()
-    if limits.branches and not method.stabilisation.projects:
-        raise MethodError(
-            f"branches: {method} does not look for singular positions; +projection and taylor do"
-        )
-    run = begun(scene, method, times, limits)
-    motion = completed(run, progress)
+    run = checked_run(scene, method, times, limits or Limits())
+    motion = finish_run(run, progress)
     run.give_back()
     return motion
 
 
-def begun(scene: Scene, method: Method, times: np.ndarray, limits: Limits) -> Run:
-    """The run of a scene, ready to be advanced."""
-    began = time.process_time()
-    if limits.code == GENERATED and not is_series(method):
+def checked_run(scene: Scene, method: Method, times: np.ndarray, limits: Limits) -> Run:
+    """Return the run of a scene; raises MethodError for limits that the method cannot meet."""
+    if limits.branches and method.crosses != "by series":
+        raise MethodError(f"branches: {method} crosses no singular position; taylor does")
+    if limits.code == GENERATED and not method.is_series:
         raise MethodError(f"code: {method} has no generated code; taylor has")
     try:
-        run = kind_of(method)(scene, method, times, limits)
+        return start_run(scene, method, times, limits)
     except NoGeneratedCode as reason:
         raise MethodError(f"code: no generated code for {scene.name!r} by {method}: {reason}") from None
-    run.built = time.process_time() - began - run.making
-    return run
 
 
-def completed(run: Run, progress: Callable[[float], None] | None = None) -> Motion:
-    """The motion of a run, advanced to its end."""
-    status, seconds = run.advance(progress)
+def finish_run(run: Run, progress: Callable[[float], None] | None = None) -> Motion:
+    """Advance a run to its end, and return its motion."""
+    status, seconds = run.stepper.advance(progress)
     status = compare_with_default(run, status)
     if status == DONE:
         _check_branches(run)
@@ -92,32 +106,20 @@ def _check_branches(run: Run) -> None:
         )
 
 
-def is_series(method: Method) -> bool:
-    """Whether the method integrates by Taylor series, the only one with generated code."""
-    return not method.integrator.step
-
-
-def kind_of(method: Method) -> type[Run]:
-    """How a run of the method treats singular positions."""
-    if is_series(method):
-        return TaylorRun
-    return CrossingRun if method.stabilisation.projects else Run
-
-
 def prepare(method: Method) -> None:
     """Compile the kernels of the method, or load them from the cache of this machine.
 
-    Those of the default method and of Taylor series are among them: comparisons and crossings need them.
+    Those of Taylor series are among them: runs of other methods are compared with one.
     """
     with compiled_beside(KERNELS_OF_SERIES, prepare_series.__module__, prepare_series.__name__):
         preparation.prepare(method)
-        preparation.prepare(Method.parse(DEFAULT))
     prepare_series()
 
 
 def are_compiled(method: Method) -> bool:
     """Whether the kernels of a run by the method are in the cache of this machine."""
-    return all(kernel.is_kept for kernel in preparation.kernels_of(method))
+    of_series = KERNELS_OF_SERIES if method.is_series else ()
+    return all(kernel.is_kept for kernel in (*preparation.kernels_of(method), *of_series))
 
 
 def why_no_code(scene: Scene, method: Method) -> str:
@@ -127,7 +129,7 @@ def why_no_code(scene: Scene, method: Method) -> str:
     """
     prepare(method)
     try:
-        TaylorRun(scene, method, np.array([scene.duration]), Limits(code=GENERATED))
+        start_run(scene, method, np.array([scene.duration]), Limits(code=GENERATED))
     except NoGeneratedCode as reason:
         return str(reason)
     return ""

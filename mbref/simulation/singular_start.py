@@ -48,6 +48,15 @@ def fits_no_branch(run: Run) -> bool:
     return fit is not None and not fit.fits
 
 
+def begins_on_singular_position(run: Run) -> bool:
+    """Whether a run that projects begins on a singular position at which several branches meet."""
+    if begins_at_rest(run):
+        return len(tangents(run.model, run.start.q)) > 1
+    if not (begins_in_motion(run) or begins_beside(run)):
+        return False
+    return fit_to_branches(run.model, 0.0, run.start.q, run.start.v) is not None
+
+
 def freedoms_of_first_order(run: Run) -> int:
     """Freedoms that Φ_q leaves at the start of a run that projects; 0 where ranks are not looked at."""
     if not run.method.stabilisation.projects or run.model.m > MOST_ROWS:

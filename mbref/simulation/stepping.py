@@ -5,21 +5,13 @@ from __future__ import annotations
 from mbref.equations.coordinates import copy_state, fastest_turn
 from mbref.equations.loads import remember_angles
 from mbref.kernels.compilation import INT, entry, kernel
-from mbref.kernels.layout import CHANGED, MEMORY, NOT_FINITE, OK
+from mbref.kernels.layout import CHANGED, MEMORY, NOT_FINITE, OK, SINGULAR_AHEAD
 from mbref.linear_algebra.vectors import all_finite, copy
 from mbref.simulation.samples import take_sample
-from mbref.simulation.singular_crossing import (
-    comes_near,
-    has_passed,
-    may_have_passed,
-    remember_state,
-    starts_near,
-    step_back,
-)
+from mbref.simulation.singular_crossing import meets_singular_position, remember_state, remember_watch
 
 # how a call ends; evaluation statuses (SINGULAR, …) end it too
-DONE, VIOLATED, STEP_TOO_SMALL, TOO_MANY_STEPS, PAUSED, SINGULAR_AHEAD, UNDECIDED, LEFT_MOTION = range(10, 18)
-CREEPING = 18
+DONE, VIOLATED, STEP_TOO_SMALL, TOO_MANY_STEPS, PAUSED, UNDECIDED, LEFT_MOTION, CREEPING = range(10, 18)
 
 MANY, PACE = 1000.0, 50  # steps of a run whose errors add up to little, and from which on its pace is known
 LEAST_TOLERANCE, EARLY = 1e-13, 1e-2  # of a step, unless rtol is less; part of rtol of the first ones
@@ -104,26 +96,14 @@ def step_within(interval, h):
 @entry(INT(MEMORY))
 def advance_to_end(memory):
     """Advance until the last sample time, a failure, or the number of steps per call; says which."""
-    return advance_steps(memory)
-
-
-@kernel
-def advance_steps(memory):
-    """The steps of ``advance_to_end``."""
     loop, clock, counts = memory.loop, memory.loop.clock, memory.equations.system.counts
     taken, times = 0, memory.loop.times
     while True:
-        if starts_near(memory):
-            clock.passage = clock.time
-            return SINGULAR_AHEAD
         y, y_rate = loop.y[: clock.y_size], loop.y_rate[: clock.y_size]
         status = evaluate_state(y, y_rate, memory)
         if status != OK:
             return status
         remember_state(counts.steps, y, y_rate, memory)
-        if has_passed(y, memory):
-            step_back(memory)
-            return SINGULAR_AHEAD
         while clock.sample < times.shape[0] and clock.time >= times[clock.sample]:
             take_sample(memory)
         if clock.sample == times.shape[0]:
@@ -165,13 +145,17 @@ def attempt(t, h, y, y_rate, y_new, memory):
 
 @kernel
 def accept_step(now, h, suggested, ratio, memory):
-    """Correct and keep the new state: OK, CHANGED (new coordinates), or the status of the failure."""
+    """Correct and keep the new state: OK, CHANGED (new coordinates), or the status of the failure.
+
+    SINGULAR_AHEAD, nothing kept, where the step comes to a singular position or passes one.
+    """
     loop, counts = memory.loop, memory.equations.system.counts
     clock = loop.clock
     status = memory.kernels.accept(now, loop.y_new, memory)
-    if status == OK and (comes_near(memory) or may_have_passed(h, memory)):
+    if status == OK and meets_singular_position(now - clock.time, memory):
+        status = SINGULAR_AHEAD
+    if status == SINGULAR_AHEAD:
         clock.passage = now
-        return SINGULAR_AHEAD
     if status == OK or status == CHANGED:  # noqa: SIM109 - no containers in kernels
         counts.steps += 1
         copy(loop.y_new, loop.y)
@@ -179,6 +163,8 @@ def accept_step(now, h, suggested, ratio, memory):
         clock.time, clock.length, clock.suggested, clock.ratio = now, h, suggested, ratio
         if status == CHANGED:
             clock.restart = counts.steps
+        else:
+            remember_watch(memory)
     return status
 
 

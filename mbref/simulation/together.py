@@ -12,12 +12,11 @@ from mbref.equations.packing import shape_of
 from mbref.method import Method
 from mbref.motion import Motion
 from mbref.scene import Scene
+from mbref.simulation.comparison import DROPS
 from mbref.simulation.followers import Followed, follow, may_lead
 from mbref.simulation.limits import Limits
 from mbref.simulation.run import Run
-from mbref.simulation.simulate import begun, completed, kind_of, simulate
-from mbref.taylor.check import DROPS
-from mbref.taylor.run import CrossingRun
+from mbref.simulation.simulate import checked_run, finish_run, simulate
 
 FEW = 0.5  # of the scenes of a shape, that follow a run: the others are left to runs of their own
 
@@ -81,9 +80,9 @@ def _by_shape(scenes: Sequence[Scene]) -> Sequence[list[int]]:
 
 
 def _can_lead(method: Method, limits: Limits) -> bool:
-    """Whether runs of a method can be followed: those in steps that projection holds to their motion."""
+    """Whether runs of a method can be followed: those that projection or series hold to their motion."""
     held = limits.rank_tolerance <= DROPS and not limits.branches
-    return kind_of(method) is CrossingRun and method.integrator.integrates and held
+    return method.stabilisation.projects and method.integrator.integrates and held
 
 
 class _Runs:
@@ -104,8 +103,8 @@ class _Runs:
         """Run scenes of one shape at these places."""
         while places:
             try:
-                run = begun(self._scenes[places[0]], *self._arguments)
-                self.ended.alone[places[0]] = completed(run)
+                run = checked_run(self._scenes[places[0]], *self._arguments)
+                self.ended.alone[places[0]] = finish_run(run)
             except Exception as error:
                 self.ended.errors[places[0]] = error
                 places = places[1:]
@@ -115,7 +114,7 @@ class _Runs:
 
     def _led(self, run: Run, places: list[int]) -> list[int]:
         """The places of scenes that are left once others have followed a run."""
-        if not places or not isinstance(run, CrossingRun) or not may_lead(run):
+        if not places or not may_lead(run):
             return places
         try:
             followed = follow(run, [self._scenes[place] for place in places])

@@ -21,8 +21,8 @@ class Stabilisation:
     All take ``layout.Memory``.  ``enter(t, y, memory) -> length of y`` chooses y from ``memory.state``;
     ``rates(t, y, y', memory) -> status`` evaluates y' and leaves the state in ``memory.state``;
     ``accept(t, y, memory) -> status`` corrects y after an accepted step (CHANGED: new coordinates, new
-    length); ``rates_with_outputs`` is ``rates`` where a sample is taken: it leaves accelerations and
-    multipliers as well.
+    length; SINGULAR_AHEAD: the rank has dropped, and the run ends); ``rates_with_outputs`` is ``rates`` where
+    a sample is taken: it leaves accelerations and multipliers as well.
     ``memory`` is the schema of the chart's own memory, in ``Memory.chart``.
     """
 
@@ -36,6 +36,7 @@ class Stabilisation:
     numbers: type = NoOptions  # the method's own numbers, a record with their defaults
     feedback: Callable[[Mapping[str, float]], tuple[float, float]] | None = None  # gains of Φ' and Φ in γ
     projects: bool = False  # every accepted state meets the constraints
+    watches_rank: bool = False  # a run ends at a singular position, where the rank of Φ_q drops
     largest_turn: float = 1.0  # rad that a body may turn in an adaptive step unless the user says
 
     @cached_property

@@ -12,7 +12,8 @@ accepted step Φ_q R z = 0, Z₀ᵀ z = e_k gives the tangents there, each on th
 continues the tangent by its sign.  They replace Z₀, orthonormalised, once one has turned by more than acos(1
 / TURNED) (Kim & Vanderploeg, ASME J. Mech. Trans. Aut. Des. 108, 1986, by QR; Keller's bordered systems,
 1977).  The number of freedoms is that at the start.  Beside a singular position the tangent of a pose that
-violates constraints by ε follows another branch within a distance of about √ε.
+violates constraints by ε follows another branch within a distance of about √ε.  Where the bordered system
+loses its rank, the run is at a singular position, and ends.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from mbref.equations.coordinates import coordinate_rates, normalise
 from mbref.equations.evaluation import assemble_jacobian, assemble_system, evaluate
 from mbref.formulations.moore_penrose import transpose
 from mbref.kernels.compilation import exchangeable, kernel
-from mbref.kernels.layout import ACCEPT, CHANGED, ENTER, OK, RATES, SINGULAR
+from mbref.kernels.layout import ACCEPT, CHANGED, ENTER, OK, RATES, SINGULAR, SINGULAR_AHEAD
 from mbref.kernels.named_memory import Indices, Matrix, Vector, opener
 from mbref.linear_algebra.orthogonal_factorisations import (
     apply_reflectors,
@@ -148,7 +149,7 @@ def solve_velocities(t, y, memory):
 @exchangeable(RATES)
 def rates(t, y, y_rate, memory):
     if not solve_velocities(t, y, memory):
-        return SINGULAR
+        return SINGULAR_AHEAD
     state, equations, nq = memory.state, memory.equations, memory.state.coordinates.shape[0]
     assemble_system(t, state.coordinates, state.velocities, equations)
     status = memory.kernels.accelerate(equations.system)
@@ -180,7 +181,7 @@ def accept(t, y, memory):
     nq, scratch = memory.state.coordinates.shape[0], scratch_of(memory.chart)
     normalise(y[:nq])
     if not solve_velocities(t, y, memory):
-        return SINGULAR
+        return SINGULAR_AHEAD
     if put_next_tangent(memory) < TURNED:
         return OK
     free = scratch.freedoms.number
@@ -193,5 +194,5 @@ def accept(t, y, memory):
 
 
 NULL_SPACE = Stabilisation(
-    "null-space", "Kim & Vanderploeg 1986", enter, rates, rates, accept, memory=Scratch
+    "null-space", "Kim & Vanderploeg 1986", enter, rates, rates, accept, memory=Scratch, watches_rank=True
 )

@@ -7,7 +7,8 @@ last accepted step (Eq. 16), and their rates from Φ_u u' = ν - Φ_v v' (Eq. 14
 
 The partition is kept while the smallest pivot of Φ_u relative to its largest stays above ``kept`` times its
 value when the partition was chosen; then it is chosen anew, and the integrator starts again.  With 0.1
-partitions last near turning points of a coordinate: errors 10 to 1000 times those of 0.6.
+partitions last near turning points of a coordinate: errors 10 to 1000 times those of 0.6.  A partition with
+fewer dependent coordinates than the one before ends the run: it is at a singular position.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from typing import Annotated, NamedTuple
 from mbref.equations.coordinates import coordinate_rates, copy_state
 from mbref.equations.evaluation import assemble_system, evaluate
 from mbref.kernels.compilation import exchangeable, kernel
-from mbref.kernels.layout import ACCEPT, CHANGED, ENTER, NOT_CONVERGED, OK, RATES
+from mbref.kernels.layout import ACCEPT, CHANGED, ENTER, NOT_CONVERGED, OK, RATES, SINGULAR_AHEAD
 from mbref.kernels.named_memory import Indices, Matrix, Vector, opener
 from mbref.linear_algebra.elimination import full_pivot, lu_factor, lu_solve
 from mbref.linear_algebra.minimum_norm import NEVER
@@ -272,12 +273,23 @@ def accept(t, y, memory):
     if partition.chosen_pivot == 0.0:
         partition.chosen_pivot = partition.pivot
     if partition.pivot < options_of(memory.chart_options).kept * partition.chosen_pivot:
+        rank = partition.rank
         choose_partition(memory)
+        if partition.rank < rank:
+            return SINGULAR_AHEAD
         gather_independent(y, memory)
         return CHANGED
     return OK
 
 
 PARTITIONING = Stabilisation(
-    "partitioning", "Eqs. 10-16", enter, rates, rates, accept, memory=Scratch, numbers=Options
+    "partitioning",
+    "Eqs. 10-16",
+    enter,
+    rates,
+    rates,
+    accept,
+    memory=Scratch,
+    numbers=Options,
+    watches_rank=True,
 )

@@ -3,8 +3,8 @@
 Mass-orthogonal: the correction is the least in the metric of M (Bayo & Ledesma, Nonlinear Dynamics 9,
 1996): positions by Newton's method, velocities with the same factor.  Only active coordinates are integrated
 (``equations.active_coordinates``, ``equations.static_constraints``).  Near a singular position the last of as
-many pivots as there are independent rows, in order of size, falls with the distance, so that
-``simulation.singular_crossing`` can step over it.  A redundant row has a pivot of α^(-1/2); where two rows
+many pivots as there are independent rows, in order of size, falls with the distance, which
+``simulation.singular_crossing`` watches.  A redundant row has a pivot of α^(-1/2); where two rows
 exchange their roles, the larger of their pivots is still about α^(-1/4).
 """
 
@@ -36,7 +36,7 @@ ROUNDING = 1e3  # tolerances: the violation below which iterations may fail to r
 SMALL, GOOD_REDUCTION = 1e-8, 1e-2  # a factor is kept while violations are so small and shrink so fast
 BENT = 1e-6  # and while the last correction, over its distance from a singular position, is so small
 MOVED = 30.0  # roundings of a last correction behind which rows and factor are found anew
-LARGEST_TURN = 2.5  # rad: less than half a turn, after which the next singular position may come
+LARGEST_TURN = 0.75  # rad: two bodies turn by less than a right angle, with which gradients would oppose
 FACTOR_FAILED = -1.0  # a Newton step's answer in place of the violation
 
 
@@ -64,6 +64,8 @@ def put_active(t, y, memory):
     evaluate(t, state.coordinates, state.velocities, memory.equations)
     if factorise_constraints(memory):
         watch_pivots(memory)
+        memory.watch.past_pivot = memory.watch.smallest_pivot
+        keep_gradient(memory)
     contract(state.coordinates, state.velocities, active, y)
     return active.coordinates.shape[0] + active.velocities.shape[0]
 
@@ -74,6 +76,14 @@ def factorise_constraints(memory):
     equations, system = memory.equations, memory.equations.system
     system.counts.factorisations += 1
     return regularised_factor(memory.factor, system.blocks.reshape(-1), equations.scene.metric_root, ALPHA)
+
+
+@kernel
+def keep_gradient(memory):
+    """Keep the gradient of the last factor, with which that at the end of a step is compared."""
+    gradients = memory.loop.gradients
+    if gradients.product.shape[0] > 0:
+        copy(memory.factor.d, gradients.start)
 
 
 @inlined
@@ -273,5 +283,5 @@ def whole_rates(t, y, y_rate, memory):
 
 PROJECTION = Stabilisation(
     "projection", "Bayo & Ledesma 1996", enter, rates, whole_rates, accept, memory=Scratch,
-    projects=True, largest_turn=LARGEST_TURN,
+    projects=True, watches_rank=True, largest_turn=LARGEST_TURN,
 )  # fmt: skip

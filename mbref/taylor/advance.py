@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from mbref.kernels.compilation import INT, entry, kernel
-from mbref.kernels.layout import OK
-from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, TOO_MANY_STEPS
+from mbref.kernels.layout import OK, SINGULAR_AHEAD
+from mbref.simulation.stepping import DONE, PAUSED, TOO_MANY_STEPS
 from mbref.taylor.brief import is_full, parts_at, pass_briefly
 from mbref.taylor.layout import SERIES
-from mbref.taylor.samples import put_terms
+from mbref.taylor.samples import put_angles, put_terms
 
 
 @entry(INT(SERIES))
@@ -45,6 +45,7 @@ def advance_series(memory):
             status = OK
         if status != OK:
             put_terms(memory.series.past, memory)
+            put_angles(0.0, memory)
             return status
         if memory.progress.passed and parts_at(counts.crossings, memory):
             return PAUSED

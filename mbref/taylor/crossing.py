@@ -30,7 +30,6 @@ SEPARATE = 1e-11  # of the determinant where it began, between two changes: less
 STRAIGHT = 4  # most parts of a step in which rates turn by less than a right angle, or do not turn back
 MET = 1e-6  # part of the time to a singular position by which it may be off where a series meets it
 CLOSE = 1e-13  # of a step, by which two estimates of the change would differ at its end
-LOST_ROW = 1e-6  # of the largest pivot: formulations may take a row with less for one that depends on others
 
 
 @kernel
@@ -103,18 +102,6 @@ def change_between(outside, inside, unit, memory):
         else:
             outside = middle
     return 0.5 * (outside + inside)
-
-
-@kernel
-def is_at_crossing(at, h, memory):
-    """Whether the rows leave a motion free to the formulation, beyond that of the series, at a time (s) of a
-    step of h seconds that crossed: pivots fall linearly."""
-    progress = memory.progress
-    if not progress.crossed:
-        return False
-    first, second = find_crossings(h, memory)
-    distance = min(abs(at - first), abs(at - second))
-    return distance * progress.past_pivot <= LOST_ROW * progress.largest_pivot * first
 
 
 @kernel

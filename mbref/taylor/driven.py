@@ -11,9 +11,9 @@ from __future__ import annotations
 from numpy import exp, isfinite, log
 
 from mbref.kernels.compilation import INT, entry, kernel
-from mbref.kernels.layout import OK
+from mbref.kernels.layout import OK, SINGULAR_AHEAD
 from mbref.linear_algebra.vectors import larger
-from mbref.simulation.stepping import DONE, PAUSED, SINGULAR_AHEAD, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED
+from mbref.simulation.stepping import DONE, PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED
 from mbref.taylor.advance import begin_once
 from mbref.taylor.brief import is_full, record_crossings
 from mbref.taylor.crossing import changes_sign
@@ -35,9 +35,10 @@ from mbref.taylor.passage import (
     size_in_use,
     vanishes_inside,
 )
-from mbref.taylor.samples import LOST_MOTION, evaluate_series, put_terms, take_sample
+from mbref.taylor.samples import evaluate_series, keep_sample, put_terms
 from mbref.taylor.stepping import (
     BEST,
+    LOST_MOTION,
     LOST_ROWS,
     SHORTER,
     expand_at,
@@ -115,7 +116,8 @@ def stride(memory):
     while True:
         status = land(h, h >= left, memory)
         if status == OK:
-            return put_samples(h, left, memory)
+            put_samples(h, left, memory)
+            return OK
         if status == SINGULAR_AHEAD:
             return approach(distance_ahead(h, memory), left, memory)
         counts.rejected += 1
@@ -127,17 +129,14 @@ def stride(memory):
 
 @kernel
 def put_samples(h, left, memory):
-    """Take the samples of a stride of h seconds, and end it: OK or why a sample cannot be taken."""
+    """Keep the samples of a stride of h seconds, and end it."""
     loop, progress = memory.run.loop, memory.progress
     clock, times = loop.clock, loop.times
     now = progress.end if h >= left else clock.time + h
     while clock.sample < times.shape[0] and times[clock.sample] <= now:
-        status = take_sample(times[clock.sample] - clock.time, h, memory)
-        if status != OK:
-            return status
+        keep_sample(times[clock.sample] - clock.time, memory)
     memory.run.equations.system.counts.steps += 1
     clock.time, clock.length = now, h
-    return OK
 
 
 @kernel
@@ -194,9 +193,8 @@ def approach(ahead, left, memory):
     if 0.0 < h < left:
         status = land(h, True, memory)
         if status == OK:
-            status, ahead = put_samples(h, left, memory), ahead - h
-            if status != OK:
-                return status
+            put_samples(h, left, memory)
+            ahead -= h
         else:
             return_to_start(memory)
     progress.passing, progress.tolerance, progress.ahead = 1, EXACT, ahead

@@ -205,7 +205,7 @@ class Progress(NamedTuple):
     change: float = 0.0  # of velocities, relative, that a passage may not magnify
     begun: int = 0  # whether a series has been begun
     passed: int = 0  # singular positions in ``Crossings``
-    taken: int = 0  # samples before the first that may wait
+    taken: int = 0  # samples that are complete
     slowing: float = 0.0  # 1/s, the relative rate of the speed where orders are by power; else 0
     leaving: int = 0  # whether the series comes from a singular position that it has passed
     striding: int = 0  # whether drivers are followed, by loose series where no singular position is passed
@@ -257,7 +257,7 @@ class Crossings(NamedTuple):
 
 
 class StepStart(NamedTuple):
-    """Where a brief passage begins: values and rates of the variables, and angles of torsion springs."""
+    """Where a series begins: values and rates of the variables, and angles of torsion springs."""
 
     terms: Annotated[Matrix, 2, "lanes"]
     angles: Annotated[Vector, "torsions"]
@@ -266,11 +266,9 @@ class StepStart(NamedTuple):
 class Waiting(NamedTuple):
     """Samples whose accelerations and multipliers are found when the steps of a call have ended."""
 
-    state: Annotated[Matrix, "waiting", "3*lanes"]  # variables and their two derivatives
-    angles: Annotated[Matrix, "waiting", "torsions"]  # rad, unwrapped
-    length: Annotated[Vector, "waiting"]  # s, of the step; 0 for a sample that waits no longer
-    lost: Annotated[Vector, "waiting"]  # accelerations times length² that a step of its tolerance may lose
-    passing: Annotated[Indices, "waiting"]  # whether the step was one of a passage
+    state: Annotated[Matrix, "k", "3*lanes"]  # variables and their two derivatives
+    angles: Annotated[Matrix, "k", "torsions"]  # rad, unwrapped
+    exact: Annotated[Indices, "k"]  # whether the step was an exact one, near a singular position
 
 
 class TaylorMemory(NamedTuple):
@@ -284,17 +282,18 @@ class TaylorMemory(NamedTuple):
     progress: Progress
     kernels: SeriesKernels
     code: SceneCode
-    crossing_start: SavedState  # from where the last passage is smooth
-    crossing: SavedState  # the last singular position passed
+    crossing_start: SavedState  # from where the last long crossing is smooth
+    landed: SavedState  # where it has ended
     step_start: StepStart
+    here: StepStart  # of the present series, kept while samples are completed
     crossings: Crossings
     parting: Annotated[Indices, "parting"]  # numbers of the singular positions left along another branch
     crossing_end: Annotated[Matrix, 2, "lanes"]  # values and rates of the variables where a passage ended
     state: Annotated[Matrix, 3, "lanes"]  # variables and their two derivatives at some time
     pose: Annotated[Matrix, 3, "12*nb"]
     angles: Annotated[Vector, "torsions"]  # rad, unwrapped, at the time of expansion
-    waiting: Waiting  # empty where samples do not wait
-    before_samples: SavedState  # the state of the run while samples that wait are taken
+    waiting: Waiting
+    before_samples: SavedState  # the state of the run while samples are completed
 
 
 SERIES = Named(TaylorMemory)

@@ -19,9 +19,9 @@ from __future__ import annotations
 from numpy import log
 
 from mbref.kernels.compilation import kernel
-from mbref.kernels.layout import OK
+from mbref.kernels.layout import OK, SINGULAR_AHEAD
 from mbref.linear_algebra.vectors import copy, larger
-from mbref.simulation.stepping import SINGULAR_AHEAD, STEP_TOO_SMALL, UNDECIDED
+from mbref.simulation.stepping import STEP_TOO_SMALL, UNDECIDED
 from mbref.taylor.crossing import (
     FEW,
     SECTIONS,

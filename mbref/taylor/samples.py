@@ -1,26 +1,12 @@
-"""Samples between the ends of a step: states from the series, multipliers by the formulation.
-
-A run in series keeps the variables while it steps; the rest of its samples is found when it pauses or ends.
-"""
+"""Samples between the ends of a step: states from the series, kept until the steps of a call have ended."""
 
 from __future__ import annotations
 
 from numpy import sqrt
 
-from mbref.equations.coordinates import contract, copy_state
-from mbref.equations.evaluation import add_resting_rows, assemble_system
-from mbref.kernels.compilation import INT, entry, inlined, kernel
-from mbref.kernels.layout import NOT_CONVERGED, OK
-from mbref.linear_algebra.vectors import copy, larger
-from mbref.simulation.samples import take_sample as record_sample
-from mbref.taylor.layout import SERIES
-from mbref.taylor.saved_state import restore_state, save_state
+from mbref.kernels.compilation import inlined, kernel
+from mbref.linear_algebra.vectors import copy
 from mbref.taylor.simd import WIDTH, load, store
-
-BESIDE = 0.1  # part of the largest least pivot below which a position is beside a singular one
-LOST_MOTION = 30.0  # tolerances, times orders², by which accelerations times the step's square may be off
-NOISE = 1e-9  # the same, by rounding
-CLEAR = 1e-6  # relative difference of accelerations that contradict each other
 
 
 @inlined
@@ -127,165 +113,21 @@ def put_terms(series, memory):
 
 
 @kernel
-def rows_times(vector, equations, out):
-    """Φ_q times a vector (n,)."""
-    bodies, blocks = equations.scene.row_bodies, equations.system.blocks
-    for row in range(out.shape[0]):
-        value = 0.0
-        for side in range(2):
-            start = 6 * bodies[row, side]
-            if start < vector.shape[0]:
-                for k in range(6):
-                    value += blocks[row, 6 * side + k] * vector[start + k]
-        out[row] = value
-
-
-@kernel
-def explained(a, b, length, lost):
-    """Whether two accelerations differ by no more than a step of that length may have ``lost``."""
-    size, difference = 0.0, 0.0
-    for k in range(a.shape[0]):
-        size = larger(size, b[k])
-        difference = larger(difference, a[k] - b[k])
-    return difference * length * length <= LOST_MOTION * lost + CLEAR * size * length * length
-
-
-@inlined
-def lost_motion(progress):
-    """The accelerations, times the step's square, by which the tolerance of a step explains a difference."""
-    return LOST_MOTION * progress.order * progress.order * progress.tolerance + NOISE
-
-
-@kernel
-def project_state(t, run):
-    """The state brought onto the constraints; as it is where that does not converge."""
-    state, y = run.state, run.loop.y[: run.loop.clock.y_size]
-    copy_state(state, run.previous)
-    contract(state.coordinates, state.velocities, run.active, y)
-    if run.kernels.accept(t, y, run) != OK:
-        copy_state(run.previous, state)
-
-
-@kernel
-def accelerate(t, run):
-    """Accelerations and multipliers at the state in memory by the formulation: OK or why there are none."""
-    loop, kernels = run.loop, run.kernels
-    y, y_rate = loop.y[: loop.clock.y_size], loop.y_rate[: loop.clock.y_size]
-    contract(run.state.coordinates, run.state.velocities, run.active, y)
-    return kernels.rates_with_outputs(t, y, y_rate, run)
-
-
-@kernel
-def balance_forces(t, acceleration, run):
-    """Multipliers that balance the forces at accelerations (n,), which the formulation finds again from
-    their rows: OK or why there are none."""
-    assemble_system(t, run.state.coordinates, run.state.velocities, run.equations)
-    rows_times(acceleration, run.equations, run.equations.system.rhs)
-    status = run.kernels.accelerate(run.equations.system)
-    add_resting_rows(t, run.factor.static, run.equations)
-    return status
-
-
-@kernel
-def take_sample(h, length, memory):
-    """Record a sample at a distance h (s) into a step: OK or why there is none.
-
-    It waits for accelerations and multipliers unless the step crosses, or there is no room.
-    """
+def keep_sample(h, memory):
+    """Keep the variables at the next sample, at a distance h (s) into the step, until samples are completed
+    (``mbref.taylor.outputs``)."""
     clock, waiting = memory.run.loop.clock, memory.waiting
     evaluate_series(h, memory)
     put_angles(h, memory)
-    place = clock.sample - memory.progress.taken
-    if place >= waiting.length.shape[0] or memory.progress.crossed:
-        if place < waiting.length.shape[0]:
-            waiting.length[place] = 0.0
-        return complete_sample(length, lost_motion(memory.progress), memory.progress.passing, memory)
-    keep_sample(place, length, memory)
+    copy(memory.state.reshape(-1), waiting.state[clock.sample])
+    copy(memory.angles, waiting.angles[clock.sample])
+    waiting.exact[clock.sample] = memory.progress.passing
     clock.sample += 1
-    return OK
-
-
-@inlined
-def keep_sample(place, length, memory):
-    """Have a sample wait at a place with the state in memory, of a step of that length."""
-    waiting = memory.waiting
-    copy(memory.state.reshape(-1), waiting.state[place])
-    copy(memory.angles, waiting.angles[place])
-    waiting.length[place], waiting.lost[place] = length, lost_motion(memory.progress)
-    waiting.passing[place] = memory.progress.passing
-
-
-@entry(INT(SERIES))
-def complete_samples(memory):
-    """Find accelerations and multipliers of the samples that wait: OK, or why one has none, which is then the
-    first that is not taken."""
-    clock, progress, waiting = memory.run.loop.clock, memory.progress, memory.waiting
-    first, end = progress.taken, clock.sample
-    progress.taken = end
-    save_state(memory.run, memory.before_samples)
-    for place in range(min(end - first, waiting.length.shape[0])):
-        if waiting.length[place] > 0.0:
-            clock.sample = first + place
-            status = complete_waiting(place, memory)
-            if status != OK:
-                clock.time = memory.run.loop.times[first + place]
-                return status
-    restore_state(memory.before_samples, memory.run)
-    return OK
-
-
-@kernel
-def complete_waiting(place, memory):
-    """Find accelerations and multipliers of the sample that waits at a place: OK or why there are none."""
-    waiting, slot = memory.waiting, memory.polynomials.torsions.slot
-    copy(waiting.state[place], memory.state.reshape(-1))
-    for s in range(slot.shape[0]):
-        memory.run.equations.angles[slot[s]] = waiting.angles[place, s]
-    return complete_sample(waiting.length[place], waiting.lost[place], waiting.passing[place], memory)
-
-
-@kernel
-def complete_sample(length, lost, passing, memory):
-    """Record the sample whose variables are in memory, of a step of that length: OK or why there is none.
-
-    Accelerations are the formulation's, but beside a singular position, where the state determines them ill,
-    the series', unless they are those of a stride; multipliers balance the forces of either.  There the exact
-    series of a passage give the state too: a projection would divide their rounding by the distance.
-    NOT_CONVERGED where the series' accelerations contradict the formulation's.
-    """
-    run, samples, k = memory.run, memory.run.loop.samples, memory.run.loop.clock.sample
-    system, watch = run.equations.system, run.watch
-    find_poses(memory)
-    put_state(memory)
-    copy(system.acceleration, samples.accelerations[k])
-    project_state(run.loop.times[k], run)
-    is_exact = passing or not memory.progress.striding
-    beside = is_exact and watch.smallest_pivot < BESIDE * watch.reference_pivot
-    if beside:
-        if passing:
-            put_state(memory)
-        status = balance_forces(run.loop.times[k], samples.accelerations[k], run)
-    else:
-        status = accelerate(run.loop.times[k], run)
-    if status == OK and not explained(system.acceleration, samples.accelerations[k], length, lost):
-        status = NOT_CONVERGED
-    if status == OK:
-        record_sample(run)
-    return status
-
-
-@kernel
-def take_sample_of_series(memory):
-    """Record the sample that was refused with the accelerations of the series: OK."""
-    run = memory.run
-    copy(run.loop.samples.accelerations[run.loop.clock.sample], run.equations.system.acceleration)
-    record_sample(run)
-    return OK
 
 
 @kernel
 def put_angles(h, memory):
-    """The torsion springs' angles at a distance h (s) from the step's beginning, for the formulation."""
+    """The torsion springs' angles at a distance h (s) from the step's beginning."""
     torsions, past = memory.polynomials.torsions, memory.series.past_angles
     for s in range(past.shape[0]):
         value = 0.0

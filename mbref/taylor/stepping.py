@@ -11,16 +11,11 @@ from __future__ import annotations
 from numpy import exp, isfinite, log
 
 from mbref.kernels.compilation import exchangeable, kernel
-from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, OK
+from mbref.kernels.layout import NOT_FINITE, OK, SINGULAR_AHEAD
 from mbref.linear_algebra.vectors import copy, larger
-from mbref.simulation.stepping import (
-    SINGULAR_AHEAD,
-    STEP_TOO_SMALL,
-    UNDECIDED,
-    share,
-)
+from mbref.simulation.stepping import STEP_TOO_SMALL, UNDECIDED, share
 from mbref.taylor.correction import correct, violation
-from mbref.taylor.crossing import count_crossings, is_at_crossing
+from mbref.taylor.crossing import count_crossings
 from mbref.taylor.layout import BEGIN, EXPAND, STEP
 from mbref.taylor.loads import (
     ANGLE,
@@ -43,14 +38,7 @@ from mbref.taylor.passage import (
     size_in_use,
 )
 from mbref.taylor.pose_maps import read_variables
-from mbref.taylor.samples import (
-    LOST_MOTION,
-    NOISE,
-    evaluate_series,
-    put_angles,
-    take_sample,
-    take_sample_of_series,
-)
+from mbref.taylor.samples import evaluate_series, keep_sample, put_angles
 from mbref.taylor.series import expand, expand_with_multipliers, turns_back_in
 from mbref.taylor.simd import WIDTH, load, store
 from mbref.taylor.solver import factorise_anew
@@ -58,6 +46,8 @@ from mbref.taylor.start import is_turned, judged_start
 
 ROUNDING = 1e-12  # of rows
 LOST_ROWS = 100.0  # tolerances by which rows may be off
+LOST_MOTION = 30.0  # tolerances, times orders², by which accelerations times the step's square may be off
+NOISE = 1e-9  # the same, by rounding
 SHORTER = 0.7
 LOOSER = 1e4  # of rates in a passage: they count where a step is short beside the motion's own time
 NEARLY = 0.2  # of a step's first pivot: a step that ends nearer to a singular position is tried beyond it
@@ -275,12 +265,7 @@ def step(memory):
             return status
     now = progress.end if h >= left else clock.time + h
     while clock.sample < times.shape[0] and times[clock.sample] <= now:
-        at = times[clock.sample] - clock.time
-        status = take_sample(at, h, memory)
-        if status == NOT_CONVERGED and is_at_crossing(at, h, memory):
-            status = take_sample_of_series(memory)
-        if status != OK:
-            return status
+        keep_sample(times[clock.sample] - clock.time, memory)
     put_angles(h, memory)
     counts.steps += 1
     counts.crossings += count_crossings(h, memory) if progress.crossed else 0
@@ -292,7 +277,6 @@ def step(memory):
 def begin(memory):
     """Choose the partition at the present state and expand there: OK or why that cannot be."""
     t, slot = memory.run.loop.clock.time, memory.polynomials.torsions.slot
-    memory.progress.taken = memory.run.loop.clock.sample
     for s in range(slot.shape[0]):
         memory.angles[s] = memory.run.equations.angles[slot[s]]
     read_variables(t, memory)

@@ -47,7 +47,7 @@ def follow_twin(change, until, memory):
     restore_state(memory.crossing_start, run)
     for i in range(run.state.velocities.shape[0]):
         run.state.velocities[i] *= 1.0 + change
-    memory.progress.end = until
+    clock.sample, memory.progress.end = run.loop.times.shape[0], until  # no samples of its own
     status = memory.kernels.begin(memory)
     while status == OK and clock.time < until and counts.steps < run.control.most_steps:
         status = memory.kernels.step(memory)

@@ -1,0 +1,79 @@
+"""Comparison of a run that nothing holds to its branch with the motion: it is completed on that motion alone.
+
+Without projection nothing but the accelerations holds a run to its branch.  At a singular position they are
+ill-determined, and a pseudo-inverse whose rank drops there lets the run go on along another branch with all
+constraints and its energy intact.  Beside one, the same happens to a partition whose dependent coordinates
+jump.  With projection it may happen where the run came near a singular position, or where a coarse rank
+tolerance drops rows that are independent.  The reference is a run of the default method, which crosses.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from mbref import rotations
+from mbref.kernels.layout import SINGULAR_AHEAD
+from mbref.method import Method, default_method
+from mbref.simulation.limits import GENERIC, Limits
+from mbref.simulation.run import Run
+from mbref.simulation.start_run import start_run
+from mbref.simulation.stepping import DONE, LEFT_MOTION, UNDECIDED
+
+MOST_STEPS = 100_000
+TOLERANCE = 1e-10  # of the reference
+OFF = (1e3, 1e-6)  # lengths or rad by which a run may be off: over its tolerance, and whatever that is
+DROPS = 1e-10  # rank tolerance above which independent rows may be dropped
+NEAR = 0.1  # relative pivot below which a projected run came near a singular position
+COARSE = 0.1  # lengths or rad by which a run in fixed steps may be off, whose error no tolerance limits
+
+
+def compare_with_default(run: Run, ended: int) -> int:
+    """Return the status of a run that ended with one, after comparing its samples with the reference.
+
+    LEFT_MOTION where it left the motion, whose samples end there; UNDECIDED, at the time of the clock, where
+    the reference cannot decide a branch of a run that is DONE, or does not cross the singular position there;
+    else as it was.  A run that is held to its motion, or that reached no sample, is not compared.
+    """
+    clock = run.memory.loop.clock
+    if not (clock.sample and may_leave(run) and run.limits.compared):
+        return ended
+    began = time.process_time()
+    limits = Limits(rtol=TOLERANCE, code=GENERIC, most_steps=MOST_STEPS)
+    reference = start_run(run.scene, Method.parse(default_method(run.scene)), run.times, limits)
+    status, _ = reference.stepper.advance(None)
+    run.making += time.process_time() - began
+    theirs = reference.memory.loop.clock
+    off = _distances(run, reference, min(int(theirs.sample), int(clock.sample))) > _allowed(run)
+    reached = float(theirs.time)
+    reference.give_back()
+    if off.any():
+        clock.sample = np.argmax(off)
+        clock.time = run.times[clock.sample]
+        return LEFT_MOTION
+    if ended != DONE or status not in (UNDECIDED, SINGULAR_AHEAD):
+        return ended
+    clock.time = reached
+    return UNDECIDED
+
+
+def may_leave(run: Run) -> bool:
+    """Return whether a run may have left its motion without a failure."""
+    method, drops = run.method, run.limits.rank_tolerance > DROPS
+    near = not method.is_series and run.memory.watch.nearest < NEAR
+    return run.model.closed_loops > 0 and (near or drops or not method.stabilisation.projects)
+
+
+def _allowed(run: Run) -> float:
+    rtol = float(run.memory.control.rtol)
+    return max(OFF[0] * rtol, OFF[1]) if run.method.integrator.adaptive else COARSE
+
+
+def _distances(run: Run, other: Run, samples: int) -> np.ndarray:
+    """The largest distance (k,) of a body at each of the first samples: over the length, or rad."""
+    mine, theirs = (r.memory.loop.samples.coordinates[:samples] for r in (run, other))
+    mine, theirs = (q.reshape(samples, run.model.nb, 7) for q in (mine, theirs))
+    places = np.linalg.norm(mine[..., :3] - theirs[..., :3], axis=-1) / run.model.length
+    turns = rotations.angle_between(mine[..., 3:], theirs[..., 3:])
+    return np.maximum(places, turns).max(axis=-1, initial=0.0)

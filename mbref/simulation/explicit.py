@@ -1,0 +1,99 @@
+"""The steps of a run by an explicit integrator, in the compiled loop."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from mbref.equations.initial_state import Start
+from mbref.equations.model import Model
+from mbref.kernels.layout import SINGULAR_AHEAD, Memory
+from mbref.simulation.control import STEPS_PER_CALL
+from mbref.simulation.ranks import ranks_at
+from mbref.simulation.run import NEARLY, Run
+from mbref.simulation.singular_start import begins_on_singular_position
+from mbref.simulation.stepping import CREEPING, PAUSED, advance_to_end
+
+OUT_OF_REACH, PACE_STEPS = 100.0, 20_000  # limits of steps that the end is away, at the pace of so many
+
+
+class ExplicitStepper:
+    """The steps of one run by the kernels of its method."""
+
+    def __init__(self, run: Run):
+        self.run = run
+        self._judged = 0.0, 0  # time (s) and steps when the pace was last judged
+        self.enter()
+
+    def enter(self) -> None:
+        """Start from the time of the clock and the state in memory."""
+        run = self.run
+        clock, enter = run.memory.loop.clock, run.method.stabilisation.enter.callable
+        clock.y_size = enter(clock.time, run.memory.loop.y, run.packed.argument)
+        clock.restart = run.memory.equations.system.counts.steps
+
+    def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
+        """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
+        began, status = time.process_time(), PAUSED
+        if self.run.times[-1] > 0.0 and begins_on_singular_position(self.run):
+            status = SINGULAR_AHEAD
+        while status == PAUSED:
+            status = self._judge_pace(int(advance_to_end(self.run.packed.argument)))
+            self._look_at_rows_again()
+            if progress is not None:
+                progress(float(self.run.memory.loop.clock.time))
+        return status, time.process_time() - began
+
+    def give_back(self) -> None:
+        """Leave no memory: it has none of its own."""
+
+    @property
+    def was_short(self) -> bool:
+        """Whether the run was completed by one call of kernels."""
+        return bool(self.run.memory.equations.system.counts.steps <= STEPS_PER_CALL)
+
+    @property
+    def memory(self) -> Memory:
+        """All memory that a run changes."""
+        return self.run.memory
+
+    def begin_again(self) -> None:
+        """Have no memory be as when the run began: it has none of its own."""
+
+    def numbers(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
+        """No numbers: it has no memory of its own."""
+        return []
+
+    def takes(self, model: Callable[[], Model], start: Start) -> bool:
+        """Enter the state in memory: there is room for every scene whose numbers it holds."""
+        self.enter()
+        return True
+
+    def advance_once(self) -> tuple[int, float]:
+        """Advance by one call of kernels: the status, and the process CPU time of the stepping alone (s)."""
+        began = time.process_time()
+        return int(advance_to_end(self.run.packed.argument)), time.process_time() - began
+
+    def _judge_pace(self, status: int) -> int:
+        """CREEPING instead of PAUSED where at the pace of the last steps the end is out of all reach."""
+        if status != PAUSED:
+            return status
+        memory, limits = self.run.memory, self.run.limits
+        now, steps = float(memory.loop.clock.time), int(memory.equations.system.counts.steps)
+        before, taken = self._judged[0], steps - self._judged[1]
+        if taken < PACE_STEPS:
+            return status
+        self._judged = now, steps
+        creeps = taken * (self.run.times[-1] - now) > OUT_OF_REACH * limits.most_steps * (now - before)
+        return CREEPING if creeps else status
+
+    def _look_at_rows_again(self) -> None:
+        """Have rows that were nearly dependent at the start not be so away from that, if they are not."""
+        run, memory = self.run, self.run.memory
+        settings = memory.equations.system.settings
+        if run.method.stabilisation.projects and settings.nearly_dependent and memory.loop.clock.time > 0.0:
+            ranks = ranks_at(run.model, memory.state.coordinates, memory.factor, run.limits.rank_tolerance)
+            settings.nearly_dependent = ranks.rank != run.ranks.rank or ranks.least < NEARLY

@@ -1,0 +1,28 @@
+"""Starts of runs: a scene by a method, with the stepper that the method needs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from mbref.method import Method
+from mbref.scene import Scene
+from mbref.simulation.explicit import ExplicitStepper
+from mbref.simulation.limits import Limits
+from mbref.simulation.run import Run, Stepper
+from mbref.taylor.stepper import SeriesStepper
+
+
+def start_run(scene: Scene, method: Method, times: np.ndarray, limits: Limits) -> Run:
+    """Return the run of a scene, ready to be advanced; its stepper may raise NoGeneratedCode."""
+    began = time.process_time()
+    run = Run(scene, method, times, limits, stepper_of(method))
+    run.built = time.process_time() - began - run.making
+    return run
+
+
+def stepper_of(method: Method) -> Callable[[Run], Stepper]:
+    """Return the stepper of a method's runs."""
+    return SeriesStepper if method.is_series else ExplicitStepper

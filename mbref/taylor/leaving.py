@@ -1,0 +1,153 @@
+"""Departures of a series from a singular position: along a branch that is asked for, and at the start.
+
+A state a little behind the singular position is corrected until the series about it comes from there with the
+velocities of the branch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from mbref.equations.branches import SMOOTH, Passed, SingularPosition, singular_position
+from mbref.equations.model import displaced, displacement
+from mbref.kernels.layout import OK
+from mbref.simulation.run import Run
+from mbref.simulation.singular_start import Leaving
+from mbref.simulation.stepping import PAUSED, UNDECIDED
+from mbref.taylor.start import OFF
+
+BEHIND = 3e-3  # lengths or rad behind a crossing where another branch is entered
+CORRECTIONS = 6  # of the state there
+COUNTED = 0.02  # of its distance from the crossing: a lesser pivot is of rows that depend on others
+
+State = tuple[np.ndarray, np.ndarray]  # coordinates (7 nb,) and velocities (n,)
+
+
+class Departure:
+    """The departures of a run whose exact steps have begun.
+
+    ``expand`` begins a series at the present state, ``state_at`` evaluates it at a distance (s).
+    """
+
+    def __init__(self, run: Run, taylor: Any, expand: Callable[[], int], state_at: Callable[[float], State]):
+        self._run, self._taylor, self._expand, self._state_at = run, taylor, expand, state_at
+
+    def along_branch(self, passed: Passed) -> int:
+        """Go on from a singular position just passed along another branch than the smooth one: PAUSED, or the
+        reason why that cannot be."""
+        crossing, run = singular_position(self._run.model, passed), self._run
+        velocities, clock = crossing.velocities[crossing.taken - 1], run.memory.loop.clock
+        clock.sample = int(np.searchsorted(run.times, crossing.time, side="right"))
+        self._taylor.progress.taken = min(int(self._taylor.progress.taken), int(clock.sample))
+        following = run.times[int(clock.sample) :]
+        ahead = self._time_in_which(velocities)
+        ahead = min(ahead, 0.5 * float(following[0] - crossing.time) if following.size else np.inf)
+        moved = displaced(crossing.coordinates, ahead * velocities), velocities
+        return self._come_from(crossing, velocities, ahead, moved)
+
+    def from_start(self, way: Leaving) -> int:
+        """Go on from a singular position at t = 0: PAUSED or the reason why that cannot be."""
+        q, v, acceleration = way
+        moves = np.any(v)
+        ahead = self._time_in_which(v) if moves else self._time_in_which(0.5 * acceleration) ** 0.5
+        ahead = min(ahead, 0.5 * float(self._run.times[-1]))
+        moved = displaced(q, ahead * v + 0.5 * ahead**2 * acceleration), v + ahead * acceleration
+        status = self._come_from(Passed(0.0, q, v, SMOOTH), v, ahead, moved)
+        if status == PAUSED and moves and self._misses(q, v, ahead):
+            return UNDECIDED
+        if status == PAUSED:
+            self._put_samples_before(ahead, way)
+        return status
+
+    def _misses(self, q: np.ndarray, v: np.ndarray, ahead: float) -> bool:
+        """Whether the series, a time ahead (s) of its beginning, misses coordinates and velocities."""
+        there = self._state_at(-ahead)
+        moved, changed = displacement(q, there[0]), there[1] - v
+        self._state_at(0.0)
+        is_far = np.abs(moved).max() > self._taylor.progress.farthest
+        return bool(is_far or np.abs(changed).max() > OFF * np.abs(v).max())
+
+    def _put_samples_before(self, ahead: float, way: Leaving) -> None:
+        """The samples from a singular position at t = 0 until a time (s) about which the series begins."""
+        run, clock = self._run, self._run.memory.loop.clock
+        for k in range(int(np.searchsorted(run.times, ahead))):
+            t = float(run.times[k])
+            q, v = self._state_at(t - ahead)
+            acceleration = run.memory.equations.system.acceleration.copy()
+            if t == 0.0:
+                q, v = way.coordinates, way.velocities
+                acceleration = acceleration if np.any(v) else way.acceleration
+            self._put_sample(k, q, v, acceleration)
+            clock.sample = self._taylor.progress.taken = k + 1
+        self._state_at(0.0)
+
+    def _put_sample(self, k: int, q: np.ndarray, v: np.ndarray, acceleration: np.ndarray) -> None:
+        """Sample k; multipliers balance the forces as well as they can, at rest along the branch alone."""
+        run = self._run
+        samples, terms = run.memory.loop.samples, run.model.terms(float(run.times[k]), q, v)
+        samples.coordinates[k], samples.velocities[k], samples.accelerations[k] = q, v, acceleration
+        across = terms.force - terms.mass * acceleration
+        samples.multipliers[k] = np.linalg.lstsq(terms.jacobian.T, across, rcond=None)[0]
+
+    def _come_from(
+        self, start: Passed | SingularPosition, velocities: np.ndarray, ahead: float, moved: State
+    ) -> int:
+        """Go on a time ahead (s) of a singular position that is left with velocities (n,), from a state near
+        that of the motion, which is corrected: PAUSED, or the reason why that cannot be."""
+        memory, progress = self._run.memory, self._taylor.progress
+        memory.loop.clock.time = start.time + ahead
+        settings: Any = memory.equations.system.settings
+        usual, settings.rank_tolerance = (
+            settings.rank_tolerance,
+            self._least_pivot_at(moved[0], start.coordinates),
+        )
+        status = self._corrected(start, velocities, ahead, moved)
+        settings.rank_tolerance = usual
+        if status != OK:
+            return status
+        progress.past_pivot, progress.clearance, progress.is_clear = 0.0, 0.0, 0
+        progress.entered = np.abs(self._taylor.solver.last[: int(progress.rank)]).min(initial=1.0)
+        self._keep_beginning()
+        return PAUSED
+
+    def _keep_beginning(self) -> None:
+        """Have a second run of the crossing begin at the present state."""
+        memory, began = self._run.memory, self._taylor.crossing_start
+        began.instant.time, began.instant.sample = memory.loop.clock.time, memory.loop.clock.sample
+        began.instant.crossings = memory.equations.system.counts.crossings
+        began.coordinates[:], began.velocities[:] = memory.state.coordinates, memory.state.velocities
+        began.angles[:] = memory.equations.angles
+
+    def _corrected(
+        self, start: Passed | SingularPosition, velocities: np.ndarray, ahead: float, moved: State
+    ) -> int:
+        """Have the series come from a singular position with velocities (n,): OK or the reason why not."""
+        (q, v), state = moved, self._run.memory.state
+        for _ in range(CORRECTIONS):
+            state.coordinates[:], state.velocities[:] = q, v
+            if (status := self._expand()) != OK:
+                return status
+            there, here = self._state_at(-ahead), self._state_at(0.0)
+            q = displaced(here[0], displacement(there[0], start.coordinates))
+            v = here[1] + velocities - there[1]
+        return OK
+
+    def _least_pivot_at(self, q: np.ndarray, crossing: np.ndarray) -> float:
+        """The least pivot that counts at coordinates near a singular position, before they are corrected.
+
+        Rows of spherical loops depend on others where the constraints hold: a state that violates them by the
+        square of its distance has pivots of that size, and those that the distance leaves are as large as it.
+        """
+        moved = displacement(q, crossing).reshape(-1, 6)
+        places = np.abs(moved[:, :3] / self._run.model.data.lengths[:, None]).max()
+        distance = float(max(places, np.abs(moved[:, 3:]).max()))
+        return max(self._run.memory.equations.system.settings.rank_tolerance, COUNTED * distance)
+
+    def _time_in_which(self, velocities: np.ndarray) -> float:
+        """Time (s) in which the fastest body moves by BEHIND."""
+        rates = velocities.reshape(-1, 6)
+        places = np.abs(rates[:, :3] / self._run.model.data.lengths[:, None]).max()
+        return BEHIND / float(max(places, np.abs(rates[:, 3:]).max()))

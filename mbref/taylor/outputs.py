@@ -1,0 +1,145 @@
+"""Outputs of a series: accelerations and multipliers at the samples that its steps have kept.
+
+Accelerations are those of a series of second order about the sample.  Near a singular position, where
+rounding over the distance would spoil that series, steps are exact, and their own second derivative serves.
+Multipliers balance the forces in the metric of a projection, so that bodies may lack inertia.
+"""
+
+from __future__ import annotations
+
+from mbref.equations.evaluation import evaluate
+from mbref.equations.primitives import constraints
+from mbref.equations.static_multipliers import add_static_multipliers
+from mbref.kernels.compilation import INT, entry, kernel
+from mbref.kernels.layout import OK, SINGULAR
+from mbref.linear_algebra.minimum_norm import find_least_multipliers
+from mbref.linear_algebra.sparse_cholesky import regularised_factor
+from mbref.linear_algebra.vectors import copy
+from mbref.simulation.samples import take_sample
+from mbref.stabilisation.projection import ALPHA
+from mbref.taylor.layout import SERIES
+from mbref.taylor.loads import expand_drivers
+from mbref.taylor.partition import choose
+from mbref.taylor.samples import find_poses, put_state
+from mbref.taylor.saved_state import restore_state, save_state
+from mbref.taylor.series import expand
+from mbref.taylor.simd import WIDTH, load, store
+from mbref.taylor.solver import factorise_anew
+
+CORRECTIONS = 2  # of the state at a sample of a loose series: the second one leaves rounding
+
+
+@entry(INT(INT, SERIES))
+def complete_samples(go_on, memory):
+    """Complete the samples kept since the last call: OK, or the reason why one has no accelerations or
+    multipliers, which is then the first that is not taken.
+
+    ``go_on``: whether steps go on afterwards from the present series.
+    """
+    progress, end = memory.progress, memory.run.loop.clock.sample
+    if progress.taken >= end:
+        return OK
+    save_state(memory.run, memory.before_samples)
+    keep_series_here(memory)
+    status = complete_until(end, memory)
+    if status == OK:
+        restore_state(memory.before_samples, memory.run)
+    if status == OK and go_on:
+        return_to_series(memory)
+    return status
+
+
+@kernel
+def complete_until(end, memory):
+    """Complete the samples before one: OK, or the reason why the one at which the clock then stands has no
+    accelerations or multipliers."""
+    loop, progress = memory.run.loop, memory.progress
+    order, tolerance = progress.order, progress.tolerance
+    progress.order, progress.tolerance, status = 2, progress.exact, OK
+    while progress.taken < end and status == OK:
+        loop.clock.sample, loop.clock.time = progress.taken, loop.times[progress.taken]
+        status = complete_sample(memory)
+        progress.taken = loop.clock.sample
+    progress.order, progress.tolerance = order, tolerance
+    return status
+
+
+@kernel
+def complete_sample(memory):
+    """Record the sample at which the clock stands: OK or the reason why it cannot be."""
+    run, waiting, slot = memory.run, memory.waiting, memory.polynomials.torsions.slot
+    k, status = run.loop.clock.sample, OK
+    copy(waiting.state[k], memory.state.reshape(-1))
+    copy(waiting.angles[k], memory.angles)
+    for s in range(slot.shape[0]):
+        run.equations.angles[slot[s]] = waiting.angles[k, s]
+    if not waiting.exact[k]:
+        status = expand_at_sample(memory)
+    find_poses(memory)
+    put_state(memory)
+    if status == OK:
+        status = balance_forces(run.loop.times[k], run)
+    if status == OK:
+        take_sample(run)
+    return status
+
+
+@kernel
+def expand_at_sample(memory):
+    """Correct the variables in ``state``, and find their second derivatives: OK or the reason why not."""
+    terms, state, variable = memory.series.terms, memory.state, memory.series.variable
+    lanes, t, status = terms.shape[1], memory.run.loop.clock.time, OK
+    for j in range(0, lanes, WIDTH):
+        store(load(variable, j) * load(state, j), terms, j)
+        store(load(variable, j) * load(state, lanes + j), terms, lanes + j)
+    for _ in range(CORRECTIONS if memory.progress.striding else 1):
+        status = memory.kernels.expand(t, memory)
+        if status != OK:
+            return status
+    for j in range(0, lanes, WIDTH):
+        store(load(terms, j), state, j)
+        store(load(terms, lanes + j), state, lanes + j)
+        store(2.0 * load(terms, 2 * lanes + j), state, 2 * lanes + j)
+    return status
+
+
+@kernel
+def balance_forces(t, run):
+    """The multipliers λ with Φ_qᵀ λ = g - M q̈ at the state and accelerations in memory: OK or SINGULAR.
+
+    Of redundant rows, those of the least norm in unit rows.
+    """
+    equations, system, factor = run.equations, run.equations.system, run.factor
+    system.counts.evaluations += 1
+    evaluate(t, run.state.coordinates, run.state.velocities, equations)
+    for j in range(system.force.shape[0]):
+        system.force[j] -= system.mass[j] * system.acceleration[j]
+    if not regularised_factor(factor, system.blocks.reshape(-1), equations.scene.metric_root, ALPHA):
+        return SINGULAR
+    find_least_multipliers(factor, system.force, system.multipliers)
+    if equations.scene.resting.shape[0] > 0:
+        constraints(t, equations.scene.resting, equations)
+    add_static_multipliers(factor.static, system)
+    return OK
+
+
+@kernel
+def keep_series_here(memory):
+    """Keep the variables, their rates and the angles about which the series in ``terms`` is."""
+    here, terms = memory.here, memory.series.terms
+    for order in range(2):
+        copy(terms[order], here.terms[order])
+    copy(memory.angles, here.angles)
+
+
+@kernel
+def return_to_series(memory):
+    """Have ``terms`` be the series about the kept variables again."""
+    here, terms = memory.here, memory.series.terms
+    for order in range(2):
+        copy(here.terms[order], terms[order])
+    copy(here.angles, memory.angles)
+    expand_drivers(memory.run.loop.clock.time, memory)
+    choose(memory)
+    factorise_anew(memory)
+    expand(memory)

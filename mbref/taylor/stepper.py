@@ -1,0 +1,362 @@
+"""The steps of a run in Taylor series: memory made of the scene's natural coordinates, and their loop."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Hashable, Mapping
+from itertools import repeat
+from typing import Any
+
+import numpy as np
+
+from mbref.equations.branches import SMOOTH, Passed
+from mbref.equations.initial_state import Start
+from mbref.equations.model import Model
+from mbref.kernels.layout import OK, SINGULAR_AHEAD
+from mbref.kernels.lent_memory import Lent, copied, fill, lent, shapes_of, take_back
+from mbref.kernels.machine_code import NoGeneratedCode
+from mbref.kernels.named_memory import allocate
+from mbref.simulation.limits import AUTO, GENERATED, GENERIC
+from mbref.simulation.run import Run
+from mbref.simulation.singular_start import fits_no_branch, leaving
+from mbref.simulation.stepping import DONE, PAUSED, UNDECIDED
+from mbref.taylor.advance import advance_series, enter
+from mbref.taylor.driven import LEAST_ORDER as LEAST_DRIVEN_ORDER
+from mbref.taylor.driven import LOOSE, ORDER, follow_drivers
+from mbref.taylor.geometry import geometry_of
+from mbref.taylor.layout import Polynomials, Series, SeriesKernels, TaylorMemory
+from mbref.taylor.leaving import Departure
+from mbref.taylor.long_crossing import begin_crossing, cross, end_crossing, go_on, look_along
+from mbref.taylor.outputs import complete_samples
+from mbref.taylor.polynomials import Geometry
+from mbref.taylor.simd import padded_size
+from mbref.taylor.start import OFF
+from mbref.taylor.stepping import begin, expand_from, step
+from mbref.taylor.twin import LEAST_CHANGE
+
+EXACT, EXACT_ORDER = 1e-13, 22  # rtol and atol of steps that pass singular positions, and their least order
+SHARE = 0.05  # of rtol + atol: the tolerance of a step that is clear of singular positions
+KEPT = 16  # singular positions that are passed in a call
+CALLED = (begin, expand_from, step)  # the SeriesKernels
+KERNELS_OF_SERIES = (
+    *CALLED, enter, advance_series, follow_drivers, complete_samples, begin_crossing, cross, go_on,
+    end_crossing, look_along,
+)  # fmt: skip
+ROUNDING = 1e-16  # of a singular value
+STEPS_WORTH_CODE = 20_000  # steps ahead from which on generated code saves more time than it takes
+LEAST_ORDER, MOST_ORDER = 4, 30
+CHEAPEST = {GENERIC: (6.0, 1.2), GENERATED: (7.0, 1.6)}  # order: at a tolerance of 1, and more per digit
+
+
+def order_of(tolerance: float, wanted: float, code: str) -> int:
+    """Return the order of the series: the one wanted, or for 0 the cheapest; ValueError outside 4 to 30."""
+    if wanted == 0:
+        first, per_digit = CHEAPEST[code]
+        best = 2 * round((first - per_digit * np.log10(tolerance)) / 2)
+        return int(min(max(best, LEAST_ORDER), MOST_ORDER))
+    if wanted not in range(LEAST_ORDER, MOST_ORDER + 1):
+        raise ValueError(f"taylor: order must be {LEAST_ORDER} to {MOST_ORDER}, got {wanted:g}")
+    return int(wanted)
+
+
+class SeriesStepper:
+    """The steps of one run in Taylor series, across singular positions.
+
+    ``strides`` says whether drivers alone are followed (``mbref.taylor.driven``).
+    """
+
+    def __init__(self, run: Run):
+        self.run = run
+        self._decide_rank()
+        prepare_series()
+        columns = run.memory.active.velocities.size
+        self.is_driven = run.ranks.rank == columns and not run.model.has_angles
+        self.strides, tolerance, order = self._kind_of_steps()
+        self.geometry, self.polynomials = self.equations_of(run.model, run.start)
+        exact_order = max(order, EXACT_ORDER) if run.model.closed_loops else order
+        self._lent = self._lend_memory(exact_order)
+        self.taylor, self._argument = self._lent.values, self._lent.packed.argument
+        self._calls, self._sampling = 0, 0.0  # of kernels that take steps; s of CPU time spent on samples
+        self._options = {
+            "order": order, "usual_order": order, "exact_order": exact_order,
+            "tolerance": tolerance, "usual": tolerance, "exact": SHARE * (EXACT + EXACT),
+            "change": max(run.memory.control.rtol, LEAST_CHANGE), "end": run.times[-1],
+            "farthest": OFF * max(1.0, run.model.length), "striding": self.strides,
+            "freedoms": columns - run.ranks.rank,
+        }  # fmt: skip
+        self._put_options()
+        self._departure = Departure(run, self.taylor, self.expand, self._state_at)
+        self._wants_code = run.limits.code == AUTO
+        if run.limits.code == GENERATED:
+            self._put_code()
+
+    # --- memory -------------------------------------------------------------------------------------------
+    def _kind_of_steps(self) -> tuple[bool, float, int]:
+        """Return whether steps are strides, and the tolerance and the order of their series."""
+        run, code = self.run, self.run.limits.code
+        wanted = run.method.options_of(run.method.integrator)["order"]
+        if self.is_driven and not run.limits.branches and (wanted == 0 or wanted >= LEAST_DRIVEN_ORDER):
+            return True, LOOSE, order_of(LOOSE, wanted or ORDER, GENERIC)
+        tolerance = SHARE * (run.memory.control.rtol + run.memory.control.atol)
+        return False, tolerance, order_of(tolerance, wanted, GENERATED if code == GENERATED else GENERIC)
+
+    def _decide_rank(self) -> None:
+        """Have the elimination count as many rows as independent as singular values do at the start."""
+        settings, (_, least, rounding) = self.run.memory.equations.system.settings, self.run.ranks
+        if settings.nearly_dependent:
+            settings.rank_tolerance = (least * max(rounding, ROUNDING)) ** 0.5
+
+    def equations_of(self, model: Model, start: Start) -> tuple[Geometry, Polynomials]:
+        """Return the natural coordinates and equations of a scene that differs from the run's in numbers
+        alone, from its start."""
+        moving = np.zeros(model.n, dtype=bool)
+        moving[self.run.memory.active.velocities] = True
+        geometry = geometry_of(model, start, moving, self.strides)
+        return geometry, geometry.polynomials(model)
+
+    def _lend_memory(self, order: int) -> Lent:
+        """Memory of the series with the numbers of this run."""
+        run, natural, polynomials = self.run, self.geometry.natural, self.polynomials
+        nz, ng, nr = len(natural.kept), len(natural.given), len(natural.rows)
+        sizes = {
+            "orders": order + 1, "nz": nz, "ng": ng, "nr": nr,
+            "lanes": padded_size(max(1, nz + nr + ng)), "slots": polynomials.products.left.size,
+            "twofold": polynomials.rows.row.size, "kept": KEPT, "k": run.times.size,
+            "springs": polynomials.springs.natural.size, "torsions": polynomials.torsions.slot.size,
+            **run.model.sizes,
+        }  # fmt: skip
+        shapes = shapes_of_equations(self.geometry, polynomials)
+        key = (TaylorMemory, *sizes.values(), shapes, run.limits.branches)
+        memory = lent(key, lambda: self._allocate(sizes), run.lent)
+        put_equations(memory.values, self.geometry, polynomials)
+        return memory
+
+    def _allocate(self, sizes: Mapping[str, int]) -> TaylorMemory:
+        """Memory of the series, ready but for numbers."""
+        orders, nz, nr = sizes["orders"], sizes["nz"], sizes["nr"]
+        series = allocate(Series, sizes)
+        grown = np.arange(1.0, orders + 1) * np.arange(2.0, orders + 2)
+        series.scale[:, :nz], series.scale[:, nz : nz + nr] = -1.0 / grown[:, None], -1.0
+        series.growth[:], series.growth[:, nz : nz + nr] = 1.0, grown[:, None]
+        series.variable[:nz] = 1.0
+        parting = [k for k, taken in dict(self.run.limits.branches).items() if taken != SMOOTH]
+        return allocate(
+            TaylorMemory,
+            sizes,
+            run=self.run.memory,
+            polynomials=copied(self.polynomials),
+            pose_maps=copied(self.geometry.pose_maps),
+            series=series,
+            kernels=SeriesKernels(*(kernel.pointer for kernel in CALLED)),
+            parting=np.array(parting, np.int64),
+        )
+
+    def give_back(self) -> None:
+        """Leave the memory to the next run; this one cannot be read any more."""
+        take_back(self._lent)
+
+    def _put_options(self) -> None:
+        """Have memory hold the numbers of the method."""
+        for name, value in self._options.items():
+            self.taylor.progress[name] = value
+
+    # --- another scene of equal structure, whose numbers memory holds --------------------------------------
+    @property
+    def was_short(self) -> bool:
+        """Whether the run was completed by one call of kernels."""
+        return self._calls == 1
+
+    @property
+    def memory(self) -> TaylorMemory:
+        """All memory that a run changes."""
+        return self.taylor
+
+    def enter(self) -> None:
+        """Start from the state in memory: the first step does."""
+
+    def begin_again(self) -> None:
+        """Have memory of its own be as when the run began."""
+        self._lent.restore()
+        put_equations(self.taylor, self.geometry, self.polynomials)
+        self._put_options()
+        self._decide_rank()
+
+    def numbers(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
+        """Where its memory has numbers in which scenes differ, and those of scenes of ``lengths`` (s,)."""
+        return [(self.taylor.progress, OFF * np.maximum(1.0, lengths), "farthest")]
+
+    def takes(self, model: Callable[[], Model], start: Start) -> bool:
+        """Put the equations of a scene; False where they have no room."""
+        equations = self.equations_of(model(), start)
+        if shapes_of_equations(*equations) != shapes_of_equations(self.geometry, self.polynomials):
+            return False
+        put_equations(self.taylor, *equations)
+        return True
+
+    def advance_once(self) -> tuple[int, float]:
+        """Advance by one call of kernels: the status, and the process CPU time of the stepping alone (s)."""
+        began = time.process_time()
+        status = self.take_steps()
+        seconds = time.process_time() - began
+        self.run.crossings += self.recorded()
+        return self._complete_samples(status, go_on=False), seconds
+
+    # --- generated code -----------------------------------------------------------------------------------
+    def _generate_where_it_pays(self) -> None:
+        """Go on with generated code where many steps are ahead."""
+        if self._wants_code and self._steps_ahead() >= STEPS_WORTH_CODE:
+            self._wants_code = False
+            with contextlib.suppress(NoGeneratedCode):  # then the generic kernels go on
+                self._put_code()
+
+    def _steps_ahead(self) -> float:
+        """Steps to the end at the pace so far, or to the limit of steps."""
+        run = self.run
+        taken, reached = run.memory.equations.system.counts.steps, run.memory.loop.clock.time
+        return min(taken * (run.times[-1] / reached - 1.0), run.limits.most_steps - taken)
+
+    def _put_code(self) -> None:
+        """Expand the series by generated code from now on; raises NoGeneratedCode where there is none."""
+        began = time.process_time()
+        try:
+            from mbref.taylor.generated.build import put_code  # optional, and not needed by most runs
+        except ModuleNotFoundError:
+            raise NoGeneratedCode("the subpackage mbref.taylor.generated is not installed") from None
+        self._code = put_code(self.taylor)
+        self.run.making += time.process_time() - began
+
+    # --- steps --------------------------------------------------------------------------------------------
+    def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
+        """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
+        making, began = self.run.making, time.process_time()
+        status = self._leave_start()
+        while status == PAUSED:
+            status = self.take_steps()
+            self.run.crossings += self.recorded()
+            if status != DONE and (status == SINGULAR_AHEAD or self._leaves_branch()):
+                status = self._begin_again(self._cross() if status == SINGULAR_AHEAD else self._take_branch())
+            else:
+                status = self._complete_samples(status, go_on=status == PAUSED)
+            if status == PAUSED:
+                self._generate_where_it_pays()
+            if progress is not None:
+                progress(float(self.run.memory.loop.clock.time))
+        seconds = time.process_time() - began
+        return status, seconds - self._sampling - (self.run.making - making)
+
+    def take_steps(self) -> int:
+        """Take as many steps as are taken at a time: PAUSED after them, DONE at the end, or the reason why
+        there are none."""
+        self._calls += 1
+        return int((follow_drivers if self.strides else advance_series)(self._argument))
+
+    def expand(self) -> int:
+        """Expand at the present time and state, for steps until the end: OK or the reason why not."""
+        self.taylor.progress.end = self.run.times[-1]
+        return int(enter(self._argument))
+
+    def _begin_again(self, status: int) -> int:
+        """The status of a crossing whose samples are completed, and behind which a series has begun."""
+        status = self._complete_samples(status, go_on=False)
+        return UNDECIDED if status == PAUSED and self.expand() != OK else status
+
+    def _complete_samples(self, status: int, go_on: bool) -> int:
+        """The status of steps whose samples are completed, or the reason why one cannot be."""
+        began = time.process_time()
+        completed = int(complete_samples(int(go_on), self._argument))
+        self._sampling += time.process_time() - began
+        return status if completed == OK or status == UNDECIDED else completed
+
+    def recorded(self) -> list[Passed]:
+        """The singular positions crossed since they were last asked for, along smooth branches."""
+        progress = self.taylor.progress
+        passed, progress.passed = int(progress.passed), 0
+        if not passed:
+            return []
+        times, coordinates, velocities = (found[:passed].copy() for found in self.taylor.crossings)
+        return list(map(Passed, times.tolist(), coordinates, velocities, repeat(SMOOTH)))
+
+    # --- singular positions -------------------------------------------------------------------------------
+    def _asked(self, number: int) -> int:
+        """The branch to take at a singular position, both counted from 1."""
+        return dict(self.run.limits.branches).get(number, SMOOTH)
+
+    def _leaves_branch(self) -> bool:
+        """Whether the last singular position is to be left along another branch, not yet taken."""
+        crossings = self.run.crossings
+        return bool(crossings) and crossings[-1].taken != self._asked(len(crossings))
+
+    def _cross(self) -> int:
+        """Cross the singular position ahead: PAUSED clear of it, DONE at the end, else the reason why not."""
+        self._calls += 1
+        return self._until_clear(int(cross(self._argument)), [])
+
+    def _take_branch(self) -> int:
+        """Go on along the branch asked for at the last singular position: as ``_cross``."""
+        crossings = self.run.crossings
+        begin_crossing(self._argument)
+        taken = [crossings.pop()._replace(taken=self._asked(len(crossings) + 1))]
+        return self._until_clear(self._departure.along_branch(taken[0]), taken)
+
+    def _leave_start(self) -> int:
+        """Leave a singular position at t = 0: PAUSED, also where there is none, DONE at the end, else the
+        reason why the motion cannot be followed."""
+        way = leaving(self.run) if self.run.times[-1] > 0.0 else None
+        if way is None:
+            return UNDECIDED if fits_no_branch(self.run) else PAUSED
+        self._calls += 1
+        begin_crossing(self._argument)
+        return self._begin_again(self._until_clear(self._departure.from_start(way), []))
+
+    def _until_clear(self, status: int, crossed: list[Passed]) -> int:
+        """The status of exact steps that go on until they are clear of singular positions, those ``crossed``
+        being the first, and whose motion is determined."""
+        counts: Any = self.run.memory.equations.system.counts
+        while status in (PAUSED, DONE):
+            branch = self._record(crossed)
+            if branch is not None:
+                counts.crossings = len(self.run.crossings) + len(crossed)
+                status = self._departure.along_branch(branch)
+            elif status == DONE or self.taylor.progress.is_clear:
+                break
+            else:
+                status = int(go_on(self._argument))
+        status = int(end_crossing(status, self._argument))
+        if status in (PAUSED, DONE):
+            self.run.crossings += crossed
+        return status
+
+    def _record(self, crossed: list[Passed]) -> Passed | None:
+        """Add the singular positions that the last step crossed, up to one to be left along another branch:
+        that one, or None."""
+        for passed in self.recorded():
+            taken = self._asked(len(self.run.crossings) + len(crossed) + 1)
+            crossed.append(passed._replace(taken=taken))
+            if taken != SMOOTH:
+                return crossed[-1]
+        return None
+
+    def _state_at(self, ahead: float) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates and velocities at a distance (s) from where the series begins, left in memory."""
+        look_along(ahead, self._argument)
+        state = self.run.memory.state
+        return state.coordinates.copy(), state.velocities.copy()
+
+
+def shapes_of_equations(geometry: Geometry, polynomials: Polynomials) -> Hashable:
+    """The shapes of the equations of a scene: all of them have room in memory that is made for one."""
+    return shapes_of((polynomials, geometry.pose_maps, geometry.tableau))
+
+
+def put_equations(memory: TaylorMemory, geometry: Geometry, polynomials: Polynomials) -> None:
+    """Have memory of series hold the equations of a scene."""
+    fill(memory.polynomials, polynomials)
+    fill(memory.pose_maps, geometry.pose_maps)
+    memory.solver.linear[:], memory.solver.place[:] = geometry.tableau
+
+
+def prepare_series() -> None:
+    """Compile the kernels of the series, or load them from the cache of this machine."""
+    for kernel in KERNELS_OF_SERIES:
+        kernel.prepare()
