@@ -11,7 +11,7 @@ import numpy as np
 
 from mbref.simulation.run import Run
 
-TRANSMISSION = 1e3  # of velocities over rates, at the place where steps or iterations fail
+TRANSMISSION = 1e2  # of velocities over rates, at the place where steps or iterations fail
 ROUNDING = 1e-13  # relative singular value of redundant rows
 MOST_ROWS = 400  # least squares of more take seconds
 

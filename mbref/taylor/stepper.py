@@ -76,7 +76,7 @@ class SeriesStepper:
         self.geometry, self.polynomials = self.equations_of(run.model, run.start)
         exact_order = max(order, EXACT_ORDER) if run.model.closed_loops else order
         self._lent = self._lend_memory(exact_order)
-        self.taylor, self._argument = self._lent.values, self._lent.packed.argument
+        self.taylor, self.argument = self._lent.values, self._lent.packed.argument
         self._calls, self._sampling = 0, 0.0  # of kernels that take steps; s of CPU time spent on samples
         self._options = {
             "order": order, "usual_order": order, "exact_order": exact_order,
@@ -249,12 +249,12 @@ class SeriesStepper:
         """Take as many steps as are taken at a time: PAUSED after them, DONE at the end, or the reason why
         there are none."""
         self._calls += 1
-        return int((follow_drivers if self.strides else advance_series)(self._argument))
+        return int((follow_drivers if self.strides else advance_series)(self.argument))
 
     def expand(self) -> int:
         """Expand at the present time and state, for steps until the end: OK or the reason why not."""
         self.taylor.progress.end = self.run.times[-1]
-        return int(enter(self._argument))
+        return int(enter(self.argument))
 
     def _begin_again(self, status: int) -> int:
         """The status of a crossing whose samples are completed, and behind which a series has begun."""
@@ -264,7 +264,7 @@ class SeriesStepper:
     def _complete_samples(self, status: int, go_on: bool) -> int:
         """The status of steps whose samples are completed, or the reason why one cannot be."""
         began = time.process_time()
-        completed = int(complete_samples(int(go_on), self._argument))
+        completed = int(complete_samples(int(go_on), self.argument))
         self._sampling += time.process_time() - began
         return status if completed == OK or status == UNDECIDED else completed
 
@@ -290,12 +290,12 @@ class SeriesStepper:
     def _cross(self) -> int:
         """Cross the singular position ahead: PAUSED clear of it, DONE at the end, else the reason why not."""
         self._calls += 1
-        return self._until_clear(int(cross(self._argument)), [])
+        return self._until_clear(int(cross(self.argument)), [])
 
     def _take_branch(self) -> int:
         """Go on along the branch asked for at the last singular position: as ``_cross``."""
         crossings = self.run.crossings
-        begin_crossing(self._argument)
+        begin_crossing(self.argument)
         taken = [crossings.pop()._replace(taken=self._asked(len(crossings) + 1))]
         return self._until_clear(self._departure.along_branch(taken[0]), taken)
 
@@ -306,7 +306,7 @@ class SeriesStepper:
         if way is None:
             return UNDECIDED if fits_no_branch(self.run) else PAUSED
         self._calls += 1
-        begin_crossing(self._argument)
+        begin_crossing(self.argument)
         return self._begin_again(self._until_clear(self._departure.from_start(way), []))
 
     def _until_clear(self, status: int, crossed: list[Passed]) -> int:
@@ -321,8 +321,8 @@ class SeriesStepper:
             elif status == DONE or self.taylor.progress.is_clear:
                 break
             else:
-                status = int(go_on(self._argument))
-        status = int(end_crossing(status, self._argument))
+                status = int(go_on(self.argument))
+        status = int(end_crossing(status, self.argument))
         if status in (PAUSED, DONE):
             self.run.crossings += crossed
         return status
@@ -339,7 +339,7 @@ class SeriesStepper:
 
     def _state_at(self, ahead: float) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates and velocities at a distance (s) from where the series begins, left in memory."""
-        look_along(ahead, self._argument)
+        look_along(ahead, self.argument)
         state = self.run.memory.state
         return state.coordinates.copy(), state.velocities.copy()
 

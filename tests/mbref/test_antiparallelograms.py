@@ -45,12 +45,11 @@ def four_bar(places, driver=None):
     return scene.with_(driver=(Driver(joint="P0", polynomial=driver),)) if driver else scene
 
 
-@pytest.mark.parametrize("method", ["alf-dual+projection", "taylor"])
 @pytest.mark.parametrize("seed", range(10))
-def test_a_driven_crossed_four_bar_stays_crossed_through_flat_positions(seed, method):
+def test_a_driven_crossed_four_bar_stays_crossed_through_flat_positions(seed):
     crank, frame, angle, rate = drawn(seed)
     times = np.linspace(0.0, END, 31)
-    run = simulate(four_bar(pins(crank, frame, angle), (0.0, rate)), method, times, Limits(rtol=1e-9))
+    run = simulate(four_bar(pins(crank, frame, angle), (0.0, rate)), "taylor", times, Limits(rtol=1e-9))
     places = [pins(crank, frame, angle + rate * t) for t in times]
     expected = np.array([(end + pin) / 2 for _, end, pin, _ in places])
     assert run.outcome.label == "COMPLETED" and run.crossings, run.message

@@ -8,6 +8,7 @@ from mbref.kernels.layout import OK
 from mbref.method import Method
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits
+from mbref.simulation.start_run import start_run
 from mbref.taylor.layout import SERIES
 from mbref.taylor.overlap import (
     motions_oppose,
@@ -18,7 +19,6 @@ from mbref.taylor.overlap import (
     size_of_motion,
 )
 from mbref.taylor.partition import choose
-from mbref.taylor.run import TaylorRun
 from mbref.taylor.solver import respond
 
 NEGATIVE, ALIKE = 1, 2
@@ -54,9 +54,9 @@ def by_choosing(memory):
 @pytest.mark.parametrize("name", ("planar_slider_crank", "spatial_slider_crank_gravity", "four_bar_gravity"))
 def test_pivots_and_motions_tell_the_determinant(name, signs):
     """Of the gradient where a motion begins and that at drawn variables."""
-    run = TaylorRun(SCENES[name](), Method.parse("taylor"), np.array([0.1]), Limits(code="generic"))
-    assert run.expand() == OK
-    taylor, rng, found = run.taylor, np.random.default_rng(3), set()
+    run = start_run(SCENES[name](), Method.parse("taylor"), np.array([0.1]), Limits(code="generic"))
+    assert run.stepper.expand() == OK
+    taylor, rng, found = run.stepper.taylor, np.random.default_rng(3), set()
     solver, progress, nz = taylor.solver, taylor.progress, taylor.solver.pivot_columns.size
     assert progress.rank == nz - 1 == solver.pivot_rows.size
     taylor.series.past[:], progress.past_choice = taylor.series.terms, progress.choice
@@ -64,7 +64,7 @@ def test_pivots_and_motions_tell_the_determinant(name, signs):
     progress.past_odd = progress.odd
     for _ in range(200):
         taylor.series.terms[0, :nz] = rng.normal(size=nz)
-        told = int(signs(run.packed_series.argument))
+        told = int(signs(run.stepper.argument))
         assert told >= ALIKE
         found.add((told - ALIKE, bool(progress.odd)))
     assert {negative for negative, _ in found} == {0, 1}

@@ -14,7 +14,7 @@ from mbref.scenes import SCENES
 from mbref.scenes.links import CRANK_RATE, about_z, link, midpoint
 from mbref.scenes.planar_slider_crank import slider_crank
 from mbref.simulation.simulate import Limits, simulate
-from mbref.taylor.run import TaylorRun
+from mbref.simulation.start_run import start_run
 
 LINKAGES = ("four_bar", "five_bar")
 ROUNDING = 1e-12  # of positions, over the scene's length
@@ -100,8 +100,8 @@ def test_an_order_that_is_asked_for_is_kept():
 
 
 def natural(name):
-    run = TaylorRun(SCENES[name](), Method.parse("taylor"), np.array([0.01]), Limits())
-    return run.geometry.natural
+    run = start_run(SCENES[name](), Method.parse("taylor"), np.array([0.01]), Limits())
+    return run.stepper.geometry.natural
 
 
 @pytest.mark.parametrize("name", LINKAGES)

@@ -9,7 +9,7 @@ import pytest
 
 from mbref.cli import first_run
 from mbref.cli.commands import main
-from mbref.method import DEFAULT
+from mbref.method import SPARSE
 from mbref.scene import SceneError
 from mbref.scenes import SCENES
 from mbref.simulation import simulate as compiled
@@ -41,7 +41,7 @@ def cold(monkeypatch):
     monkeypatch.setattr(first_run, "_compile", for_ever)
 
 
-def motion(method=DEFAULT):
+def motion(method=SPARSE):
     """The motion, and the times told as progress; an interrupt ends the wait for the compilation."""
     found, told = [], []
     with contextlib.suppress(KeyboardInterrupt), first_run.simulator(method) as simulate:
@@ -52,7 +52,7 @@ def motion(method=DEFAULT):
 
 def test_interpreted_kernels_give_the_same_motion_before_kernels_are_compiled():
     found, told = motion()
-    expected = compiled.simulate(SCENES["four_bar_gravity"](), DEFAULT, TIMES, Limits())
+    expected = compiled.simulate(SCENES["four_bar_gravity"](), SPARSE, TIMES, Limits())
     assert found.settings["kernels"] == "interpreted" and told == [TIMES[-1]]
     assert "kernels" not in expected.settings
     np.testing.assert_allclose(found.position, expected.position, rtol=0, atol=1e-9)
@@ -80,5 +80,5 @@ def test_the_command_waits_for_the_compilation_after_its_result(monkeypatch, cap
 
 def test_one_processor_compiles_first(monkeypatch):
     monkeypatch.setattr(os, "cpu_count", lambda: 1)
-    with first_run.simulator(DEFAULT) as simulate:
+    with first_run.simulator(SPARSE) as simulate:
         assert simulate is compiled.simulate

@@ -9,8 +9,8 @@ from mbref.formulations import FORMULATIONS
 from mbref.kernels.layout import NOT_CONVERGED, OK, SINGULAR
 from mbref.method import Method
 from mbref.scenes import SCENES, find_scene
-from mbref.simulation.run import Run
 from mbref.simulation.simulate import Limits, simulate
+from mbref.simulation.start_run import start_run
 from mbref.trajectory import Outcome
 
 
@@ -167,7 +167,7 @@ def test_rows_known_to_be_independent_need_one_iteration_and_no_alpha():
 
 @pytest.mark.parametrize(("name", "independent"), [("bennett", False), ("spatial_slider_crank", True)])
 def test_alpha_is_left_out_for_independent_rows_alone(name, independent):
-    run = Run(SCENES[name](), Method.parse("alf-dual+projection"), np.array([0.1]), Limits())
+    run = start_run(SCENES[name](), Method.parse("alf-dual+projection"), np.array([0.1]), Limits())
     assert run.memory.equations.system.settings.independent == independent
 
 
@@ -185,7 +185,7 @@ def test_only_coordinates_that_move_are_integrated(stabilisation):
     scene, sizes = find_scene("four_bar_chain[3]"), []
     for formulation in ("alf-dual", "mpi-qr"):
         method = Method.parse(f"{formulation}+{stabilisation}/rk4[step=0.01]")
-        run = Run(scene, method, np.array([0.1]), Limits())
+        run = start_run(scene, method, np.array([0.1]), Limits())
         run.advance(None)
         sizes.append(int(run.memory.loop.clock.y_size))
         turns = run.memory.state.coordinates.reshape(-1, 7)[:, 3:]

@@ -17,9 +17,9 @@ from mbref.scene import Driver
 from mbref.scenes import SCENES, find_scene
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.simulate import Limits, simulate, why_no_code
+from mbref.simulation.start_run import start_run
 from mbref.simulation.stepping import DONE
 from mbref.taylor.generated import build
-from mbref.taylor.run import TaylorRun
 from mbref.trajectory import Outcome
 
 TAYLOR = Method.parse("taylor")
@@ -32,9 +32,9 @@ MECHANISMS = (
 
 def terms(scene, code):
     """Terms (orders, lanes) of the series about the start, each over t^order, t its own time (s)."""
-    run = TaylorRun(scene, ORDER_16, np.array([0.1]), Limits(code=code))
-    assert run.expand() == OK
-    found = run.taylor.series.terms.copy()
+    run = start_run(scene, ORDER_16, np.array([0.1]), Limits(code=code))
+    assert run.stepper.expand() == OK
+    found = run.stepper.taylor.series.terms.copy()
     sizes = np.abs(found[2:]).max(axis=1)
     time = (sizes[0] / sizes.max()) ** (1.0 / max(1, sizes.argmax()))
     found *= time ** np.arange(len(found))[:, None]
@@ -44,15 +44,15 @@ def terms(scene, code):
 def agree(scene):
     """Whether the terms of a scene's code are those of the kernels; by power it gives those of variables."""
     (expected, _), (found, run) = (terms(scene, code) for code in ("generic", "generated"))
-    by_power = run.taylor.progress.slowing > 0.0
-    lanes = slice(run.taylor.solver.pivot_columns.size if by_power else None)
+    by_power = run.stepper.taylor.progress.slowing > 0.0
+    lanes = slice(run.stepper.taylor.solver.pivot_columns.size if by_power else None)
     return np.abs(found - expected)[:, lanes].max() <= 1e-11 * np.abs(expected).max()
 
 
 def in_motion(scene, duration):
     """Coordinates and velocities of all bodies after a time (s)."""
-    run = TaylorRun(scene, TAYLOR, np.array([duration]), Limits(rtol=1e-10, code="generic"))
-    run.advance(None)
+    run = start_run(scene, TAYLOR, np.array([duration]), Limits(rtol=1e-10, code="generic"))
+    run.stepper.advance(None)
     samples = run.memory.loop.samples
     return samples.coordinates[0].copy(), samples.velocities[0].copy()
 
@@ -98,12 +98,13 @@ def test_power_gives_the_terms_of_one_freedom(name, duration):
     scene, found = SCENES[name](), []
     state = in_motion(scene, duration)
     for code in ("generic", "generated"):
-        run = TaylorRun(scene, ORDER_16, np.array([0.1]), Limits(code=code))
+        run = start_run(scene, ORDER_16, np.array([0.1]), Limits(code=code))
         run.memory.state.coordinates[:], run.memory.state.velocities[:] = state
         run.memory.loop.clock.length = duration
-        assert run.expand() == OK
-        found.append(run.taylor.series.terms[:17, : run.taylor.solver.pivot_columns.size].copy())
-    assert run.taylor.progress.slowing > 0.0, "by power"
+        assert run.stepper.expand() == OK
+        taylor = run.stepper.taylor
+        found.append(taylor.series.terms[:17, : taylor.solver.pivot_columns.size].copy())
+    assert run.stepper.taylor.progress.slowing > 0.0, "by power"
     sizes = np.abs(found[0]).max(axis=1)
     time = min(duration, (sizes[2:] ** (-1.0 / np.arange(2, 17))).min())
     off = np.abs(found[0] - found[1]).max(axis=1) * time ** np.arange(17)
@@ -146,37 +147,24 @@ def _reactions(one, other):
     return [(one.reactions[joint], other.reactions[joint]) for joint in one.reactions or ()]
 
 
-@pytest.mark.parametrize("name", ("spatial_slider_crank_gravity", "four_bar_gravity", "four_bar"))
-def test_samples_that_find_no_room_to_wait_are_the_same(name, monkeypatch):
-    """But for rounding; also where steps cross singular positions."""
-    found, times = [], np.linspace(0.0, SCENES[name]().duration, 41)
-    for waiting in (1024, 7, 0):
-        monkeypatch.setattr(TaylorRun, "most_waiting", waiting)
-        found.append(simulate(SCENES[name](), TAYLOR, times, Limits(code="generic")))
-    for other in found[1:]:
-        assert len(other.times) == 41
-        for array in ("position", "velocity", "acceleration"):
-            np.testing.assert_allclose(getattr(found[0], array), getattr(other, array), 1e-11, 1e-11)
-
-
 def test_auto_takes_the_code_where_many_steps_are_ahead():
     scene, times = SCENES["planar_slider_crank"](), np.array([0.4])
     limits = Limits(rtol=1e-9, largest_step=1.2e-5)
-    run = TaylorRun(scene, TAYLOR, times, limits)
-    auto = trajectory_of(run, *run.advance(None), 0.0)
-    assert run.taylor.code.expand != 0
+    run = start_run(scene, TAYLOR, times, limits)
+    auto = trajectory_of(run, *run.stepper.advance(None), 0.0)
+    assert run.stepper.taylor.code.expand != 0
     generic = simulate(scene, "taylor", times, Limits(rtol=1e-9, code="generic"))
     assert np.abs(auto.position - generic.position).max() < 1e-6
-    short = TaylorRun(scene, TAYLOR, np.array([0.1]), limits)
-    short.advance(None)
-    assert short.taylor.code.expand == 0, "a short run does not make code"
+    short = start_run(scene, TAYLOR, np.array([0.1]), limits)
+    short.stepper.advance(None)
+    assert short.stepper.taylor.code.expand == 0, "a short run does not make code"
 
 
 def test_one_process_loads_the_code_of_a_scene_once():
     crank = SCENES["planar_slider_crank"]()
-    first, again = (TaylorRun(crank, TAYLOR, np.array([0.1]), Limits(code="generated")) for _ in "ab")
+    first, again = (start_run(crank, TAYLOR, np.array([0.1]), Limits(code="generated")) for _ in "ab")
     assert first.taylor.code.expand == again.taylor.code.expand != 0
-    finer = TaylorRun(crank, TAYLOR, np.array([0.1]), Limits(rtol=1e-12, code="generated"))
+    finer = start_run(crank, TAYLOR, np.array([0.1]), Limits(rtol=1e-12, code="generated"))
     assert finer.taylor.progress.order > first.taylor.progress.order
     assert finer.taylor.code.expand == first.taylor.code.expand, "one code serves all orders"
 
@@ -184,8 +172,8 @@ def test_one_process_loads_the_code_of_a_scene_once():
 def test_springs_are_left_to_the_kernels_and_long_eliminations_too():
     names = {}
     for scene in ("planar_slider_crank", "andrews_squeezer", "bricard"):
-        run = TaylorRun(SCENES[scene](), TAYLOR, np.array([0.01]), Limits(code="generated"))
-        names[scene] = {name for name in build.NAMES if run.taylor.code[name]}
+        run = start_run(SCENES[scene](), TAYLOR, np.array([0.01]), Limits(code="generated"))
+        names[scene] = {name for name in build.NAMES if run.stepper.taylor.code[name]}
     corrections = {"violation", "close", "close_rate"}
     assert names["planar_slider_crank"] == {"expand", "factorise", *corrections}
     assert names["andrews_squeezer"] == {"factorise", *corrections}
@@ -196,12 +184,12 @@ def test_springs_are_left_to_the_kernels_and_long_eliminations_too():
 def test_every_order_is_that_of_the_kernels(order):
     method = Method.parse(f"taylor[order={order}]")
     generic, own = (
-        TaylorRun(SCENES["spatial_slider_crank_gravity"](), method, np.array([0.1]), Limits(code=code))
+        start_run(SCENES["spatial_slider_crank_gravity"](), method, np.array([0.1]), Limits(code=code))
         for code in ("generic", "generated")
     )
-    assert own.expand() == generic.expand() == OK
-    variables = own.taylor.solver.pivot_columns.size
-    found, expected = (run.taylor.series.terms[: order + 1, :variables] for run in (own, generic))
+    assert own.stepper.expand() == generic.stepper.expand() == OK
+    variables = own.stepper.taylor.solver.pivot_columns.size
+    found, expected = (run.stepper.taylor.series.terms[: order + 1, :variables] for run in (own, generic))
     assert np.abs(expected[order]).max() > 0.0
     size = np.abs(expected).max(axis=1, keepdims=True)
     assert (np.abs(found - expected) <= 1e-9 * size).all()
@@ -265,6 +253,8 @@ def test_mbref_runs_without_the_subpackage(tmp_path):
 def test_auto_goes_on_by_the_kernels_without_the_subpackage(monkeypatch):
     monkeypatch.setitem(sys.modules, "mbref.taylor.generated.build", None)
     scene, times = SCENES["planar_slider_crank"](), np.array([0.4])
-    run = TaylorRun(scene, TAYLOR, times, Limits(rtol=1e-9, largest_step=1.2e-5))
-    assert run.advance(None)[0] == DONE
-    assert not run.wants_code and run.taylor.code.expand == 0, "code was asked for, and there is none"
+    run = start_run(scene, TAYLOR, times, Limits(rtol=1e-9, largest_step=1.2e-5))
+    assert run.stepper.advance(None)[0] == DONE
+    assert not run.stepper._wants_code and run.stepper.taylor.code.expand == 0, (
+        "code was asked for, and there is none"
+    )

@@ -10,7 +10,7 @@ from mbref.method import Method
 from mbref.scene import Body, Driver, Fixed, Force, Revolute, Scene, Spring, Translational
 from mbref.scenes import SCENES, find_scene
 from mbref.simulation.simulate import Limits, simulate
-from mbref.taylor.run import CrossingRun as Run
+from mbref.simulation.start_run import start_run
 
 METHOD = "alf-dual+projection"
 ORIGIN, X, Z = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
@@ -56,7 +56,7 @@ WELD = Scene(
 
 def held(scene):
     """The columns that rows hold, as body and axis: x, y, z of its position, a, b, c of its own frame."""
-    run = Run(scene, Method.parse(METHOD), np.array([0.1]), Limits())
+    run = start_run(scene, Method.parse(METHOD), np.array([0.1]), Limits())
     moving, entries = active_entries(run.model, run.start.q, run.start.v)
     found, left = held_by_rows(run.model, run.start, moving, entries)
     columns = [column for each in found for column in each.columns]
@@ -123,7 +123,7 @@ def test_rows_of_changing_length_or_at_an_angle_do_not_hold():
 )
 def test_what_is_held_cannot_move_at_any_pose_of_the_motion(scene):
     """Φ_q v = 0 has no solution that moves it: the null space has zeros there, wherever the rest goes."""
-    run = Run(scene, Method.parse(METHOD), np.linspace(0.0, 0.05, 4), Limits())
+    run = start_run(scene, Method.parse(METHOD), np.linspace(0.0, 0.05, 4), Limits())
     moving, entries = active_entries(run.model, run.start.q, run.start.v)
     found, _ = held_by_rows(run.model, run.start, moving, entries)
     columns = [column for each in found for column in each.columns]
@@ -150,7 +150,7 @@ MECHANISMS = (*(SCENES[name]() for name in NAMES), RAIL, SLEEVE, WELD, TWO_GUIDE
 )
 def test_accelerations_and_multipliers_satisfy_all_equations_of_motion(scene, method):
     """M q̈ + Φ_qᵀ λ = g in every column, those held too, whose only equation this is."""
-    run = Run(scene, Method.parse(method), np.linspace(0.0, 0.05, 6), Limits())
+    run = start_run(scene, Method.parse(method), np.linspace(0.0, 0.05, 6), Limits())
     run.advance(None)
     for t, q, v, acceleration, multipliers in zip(run.times, *run.memory.loop.samples, strict=True):
         terms = run.model.terms(t, q, v)
@@ -190,7 +190,7 @@ def test_a_driver_that_works_against_what_would_be_held_is_not_passed_over():
 
 def test_primitives_that_only_hold_columns_are_evaluated_at_samples():
     scene, times = find_scene("spatial_slider_crank_gravity"), np.linspace(0.0, 0.1, 4)
-    run = Run(scene, Method.parse(METHOD), times, Limits())
+    run = start_run(scene, Method.parse(METHOD), times, Limits())
     resting = run.memory.equations.scene.resting
     assert resting.size == 4, "the directions of the revolute and of the translational joint hold columns"
     found, dense = (
@@ -205,13 +205,13 @@ def test_primitives_that_only_hold_columns_are_evaluated_at_samples():
 @pytest.mark.parametrize("stabilisation", ["none", "partitioning"])
 def test_all_primitives_are_evaluated_where_all_gradients_are_read(formulation, stabilisation):
     scene = find_scene("spatial_slider_crank_gravity")
-    run = Run(scene, Method.parse(f"{formulation}+{stabilisation}"), np.array([0.1]), Limits())
+    run = start_run(scene, Method.parse(f"{formulation}+{stabilisation}"), np.array([0.1]), Limits())
     assert run.memory.equations.scene.resting.size == 0
 
 
 def entries(scene):
     """Coordinates and velocities that are integrated."""
-    run = Run(scene, Method.parse(METHOD), np.array([0.1]), Limits())
+    run = start_run(scene, Method.parse(METHOD), np.array([0.1]), Limits())
     return run.memory.active.coordinates.size, run.memory.active.velocities.size
 
 

@@ -5,13 +5,10 @@ import pytest
 
 from crosscheck.judge.metrics import error_series, measure
 from crosscheck.judge.truth import closed_form
-from mbref.kernels.layout import NOT_CONVERGED
 from mbref.scenes.five_bar import five_bar_gravity
 from mbref.scenes.four_bar import four_bar, four_bar_gravity
 from mbref.scenes.planar_slider_crank import slider_crank
 from mbref.simulation.simulate import Limits, simulate
-from mbref.taylor import check
-from mbref.taylor.run import CrossingRun
 
 SCENES = {
     "four_bar": (four_bar_gravity(0.3, "four_bar"), 1.5),
@@ -48,19 +45,6 @@ def test_a_run_that_left_its_motion_says_when():
     assert run.outcome.label == "LEFT_MOTION" and run.t_end == times[left]
     assert np.array_equal(run.times, times[:left]), "samples end where the run left its motion"
     assert f"by t = {run.t_end:.6g} s; " in run.message
-
-
-def test_a_run_that_left_is_told_by_series_where_the_default_method_fails(monkeypatch):
-    """A pseudo-inverse through singular positions, beside which the default's iteration may not converge."""
-
-    class Failing(CrossingRun):
-        def advance(self, progress):
-            return NOT_CONVERGED, 0.0
-
-    monkeypatch.setattr(check, "CrossingRun", Failing)
-    scene, end = SCENES["four_bar"]
-    run = simulate(scene, "mpi-gs+none", np.linspace(0.0, end, 31), Limits(rtol=1e-6))
-    assert run.outcome.label == "LEFT_MOTION"
 
 
 def test_a_run_that_fails_behind_another_motion_has_left_it():

@@ -9,10 +9,11 @@ from mbref.kernels.compilation import INT, entry
 from mbref.kernels.layout import OK
 from mbref.method import Method
 from mbref.scenes import SCENES
+from mbref.simulation.run import Run
 from mbref.simulation.simulate import Limits, simulate
+from mbref.simulation.start_run import start_run
 from mbref.taylor.layout import SERIES
 from mbref.taylor.meeting import meet, time_to_meet
-from mbref.taylor.run import TaylorRun
 
 ORDER = 22
 
@@ -26,17 +27,18 @@ def without_miss(memory):
     return OK
 
 
-def looking_along(motion: np.ndarray, miss: float, distance: float) -> TaylorRun:
+def looking_along(motion: np.ndarray, miss: float, distance: float) -> Run:
     """A run whose series is a motion of radius 1 that misses a position at a distance (s)."""
     method = Method.parse(f"taylor[order={ORDER}]")
-    run = TaylorRun(SCENES["four_bar_gravity"](), method, np.array([0.1]), Limits(code="generic"))
-    progress, nz = run.taylor.progress, run.taylor.solver.pivot_columns.size
+    run = start_run(SCENES["four_bar_gravity"](), method, np.array([0.1]), Limits(code="generic"))
+    taylor = run.stepper.taylor
+    progress, past, nz = taylor.progress, taylor.series.past, taylor.solver.pivot_columns.size
     orders = np.arange(ORDER + 1)[:, None]
-    run.taylor.series.past[:] = 0.0
-    run.taylor.series.past[: ORDER + 1, :nz] = motion[:, :nz] + miss * np.arange(1, nz + 1) / distance**orders
+    past[:] = 0.0
+    past[: ORDER + 1, :nz] = motion[:, :nz] + miss * np.arange(1, nz + 1) / distance**orders
     progress.past_pivot, progress.largest_pivot = abs(distance), 1.0
     progress.top = progress.cut = ORDER
-    without_miss(run.packed_series.argument)
+    without_miss(run.stepper.argument)
     return run
 
 
@@ -45,10 +47,10 @@ def test_a_miss_by_rounding_is_taken_out(distance):
     """Of a position ahead, with the time to it, and of one behind."""
     motion = np.random.default_rng(5).uniform(0.5, 1.0, (ORDER + 1, 6))
     run = looking_along(motion, 1e-15, distance)
-    progress, nz = run.taylor.progress, run.taylor.solver.pivot_columns.size
+    progress, nz = run.stepper.taylor.progress, run.stepper.taylor.solver.pivot_columns.size
     assert progress.meets == pytest.approx(distance, rel=1e-6)
     assert 4 <= progress.cut == progress.top < ORDER
-    left = run.taylor.series.past[: int(progress.top), :nz] - motion[: int(progress.top), :nz]
+    left = run.stepper.taylor.series.past[: int(progress.top), :nz] - motion[: int(progress.top), :nz]
     reached = 4.0 * abs(distance) ** np.arange(
         int(progress.top)
     )  # of steps four times as long as the distance
@@ -60,8 +62,8 @@ def test_a_gap_stays(miss):
     """One wider than rounding explains."""
     motion = np.random.default_rng(5).uniform(0.5, 1.0, (ORDER + 1, 6))
     run = looking_along(motion, miss, 0.01)
-    assert run.taylor.progress.meets == 0.0
-    assert run.taylor.progress.cut == ORDER
+    assert run.stepper.taylor.progress.meets == 0.0
+    assert run.stepper.taylor.progress.cut == ORDER
 
 
 @pytest.mark.parametrize("name", ("four_bar_gravity", "five_bar_gravity"))

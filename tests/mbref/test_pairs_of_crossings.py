@@ -10,7 +10,7 @@ from mbref.scenes.four_bar import LENGTH, Z, parallelogram
 from mbref.scenes.links import about_z, link
 from mbref.simulation.simulate import Limits, simulate
 
-METHODS = ("taylor", "taylor[order=28]", "alf-dual+projection")
+METHODS = ("taylor", "taylor[order=28]")
 APART = (2e-2, -5e-3, 3e-4)  # rad, of the crank, between the flat positions of both loops
 
 

@@ -7,7 +7,8 @@ from crosscheck.judge.metrics import measure, order_of_convergence
 from crosscheck.judge.truth import truth_for
 from mbref.method import Method, MethodError
 from mbref.scenes import SCENES
-from mbref.simulation.simulate import Limits, kind_of, simulate
+from mbref.simulation.simulate import Limits, simulate
+from mbref.simulation.start_run import start_run
 from mbref.simulation.stepping import DONE
 
 DROPPED = ("lm2-first-rows", "lm2-step-rows")
@@ -31,8 +32,8 @@ def test_dropped_rows_change_no_motion(scene, formulation):
 def finished(scene, method, times, rtol=1e-9):
     """A completed run, whose samples have multipliers and the model's own coordinates."""
     method = Method.parse(method)
-    run = kind_of(method)(SCENES[scene](), method, np.array(times), Limits(rtol=rtol))
-    status, _ = run.advance(None)
+    run = start_run(SCENES[scene](), method, np.array(times), Limits(rtol=rtol))
+    status, _ = run.stepper.advance(None)
     assert status == DONE
     return run
 

@@ -17,12 +17,9 @@ from mbref.kernels.named_memory import Packed
 from mbref.method import Method
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.simulation.run import Run
 from mbref.simulation.simulate import Limits, simulate
-from mbref.simulation.stepping import DONE
+from mbref.simulation.start_run import start_run
 from mbref.taylor import geometry
-from mbref.taylor.passing_run import PassingRun
-from mbref.taylor.run import CrossingRun
 from mbref.variation import Variation, variants
 from tests.mbref.scenes_of_one_structure import CRANK, NUMBERS_DECIDE, SPATIAL, results
 
@@ -126,17 +123,17 @@ def test_a_repeated_run_evaluates_its_start_twice(scene, monkeypatch):
     simulated(scene)
     asked, along = [], Model.along
     monkeypatch.setattr(Model, "along", lambda *given: asked.append(given) or along(*given))
-    Run(scene, Method.parse(METHODS[0]), TIMES, Limits())
+    start_run(scene, Method.parse(METHODS[0]), TIMES, Limits())
     assert len(asked) == 2
 
 
 def test_memory_in_use_is_not_lent():
     method, limits = Method.parse(METHODS[0]), Limits()
-    one = Run(CRANK, method, TIMES, limits)
-    other = Run(CRANK, method, TIMES, limits)
+    one = start_run(CRANK, method, TIMES, limits)
+    other = start_run(CRANK, method, TIMES, limits)
     assert one.memory is not other.memory
     one.give_back()
-    third = Run(CRANK, method, TIMES, limits)
+    third = start_run(CRANK, method, TIMES, limits)
     assert third.memory is one.memory and third.memory is not other.memory
 
 
@@ -150,23 +147,8 @@ def test_memory_with_generated_code_is_packed_once(monkeypatch):
     assert run() == first
 
 
-def test_memory_of_passages_is_lent_again():
-    def passed() -> tuple[CrossingRun, PassingRun]:
-        run = CrossingRun(FIVE_BAR, Method.parse(METHODS[0]), np.array([0.1]), Limits())
-        assert run.advance(None)[0] == DONE and run.crossings
-        return run, run._passage._series()
-
-    one, first = passed()
-    one.give_back()
-    other, second = passed()
-    assert second is not first and second.memory is first.memory
-    assert second.taylor is first.taylor
-    assert other.memory is one.memory is not second.memory
-
-
-@pytest.mark.parametrize("method", [METHODS[0], "taylor"])
-def test_a_repeated_passage_has_the_same_bits(method):
-    runs = [simulate(FIVE_BAR, method, [0.05, 0.1]) for _ in range(3)]
+def test_a_repeated_crossing_has_the_same_bits():
+    runs = [simulate(FIVE_BAR, "taylor", [0.05, 0.1]) for _ in range(3)]
     assert runs[0].crossings
     assert results(runs[0]) == results(runs[1]) == results(runs[2])
 

@@ -26,8 +26,8 @@ from mbref.linear_algebra.symbolic_factorisation import _of_pattern, sparse_fact
 from mbref.method import Method
 from mbref.scenes import find_scene
 from mbref.simulation.ranks import MOST_ROWS, are_clear
-from mbref.simulation.run import Run
 from mbref.simulation.simulate import Limits, simulate
+from mbref.simulation.start_run import start_run
 
 
 @given(bodies=st.integers(1, 12), rows=st.integers(1, 40), seed=st.integers(0, 999))
@@ -243,7 +243,7 @@ def test_shares_of_redundant_rows_dense_and_sparse():
 
 @pytest.mark.parametrize("stabilisation", ["projection", "none"])
 def test_pivots_tell_that_many_rows_are_independent(stabilisation):
-    run = Run(
+    run = start_run(
         find_scene("four_bar_chain[25]"), Method.parse(f"alf-dual+{stabilisation}"), np.array([0.1]), Limits()
     )
     rows = run.memory.pivots.size
@@ -252,6 +252,6 @@ def test_pivots_tell_that_many_rows_are_independent(stabilisation):
 
 
 def test_pivots_tell_that_rows_are_redundant():
-    run = Run(find_scene("bennett"), Method.parse("alf-dual+projection"), np.array([0.1]), Limits())
+    run = start_run(find_scene("bennett"), Method.parse("alf-dual+projection"), np.array([0.1]), Limits())
     blocks = run.model.blocks(0.0, run.start.q, np.zeros(run.model.n)).jacobian
     assert not are_clear(run.model, blocks, run.memory.factor)

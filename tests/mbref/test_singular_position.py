@@ -1,0 +1,158 @@
+"""Methods that watch the rank end at a singular position; methods that claim to cross it are right behind."""
+
+import numpy as np
+import pytest
+
+from crosscheck.judge.metrics import measure
+from crosscheck.judge.truth import closed_form
+from mbref import Limits, simulate
+from mbref.kernels.layout import SINGULAR_AHEAD
+from mbref.method import MOST_BODIES, Method, MethodError, default_method
+from mbref.scene import Scene
+from mbref.scenes import SCENES, find_scene
+from mbref.scenes.five_bar import five_bar_gravity
+from mbref.scenes.four_bar import four_bar, four_bar_gravity
+from mbref.scenes.planar_slider_crank import slider_crank
+from mbref.simulation.start_run import start_run
+
+WATCHING = (
+    "alf-dual+projection", "mpi-svd+projection", "mpi-gs+projection/adams", "alf+projection/rk4[step=1e-3]",
+)  # fmt: skip
+CROSSING = ("taylor", "alf-dual+none", "alf-dual+baumgarte", "alf+none")
+LOOPS = {
+    "four": (four_bar_gravity(0.3, "four"), 1.0),
+    "five": (five_bar_gravity(0.3, "five"), 1.0),
+    "equal": (slider_crank(0.308, 0.308, 0.3, "equal", rate=30.0), 0.1),
+}
+
+
+def first_crossing(scene: Scene, end: float) -> float:
+    return float(simulate(scene, "taylor", [end]).crossings[0].time)
+
+
+@pytest.mark.parametrize("method", WATCHING)
+@pytest.mark.parametrize("loop", LOOPS)
+def test_a_method_that_watches_the_rank_ends_at_the_first_singular_position(loop, method):
+    scene, end = LOOPS[loop]
+    time = first_crossing(scene, end)
+    run = simulate(scene, method, np.linspace(0.0, end, 41))
+    assert Method.parse(method).crosses == "no"
+    assert run.outcome.name == "SINGULAR_POSITION", run.message
+    assert run.t_end == pytest.approx(time, abs=2e-3 * end)
+    assert np.all(run.times <= run.t_end), "samples end there"
+    [position] = run.crossings
+    assert position.time == run.t_end and position.taken == 0
+    assert "lose rank" in run.message and "taylor does" in run.message
+
+
+@pytest.mark.parametrize("loop", ["four", "five"])
+def test_the_sentence_names_the_joints(loop):
+    scene, end = LOOPS[loop]
+    message = simulate(scene, "alf-dual+projection", [end]).message
+    assert all(repr(joint.name) in message for joint in scene.joint), message
+
+
+def test_the_pose_is_flat():
+    scene, end = LOOPS["four"]
+    exact = simulate(scene, "taylor", [end]).crossings[0]
+    run = simulate(scene, "alf-dual+projection", [end])
+    assert np.abs(run.crossings[0].position - exact.position).max() < 1e-2
+
+
+@pytest.mark.parametrize("method", CROSSING)
+@pytest.mark.parametrize("loop", LOOPS)
+def test_a_method_that_claims_to_cross_is_right_behind_the_singular_position(loop, method):
+    """By regularisation it may say that it left the motion, but it never completes elsewhere."""
+    scene, end = LOOPS[loop]
+    crosses = Method.parse(method).crosses
+    assert crosses == ("by series" if method == "taylor" else "by regularisation")
+    run = simulate(scene, method, np.linspace(0.0, end, 21), Limits(rtol=1e-8))
+    error = measure(scene, run, closed_form(scene))["error"]
+    if run.outcome.name == "COMPLETED":
+        assert error < 1e-5
+    else:
+        assert method != "taylor" and run.outcome.name == "LEFT_MOTION", run.message
+
+
+@pytest.mark.parametrize("formulation", ["alf-dual", "alf"])
+def test_regularisation_crosses(formulation):
+    scene, end = LOOPS["four"]
+    run = simulate(scene, f"{formulation}+none", np.linspace(0.0, end, 21), Limits(rtol=1e-9))
+    assert run.outcome.name == "COMPLETED", run.message
+
+
+def test_kinematic_analysis_ends_at_a_flat_position():
+    scene = four_bar(0.3)
+    run = simulate(scene, "kinematic", np.linspace(0.0, 0.1, 41))
+    assert run.outcome.name == "SINGULAR_POSITION", run.message
+    assert run.t_end == pytest.approx(first_crossing(scene, 0.1), abs=2e-4)
+
+
+@pytest.mark.parametrize("loops", [2, 12])
+def test_loops_that_are_flat_at_once_end_the_run(loops):
+    """The sign of the determinant stays for an even number; of more than 60 rows none is looked at."""
+    scene = find_scene(f"four_bar_chain[{loops}]")
+    run = simulate(scene, "alf-dual+projection", [scene.duration])
+    assert run.outcome.name == "SINGULAR_POSITION", run.message
+    assert run.t_end == pytest.approx(first_crossing(scene, scene.duration), abs=2e-2)
+
+
+@pytest.mark.parametrize("distance", [3e-2, 1e-1])
+def test_a_motion_that_turns_back_before_the_flat_position_is_completed(distance):
+    scene = four_bar_gravity(-distance)
+    run = simulate(scene, "alf-dual+projection", np.linspace(0.0, 1.5, 9))
+    assert run.outcome.name == "COMPLETED", run.message
+    assert run.crossings == () and measure(scene, run, closed_form(scene))["error"] < 1e-6
+
+
+@pytest.mark.parametrize("gap", [1e-2, 1e-3, 1e-5, 1e-7])
+def test_beside_a_gap_a_run_is_right_or_ends(gap):
+    scene = slider_crank(0.308, 0.308 + gap, 0.3, "gap", rate=30.0)
+    for rtol in (1e-5, 1e-9):
+        run = simulate(scene, "alf-dual+projection", np.linspace(0.0, 0.25, 21), Limits(rtol=rtol))
+        error = measure(scene, run, closed_form(scene))["error"]
+        assert run.outcome.name != "COMPLETED" or error < max(1e3 * rtol, 1e-6), (rtol, error)
+
+
+def test_a_start_on_a_singular_position():
+    run = simulate(four_bar_gravity(0.0), "alf-dual+projection", [0.0, 0.5])
+    assert run.outcome.name == "SINGULAR_POSITION" and run.t_end == 0.0, run.message
+    assert simulate(four_bar_gravity(0.0), times=[0.0, 0.5]).outcome.name in ("COMPLETED", "UNDECIDED")
+
+
+def test_a_branch_is_for_the_method_that_crosses():
+    with pytest.raises(MethodError, match="taylor does"):
+        simulate(four_bar(), "alf-dual+projection", [0.05], Limits(branches={2: 2}))
+
+
+def test_the_default_method_follows_from_the_number_of_bodies():
+    assert default_method(SCENES["planar_slider_crank"]()) == "taylor"
+    few, many = find_scene("four_bar_chain[12]"), find_scene("four_bar_chain[40]")
+    assert len(few.body) <= MOST_BODIES < len(many.body)
+    assert default_method(few) == "taylor" and default_method(many) == "alf-dual+projection/dop853"
+    assert simulate(few, times=[0.01]).method == "alf-dual+projection/taylor"
+
+
+def test_kernels_end_before_the_step_that_crosses():
+    scene, end = LOOPS["four"]
+    run = start_run(scene, Method.parse("alf-dual+projection"), np.array([end]), Limits())
+    status, _ = run.stepper.advance(None)
+    clock = run.memory.loop.clock
+    assert status == SINGULAR_AHEAD and clock.time < first_crossing(scene, end) < clock.passage
+
+
+@pytest.mark.parametrize("name", ["point_pendulum", "bricard_thin"])
+def test_bodies_without_inertia_about_an_axis_run_by_default(name):
+    scene = SCENES[name]()
+    run = simulate(scene, times=np.linspace(0.0, 2.0, 21))
+    assert run.outcome.name == "COMPLETED", run.message
+    energy = run.energy
+    assert np.abs(energy - energy[0]).max() < 1e-9 * (1.0 + np.abs(run.kinetic_energy).max())
+
+
+def test_reactions_of_a_point_on_a_bar():
+    """A point mass on a bar of 1 m: the bar pulls with 3 m g sin φ below the horizontal."""
+    run = simulate("point_pendulum", times=np.linspace(0.0, 2.0, 21))
+    along = -np.einsum("ki,ki->k", run.reactions["pivot"][:, :3], run.position[:, 0])
+    below = -run.position[:, 0, 1]
+    assert along == pytest.approx(3.0 * 9.81 * below, abs=1e-8)
