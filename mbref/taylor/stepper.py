@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable
 from itertools import repeat
 from typing import Any
 
@@ -14,9 +14,8 @@ from mbref.equations.branches import SMOOTH, Passed
 from mbref.equations.initial_state import Start
 from mbref.equations.model import Model
 from mbref.kernels.layout import OK, SINGULAR_AHEAD
-from mbref.kernels.lent_memory import Lent, copied, fill, lent, shapes_of, take_back
+from mbref.kernels.lent_memory import take_back
 from mbref.kernels.machine_code import NoGeneratedCode
-from mbref.kernels.named_memory import allocate
 from mbref.simulation.limits import AUTO, GENERATED, GENERIC
 from mbref.simulation.run import Run
 from mbref.simulation.singular_start import fits_no_branch, leaving
@@ -25,20 +24,17 @@ from mbref.taylor.advance import advance_series, enter
 from mbref.taylor.driven import LEAST_ORDER as LEAST_DRIVEN_ORDER
 from mbref.taylor.driven import LOOSE, ORDER, follow_drivers
 from mbref.taylor.geometry import geometry_of
-from mbref.taylor.layout import Polynomials, Series, SeriesKernels, TaylorMemory
+from mbref.taylor.layout import Polynomials, TaylorMemory
 from mbref.taylor.leaving import Departure
 from mbref.taylor.long_crossing import begin_crossing, cross, end_crossing, go_on, look_along
 from mbref.taylor.outputs import complete_samples
 from mbref.taylor.polynomials import Geometry
-from mbref.taylor.simd import padded_size
+from mbref.taylor.series_memory import CALLED, lend_memory, put_equations, shapes_of_equations
 from mbref.taylor.start import OFF
-from mbref.taylor.stepping import begin, expand_from, step
 from mbref.taylor.twin import LEAST_CHANGE
 
 EXACT, EXACT_ORDER = 1e-13, 22  # rtol and atol of steps that pass singular positions, and their least order
 SHARE = 0.05  # of rtol + atol: the tolerance of a step that is clear of singular positions
-KEPT = 16  # singular positions that are passed in a call
-CALLED = (begin, expand_from, step)  # the SeriesKernels
 KERNELS_OF_SERIES = (
     *CALLED, enter, advance_series, follow_drivers, complete_samples, begin_crossing, cross, go_on,
     end_crossing, look_along,
@@ -75,7 +71,7 @@ class SeriesStepper:
         self.strides, tolerance, order = self._kind_of_steps()
         self.geometry, self.polynomials = self.equations_of(run.model, run.start)
         exact_order = max(order, EXACT_ORDER) if run.model.closed_loops else order
-        self._lent = self._lend_memory(exact_order)
+        self._lent = lend_memory(run, self.geometry, self.polynomials, exact_order)
         self.taylor, self.argument = self._lent.values, self._lent.packed.argument
         self._calls, self._sampling = 0, 0.0  # of kernels that take steps; s of CPU time spent on samples
         self._options = {
@@ -114,43 +110,6 @@ class SeriesStepper:
         moving[self.run.memory.active.velocities] = True
         geometry = geometry_of(model, start, moving, self.strides)
         return geometry, geometry.polynomials(model)
-
-    def _lend_memory(self, order: int) -> Lent:
-        """Memory of the series with the numbers of this run."""
-        run, natural, polynomials = self.run, self.geometry.natural, self.polynomials
-        nz, ng, nr = len(natural.kept), len(natural.given), len(natural.rows)
-        sizes = {
-            "orders": order + 1, "nz": nz, "ng": ng, "nr": nr,
-            "lanes": padded_size(max(1, nz + nr + ng)), "slots": polynomials.products.left.size,
-            "twofold": polynomials.rows.row.size, "kept": KEPT, "k": run.times.size,
-            "springs": polynomials.springs.natural.size, "torsions": polynomials.torsions.slot.size,
-            **run.model.sizes,
-        }  # fmt: skip
-        shapes = shapes_of_equations(self.geometry, polynomials)
-        key = (TaylorMemory, *sizes.values(), shapes, run.limits.branches)
-        memory = lent(key, lambda: self._allocate(sizes), run.lent)
-        put_equations(memory.values, self.geometry, polynomials)
-        return memory
-
-    def _allocate(self, sizes: Mapping[str, int]) -> TaylorMemory:
-        """Memory of the series, ready but for numbers."""
-        orders, nz, nr = sizes["orders"], sizes["nz"], sizes["nr"]
-        series = allocate(Series, sizes)
-        grown = np.arange(1.0, orders + 1) * np.arange(2.0, orders + 2)
-        series.scale[:, :nz], series.scale[:, nz : nz + nr] = -1.0 / grown[:, None], -1.0
-        series.growth[:], series.growth[:, nz : nz + nr] = 1.0, grown[:, None]
-        series.variable[:nz] = 1.0
-        parting = [k for k, taken in dict(self.run.limits.branches).items() if taken != SMOOTH]
-        return allocate(
-            TaylorMemory,
-            sizes,
-            run=self.run.memory,
-            polynomials=copied(self.polynomials),
-            pose_maps=copied(self.geometry.pose_maps),
-            series=series,
-            kernels=SeriesKernels(*(kernel.pointer for kernel in CALLED)),
-            parting=np.array(parting, np.int64),
-        )
 
     def give_back(self) -> None:
         """Leave the memory to the next run; this one cannot be read any more."""
@@ -342,18 +301,6 @@ class SeriesStepper:
         look_along(ahead, self.argument)
         state = self.run.memory.state
         return state.coordinates.copy(), state.velocities.copy()
-
-
-def shapes_of_equations(geometry: Geometry, polynomials: Polynomials) -> Hashable:
-    """The shapes of the equations of a scene: all of them have room in memory that is made for one."""
-    return shapes_of((polynomials, geometry.pose_maps, geometry.tableau))
-
-
-def put_equations(memory: TaylorMemory, geometry: Geometry, polynomials: Polynomials) -> None:
-    """Have memory of series hold the equations of a scene."""
-    fill(memory.polynomials, polynomials)
-    fill(memory.pose_maps, geometry.pose_maps)
-    memory.solver.linear[:], memory.solver.place[:] = geometry.tableau
 
 
 def prepare_series() -> None:

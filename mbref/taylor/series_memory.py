@@ -1,0 +1,72 @@
+"""Memory of a Taylor series for a run: lent from run to run, with the equations of its scene."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+
+import numpy as np
+
+from mbref.equations.branches import SMOOTH
+from mbref.kernels.lent_memory import Lent, copied, fill, lent, shapes_of
+from mbref.kernels.named_memory import allocate
+from mbref.simulation.run import Run
+from mbref.taylor.layout import Polynomials, Series, SeriesKernels, TaylorMemory
+from mbref.taylor.polynomials import Geometry
+from mbref.taylor.simd import padded_size
+from mbref.taylor.stepping import begin, expand_from, step
+
+KEPT = 16  # singular positions that are passed in a call
+CALLED = (begin, expand_from, step)  # the SeriesKernels
+
+
+def lend_memory(run: Run, geometry: Geometry, polynomials: Polynomials, order: int) -> Lent:
+    """Return memory of the series of a run, up to an order, with its equations."""
+    natural = geometry.natural
+    nz, ng, nr = len(natural.kept), len(natural.given), len(natural.rows)
+    sizes = {
+        "orders": order + 1, "nz": nz, "ng": ng, "nr": nr,
+        "lanes": padded_size(max(1, nz + nr + ng)), "slots": polynomials.products.left.size,
+        "twofold": polynomials.rows.row.size, "kept": KEPT, "k": run.times.size,
+        "springs": polynomials.springs.natural.size, "torsions": polynomials.torsions.slot.size,
+        **run.model.sizes,
+    }  # fmt: skip
+    shapes = shapes_of_equations(geometry, polynomials)
+    key = (TaylorMemory, *sizes.values(), shapes, run.limits.branches)
+    memory = lent(key, lambda: _allocate(run, geometry, polynomials, sizes), run.lent)
+    put_equations(memory.values, geometry, polynomials)
+    return memory
+
+
+def _allocate(
+    run: Run, geometry: Geometry, polynomials: Polynomials, sizes: Mapping[str, int]
+) -> TaylorMemory:
+    """Memory of the series, ready but for numbers."""
+    orders, nz, nr = sizes["orders"], sizes["nz"], sizes["nr"]
+    series = allocate(Series, sizes)
+    grown = np.arange(1.0, orders + 1) * np.arange(2.0, orders + 2)
+    series.scale[:, :nz], series.scale[:, nz : nz + nr] = -1.0 / grown[:, None], -1.0
+    series.growth[:], series.growth[:, nz : nz + nr] = 1.0, grown[:, None]
+    series.variable[:nz] = 1.0
+    parting = [k for k, taken in dict(run.limits.branches).items() if taken != SMOOTH]
+    return allocate(
+        TaylorMemory,
+        sizes,
+        run=run.memory,
+        polynomials=copied(polynomials),
+        pose_maps=copied(geometry.pose_maps),
+        series=series,
+        kernels=SeriesKernels(*(kernel.pointer for kernel in CALLED)),
+        parting=np.array(parting, np.int64),
+    )
+
+
+def shapes_of_equations(geometry: Geometry, polynomials: Polynomials) -> Hashable:
+    """The shapes of the equations of a scene: all of them have room in memory that is made for one."""
+    return shapes_of((polynomials, geometry.pose_maps, geometry.tableau))
+
+
+def put_equations(memory: TaylorMemory, geometry: Geometry, polynomials: Polynomials) -> None:
+    """Have memory of series hold the equations of a scene."""
+    fill(memory.polynomials, polynomials)
+    fill(memory.pose_maps, geometry.pose_maps)
+    memory.solver.linear[:], memory.solver.place[:] = geometry.tableau
