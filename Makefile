@@ -66,13 +66,13 @@ reference: $(VENV)/ready ## the committed report with its records, anew, into re
 	rm -rf reports/reference && mv $(ANEW) reports/reference
 	$(BIN)/crosscheck report --render reports/reference
 
-DRAWN := mechanisms 200 --beside mbref=alf-dual+projection
+DRAWN := mechanisms 200 --beside mbref=taylor
 
 drawn: $(VENV)/ready ## every card on drawn mechanisms, for the committed report; resumes from build/drawn/
 	mkdir -p build/drawn
 	for engine in mujoco pinocchio exudyn; do $(BIN)/crosscheck verify $$engine --$(DRAWN) --json \
 	    --records build/drawn/$$engine.jsonl > reports/reference/conformance/$${engine}_drawn.json; done
-	$(BIN)/crosscheck verify mbref --family alf-dual+projection --mechanisms 2000 --json \
+	$(BIN)/crosscheck verify mbref --family taylor --mechanisms 2000 --json \
 	    --records build/drawn/mbref.jsonl > reports/reference/conformance/mbref_drawn.json
 	$(BIN)/crosscheck report --render reports/reference
 

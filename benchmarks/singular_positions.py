@@ -154,7 +154,7 @@ def main() -> None:
     )
     parser.add_argument("sweep", nargs="*", metavar="SWEEP", default=list(SWEEPS))
     parser.add_argument("--count", type=int)
-    parser.add_argument("--method", default="alf-dual+projection")
+    parser.add_argument("--method", default="taylor")
     parser.add_argument("--code", default="auto", help="generic, generated or auto, the default")
     parser.add_argument("--rtol", type=float, default=1e-9)
     given = parser.parse_args()

@@ -35,7 +35,7 @@ def passage() -> Passage:
     truth, times = truth_for(scene), np.linspace(0.0, scene.duration, SAMPLES)
     assert truth is not None
     finest = [s for s in settings("mujoco", scene) if s.family == "defaults"][-1]
-    chosen = (("mbref", Setting("alf-dual+projection", {"rtol": 1e-9})), ("mujoco", finest))
+    chosen = (("mbref", Setting("taylor", {"rtol": 1e-9})), ("mujoco", finest))
     records = study([Case(scene, times, engine, setting) for engine, setting in chosen])
     return Passage(scene, truth.poses(times), singular_instants(scene), records)
 

@@ -28,15 +28,19 @@ METHODS = (
     "mpi-qr+projection",
     "lm2+projection",
 )
-WITH_SINGULAR_MASS = ("lm1+projection", "alf+projection")  # of bodies without some moment of inertia
+WITH_SINGULAR_MASS = (
+    "taylor",
+    "lm1+projection",
+    "alf+projection",
+)  # of bodies without some moment of inertia
 KINEMATIC = "kinematic"  # of driven scenes; integrates nothing, so has no tolerance
 GENERATED = ", generated"  # by machine code for the scene, made before the clock runs
 FAMILIES = {
-    "alf-dual+projection": "augmented Lagrangian in dual form, projection, DOP853; the default method",
+    "alf-dual+projection": "augmented Lagrangian in dual form, projection, DOP853; default of many bodies",
     "lm2+projection": "Lagrange multipliers eliminated by blocks, projection, DOP853",
     "lm1+projection": "Lagrange multipliers, projection, DOP853; where a body lacks a moment of inertia",
     "alf+projection": "augmented Lagrangian, projection, DOP853; where a body lacks a moment of inertia",
-    "taylor": "Taylor series in natural coordinates, projection",
+    "taylor": "Taylor series in natural coordinates; the default; crosses singular positions",
     "kinematic": "Newton-Raphson on the constraints of a fully driven mechanism",
     "mpi-svd+partitioning": "Moore-Penrose inverse by SVD, coordinate partitioning, DOP853",
     "mpi-svd+projection": "Moore-Penrose inverse by SVD, projection, DOP853",
@@ -86,8 +90,12 @@ class Mbref(Engine):
         return [setting for family in methods for setting in self.settings_of(scene, family)]
 
     def best_settings(self, scene: Scene) -> Sequence[Setting]:
+        from mbref.method import default_method
+
         methods = WITH_SINGULAR_MASS if _has_singular_mass(scene) else METHODS
-        return next(filter(None, (self.settings_of(scene, family) for family in methods)), ())
+        default = default_method(scene).removesuffix("/dop853")
+        order = (default, *methods) if default in methods else methods
+        return next(filter(None, (self.settings_of(scene, family) for family in order)), ())
 
     def settings_of(self, scene: Scene, family: str) -> Sequence[Setting]:
         if not self.serves(scene, family):
@@ -103,7 +111,8 @@ class Mbref(Engine):
         is_kinematic = family.startswith(KINEMATIC) or method.formulation.needs_independent_columns
         if is_kinematic and undriven_freedoms(scene) > 0:
             return False
-        if _has_singular_mass(scene) and not method.formulation.handles_singular_mass:
+        handles = method.is_series or method.formulation.handles_singular_mass
+        if _has_singular_mass(scene) and not handles:
             return False
         if family.endswith(GENERATED):
             return not why_no_code(scene, method)

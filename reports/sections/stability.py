@@ -17,21 +17,21 @@ from reports.runs import Curve
 ALLOWED = max(1e3 * RTOL, 1e-6)  # error of a method of mbref beyond which a completed run is a false success
 MOST_DIGITS = 15.0
 LETTERS = {  # of outcomes that the paper's tables do not have
-    "UNDECIDED": "u", "LEFT_MOTION": "m", "TIMED_OUT": "t", "CRASHED": "x", "NOT_FINITE": "n",
+    "SINGULAR_POSITION": "s", "UNDECIDED": "u", "LEFT_MOTION": "m", "TIMED_OUT": "t", "CRASHED": "x",
+    "NOT_FINITE": "n",
 }  # fmt: skip
 HOW = (
     "Numbers are digits kept: minus the logarithm of the largest error. Red cells, bold in the text, are "
     f"false successes: completed with an error above {ALLOWED:g}, or {FALSE_SUCCESS:g} of engines and "
     "ali3-p, which has no tolerance. A letter names the outcome of a run that ended early: a singular "
-    "matrix, b iteration not converged, c violation, d step failed, u branch undecided, m left the motion, "
-    "t out of time, x crashed, n not finite. Empty cells were not run."
+    "matrix, b iteration not converged, c violation, d step failed, s singular position, u branch undecided, "
+    "m left the motion, t out of time, x crashed, n not finite. Empty cells were not run."
 )
 WHEN = (
-    "Where a mechanism passes singular positions, or comes near them, projection (the default) and taylor "
-    "follow the motion, whether it crosses, turns back or misses, and end UNDECIDED where double precision "
-    "does not tell. Partitioning, the null space and rows dropped at every step pass some crossings with "
-    "fewer digits and end early at others, ali3-p goes over them with the second order of its steps, and "
-    "Baumgarte's feedback, unstabilised pseudo-inverses and rows dropped once suit motions without them."
+    "Only taylor, the default, follows a motion across singular positions with all digits, and ends "
+    "UNDECIDED where double precision cannot decide the branch; projection ends at the singular position, "
+    "because it watches the rank. All other methods run on by their own rules: some cross with fewer digits, "
+    "some fail there, and a run that ends on another branch has the outcome LEFT_MOTION."
 )
 
 Runs = Mapping[Curve, Mapping[float, Record]]  # by engine and family, by difficulty
