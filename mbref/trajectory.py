@@ -193,7 +193,8 @@ class Trajectory:
         By joint: number of reaction components that equilibrium does not determine, because of redundant
         constraint rows or at a singular position.
     crossings : sequence of Crossing, or None
-        Singular positions that the run crossed. None if the method or engine does not look for them.
+        Singular positions that the run crossed, or the one at which it ended. None if the method or engine
+        does not look for them.
     outcome : Outcome
         How the run ended.
     t_end : float

@@ -20,9 +20,7 @@ def chosen(smooth: Motion, number: int | None) -> int:
     Raises MethodError where none was looked for, ValueError where there is none.
     """
     if smooth.crossings is None:
-        raise MethodError(
-            f"--branches: {smooth.method} looks for no singular position; +projection and taylor do"
-        )
+        raise MethodError(f"--branches: {smooth.method} looks for no singular position; taylor does")
     passed, until = len(smooth.crossings), f"up to t = {smooth.t_end:g} s"
     if number is not None and not 1 <= number <= passed:
         raise ValueError(f"--crossing: the motion passes {passed} singular positions {until}, got {number}")

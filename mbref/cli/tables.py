@@ -24,7 +24,7 @@ MEANINGS = {  # of the parts of a method
     "lm2-first-rows": "lm2 without the rows that are dependent at t = 0",
     "lm2-step-rows": "lm2 without the rows that are dependent at each step",
     "alf": "augmented Lagrangian, a penalty iterated; bodies may lack inertia",
-    "alf-dual": "augmented Lagrangian on the multipliers; redundant rows; the default",
+    "alf-dual": "augmented Lagrangian on the multipliers; redundant rows; with the default of many bodies",
     "mpi-svd": "Moore-Penrose inverse by singular values; any rank; dear",
     "mpi-gs": "Moore-Penrose inverse by Gram-Schmidt; any rank",
     "mpi-gs-literal": "Gram-Schmidt as the paper prints it; fully driven mechanisms only",
@@ -33,13 +33,13 @@ MEANINGS = {  # of the parts of a method
     "baumgarte": "violations decay by feedback; an error in the motion remains",
     "partitioning": "integrates independent coordinates and solves for the others",
     "null-space": "integrates speeds along the constraints' tangent",
-    "projection": "back onto the constraints after each step; passes singular positions; the default",
-    "dop853": "Runge-Kutta of order 8 with adaptive steps; the default",
+    "projection": "back onto the constraints after each step; ends at singular positions",
+    "dop853": "Runge-Kutta of order 8 with adaptive steps",
     "rk4": "classical Runge-Kutta with a fixed step (s)",
     "adams": "predictor-corrector of orders 1 to 12 with adaptive steps",
     "ali3": "trapezoidal rule on positions, fixed step (s); without formulation: ali3-p",
     "predictor": "extrapolation only, for fully driven mechanisms; without formulation: kinematic",
-    "taylor": "power series of order 4 to 30, fastest at small errors; without formulation: taylor",
+    "taylor": "power series of order 4 to 30; crosses singular positions; the default: taylor",
 }
 
 
