@@ -21,13 +21,13 @@ from statistics import median
 
 import numpy as np
 
+from mbref.ensembles.ensemble import MOST_AT_ONCE, ensemble
+from mbref.ensembles.processes import processes
+from mbref.ensembles.simulate_all import run_all
 from mbref.method import SERIES
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.simulation.ensemble import MOST_AT_ONCE, ensemble
-from mbref.simulation.processes import processes
 from mbref.simulation.simulate import Limits, simulate
-from mbref.simulation.together import run_all
 from mbref.variation import Variation, variants
 
 REPEATS = 5

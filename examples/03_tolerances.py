@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from mbref.ensembles.ensemble import ensemble
 from mbref.scenes import find_scene
-from mbref.simulation.ensemble import ensemble
 from mbref.simulation.simulate import simulate
 from mbref.variation import Variation, variants
 

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 from mbref.scene_services import SERVICES
 
 if TYPE_CHECKING:
+    from mbref.ensembles.ensemble import ensemble
     from mbref.equations.diagnosis import Diagnosis, counts, diagnose
     from mbref.method import Method, MethodError
     from mbref.motion import Motion
     from mbref.scene import Scene, SceneError
     from mbref.scenes import SCENES, find_scene
-    from mbref.simulation.ensemble import ensemble
     from mbref.simulation.simulate import Limits, simulate
     from mbref.trajectory import Cost, Outcome, Trajectory
     from mbref.variation import Variation, variants
@@ -38,7 +38,7 @@ _MODULE_OF = {
     "Variation": "mbref.variation",
     "counts": "mbref.equations.diagnosis",
     "diagnose": "mbref.equations.diagnosis",
-    "ensemble": "mbref.simulation.ensemble",
+    "ensemble": "mbref.ensembles.ensemble",
     "find_scene": "mbref.scenes",
     "simulate": "mbref.simulation.simulate",
     "variants": "mbref.variation",

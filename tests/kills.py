@@ -27,10 +27,10 @@ import numpy as np
 
 from crosscheck.engine import Setting
 from crosscheck.study.grid import Case, study
+from mbref.ensembles.ensemble import ensemble
+from mbref.ensembles.processes import processes
 from mbref.scene import Body, Scene
 from mbref.scenes import SCENES
-from mbref.simulation.ensemble import ensemble
-from mbref.simulation.processes import processes
 from mbref.variation import Variation, variants
 
 HERE = Path(__file__).parent

@@ -43,8 +43,8 @@ def add(commands: Any) -> None:
 
 
 def _ensemble(options: argparse.Namespace) -> int:
-    from mbref.simulation.ensemble import ensemble
-    from mbref.simulation.processes import processes
+    from mbref.ensembles.ensemble import ensemble
+    from mbref.ensembles.processes import processes
     from mbref.variation import Variation, variants
 
     scene = find_scene(options.scene)

@@ -47,7 +47,7 @@ class Balance:
         """The model and Φ_q as blocks (k, m, 12)."""
         model = self._model or Model(self._scene)
         blocks = model.blocks_along(self._times, self._q)
-        model.give_back()
+        model.release()
         return model, blocks
 
     def reactions(self) -> OfJoints | None:

@@ -18,7 +18,7 @@ from mbref.equations.evaluation import evaluate_along
 from mbref.equations.packing import Packs, row_of
 from mbref.equations.random_states import RandomStates
 from mbref.kernels.layout import Counts, Equations, Frames, Settings, System
-from mbref.kernels.lent_memory import Lent, copied, lent, take_back
+from mbref.kernels.memory_pool import Pooled, acquire, copied, release
 from mbref.kernels.named_memory import allocate
 from mbref.kernels.records import record
 from mbref.kernels.scene_layout import SceneData
@@ -58,21 +58,21 @@ class Model:
         self.entry_columns = self.structure.entry_columns
         self.mass, self.principal = packs.mass[place], packs.principal[place]
         self.length, self.orientation = float(packs.length[place]), packs.orientation[place]
-        self._lent: Lent | None = None
+        self._pooled: Pooled | None = None
 
     @property
-    def memory(self) -> Lent:
-        """Memory of evaluations with the numbers of this scene, lent when it is first asked for."""
-        if self._lent is None:
-            self._lent = lent((Equations, self.structure), self.equations)
-            self.put_numbers(self._lent.values, self.data)
-        return self._lent
+    def memory(self) -> Pooled:
+        """Memory of evaluations with the numbers of this scene, acquired when it is first asked for."""
+        if self._pooled is None:
+            self._pooled = acquire((Equations, self.structure), self.equations)
+            self.put_numbers(self._pooled.values, self.data)
+        return self._pooled
 
-    def give_back(self) -> None:
-        """Leave the memory of evaluations to the next model."""
-        if self._lent is not None:
-            take_back(self._lent)
-            self._lent = None
+    def release(self) -> None:
+        """Release the memory of evaluations."""
+        if self._pooled is not None:
+            release(self._pooled)
+            self._pooled = None
 
     @property
     def sizes(self) -> dict[str, int]:

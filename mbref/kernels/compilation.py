@@ -178,7 +178,7 @@ class Exchangeable:
 class Entry(Exchangeable):
     """A kernel that Python calls: explicit signature, compiled on first use."""
 
-    def __call__(self, *arguments: object) -> object:
+    def __call__(self, *arguments: object) -> Any:
         return self.pointer(*arguments)
 
     def _decorator(self, **options: bool) -> Callable:

@@ -12,7 +12,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from mbref.kernels.compilation import FLOAT, INT, entry, kernel
-from mbref.kernels.lent_memory import lent, take_back
+from mbref.kernels.memory_pool import acquire, release
 from mbref.kernels.named_memory import Indices, Matrix, Named, Vector, allocate
 from mbref.linear_algebra.orthogonal_factorisations import apply_reflectors, minimum_norm, qr_pivoted
 
@@ -78,12 +78,12 @@ def least_norm(matrix: np.ndarray, rhs: np.ndarray, tolerance: float) -> tuple[n
     m, n = matrix.shape
     if not matrix.size:
         return np.zeros(n), np.eye(n)
-    memory = lent((Scratch, m, n), lambda: allocate(Scratch, {"m": m, "n": n}))
+    memory = acquire((Scratch, m, n), lambda: allocate(Scratch, {"m": m, "n": n}))
     scratch = memory.values
     scratch.transposed[:], scratch.b[:] = matrix.T, rhs
     rank = int(solve_clearly(tolerance, memory.packed.argument))
     x, basis = scratch.solution.copy(), scratch.basis[: n - rank].T.copy()
-    take_back(memory)
+    release(memory)
     if rank == UNCLEAR or np.abs(matrix @ x - rhs).max() > MET * max(1.0, np.abs(x).max()):
         return _by_singular_values(matrix, rhs, tolerance)
     return x, basis

@@ -47,7 +47,7 @@ def compare_with_default(run: Run, ended: int) -> int:
     theirs = reference.memory.loop.clock
     off = _distances(run, reference, min(int(theirs.sample), int(clock.sample))) > _allowed(run)
     reached = float(theirs.time)
-    reference.give_back()
+    reference.release()
     if off.any():
         clock.sample = np.argmax(off)
         clock.time = run.times[clock.sample]

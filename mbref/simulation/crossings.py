@@ -23,7 +23,7 @@ class Crossings(Sequence[Crossing]):
     @functools.cached_property
     def _found(self) -> tuple[Crossing, ...]:
         found = tuple(_crossing(self._model, passed) for passed in self._passed)
-        self._model.give_back()
+        self._model.release()
         return found
 
     def __len__(self) -> int:

@@ -47,8 +47,8 @@ class ExplicitStepper:
                 progress(float(self.run.memory.loop.clock.time))
         return status, time.process_time() - began
 
-    def give_back(self) -> None:
-        """Leave no memory: it has none of its own."""
+    def release(self) -> None:
+        """Release no memory: the stepper has none of its own."""
 
     @property
     def was_short(self) -> bool:
@@ -63,7 +63,7 @@ class ExplicitStepper:
     def begin_again(self) -> None:
         """Have no memory be as when the run began: it has none of its own."""
 
-    def numbers(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
+    def parameters(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
         """No numbers: it has no memory of its own."""
         return []
 

@@ -24,7 +24,7 @@ from mbref.kernels.layout import (
     State,
     Watch,
 )
-from mbref.kernels.lent_memory import Lent, lent, take_back, write
+from mbref.kernels.memory_pool import Pooled, acquire, release, write
 from mbref.kernels.named_memory import allocate, packed
 from mbref.kernels.records import record
 from mbref.kernels.scene_layout import SceneData
@@ -51,8 +51,8 @@ class Stepper(Protocol):
         ``progress`` is given the time reached (s).
         """
 
-    def give_back(self) -> None:
-        """Leave memory of its own to the next run."""
+    def release(self) -> None:
+        """Release memory of its own."""
 
     @property
     def was_short(self) -> bool:
@@ -68,7 +68,7 @@ class Stepper(Protocol):
     def begin_again(self) -> None:
         """Have memory of its own be as when the run began."""
 
-    def numbers(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
+    def parameters(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
         """Where its memory has numbers in which scenes differ, and those of scenes of ``lengths`` (s,)."""
 
     def takes(self, model: Callable[[], Model], start: Start) -> bool:
@@ -94,19 +94,19 @@ class Run:
         self.model, self.start, self.reduction = self._posed()
         self._control = control_of(self.model, method, times, limits)
         prepare(method)  # so that the run alone is timed
-        self.lent = self._lend_memory()
-        self.memory, self.packed = self.lent.values, self.lent.packed
+        self.pooled = self._acquire_memory()
+        self.memory, self.packed = self.pooled.values, self.pooled.packed
         self.put_start()
         self.crossings: list[Passed] = []
         self.making = 0.0  # s of CPU time, within ``advance``, that is construction
         self.built = 0.0  # s of CPU time before the first step
         self.stepper = stepper(self)
 
-    def give_back(self) -> None:
-        """Leave the memory to the next run; this one cannot be read any more."""
-        self.stepper.give_back()
-        take_back(self.lent)
-        self.model.give_back()
+    def release(self) -> None:
+        """Release the memory to the next run; this one cannot be read any more."""
+        self.stepper.release()
+        release(self.pooled)
+        self.model.release()
 
     def _posed(self) -> tuple[Model, Start, Reduction | None]:
         """The scene as a model, its consistent start, and the part of the equations that the method needs.
@@ -137,7 +137,7 @@ class Run:
 
     def begin_again(self) -> None:
         """Have the memory that this run was given, with its numbers and its start."""
-        self.lent.restore()
+        self.pooled.restore()
         self._put_numbers(self.memory, self.reduced(self.model.data))
         self.put_start()
         self.stepper.begin_again()
@@ -149,11 +149,11 @@ class Run:
         all_move = all_move or not self.method.stabilisation.projects  # others read the gradients of all rows
         return self.reduction.scene(data, all_move, axis) if self.reduction and sparse else data
 
-    def _lend_memory(self) -> Lent:
+    def _acquire_memory(self) -> Pooled:
         """Memory with the numbers of this run."""
         data = self.reduced(self.model.data)
         key = (Memory, *self._identity(), self.model.structure, self.reduction, self.times.size)
-        memory = lent(key, lambda: self._allocate(data))
+        memory = acquire(key, lambda: self._allocate(data))
         self._put_numbers(memory.values, data)
         return memory
 

@@ -71,7 +71,7 @@ def simulate(
     method = Method.parse(method) if isinstance(method, str) else method
     run = checked_run(scene, method, times, limits or Limits())
     motion = finish_run(run, progress)
-    run.give_back()
+    run.release()
     return motion
 
 

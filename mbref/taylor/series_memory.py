@@ -1,4 +1,4 @@
-"""Memory of a Taylor series for a run: lent from run to run, with the equations of its scene."""
+"""Memory of a Taylor series for a run: pooled, with the equations of its scene."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Hashable, Mapping
 import numpy as np
 
 from mbref.equations.branches import SMOOTH
-from mbref.kernels.lent_memory import Lent, copied, fill, lent, shapes_of
+from mbref.kernels.memory_pool import Pooled, acquire, copied, fill, shapes_of
 from mbref.kernels.named_memory import allocate
 from mbref.simulation.run import Run
 from mbref.taylor.layout import Polynomials, Series, SeriesKernels, TaylorMemory
@@ -19,7 +19,7 @@ KEPT = 16  # singular positions that are passed in a call
 CALLED = (begin, expand_from, step)  # the SeriesKernels
 
 
-def lend_memory(run: Run, geometry: Geometry, polynomials: Polynomials, order: int) -> Lent:
+def acquire_memory(run: Run, geometry: Geometry, polynomials: Polynomials, order: int) -> Pooled:
     """Return memory of the series of a run, up to an order, with its equations."""
     natural = geometry.natural
     nz, ng, nr = len(natural.kept), len(natural.given), len(natural.rows)
@@ -32,7 +32,7 @@ def lend_memory(run: Run, geometry: Geometry, polynomials: Polynomials, order: i
     }  # fmt: skip
     shapes = shapes_of_equations(geometry, polynomials)
     key = (TaylorMemory, *sizes.values(), shapes, run.limits.branches)
-    memory = lent(key, lambda: _allocate(run, geometry, polynomials, sizes), run.lent)
+    memory = acquire(key, lambda: _allocate(run, geometry, polynomials, sizes), run.pooled)
     put_equations(memory.values, geometry, polynomials)
     return memory
 

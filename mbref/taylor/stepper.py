@@ -14,8 +14,8 @@ from mbref.equations.branches import SMOOTH, Passed
 from mbref.equations.initial_state import Start
 from mbref.equations.model import Model
 from mbref.kernels.layout import OK, SINGULAR_AHEAD
-from mbref.kernels.lent_memory import take_back
 from mbref.kernels.machine_code import NoGeneratedCode
+from mbref.kernels.memory_pool import release
 from mbref.simulation.limits import AUTO, GENERATED, GENERIC
 from mbref.simulation.run import Run
 from mbref.simulation.singular_start import fits_no_branch, leaving
@@ -29,7 +29,7 @@ from mbref.taylor.leaving import Departure
 from mbref.taylor.long_crossing import begin_crossing, cross, end_crossing, go_on, look_along
 from mbref.taylor.outputs import complete_samples
 from mbref.taylor.polynomials import Geometry
-from mbref.taylor.series_memory import CALLED, lend_memory, put_equations, shapes_of_equations
+from mbref.taylor.series_memory import CALLED, acquire_memory, put_equations, shapes_of_equations
 from mbref.taylor.start import OFF
 from mbref.taylor.twin import LEAST_CHANGE
 
@@ -71,8 +71,8 @@ class SeriesStepper:
         self.strides, tolerance, order = self._kind_of_steps()
         self.geometry, self.polynomials = self.equations_of(run.model, run.start)
         exact_order = max(order, EXACT_ORDER) if run.model.closed_loops else order
-        self._lent = lend_memory(run, self.geometry, self.polynomials, exact_order)
-        self.taylor, self.argument = self._lent.values, self._lent.packed.argument
+        self._pooled = acquire_memory(run, self.geometry, self.polynomials, exact_order)
+        self.taylor, self.argument = self._pooled.values, self._pooled.packed.argument
         self._calls, self._sampling = 0, 0.0  # of kernels that take steps; s of CPU time spent on samples
         self._options = {
             "order": order, "usual_order": order, "exact_order": exact_order,
@@ -111,9 +111,9 @@ class SeriesStepper:
         geometry = geometry_of(model, start, moving, self.strides)
         return geometry, geometry.polynomials(model)
 
-    def give_back(self) -> None:
-        """Leave the memory to the next run; this one cannot be read any more."""
-        take_back(self._lent)
+    def release(self) -> None:
+        """Release the memory to the next run; this one cannot be read any more."""
+        release(self._pooled)
 
     def _put_options(self) -> None:
         """Have memory hold the numbers of the method."""
@@ -136,12 +136,12 @@ class SeriesStepper:
 
     def begin_again(self) -> None:
         """Have memory of its own be as when the run began."""
-        self._lent.restore()
+        self._pooled.restore()
         put_equations(self.taylor, self.geometry, self.polynomials)
         self._put_options()
         self._decide_rank()
 
-    def numbers(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
+    def parameters(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
         """Where its memory has numbers in which scenes differ, and those of scenes of ``lengths`` (s,)."""
         return [(self.taylor.progress, OFF * np.maximum(1.0, lengths), "farthest")]
 

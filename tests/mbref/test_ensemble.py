@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 from mbref.cli import main
+from mbref.ensembles.ensemble import ensemble
+from mbref.ensembles.processes import processes
+from mbref.ensembles.simulate_all import run_all
 from mbref.scene import Driver, Scene, SceneError
 from mbref.scenes import SCENES
 from mbref.scenes.spatial_slider_crank import OFFSET, RADIUS, ROD
-from mbref.simulation.ensemble import ensemble
-from mbref.simulation.processes import processes
 from mbref.simulation.simulate import Limits, simulate
-from mbref.simulation.together import run_all
 from mbref.variation import Variation, variants
 
 TIMES = np.array([0.0, 0.004, 0.01])
@@ -67,7 +67,7 @@ def test_interrupted_and_uninterrupted_ensembles_agree(tmp_path: Path, monkeypat
         ran.extend(map(scenes.index, given))
         return run_all(given, *arguments)
 
-    monkeypatch.setattr("mbref.simulation.ensemble.run_all", counted)
+    monkeypatch.setattr("mbref.ensembles.ensemble.run_all", counted)
     with ThreadPoolExecutor(1) as one:
         whole = dict(ensemble(scenes, TIMES, METHOD, LIMITS, one))
         ran.clear()
@@ -227,7 +227,7 @@ def test_runs_are_given_several_at_a_time_and_tried_one_by_one_where_a_process_i
     monkeypatch: pytest.MonkeyPatch,
 ):
     """However long a run takes, as many as may be are given at a time."""
-    monkeypatch.setattr("mbref.simulation.ensemble.SECONDS", np.inf)
+    monkeypatch.setattr("mbref.ensembles.ensemble.SECONDS", np.inf)
     scenes = list(variants(DRIVEN, VARY, 60))
     executor = Fragile(lambda given: scenes[50] in given)
     runs = dict(ensemble(scenes, TIMES, METHOD, Limits(rtol=1e-3), executor))
@@ -239,7 +239,7 @@ def test_runs_are_given_several_at_a_time_and_tried_one_by_one_where_a_process_i
 
 def test_scenes_that_come_slowly_do_not_wait_for_others(monkeypatch: pytest.MonkeyPatch):
     """With no time to wait, each is run before the next one is drawn."""
-    monkeypatch.setattr("mbref.simulation.ensemble.SECONDS", 0.0)
+    monkeypatch.setattr("mbref.ensembles.ensemble.SECONDS", 0.0)
     executor, drawn = Fragile(lambda given: False), []
 
     def drawing():

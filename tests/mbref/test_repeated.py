@@ -11,7 +11,7 @@ import pytest
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from mbref.equations import reduction
 from mbref.equations.model import Model
-from mbref.kernels import lent_memory
+from mbref.kernels import memory_pool
 from mbref.kernels.compilation import PLAIN
 from mbref.kernels.named_memory import Packed
 from mbref.method import Method
@@ -38,7 +38,7 @@ def nothing_known() -> Iterator[None]:
 
 def forget() -> None:
     reduction._known.clear()
-    lent_memory._kept.clear()
+    memory_pool._kept.clear()
     geometry._known.clear()
 
 
@@ -66,7 +66,7 @@ def test_variants_in_a_row_and_alone_agree(scene, method):
     expected = [alone(each, method) for each in scenes]
     forget()
     assert [simulated(each, method) for each in scenes * 2] == expected * 2
-    assert lent_memory._kept, "nothing was lent again"
+    assert memory_pool._kept, "no memory is kept"
 
 
 def test_random_mechanisms_in_a_row_and_alone_agree():
@@ -127,12 +127,12 @@ def test_a_repeated_run_evaluates_its_start_twice(scene, monkeypatch):
     assert len(asked) == 2
 
 
-def test_memory_in_use_is_not_lent():
+def test_memory_in_use_is_not_acquired_again():
     method, limits = Method.parse(METHODS[0]), Limits()
     one = start_run(CRANK, method, TIMES, limits)
     other = start_run(CRANK, method, TIMES, limits)
     assert one.memory is not other.memory
-    one.give_back()
+    one.release()
     third = start_run(CRANK, method, TIMES, limits)
     assert third.memory is one.memory and third.memory is not other.memory
 
@@ -154,6 +154,6 @@ def test_a_repeated_crossing_has_the_same_bits():
 
 
 def test_what_is_kept_is_bounded():
-    for count in range(2, lent_memory.MOST_KEYS + 10):
+    for count in range(2, memory_pool.MOST_KEYS + 10):
         simulate(CRANK, METHODS[0], np.linspace(0.0, 1e-4, count))
-    assert len(lent_memory._kept) <= lent_memory.MOST_KEYS
+    assert len(memory_pool._kept) <= memory_pool.MOST_KEYS

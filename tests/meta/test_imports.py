@@ -27,7 +27,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["command_line", "formats", "scenes", "scene_slips", "variation"], ["drawing"],
         ["joint_motion", "energy"],
         ["motion"], ["kernels"], ["linear_algebra"], ["equations"], ["formulations"], ["stabilisation"],
-        ["integrators"], ["method"], ["simulation", "taylor"], ["design"], ["cli"],
+        ["integrators"], ["method"], ["simulation", "taylor"], ["ensembles"], ["design"], ["cli"],
         ["__main__"],
     ),
     "crosscheck": (

@@ -231,13 +231,13 @@ DEFECTS = (
     ),
     # ensembles and the command line
     Defect(
-        "mbref/simulation/ensemble.py",
+        "mbref/ensembles/ensemble.py",
         "identity = [scene.to_dict(), times.tolist(), str(method)",
         "identity = [scene.to_dict(), str(method)",
         f"{ENSEMBLE}::test_other_limits_and_stored_results_are_not_confused",
     ),
     Defect(
-        "mbref/simulation/ensemble.py",
+        "mbref/ensembles/ensemble.py",
         "            if key in known:",
         "            if False:",
         f"{ENSEMBLE}::test_interrupted_and_uninterrupted_ensembles_agree",

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from crosscheck.conformance.random_mechanisms import random_mechanism
+from mbref.ensembles.simulate_all import run_all, simulate_all
 from mbref.equations.packing import shape_of
 from mbref.scene import Scene, SceneError, Spring
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
-from mbref.simulation.together import run_all, simulate_all
 from mbref.trajectory import Crossing
 from mbref.variation import Variation, variants
 from tests.mbref.scenes_of_one_structure import CRANK, NUMBERS_DECIDE, results
@@ -34,10 +34,10 @@ def agree(scenes: list[Scene], times=TIMES, limits=LIMITS, method=METHOD) -> lis
     return together
 
 
-def followers(scenes: list[Scene], times=TIMES, limits=LIMITS) -> int:
-    """How many runs followed another."""
+def in_batches(scenes: list[Scene], times=TIMES, limits=LIMITS) -> int:
+    """The number of runs that were completed in a batch."""
     ended = run_all(scenes, METHOD, times, limits)
-    return sum(len(followed.places) for _, followed in ended.followed)
+    return sum(len(followed.places) for _, followed in ended.batches)
 
 
 def bytes_of(crossing: Crossing) -> list:
@@ -55,14 +55,14 @@ def test_variants_together_and_alone_agree(name):
     varied = [Variation(f"body[{body}].mass", 0.5, 2.0), Variation("gravity[1]", -10.0, 10.0)]
     scenes = list(variants(SCENES[name](), varied, 12))
     runs = agree(scenes)
-    assert followers(scenes) == 11
+    assert in_batches(scenes) == 11
     assert len({run.position.tobytes() for run in runs}) == 12, "the variants are to differ"
 
 
 def test_varied_lengths_and_a_driver_together_and_alone_agree():
     scenes = list(variants(DRIVEN, [Variation("joint[B].anchor[0]", 0.1, 1e-3, normal=True)], 12))
     agree(scenes)
-    assert followers(scenes) == 11, "roundings of zero in Φ and γ decide nothing"
+    assert in_batches(scenes) == 11, "roundings of zero in Φ and γ decide nothing"
 
 
 def test_runs_that_pass_singular_positions_and_others_agree():
@@ -82,7 +82,7 @@ def test_runs_over_singular_positions_follow_each_other():
     for varied in ([mass], [mass, centre]):
         scenes = list(variants(SCENES["five_bar"](), varied, 6))
         runs = agree(scenes, times)
-        assert followers(scenes, times) == 5
+        assert in_batches(scenes, times) == 5
         for scene, run in zip(scenes, runs, strict=True):
             alone = simulate(scene, METHOD, times, LIMITS).crossings
             assert alone and list(map(bytes_of, run.crossings)) == list(map(bytes_of, alone))
@@ -120,7 +120,7 @@ def test_springs_and_products_of_inertia_together_and_alone_agree():
     varied = [Variation("load[1].stiffness", 10.0, 90.0), LENGTH]
     scenes = list(variants(sprung, varied, 6))
     agree([*scenes, *variants(turned, varied, 6)])
-    assert followers(scenes) == 5
+    assert in_batches(scenes) == 5
 
 
 @pytest.mark.parametrize(
@@ -134,10 +134,10 @@ def test_scenes_whose_numbers_defy_an_array_operation_run_alone(monkeypatch: pyt
     def fails(*arguments):
         raise np.linalg.LinAlgError("SVD did not converge")
 
-    monkeypatch.setattr("mbref.simulation.group.all_ranks", fails)
+    monkeypatch.setattr("mbref.ensembles.candidates.all_ranks", fails)
     scenes = list(variants(CRANK, [MASS], 3))
     agree(scenes)
-    assert followers(scenes) == 0
+    assert in_batches(scenes) == 0
 
 
 def test_runs_and_their_reactions_pass_between_processes():

@@ -1,30 +1,31 @@
-"""Followers: scenes that differ from that of a run in numbers alone, run one after another in its memory.
+"""Batches: scenes that differ from a lead scene in numbers alone, simulated one after another in its memory.
 
-All of them are set up at once, in arrays whose first axis counts them.  A follower must give the answers on
-which the run's choice of rows and columns rests, begin on no singular position, and complete in one call of
-the run's stepper, as the run itself; every other scene is left to a run of its own.  The results are those of
-runs of their own, to the bit.
+All of them are set up at once, in arrays whose first axis counts them.  A scene of a batch must lead to the
+structural decisions of the lead scene (rank, active rows and columns), begin on no singular position, and
+complete in one call of the stepper, as the lead scene did.  Every other scene is left to a run of its own.
+The results agree to the bit with runs of single scenes.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from mbref.ensembles.candidates import Candidates, candidates_of
+from mbref.ensembles.parameters import Parameters
 from mbref.equations.initial_state import LARGE
 from mbref.equations.joint_reactions import Balance
 from mbref.equations.model import motion_of
-from mbref.kernels.copying import Bytes, copy_rows, rows_from, table_of
 from mbref.kernels.layout import Counts
+from mbref.kernels.memory_pool import SavedNumbers
 from mbref.motion import Motion
 from mbref.scene import Scene
 from mbref.simulation.comparison import may_leave
 from mbref.simulation.crossings import Crossings
-from mbref.simulation.evaluations import Rows
-from mbref.simulation.group import Group, group_of
 from mbref.simulation.outcome import OUTCOMES, cost_of, facts_of, reactions_of, report_of
 from mbref.simulation.run import NEARLY, Run
 from mbref.simulation.singular_start import begins_at_rest, begins_in_motion
@@ -33,14 +34,14 @@ from mbref.trajectory import Crossing
 
 
 def may_lead(run: Run) -> bool:
-    """Whether a run that has ended was so ordinary that others may follow it."""
+    """Whether a run that has ended was so ordinary that it may lead a batch."""
     ordinary = run.reduction is not None and run.model.m <= LARGE
     completed = run.memory.loop.clock.sample == run.times.size and not run.limits.branches
     return bool(ordinary and completed and run.stepper.was_short and run.ranks.least >= NEARLY)
 
 
-class Followed(NamedTuple):
-    """Runs that followed one: s completed ones, at k samples.
+class BatchResult(NamedTuple):
+    """The s completed runs of a batch, at k samples.
 
     ``places`` (s) among the scenes, poses (s, k, nb, …) as a Motion names them, coordinates (s, k, nb, 7),
     multipliers (s, k, m), ``layout.Counts`` (s, 6), the seconds of stepping (s) and construction, and the
@@ -60,7 +61,7 @@ class Followed(NamedTuple):
     facts: dict[str, Any]
 
     def motions(self, scenes: Sequence[Scene]) -> Iterator[tuple[int, Motion]]:
-        """The place and the motion of each; the scenes are those that were to follow."""
+        """The place and the motion of each; ``scenes`` are all of the batch."""
         for k, place in enumerate(self.places):
             poses = {name: array[k] for name, array in self.poses.items()}
             balance = Balance(scenes[place], self.times, self.coordinates[k], self.multipliers[k])
@@ -81,29 +82,26 @@ class Followed(NamedTuple):
             )
 
 
-def follow(run: Run, scenes: Sequence[Scene]) -> Followed:
-    """The scenes that followed a run that may lead them; its memory is theirs from now on."""
+def run_batch(run: Run, scenes: Sequence[Scene]) -> BatchResult:
+    """Simulate scenes in the memory of a run that may lead them; the run cannot be read any more."""
     began = time.process_time()
-    group = group_of(run, scenes)
-    ended = Runs(run, group)
-    places = ended.run()
-    return ended.followed(places, time.process_time() - began)
+    batch = Batch(run, candidates_of(run, scenes))
+    places = batch.run()
+    return batch.result(places, time.process_time() - began)
 
 
-class Runs:
-    """Runs of a group of scenes in the memory of one run."""
+class Batch:
+    """Runs of scenes in the memory of one run."""
 
-    def __init__(self, run: Run, group: Group):
-        self._run, self._group = run, group
+    def __init__(self, run: Run, candidates: Candidates):
+        self._run, self._candidates = run, candidates
         self._rank = self._begin()
-        count, memory = len(group.q), run.memory
+        count, memory = len(candidates.q), run.memory
         self._crossings: dict[int, Sequence[Crossing]] = {}
-        numbers = [*group.numbers(run, memory), *run.stepper.numbers(group.packs.length)]
-        self._begins = Rows(numbers, Bytes(run.stepper.memory))
+        parameters = candidates.parameters(run, memory), run.stepper.parameters(candidates.packs.length)
+        self._parameters = Parameters([*parameters[0], *parameters[1]], SavedNumbers(run.stepper.memory))
         self._samples = [np.empty((count, *each.shape)) for each in memory.loop.samples]
         self._counts = np.empty((count, len(Counts._fields)), dtype=np.int64)
-        sources: list[Any] = [*memory.loop.samples, memory.equations.system.counts]
-        self._ends = table_of(rows_from(*each) for each in zip(sources, self._rows(), strict=True))
         self._seconds = np.zeros(count)
 
     def _begin(self) -> int:
@@ -116,39 +114,42 @@ class Runs:
         run.begin_again()
         return -1 if extraordinary else rank
 
-    def _rows(self) -> list[np.ndarray]:
-        """Arrays that take samples and counts."""
-        return [*self._samples, self._counts]
+    def _keep(self, place: int) -> None:
+        """Keep the samples and counts of the scene at a place."""
+        memory = self._run.memory
+        for kept, samples in zip(self._samples, memory.loop.samples, strict=True):
+            kept[place] = samples
+        self._counts[place] = tuple(memory.equations.system.counts)
 
     def run(self) -> list[int]:
         """Run the scenes that fit; the places of those that completed in one call."""
         run, stepper, completed = self._run, self._run.stepper, []
-        for k in self._group.fit:
-            self._begins.copy(k)
+        for k in self._candidates.fit:
+            self._parameters.write(k)
             run.crossings = []
-            if not stepper.takes(lambda place=k: self._group.model(place), self._group.starts[k]):
+            if not stepper.takes(partial(self._candidates.model, k), self._candidates.starts[k]):
                 continue
             if run.memory.watch.generic_rank != self._rank:
                 continue
             status, self._seconds[k] = stepper.advance_once()
             if status == DONE and not may_leave(run):
-                copy_rows(self._ends, k)
+                self._keep(k)
                 completed.append(k)
                 if run.crossings:
-                    self._crossings[k] = Crossings(self._group.model(k), run.crossings)
+                    self._crossings[k] = Crossings(self._candidates.model(k), run.crossings)
         return completed
 
-    def followed(self, places: list[int], seconds: float) -> Followed:
+    def result(self, places: list[int], seconds: float) -> BatchResult:
         """The runs at these places, which all took so many seconds of CPU time."""
-        packs, nb = self._group.packs, self._run.model.nb
+        packs, nb = self._candidates.packs, self._run.model.nb
         shape = len(places), self._run.times.size, nb
         q, v, a, multipliers = (each[places] for each in self._samples)
         q, v, a = q.reshape(*shape, 7), v.reshape(*shape, 6), a.reshape(*shape, 6)
         principal = packs.principal[places][:, None] if packs.turns_frames else None
         stepping, crossings = self._seconds[places], [self._crossings.get(k, ()) for k in places]
-        starts = ((self._group.starts[k], self._group.ranks[k]) for k in places)
+        starts = ((self._candidates.starts[k], self._candidates.ranks[k]) for k in places)
         messages = [report_of(*start, len(c)) for start, c in zip(starts, crossings, strict=True)]
-        return Followed(
+        return BatchResult(
             places=places,
             times=self._run.times,
             poses=motion_of(q, v, a, principal, len(self._run.scene.body)),

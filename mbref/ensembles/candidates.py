@@ -1,4 +1,4 @@
-"""Groups of scenes of one shape that may follow a run: their starts, and the numbers that memory takes."""
+"""Candidates: scenes of equal structure that may be simulated in the memory of one run."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mbref.ensembles.evaluations import Evaluations
+from mbref.ensembles.parameters import parameters_of
 from mbref.equations.active_coordinates import without_rounding
 from mbref.equations.initial_state import Start
 from mbref.equations.model import Model
@@ -16,14 +18,16 @@ from mbref.equations.reduction import Reduction
 from mbref.kernels.layout import Memory
 from mbref.scene import Scene
 from mbref.simulation.control import largest_violation
-from mbref.simulation.evaluations import Evaluations, numbers_of
 from mbref.simulation.ranks import Ranks, all_ranks
 from mbref.simulation.run import NEARLY, Run
 
 
-class Group(NamedTuple):
-    """Scenes (s) of one shape, their coordinates (s, 7 nb) and velocities (s, 6 nb) at the start, consistent
-    starts by place, ranks there, and the places of those that fit to follow."""
+class Candidates(NamedTuple):
+    """Scenes (s) of equal structure and their starts.
+
+    Coordinates (s, 7 nb) and velocities (s, 6 nb) at the start, consistent starts by place, ranks there, and
+    the places of the scenes that lead to the structural decisions of the run.
+    """
 
     packs: Packs
     q: np.ndarray
@@ -36,11 +40,11 @@ class Group(NamedTuple):
         """The model of the scene at a place."""
         return Model(self.packs.scenes[place], self.packs, place)
 
-    def numbers(self, run: Run, memory: Memory) -> list[tuple[Any, ...]]:
-        """Where memory of a run has the numbers in which the scenes differ, and those of all of them."""
+    def parameters(self, run: Run, memory: Memory) -> list[tuple[Any, ...]]:
+        """The arrays of memory of a run in which the scenes differ, each with the values of all scenes."""
         length, rounding = self.packs.length, run.method.settings(0.0).rounding
         return [
-            *numbers_of(memory.equations, run.reduced(self.packs.data, axis=1), self.packs),
+            *parameters_of(memory.equations, run.reduced(self.packs.data, axis=1), self.packs),
             (memory.state.coordinates, self.q),
             (memory.state.velocities, self.v),
             (memory.control, largest_violation(run.limits, length), "violation"),
@@ -48,8 +52,8 @@ class Group(NamedTuple):
         ]
 
 
-def group_of(run: Run, scenes: Sequence[Scene]) -> Group:
-    """The scenes, of which those fit that give the run's answers and start as regularly."""
+def candidates_of(run: Run, scenes: Sequence[Scene]) -> Candidates:
+    """The scenes; those fit that lead to the structural decisions of the run and start as regularly."""
     packs, evidence = Packs(scenes), _reduction(run).evidence
     evaluations = Evaluations(run.model, packs)
     starts, q, v = _starts(run, packs, evaluations)
@@ -60,11 +64,11 @@ def group_of(run: Run, scenes: Sequence[Scene]) -> Group:
     symbolic, tolerance = run.memory.factor.symbolic, run.limits.rank_tolerance
     ranks = all_ranks(run.model, terms.jacobian[:, 0], packs.data.metric_root, symbolic, tolerance)
     alike = [rank.rank == run.ranks.rank and rank.least >= NEARLY for rank in ranks]
-    return Group(packs, q, v, starts, ranks, [k for k in starts if agree[k] and alike[k]])
+    return Candidates(packs, q, v, starts, ranks, [k for k in starts if agree[k] and alike[k]])
 
 
 def _reduction(run: Run) -> Reduction:
-    """The reduction of a run that may lead others, which has one."""
+    """The reduction of a run that may lead a batch, which has one."""
     assert run.reduction is not None
     return run.reduction
 

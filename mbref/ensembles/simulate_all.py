@@ -1,4 +1,4 @@
-"""Many scenes by one method in one process: those of one shape follow the first of them (``followers``)."""
+"""Many scenes by one method in one process: scenes of equal structure are simulated in batches."""
 
 from __future__ import annotations
 
@@ -8,28 +8,28 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from mbref.ensembles.batch import BatchResult, may_lead, run_batch
 from mbref.equations.packing import shape_of
 from mbref.method import Method
 from mbref.motion import Motion
 from mbref.scene import Scene
 from mbref.simulation.comparison import DROPS
-from mbref.simulation.followers import Followed, follow, may_lead
 from mbref.simulation.limits import Limits
 from mbref.simulation.run import Run
 from mbref.simulation.simulate import checked_run, finish_run, simulate
 
-FEW = 0.5  # of the scenes of a shape, that follow a run: the others are left to runs of their own
+FEW = 0.5  # fraction of a batch: where so few completed, no further batch is tried, but single runs
 
 
 @dataclass
 class Ended:
     """Runs of several scenes, by their places, and the exceptions of those that cannot be simulated.
 
-    ``followed`` has the places of those that were to follow a run, and how they ended.
+    ``batches`` have the places of their scenes, and the completed runs.
     """
 
     alone: dict[int, Motion] = field(default_factory=dict)
-    followed: list[tuple[list[int], Followed]] = field(default_factory=list)
+    batches: list[tuple[list[int], BatchResult]] = field(default_factory=list)
     errors: dict[int, Exception] = field(default_factory=dict)
     seconds: float = 0.0  # of wall time
 
@@ -41,8 +41,8 @@ class Ended:
     def motions(self, scenes: Sequence[Scene]) -> Iterator[tuple[int, Motion]]:
         """Place and motion of every run."""
         yield from self.alone.items()
-        for places, followed in self.followed:
-            for k, motion in followed.motions([scenes[place] for place in places]):
+        for places, batch in self.batches:
+            for k, motion in batch.motions([scenes[place] for place in places]):
                 yield places[k], motion
 
 
@@ -64,7 +64,7 @@ def run_all(scenes: Sequence[Scene], method: Method | str, times: np.ndarray, li
     runs = _Runs(scenes, method, times, limits)
     for places in _by_shape(scenes):
         if len(places) > 1 and _can_lead(method, limits):
-            runs.one_behind_the_other(places)
+            runs.in_batches(places)
         else:
             runs.alone(places)
     runs.ended.seconds = time.perf_counter() - began
@@ -80,13 +80,13 @@ def _by_shape(scenes: Sequence[Scene]) -> Sequence[list[int]]:
 
 
 def _can_lead(method: Method, limits: Limits) -> bool:
-    """Whether runs of a method can be followed: those that projection or series hold to their motion."""
+    """Whether runs of a method may lead a batch: those that projection or series hold to their motion."""
     held = limits.rank_tolerance <= DROPS and not limits.branches
     return method.stabilisation.projects and method.integrator.integrates and held
 
 
 class _Runs:
-    """Runs of scenes, those of one shape behind the first run that may lead and that they can follow."""
+    """Runs of scenes: of each shape a batch behind the first run that may lead one."""
 
     def __init__(self, scenes: Sequence[Scene], method: Method, times: np.ndarray, limits: Limits):
         self.ended, self._scenes, self._arguments = Ended(), scenes, (method, times, limits)
@@ -96,11 +96,11 @@ class _Runs:
         for place in places:
             try:
                 self.ended.alone[place] = simulate(self._scenes[place], *self._arguments)
-            except Exception as error:  # told behind the runs that went well
+            except Exception as error:  # reported after the runs that went well
                 self.ended.errors[place] = error
 
-    def one_behind_the_other(self, places: list[int]) -> None:
-        """Run scenes of one shape at these places."""
+    def in_batches(self, places: list[int]) -> None:
+        """Run scenes of equal structure at these places."""
         while places:
             try:
                 run = checked_run(self._scenes[places[0]], *self._arguments)
@@ -110,20 +110,20 @@ class _Runs:
                 places = places[1:]
                 continue
             places = self._led(run, places[1:])
-            run.give_back()
+            run.release()
 
     def _led(self, run: Run, places: list[int]) -> list[int]:
-        """The places of scenes that are left once others have followed a run."""
+        """The places of scenes that are left after the batch of a run."""
         if not places or not may_lead(run):
             return places
         try:
-            followed = follow(run, [self._scenes[place] for place in places])
+            batch = run_batch(run, [self._scenes[place] for place in places])
         except np.linalg.LinAlgError:  # which the numbers of one scene have caused
             self.alone(places)
             return []
-        self.ended.followed.append((places, followed))
-        have_followed = set(followed.places)
-        left = [place for k, place in enumerate(places) if k not in have_followed]
+        self.ended.batches.append((places, batch))
+        completed = set(batch.places)
+        left = [place for k, place in enumerate(places) if k not in completed]
         if len(left) <= FEW * len(places):
             return left
         self.alone(left)

@@ -1,6 +1,6 @@
 """Ensembles: many scenes by one method, spread over processes; results are streamed, stored and resumed.
 
-Processes are given several runs at a time: runs of scenes of one shape are set up together (``together``).
+Processes are given several runs at a time: scenes of equal structure are set up together (``batch``).
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from typing import NamedTuple
 import numpy as np
 
 from mbref import __version__, records
+from mbref.ensembles.processes import processes
+from mbref.ensembles.simulate_all import Ended, run_all
 from mbref.method import Method, default_method
 from mbref.scene import Scene
-from mbref.simulation.processes import processes
 from mbref.simulation.simulate import Limits, checked_times, prepare
-from mbref.simulation.together import Ended, run_all
 from mbref.trajectory import Outcome, Trajectory
 
 AHEAD = (

@@ -1,0 +1,48 @@
+"""Parameters: the numbers in which scenes of equal structure differ, written to one memory scene by scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from mbref.equations.packing import Packs
+from mbref.kernels.layout import Equations
+from mbref.kernels.memory_pool import SavedNumbers
+from mbref.kernels.scene_layout import SceneData
+
+
+class Parameters:
+    """Arrays of memory, each with the values (s, …) of s scenes.
+
+    ``values`` are (array, values), or (record, values, name of a number in it).  ``saved`` numbers are
+    restored before those of a scene are written.
+    """
+
+    def __init__(self, values: Sequence[tuple[Any, ...]], saved: SavedNumbers | None = None):
+        self._values = [(target, of_all, *(name or (...,))) for target, of_all, *name in values]
+        self._saved = saved
+
+    def write(self, place: int) -> None:
+        """Write the numbers of the scene at a place."""
+        if self._saved is not None:
+            self._saved.restore()
+        for target, of_all, where in self._values:
+            target[where] = of_all[place]
+
+
+def parameters_of(equations: Equations, data: SceneData, packs: Packs) -> list[tuple[Any, ...]]:
+    """The arrays of memory of evaluations, each with the values of all scenes."""
+    system = equations.system
+    masses = (system.mass, packs.mass), (system.inverse_root, packs.inverse_root)
+    return [*zip(_arrays_of(equations.scene), _arrays_of(data), strict=True), *masses]
+
+
+def _arrays_of(values: Sequence[Any]) -> Iterator[np.ndarray]:
+    """All arrays of nested tuples."""
+    for value in values:
+        if isinstance(value, np.ndarray):
+            yield value
+        else:
+            yield from _arrays_of(value)

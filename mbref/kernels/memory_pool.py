@@ -1,0 +1,120 @@
+"""Memory pool: memory of kernels that is made and packed once, and serves one run after another.
+
+To allocate and pack the memory of a small mechanism takes longer than a short run.  Released memory is
+acquired again for an equal key with the numbers that it had when it was made, so that nothing of one run
+reaches the next.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Hashable, Iterator
+from typing import Any
+
+import numpy as np
+
+from mbref.kernels.aligned import aligned_copy
+from mbref.kernels.named_memory import Packed, packed
+from mbref.kernels.records import Numbers
+
+MOST_KEYS, MOST_OF_A_KEY, MOST_BYTES = 64, 4, 1 << 20  # kept for later; larger memory is not kept
+
+
+class SavedNumbers:
+    """Copies of all arrays and records of a memory."""
+
+    def __init__(self, values: Any):
+        arrays = {id(array): array for array in arrays_in(values) if array.nbytes and array.flags.writeable}
+        self._pairs = [(array, array.copy()) for array in arrays.values()]
+        self.size = sum(array.nbytes for array, _ in self._pairs)  # bytes
+
+    def restore(self) -> None:
+        """Write the numbers back to where they were copied from."""
+        for array, numbers in self._pairs:
+            array[...] = numbers
+
+
+def arrays_in(values: Any) -> Iterator[np.ndarray]:
+    """The arrays of a schema and of the packed schemas in it; that of a record has one element."""
+    if isinstance(values, Packed):
+        yield from arrays_in(values.values)
+    elif isinstance(values, tuple):
+        for value in values:
+            yield from arrays_in(value)
+    elif isinstance(values, Numbers):
+        yield values.base
+    elif isinstance(values, np.ndarray):
+        yield values
+
+
+class Pooled:
+    """Packed memory of a schema, and the numbers with which it begins.
+
+    ``part`` is other pooled memory that is in it, and keeps its own numbers; ``number`` identifies it.
+    """
+
+    def __init__(self, values: Any, key: Hashable, part: Pooled | None = None):
+        self.values, self.key, self.number = values, key, next(_numbers)
+        self.packed = packed(values, part.packed if part else None)
+        self._first = SavedNumbers(
+            values if part is None else tuple(v for v in values if v is not part.values)
+        )
+        self.size = self._first.size + (part.size if part else 0)  # bytes in arrays and records
+
+    def restore(self) -> None:
+        """Write the numbers with which the memory was made to its arrays and records, except its part's."""
+        self._first.restore()
+
+
+_kept: dict[Hashable, list[Pooled]] = {}
+_numbers = itertools.count()
+
+
+def acquire(key: Hashable, make: Callable[[], Any], part: Pooled | None = None) -> Pooled:
+    """Memory of a key, which determines all that ``make`` makes, its part included: kept memory, or new."""
+    key = (key, part.number) if part else key
+    kept = _kept.get(key)
+    try:
+        memory = kept.pop() if kept else None
+    except IndexError:  # another thread was faster
+        memory = None
+    if memory is None:
+        return Pooled(make(), key, part)
+    memory.restore()
+    return memory
+
+
+def release(memory: Pooled) -> None:
+    """Keep memory that nobody uses any more."""
+    if memory.size > MOST_BYTES:
+        return
+    if memory.key not in _kept and len(_kept) >= MOST_KEYS:
+        _kept.pop(next(iter(_kept)), None)
+    kept = _kept.setdefault(memory.key, [])
+    if len(kept) < MOST_OF_A_KEY:
+        kept.append(memory)
+
+
+def fill(target: Any, source: Any) -> None:
+    """Copy the arrays of one instance of a schema into those of another."""
+    for mine, theirs in zip(target, source, strict=True):
+        if isinstance(theirs, tuple):
+            fill(mine, theirs)
+        else:
+            mine[...] = theirs
+
+
+def write(record: Numbers, values: Any) -> None:
+    """Write numbers to a record."""
+    for name, value in zip(values._fields, values, strict=True):
+        record[name] = value
+
+
+def shapes_of(values: Any) -> tuple[Any, ...]:
+    """The shapes of the arrays of a schema."""
+    return tuple(shapes_of(value) if isinstance(value, tuple) else value.shape for value in values)
+
+
+def copied(values: Any) -> Any:
+    """An instance of the same schema with arrays of its own."""
+    return type(values)(*(copied(v) if isinstance(v, tuple) else aligned_copy(v) for v in values))
