@@ -106,7 +106,7 @@ def test_documentation_tells_every_method(table):
 
 def test_readme_is_short_and_its_links_lead_somewhere():
     text = (ROOT / "README.md").read_text()
-    assert len(text.splitlines()) <= 160, len(text.splitlines())
+    assert len(text.splitlines()) <= 120, len(text.splitlines())
     for path in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md")):
         links = re.findall(r"\]\(([^)#:]+)\)", path.read_text())
         there = [link for link in links if "figures/" not in link]  # made by docs/hooks.py
