@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from mbref.kernels.compilation import INT, entry, kernel
+from mbref.kernels.compilation import INT, entry
 from mbref.kernels.layout import OK, SINGULAR_AHEAD
 from mbref.simulation.stepping import DONE, PAUSED, TOO_MANY_STEPS
-from mbref.taylor.brief import is_full, parts_at, pass_briefly
+from mbref.taylor.crossing.short_crossing import cross_briefly, is_full, switches_branch
 from mbref.taylor.layout import SERIES
 from mbref.taylor.samples import put_angles, put_terms
+from mbref.taylor.stepping import begin_once
 
 
 @entry(INT(SERIES))
@@ -15,15 +16,6 @@ def enter(memory):
     """Begin a series at the present state: OK or why that cannot be."""
     memory.progress.begun = 0
     return begin_once(memory)
-
-
-@kernel
-def begin_once(memory):
-    """Begin a series at the present state unless one has begun: OK or why that cannot be."""
-    if memory.progress.begun:
-        return OK
-    memory.progress.begun = 1
-    return memory.kernels.begin(memory)
 
 
 @entry(INT(SERIES))
@@ -41,13 +33,13 @@ def advance_series(memory):
         if counts.steps >= memory.run.control.most_steps:
             return TOO_MANY_STEPS
         status = memory.kernels.step(memory)
-        if status == SINGULAR_AHEAD and pass_briefly(memory):
+        if status == SINGULAR_AHEAD and cross_briefly(memory):
             status = OK
         if status != OK:
             put_terms(memory.series.past, memory)
             put_angles(0.0, memory)
             return status
-        if memory.progress.passed and parts_at(counts.crossings, memory):
+        if memory.progress.recorded and switches_branch(counts.crossings, memory):
             return PAUSED
         if clock.time >= memory.progress.end:
             return DONE

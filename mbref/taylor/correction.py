@@ -6,7 +6,7 @@ from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.layout import NOT_CONVERGED, OK
 from mbref.linear_algebra.vectors import larger
 from mbref.taylor.generated_calls import close_by_code, violation_by_code
-from mbref.taylor.passage import least_pivot
+from mbref.taylor.partition import least_pivot
 from mbref.taylor.simd import WIDTH, gather, load, store
 from mbref.taylor.solver import factorise, solution
 
@@ -111,18 +111,18 @@ def changes_factor(left, memory):
     It has by the correction over the distance from a singular position, which the least pivot tells; where
     masses differ much, light bodies move the farther the heavier the others are, by the change over Φ.
     """
-    tolerance, change, pivot = memory.progress.tolerance, memory.progress.corrected, least_pivot(memory)
+    tolerance, change, pivot = memory.mode.tolerance, memory.step.correction, least_pivot(memory)
     return left > tolerance * pivot * pivot or change * change > tolerance * left
 
 
 @kernel
 def correct(memory):
     """Correct positions and velocities, the first coefficients: OK, SINGULAR or NOT_CONVERGED."""
-    progress, left = memory.progress, 1.0
+    step, left = memory.step, 1.0
     for attempt in range(CORRECTIONS):
         left = violation(memory)
         if attempt == 0:
-            progress.violation = left
+            step.violation = left
         status = factorise(memory)
         if status != OK:
             return status
@@ -131,7 +131,7 @@ def correct(memory):
             break
     if not left <= SMALL:
         return NOT_CONVERGED
-    progress.corrected = largest_change(memory)
+    step.correction = largest_change(memory)
     if changes_factor(left, memory):
         status = factorise(memory)
     close_rate(memory)

@@ -162,53 +162,71 @@ class Solver(NamedTuple):
     change: Annotated[Vector, "lanes"]  # the last correction
 
 
-class Progress(NamedTuple):
-    """Where the method is."""
+class Options(NamedTuple):
+    """Numbers of a run that its steps do not change."""
+
+    regular_tolerance: float = 0.0  # of the last terms of the series, in regular steps
+    regular_order: int = 0  # of their series
+    accurate_tolerance: float = 0.0  # of high-accuracy steps, which cross singular positions
+    accurate_order: int = 0
+    velocity_change: float = 0.0  # relative, of a perturbed run
+    start_distance: float = 0.0  # m or rad by which the series may miss the coordinates of the start
+    start_freedoms: int = 0  # by singular values of the constraint rows
+    follows_drivers: int = 0  # whether steps are predictor steps away from singular positions
+
+
+class Mode(NamedTuple):
+    """The kind of the next steps, as ``mbref.taylor.mode`` sets it."""
+
+    kind: int = 0  # REGULAR, HIGH_ACCURACY or PREDICTOR
+    tolerance: float = 0.0  # of the last terms of the series
+    order: int = 0  # of the series
+
+
+class Partition(NamedTuple):
+    """Which rows are independent and which variables depend on them."""
 
     rank: int = 0  # of the constraint rows
-    order: int = 0  # of the series
-    tolerance: float = 0.0  # of the last terms of the series
-    farthest: float = 0.0  # m by which the series may miss the coordinates of the start
-    freedoms: int = 0  # at the start, by singular values of the constraint rows
+    partition_id: int = 0  # number of choices of rows and variables so far
+    parity: int = 0  # whether their order is an odd permutation
+    replaced_pivot: float = 0.0  # least pivot before the last choice; minus infinity if a sign had changed
+
+
+class Step(NamedTuple):
+    """The state of a step: its start, the series that it evaluates, and its last attempt."""
+
+    start_partition_id: int = 0
+    start_parity: int = 0
+    start_pivot: float = 1.0  # the least pivot of G
+    start_negative: int = 0  # whether det G of a square gradient is negative
+    start_logarithm: float = 0.0  # of the size of det G
+    start_violation: float = 0.0  # of the rows; known after an attempt failed
+    approaching: int = 1  # whether the pivot falls since the step before, which did not cross
+    last_order: int = 0  # of the series that is not rounding
+    used_order: int = 0  # the last order that an attempt evaluates
+    time_to_pole: float = 0.0  # s to the rounding pole that is subtracted; 0 without one
+    time_to_crossing: float = 0.0  # s to a singular position, from the pivots of an attempt; 0 without one
+    deceleration: float = 0.0  # 1/s, the relative rate of the speed where orders are by power; else 0
     violation: float = 0.0  # the largest before the last correction
-    corrected: float = 0.0  # the largest change of a variable by the last correction
-    first: float = 0.0  # s, from the last step's beginning to where it crossed
-    second: float = 0.0  # s, the same of the second singular position; negative if it met one
-    resting: int = 0  # whether the motion began at rest beside a singular position that is near
+    correction: float = 0.0  # the largest change of a variable by the last correction
     crossed: int = 0  # whether the last attempt crossed a singular position
-    end: float = 0.0  # time of the last step's end
-    choice: int = 0  # of the partition, counted
-    past_choice: int = 0  # where the step began
-    odd: int = 0  # whether rows and variables are chosen in an order that an odd number of exchanges makes
-    past_odd: int = 0  # the same where the step began
-    kept_pivot: float = (
-        0.0  # the least of G just before the last choice; minus infinity if a sign had changed
-    )
-    past_pivot: float = 1.0  # the least of G where the step began
-    approaching: int = 1  # whether it is less than where the step before began, which did not cross
-    past_negative: int = 0  # whether det G of a square gradient is negative where the step began
-    past_logarithm: float = 0.0  # of its size
-    largest_pivot: float = 0.1  # that the least one has been, of rows of length one about
-    passing: int = 0  # whether singular positions are passed, or run up to
-    clearance: float = 0.0  # from singular positions, over that at which a passage ends
-    is_clear: int = 0  # whether the passage has ended
-    left: float = 0.0  # of the violation, where the step began; known after an attempt failed
-    entered: float = 0.0  # the least pivot where the series began
-    meets: float = 0.0  # s, until the series meets a singular position; negative behind one, 0 without one
-    ahead: float = 0.0  # s, the same from the pivots of an attempt that came to it; 0 if there was none
-    top: int = 0  # the last order of the series that is not rounding
-    cut: int = 0  # the last order of the series that an attempt takes
-    usual: float = 0.0  # the tolerance of steps that pass no singular position
-    usual_order: int = 0  # the order of their series
-    exact: float = 0.0  # the tolerance of steps that pass one
-    exact_order: int = 0
-    change: float = 0.0  # of velocities, relative, that a passage may not magnify
+    first_crossing: float = 0.0  # s from the start of the last step
+    second_crossing: float = 0.0  # s; negative if there was one
+
+
+class Progress(NamedTuple):
+    """How far a run has come."""
+
+    end: float = 0.0  # s at which the last step ends
     begun: int = 0  # whether a series has been begun
-    passed: int = 0  # singular positions in ``Crossings``
-    taken: int = 0  # samples that are complete
-    slowing: float = 0.0  # 1/s, the relative rate of the speed where orders are by power; else 0
-    leaving: int = 0  # whether the series comes from a singular position that it has passed
-    striding: int = 0  # whether drivers are followed, by loose series where no singular position is passed
+    recorded: int = 0  # singular positions in ``Crossings``
+    completed: int = 0  # samples that have accelerations and multipliers
+    largest_pivot: float = 0.1  # largest value of the least pivot so far
+    entry_pivot: float = 0.0  # the least pivot where the high-accuracy steps began
+    leaving: int = 0  # whether the motion leaves a singular position that it has crossed
+    rests_near: int = 0  # whether the motion started at rest near a singular position and is still near
+    clearance: float = 0.0  # distance from singular positions, relative to the end of a long crossing
+    is_clear: int = 0  # whether a long crossing has ended
 
 
 class SeriesKernels(NamedTuple):
@@ -232,7 +250,7 @@ class SceneCode(NamedTuple):
 
 
 class Instant(NamedTuple):
-    """When a saved was taken."""
+    """When a state was saved."""
 
     time: float = 0.0  # s
     sample: int = 0  # the next one to take
@@ -279,15 +297,19 @@ class TaylorMemory(NamedTuple):
     pose_maps: PoseMaps
     series: Series
     solver: Solver
+    options: Options
+    mode: Mode
+    partition: Partition
+    step: Step
     progress: Progress
     kernels: SeriesKernels
     code: SceneCode
     crossing_start: SavedState  # from where the last long crossing is smooth
-    landed: SavedState  # where it has ended
+    crossing_result: SavedState  # where it has ended
     step_start: StepStart
-    here: StepStart  # of the present series, kept while samples are completed
+    series_start: StepStart  # of the present series, saved while samples are completed
     crossings: Crossings
-    parting: Annotated[Indices, "parting"]  # numbers of the singular positions left along another branch
+    branch_switches: Annotated[Indices, "branch_switches"]  # numbers of crossings left along another branch
     crossing_end: Annotated[Matrix, 2, "lanes"]  # values and rates of the variables where a passage ended
     state: Annotated[Matrix, 3, "lanes"]  # variables and their two derivatives at some time
     pose: Annotated[Matrix, 3, "12*nb"]

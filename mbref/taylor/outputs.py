@@ -22,7 +22,7 @@ from mbref.taylor.loads import expand_drivers
 from mbref.taylor.partition import choose
 from mbref.taylor.samples import find_poses, put_state
 from mbref.taylor.saved_state import restore_state, save_state
-from mbref.taylor.series import expand
+from mbref.taylor.series import expand_series
 from mbref.taylor.simd import WIDTH, load, store
 from mbref.taylor.solver import factorise_anew
 
@@ -36,8 +36,8 @@ def complete_samples(go_on, memory):
 
     ``go_on``: whether steps go on afterwards from the present series.
     """
-    progress, end = memory.progress, memory.run.loop.clock.sample
-    if progress.taken >= end:
+    end = memory.run.loop.clock.sample
+    if memory.progress.completed >= end:
         return OK
     save_state(memory.run, memory.before_samples)
     keep_series_here(memory)
@@ -53,14 +53,14 @@ def complete_samples(go_on, memory):
 def complete_until(end, memory):
     """Complete the samples before one: OK, or the reason why the one at which the clock then stands has no
     accelerations or multipliers."""
-    loop, progress = memory.run.loop, memory.progress
-    order, tolerance = progress.order, progress.tolerance
-    progress.order, progress.tolerance, status = 2, progress.exact, OK
-    while progress.taken < end and status == OK:
-        loop.clock.sample, loop.clock.time = progress.taken, loop.times[progress.taken]
+    loop, progress, mode, status = memory.run.loop, memory.progress, memory.mode, OK
+    order, tolerance = mode.order, mode.tolerance
+    mode.order, mode.tolerance = 2, memory.options.accurate_tolerance
+    while progress.completed < end and status == OK:
+        loop.clock.sample, loop.clock.time = progress.completed, loop.times[progress.completed]
         status = complete_sample(memory)
-        progress.taken = loop.clock.sample
-    progress.order, progress.tolerance = order, tolerance
+        progress.completed = loop.clock.sample
+    mode.order, mode.tolerance = order, tolerance
     return status
 
 
@@ -92,7 +92,7 @@ def expand_at_sample(memory):
     for j in range(0, lanes, WIDTH):
         store(load(variable, j) * load(state, j), terms, j)
         store(load(variable, j) * load(state, lanes + j), terms, lanes + j)
-    for _ in range(CORRECTIONS if memory.progress.striding else 1):
+    for _ in range(CORRECTIONS if memory.options.follows_drivers else 1):
         status = memory.kernels.expand(t, memory)
         if status != OK:
             return status
@@ -126,7 +126,7 @@ def balance_forces(t, run):
 @kernel
 def keep_series_here(memory):
     """Keep the variables, their rates and the angles about which the series in ``terms`` is."""
-    here, terms = memory.here, memory.series.terms
+    here, terms = memory.series_start, memory.series.terms
     for order in range(2):
         copy(terms[order], here.terms[order])
     copy(memory.angles, here.angles)
@@ -135,11 +135,11 @@ def keep_series_here(memory):
 @kernel
 def return_to_series(memory):
     """Have ``terms`` be the series about the kept variables again."""
-    here, terms = memory.here, memory.series.terms
+    here, terms = memory.series_start, memory.series.terms
     for order in range(2):
         copy(here.terms[order], terms[order])
     copy(here.angles, memory.angles)
     expand_drivers(memory.run.loop.clock.time, memory)
     choose(memory)
     factorise_anew(memory)
-    expand(memory)
+    expand_series(memory)

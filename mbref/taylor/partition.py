@@ -11,19 +11,19 @@ from mbref.taylor.simd import WIDTH, load, max_abs, store
 
 @kernel
 def freedoms(memory):
-    """Variables that the rows leave to the forces."""
-    return memory.solver.pivot_columns.shape[0] - memory.progress.rank
+    """Return the number of degrees of freedom: variables that the rows leave to the forces."""
+    return memory.solver.pivot_columns.shape[0] - memory.partition.rank
 
 
 @kernel
 def is_undriven(memory):
-    """Whether there are no drivers."""
+    """Return whether the scene has no drivers."""
     return memory.run.equations.scene.drivers.polynomial.shape[0] == 0
 
 
 @kernel
-def put_gradient(y, memory):
-    """G at variables y[0] into ``work``; rows are of length one about, or zero in all positions."""
+def evaluate_gradient(y, memory):
+    """Evaluate G at variables y[0] into ``work``; rows have about unit length, or are zero everywhere."""
     rows, work = memory.polynomials.rows, memory.solver.work
     work[:] = 0.0
     for e in range(rows.linear_row.shape[0]):
@@ -35,8 +35,8 @@ def put_gradient(y, memory):
 
 
 @kernel
-def eliminate(work, pivot_rows, pivot_columns, k):
-    """Subtract the pivot row k from those after it."""
+def eliminate_below(work, pivot_rows, pivot_columns, k):
+    """Subtract pivot row k from the rows after it."""
     for p in range(k + 1, pivot_rows.shape[0]):
         factor = work[pivot_rows[p], pivot_columns[k]] / work[pivot_rows[k], pivot_columns[k]]
         if factor != 0.0:
@@ -46,7 +46,7 @@ def eliminate(work, pivot_rows, pivot_columns, k):
 
 @inlined
 def put_rows(memory):
-    """The tableau [G 1] at the first coefficients: a row has a one in the lane of its multiplier."""
+    """Evaluate the tableau [G 1] at the first coefficients: a row has a one in the lane of its multiplier."""
     solver, rows, terms = memory.solver, memory.polynomials.rows, memory.series.terms
     tableau, linear, place = solver.tableau.reshape(-1), solver.linear, solver.place
     weight, other = rows.weight, rows.other
@@ -58,14 +58,14 @@ def put_rows(memory):
 
 @kernel
 def choose(memory):
-    """Choose independent rows and dependent variables by complete pivoting; how many there are.
+    """Choose independent rows and dependent variables by complete pivoting; return their number.
 
     The tableau is left with other numbers.
     """
     solver, tolerance = memory.solver, memory.run.equations.system.settings.rank_tolerance
     pivot_rows, pivot_columns, rank = solver.pivot_rows, solver.pivot_columns, 0
     tableau, row_max = solver.tableau, solver.row_max
-    odd = False
+    parity = False
     put_rows(memory)
     copy(memory.series.variable, solver.left)
     for k in range(pivot_rows.shape[0]):
@@ -77,26 +77,26 @@ def choose(memory):
         p = place_of_largest_row(row_max, pivot_rows, rank)
         if not row_max[pivot_rows[p]] > tolerance:
             break
-        odd = odd != (p != rank)
+        parity = parity != (p != rank)
         pivot_rows[rank], pivot_rows[p] = pivot_rows[p], pivot_rows[rank]
         q, r = rank, pivot_rows[rank]
         while q < pivot_columns.shape[0] - 1 and abs(tableau[r, pivot_columns[q]]) != row_max[r]:
             q += 1
-        odd = odd != (q != rank)
+        parity = parity != (q != rank)
         pivot_columns[rank], pivot_columns[q] = pivot_columns[q], pivot_columns[rank]
         c = pivot_columns[rank]
         solver.left[c], inverse = 0.0, 1.0 / tableau[r, c]
         for p in range(rank + 1, pivot_rows.shape[0]):
             subtract_pivot_row(pivot_rows[p], inverse * tableau[pivot_rows[p], c], r, memory)
         rank += 1
-    memory.progress.choice += 1
-    memory.progress.odd = odd
+    memory.partition.partition_id += 1
+    memory.partition.parity = parity
     return rank
 
 
 @inlined
 def place_of_largest_row(row_max, pivot_rows, first):
-    """The first place, from one on, of the row with the largest entry."""
+    """Return the first place, from ``first`` on, of the row with the largest entry."""
     place = first
     for p in range(first + 1, pivot_rows.shape[0]):
         if row_max[pivot_rows[p]] > row_max[pivot_rows[place]]:
@@ -118,19 +118,31 @@ def subtract_pivot_row(i, factor, pivot, memory):
 
 
 @kernel
-def keep_pivot(memory):
-    """Keep the least pivot of rows and variables that are no longer used; minus infinity where one has
-    another sign than where the step began."""
+def save_replaced_pivot(memory):
+    """Save the least pivot of the partition that is replaced; minus infinity where a sign differs from the
+    start of the step."""
     solver, least = memory.solver, inf
-    for k in range(memory.progress.rank):
+    for k in range(memory.partition.rank):
         same = solver.last[k] * solver.past[k] > 0.0
         least = min(least, abs(solver.last[k]) if same else -inf)
-    memory.progress.kept_pivot = least
+    memory.partition.replaced_pivot = least
 
 
 @kernel
-def kept_pivot(memory):
-    """The least pivot of the rows and variables where the step began, just before others were chosen;
-    minus infinity if a sign had changed, or others were chosen more than once or never."""
-    progress = memory.progress
-    return progress.kept_pivot if progress.choice == progress.past_choice + 1 else -inf
+def replaced_pivot(memory):
+    """Return the least pivot of the partition at the start of the step, just before its only replacement.
+
+    Minus infinity if a sign had changed, or the partition was replaced more than once or never.
+    """
+    partition = memory.partition
+    is_single = partition.partition_id == memory.step.start_partition_id + 1
+    return partition.replaced_pivot if is_single else -inf
+
+
+@kernel
+def least_pivot(memory):
+    """Return the least pivot of G at the last factorisation; 1 without rows."""
+    solver, least = memory.solver, 1.0
+    for k in range(memory.partition.rank):
+        least = min(least, abs(solver.last[k]))
+    return least

@@ -6,6 +6,7 @@ from numpy import sqrt
 
 from mbref.kernels.compilation import inlined, kernel
 from mbref.linear_algebra.vectors import copy
+from mbref.taylor.mode import is_accurate
 from mbref.taylor.simd import WIDTH, load, store
 
 
@@ -13,7 +14,7 @@ from mbref.taylor.simd import WIDTH, load, store
 def evaluate_series(h, memory):
     """All lanes and their first two derivatives at a distance h (s) from the step's beginning (Horner)."""
     past, state = memory.series.past, memory.state
-    last, lanes = memory.progress.cut, past.shape[1]
+    last, lanes = memory.step.used_order, past.shape[1]
     for j in range(0, lanes, WIDTH):
         value = load(past, last * lanes + j)
         rate = 0.0 * value
@@ -121,7 +122,7 @@ def keep_sample(h, memory):
     put_angles(h, memory)
     copy(memory.state.reshape(-1), waiting.state[clock.sample])
     copy(memory.angles, waiting.angles[clock.sample])
-    waiting.exact[clock.sample] = memory.progress.passing
+    waiting.exact[clock.sample] = is_accurate(memory)
     clock.sample += 1
 
 
@@ -131,7 +132,7 @@ def put_angles(h, memory):
     torsions, past = memory.polynomials.torsions, memory.series.past_angles
     for s in range(past.shape[0]):
         value = 0.0
-        for k in range(memory.progress.cut, -1, -1):
+        for k in range(memory.step.used_order, -1, -1):
             value = value * h + past[s, k]
         memory.run.equations.angles[torsions.slot[s]] = value
         memory.angles[s] = value

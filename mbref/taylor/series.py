@@ -9,9 +9,9 @@ is added to the sums of all later orders at once, so that little is left between
 from __future__ import annotations
 
 from mbref.kernels.compilation import inlined, kernel
+from mbref.taylor.coefficients import largest_coefficient
 from mbref.taylor.generated_calls import expand_by_code, expand_by_power
 from mbref.taylor.loads import add_loads, start_loads
-from mbref.taylor.passage import size_of
 from mbref.taylor.simd import WIDTH, gather, load, store
 from mbref.taylor.solver import respond_in_loops, solution
 
@@ -105,54 +105,57 @@ def expand_with_springs(last, memory):
 
 
 @kernel
-def expand(memory):
+def expand_series(memory):
     """All orders of the variables from the first two, which are consistent."""
-    code, progress = memory.code, memory.progress
-    progress.slowing = 0.0
-    if code.expand_by_power != 0 and code.rank == progress.rank and not begins_at_rest(memory):
+    code, step, order = memory.code, memory.step, memory.mode.order
+    step.deceleration = 0.0
+    if code.expand_by_power != 0 and code.rank == memory.partition.rank and not starts_at_rest(memory):
         series, solver = memory.series, memory.solver
         expand_by_power(
             code.expand_by_power, series.terms, solver.response, series.left, series.right, solver.rhs,
-            progress.order - 2,
+            order - 2,
         )  # fmt: skip
-        progress.slowing = abs(solver.rhs[0])
+        step.deceleration = abs(solver.rhs[0])
         length = memory.run.loop.clock.length
         if length == 0.0:  # at the start, before a step: the time in which a variable moves by one
-            length = 1.0 / size_of(series.terms, 1, solver.pivot_columns.shape[0])
+            length = 1.0 / largest_coefficient(series.terms, 1, solver.pivot_columns.shape[0])
         if not turns_back_in(length, memory):
             return
     expand_with_multipliers(memory)
 
 
 @inlined
-def begins_at_rest(memory):
+def starts_at_rest(memory):
     """Whether no step has been taken, and no variable moves."""
     is_first = memory.run.loop.clock.length == 0.0
-    return is_first and not size_of(memory.series.terms, 1, memory.solver.pivot_columns.shape[0]) > 0.0
+    return (
+        is_first
+        and not largest_coefficient(memory.series.terms, 1, memory.solver.pivot_columns.shape[0]) > 0.0
+    )
 
 
 @inlined
 def turns_back_in(h, memory):
     """Whether a motion whose orders are by power is at rest, or may turn back in much less than h seconds."""
-    return not memory.progress.slowing * h <= SLOWEST
+    return not memory.step.deceleration * h <= SLOWEST
 
 
 @kernel
 def expand_with_multipliers(memory):
     """All orders of the variables and multipliers from the first two."""
     springs, torsions, code = memory.polynomials.springs, memory.polynomials.torsions, memory.code
-    memory.progress.slowing = 0.0
+    memory.step.deceleration = 0.0
     if code.expand_by_power != 0:
         respond_in_loops(memory)
-    if code.expand != 0 and code.rank == memory.progress.rank:
+    if code.expand != 0 and code.rank == memory.partition.rank:
         series, solver = memory.series, memory.solver
         expand_by_code(
             code.expand, series.terms, solver.response, series.left, series.right, series.scale,
-            series.growth, solver.rhs, memory.progress.order - 2,
+            series.growth, solver.rhs, memory.mode.order - 2,
         )  # fmt: skip
         return
     start_sums(memory)
     if springs.damping.shape[0] + torsions.damping.shape[0] == 0:
-        expand_without_springs(memory.progress.order - 2, memory)
+        expand_without_springs(memory.mode.order - 2, memory)
     else:
-        expand_with_springs(memory.progress.order - 2, memory)
+        expand_with_springs(memory.mode.order - 2, memory)

@@ -47,7 +47,7 @@ def _allocate(
     series.scale[:, :nz], series.scale[:, nz : nz + nr] = -1.0 / grown[:, None], -1.0
     series.growth[:], series.growth[:, nz : nz + nr] = 1.0, grown[:, None]
     series.variable[:nz] = 1.0
-    parting = [k for k, taken in dict(run.limits.branches).items() if taken != SMOOTH]
+    switches = [k for k, taken in dict(run.limits.branches).items() if taken != SMOOTH]
     return allocate(
         TaylorMemory,
         sizes,
@@ -56,7 +56,7 @@ def _allocate(
         pose_maps=copied(geometry.pose_maps),
         series=series,
         kernels=SeriesKernels(*(kernel.pointer for kernel in CALLED)),
-        parting=np.array(parting, np.int64),
+        branch_switches=np.array(switches, np.int64),
     )
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.layout import OK, SINGULAR
 from mbref.taylor.generated_calls import factorise_by_code
-from mbref.taylor.partition import choose, keep_pivot, put_rows
+from mbref.taylor.partition import choose, put_rows, save_replaced_pivot
 from mbref.taylor.simd import WIDTH, load, store
 
 KEPT = 0.5  # a pivot over its first below which rows and variables are chosen again
@@ -24,18 +24,24 @@ def exchange(memory):
 
     Behind it a row of the tableau has N in the lanes of multipliers and -T in those of independent variables.
     """
-    solver, rank = memory.solver, memory.progress.rank
+    solver, rank = memory.solver, memory.partition.rank
     tableau, rows, columns, last = solver.tableau, solver.pivot_rows, solver.pivot_columns, solver.last
     put_rows(memory)
     for k in range(rank):
         r, c = rows[k], columns[k]
         last[k] = tableau[r, c]
-        multiply_row(tableau, r, 1.0 / tableau[r, c])
+        multiply_row(tableau, r, inverse_or_zero(last[k]))
         for p in range(rank):
             i = rows[p]
             entry = tableau[i, c]
             if i != r and entry != 0.0:
                 subtract_multiple(tableau, i, entry, r)
+
+
+@inlined
+def inverse_or_zero(pivot):
+    """Return 1 / pivot, or 0 for a pivot of zero, after which rows and variables are chosen again."""
+    return 1.0 / pivot if pivot != 0.0 else 0.0
 
 
 @inlined
@@ -58,7 +64,7 @@ def subtract_multiple(matrix, i, factor, k):
 @inlined
 def split(memory):
     """N in rows of all variables and T in rows of the independent ones, from the tableau."""
-    solver, rank, variable = memory.solver, memory.progress.rank, memory.series.variable
+    solver, rank, variable = memory.solver, memory.partition.rank, memory.series.variable
     tableau, rows, columns = solver.tableau, solver.pivot_rows, solver.pivot_columns
     lanes = tableau.shape[1]
     particular, null_space = solver.particular, solver.null_space
@@ -78,7 +84,7 @@ def split(memory):
 @inlined
 def reduce_inertia(memory):
     """Tᵀ M T in ``reduced``, and Tᵀ and -Tᵀ M N in the independent variables' rows of the response."""
-    solver, mass, rank = memory.solver, memory.polynomials.inertia.mass, memory.progress.rank
+    solver, mass, rank = memory.solver, memory.polynomials.inertia.mass, memory.partition.rank
     null_space, momentum, columns = solver.null_space, solver.momentum, solver.pivot_columns
     nz = columns.shape[0]
     for f in range(nz - rank):
@@ -119,11 +125,11 @@ def put_free_motion(f, variable, nz, solver):
 @inlined
 def solve_reduced(memory):
     """The response of the independent variables, by Gauss–Jordan elimination of the reduced mass matrix."""
-    solver, rank = memory.solver, memory.progress.rank
+    solver, rank = memory.solver, memory.partition.rank
     reduced, response, columns, last = solver.reduced, solver.response, solver.pivot_columns, solver.last
     for f in range(columns.shape[0] - rank):
         last[rank + f] = reduced[f, f]
-        factor = 1.0 / reduced[f, f]
+        factor = inverse_or_zero(reduced[f, f])
         multiply_row(response, columns[rank + f], factor)
         multiply_numbers(reduced, f, factor)
         for g in range(columns.shape[0] - rank):
@@ -150,7 +156,7 @@ def subtract_numbers(matrix, g, factor, f):
 @inlined
 def put_dependent(memory):
     """The response of the dependent variables: N, and T of the independent ones'."""
-    solver, rank = memory.solver, memory.progress.rank
+    solver, rank = memory.solver, memory.partition.rank
     response, particular, null_space, columns = (
         solver.response, solver.particular, solver.null_space, solver.pivot_columns,
     )  # fmt: skip
@@ -167,7 +173,7 @@ def put_dependent(memory):
 @inlined
 def put_multipliers(memory):
     """The response of the multipliers: Nᵀ of the forces that the dependent variables' motion leaves."""
-    solver, rank, response = memory.solver, memory.progress.rank, memory.solver.response
+    solver, rank, response = memory.solver, memory.partition.rank, memory.solver.response
     particular, forces, columns = solver.particular, solver.forces, solver.pivot_columns
     nz, lanes = columns.shape[0], response.shape[1]
     for k in range(rank):
@@ -207,7 +213,7 @@ def is_sharp(solver):
 def respond(memory):
     """The pivots and the response at the first coefficients, by code of the scene's own where it serves."""
     solver, code = memory.solver, memory.code
-    if code.factorise != 0 and code.rank == memory.progress.rank:
+    if code.factorise != 0 and code.rank == memory.partition.rank:
         factorise_by_code(
             code.factorise, memory.series.terms, solver.tableau, solver.particular, solver.null_space,
             solver.response, solver.last, solver.pivot_rows, solver.pivot_columns,
@@ -235,7 +241,7 @@ def respond_in_loops(memory):
     """The pivots and the response by elimination of the rows, then of the reduced mass matrix."""
     exchange(memory)
     split(memory)
-    if memory.progress.rank == memory.solver.pivot_columns.shape[0]:
+    if memory.partition.rank == memory.solver.pivot_columns.shape[0]:
         put_inverse(memory.solver)
     else:
         reduce_inertia(memory)
@@ -250,8 +256,8 @@ def factorise(memory):
     memory.run.equations.system.counts.factorisations += 1
     respond(memory)
     if not is_sharp(memory.solver):
-        keep_pivot(memory)
-        if choose(memory) != memory.progress.rank:
+        save_replaced_pivot(memory)
+        if choose(memory) != memory.partition.rank:
             return SINGULAR
         factorise_anew(memory)
     return inertia_left(memory)
@@ -272,7 +278,7 @@ def inertia_left(memory):
     solver, mass, largest = memory.solver, memory.polynomials.inertia.mass, 0.0
     for i in range(mass.shape[0]):
         largest = max(largest, mass[i, i])
-    for k in range(memory.progress.rank, mass.shape[0]):
+    for k in range(memory.partition.rank, mass.shape[0]):
         if not solver.first[k] > WITHOUT_INERTIA * largest:
             return SINGULAR
     return OK

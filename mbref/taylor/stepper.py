@@ -21,23 +21,29 @@ from mbref.simulation.run import Run
 from mbref.simulation.singular_start import fits_no_branch, leaving
 from mbref.simulation.stepping import DONE, PAUSED, UNDECIDED
 from mbref.taylor.advance import advance_series, enter
+from mbref.taylor.crossing.departure import Departure
+from mbref.taylor.crossing.long_crossing import (
+    begin_crossing,
+    continue_crossing,
+    cross_position,
+    end_crossing,
+    put_state_along,
+)
+from mbref.taylor.crossing.thresholds import MIN_CHANGE, START_ERROR
+from mbref.taylor.driven import ACCURATE_TOLERANCE, ORDER, PREDICTOR_TOLERANCE, follow_drivers
 from mbref.taylor.driven import LEAST_ORDER as LEAST_DRIVEN_ORDER
-from mbref.taylor.driven import LOOSE, ORDER, follow_drivers
 from mbref.taylor.geometry import geometry_of
-from mbref.taylor.layout import Polynomials, TaylorMemory
-from mbref.taylor.leaving import Departure
-from mbref.taylor.long_crossing import begin_crossing, cross, end_crossing, go_on, look_along
+from mbref.taylor.layout import Options, Polynomials, TaylorMemory
+from mbref.taylor.mode import REGULAR
 from mbref.taylor.outputs import complete_samples
 from mbref.taylor.polynomials import Geometry
 from mbref.taylor.series_memory import CALLED, acquire_memory, put_equations, shapes_of_equations
-from mbref.taylor.start import OFF
-from mbref.taylor.twin import LEAST_CHANGE
 
 EXACT, EXACT_ORDER = 1e-13, 22  # rtol and atol of steps that pass singular positions, and their least order
 SHARE = 0.05  # of rtol + atol: the tolerance of a step that is clear of singular positions
 KERNELS_OF_SERIES = (
-    *CALLED, enter, advance_series, follow_drivers, complete_samples, begin_crossing, cross, go_on,
-    end_crossing, look_along,
+    *CALLED, enter, advance_series, follow_drivers, complete_samples, begin_crossing, cross_position,
+    continue_crossing, end_crossing, put_state_along,
 )  # fmt: skip
 ROUNDING = 1e-16  # of a singular value
 STEPS_WORTH_CODE = 20_000  # steps ahead from which on generated code saves more time than it takes
@@ -74,13 +80,16 @@ class SeriesStepper:
         self._pooled = acquire_memory(run, self.geometry, self.polynomials, exact_order)
         self.taylor, self.argument = self._pooled.values, self._pooled.packed.argument
         self._calls, self._sampling = 0, 0.0  # of kernels that take steps; s of CPU time spent on samples
-        self._options = {
-            "order": order, "usual_order": order, "exact_order": exact_order,
-            "tolerance": tolerance, "usual": tolerance, "exact": SHARE * (EXACT + EXACT),
-            "change": max(run.memory.control.rtol, LEAST_CHANGE), "end": run.times[-1],
-            "farthest": OFF * max(1.0, run.model.length), "striding": self.strides,
-            "freedoms": columns - run.ranks.rank,
-        }  # fmt: skip
+        self._options = Options(
+            regular_tolerance=tolerance,
+            regular_order=order,
+            accurate_tolerance=ACCURATE_TOLERANCE if self.strides else SHARE * (EXACT + EXACT),
+            accurate_order=exact_order,
+            velocity_change=max(run.memory.control.rtol, MIN_CHANGE),
+            start_distance=START_ERROR * max(1.0, run.model.length),
+            start_freedoms=columns - run.ranks.rank,
+            follows_drivers=self.strides,
+        )
         self._put_options()
         self._departure = Departure(run, self.taylor, self.expand, self._state_at)
         self._wants_code = run.limits.code == AUTO
@@ -93,7 +102,7 @@ class SeriesStepper:
         run, code = self.run, self.run.limits.code
         wanted = run.method.options_of(run.method.integrator)["order"]
         if self.is_driven and not run.limits.branches and (wanted == 0 or wanted >= LEAST_DRIVEN_ORDER):
-            return True, LOOSE, order_of(LOOSE, wanted or ORDER, GENERIC)
+            return True, PREDICTOR_TOLERANCE, order_of(PREDICTOR_TOLERANCE, wanted or ORDER, GENERIC)
         tolerance = SHARE * (run.memory.control.rtol + run.memory.control.atol)
         return False, tolerance, order_of(tolerance, wanted, GENERATED if code == GENERATED else GENERIC)
 
@@ -117,8 +126,11 @@ class SeriesStepper:
 
     def _put_options(self) -> None:
         """Have memory hold the numbers of the method."""
-        for name, value in self._options.items():
-            self.taylor.progress[name] = value
+        for name, value in self._options._asdict().items():
+            self.taylor.options[name] = value
+        self.taylor.progress.end = self.run.times[-1]
+        mode, options = self.taylor.mode, self._options
+        mode.kind, mode.tolerance, mode.order = REGULAR, options.regular_tolerance, options.regular_order
 
     # --- another scene of equal structure, whose numbers memory holds --------------------------------------
     @property
@@ -143,7 +155,7 @@ class SeriesStepper:
 
     def parameters(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
         """Where its memory has numbers in which scenes differ, and those of scenes of ``lengths`` (s,)."""
-        return [(self.taylor.progress, OFF * np.maximum(1.0, lengths), "farthest")]
+        return [(self.taylor.options, START_ERROR * np.maximum(1.0, lengths), "start_distance")]
 
     def takes(self, model: Callable[[], Model], start: Start) -> bool:
         """Put the equations of a scene; False where they have no room."""
@@ -230,10 +242,10 @@ class SeriesStepper:
     def recorded(self) -> list[Passed]:
         """The singular positions crossed since they were last asked for, along smooth branches."""
         progress = self.taylor.progress
-        passed, progress.passed = int(progress.passed), 0
-        if not passed:
+        count, progress.recorded = int(progress.recorded), 0
+        if not count:
             return []
-        times, coordinates, velocities = (found[:passed].copy() for found in self.taylor.crossings)
+        times, coordinates, velocities = (found[:count].copy() for found in self.taylor.crossings)
         return list(map(Passed, times.tolist(), coordinates, velocities, repeat(SMOOTH)))
 
     # --- singular positions -------------------------------------------------------------------------------
@@ -249,7 +261,7 @@ class SeriesStepper:
     def _cross(self) -> int:
         """Cross the singular position ahead: PAUSED clear of it, DONE at the end, else the reason why not."""
         self._calls += 1
-        return self._until_clear(int(cross(self.argument)), [])
+        return self._until_clear(int(cross_position(self.argument)), [])
 
     def _take_branch(self) -> int:
         """Go on along the branch asked for at the last singular position: as ``_cross``."""
@@ -280,7 +292,7 @@ class SeriesStepper:
             elif status == DONE or self.taylor.progress.is_clear:
                 break
             else:
-                status = int(go_on(self.argument))
+                status = int(continue_crossing(self.argument))
         status = int(end_crossing(status, self.argument))
         if status in (PAUSED, DONE):
             self.run.crossings += crossed
@@ -298,7 +310,7 @@ class SeriesStepper:
 
     def _state_at(self, ahead: float) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates and velocities at a distance (s) from where the series begins, left in memory."""
-        look_along(ahead, self.argument)
+        put_state_along(ahead, self.argument)
         state = self.run.memory.state
         return state.coordinates.copy(), state.velocities.copy()
 

@@ -1,9 +1,10 @@
-"""The steps of a Taylor method: as long as the last terms allow, each judged where it ends.
+"""The steps of a Taylor method: as long as the last terms allow, each judged at its end.
 
-Steps follow À. Jorba and M. Zou (Experimental Mathematics 14, 2005).  Where a step ends, the constraint rows
-are violated by what the series has lost, which is corrected, and the accelerations of the equations differ
-from the series'.  Where either is more than the tolerance explains, or rows have become dependent, the step
-ends earlier: so a series that continues beyond a singular position passes it, and no other does.
+Steps follow À.  Jorba and M.  Zou (Experimental Mathematics 14, 2005).  At the end of a step the rows are
+violated by the error of the series, which is corrected, and the accelerations of the equations differ from
+the series.  Where either is more than the tolerance explains, or rows have become dependent, the step is
+repeated with a smaller length.  So a series that continues across a singular position crosses it, and no
+other does.
 """
 
 from __future__ import annotations
@@ -12,151 +13,164 @@ from numpy import exp, isfinite, log
 
 from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import NOT_FINITE, OK, SINGULAR_AHEAD
-from mbref.linear_algebra.vectors import copy, larger
+from mbref.linear_algebra.vectors import larger
 from mbref.simulation.stepping import STEP_TOO_SMALL, UNDECIDED, share
-from mbref.taylor.correction import correct, violation
-from mbref.taylor.crossing import count_crossings
+from mbref.taylor.coefficients import largest_used
+from mbref.taylor.correction import correct
+from mbref.taylor.crossing.acceptance import crossing_tolerance, judge_branch, step_tolerance
+from mbref.taylor.crossing.detection import save_pivots, time_to_singular_position
+from mbref.taylor.crossing.location import count_crossings
+from mbref.taylor.crossing.rounding_pole import remove_pole, time_of_pole
+from mbref.taylor.crossing.start import is_turned, judge_start
+from mbref.taylor.crossing.thresholds import (
+    CROSSING_MARGIN,
+    CROSSING_START,
+    LOOSER_RATES,
+    MIN_GAIN,
+    MIN_PIVOT_RATIO,
+    OVERSHOOT,
+)
 from mbref.taylor.layout import BEGIN, EXPAND, STEP
-from mbref.taylor.loads import (
-    ANGLE,
-    TORSION_SERIES,
-    expand_drivers,
-    part_behind_no_length,
-    time_to_no_length,
-)
-from mbref.taylor.meeting import meet, time_to_meet
-from mbref.taylor.partition import choose
-from mbref.taylor.passage import (
-    BEFORE,
-    distance_ahead,
-    exactness,
-    exactness_across,
-    judge_branch,
-    least_pivot,
-    remember_pivots,
-    remember_pivots_here,
-    size_in_use,
-)
+from mbref.taylor.loads import expand_drivers, part_behind_no_length, time_to_no_length
+from mbref.taylor.mode import is_accurate
+from mbref.taylor.partition import choose, least_pivot
 from mbref.taylor.pose_maps import read_variables
 from mbref.taylor.samples import evaluate_series, keep_sample, put_angles
-from mbref.taylor.series import expand, expand_with_multipliers, turns_back_in
+from mbref.taylor.series import expand_series, expand_with_multipliers, turns_back_in
 from mbref.taylor.simd import WIDTH, load, store
 from mbref.taylor.solver import factorise_anew
-from mbref.taylor.start import is_turned, judged_start
+from mbref.taylor.step_start import return_to_start, save_series
 
-ROUNDING = 1e-12  # of rows
-LOST_ROWS = 100.0  # tolerances by which rows may be off
-LOST_MOTION = 30.0  # tolerances, times orders², by which accelerations times the step's square may be off
-NOISE = 1e-9  # the same, by rounding
-SHORTER = 0.7
-LOOSER = 1e4  # of rates in a passage: they count where a step is short beside the motion's own time
-NEARLY = 0.2  # of a step's first pivot: a step that ends nearer to a singular position is tried beyond it
-CROSSING = 1.05  # of the time in which a singular position is met: a longer step crosses it
-BEST = 0.6  # of a step that crosses: where it begins, from the singular position
-WORTH = 0.5  # of a step that a series with its rounding allows: a series without it allows as long a one
-OVER = 1.25  # its length then, over the distance; the same to where a spring has no length
+ROW_ROUNDING = 1e-12  # violation of a row, in units of the scene, that rounding may leave
+LOST_ROWS = 100.0  # violation of rows at the end of a step, relative to the tolerance
+LOST_MOTION = 30.0  # error of accelerations times the square of the step, relative to tolerance × order²
+MOTION_ROUNDING = 1e-9  # error by rounding, relative to accelerations times the square of the step
+SHORTER = 0.7  # length of the next attempt, relative to the one that failed
 
 
 @exchangeable(EXPAND)
 def expand_from(t, memory):
-    """Correct the state at time t and expand it: OK or why it cannot be."""
+    """Correct the state at time t and expand it; return OK or the failure status."""
     expand_drivers(t, memory)
     status = correct(memory)
     if status == OK:
-        expand(memory)
+        expand_series(memory)
     return status
 
 
+# --- length ---------------------------------------------------------------------------------------------
 @kernel
 def longest_step(tolerance, memory):
-    """The step at which the last two terms of the series are as large as the tolerance.
+    """Return the step (s) at which the last two terms of the series are as large as the tolerance.
 
-    So are those of its rate, over the largest rate where that is above 1; in a passage, which asks for
-    rounding anyway, they may be LOOSER, and do not count near a singular position.  It is at
-    most clearly over the time in which a spring's ends could meet.
+    The terms of its rate count too, relative to the largest rate where that is above 1; more loosely in
+    high-accuracy steps, and not near a singular position.  A step ends little behind a position where a
+    spring has no length.
     """
-    progress, control = memory.progress, memory.run.control
+    step, control, is_first = memory.step, memory.run.control, memory.run.equations.system.counts.steps == 0
     h = control.largest_step
-    shortest, of_rates = log(h), tolerance * max(1.0, size_in_use(1, memory))
-    if progress.passing:
-        of_rates *= LOOSER
-    counted = not progress.passing or progress.past_pivot >= BEFORE * progress.largest_pivot
-    for k in range(progress.top - 1, min(progress.top + 1, progress.order) + 1):
-        size = size_in_use(k, memory)
+    shortest, of_rates = log(h), tolerance * max(1.0, largest_used(1, memory))
+    if is_accurate(memory):
+        of_rates *= LOOSER_RATES
+    is_far = step.start_pivot >= CROSSING_START * memory.progress.largest_pivot
+    for k in range(step.last_order - 1, min(step.last_order + 1, memory.mode.order) + 1):
+        size = largest_used(k, memory)
         if size > 0.0:
             shortest = min(shortest, log(tolerance / size) / k)
-            if counted:
+            if is_far or not is_accurate(memory):
                 shortest = min(shortest, log(of_rates / (k * size)) / (k - 1))
-    h = min(exp(shortest), OVER * time_to_no_length(memory))
-    if memory.run.equations.system.counts.steps == 0 and control.first_step > 0.0:
-        h = min(h, control.first_step)
-    return h
+    h = min(exp(shortest), OVERSHOOT * time_to_no_length(memory))
+    return min(h, control.first_step) if is_first and control.first_step > 0.0 else h
 
 
 @kernel
 def first_lengths(left, memory):
-    """The longest step (s) by the tolerance, and by that of one that crosses; not beyond the time left."""
-    progress = memory.progress
-    whole = 1.0 if progress.passing else share(memory.run.loop.clock.length, memory.run)
-    usual, looser = exactness(progress), exactness_across(progress)
-    exact = min(longest_step(whole * usual, memory), left)
-    if not progress.passing:
-        return exact, exact
-    across = exact if looser == usual else min(longest_step(whole * looser, memory), left)
-    ahead, progress.ahead = progress.meets if progress.meets > 0.0 else progress.ahead, 0.0
-    if across < CROSSING * ahead and exact > (1.0 - NEARLY) * ahead:
-        exact = across = ahead - BEST * across
-    return exact, across
+    """Return the longest step (s) by the tolerance, and the longest one that crosses; at most the time
+    left."""
+    step = memory.step
+    if not is_accurate(memory):
+        part = share(memory.run.loop.clock.length, memory.run)
+        regular = min(longest_step(part * step_tolerance(memory), memory), left)
+        return regular, regular
+    tight, loose = step_tolerance(memory), crossing_tolerance(memory)
+    regular = min(longest_step(tight, memory), left)
+    across = regular if loose == tight else min(longest_step(loose, memory), left)
+    ahead = step.time_to_pole if step.time_to_pole > 0.0 else step.time_to_crossing
+    step.time_to_crossing = 0.0
+    if across < CROSSING_MARGIN * ahead and regular > (1.0 - MIN_PIVOT_RATIO) * ahead:
+        regular = across = ahead - CROSSING_START * across
+    return regular, across
 
 
 @kernel
-def keep_terms(memory):
-    """The terms, which are looked along from now on; angles have no last order."""
-    series, progress = memory.series, memory.progress
-    for j in range(0, (progress.order + 1) * series.terms.shape[1], WIDTH):
-        store(load(series.terms, j), series.past, j)
-    for s in range(series.past_angles.shape[0]):
-        for k in range(progress.order):
-            series.past_angles[s, k] = series.torsions[TORSION_SERIES * s + ANGLE, k]
-        series.past_angles[s, progress.order] = 0.0
-    progress.top = progress.cut = progress.order
-    progress.meets = 0.0
+def next_length(h, regular, memory):
+    """Return the length (s) of the attempt after one of h seconds.
 
-
-@kernel
-def keep_series(memory):
-    """Have steps look along the series that begins here, without its rounding unless that makes them short:
-    beside a near position few orders may be left that rounding does not outgrow."""
-    keep_terms(memory)
-    distance = time_to_meet(memory)
-    if distance != 0.0:
-        tolerance = exactness(memory.progress)
-        reached = longest_step(tolerance, memory)
-        meet(distance, memory)
-        if not longest_step(tolerance, memory) > WORTH * reached:
-            keep_terms(memory)
-
-
-@kernel
-def remember_series(memory):
-    """Keep the series of the step's beginning, and the pivots there."""
-    remember_pivots(memory)
-    keep_series(memory)
-
-
-@kernel
-def judge(h, last, memory):
-    """OK where rows and accelerations at the end of a step are off by no more than the tolerance explains.
-
-    Behind a position where a spring has no length, all of the time counts in which accelerations are off.
+    Clearly across the singular position that the attempt came near or crossed, by the terms of the series
+    that are not rounding; otherwise a length that does not reach it.
     """
-    progress, state, terms = memory.progress, memory.state, memory.series.terms
-    if not progress.violation <= LOST_ROWS * progress.tolerance + ROUNDING:
+    step = memory.step
+    near = step.crossed or least_pivot(memory) < MIN_PIVOT_RATIO * step.start_pivot
+    if step.used_order == step.last_order and near and h > regular:
+        across = OVERSHOOT * time_to_singular_position(h, memory)
+        step.used_order = order_of_least_term(across, memory)
+        return across
+    step.used_order = step.last_order
+    return regular if h > regular else h * SHORTER
+
+
+@kernel
+def order_of_least_term(h, memory):
+    """Return the order, below the last, of the smallest term at a distance h (s): terms beyond are
+    rounding."""
+    best, least, power = 2, 1e300, h
+    for k in range(2, memory.step.last_order):
+        power *= h
+        size = largest_used(k, memory) * power
+        if size < least:
+            best, least = k, size
+    return best
+
+
+# --- attempts -------------------------------------------------------------------------------------------
+@kernel
+def save_series_without_pole(memory):
+    """Save the series that starts here, without its rounding pole unless that makes steps short.
+
+    Very near a singular position few orders may be left that rounding does not outgrow.
+    """
+    save_series(memory)
+    pole = time_of_pole(memory)
+    if pole != 0.0:
+        tolerance = step_tolerance(memory)
+        reached = longest_step(tolerance, memory)
+        remove_pole(pole, memory)
+        if not longest_step(tolerance, memory) > MIN_GAIN * reached:
+            save_series(memory)
+
+
+@kernel
+def save_start(memory):
+    """Save the series and the pivots at the start of the step."""
+    save_pivots(memory)
+    save_series_without_pole(memory)
+
+
+@kernel
+def judge_step(h, last, memory):
+    """Return OK where rows and accelerations at the end of a step are off by no more than the tolerance
+    explains.
+
+    Behind a position where a spring has no length, the time since then counts in which accelerations are
+    off.
+    """
+    step, order, state, terms = memory.step, memory.mode.order, memory.state, memory.series.terms
+    if not step.violation <= LOST_ROWS * memory.mode.tolerance + ROW_ROUNDING:
         return STEP_TOO_SMALL
     status = judge_branch(h, last, memory)
     if status != OK:
         return status
-    if progress.resting and is_turned(memory):
+    if memory.progress.rests_near and is_turned(memory):
         return UNDECIDED
     off, size = 0.0, 1.0
     for i in range(memory.solver.pivot_columns.shape[0]):
@@ -165,124 +179,101 @@ def judge(h, last, memory):
     if not isfinite(off):
         return NOT_FINITE
     part = part_behind_no_length(memory)
-    if part > 0.0:
-        rates = size_in_use(1, memory)
-        if off * part > exactness_across(progress) * rates * h:
-            return STEP_TOO_SMALL
-    lost = LOST_MOTION * progress.order * progress.order * exactness_across(progress)
-    return OK if off <= lost + NOISE * size else STEP_TOO_SMALL
+    if part > 0.0 and off * part > crossing_tolerance(memory) * largest_used(1, memory) * h:
+        return STEP_TOO_SMALL
+    lost = LOST_MOTION * order * order * crossing_tolerance(memory)
+    return OK if off <= lost + MOTION_ROUNDING * size else STEP_TOO_SMALL
 
 
 @kernel
 def expand_at(h, last, memory):
-    """Expand at a distance h (s), to the second order if it is the last step: OK or why it cannot be."""
-    progress, terms, state = memory.progress, memory.series.terms, memory.state
+    """Expand at a distance h (s), to order 2 for the last step; return OK or the failure status."""
+    mode, terms, state = memory.mode, memory.series.terms, memory.state
     evaluate_series(h, memory)
     lanes, variable = terms.shape[1], memory.series.variable
     for j in range(0, lanes, WIDTH):
         store(load(variable, j) * load(state, j), terms, j)
         store(load(variable, j) * load(state, lanes + j), terms, lanes + j)
     put_angles(h, memory)
-    order = progress.order
-    progress.order = 2 if last else order
+    order = mode.order
+    mode.order = 2 if last else order
     status = memory.kernels.expand(memory.run.loop.clock.time + h, memory)
-    progress.order = order
+    mode.order = order
     return status
 
 
 @kernel
-def attempt(h, last, memory):
+def attempt_step(h, last, memory):
     """Step to a distance h (s), expand there, and judge the step."""
     status = expand_at(h, last, memory)
-    return judge(h, last, memory) if status == OK else status
-
-
-@kernel
-def return_to_start(memory):
-    """Back to where the step began: rows and variables as chosen there, and the violation that is left."""
-    progress, past, terms = memory.progress, memory.series.past, memory.series.terms
-    for k in range(2):
-        copy(past[k], terms[k])
-    progress.left = violation(memory)
-    if progress.choice != progress.past_choice:
-        choose(memory)
-        factorise_anew(memory)
-        remember_pivots_here(memory)
-
-
-@kernel
-def next_length(h, exact, memory):
-    """The length (s) of the attempt after one of h seconds: clearly over the singular position that it came
-    near to or crossed, by the series without its rounding; else one that does not reach it."""
-    progress = memory.progress
-    near = progress.crossed or least_pivot(memory) < NEARLY * progress.past_pivot
-    if progress.cut == progress.top and near and h > exact:
-        over = OVER * distance_ahead(h, memory)
-        progress.cut = least_term(over, memory)
-        return over
-    progress.cut = progress.top
-    return exact if h > exact else h * SHORTER
-
-
-@kernel
-def least_term(h, memory):
-    """The order, below the last, of the least term at a distance h (s): those beyond grow by rounding."""
-    best, least, power = 2, 1e300, h
-    for k in range(2, memory.progress.top):
-        power *= h
-        size = size_in_use(k, memory) * power
-        if size < least:
-            best, least = k, size
-    return best
+    return judge_step(h, last, memory) if status == OK else status
 
 
 @exchangeable(STEP)
 def step(memory):
-    """One step, as many attempts as it takes, and the samples on its way."""
-    loop, control, counts = memory.run.loop, memory.run.control, memory.run.equations.system.counts
-    clock, times, progress = loop.clock, loop.times, memory.progress
-    remember_series(memory)
-    left, progress.left = progress.end - clock.time, 0.0
-    exact, h = first_lengths(left, memory)
+    """Take one step in as many attempts as it needs, and its samples; return OK or the failure status."""
+    clock, counts, state, left = (
+        memory.run.loop.clock, memory.run.equations.system.counts, memory.step,
+        memory.progress.end - memory.run.loop.clock.time,
+    )  # fmt: skip
+    save_start(memory)
+    state.start_violation = 0.0
+    regular, h = first_lengths(left, memory)
     if turns_back_in(h, memory):
         expand_with_multipliers(memory)
-        keep_series(memory)
-        exact, h = first_lengths(left, memory)
-    if 0.0 < progress.meets < h and not progress.passing:
+        save_series_without_pole(memory)
+        regular, h = first_lengths(left, memory)
+    if 0.0 < state.time_to_pole < h and not is_accurate(memory):
         clock.passage = clock.time + h
         return SINGULAR_AHEAD
     while True:
-        status = attempt(h, h >= left, memory)
-        if status == OK and (progress.crossed or h <= exact):
+        status = attempt_step(h, h >= left, memory)
+        if status == OK and (state.crossed or h <= regular):
             break
-        if status == SINGULAR_AHEAD or (status == UNDECIDED and (progress.crossed or h <= exact)):
-            clock.passage, progress.ahead = clock.time + h, distance_ahead(h, memory)
+        if status == SINGULAR_AHEAD or (status == UNDECIDED and (state.crossed or h <= regular)):
+            clock.passage, state.time_to_crossing = clock.time + h, time_to_singular_position(h, memory)
             return status
         counts.rejected += 1
-        h = min(next_length(h, exact, memory), left)
+        h = min(next_length(h, regular, memory), left)
         return_to_start(memory)
-        if not h >= control.smallest_step:
+        if not h >= memory.run.control.smallest_step:
             return status
-    now = progress.end if h >= left else clock.time + h
+    end_step(h, left, memory)
+    put_angles(h, memory)
+    counts.crossings += count_crossings(h, memory) if state.crossed else 0
+    return OK
+
+
+@kernel
+def end_step(h, left, memory):
+    """Keep the samples of a step of h seconds, and end it."""
+    clock, times = memory.run.loop.clock, memory.run.loop.times
+    now = memory.progress.end if h >= left else clock.time + h
     while clock.sample < times.shape[0] and times[clock.sample] <= now:
         keep_sample(times[clock.sample] - clock.time, memory)
-    put_angles(h, memory)
-    counts.steps += 1
-    counts.crossings += count_crossings(h, memory) if progress.crossed else 0
+    memory.run.equations.system.counts.steps += 1
     clock.time, clock.length = now, h
-    return OK
+
+
+@kernel
+def begin_once(memory):
+    """Begin a series at the present state unless one has begun; return OK or the failure status."""
+    if memory.progress.begun:
+        return OK
+    memory.progress.begun = 1
+    return memory.kernels.begin(memory)
 
 
 @exchangeable(BEGIN)
 def begin(memory):
-    """Choose the partition at the present state and expand there: OK or why that cannot be."""
+    """Choose the partition at the present state and expand there; return OK or the failure status."""
     t, slot = memory.run.loop.clock.time, memory.polynomials.torsions.slot
     for s in range(slot.shape[0]):
         memory.angles[s] = memory.run.equations.angles[slot[s]]
     read_variables(t, memory)
     expand_drivers(t, memory)
-    memory.progress.rank, memory.progress.crossed, memory.progress.leaving = choose(memory), 0, 0
-    memory.progress.resting = 0
+    memory.partition.rank, memory.step.crossed, memory.progress.leaving = choose(memory), 0, 0
+    memory.progress.rests_near = 0
     factorise_anew(memory)
     status = memory.kernels.expand(t, memory)
-    return status if t > 0.0 else judged_start(status, memory)
+    return status if t > 0.0 else judge_start(status, memory)

@@ -44,7 +44,7 @@ def terms(scene, code):
 def agree(scene):
     """Whether the terms of a scene's code are those of the kernels; by power it gives those of variables."""
     (expected, _), (found, run) = (terms(scene, code) for code in ("generic", "generated"))
-    by_power = run.stepper.taylor.progress.slowing > 0.0
+    by_power = run.stepper.taylor.step.deceleration > 0.0
     lanes = slice(run.stepper.taylor.solver.pivot_columns.size if by_power else None)
     return np.abs(found - expected)[:, lanes].max() <= 1e-11 * np.abs(expected).max()
 
@@ -104,7 +104,7 @@ def test_power_gives_the_terms_of_one_freedom(name, duration):
         assert run.stepper.expand() == OK
         taylor = run.stepper.taylor
         found.append(taylor.series.terms[:17, : taylor.solver.pivot_columns.size].copy())
-    assert run.stepper.taylor.progress.slowing > 0.0, "by power"
+    assert run.stepper.taylor.step.deceleration > 0.0, "by power"
     sizes = np.abs(found[0]).max(axis=1)
     time = min(duration, (sizes[2:] ** (-1.0 / np.arange(2, 17))).min())
     off = np.abs(found[0] - found[1]).max(axis=1) * time ** np.arange(17)
@@ -165,7 +165,7 @@ def test_one_process_loads_the_code_of_a_scene_once():
     first, again = (start_run(crank, TAYLOR, np.array([0.1]), Limits(code="generated")) for _ in "ab")
     assert first.taylor.code.expand == again.taylor.code.expand != 0
     finer = start_run(crank, TAYLOR, np.array([0.1]), Limits(rtol=1e-12, code="generated"))
-    assert finer.taylor.progress.order > first.taylor.progress.order
+    assert finer.taylor.mode.order > first.taylor.mode.order
     assert finer.taylor.code.expand == first.taylor.code.expand, "one code serves all orders"
 
 

@@ -62,7 +62,7 @@ def functions_of(taylor: TaylorMemory) -> tuple[str, ...]:
 
 def rank_of(taylor: TaylorMemory) -> int:
     """The rank of the rows where all of the start's freedoms are left."""
-    return taylor.solver.pivot_columns.size - int(taylor.progress.freedoms)
+    return taylor.solver.pivot_columns.size - int(taylor.options.start_freedoms)
 
 
 def _key(taylor: TaylorMemory, names: Sequence[str]) -> str:

@@ -30,7 +30,7 @@ ZERO, HALF = constant([0.0] * WIDTH), constant([0.5] * WIDTH)
 
 def serves(taylor: TaylorMemory) -> bool:
     """Whether a scene has one freedom and no drivers, and power takes no more products than multipliers."""
-    if taylor.progress.freedoms != 1 or taylor.polynomials.given.driver.size:
+    if taylor.options.start_freedoms != 1 or taylor.polynomials.given.driver.size:
         return False
     products, nz, nr = (
         taylor.polynomials.products,

@@ -17,11 +17,12 @@ from mbref.kernels.layout import OK
 from mbref.simulation.run import Run
 from mbref.simulation.singular_start import Leaving
 from mbref.simulation.stepping import PAUSED, UNDECIDED
-from mbref.taylor.start import OFF
-
-BEHIND = 3e-3  # lengths or rad behind a crossing where another branch is entered
-CORRECTIONS = 6  # of the state there
-COUNTED = 0.02  # of its distance from the crossing: a lesser pivot is of rows that depend on others
+from mbref.taylor.crossing.thresholds import (
+    DEPARTURE,
+    DEPARTURE_CORRECTIONS,
+    DEPARTURE_PIVOT,
+    START_ERROR,
+)
 
 State = tuple[np.ndarray, np.ndarray]  # coordinates (7 nb,) and velocities (n,)
 
@@ -41,7 +42,7 @@ class Departure:
         crossing, run = singular_position(self._run.model, passed), self._run
         velocities, clock = crossing.velocities[crossing.taken - 1], run.memory.loop.clock
         clock.sample = int(np.searchsorted(run.times, crossing.time, side="right"))
-        self._taylor.progress.taken = min(int(self._taylor.progress.taken), int(clock.sample))
+        self._taylor.progress.completed = min(int(self._taylor.progress.completed), int(clock.sample))
         following = run.times[int(clock.sample) :]
         ahead = self._time_in_which(velocities)
         ahead = min(ahead, 0.5 * float(following[0] - crossing.time) if following.size else np.inf)
@@ -67,8 +68,8 @@ class Departure:
         there = self._state_at(-ahead)
         moved, changed = displacement(q, there[0]), there[1] - v
         self._state_at(0.0)
-        is_far = np.abs(moved).max() > self._taylor.progress.farthest
-        return bool(is_far or np.abs(changed).max() > OFF * np.abs(v).max())
+        is_far = np.abs(moved).max() > self._taylor.options.start_distance
+        return bool(is_far or np.abs(changed).max() > START_ERROR * np.abs(v).max())
 
     def _put_samples_before(self, ahead: float, way: Leaving) -> None:
         """The samples from a singular position at t = 0 until a time (s) about which the series begins."""
@@ -81,7 +82,7 @@ class Departure:
                 q, v = way.coordinates, way.velocities
                 acceleration = acceleration if np.any(v) else way.acceleration
             self._put_sample(k, q, v, acceleration)
-            clock.sample = self._taylor.progress.taken = k + 1
+            clock.sample = self._taylor.progress.completed = k + 1
         self._state_at(0.0)
 
     def _put_sample(self, k: int, q: np.ndarray, v: np.ndarray, acceleration: np.ndarray) -> None:
@@ -108,8 +109,9 @@ class Departure:
         settings.rank_tolerance = usual
         if status != OK:
             return status
-        progress.past_pivot, progress.clearance, progress.is_clear = 0.0, 0.0, 0
-        progress.entered = np.abs(self._taylor.solver.last[: int(progress.rank)]).min(initial=1.0)
+        self._taylor.step.start_pivot, progress.clearance, progress.is_clear = 0.0, 0.0, 0
+        pivots = self._taylor.solver.last[: int(self._taylor.partition.rank)]
+        progress.entry_pivot = np.abs(pivots).min(initial=1.0)
         self._keep_beginning()
         return PAUSED
 
@@ -126,7 +128,7 @@ class Departure:
     ) -> int:
         """Have the series come from a singular position with velocities (n,): OK or the reason why not."""
         (q, v), state = moved, self._run.memory.state
-        for _ in range(CORRECTIONS):
+        for _ in range(DEPARTURE_CORRECTIONS):
             state.coordinates[:], state.velocities[:] = q, v
             if (status := self._expand()) != OK:
                 return status
@@ -144,10 +146,10 @@ class Departure:
         moved = displacement(q, crossing).reshape(-1, 6)
         places = np.abs(moved[:, :3] / self._run.model.data.lengths[:, None]).max()
         distance = float(max(places, np.abs(moved[:, 3:]).max()))
-        return max(self._run.memory.equations.system.settings.rank_tolerance, COUNTED * distance)
+        return max(self._run.memory.equations.system.settings.rank_tolerance, DEPARTURE_PIVOT * distance)
 
     def _time_in_which(self, velocities: np.ndarray) -> float:
-        """Time (s) in which the fastest body moves by BEHIND."""
+        """Time (s) in which the fastest body moves by DEPARTURE."""
         rates = velocities.reshape(-1, 6)
         places = np.abs(rates[:, :3] / self._run.model.data.lengths[:, None]).max()
-        return BEHIND / float(max(places, np.abs(rates[:, 3:]).max()))
+        return DEPARTURE / float(max(places, np.abs(rates[:, 3:]).max()))

@@ -1,0 +1,151 @@
+"""Acceptance of a step that comes near a singular position or crosses one, and the tolerance of such steps.
+
+- Where two branches miss each other by a gap g, the series of one side goes straight on to the other side.
+  Beyond the gap it violates the rows by at least g.  A step near a singular position is therefore as
+  accurate as rounding allows, and accepted only if the violation at its end is due to rounding.
+- Near a singular position rounding moves the state along the vanishing direction by its ratio to the pivot,
+  and turns the velocity by as much again.  A motion that comes nearer than MIN_PIVOT and does not cross is
+  UNDECIDED.  Rounding of the lengths may open a gap that a motion meets before it turns back nearer than
+  MIN_PIVOT_FREE: that is UNDECIDED too.  ``uniqueness`` judges other motions.
+- A correction that moves the state by as much as its distance from the singular position may change the
+  branch.  Where a driver stands still there, the pivot itself is a result of the correction.
+"""
+
+from __future__ import annotations
+
+from mbref.kernels.compilation import kernel
+from mbref.kernels.layout import OK
+from mbref.simulation.stepping import SINGULAR_AHEAD, STEP_TOO_SMALL, UNDECIDED
+from mbref.taylor.coefficients import turns_back
+from mbref.taylor.crossing.detection import (
+    contains_singular_position,
+    ends_near_singular,
+    is_near_singular,
+)
+from mbref.taylor.crossing.thresholds import (
+    BISECTIONS,
+    CROSSING_NOISE,
+    CROSSING_START,
+    ENTRY_RATIO,
+    MAX_SHIFT,
+    MIN_PIVOT,
+    MIN_PIVOT_ACROSS,
+    MIN_PIVOT_FREE,
+    MIN_PIVOT_RATIO,
+    MIN_PIVOT_RATIO_ACROSS,
+    MIN_PIVOT_RESOLVED,
+    TIME_ROUNDING,
+    VIOLATION_ACROSS,
+    VIOLATION_FLOOR,
+    VIOLATION_LEFT,
+    VIOLATION_NEAR,
+)
+from mbref.taylor.mode import is_accurate
+from mbref.taylor.partition import eliminate_below, evaluate_gradient, freedoms, least_pivot
+from mbref.taylor.samples import evaluate_series
+
+
+@kernel
+def relative_distance(memory):
+    """Return the least pivot at the start of the step relative to the largest pivot."""
+    return memory.step.start_pivot / memory.progress.largest_pivot
+
+
+@kernel
+def step_tolerance(memory):
+    """Return the tolerance of a step: a motion bends the more, the nearer it is to a singular position."""
+    return memory.mode.tolerance * min(1.0, relative_distance(memory))
+
+
+@kernel
+def crossing_tolerance(memory):
+    """Return the tolerance of a step that crosses, whose last terms are rounding over the distance."""
+    distance = relative_distance(memory)
+    if is_accurate(memory) and memory.step.approaching and distance < CROSSING_START:
+        return max(memory.mode.tolerance, CROSSING_NOISE / distance)
+    return step_tolerance(memory)
+
+
+@kernel
+def largest_violation(memory):
+    """Return the violation of the rows that rounding explains at the end of a step near a singular position.
+
+    Drivers have the rounding of the time.  Of rows that depend on others, corrections leave what they had.
+    """
+    step, terms, rounding, speed = memory.step, memory.series.terms, VIOLATION_FLOOR, 0.0
+    if memory.polynomials.given.driver.shape[0] > 0:
+        for i in range(memory.solver.pivot_columns.shape[0]):
+            speed = max(speed, abs(terms[1, i]))
+        rounding = max(rounding, TIME_ROUNDING * memory.run.loop.clock.time * speed)
+    if step.crossed:
+        return max(VIOLATION_ACROSS, rounding)
+    return max(VIOLATION_NEAR * relative_distance(memory), rounding, VIOLATION_LEFT * step.start_violation)
+
+
+@kernel
+def judge_branch(h, last, memory):
+    """Return OK, or the status that refuses a step of h seconds because its branch is in doubt.
+
+    Regular steps return SINGULAR_AHEAD where a singular position is near.
+    """
+    step, pivot = memory.step, least_pivot(memory)
+    step.crossed = contains_singular_position(h, pivot, memory)
+    if not is_accurate(memory):
+        return SINGULAR_AHEAD if step.crossed or ends_near_singular(pivot, memory) else OK
+    if not (step.crossed or is_near_singular(pivot, memory)):
+        return OK
+    turned = turns_back(memory.series.terms, memory)
+    if step.crossed:
+        return judge_crossing(pivot, turned, last, memory)
+    return judge_approach(h, pivot, turned, last, memory)
+
+
+@kernel
+def judge_crossing(pivot, turned, last, memory):
+    """Return OK, or the status that refuses a high-accuracy step that crosses a singular position."""
+    step, progress = memory.step, memory.progress
+    if turned:
+        return STEP_TOO_SMALL
+    if step.start_pivot < min(MIN_PIVOT_ACROSS * progress.largest_pivot, progress.entry_pivot):
+        return UNDECIDED
+    is_shallow = pivot < MIN_PIVOT_RATIO_ACROSS * step.start_pivot and not last
+    if is_shallow or not step.violation <= largest_violation(memory) or step.correction > MAX_SHIFT * pivot:
+        return STEP_TOO_SMALL
+    return OK
+
+
+@kernel
+def judge_approach(h, pivot, turned, last, memory):
+    """Return OK, or the status that refuses a high-accuracy step near a singular position."""
+    step, progress = memory.step, memory.progress
+    is_deep = pivot < MIN_PIVOT_RATIO * step.start_pivot and not last
+    if is_deep or not step.violation <= largest_violation(memory):
+        return STEP_TOO_SMALL
+    if step.correction > MAX_SHIFT * pivot:
+        return STEP_TOO_SMALL if last else UNDECIDED
+    resolved = MIN_PIVOT_FREE if freedoms(memory) > 0 else MIN_PIVOT_RESOLVED
+    resolved = min(resolved, ENTRY_RATIO * progress.entry_pivot)
+    if turned and pivot_at_turning_point(h, memory) < resolved:
+        return UNDECIDED
+    if pivot >= step.start_pivot:
+        return OK
+    return OK if pivot >= max(resolved, MIN_PIVOT * progress.largest_pivot) else UNDECIDED
+
+
+@kernel
+def pivot_at_turning_point(h, memory):
+    """Return the least pivot of G at the turning point of a motion that reverses in a step of h seconds."""
+    solver, start, end, least = memory.solver, 0.0, h, 1.0
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (start + end)
+        evaluate_series(middle, memory)
+        if turns_back(memory.state, memory):
+            end = middle
+        else:
+            start = middle
+    evaluate_gradient(memory.state, memory)
+    for k in range(memory.partition.rank):
+        least = min(least, abs(solver.work[solver.pivot_rows[k], solver.pivot_columns[k]]))
+        eliminate_below(solver.work, solver.pivot_rows, solver.pivot_columns, k)
+    evaluate_series(h, memory)
+    return least

@@ -1,0 +1,118 @@
+"""Long crossings: high-accuracy steps across singular positions until clear of them, confirmed by a
+perturbed run.
+
+A long crossing follows where a short one (``short_crossing``) cannot show that the motion is determined.
+The order of the steps is lower here, because lower orders magnify rounding less.  Unless drivers prescribe
+the whole motion, a perturbed run repeats the crossing (``uniqueness``).
+"""
+
+from __future__ import annotations
+
+from mbref.kernels.compilation import FLOAT, INT, entry, kernel
+from mbref.kernels.layout import OK
+from mbref.simulation.stepping import DONE, PAUSED, TOO_MANY_STEPS, UNDECIDED
+from mbref.taylor.crossing.short_crossing import record_crossings
+from mbref.taylor.crossing.thresholds import LONG_CROSSING_ORDER, PIVOT_CLEAR
+from mbref.taylor.crossing.uniqueness import perturbed_run_agrees
+from mbref.taylor.layout import SERIES
+from mbref.taylor.mode import set_high_accuracy, set_regular
+from mbref.taylor.partition import freedoms, least_pivot
+from mbref.taylor.samples import put_state_at, put_terms
+from mbref.taylor.saved_state import restore_state, save_state
+from mbref.taylor.step_start import save_series
+
+
+@entry(INT(SERIES))
+def begin_crossing(memory):
+    """Start high-accuracy steps at the present state; return OK."""
+    start_crossing(memory)
+    return OK
+
+
+@kernel
+def start_crossing(memory):
+    """Start a crossing by high-accuracy steps at the present state."""
+    mode, progress = memory.mode, memory.progress
+    set_high_accuracy(memory)
+    memory.step.start_pivot = 1.0
+    mode.order, progress.clearance, progress.is_clear = min(mode.order, LONG_CROSSING_ORDER), 0.0, 0
+    save_state(memory.run, memory.crossing_start)
+
+
+@entry(INT(SERIES))
+def cross_position(memory):
+    """Begin a series at the present state, and cross the first singular position ahead
+    (``continue_crossing``)."""
+    start_crossing(memory)
+    status = memory.kernels.begin(memory)
+    memory.progress.entry_pivot = least_pivot(memory)
+    return step_until_clear(memory) if status == OK else status
+
+
+@entry(INT(SERIES))
+def continue_crossing(memory):
+    """Cross the next singular position, which is recorded, or step clear of all of them.
+
+    Return PAUSED, DONE at the end, or the reason why the motion cannot be followed.  ``progress.is_clear``
+    is set when regular steps can follow: the least pivot is large enough, and not smaller than a step ago.
+    """
+    return step_until_clear(memory)
+
+
+@kernel
+def step_until_clear(memory):
+    """Take the steps of ``continue_crossing``."""
+    clock, counts, progress = memory.run.loop.clock, memory.run.equations.system.counts, memory.progress
+    crossings = counts.crossings
+    while counts.steps < memory.run.control.most_steps:
+        status = memory.kernels.step(memory)
+        if status != OK:
+            put_terms(memory.series.past, memory)
+            return status
+        if counts.crossings != crossings:
+            record_crossings(memory)
+        put_terms(memory.series.terms, memory)
+        if clock.time >= progress.end:
+            return DONE
+        judge_clearance(memory)
+        if progress.is_clear or counts.crossings != crossings:
+            return PAUSED
+    return TOO_MANY_STEPS
+
+
+@kernel
+def judge_clearance(memory):
+    """Decide whether regular steps can follow."""
+    progress, clock, before = memory.progress, memory.run.loop.clock, memory.progress.clearance
+    progress.clearance = least_pivot(memory) / (PIVOT_CLEAR * progress.largest_pivot)
+    progress.is_clear = progress.clearance >= max(before, 1.0) and clock.time >= clock.passage
+
+
+@entry(INT(INT, SERIES))
+def end_crossing(status, memory):
+    """Return to regular steps after a crossing that ended with a status.
+
+    Return PAUSED or DONE, or the reason why the motion cannot be followed:  UNDECIDED where a perturbed run
+    ends elsewhere.  Steps of that run are not counted.
+    """
+    run, counts = memory.run, memory.run.equations.system.counts
+    if status == PAUSED or status == DONE:  # noqa: SIM109 - no containers in kernels
+        steps, rejected, factorisations = counts.steps, counts.rejected, counts.factorisations
+        save_state(run, memory.crossing_result)
+        if freedoms(memory) > 0 and not perturbed_run_agrees(run.control.rtol, memory):
+            status = UNDECIDED
+        restore_state(memory.crossing_result, run)
+        counts.steps, counts.rejected, counts.factorisations = steps, rejected, factorisations
+        memory.progress.end = run.loop.times[run.loop.times.shape[0] - 1]
+    elif status != TOO_MANY_STEPS:
+        status = UNDECIDED
+    set_regular(memory)
+    return status
+
+
+@entry(INT(FLOAT, SERIES))
+def put_state_along(h, memory):
+    """Put the state at a distance h (s) from the start of the present series into memory; return OK."""
+    save_series(memory)
+    put_state_at(h, memory)
+    return OK

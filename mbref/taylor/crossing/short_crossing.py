@@ -1,0 +1,140 @@
+"""Short crossings: a few high-accuracy steps across a singular position, where the speed bounds the
+sensitivity.
+
+If the bound of ``uniqueness`` is too large, or the steps do not cross, all is restored, and a long crossing
+with a perturbed run takes over.
+"""
+
+from __future__ import annotations
+
+from mbref.kernels.compilation import kernel
+from mbref.kernels.layout import OK
+from mbref.linear_algebra.vectors import copy
+from mbref.taylor.crossing.start import judge_start
+from mbref.taylor.crossing.thresholds import MAX_SHORT_STEPS
+from mbref.taylor.crossing.uniqueness import energy_in_middle, is_bounded, keeps_moving, kinetic_energy
+from mbref.taylor.mode import set_high_accuracy, set_regular
+from mbref.taylor.partition import freedoms, is_undriven, least_pivot
+from mbref.taylor.samples import put_angles, put_state_at
+from mbref.taylor.step_start import return_to_start
+
+
+@kernel
+def may_be_short(memory):
+    """Return whether the motion has no degree of freedom, or one and no drivers."""
+    return freedoms(memory) <= is_undriven(memory)
+
+
+@kernel
+def switches_branch(crossing, memory):
+    """Return whether another branch than the smooth one is requested at a crossing, counted from 1."""
+    for number in memory.branch_switches:  # noqa: SIM110 - no generators in kernels
+        if number == crossing:
+            return True
+    return False
+
+
+@kernel
+def is_full(memory):
+    """Return whether memory has no room for the crossings of another step, two at most."""
+    return memory.progress.recorded + 2 > memory.crossings.time.shape[0]
+
+
+@kernel
+def switches_branch_in_pair(before, memory):
+    """Return whether the last step crossed twice, after a number of crossings, and another branch than the
+    smooth one is requested at one of both."""
+    if memory.run.equations.system.counts.crossings < before + 2:
+        return False
+    return switches_branch(before + 1, memory) or switches_branch(before + 2, memory)
+
+
+@kernel
+def cross_briefly(memory):
+    """Cross the singular position ahead of the start of the last step; if that fails, restore all and return
+    False."""
+    clock, counts = memory.run.loop.clock, memory.run.equations.system.counts
+    if not may_be_short(memory) or is_full(memory):
+        return False
+    time, sample, passage = clock.time, clock.sample, clock.passage
+    steps, crossings = counts.steps, counts.crossings
+    save_step_start(memory)
+    return_to_start(memory)
+    set_high_accuracy(memory)
+    memory.step.start_pivot = 1.0
+    status = memory.kernels.expand(time, memory)
+    if time == 0.0:
+        status = judge_start(status, memory)
+    has_crossed = status == OK and take_crossing_steps(memory)
+    set_regular(memory)
+    if not has_crossed:
+        clock.time, clock.sample, clock.passage = time, sample, passage
+        counts.steps, counts.crossings = steps, crossings
+        restore_step_start(memory)
+    return has_crossed
+
+
+@kernel
+def save_step_start(memory):
+    """Save the variables and angles at the start of the last step."""
+    saved, past = memory.step_start, memory.series.past
+    for order in range(2):
+        copy(past[order], saved.terms[order])
+    put_angles(0.0, memory)
+    copy(memory.angles, saved.angles)
+
+
+@kernel
+def restore_step_start(memory):
+    """Restore the variables and angles that ``save_step_start`` saved."""
+    saved, slot = memory.step_start, memory.polynomials.torsions.slot
+    for order in range(2):
+        copy(saved.terms[order], memory.series.past[order])
+    for s in range(slot.shape[0]):
+        memory.run.equations.angles[slot[s]] = saved.angles[s]
+
+
+@kernel
+def take_crossing_steps(memory):
+    """Take a few high-accuracy steps until one crosses; return whether it did on a motion that is
+    determined."""
+    clock, counts, progress = memory.run.loop.clock, memory.run.equations.system.counts, memory.progress
+    crossings, is_free = counts.crossings, freedoms(memory) > 0
+    first, slower, delay = kinetic_energy(memory.series.terms, memory), 1.0, 0.0
+    progress.entry_pivot = least_pivot(memory)
+    for _ in range(MAX_SHORT_STEPS):
+        if clock.time >= progress.end or memory.kernels.step(memory) != OK:
+            return False
+        if is_free:
+            middle, after = energy_in_middle(memory), kinetic_energy(memory.series.terms, memory)
+            if not keeps_moving(min(middle, after), first, memory):
+                return False
+            delay += clock.length * (slower + 4.0 * first / middle + first / after) / 6.0  # Simpson's rule
+            slower = first / after
+        if counts.crossings != crossings:
+            is_determined = not is_free or is_bounded(delay, memory)
+            progress.leaving = is_determined and not switches_branch_in_pair(crossings, memory)
+            if progress.leaving:
+                record_crossings(memory)
+            return progress.leaving
+    return False
+
+
+@kernel
+def record_crossings(memory):
+    """Record times and states of the crossings of the last step."""
+    record_at(memory.step.first_crossing, memory)
+    if memory.step.second_crossing >= 0.0:
+        record_at(memory.step.second_crossing, memory)
+
+
+@kernel
+def record_at(h, memory):
+    """Record time and state at a distance h (s) from the start of the last step."""
+    run, crossings, k = memory.run, memory.crossings, memory.progress.recorded
+    length = run.loop.clock.length
+    put_state_at(h, memory)
+    crossings.time[k] = run.loop.clock.time - (length - h)
+    copy(run.state.coordinates, crossings.coordinates[k])
+    copy(run.state.velocities, crossings.velocities[k])
+    memory.progress.recorded = k + 1

@@ -1,0 +1,51 @@
+"""Thresholds at singular positions: one table, a check of each, and crossings without compiled kernels."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from mbref.taylor.crossing import thresholds
+
+CHECKS = Path(__file__).with_name("interpreted_thresholds.py")
+CROSSINGS = """
+import warnings
+warnings.simplefilter("error")
+import numpy as np
+from mbref.scenes import find_scene
+from mbref.scenes.four_bar import four_bar_gravity
+from mbref.simulation.simulate import Limits, simulate
+for scene, end, crossings in (
+    (find_scene("planar_slider_crank_equal"), 0.1, 1), (find_scene("four_bar"), 0.1, 4),
+    (four_bar_gravity(), 0.6, 1), (four_bar_gravity(-1e-3), 0.5, 0), (four_bar_gravity(1e-4), 0.3, 1),
+):
+    run = simulate(scene, "taylor", np.linspace(0.0, end, 5), Limits(rtol=1e-9))
+    assert run.outcome.label == "COMPLETED", run.message
+    assert len(run.crossings or ()) == crossings, (scene.name, run.crossings)
+"""
+
+
+def interpreted(*arguments: str) -> subprocess.CompletedProcess:
+    """A process of Python whose kernels are interpreted."""
+    return subprocess.run(
+        [sys.executable, *arguments], check=False, capture_output=True, text=True,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, cwd=Path(__file__).parents[2],
+    )  # fmt: skip
+
+
+def test_the_table_has_every_threshold():
+    constants = {name for name, value in vars(thresholds).items() if name.isupper() and name != "TABLE"}
+    rows = [threshold.name for threshold in thresholds.TABLE]
+    assert set(rows) == constants and len(rows) == len(constants)
+    assert all(threshold.unit and threshold.reason for threshold in thresholds.TABLE)
+
+
+def test_each_decision_changes_at_its_threshold():
+    done = interpreted("-m", "pytest", "-q", "-p", "no:cacheprovider", str(CHECKS))
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
+    assert f"{len(thresholds.TABLE)} passed" in done.stdout, done.stdout[-500:]
+
+
+def test_singular_positions_are_crossed_without_compiled_kernels():
+    done = interpreted("-c", CROSSINGS)
+    assert done.returncode == 0, done.stderr[-3000:]
