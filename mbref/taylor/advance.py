@@ -23,7 +23,7 @@ def advance_series(memory):
     """Begin a series unless one has begun, and advance until the end, a failure, or the number of steps or of
     singular positions per call; says which.
 
-    SINGULAR_AHEAD where a passage cannot be brief.
+    SINGULAR_AHEAD where a crossing cannot be short.
     """
     clock, counts = memory.run.loop.clock, memory.run.equations.system.counts
     status = begin_once(memory)

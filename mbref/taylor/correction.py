@@ -16,7 +16,7 @@ CORRECTIONS = 8
 
 @kernel
 def violation(memory):
-    """Φ of every row at the first coefficients; the largest."""
+    """Evaluate Φ of every row at the first coefficients; return the largest."""
     solver, code, largest = memory.solver, memory.code, 0.0
     if code.violation != 0:
         violation_by_code(code.violation, memory.series.terms, solver.phi)
@@ -29,7 +29,7 @@ def violation(memory):
 
 @inlined
 def violation_in_loops(memory):
-    """Φ of every row at the first coefficients."""
+    """Evaluate Φ of every row at the first coefficients, by the general code."""
     rows, products, terms = memory.polynomials.rows, memory.polynomials.products, memory.series.terms
     phi, nz = memory.solver.phi, memory.solver.pivot_columns.shape[0]
     for block in range(products.start.shape[0] - 1):
@@ -44,7 +44,7 @@ def violation_in_loops(memory):
 
 @inlined
 def violation_rate(memory):
-    """Φ' of every row at the first two coefficients."""
+    """Evaluate Φ' of every row at the first two coefficients."""
     rows, products, terms = memory.polynomials.rows, memory.polynomials.products, memory.series.terms
     phi, nz, lanes = memory.solver.phi, memory.solver.pivot_columns.shape[0], memory.series.terms.shape[1]
     for block in range(products.start.shape[0] - 1):
@@ -97,7 +97,7 @@ def close_rate(memory):
 
 @kernel
 def largest_change(memory):
-    """The largest change of a variable by the last correction."""
+    """Return the largest change of a variable by the last correction."""
     solver, change = memory.solver, 0.0
     for j in range(solver.pivot_columns.shape[0]):
         change = larger(change, solver.change[j])
@@ -106,9 +106,9 @@ def largest_change(memory):
 
 @kernel
 def changes_factor(left, memory):
-    """Whether the last correction, which took a violation away, has changed the factor.
+    """Return whether the last correction, which took a violation away, has changed the factor.
 
-    It has by the correction over the distance from a singular position, which the least pivot tells; where
+    It changes by the correction over the distance from a singular position, which is the least pivot; where
     masses differ much, light bodies move the farther the heavier the others are, by the change over Φ.
     """
     tolerance, change, pivot = memory.mode.tolerance, memory.step.correction, least_pivot(memory)

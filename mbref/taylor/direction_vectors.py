@@ -32,7 +32,7 @@ class DirectionVectors:
     def add(
         self, body: int, along: np.ndarray, across: np.ndarray | None = None, driver: int = NO_DRIVER
     ) -> tuple[int, ...]:
-        """New variables of a body (nb for the ground), from forms (k, 12); their numbers."""
+        """Add variables of a body (nb for the ground) by forms (k, 12); return their numbers."""
         first, count = len(self), len(along)
         self._bodies += [body] * count
         self._turned_by += [driver] * count
@@ -41,7 +41,7 @@ class DirectionVectors:
         return tuple(range(first, first + count))
 
     def pose_maps(self, wanted: Sequence[int]) -> PoseMaps:
-        """The forms of the variables wanted, by which kernels read their values from states."""
+        """Return the forms of some variables, by which kernels evaluate them from states."""
         chosen = list(wanted)
         body, driver = (np.array(each, np.int64)[chosen] for each in (self._bodies, self._turned_by))
         forms = (np.array(each, float).reshape(-1, 12)[chosen] for each in (self._along, self._across))
@@ -50,5 +50,6 @@ class DirectionVectors:
 
 
 def direction_forms(axes: np.ndarray, local: np.ndarray) -> np.ndarray:
-    """Forms (k, 12) of the components along axes at rest (k, 3) of a direction (3,) in a body's own frame."""
+    """Return forms (k, 12) of the components along axes at rest (k, 3) of a direction (3,) in a body's own
+    frame."""
     return np.array([np.concatenate([np.zeros(3), np.outer(axis, local).ravel()]) for axis in axes])

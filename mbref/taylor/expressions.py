@@ -20,7 +20,7 @@ DEPENDENT = 1e-9  # of a polynomial, left by the elimination of others
 
 
 def combination(*terms: tuple[float, Expression]) -> Expression:
-    """The sum of expressions times factors."""
+    """Return the sum of expressions times factors."""
     total: Expression = {}
     for factor, expression in terms:
         for variable, coefficient in expression.items():
@@ -29,13 +29,13 @@ def combination(*terms: tuple[float, Expression]) -> Expression:
 
 
 def cleaned(expression: dict) -> dict:
-    """Without coefficients that are the rounding of zero."""
+    """Return an expression without coefficients of round-off size."""
     small = ROUNDING * max(map(abs, expression.values()), default=0.0)
     return {key: value for key, value in expression.items() if abs(value) > small}
 
 
 def product_sum(pairs: Iterable[tuple[Expression, Expression]], factor: float = 1.0) -> Polynomial:
-    """Σ a b over pairs of expressions, times a factor."""
+    """Return Σ a b over pairs of expressions, times a factor."""
     total: Polynomial = {}
     for first, second in pairs:
         for i, a in first.items():
@@ -46,7 +46,7 @@ def product_sum(pairs: Iterable[tuple[Expression, Expression]], factor: float = 
 
 
 def plus(polynomial: Polynomial, factor: float, expression: Expression) -> Polynomial:
-    """A polynomial and an expression times a factor."""
+    """Return a polynomial and an expression times a factor."""
     total = dict(polynomial)
     for variable, coefficient in expression.items():
         key = (ONE, variable)
@@ -55,19 +55,20 @@ def plus(polynomial: Polynomial, factor: float, expression: Expression) -> Polyn
 
 
 def significant(equation: dict[Key, float], constant: Key) -> dict[Key, float]:
-    """Without coefficients that are the rounding of zero; the constant alone where all others vanish."""
+    """Return a polynomial without coefficients of round-off size; its constant alone where all others
+    vanish."""
     largest = max((abs(c) for key, c in equation.items() if key != constant), default=0.0)
     small = ROUNDING if largest > VANISHING else VANISHING
     return {key: c for key, c in equation.items() if abs(c) > small or key == constant}
 
 
 def degree(polynomial: Polynomial) -> int:
-    """0 of a constant, 1 of an expression, 2 else."""
+    """Return the degree: 0 of a constant, 1 of an expression, otherwise 2."""
     return max(((i != ONE) + (j != ONE) for i, j in polynomial), default=0)
 
 
 def as_expression(polynomial: Polynomial) -> Expression:
-    """A polynomial of degree 1 or 0 as an expression."""
+    """Return a polynomial of degree 1 or 0 as an expression."""
     return {j: coefficient for (_, j), coefficient in polynomial.items()}
 
 
@@ -85,7 +86,7 @@ class Elimination:
         self.left: list[Expression] = []  # equations that eliminate nothing
 
     def __call__(self, expression: Expression) -> Expression:
-        """The expression in variables that are not eliminated."""
+        """Return the expression in variables that are not eliminated."""
         known = self.expressed
         if not any(variable in known for variable in expression):
             return expression
@@ -122,7 +123,7 @@ class Elimination:
 
 
 def independent(polynomials: Sequence[Polynomial]) -> list[Polynomial]:
-    """Those that are no linear combination of others, the ones with fewer terms before the others."""
+    """Return the linearly independent polynomials; those with fewer terms come first."""
     reduced: dict[tuple[int, int], Polynomial] = {}  # by the monomial that none of the others has
     kept = []
     for polynomial in sorted(polynomials, key=len):

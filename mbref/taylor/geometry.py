@@ -20,7 +20,7 @@ _known: dict[Hashable, Geometry] = {}
 
 
 def geometry_of(model: Model, start: Start, moving: np.ndarray, driven: bool) -> Geometry:
-    """The geometry of a scene at its start, of which these velocities (n,) can be other than zero.
+    """Return the geometry of a scene at its start, of which these velocities (n,) can be other than zero.
 
     ``driven``: for kinematics alone, because drivers prescribe the whole motion.
     """
@@ -34,6 +34,6 @@ def geometry_of(model: Model, start: Start, moving: np.ndarray, driven: bool) ->
 
 
 def _key(model: Model, start: Start, moving: np.ndarray) -> Hashable:
-    """All numbers that have a part in the geometry, and the joints that have one."""
+    """Return all numbers and joints that the geometry depends on."""
     numbers = (start.q, moving, model.start(), model.principal, *model.data.primitives)
     return model.structure, model.joints, model.length, *(array.tobytes() for array in numbers)

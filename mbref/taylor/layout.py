@@ -310,7 +310,7 @@ class TaylorMemory(NamedTuple):
     series_start: StepStart  # of the present series, saved while samples are completed
     crossings: Crossings
     branch_switches: Annotated[Indices, "branch_switches"]  # numbers of crossings left along another branch
-    crossing_end: Annotated[Matrix, 2, "lanes"]  # values and rates of the variables where a passage ended
+    crossing_end: Annotated[Matrix, 2, "lanes"]  # values and rates of the variables at the end of a crossing
     state: Annotated[Matrix, 3, "lanes"]  # variables and their two derivatives at some time
     pose: Annotated[Matrix, 3, "12*nb"]
     angles: Annotated[Vector, "torsions"]  # rad, unwrapped, at the time of expansion

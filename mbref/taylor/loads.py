@@ -26,7 +26,7 @@ E1, E2, F, COS, SIN, ANGLE, MOMENT, MOMENT_COS, MOMENT_SIN, TORSION_SERIES = (
 
 @inlined
 def product(a, b, k):
-    """Order k of the product of two series."""
+    """Return order k of the product of two series."""
     value = 0.0
     for i in range(k + 1):
         value += a[i] * b[k - i]
@@ -35,7 +35,7 @@ def product(a, b, k):
 
 @inlined
 def grow_form(constant, form, k, variables, target):
-    """Order k of an affine form of the variables."""
+    """Compute order k of an affine form of the variables."""
     value = constant if k == 0 else 0.0
     for i in range(form.shape[0]):
         value += form[i] * variables[k, i]
@@ -44,7 +44,7 @@ def grow_form(constant, form, k, variables, target):
 
 @inlined
 def start_loads(memory):
-    """The orders 0 of all loads."""
+    """Compute the orders 0 of all loads."""
     grow_springs(0, memory)
     grow_torsions(0, memory)
 
@@ -60,13 +60,13 @@ def add_loads(k, memory):
 
 @inlined
 def has_direction(s, springs):
-    """Whether the force of a spring depends on its direction; else it is linear in the variables."""
+    """Return whether the force of a spring depends on its direction; else it is linear in the variables."""
     return springs.natural[s] > 0.0 or springs.damping[s] > 0.0
 
 
 @kernel
 def grow_springs(k, memory):
-    """Order k of the springs' vectors, lengths and inverses; order k - 1 of their rates."""
+    """Compute order k of the springs' vectors, lengths and inverses; order k - 1 of their rates."""
     springs, variables = memory.polynomials.springs, memory.series.terms
     for s in range(springs.stiffness.shape[0]):
         of = memory.series.springs[SPRING_SERIES * s : SPRING_SERIES * (s + 1)]
@@ -91,7 +91,7 @@ def grow_springs(k, memory):
 
 @kernel
 def add_springs(k, memory):
-    """Order k of their forces: -(stiffness (1 - natural / l) + damping l' / l) times the vector."""
+    """Compute order k of their forces: -(stiffness (1 - natural / l) + damping l' / l) times the vector."""
     springs, sums, nz = memory.polynomials.springs, memory.series.sums, memory.solver.pivot_columns.shape[0]
     for s in range(springs.stiffness.shape[0]):
         of = memory.series.springs[SPRING_SERIES * s : SPRING_SERIES * (s + 1)]
@@ -106,7 +106,8 @@ def add_springs(k, memory):
 
 @kernel
 def time_to_no_length(memory):
-    """The shortest time (s) in which the ends of a spring could meet at their speed; infinite without any.
+    """Return the shortest time (s) in which the ends of a spring could meet at their speed; infinite
+    without any.
 
     Beyond that time the series of a force that has the direction of its spring is rounding: a small length
     divides it.
@@ -123,7 +124,7 @@ def time_to_no_length(memory):
 
 @kernel
 def part_behind_no_length(memory):
-    """The part of a step behind a position where a spring has no length, at which its force turns around; 0
+    """Return the part of a step behind a position where a spring has no length and its force turns around; 0
     for none.
 
     Such a spring has turned by more than a right angle.  Its series goes on with a negative length.
@@ -144,7 +145,7 @@ def part_behind_no_length(memory):
 
 @kernel
 def grow_torsions(k, memory):
-    """Order k of directions, cosine and sine; of the angle, whose rate is C S' - S C'."""
+    """Compute order k of directions, cosine and sine; of the angle, whose rate is C S' - S C'."""
     torsions, variables = memory.polynomials.torsions, memory.series.terms
     for s in range(torsions.stiffness.shape[0]):
         of = memory.series.torsions[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
@@ -167,7 +168,7 @@ def grow_torsions(k, memory):
 
 @kernel
 def add_torsions(k, memory):
-    """Order k of their forces: -(stiffness (θ - natural) + damping θ') times C δS - S δC."""
+    """Compute order k of their forces: -(stiffness (θ - natural) + damping θ') times C δS - S δC."""
     torsions, sums, nz = memory.polynomials.torsions, memory.series.sums, memory.solver.pivot_columns.shape[0]
     for s in range(torsions.stiffness.shape[0]):
         of = memory.series.torsions[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
@@ -186,7 +187,7 @@ def add_torsions(k, memory):
 
 @kernel
 def expand_drivers(t, memory):
-    """The functions that drivers prescribe, as series about time t."""
+    """Compute the functions that drivers prescribe, as series about time t."""
     given, functions, n = (
         memory.polynomials.given,
         memory.series.terms,
@@ -204,7 +205,7 @@ def expand_drivers(t, memory):
 
 @kernel
 def expand_angle(driven, functions, g):
-    """The cosine and the sine of a series, into lanes g and g + 1."""
+    """Compute the cosine and the sine of a series, into lanes g and g + 1."""
     functions[0, g], functions[0, g + 1] = cos(driven[0]), sin(driven[0])
     last = driven.shape[0] - 1
     while last > 1 and driven[last] == 0.0:
@@ -219,7 +220,7 @@ def expand_angle(driven, functions, g):
 
 @kernel
 def expand_driver(t, d, drivers, series):
-    """A driver's value as a series about time t: its polynomial shifted, and its sine."""
+    """Compute a driver's value as a series about time t: its polynomial shifted, and its sine."""
     terms, size = drivers.polynomial.shape[1], series.shape[0]
     for k in range(size):
         value, binomial = 0.0, 1.0

@@ -76,7 +76,7 @@ class NaturalCoordinates:
         return sum(variable in pair and ONE not in pair for row in self.rows for pair in row)
 
     def direction(self, body: int, local: np.ndarray) -> Triple:
-        """A direction fixed in a body, given in its principal frame."""
+        """Return a direction fixed in a body, given in its principal frame."""
         return tuple(
             map(
                 self.eliminate, self.orientations[body].direction_vector(self.orientations.world(body, local))
@@ -84,7 +84,7 @@ class NaturalCoordinates:
         )
 
     def point(self, body: int, local: np.ndarray) -> Triple:
-        """A point fixed in a body, given in its principal frame from its centre of mass (m)."""
+        """Return a point fixed in a body, given in its principal frame from its centre of mass (m)."""
         arm = self.orientations[body].direction_vector(self.orientations.world(body, local) / self.length)
         if body == self.nb:
             return arm
@@ -94,7 +94,7 @@ class NaturalCoordinates:
 
     # --- rows ---------------------------------------------------------------------------------------------
     def _rows(self) -> list[Polynomial]:
-        """Independent rows of second degree, and of first degree those that eliminate nothing."""
+        """Return independent rows of degree 2, and rows of degree 1 that eliminate nothing."""
         for equation in self._linear_equations():
             self.eliminate.add(equation)
         self.eliminate.settle()
@@ -119,11 +119,11 @@ class NaturalCoordinates:
         return independent([row for row in (*rows, *linear) if degree(row) > 0])
 
     def _is_prescribed(self, row: Polynomial) -> bool:
-        """Whether a driver has a part in a row, which then eliminates nothing: M would depend on time."""
+        """Return whether a row has a driver; it eliminates nothing, because M would depend on time."""
         return any(variable in self.given for pair in row for variable in pair)
 
     def _linear_equations(self) -> Iterator[Expression]:
-        """Positions at rest, axes that joints share, coincident points; an expression that is zero each."""
+        """Yield expressions that are zero: static positions, axes that joints share, coincident points."""
         for b, c in zip(*np.nonzero(~self._moving[:, :3]), strict=True):
             yield {self.centres[b][c]: 1.0, ONE: -float(self.place[b, c])}
         numbered = self.orientations.numbered
@@ -135,7 +135,7 @@ class NaturalCoordinates:
             yield from _difference(first, second)
 
     def _ends(self, p: int) -> tuple[Triple, Triple]:
-        """The points of a primitive constraint on both bodies."""
+        """Return the points of a primitive constraint on both bodies."""
         table = self.model.data.primitives
         first, second = int(table.first[p]), int(table.second[p])
         return self.point(first, table.point_first[p]), self.point(second, table.point_second[p])
@@ -150,14 +150,15 @@ class NaturalCoordinates:
         return product_sum(zip(first, self._other_side(p), strict=True))
 
     def _other_side(self, p: int) -> Triple:
-        """The vector that stays perpendicular to a primitive's first direction."""
+        """Return the vector that stays perpendicular to a primitive's first direction."""
         table = self.model.data.primitives
         if table.kind[p] == DOT1:
             return self.direction(int(table.second[p]), table.direction_second[p])
         return _difference(*self._ends(p)[::-1])
 
     def _turned(self, p: int) -> int | None:
-        """The orientation that a driver turns about an axis at rest, from directions at rest; else None."""
+        """Return the orientation that a driver turns about an axis at rest, from directions at rest; else
+        None."""
         table = self.model.data.primitives
         if not self.driven or table.driver[p] < 0 or table.kind[p] != DOT1:
             return None
@@ -169,7 +170,7 @@ class NaturalCoordinates:
         return number if self.orientations.numbered[number].frame is not None else None
 
     def _turning(self, p: int) -> list[Polynomial]:
-        """Rows of first degree of a driven direction, cos ψ x + sin ψ y: the rotation needs no others."""
+        """Return rows of degree 1 of a driven direction, cos ψ x + sin ψ y, which determine the rotation."""
         table = self.model.data.primitives
         cosine, sine = self._prescribed(int(table.driver[p]), (COSINE, SINE))
         x, y = (
@@ -182,8 +183,8 @@ class NaturalCoordinates:
         return rows
 
     def _driven(self, p: int) -> list[Polynomial]:
-        """A displacement along an axis, or an angle: the second body's direction stays perpendicular to
-        the first's, turned by the driver: e = cos ψ y - sin ψ x."""
+        """Return rows of a driven displacement or angle: the direction of the second body stays
+        perpendicular to the first's, turned by the driver: e = cos ψ y - sin ψ x."""
         table = self.model.data.primitives
         driver, body = int(table.driver[p]), int(table.first[p])
         if table.kind[p] == DOT2:
@@ -199,7 +200,7 @@ class NaturalCoordinates:
         return [*rows, product_sum(zip(e, self._other_side(p), strict=True))]
 
     def _own_variables(self, p: int, turned: list[Polynomial]) -> tuple[list[Polynomial], list[Polynomial]]:
-        """A direction that is of second degree as variables, and the rows that define them."""
+        """Return a direction of degree 2 as new variables, and the rows that define them."""
         table = self.model.data.primitives
         body = int(table.first[p])
         along, across = (
@@ -215,7 +216,7 @@ class NaturalCoordinates:
         return variables
 
     def _reduced(self, row: Polynomial) -> Polynomial:
-        """A row without the variables eliminated."""
+        """Return a row without eliminated variables."""
         gone, total = self.eliminate.expressed, {}
         for (i, j), coefficient in row.items():
             if i in gone or j in gone:

@@ -36,11 +36,11 @@ class Orientation:
 
     @functools.cached_property
     def _inverse(self) -> np.ndarray:
-        """The inverse of the basis (3, 3)."""
+        """Return the inverse of the basis (3, 3)."""
         return np.asarray(np.linalg.inv(self.basis))
 
     def direction_vector(self, w: np.ndarray) -> Triple:
-        """R w of a direction w (3,) that is fixed in the bodies."""
+        """Return R w of a direction w (3,) that is fixed in the bodies."""
         if self.basis is None:
             return tuple({ONE: c} if c else {} for c in w.tolist())
         a, b, c = (w @ self._inverse).tolist()
@@ -56,7 +56,7 @@ class Orientation:
         return tuple(map(cleaned, direction_vectors))
 
     def rows(self) -> Iterator[Polynomial]:
-        """R is a rotation."""
+        """Yield the rows by which R is a rotation."""
         if self.frame is not None:
             cosine, sine = ({v: 1.0} for v in self.variables)
             yield product_sum([(cosine, cosine), (sine, sine), ({ONE: 1.0}, {ONE: -1.0})], 0.5)
@@ -87,19 +87,19 @@ class Orientations:
         self.numbered = self._orientations()
 
     def __getitem__(self, body: int) -> Orientation:
-        """Of a body, or of the fixed frame (index nb)."""
+        """Return the orientation of a body, or of the fixed frame (index nb)."""
         return self.numbered[self.number(body)]
 
     def number(self, body: int) -> int:
-        """The number of the orientation of a body, or of the fixed frame (index nb)."""
+        """Return the number of the orientation of a body, or of the fixed frame (index nb)."""
         return self.group[body] if body < self.nb else -1
 
     def world(self, body: int, local: np.ndarray) -> np.ndarray:
-        """A direction (3,) in the principal frame of a body in world axes at the start."""
+        """Return a direction (3,) in the principal frame of a body in world axes at the start."""
         return self._axes[body] @ local if body < self.nb else np.asarray(local)
 
     def _groups(self) -> list[int]:
-        """The number of the orientation of each body; -1 for those oriented with the fixed frame."""
+        """Return the number of the orientation of each body; -1 for those oriented with the fixed frame."""
         group = [*range(self.nb), -1]
         for joint in self.model.joints:
             if len(joint.facts.forbidden_rotations) == 3:
@@ -122,7 +122,7 @@ class Orientations:
         return found
 
     def _axes_at_rest(self) -> dict[int, list[np.ndarray]]:
-        """Up to two axes of each orientation that rest, in world axes."""
+        """Return up to two axes of each orientation that rest, in world axes."""
         known: dict[int, list[np.ndarray]] = {-1: [np.eye(3)[0], np.eye(3)[1]]}
         for b, (group, turns) in enumerate(zip(self.group, self._moving, strict=True)):
             for k in (0, 1, 2) if not turns.any() else np.flatnonzero(turns) if turns.sum() == 1 else ():
@@ -137,7 +137,8 @@ class Orientations:
         return known
 
     def shared_axes(self) -> Iterator[tuple[Frame, Frame]]:
-        """The orientations that joints let turn about a common axis only, each with the axis (world)."""
+        """Yield pairs of orientations that joints let turn about a common axis only, each with the axis
+        (world)."""
         for joint in self.model.joints:
             if len(joint.facts.forbidden_rotations) == 2:
                 yield tuple(  # type: ignore[misc]
@@ -162,7 +163,8 @@ class Orientations:
         )
 
     def _frame(self, axis: np.ndarray) -> np.ndarray:
-        """Right-handed unit vectors in rows, the third an axis, the first one that a body slides along."""
+        """Return Right-handed unit vectors in rows, the third an axis, the first one that a body slides
+        along."""
         slides = [j for j in self.model.joints if len(j.facts.forbidden_translations) == 2]
         along = [self._axis(j.bodies[0], j.directions[0]) for j in slides]
         first = next((x for x in along if abs(x @ axis) < PARALLEL), np.eye(3)[np.argmin(np.abs(axis))])
@@ -181,7 +183,8 @@ class Orientations:
         return self._direction_vectors.add(body, np.concatenate(forms))
 
     def _directions(self, group: int) -> Iterator[np.ndarray]:
-        """Directions for the basis of an orientation, the best first: axes of joints, arms, own axes."""
+        """Yield directions for the basis of an orientation, the best first: axes of joints, arms, principal
+        axes."""
         joints = [joint for joint in self.model.joints if group in map(self._group_of, joint.bodies)]
         for joint in joints:
             for name, axis in zip(joint.bodies, joint.directions * (3 - len(joint.directions)), strict=False):
@@ -207,7 +210,7 @@ def _are_parallel(one: np.ndarray, other: np.ndarray) -> bool:
 
 
 def _keep(known: dict[int, list[np.ndarray]], group: int, axis: np.ndarray) -> bool:
-    """Whether an axis is new to an orientation, which then has it."""
+    """Add an axis to the known ones of an orientation; return whether it is new."""
     axes = known.setdefault(group, [])
     if len(axes) > 1 or any(map(functools.partial(_are_parallel, axis), axes)):
         return False
@@ -216,7 +219,7 @@ def _keep(known: dict[int, list[np.ndarray]], group: int, axis: np.ndarray) -> b
 
 
 def _basis(directions: Iterable[np.ndarray]) -> np.ndarray:
-    """The first two directions that are well apart and the one across both, unit vectors, in rows."""
+    """Return the first two directions that are well apart and the one across both, unit vectors, in rows."""
     chosen: list[np.ndarray] = []
     for unit in directions:
         if not chosen or np.linalg.norm(rotations.cross(chosen[0], unit)) > APART:

@@ -105,7 +105,7 @@ def expand_at_sample(memory):
 
 @kernel
 def balance_forces(t, run):
-    """The multipliers λ with Φ_qᵀ λ = g - M q̈ at the state and accelerations in memory: OK or SINGULAR.
+    """Compute multipliers λ with Φ_qᵀ λ = g - M q̈ at the state and accelerations in memory: OK or SINGULAR.
 
     Of redundant rows, those of the least norm in unit rows.
     """
@@ -134,7 +134,7 @@ def keep_series_here(memory):
 
 @kernel
 def return_to_series(memory):
-    """Have ``terms`` be the series about the kept variables again."""
+    """Restore the series about the saved variables in ``terms``."""
     here, terms = memory.series_start, memory.series.terms
     for order in range(2):
         copy(here.terms[order], terms[order])

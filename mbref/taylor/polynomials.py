@@ -37,7 +37,7 @@ class Geometry:
         self._without = Springs(*_stacked([], 3, len(of.kept))), _torsions_of([], len(of.kept))
 
     def polynomials(self, model: Model) -> Polynomials:
-        """The polynomials of a scene of this geometry."""
+        """Return the polynomials of a scene of this geometry."""
         (springs, torsions), loads = self._without, model.data.loads
         if (loads.kind == SPRING).any():
             springs = _springs(loads, self._forms)
@@ -64,7 +64,7 @@ class Forms:
         self._of_axes: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     def __call__(self, expressions: Sequence[Expression]) -> tuple[np.ndarray, np.ndarray]:
-        """Constants (k,) and coefficients (k, d)."""
+        """Return constants (k,) and coefficients (k, d)."""
         constant, matrix = np.zeros(len(expressions)), np.zeros((len(expressions), self.d))
         for row, expression in enumerate(expressions):
             for variable, coefficient in self.of.eliminate(expression).items():
@@ -75,30 +75,30 @@ class Forms:
         return constant, matrix
 
     def variables(self, variables: Iterable[int]) -> tuple[np.ndarray, np.ndarray]:
-        """The same of variables, whether kept or eliminated."""
+        """Return constants and coefficients of variables, kept or eliminated."""
         return self([{v: 1.0} for v in variables])
 
     def axes(self, body: int) -> Sequence[Triple]:
-        """The directions of a body's three principal axes."""
+        """Return the directions of a body's three principal axes."""
         if body not in self._axes:
             self._axes[body] = [self.of.direction(body, axis) for axis in np.eye(3)]
         return self._axes[body]
 
     @cached_property
     def centres(self) -> np.ndarray:
-        """Coefficients (nb, 3, d) of the bodies' centres of mass."""
+        """Return coefficients (nb, 3, d) of the bodies' centres of mass."""
         found = [self.variables(centre)[1] for centre in self.of.centres]
         return np.array(found).reshape(self.of.nb, 3, self.d)
 
     @cached_property
     def _of_inertia(self) -> np.ndarray:
-        """The parts (4 nb, d, d) of M that a body's mass, and ∫ x² dm of its principal axes, have."""
+        """Return the parts (4 nb, d, d) of M that a body's mass, and ∫ x² dm of its principal axes, have."""
         direction_vectors = [self.of_axes(b)[1].reshape(3, 3, self.d) for b in range(self.of.nb)]
         forms = [form for b, axes in enumerate(direction_vectors) for form in (self.centres[b], *axes)]
         return np.array([form.T @ form for form in forms]).reshape(4 * self.of.nb, self.d, self.d)
 
     def of_axes(self, body: int) -> tuple[np.ndarray, np.ndarray]:
-        """Constants (9,) and coefficients (9, d) of the directions of a body's principal axes."""
+        """Return constants (9,) and coefficients (9, d) of the directions of a body's principal axes."""
         if body not in self._of_axes:
             self._of_axes[body] = self(
                 [component for direction_vector in self.axes(body) for component in direction_vector]
@@ -106,7 +106,7 @@ class Forms:
         return self._of_axes[body]
 
     def mass(self, bodies: Bodies) -> np.ndarray:
-        """M (d, d) with ½ ż M ż the kinetic energy in the unit of length squared."""
+        """Return M (d, d), with ½ ż M ż the kinetic energy in the unit of length squared."""
         principal = bodies.inertia / self.of.length**2
         along = principal.sum(axis=1, keepdims=True) / 2 - principal
         weights = np.concatenate([bodies.mass[:, None], along], axis=1).reshape(-1, 1, 1)
@@ -127,7 +127,8 @@ def _rows(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Rows:
 
 
 def _tableau(rows: Rows, nz: int, nr: int, lanes: int) -> tuple[np.ndarray, np.ndarray]:
-    """The constant part of the tableau (nr + 1, lanes) of the rows, and the places of products in it."""
+    """Return the constant part of the tableau (nr + 1, lanes) of the rows, and the places of products in
+    it."""
     linear, of_variables = np.zeros((nr + 1, lanes)), rows.linear_lane < nz
     places = rows.linear_row[of_variables], rows.linear_lane[of_variables]
     np.add.at(linear, places, rows.linear_weight[of_variables])
@@ -136,14 +137,14 @@ def _tableau(rows: Rows, nz: int, nr: int, lanes: int) -> tuple[np.ndarray, np.n
 
 
 def _columns(entries: Sequence[tuple[float, ...]], indices: int) -> list[np.ndarray]:
-    """Columns of a table, the first ones of indices and the last of numbers."""
+    """Return columns of a table, the first ones of indices and the last of numbers."""
     table = np.array(entries, dtype=float).reshape(len(entries), indices + 1)
     columns = [np.ascontiguousarray(column) for column in table.T]
     return [column.astype(np.int64) for column in columns[:-1]] + columns[-1:]
 
 
 def _products(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Products:
-    """Of rows: two variables or functions; of forces: a row's multiplier and one of these."""
+    """Return the products: of two variables in rows, of a multiplier and a variable in forces."""
     nz = len(of.kept)
     terms: list[list[tuple[float, ...]]] = [[] for _ in range(lanes)]
     for r, row in enumerate(of.rows):
@@ -160,13 +161,13 @@ def _products(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Produ
 
 
 def products_of_lanes(terms: Sequence[Sequence[tuple]]) -> Products:
-    """Products by the factors and weights of each lane's, vectors of slots padded."""
+    """Return products by the factors and weights of each lane, with padded slots."""
     slots, start = _slots(terms, (0, 0, 0.0))
     return Products(*_columns(slots, 2), start)
 
 
 def _slots(terms: Sequence[Sequence[tuple]], nothing: tuple) -> tuple[list[tuple], np.ndarray]:
-    """The terms of each lane in vectors, padded with nothing; where each block of lanes begins."""
+    """Return the terms of each lane in vectors, padded with nothing; where each block of lanes begins."""
     slots, start = [], [0]
     for block in range(0, len(terms), WIDTH):
         levels = itertools.zip_longest(*terms[block : block + WIDTH], fillvalue=nothing)
@@ -176,7 +177,7 @@ def _slots(terms: Sequence[Sequence[tuple]], nothing: tuple) -> tuple[list[tuple
 
 
 def _inertia(model: Model, forms: Forms, lanes: int) -> Inertia:
-    """The mass matrix; gravity, forces and moments that are constant."""
+    """Return the mass matrix; gravity, forces and moments that are constant."""
     of, loads = forms.of, model.data.loads
     weight = model.data.bodies.mass[:, None] * (model.data.gravity / of.length)
     force, linear = (weight[:, :, None] * forms.centres).sum(axis=(0, 1)), np.zeros((forms.d, forms.d))
@@ -202,7 +203,8 @@ def _inertia(model: Model, forms: Forms, lanes: int) -> Inertia:
 
 
 def _moment(forms: Forms, body: int, moment: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Constant (d,) and linear (d, d) force of a moment: ½ Σ (moment × R e) · δ(R e) over three axes."""
+    """Return constant (d,) and linear (d, d) force of a moment: ½ Σ (moment × R e) · δ(R e) over three
+    axes."""
     constant, matrix = np.zeros(forms.d), np.zeros((forms.d, forms.d))
     at_rest, all_moving = (each.reshape(3, 3, -1) for each in forms.of_axes(body))
     vectors = np.concatenate([at_rest, all_moving], axis=2).swapaxes(1, 2)
@@ -266,7 +268,7 @@ def _torsions_of(rows: Sequence[tuple], d: int) -> Torsions:
 
 
 def _stacked(rows: Sequence[tuple], width: int, d: int, numbers: int = 3) -> list[np.ndarray]:
-    """Constants (k, width), forms (k width, d) and columns of numbers (k,)."""
+    """Return constants (k, width), forms (k width, d) and columns of numbers (k,)."""
     columns = [[row[i] for row in rows] for i in range(2 + numbers)]
     constant, form = np.array(columns[0], dtype=float), np.array(columns[1], dtype=float)
     return [

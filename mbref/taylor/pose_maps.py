@@ -11,7 +11,8 @@ from mbref.kernels.compilation import kernel
 
 @kernel
 def read_variables(t, memory):
-    """Values and rates of all variables at time t from the state in memory: first terms of the series."""
+    """Compute values and rates of all variables at time t from the state in memory, as first terms of the
+    series."""
     run, pose_maps, terms = memory.run, memory.pose_maps, memory.series.terms
     frames = run.equations.frames
     set_poses(run.state.coordinates, frames)
@@ -31,7 +32,8 @@ def read_variables(t, memory):
 
 @kernel
 def value_and_rate(i, forms, body, frames):
-    """Value and rate of the linear form in row i (12,) of a body's pose: position, rotation matrix R by rows.
+    """Return value and rate of the linear form in row i (12,) of a body's pose: position, rotation matrix R
+    by rows.
 
     A row a of R turns by a × ω', ω' in the body's frame.
     """

@@ -12,7 +12,7 @@ from mbref.taylor.simd import WIDTH, load, store
 
 @inlined
 def evaluate_series(h, memory):
-    """All lanes and their first two derivatives at a distance h (s) from the step's beginning (Horner)."""
+    """Evaluate all lanes and two derivatives at a distance h (s) from the start of the step (Horner)."""
     past, state = memory.series.past, memory.state
     last, lanes = memory.step.used_order, past.shape[1]
     for j in range(0, lanes, WIDTH):
@@ -30,7 +30,7 @@ def evaluate_series(h, memory):
 
 @kernel
 def find_poses(memory):
-    """Positions and rotation matrices of all bodies, and their derivatives, from ``state``."""
+    """Compute positions and rotation matrices of all bodies, and their derivatives, from ``state``."""
     poses, state, pose = memory.polynomials.poses, memory.state, memory.pose
     for p in range(poses.constant.shape[0]):
         value, rate, second = poses.constant[p], 0.0, 0.0
@@ -44,7 +44,7 @@ def find_poses(memory):
 
 @inlined
 def turning(a, a_rate, out):
-    """The axial vector (3,) of the skew part of Aᵀ A', from rotation matrices by rows (9,)."""
+    """Compute the axial vector (3,) of the skew part of Aᵀ A', from rotation matrices by rows (9,)."""
     for k in range(3):
         i, j = (k + 2) % 3, (k + 1) % 3
         value = 0.0
@@ -55,7 +55,8 @@ def turning(a, a_rate, out):
 
 @inlined
 def put_quaternion(a, p):
-    """The unit quaternion of a rotation matrix by rows (9,), on the side of the one that p (4,) was."""
+    """Compute the unit quaternion of a rotation matrix by rows (9,), on the side of the one that p (4,)
+    was."""
     squares = (
         1.0 + a[0] + a[4] + a[8], 1.0 + a[0] - a[4] - a[8],
         1.0 - a[0] + a[4] - a[8], 1.0 - a[0] - a[4] + a[8],
@@ -81,7 +82,7 @@ def put_quaternion(a, p):
 
 @kernel
 def put_state(memory):
-    """Coordinates, velocities and accelerations of all bodies from their poses."""
+    """Compute coordinates, velocities and accelerations of all bodies from their poses."""
     q, v, pose = memory.run.state.coordinates, memory.run.state.velocities, memory.pose
     acceleration = memory.run.equations.system.acceleration
     for b in range(v.shape[0] // 6):
@@ -97,7 +98,7 @@ def put_state(memory):
 
 @kernel
 def put_state_at(h, memory):
-    """Coordinates and velocities of all bodies at a distance h (s) from the step's beginning."""
+    """Compute coordinates and velocities of all bodies at a distance h (s) from the step's beginning."""
     evaluate_series(h, memory)
     find_poses(memory)
     put_state(memory)
@@ -105,7 +106,7 @@ def put_state_at(h, memory):
 
 @kernel
 def put_terms(series, memory):
-    """Coordinates and velocities of all bodies where a series begins."""
+    """Compute coordinates and velocities of all bodies where a series begins."""
     state = memory.state
     for i in range(memory.solver.pivot_columns.shape[0]):
         state[0, i], state[1, i] = series[0, i], series[1, i]
@@ -128,7 +129,7 @@ def keep_sample(h, memory):
 
 @kernel
 def put_angles(h, memory):
-    """The torsion springs' angles at a distance h (s) from the step's beginning."""
+    """Compute the torsion springs' angles at a distance h (s) from the step's beginning."""
     torsions, past = memory.polynomials.torsions, memory.series.past_angles
     for s in range(past.shape[0]):
         value = 0.0

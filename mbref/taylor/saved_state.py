@@ -8,7 +8,7 @@ from mbref.linear_algebra.vectors import copy
 
 @kernel
 def save_state(run, saved):
-    """Keep the state of a run, its time, the samples taken and the singular positions passed."""
+    """Save state and time of a run, the number of samples taken and of singular positions crossed."""
     clock, instant = run.loop.clock, saved.instant
     instant.time, instant.sample = clock.time, clock.sample
     instant.crossings = run.equations.system.counts.crossings
@@ -19,7 +19,7 @@ def save_state(run, saved):
 
 @kernel
 def restore_state(saved, run):
-    """Bring a run back to the state that was kept."""
+    """Restore the state of a run that was saved."""
     clock, instant = run.loop.clock, saved.instant
     clock.time, clock.sample = instant.time, instant.sample
     run.equations.system.counts.crossings = instant.crossings

@@ -20,7 +20,7 @@ SLOWEST = 2.0  # steps over the time in which the speed would vanish: beyond, ro
 
 @inlined
 def start_sums(memory):
-    """No products, and minus the constant forces in the first order."""
+    """Set the sums to minus the constant forces in order 0."""
     sums, force = memory.series.sums, memory.polynomials.inertia.force
     size = sums.shape[0] * sums.shape[1]
     zero = 0.0 * load(force, 0)
@@ -32,7 +32,7 @@ def start_sums(memory):
 
 @inlined
 def put_sums(k, memory):
-    """The right-hand side of order k, from the factors of order k + 1 and those known before."""
+    """Compute the right-hand side of order k, from the factors of order k + 1 and those known before."""
     series, products, terms = memory.series, memory.polynomials.products, memory.series.terms
     left, right, lanes, slots = series.left, series.right, terms.shape[1], series.left.shape[1]
     inertia = memory.polynomials.inertia
@@ -75,7 +75,7 @@ def add_to_later_sums(k, last, memory):
 
 @inlined
 def solve_order(k, last, memory):
-    """Order k + 2 of the variables and order k of the multipliers; loads are in the sums."""
+    """Compute order k + 2 of the variables and order k of the multipliers; loads are in the sums."""
     series, terms, rhs = memory.series, memory.series.terms, memory.solver.rhs
     n, lanes = memory.solver.pivot_columns.shape[0] + memory.solver.pivot_rows.shape[0], terms.shape[1]
     put_sums(k, memory)
@@ -90,14 +90,14 @@ def solve_order(k, last, memory):
 
 @kernel
 def expand_without_springs(last, memory):
-    """The orders k = 0 … last without springs, by code short enough for the registers."""
+    """Compute orders 0 … last without springs, by code short enough for the registers."""
     for k in range(last + 1):
         solve_order(k, last, memory)
 
 
 @kernel
 def expand_with_springs(last, memory):
-    """The orders k = 0 … last."""
+    """Compute orders 0 … last with springs."""
     start_loads(memory)
     for k in range(last + 1):
         add_loads(k, memory)
@@ -106,7 +106,7 @@ def expand_with_springs(last, memory):
 
 @kernel
 def expand_series(memory):
-    """All orders of the variables from the first two, which are consistent."""
+    """Compute all orders of the variables from the first two, which are consistent."""
     code, step, order = memory.code, memory.step, memory.mode.order
     step.deceleration = 0.0
     if code.expand_by_power != 0 and code.rank == memory.partition.rank and not starts_at_rest(memory):
@@ -126,7 +126,7 @@ def expand_series(memory):
 
 @inlined
 def starts_at_rest(memory):
-    """Whether no step has been taken, and no variable moves."""
+    """Return whether no step has been taken, and no variable moves."""
     is_first = memory.run.loop.clock.length == 0.0
     return (
         is_first
@@ -136,13 +136,14 @@ def starts_at_rest(memory):
 
 @inlined
 def turns_back_in(h, memory):
-    """Whether a motion whose orders are by power is at rest, or may turn back in much less than h seconds."""
+    """Return whether a motion whose orders are by power is at rest, or may turn back in much less than h
+    seconds."""
     return not memory.step.deceleration * h <= SLOWEST
 
 
 @kernel
 def expand_with_multipliers(memory):
-    """All orders of the variables and multipliers from the first two."""
+    """Compute all orders of the variables and multipliers from the first two."""
     springs, torsions, code = memory.polynomials.springs, memory.polynomials.torsions, memory.code
     memory.step.deceleration = 0.0
     if code.expand_by_power != 0:

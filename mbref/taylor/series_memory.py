@@ -40,7 +40,7 @@ def acquire_memory(run: Run, geometry: Geometry, polynomials: Polynomials, order
 def _allocate(
     run: Run, geometry: Geometry, polynomials: Polynomials, sizes: Mapping[str, int]
 ) -> TaylorMemory:
-    """Memory of the series, ready but for numbers."""
+    """Return memory of the series, ready except for numbers."""
     orders, nz, nr = sizes["orders"], sizes["nz"], sizes["nr"]
     series = allocate(Series, sizes)
     grown = np.arange(1.0, orders + 1) * np.arange(2.0, orders + 2)
@@ -61,12 +61,12 @@ def _allocate(
 
 
 def shapes_of_equations(geometry: Geometry, polynomials: Polynomials) -> Hashable:
-    """The shapes of the equations of a scene: all of them have room in memory that is made for one."""
+    """Return the shapes of the equations of a scene: all of them have room in memory that is made for one."""
     return shapes_of((polynomials, geometry.pose_maps, geometry.tableau))
 
 
 def put_equations(memory: TaylorMemory, geometry: Geometry, polynomials: Polynomials) -> None:
-    """Have memory of series hold the equations of a scene."""
+    """Put the equations of a scene into memory."""
     fill(memory.polynomials, polynomials)
     fill(memory.pose_maps, geometry.pose_maps)
     memory.solver.linear[:], memory.solver.place[:] = geometry.tableau

@@ -45,7 +45,7 @@ class _VectorModel(models.PrimitiveModel):
 
 
 def _repeated(builder, number):
-    """A vector of one number."""
+    """Return a vector of one number."""
     none, first = ir.Constant(ir.VectorType(number.type, WIDTH), ir.Undefined), ir.IntType(32)(0)
     of_first = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
     return builder.shuffle_vector(builder.insert_element(none, number, first), none, of_first)

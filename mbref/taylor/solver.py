@@ -20,7 +20,7 @@ WITHOUT_INERTIA = 1e-13  # of the largest inertia of a variable
 
 @inlined
 def exchange(memory):
-    """Gauss–Jordan elimination of the independent rows by their dependent variables.
+    """Eliminate the dependent variables of the independent rows (Gauss–Jordan).
 
     Behind it a row of the tableau has N in the lanes of multipliers and -T in those of independent variables.
     """
@@ -63,7 +63,7 @@ def subtract_multiple(matrix, i, factor, k):
 
 @inlined
 def split(memory):
-    """N in rows of all variables and T in rows of the independent ones, from the tableau."""
+    """Put N in rows of all variables, and T in rows of the independent ones, from the tableau."""
     solver, rank, variable = memory.solver, memory.partition.rank, memory.series.variable
     tableau, rows, columns = solver.tableau, solver.pivot_rows, solver.pivot_columns
     lanes = tableau.shape[1]
@@ -83,7 +83,7 @@ def split(memory):
 
 @inlined
 def reduce_inertia(memory):
-    """Tᵀ M T in ``reduced``, and Tᵀ and -Tᵀ M N in the independent variables' rows of the response."""
+    """Compute Tᵀ M T, and put Tᵀ - Tᵀ M N into the rows of the independent variables in the response."""
     solver, mass, rank = memory.solver, memory.polynomials.inertia.mass, memory.partition.rank
     null_space, momentum, columns = solver.null_space, solver.momentum, solver.pivot_columns
     nz = columns.shape[0]
@@ -99,7 +99,7 @@ def reduce_inertia(memory):
 
 @inlined
 def put_combination(f, factors, matrix, rows, out):
-    """The combination of the rows of a matrix by the factors in row f, into row f of ``out``."""
+    """Compute the combination of the rows of a matrix by the factors in row f, into row f of ``out``."""
     lanes = matrix.shape[1]
     for j in range(0, lanes, WIDTH):
         total = factors[f, 0] * load(matrix, j)
@@ -110,7 +110,7 @@ def put_combination(f, factors, matrix, rows, out):
 
 @inlined
 def put_free_motion(f, variable, nz, solver):
-    """Row f of Tᵀ - Tᵀ M N into the response of its independent variable."""
+    """Put row f of Tᵀ - Tᵀ M N into the response of its independent variable."""
     null_space, particular, momentum, response = (
         solver.null_space, solver.particular, solver.momentum, solver.response,
     )  # fmt: skip
@@ -124,7 +124,8 @@ def put_free_motion(f, variable, nz, solver):
 
 @inlined
 def solve_reduced(memory):
-    """The response of the independent variables, by Gauss–Jordan elimination of the reduced mass matrix."""
+    """Compute the response of the independent variables, by Gauss–Jordan elimination of the reduced mass
+    matrix."""
     solver, rank = memory.solver, memory.partition.rank
     reduced, response, columns, last = solver.reduced, solver.response, solver.pivot_columns, solver.last
     for f in range(columns.shape[0] - rank):
@@ -155,7 +156,8 @@ def subtract_numbers(matrix, g, factor, f):
 
 @inlined
 def put_dependent(memory):
-    """The response of the dependent variables: N, and T of the independent ones'."""
+    """Compute the response of the dependent variables:  N, plus T times the response of the independent
+    ones."""
     solver, rank = memory.solver, memory.partition.rank
     response, particular, null_space, columns = (
         solver.response, solver.particular, solver.null_space, solver.pivot_columns,
@@ -172,7 +174,8 @@ def put_dependent(memory):
 
 @inlined
 def put_multipliers(memory):
-    """The response of the multipliers: Nᵀ of the forces that the dependent variables' motion leaves."""
+    """Compute the response of the multipliers:  Nᵀ of the forces that the motion of dependent variables
+    leaves."""
     solver, rank, response = memory.solver, memory.partition.rank, memory.solver.response
     particular, forces, columns = solver.particular, solver.forces, solver.pivot_columns
     nz, lanes = columns.shape[0], response.shape[1]
@@ -188,7 +191,7 @@ def put_multipliers(memory):
 
 @inlined
 def put_force(i, memory):
-    """The force left at a variable: the one on the right-hand side minus that of its inertia."""
+    """Compute the force left at a variable: the applied one minus its inertia."""
     solver, inertia, lanes = memory.solver, memory.polynomials.inertia, memory.solver.response.shape[1]
     response, forces, mass, coupled = solver.response, solver.forces, inertia.mass, inertia.coupled
     first, end = inertia.first[i], inertia.first[i + 1]
@@ -202,7 +205,7 @@ def put_force(i, memory):
 
 @inlined
 def is_sharp(solver):
-    """Whether all pivots are nearly as large as when they were chosen."""
+    """Return whether all pivots are nearly as large as when they were chosen."""
     for k in range(solver.first.shape[0]):  # noqa: SIM110 - no generators in kernels
         if not abs(solver.last[k]) > KEPT * solver.first[k]:
             return False
@@ -211,7 +214,7 @@ def is_sharp(solver):
 
 @inlined
 def respond(memory):
-    """The pivots and the response at the first coefficients, by code of the scene's own where it serves."""
+    """Compute pivots and response at the first coefficients, by generated code where there is some."""
     solver, code = memory.solver, memory.code
     if code.factorise != 0 and code.rank == memory.partition.rank:
         factorise_by_code(
@@ -226,7 +229,7 @@ def respond(memory):
 
 @inlined
 def put_inverse(solver):
-    """The response of the variables to rows that determine all of them, so that no force moves any."""
+    """Compute the response of variables that rows determine, so that no force moves any."""
     response, particular, nz = solver.response, solver.particular, solver.pivot_columns.shape[0]
     zero, lanes = 0.0 * load(response, 0), response.shape[1]
     for j in range(0, (nz + solver.pivot_rows.shape[0]) * lanes, WIDTH):
@@ -238,7 +241,7 @@ def put_inverse(solver):
 
 @kernel
 def respond_in_loops(memory):
-    """The pivots and the response by elimination of the rows, then of the reduced mass matrix."""
+    """Compute the pivots and the response by elimination of the rows, then of the reduced mass matrix."""
     exchange(memory)
     split(memory)
     if memory.partition.rank == memory.solver.pivot_columns.shape[0]:
@@ -252,7 +255,8 @@ def respond_in_loops(memory):
 
 @kernel
 def factorise(memory):
-    """The response at the first coefficients; SINGULAR where rows or inertia have another rank."""
+    """Compute the response at the first coefficients; return OK, or SINGULAR where rows or inertia change
+    rank."""
     memory.run.equations.system.counts.factorisations += 1
     respond(memory)
     if not is_sharp(memory.solver):
@@ -265,7 +269,7 @@ def factorise(memory):
 
 @kernel
 def factorise_anew(memory):
-    """The response by a partition that has just been chosen, whose pivots are the first."""
+    """Compute the response by a partition that has just been chosen, whose pivots are the reference."""
     solver = memory.solver
     respond(memory)
     for k in range(solver.first.shape[0]):
@@ -274,7 +278,7 @@ def factorise_anew(memory):
 
 @inlined
 def inertia_left(memory):
-    """SINGULAR where a motion that the rows allow has no inertia."""
+    """Return OK, or SINGULAR where a motion that the rows allow has no inertia."""
     solver, mass, largest = memory.solver, memory.polynomials.inertia.mass, 0.0
     for i in range(mass.shape[0]):
         largest = max(largest, mass[i, i])
@@ -286,7 +290,7 @@ def inertia_left(memory):
 
 @kernel
 def add_functions(functions, memory):
-    """The response to functions prescribed: what rows that depend on them take, and themselves."""
+    """Compute the response to prescribed functions: the part in rows that depend on them, and themselves."""
     solver, rows, terms = memory.solver, memory.polynomials.rows, memory.series.terms
     response, n = solver.response, solver.pivot_columns.shape[0] + solver.pivot_rows.shape[0]
     for g in range(n, n + functions):
@@ -303,7 +307,7 @@ def add_functions(functions, memory):
 
 @inlined
 def subtract_row(row, lane, value, solver):
-    """Of a row's dependence on a function: what it takes away from the right-hand side."""
+    """Subtract what the dependence of a row on a function takes from the right-hand side."""
     response, lanes, nz = solver.response, solver.response.shape[1], solver.pivot_columns.shape[0]
     if lane >= nz + solver.pivot_rows.shape[0]:
         for j in range(0, lanes, WIDTH):
@@ -313,7 +317,7 @@ def subtract_row(row, lane, value, solver):
 
 @inlined
 def solution(solver, j):
-    """The block from lane j on of the solution of the right-hand side."""
+    """Return the vector from lane j on of the solution of the right-hand side."""
     response, rhs, lanes = solver.response, solver.rhs, solver.response.shape[1]
     a, b = rhs[0] * load(response, j), rhs[1] * load(response, lanes + j)
     c, d = rhs[2] * load(response, 2 * lanes + j), rhs[3] * load(response, 3 * lanes + j)

@@ -65,7 +65,7 @@ def order_of(tolerance: float, wanted: float, code: str) -> int:
 class SeriesStepper:
     """The steps of one run in Taylor series, across singular positions.
 
-    ``strides`` says whether drivers alone are followed (``mbref.taylor.driven``).
+    ``follows_drivers`` says whether steps are predictor steps (``mbref.taylor.driven``).
     """
 
     def __init__(self, run: Run):
@@ -74,7 +74,7 @@ class SeriesStepper:
         prepare_series()
         columns = run.memory.active.velocities.size
         self.is_driven = run.ranks.rank == columns and not run.model.has_angles
-        self.strides, tolerance, order = self._kind_of_steps()
+        self.follows_drivers, tolerance, order = self._kind_of_steps()
         self.geometry, self.polynomials = self.equations_of(run.model, run.start)
         exact_order = max(order, EXACT_ORDER) if run.model.closed_loops else order
         self._pooled = acquire_memory(run, self.geometry, self.polynomials, exact_order)
@@ -83,12 +83,12 @@ class SeriesStepper:
         self._options = Options(
             regular_tolerance=tolerance,
             regular_order=order,
-            accurate_tolerance=ACCURATE_TOLERANCE if self.strides else SHARE * (EXACT + EXACT),
+            accurate_tolerance=ACCURATE_TOLERANCE if self.follows_drivers else SHARE * (EXACT + EXACT),
             accurate_order=exact_order,
             velocity_change=max(run.memory.control.rtol, MIN_CHANGE),
             start_distance=START_ERROR * max(1.0, run.model.length),
             start_freedoms=columns - run.ranks.rank,
-            follows_drivers=self.strides,
+            follows_drivers=self.follows_drivers,
         )
         self._put_options()
         self._departure = Departure(run, self.taylor, self.expand, self._state_at)
@@ -98,7 +98,7 @@ class SeriesStepper:
 
     # --- memory -------------------------------------------------------------------------------------------
     def _kind_of_steps(self) -> tuple[bool, float, int]:
-        """Return whether steps are strides, and the tolerance and the order of their series."""
+        """Return whether steps are predictor steps, and the tolerance and the order of their series."""
         run, code = self.run, self.run.limits.code
         wanted = run.method.options_of(run.method.integrator)["order"]
         if self.is_driven and not run.limits.branches and (wanted == 0 or wanted >= LEAST_DRIVEN_ORDER):
@@ -107,7 +107,7 @@ class SeriesStepper:
         return False, tolerance, order_of(tolerance, wanted, GENERATED if code == GENERATED else GENERIC)
 
     def _decide_rank(self) -> None:
-        """Have the elimination count as many rows as independent as singular values do at the start."""
+        """Set the rank tolerance so that elimination and singular values at the start count equal ranks."""
         settings, (_, least, rounding) = self.run.memory.equations.system.settings, self.run.ranks
         if settings.nearly_dependent:
             settings.rank_tolerance = (least * max(rounding, ROUNDING)) ** 0.5
@@ -117,7 +117,7 @@ class SeriesStepper:
         alone, from its start."""
         moving = np.zeros(model.n, dtype=bool)
         moving[self.run.memory.active.velocities] = True
-        geometry = geometry_of(model, start, moving, self.strides)
+        geometry = geometry_of(model, start, moving, self.follows_drivers)
         return geometry, geometry.polynomials(model)
 
     def release(self) -> None:
@@ -125,7 +125,7 @@ class SeriesStepper:
         release(self._pooled)
 
     def _put_options(self) -> None:
-        """Have memory hold the numbers of the method."""
+        """Put the numbers of the method into memory."""
         for name, value in self._options._asdict().items():
             self.taylor.options[name] = value
         self.taylor.progress.end = self.run.times[-1]
@@ -135,26 +135,26 @@ class SeriesStepper:
     # --- another scene of equal structure, whose numbers memory holds --------------------------------------
     @property
     def was_short(self) -> bool:
-        """Whether the run was completed by one call of kernels."""
+        """Return whether the run was completed by one call of kernels."""
         return self._calls == 1
 
     @property
     def memory(self) -> TaylorMemory:
-        """All memory that a run changes."""
+        """Return all memory that a run changes."""
         return self.taylor
 
     def enter(self) -> None:
         """Start from the state in memory: the first step does."""
 
     def begin_again(self) -> None:
-        """Have memory of its own be as when the run began."""
+        """Reset the memory of the stepper to the start of the run."""
         self._pooled.restore()
         put_equations(self.taylor, self.geometry, self.polynomials)
         self._put_options()
         self._decide_rank()
 
     def parameters(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
-        """Where its memory has numbers in which scenes differ, and those of scenes of ``lengths`` (s,)."""
+        """Return where memory has numbers that differ between scenes, and their values for ``lengths`` (s,)."""
         return [(self.taylor.options, START_ERROR * np.maximum(1.0, lengths), "start_distance")]
 
     def takes(self, model: Callable[[], Model], start: Start) -> bool:
@@ -182,7 +182,7 @@ class SeriesStepper:
                 self._put_code()
 
     def _steps_ahead(self) -> float:
-        """Steps to the end at the pace so far, or to the limit of steps."""
+        """Return the steps to the end at the pace so far, or to the limit of steps."""
         run = self.run
         taken, reached = run.memory.equations.system.counts.steps, run.memory.loop.clock.time
         return min(taken * (run.times[-1] / reached - 1.0), run.limits.most_steps - taken)
@@ -220,7 +220,7 @@ class SeriesStepper:
         """Take as many steps as are taken at a time: PAUSED after them, DONE at the end, or the reason why
         there are none."""
         self._calls += 1
-        return int((follow_drivers if self.strides else advance_series)(self.argument))
+        return int((follow_drivers if self.follows_drivers else advance_series)(self.argument))
 
     def expand(self) -> int:
         """Expand at the present time and state, for steps until the end: OK or the reason why not."""
@@ -228,19 +228,20 @@ class SeriesStepper:
         return int(enter(self.argument))
 
     def _begin_again(self, status: int) -> int:
-        """The status of a crossing whose samples are completed, and behind which a series has begun."""
+        """Complete the samples of a crossing and begin a series behind it; return the status."""
         status = self._complete_samples(status, go_on=False)
         return UNDECIDED if status == PAUSED and self.expand() != OK else status
 
     def _complete_samples(self, status: int, go_on: bool) -> int:
-        """The status of steps whose samples are completed, or the reason why one cannot be."""
+        """Complete the samples of steps; return the status of the steps, or of the completion if that
+        failed."""
         began = time.process_time()
         completed = int(complete_samples(int(go_on), self.argument))
         self._sampling += time.process_time() - began
         return status if completed == OK or status == UNDECIDED else completed
 
     def recorded(self) -> list[Passed]:
-        """The singular positions crossed since they were last asked for, along smooth branches."""
+        """Return the singular positions crossed since they were last asked for, along smooth branches."""
         progress = self.taylor.progress
         count, progress.recorded = int(progress.recorded), 0
         if not count:
@@ -250,11 +251,11 @@ class SeriesStepper:
 
     # --- singular positions -------------------------------------------------------------------------------
     def _asked(self, number: int) -> int:
-        """The branch to take at a singular position, both counted from 1."""
+        """Return the branch to take at a singular position, both counted from 1."""
         return dict(self.run.limits.branches).get(number, SMOOTH)
 
     def _leaves_branch(self) -> bool:
-        """Whether the last singular position is to be left along another branch, not yet taken."""
+        """Return whether the last singular position is to be left along another branch, not yet taken."""
         crossings = self.run.crossings
         return bool(crossings) and crossings[-1].taken != self._asked(len(crossings))
 
@@ -281,8 +282,8 @@ class SeriesStepper:
         return self._begin_again(self._until_clear(self._departure.from_start(way), []))
 
     def _until_clear(self, status: int, crossed: list[Passed]) -> int:
-        """The status of exact steps that go on until they are clear of singular positions, those ``crossed``
-        being the first, and whose motion is determined."""
+        """Take high-accuracy steps until they are clear of singular positions; return the status.  Those
+        ``crossed`` being the first, and whose motion is determined."""
         counts: Any = self.run.memory.equations.system.counts
         while status in (PAUSED, DONE):
             branch = self._record(crossed)
@@ -309,7 +310,7 @@ class SeriesStepper:
         return None
 
     def _state_at(self, ahead: float) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates and velocities at a distance (s) from where the series begins, left in memory."""
+        """Return coordinates and velocities at a distance (s) from the start of the series."""
         put_state_along(ahead, self.argument)
         state = self.run.memory.state
         return state.coordinates.copy(), state.velocities.copy()

@@ -64,7 +64,7 @@ class Departure:
         return status
 
     def _misses(self, q: np.ndarray, v: np.ndarray, ahead: float) -> bool:
-        """Whether the series, a time ahead (s) of its beginning, misses coordinates and velocities."""
+        """Return whether the series, a time ahead (s) of its beginning, misses coordinates and velocities."""
         there = self._state_at(-ahead)
         moved, changed = displacement(q, there[0]), there[1] - v
         self._state_at(0.0)
@@ -72,7 +72,8 @@ class Departure:
         return bool(is_far or np.abs(changed).max() > START_ERROR * np.abs(v).max())
 
     def _put_samples_before(self, ahead: float, way: Leaving) -> None:
-        """The samples from a singular position at t = 0 until a time (s) about which the series begins."""
+        """Put the samples from a singular position at t = 0 until the time (s) about which the series
+        begins."""
         run, clock = self._run, self._run.memory.loop.clock
         for k in range(int(np.searchsorted(run.times, ahead))):
             t = float(run.times[k])
@@ -86,7 +87,8 @@ class Departure:
         self._state_at(0.0)
 
     def _put_sample(self, k: int, q: np.ndarray, v: np.ndarray, acceleration: np.ndarray) -> None:
-        """Sample k; multipliers balance the forces as well as they can, at rest along the branch alone."""
+        """Put sample k; multipliers balance the forces in the least-squares sense, at rest along the branch
+        alone."""
         run = self._run
         samples, terms = run.memory.loop.samples, run.model.terms(float(run.times[k]), q, v)
         samples.coordinates[k], samples.velocities[k], samples.accelerations[k] = q, v, acceleration
@@ -116,7 +118,7 @@ class Departure:
         return PAUSED
 
     def _keep_beginning(self) -> None:
-        """Have a second run of the crossing begin at the present state."""
+        """Save the present state as the start of a perturbed run of the crossing."""
         memory, began = self._run.memory, self._taylor.crossing_start
         began.instant.time, began.instant.sample = memory.loop.clock.time, memory.loop.clock.sample
         began.instant.crossings = memory.equations.system.counts.crossings
@@ -126,7 +128,8 @@ class Departure:
     def _corrected(
         self, start: Passed | SingularPosition, velocities: np.ndarray, ahead: float, moved: State
     ) -> int:
-        """Have the series come from a singular position with velocities (n,): OK or the reason why not."""
+        """Correct the state until its series comes from a singular position with velocities (n,); return
+        the status."""
         (q, v), state = moved, self._run.memory.state
         for _ in range(DEPARTURE_CORRECTIONS):
             state.coordinates[:], state.velocities[:] = q, v
@@ -138,10 +141,12 @@ class Departure:
         return OK
 
     def _least_pivot_at(self, q: np.ndarray, crossing: np.ndarray) -> float:
-        """The least pivot that counts at coordinates near a singular position, before they are corrected.
+        """Return the least pivot that counts at coordinates near a singular position, before their
+        correction.
 
-        Rows of spherical loops depend on others where the constraints hold: a state that violates them by the
-        square of its distance has pivots of that size, and those that the distance leaves are as large as it.
+        Rows of spherical loops depend on others where the constraints hold: a state that violates them by
+        the square of its distance has pivots of that size, and those that the distance leaves are as large
+        as it.
         """
         moved = displacement(q, crossing).reshape(-1, 6)
         places = np.abs(moved[:, :3] / self._run.model.data.lengths[:, None]).max()
@@ -149,7 +154,7 @@ class Departure:
         return max(self._run.memory.equations.system.settings.rank_tolerance, DEPARTURE_PIVOT * distance)
 
     def _time_in_which(self, velocities: np.ndarray) -> float:
-        """Time (s) in which the fastest body moves by DEPARTURE."""
+        """Return time (s) in which the fastest body moves by DEPARTURE."""
         rates = velocities.reshape(-1, 6)
         places = np.abs(rates[:, :3] / self._run.model.data.lengths[:, None]).max()
         return DEPARTURE / float(max(places, np.abs(rates[:, 3:]).max()))

@@ -1,7 +1,7 @@
 """Detection of singular positions: the one decision whether a step of free or driven motion contains one.
 
 Pivots of equal rows and variables with equal signs at both ends have vanished twice or never, and twice
-takes a way that is long beside them.  Otherwise the determinant of the gradients decides
+takes a distance that is long compared with them.  Otherwise the determinant of the gradients decides
 (``determinants``).  Branches of several loops that cross at once keep its sign, and so do two crossings:
 therefore it is also evaluated where it is smallest if pivots change their signs, and where a least pivot
 that falls and rises linearly vanishes.

@@ -188,7 +188,7 @@ TABLE = (
     Threshold(
         "VIOLATION_NEAR",
         "units of the scene, times the relative distance",
-        "a gap that is wider shows in the violation of a step beside it",
+        "a gap that is wider shows in the violation of a step near it",
     ),
     Threshold(
         "VIOLATION_ACROSS",

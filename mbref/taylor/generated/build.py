@@ -50,8 +50,8 @@ def code_of(taylor: TaylorMemory, names: Sequence[str]) -> Code:
 
 
 def functions_of(taylor: TaylorMemory) -> tuple[str, ...]:
-    """The names of a scene's functions: loads of springs are no sums of products of series, and elimination
-    of many rows is left to the kernels' loops."""
+    """Return the names of a scene's functions: loads of springs are no sums of products of series, and
+    elimination of many rows is left to the kernels' loops."""
     springs = taylor.polynomials.springs.damping.size + taylor.polynomials.torsions.damping.size
     rank, nr, nz = rank_of(taylor), taylor.solver.pivot_rows.size, taylor.solver.pivot_columns.size
     is_short = (rank * rank + nr * nz) * taylor.series.terms.shape[1] // WIDTH <= MOST_VECTORS
@@ -61,12 +61,12 @@ def functions_of(taylor: TaylorMemory) -> tuple[str, ...]:
 
 
 def rank_of(taylor: TaylorMemory) -> int:
-    """The rank of the rows where all of the start's freedoms are left."""
+    """Return the rank of the rows where all of the start's freedoms are left."""
     return taylor.solver.pivot_columns.size - int(taylor.options.start_freedoms)
 
 
 def _key(taylor: TaylorMemory, names: Sequence[str]) -> str:
-    """A digest of all that the code depends on."""
+    """Return a digest of all that the code depends on."""
     polynomials, solver = taylor.polynomials, taylor.solver
     digest = hashlib.sha256(f"{names} {rank_of(taylor)} {processor()}".encode())
     arrays = (
@@ -82,7 +82,7 @@ def _key(taylor: TaylorMemory, names: Sequence[str]) -> str:
 
 
 def write_code(taylor: TaylorMemory, names: Sequence[str]) -> str:
-    """LLVM IR of the functions whose addresses ``SceneCode`` has."""
+    """Return LLVM IR of the functions whose addresses ``SceneCode`` has."""
     module = ir.Module()
     if EXPAND in names:
         write = Instructions(module, EXPAND, multiplier_orders.POINTERS, counts=orders.COUNTS)

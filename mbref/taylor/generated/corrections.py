@@ -70,7 +70,7 @@ class Correction:
             write.store([total], change, b * WIDTH)
 
     def _products(self, vector: int) -> Iterator[tuple[np.ndarray, list[int], list[int]]]:
-        """Weights and lanes of both factors of the products in a vector of rows."""
+        """Yield weights and lanes of both factors of the products in a vector of rows."""
         products = self._taylor.polynomials.products
         for c in range(products.start[vector], products.start[vector + 1], WIDTH):
             weights = self._masked(vector, products.weight[c : c + WIDTH])
@@ -82,7 +82,7 @@ class Correction:
                 yield weights, left, right
 
     def _linear(self, vector: int, row: Vectors) -> list[ir.Value]:
-        """The linear terms in a vector of rows, one of each row at a time."""
+        """Return the linear terms in a vector of rows, one of each row at a time."""
         rows = self._taylor.polynomials.rows
         places = (np.flatnonzero(rows.linear_row + self._nz == lane) for lane in self._lanes_of(vector))
         terms = [[(rows.linear_weight[e], int(rows.linear_lane[e])) for e in of_row] for of_row in places]
@@ -91,7 +91,7 @@ class Correction:
         ]
 
     def _masked(self, vector: int, numbers: np.ndarray) -> np.ndarray:
-        """Numbers of a vector, those of other lanes than rows' zero."""
+        """Return numbers of a vector, with zero in lanes that are no rows."""
         return np.where([lane in self._rows for lane in self._lanes_of(vector)], numbers, 0.0)
 
     def _lanes_of(self, vector: int) -> range:

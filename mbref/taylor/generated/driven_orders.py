@@ -28,7 +28,7 @@ class DrivenOrders(MultiplierOrders):
         super().__init__(taylor, write, products_of_lanes([terms for _, terms in lanes] + unused))
 
     def _solve(self, k: ir.Value, known: Sums, newest: Newest, force: np.ndarray | None = None) -> Vectors:
-        """Order k + 2 of the variables, stored, and of the functions prescribed."""
+        """Write order k + 2 of the variables and of the prescribed functions."""
         write, ahead = self._write, self._write.plus(self._write.multiplied(k, self._lanes), 2 * self._lanes)
         numbers = [write.everywhere(write.number(self._terms, ahead, g)) for g in self._functions]
         response = list(self._functions)
@@ -48,8 +48,8 @@ class DrivenOrders(MultiplierOrders):
 
 
 def _lanes_of(terms: list[list[Term]]) -> list[tuple[int, list[Term]]]:
-    """The row of each lane and its products, the most first: lanes of a vector that rows leave go to those
-    with the most."""
+    """Return the row of each lane and its products, the most first: lanes of a vector that rows leave go to
+    those with the most."""
     count = [1] * len(terms)
     for _ in range(WIDTH - len(terms) if terms else 0):
         count[max(range(len(terms)), key=lambda row: len(terms[row]) / count[row])] += 1

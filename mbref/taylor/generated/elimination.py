@@ -48,7 +48,7 @@ class Elimination:
 
     # --- N and T ------------------------------------------------------------------------------------------
     def _gradient(self, r: int) -> Vectors:
-        """Row r of [G 1]."""
+        """Return row r of [G 1]."""
         linear, variables = self._taylor.solver.linear[r], self._write.row(self._terms, 0, self._lanes)
         vectors = []
         for vector in range(self._lanes // WIDTH):
@@ -59,7 +59,7 @@ class Elimination:
         return vectors
 
     def _levels(self, r: int, vector: int) -> Iterator[tuple[np.ndarray, list[int]]]:
-        """Weights and lanes of the products in a vector of row r, of each variable one at a time."""
+        """Return weights and lanes of the products in a vector of row r, of each variable one at a time."""
         rows, variables = (
             self._taylor.polynomials.rows,
             range(vector * WIDTH, min((vector + 1) * WIDTH, self._nz)),
@@ -87,7 +87,7 @@ class Elimination:
             write.store(left, self._tableau, self._rows[p])
 
     def _split(self) -> None:
-        """N and T in memory, by their variables; the numbers of T one by one."""
+        """Write N and T to memory, by their variables; T number by number."""
         write, free = self._write, self._columns[self._rank :]
         for k, column in enumerate(self._columns[: self._rank]):
             place = write.multiplied(column, self._lanes)
@@ -124,13 +124,14 @@ class Elimination:
         self._put_rows(forces)
 
     def _put_inverse(self) -> None:
-        """Rows that determine all variables: no force moves any, and multipliers are not asked for."""
+        """Write the response of rows that determine all variables: no force moves any, and no multiplier is
+        needed."""
         for i in range(self._nz):
             self._store({}, i)
         self._put_rows([self._one(i) for i in range(self._nz)])
 
     def _put_rows(self, forces: list[Row]) -> None:
-        """The response to rows: Nᵀ of the forces that are left at the variables."""
+        """Write the response to rows: Nᵀ of the forces that are left at the variables."""
         for e in range(self._nz, self._nz + self._nr):
             parts = [
                 self._times(
@@ -141,19 +142,19 @@ class Elimination:
             self._store(self._sum(*parts), e)
 
     def _free_motions(self, particular: list[Row]) -> list[Row]:
-        """The response of the independent variables, by the reduced mass matrix."""
+        """Return the response of the independent variables, by the reduced mass matrix."""
         motions, momenta = self._motions_and_momenta()
         rest = [self._without_rows(p, motion, particular) for p, motion in zip(momenta, motions, strict=True)]
         return self._reduced(motions, momenta, rest)
 
     def _motions_and_momenta(self) -> tuple[list[Row], list[Row]]:
-        """T and M T, a row for each independent variable."""
+        """Return T and M T, a row for each independent variable."""
         free = range(self._nz - self._rank)
         motions = [self._row(self._null_space, f, self._of_variables) for f in free]
         return motions, [self._momentum(f, motion) for f, motion in enumerate(motions)]
 
     def _reduced(self, motions: list[Row], momenta: list[Row], solved: list[Row]) -> list[Row]:
-        """Right-hand sides solved for by the reduced mass matrix, whose pivots are kept."""
+        """Solve right-hand sides by the reduced mass matrix, whose pivots are kept."""
         free = range(len(motions))
         reduced = [[self._inner(momenta[f], motions[g]) for g in free] for f in free]
         solved = list(solved)
@@ -173,7 +174,7 @@ class Elimination:
         return solved
 
     def _momentum(self, f: int, motion: Row) -> Row:
-        """M times a motion, whose variables are in memory, too."""
+        """Return M times a motion, whose variables are in memory too."""
         mass = self._taylor.polynomials.inertia.mass
         row = {}
         for vector in self._of_variables:
@@ -197,7 +198,8 @@ class Elimination:
         return self._write.added_up(self._write.total(parts))
 
     def _without_rows(self, momentum: Row, motion: Row, particular: list[Row]) -> Row:
-        """A motion in the lanes of variables, and minus its momentum times N in those of multipliers."""
+        """Return a motion in the lanes of variables, and minus its momentum times N in those of
+        multipliers."""
         vectors = [momentum[vector] for vector in self._of_variables]
         parts = [
             self._times(self._write.minus(self._write.repeated(vectors, i)), row)
@@ -206,13 +208,13 @@ class Elimination:
         return self._sum(motion, *parts)
 
     def _force(self, i: int, rows: list[Row]) -> Row:
-        """The force that is left at a variable by the inertia of all others."""
+        """Return the force that is left at a variable by the inertia of all others."""
         mass = self._taylor.polynomials.inertia.mass[i]
         parts = [self._times(constant([-mass[j]] * WIDTH), rows[j]) for j in np.flatnonzero(mass[: self._nz])]
         return self._sum(self._one(i), *parts)
 
     def _one(self, i: int) -> Row:
-        """One in a variable's lane."""
+        """Return a one in the lane of a variable."""
         return {i // WIDTH: constant([float(lane == i % WIDTH) for lane in range(WIDTH)])}
 
     # --- rows ---------------------------------------------------------------------------------------------
@@ -240,7 +242,7 @@ class EliminationOfRows(Elimination):
     """The response of the variables to rows alone."""
 
     def _put_response(self) -> None:
-        """By the forces that no motion takes."""
+        """Write the response by the forces that no motion takes."""
         motions, momenta = self._motions_and_momenta()
         solved, forces = self._reduced(motions, momenta, motions), []
         for i in range(self._nz):

@@ -59,7 +59,7 @@ class Instructions:
         return kept
 
     def row(self, pointer: ir.Value, start: int | ir.Value, lanes: int) -> Vectors:
-        """The vectors of as many lanes from a place of an array on."""
+        """Return the vectors of some lanes of an array, from a place on."""
         places = (self._vector(pointer, start, lane) for lane in range(0, lanes, WIDTH))
         return [self._builder.load(place, align=8) for place in places]
 
@@ -69,11 +69,11 @@ class Instructions:
             self._builder.store(vector, self._vector(pointer, start, k * WIDTH), align=8)
 
     def vector(self, pointer: ir.Value, *places: int | ir.Value) -> ir.Value:
-        """The vector at the sum of some places of an array."""
+        """Return the vector at the sum of some places of an array."""
         return self._builder.load(self._vector(pointer, *places), align=8)
 
     def number(self, pointer: ir.Value, *places: int | ir.Value) -> ir.Value:
-        """The number at the sum of some places of an array."""
+        """Return the number at the sum of some places of an array."""
         return self._builder.load(self._place(pointer, *places))
 
     def put(self, number: ir.Value, pointer: ir.Value, *places: int | ir.Value) -> None:
@@ -81,49 +81,49 @@ class Instructions:
         self._builder.store(number, self._place(pointer, *places))
 
     def multiplied(self, whole: ir.Value, factor: int) -> ir.Value:
-        """A whole number times a factor."""
+        """Return an integer times a factor."""
         return self._builder.mul(whole, WORD(factor))
 
     def plus(self, whole: ir.Value, more: int | ir.Value) -> ir.Value:
-        """A whole number and more."""
+        """Return the sum of two integers."""
         return self._builder.add(whole, _whole(more))
 
     def real(self, whole: ir.Value) -> ir.Value:
-        """A whole number as a number."""
+        """Return an integer as a floating-point number."""
         return self._builder.sitofp(whole, DOUBLE)
 
     def halved(self, whole: ir.Value) -> tuple[ir.Value, ir.Value]:
-        """A whole number's half, rounded down, and the remainder."""
+        """Return half of an integer, rounded down, and the remainder."""
         return self._builder.lshr(whole, WORD(1)), self._builder.and_(whole, WORD(1))
 
     def less(self, whole: ir.Value, by: ir.Value) -> ir.Value:
-        """A whole number less another."""
+        """Return the difference of two integers."""
         return self._builder.sub(whole, by)
 
     def inverse(self, number: ir.Value) -> ir.Value:
-        """One over a number."""
+        """Return the inverse of a number."""
         return self._builder.fdiv(DOUBLE(1.0), number)
 
     def minus(self, number: ir.Value) -> ir.Value:
-        """A number or vector with its sign changed."""
+        """Return a number or vector with its sign changed."""
         return self._builder.fneg(number)
 
     def everywhere(self, number: ir.Value) -> ir.Value:
-        """A vector of one number."""
+        """Return a vector of one number in all lanes."""
         none = ir.Constant(VECTOR, ir.Undefined)
         first = self._builder.insert_element(none, number, PLACE(0))
         return self._shuffled(first, none, [0] * WIDTH)
 
     def added_up(self, vector: ir.Value) -> ir.Value:
-        """The sum of a vector's numbers."""
+        """Return the sum of the numbers of a vector."""
         return self.first(self.summed(vector))
 
     def first(self, vector: ir.Value) -> ir.Value:
-        """The first number of a vector."""
+        """Return the first number of a vector."""
         return self._builder.extract_element(vector, PLACE(0))
 
     def summed(self, vector: ir.Value) -> ir.Value:
-        """A vector of the sum of a vector's numbers."""
+        """Return the sum of the numbers of a vector in all lanes."""
         apart = WIDTH // 2
         while apart:
             other = self._shuffled(vector, vector, [(k + apart) % WIDTH for k in range(WIDTH)])
@@ -132,19 +132,19 @@ class Instructions:
         return vector
 
     def difference(self, one: ir.Value, other: ir.Value) -> ir.Value:
-        """One minus the other; fused where the other is a product."""
+        """Return one minus the other; fused where the other is a product."""
         return self._builder.fsub(one, other, flags=FUSED)
 
     def times(self, numbers: np.ndarray, vector: ir.Value) -> ir.Value:
-        """A vector times numbers (WIDTH,)."""
+        """Return a vector times numbers (WIDTH,)."""
         return vector if (numbers == 1.0).all() else self.product(constant(numbers), vector)
 
     def product(self, one: ir.Value, other: ir.Value) -> ir.Value:
-        """The products of two vectors."""
+        """Return the products of two vectors."""
         return self._builder.fmul(one, other, flags=FUSED)
 
     def total(self, vectors: Sequence[ir.Value]) -> ir.Value:
-        """The sum of vectors, zero without any, added up in several chains."""
+        """Return the sum of vectors, zero without any, added up in several chains."""
         vectors = vectors or [constant([0.0] * WIDTH)]
         chains = [functools.reduce(self._sum, vectors[k::CHAINS]) for k in range(min(CHAINS, len(vectors)))]
         while len(chains) > 1:
@@ -155,7 +155,7 @@ class Instructions:
         return self._builder.fadd(one, other, flags=FUSED)
 
     def gather(self, row: Vectors, lanes: Sequence[int]) -> ir.Value:
-        """The vector of a row's lanes; -1 for a lane whose number is not used."""
+        """Return a vector of lanes of a row; lane -1 for a number that is not used."""
         first, *others = sorted({lane // WIDTH for lane in lanes if lane >= 0})
         second, *more = others or [first]
         places = [lane % WIDTH + (WIDTH if lane // WIDTH == second != first else 0) for lane in lanes]
@@ -169,12 +169,12 @@ class Instructions:
         return self._builder.shuffle_vector(one, other, ir.Constant(PLACES, places))
 
     def repeated(self, row: Vectors, lane: int) -> ir.Value:
-        """A vector of a lane's number."""
+        """Return the number of a lane in all lanes."""
         vector = row[lane // WIDTH]
         return self._shuffled(vector, vector, [lane % WIDTH] * WIDTH)
 
     def end(self) -> None:
-        """Return."""
+        """Write the return instruction."""
         self._builder.ret_void()
 
     def _place(self, pointer: ir.Value, *places: int | ir.Value) -> ir.Value:
@@ -191,7 +191,7 @@ def _whole(number: int | ir.Value) -> ir.Value:
 
 
 def constant(numbers: Sequence[float]) -> ir.Constant:
-    """A vector of numbers known."""
+    """Return a vector of constants."""
     return ir.Constant(VECTOR, [float(number) for number in numbers])
 
 

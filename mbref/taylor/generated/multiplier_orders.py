@@ -42,14 +42,14 @@ class MultiplierOrders(Orders):
     def _order(
         self, k: ir.Value, row: Vectors, factors: dict[int, Factors], inner: Sums, is_second: bool = False
     ) -> Vectors:
-        """Order k + 2 of the variables and order k of the multipliers."""
+        """Write order k + 2 of the variables and order k of the multipliers."""
         write, newest = self._write, Newest()
         for c, (left, right) in self._first.items():
             newest[c] = write.product(left, factors[c].right), write.product(factors[c].left, right)
         return self._solve(k, inner, newest)
 
     def _solve(self, k: ir.Value, known: Sums, newest: Newest, force: np.ndarray | None = None) -> Vectors:
-        """Order k + 2 of the terms, stored; the sums known before the newest products are added up first."""
+        """Write order k + 2 of the terms; the newest products are added last."""
         write, place, sums = self._write, self._write.multiplied(k, self._lanes), []
         for b in self._vectors:
             others = self._linear_forces(place, b)
@@ -60,7 +60,7 @@ class MultiplierOrders(Orders):
         return self._respond(place, sums)
 
     def _total(self, vector: int, known: Sums, newest: Newest, others: Sequence[ir.Value] = ()) -> ir.Value:
-        """The sum of a vector's products and of others, the newest last."""
+        """Return the sum of the products of a vector and of others, the newest last."""
         write, start = self._write, self._products.start
         slots = range(start[vector], start[vector + 1], WIDTH)
         parts = [*(known[c] for c in slots if c in known), *others]
@@ -68,7 +68,7 @@ class MultiplierOrders(Orders):
         return write.total([*parts, *(product for c in slots if c in newest for product in newest[c])])
 
     def _linear_forces(self, place: ir.Value, vector: int) -> list[ir.Value]:
-        """Minus the forces that are linear in the variables."""
+        """Return minus the forces that are linear in the variables."""
         write, inertia, parts = self._write, self._taylor.polynomials.inertia, []
         terms = [write.vector(self._terms, place, b * WIDTH) for b in self._vectors]
         for slot in range(inertia.start[vector], inertia.start[vector + 1], WIDTH):
@@ -79,7 +79,8 @@ class MultiplierOrders(Orders):
         return parts
 
     def _respond(self, place: ir.Value, sums: Vectors) -> Vectors:
-        """The row of terms two orders later, by the response to the sums and to functions prescribed."""
+        """Return the row of terms two orders later, by the response to the sums and to functions
+        prescribed."""
         write, ahead = self._write, self._write.plus(place, 2 * self._lanes)
         write.store(sums, self._sums, 0)
         numbers = [write.number(self._sums, e) for e in range(self._equations)]

@@ -58,15 +58,15 @@ class Orders(ABC):
     def _order(
         self, k: ir.Value, row: Vectors, factors: dict[int, Factors], inner: Sums, is_second: bool = False
     ) -> Vectors:
-        """Order k + 2 of the variables, from the row of terms before, its factors, and the sums of products
-        of earlier ones; the second one of a pair lacks two more."""
+        """Write order k + 2 of the variables, from the row of terms before, its factors, and the sums of
+        products of earlier ones; the second one of a pair lacks two more."""
 
     def _factors(self, k: ir.Value, row: Vectors) -> dict[int, Factors]:
-        """The factors of order k by the places of their slots, kept for later orders."""
+        """Return the factors of order k by the places of their slots, kept for later orders."""
         return self._factors_of_products(k, row)
 
     def _repeat(self, row: Vectors) -> None:
-        """All orders but the first, from the row of terms before."""
+        """Write all orders except the first, from the row of terms before."""
         write = self._write
         pairs, alone = write.halved(self._last)
         row = write.repeat(
@@ -78,7 +78,7 @@ class Orders(ABC):
         )
 
     def _pair(self, k: ir.Value, row: Vectors) -> Vectors:
-        """Orders k and k + 1, from the row of terms before."""
+        """Write orders k and k + 1, from the row of terms before."""
         factors, following = self._factors(k, row), self._write.plus(k, 1)
         products, ahead = self._inner(k, factors)
         row = self._order(k, row, factors, products)
@@ -86,7 +86,7 @@ class Orders(ABC):
 
     # --- products -----------------------------------------------------------------------------------------
     def _factors_of_products(self, k: ir.Value, row: Vectors) -> dict[int, Factors]:
-        """Those of ``products``."""
+        """Return the factors of ``products`` at order k, stored for later orders."""
         write, products, known = self._write, self._products, {}
         place, factors = write.multiplied(k, self._slots), {}
         for c in range(0, products.weight.size, WIDTH):
@@ -103,7 +103,7 @@ class Orders(ABC):
         return factors
 
     def _inner(self, k: ir.Value, factors: dict[int, Factors]) -> tuple[Sums, Sums]:
-        """Of each slot the products of factors 1 … k - 1 with k - 1 … 1, and of 1 … k with k … 1."""
+        """Return for each slot the sums of products 1 … k - 1 with k - 1 … 1, and of 1 … k with k … 1."""
         write, products, ahead, slots = self._write, {}, {}, sorted(factors)
         for first in range(0, len(slots), AT_ONCE):
             group = slots[first : first + AT_ONCE]
@@ -134,7 +134,7 @@ class Orders(ABC):
 
 
 def terms_of_rows(taylor: TaylorMemory) -> list[list[Term]]:
-    """The products of each row."""
+    """Return the products of each row."""
     products, nz, nr = (
         taylor.polynomials.products,
         taylor.solver.pivot_columns.size,

@@ -9,7 +9,7 @@ v_k = (k + 1) z_{k+1} and w_k = (k + 1) (k + 2) M z_{k+2} - Q_k,
     z_{k+2} = B z_{k+1} - R s_k + v_0 (v_0 · M z_{k+2}) / (v_0 · M v_0),
 
 where R is the response to rows, s_k sums the products in Φ of z_2 … z_k, and B = -R G' with the rate of G: so
-little is left between one order and the next.  At rest no velocity tells the motion; there and where it turns
+little is left between one order and the next.  At rest no velocity determines the motion; there and where it turns
 back the orders have multipliers.
 """
 
@@ -29,7 +29,8 @@ ZERO, HALF = constant([0.0] * WIDTH), constant([0.5] * WIDTH)
 
 
 def serves(taylor: TaylorMemory) -> bool:
-    """Whether a scene has one freedom and no drivers, and power takes no more products than multipliers."""
+    """Return whether a scene has one freedom and no drivers, and power takes no more products than
+    multipliers."""
     if taylor.options.start_freedoms != 1 or taylor.polynomials.given.driver.size:
         return False
     products, nz, nr = (
@@ -44,13 +45,13 @@ def serves(taylor: TaylorMemory) -> bool:
 
 
 def products_of_rows(taylor: TaylorMemory) -> Products:
-    """Minus the products of rows, a row in each lane."""
+    """Return minus the products of rows, a row in each lane."""
     terms, nr = terms_of_rows(taylor), taylor.solver.pivot_rows.size
     return products_of_lanes([*terms, *[[]] * (padded_size(nr) - nr)])
 
 
 def moments_of(inertia: Inertia, nz: int) -> np.ndarray:
-    """The matrix (nz, nz) of the forces that are linear in the variables."""
+    """Return the matrix (nz, nz) of the forces that are linear in the variables."""
     matrix = np.zeros((nz, nz))
     for vector in range(padded_size(nz) // WIDTH):
         for c in range(inertia.start[vector], inertia.start[vector + 1]):
@@ -99,7 +100,7 @@ class PowerOrders(Orders):
     def _order(
         self, k: ir.Value, row: Vectors, factors: dict[int, Factors], inner: Sums, is_second: bool = False
     ) -> Vectors:
-        """Order k + 2: of the power v_k · w_0 is not yet in the sums, nor v_1 · w_{k-1} of a second order."""
+        """Write order k + 2: v_k · w_0 is not yet in the power sums, nor v_1 · w_{k-1} of a second order."""
         write, one = self._write, real_vector(self._write, k, 1)
         newest = self._scaled(one, self._lost_force)
         known = [write.minus(inner[c]) for c in self._power if c in inner]
@@ -117,7 +118,7 @@ class PowerOrders(Orders):
 
     # --- power --------------------------------------------------------------------------------------------
     def _factors(self, k: ir.Value, row: Vectors) -> dict[int, Factors]:
-        """Those of rows, and v_k and w_{k-1}."""
+        """Return the factors of the products of rows and of the power, v_k and w_{k-1}, at order k."""
         write, before = self._write, self._write.less(k, WHOLE(1))
         factors, one = self._factors_of_products(k, row), real_vector(self._write, k, 1)
         force = self._scaled(write.product(one, real_vector(write, k, 0)), self._times(self._mass, row))
@@ -130,20 +131,20 @@ class PowerOrders(Orders):
         return factors
 
     def _power_of_moments(self, along: Vectors, k: ir.Value) -> Vectors:
-        """The power of the moments of order k along the velocity or its rate, times their matrix."""
+        """Return the power of the moments of order k along the velocity or its rate, times their matrix."""
         if not self._has_moments:
             return []
         return [self._write.product(one, other) for one, other in zip(along, self._row(k), strict=True)]
 
     def _inverse_of_growth(self, k: ir.Value) -> ir.Value:
-        """1 / ((k + 1) (k + 2))."""
+        """Return 1 / ((k + 1) (k + 2))."""
         write = self._write
         growth = write.product(real_vector(write, k, 1), real_vector(write, k, 2))
         return write.everywhere(write.inverse(write.first(growth)))
 
     # --- rows ---------------------------------------------------------------------------------------------
     def _turning_by(self, velocity: Vectors) -> list[Vectors]:
-        """B: the response to the rate of G, a row of vectors for each variable."""
+        """Return B, the response to the rate of G: a row of vectors for each variable."""
         write, rows = self._write, self._taylor.polynomials.rows
         numbers = [write.repeated(velocity, i) for i in range(self._nz)]
         turning = []
@@ -159,12 +160,12 @@ class PowerOrders(Orders):
         return turning
 
     def _turned(self, row: Vectors) -> Vectors:
-        """B times a row of terms."""
+        """Return B times a row of terms."""
         numbers = [self._write.repeated(row, i) for i in range(self._nz)]
         return [self._combined(numbers, [vectors[b] for vectors in self._turning]) for b in self._vectors]
 
     def _response_to(self, products: Sums) -> Vectors:
-        """The response to minus sums of products of rows."""
+        """Return the response to minus sums of products of rows."""
         write, start, sums = self._write, self._products.start, []
         for b in range(start.size - 1):
             parts = [products[c] for c in range(start[b], start[b + 1], WIDTH)]
@@ -174,11 +175,11 @@ class PowerOrders(Orders):
         return [self._combined(numbers, [self._of_row(e, b) for e in range(self._nr)]) for b in self._vectors]
 
     def _of_row(self, e: int, b: int) -> ir.Value:
-        """A vector of the response to row e."""
+        """Return a vector of the response to row e."""
         return self._write.vector(self._response, (self._nz + e) * self._lanes + b * WIDTH)
 
     def _put(self, k: ir.Value, row: Vectors, power: ir.Value, factor: ir.Value) -> Vectors:
-        """Order k + 2 with the share of the motion in a power, times a factor, stored."""
+        """Write order k + 2: a row plus the motion that a power, times a factor, adds."""
         write = self._write
         moved = (write.product(power, share) for share in self._scaled(factor, self._share))
         row = [write.total(pair) for pair in zip(row, moved, strict=True)]
@@ -187,12 +188,12 @@ class PowerOrders(Orders):
 
     # --- vectors of variables ------------------------------------------------------------------------------
     def _row(self, k: ir.Value) -> Vectors:
-        """Order k of the variables."""
+        """Return order k of the variables."""
         place = self._write.multiplied(k, self._lanes)
         return self._write.row(self._terms, place, padded_size(self._nz))
 
     def _times(self, matrix: np.ndarray, row: Vectors) -> Vectors:
-        """A matrix (nz, nz) of numbers known times a row."""
+        """Return a matrix (nz, nz) of numbers known times a row."""
         write, vectors = self._write, []
         for b in self._vectors:
             lines = matrix[b * WIDTH : (b + 1) * WIDTH]
@@ -208,14 +209,14 @@ class PowerOrders(Orders):
         return [self._write.total(pair) for pair in zip(one, other, strict=True)]
 
     def _combined(self, factors: Vectors, vectors: Vectors) -> ir.Value:
-        """The sum of the products of factors and vectors."""
+        """Return the sum of the products of factors and vectors."""
         return self._write.total(list(map(self._write.product, factors, vectors)))
 
     def _inner_product(self, one: Vectors, other: Vectors) -> ir.Value:
-        """A vector of the inner product of two rows."""
+        """Return a vector of the inner product of two rows."""
         return self._write.summed(self._combined(one, other))
 
 
 def real_vector(write: Instructions, k: ir.Value, more: int) -> ir.Value:
-    """A vector of the number k + more."""
+    """Return a vector of the number k + more."""
     return write.everywhere(write.real(write.plus(k, more)))
