@@ -1,16 +1,16 @@
 """Machine code of the orders of a series with one freedom and no drivers, without multipliers.
 
-The rows allow one motion, along the velocity v: the power of inertia and forces along it vanishes, v · w = 0
-with w = M a - Q (P. E. B. Jourdain, Quart. J. Pure Appl. Math. 40, 1909).  With the rows it gives each order,
-while multipliers take most of the products in ``multiplier_orders``.  In Taylor coefficients, with
-v_k = (k + 1) z_{k+1} and w_k = (k + 1) (k + 2) M z_{k+2} - Q_k,
+The rows allow one motion, along the velocity v: the power of inertia and forces along it vanishes, v · w =
+0 with w = M a - Q (P.  E.  B.  Jourdain, Quart.  J.  Pure Appl.  Math. 40, 1909).  With the rows it gives
+each order, while multipliers take most of the products in ``multiplier_orders``.  In Taylor coefficients,
+with v_k = (k + 1) z_{k+1} and w_k = (k + 1) (k + 2) M z_{k+2} - Q_k,
 
     (k + 1) (k + 2) v_0 · M z_{k+2} = v_0 · Q_k - Σ_{i=1…k} v_i · w_{k-i},
     z_{k+2} = B z_{k+1} - R s_k + v_0 (v_0 · M z_{k+2}) / (v_0 · M v_0),
 
-where R is the response to rows, s_k sums the products in Φ of z_2 … z_k, and B = -R G' with the rate of G: so
-little is left between one order and the next.  At rest no velocity determines the motion; there and where it turns
-back the orders have multipliers.
+where R is the response to rows, s_k sums the products in Φ of z_2 … z_k, and B = -R G' with the rate of G:
+so little is left between one order and the next.  At rest no velocity determines the motion; there and
+where it turns back the orders have multipliers.
 """
 
 from __future__ import annotations
