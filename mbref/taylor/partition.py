@@ -146,3 +146,15 @@ def least_pivot(memory):
     for k in range(memory.partition.rank):
         least = min(least, abs(solver.last[k]))
     return least
+
+
+@kernel
+def save_start_pivots(memory):
+    """Save pivots, null vector and partition of the last factorisation as those of the start of a step."""
+    solver, step, partition, progress = memory.solver, memory.step, memory.partition, memory.progress
+    copy(solver.last, solver.past)
+    for i in range(solver.pivot_columns.shape[0]):
+        solver.past_motion[i] = solver.null_space[0, i]
+    step.start_partition_id, step.start_parity = partition.partition_id, partition.parity
+    step.start_pivot = least_pivot(memory)
+    progress.largest_pivot = max(progress.largest_pivot, step.start_pivot)

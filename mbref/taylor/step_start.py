@@ -5,9 +5,8 @@ from __future__ import annotations
 from mbref.kernels.compilation import kernel
 from mbref.linear_algebra.vectors import copy
 from mbref.taylor.correction import violation
-from mbref.taylor.crossing.detection import save_start_pivots
 from mbref.taylor.loads import ANGLE, TORSION_SERIES
-from mbref.taylor.partition import choose
+from mbref.taylor.partition import choose, save_start_pivots
 from mbref.taylor.simd import WIDTH, load, store
 from mbref.taylor.solver import factorise_anew
 

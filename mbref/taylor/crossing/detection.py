@@ -10,7 +10,6 @@ that falls and rises linearly vanishes.
 from __future__ import annotations
 
 from mbref.kernels.compilation import kernel
-from mbref.linear_algebra.vectors import copy
 from mbref.taylor.coefficients import distance_moved, turns_back
 from mbref.taylor.crossing.determinants import (
     gradient_determinant,
@@ -39,7 +38,7 @@ from mbref.taylor.crossing.thresholds import (
     SECTIONS_COARSE,
 )
 from mbref.taylor.mode import PREDICTOR, is_accurate
-from mbref.taylor.partition import freedoms, is_undriven, least_pivot, replaced_pivot
+from mbref.taylor.partition import freedoms, is_undriven, least_pivot, replaced_pivot, save_start_pivots
 from mbref.taylor.samples import evaluate_series
 
 
@@ -51,18 +50,6 @@ def save_pivots(memory):
     save_start_pivots(memory)
     step.approaching = step.start_pivot <= before and not step.crossed
     progress.leaving = progress.leaving and step.start_pivot < PIVOT_AHEAD * progress.largest_pivot
-
-
-@kernel
-def save_start_pivots(memory):
-    """Save pivots, null vector and partition of the last factorisation as those of the start of a step."""
-    solver, step, partition, progress = memory.solver, memory.step, memory.partition, memory.progress
-    copy(solver.last, solver.past)
-    for i in range(solver.pivot_columns.shape[0]):
-        solver.past_motion[i] = solver.null_space[0, i]
-    step.start_partition_id, step.start_parity = partition.partition_id, partition.parity
-    step.start_pivot = least_pivot(memory)
-    progress.largest_pivot = max(progress.largest_pivot, step.start_pivot)
 
 
 @kernel
