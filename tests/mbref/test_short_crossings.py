@@ -1,4 +1,4 @@
-"""Brief passages judge motions whose speed tells them determined; all others are judged by a twin."""
+"""Short crossings judge motions whose speed bounds the sensitivity; a perturbed run judges all others."""
 
 import numpy as np
 import pytest
@@ -14,14 +14,14 @@ from mbref.taylor.stepper import SeriesStepper
 METHODS = ["taylor"]
 
 
-class LongPassage(Exception):
-    """Raised in place of a passage whose end a twin judges."""
+class LongCrossing(Exception):
+    """Raised in place of a crossing that a perturbed run judges."""
 
 
 @pytest.fixture
-def _briefly(monkeypatch):
+def _short_only(monkeypatch):
     def refuse(*_):
-        raise LongPassage
+        raise LongCrossing
 
     monkeypatch.setattr(SeriesStepper, "_cross", refuse)
 
@@ -33,12 +33,12 @@ def with_pendulum(scene: Scene) -> Scene:
     return scene.with_(body=(*scene.body, bob), joint=(*scene.joint, joint))
 
 
-@pytest.mark.usefixtures("_briefly")
+@pytest.mark.usefixtures("_short_only")
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(
     "name", ["four_bar", "four_bar_gravity", "five_bar_gravity", "planar_slider_crank_heavy"]
 )
-def test_a_fast_motion_of_one_freedom_passes_briefly(name, method):
+def test_a_fast_motion_of_one_freedom_needs_short_crossings(name, method):
     """All 61 singular positions of the heavy crank, too, of which a call of the kernel passes 16."""
     scene = find_scene(name)
     run = simulate(scene, method, np.linspace(0.0, scene.duration, 9), Limits(rtol=1e-9))
@@ -47,17 +47,17 @@ def test_a_fast_motion_of_one_freedom_passes_briefly(name, method):
     assert len(run.crossings) == {"four_bar": 4, "planar_slider_crank_heavy": 61}.get(name, 3)
 
 
-@pytest.mark.usefixtures("_briefly")
+@pytest.mark.usefixtures("_short_only")
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(
     "scene",
     [four_bar_gravity(-1e-3), four_bar_gravity(3e-3), with_pendulum(four_bar_gravity())],
     ids=["turns back", "all but stops", "two freedoms"],
 )
-def test_other_motions_are_judged_by_a_twin(scene, method):
+def test_other_motions_are_judged_by_a_perturbed_run(scene, method):
     """A rhombus that turns back near its flat position, that crosses it with little speed left, and one
     beside which a pendulum swings."""
-    with pytest.raises(LongPassage):
+    with pytest.raises(LongCrossing):
         simulate(scene, method, [2.0])
 
 
@@ -85,8 +85,8 @@ def test_samples_beside_crossings_are_right_at_a_loose_tolerance(method):
 
 
 @pytest.mark.parametrize("rtol", [1e-3, 1e-4, 3e-5])
-def test_angles_of_torsion_springs_go_on_behind_brief_passages(rtol):
-    """Exact steps of a passage leave terms of higher orders than the usual steps behind it have."""
+def test_angles_of_torsion_springs_continue_behind_short_crossings(rtol):
+    """High-accuracy steps leave terms of higher orders than the regular steps behind them have."""
     scene = four_bar_gravity().with_(load=(TorsionSpring(joint="A", stiffness=1.0),))
     times = np.linspace(0.0, 3.0, 31)
     run = simulate(scene, "taylor", times, Limits(rtol=rtol))
