@@ -154,7 +154,8 @@ class SeriesStepper:
         self._decide_rank()
 
     def parameters(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
-        """Return where memory has numbers that differ between scenes, and their values for ``lengths`` (s,)."""
+        """Return where memory has numbers that differ between scenes, and their values for ``lengths``
+        (s,)."""
         return [(self.taylor.options, START_ERROR * np.maximum(1.0, lengths), "start_distance")]
 
     def takes(self, model: Callable[[], Model], start: Start) -> bool:
