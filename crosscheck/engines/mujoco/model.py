@@ -166,7 +166,10 @@ class _Builder:
             self._spring(k, load)
         elif isinstance(load, TorsionSpring):
             joint = self.joint[self.tree.coordinate(self.scene, load.joint)]
-            joint.stiffness[0], joint.springref = joint.stiffness[0] + load.stiffness, load.natural_angle
+            before, added = joint.stiffness[0], load.stiffness
+            if added > 0:  # two springs act as one about the mean of their natural angles, by stiffness
+                moment = before * joint.springref + added * load.natural_angle
+                joint.stiffness[0], joint.springref = before + added, moment / (before + added)
             joint.damping[0] += load.damping
 
     def link_of(self, body: str) -> int:

@@ -1,0 +1,123 @@
+"""Two parts of one kind at one place: each engine against the motion by Gauss's principle."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import BUILT_IN, OPTIONAL, engine, installed
+from crosscheck.judge.gauss_motion import gauss_motion
+from crosscheck.judge.metrics import error_series
+from crosscheck.judge.tolerances import LIKE_TRUTH
+from crosscheck.processes.serve import run_once
+from mbref.scene import (
+    Body,
+    Cylindrical,
+    Distance,
+    Driver,
+    Force,
+    Moment,
+    Revolute,
+    Scene,
+    Spring,
+    TorsionSpring,
+)
+from mbref.trajectory import Outcome
+
+TIMES = (0.0, 0.05, 0.1)
+ARM = Body(name="arm", mass=1.0, inertia=(0.01, 0.09, 0.09), position=(0.5, 0.0, 0.0))
+BOB = Body(name="bob", mass=0.4, inertia=(0.02, 0.03, 0.04), position=(1.0, -0.4, 0.1))
+A = Revolute(name="A", bodies=("ground", "arm"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+B = Revolute(name="B", bodies=("arm", "bob"), anchor=(1.0, 0.0, 0.0), axis=(0.0, 0.6, 0.8))
+C = Cylindrical(name="B", bodies=("arm", "bob"), anchor=(1.0, 0.0, 0.0), axis=(0.0, 0.6, 0.8))
+
+
+def twist(joint: str, stiffness: float, damping: float, natural_angle: float) -> TorsionSpring:
+    return TorsionSpring(joint=joint, stiffness=stiffness, damping=damping, natural_angle=natural_angle)
+
+
+def spring(first: tuple, second: tuple, stiffness: float, natural_length: float) -> Spring:
+    return Spring(bodies=("ground", "bob"), points=(first, second), stiffness=stiffness, damping=0.3,
+                  natural_length=natural_length)  # fmt: skip
+
+
+def pull(point: tuple, force: tuple) -> Force:
+    return Force(body="bob", point=point, force=force)
+
+
+ENDS = (0.0, 1.0, 0.0), (1.0, -0.4, 0.0)
+PAIRS = {
+    "two torsion springs": (twist("A", 13.0, 0.1, 1.4), twist("A", 22.0, 0.2, 0.7)),
+    "torsion springs of two joints": (twist("A", 13.0, 0.1, 1.4), twist("B", 5.0, 0.2, -0.7)),
+    "a torsion spring and a torsion damper": (twist("B", 13.0, 0.0, 1.4), twist("B", 0.0, 0.7, 0.3)),
+    "a torsion damper and a torsion spring": (twist("B", 0.0, 0.7, 0.3), twist("B", 13.0, 0.0, 1.4)),
+    "two springs between the same points": (spring(*ENDS, 30.0, 1.0), spring(*ENDS, 50.0, 2.5)),
+    "two springs between the same bodies": (
+        spring(*ENDS, 30.0, 1.0), spring(ENDS[0], (1.0, 0.0, 0.4), 9.0, 0.0),
+    ),
+    "two moments": (Moment(body="bob", moment=(1.0, 0.0, 2.0)), Moment(body="bob", moment=(0.5, -1.0, 0.0))),
+    "two forces at one point": (pull(ENDS[1], (1.0, 2.0, 0.0)), pull(ENDS[1], (0.0, -5.0, 3.0))),
+    "two forces at two points": (pull(ENDS[1], (1.0, 2.0, 0.0)), pull((1.0, 0.0, 0.5), (0.0, -5.0, 3.0))),
+}  # fmt: skip
+ROBUST = ("alpha",)  # where Exudyn's best family stops at redundant rows
+ENGINES = [name for name in BUILT_IN + OPTIONAL if name != "ondsel" and installed(name)]
+
+
+def scene(**parts: object) -> Scene:
+    given = {"body": (ARM, BOB), "joint": (A, B), "gravity": (0.0, -9.81, 0.0), **parts}
+    return Scene(name="pair", duration=TIMES[-1], **given)
+
+
+def check(name: str, mechanism: Scene) -> None:
+    simulator = engine(name)
+    if reason := simulator.cannot(mechanism):
+        pytest.skip(str(reason))
+    finest = {setting.family: setting for setting in simulator.settings(mechanism)}
+    best = simulator.best_settings(mechanism)[-1]
+    for setting in (best, *(s for s in finest.values() if s.family in ROBUST)):
+        run = run_once(name, mechanism, np.array(TIMES), setting)
+        if run.outcome is Outcome.COMPLETED:
+            break
+    assert run.outcome is Outcome.COMPLETED, run.message
+    error = error_series(mechanism, run, gauss_motion(mechanism, TIMES)).max()
+    assert error < LIKE_TRUTH, (str(setting), error)
+
+
+@pytest.mark.parametrize("name", ENGINES)
+@pytest.mark.parametrize("pair", PAIRS)
+def test_both_loads_of_a_pair_act(name, pair):
+    check(name, scene(load=PAIRS[pair]))
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_each_load_of_a_pair_changes_the_motion(pair):
+    """So that a pair of which one is lost cannot pass."""
+    both = gauss_motion(scene(load=PAIRS[pair]), TIMES)
+    for lost in range(2):
+        alone = gauss_motion(scene(load=PAIRS[pair][lost : lost + 1]), TIMES)
+        assert error_series(scene(), alone, both).max() > 100 * LIKE_TRUTH, (pair, lost)
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_a_driver_and_a_torsion_spring_act_in_one_joint(name):
+    driven = Driver(joint="A", polynomial=(0.0, 2.0, 1.0))
+    check(name, scene(driver=(driven,), load=(twist("A", 13.0, 0.1, 1.4), twist("B", 3.0, 0.1, 0.5))))
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_two_drivers_move_joints_of_one_body(name):
+    drivers = Driver(joint="A", polynomial=(0.0, 2.0)), Driver(joint="B", polynomial=(0.0, -1.0, 3.0))
+    check(name, scene(driver=drivers))
+
+
+@pytest.mark.parametrize("name", ENGINES)
+@pytest.mark.parametrize(
+    "second",
+    [
+        Distance(name="D", bodies=("arm", "bob"), anchors=((0.5, 0.2, 0.0), (1.0, -0.4, 0.1))),
+        Revolute(name="D", bodies=("arm", "bob"), anchor=(1.0, 0.3, 0.4), axis=(0.0, 0.6, 0.8)),
+    ],
+    ids=["and a distance", "and a coaxial hinge"],
+)
+def test_two_joints_hold_the_same_two_bodies(name, second):
+    check(name, scene(joint=(A, C, second)))
