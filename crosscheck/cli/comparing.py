@@ -35,7 +35,8 @@ def compare(arguments: argparse.Namespace) -> int:
     if arguments.repeats < REPEATS:
         raise RequestError(f"--repeats: must be at least {REPEATS}, got {arguments.repeats}")
     asked = asked_of(arguments, sweep.QUICK_SAMPLES)
-    wanted = Wanted(asked.times, arguments.reference_time, asked.chosen.is_quick, None, arguments.repeats)
+    wanted = Wanted(asked.times, arguments.reference_time, asked.chosen.is_quick, None, arguments.repeats,
+                    asked.chosen.is_named)  # fmt: skip
     found = collected(
         asked.scenes, asked.engines, wanted, lambda: request.plan(*asked, notice), notice
     )  # fmt: skip
@@ -44,8 +45,10 @@ def compare(arguments: argparse.Namespace) -> int:
     for comparison in compared:
         if comparison.difference:
             name = comparison.judged.scene.name
-            reason = f"the engines simulate different mechanisms: {comparison.difference}"
-            notice(f"{name}: times are not compared, {reason}")
+            reason = "the engines simulate different mechanisms, so times are not compared"
+            blamed = ", ".join(comparison.judged.differences)
+            reason = f"{blamed}: the adapter or the scene differs" if blamed else reason
+            notice(f"{name}: {reason}: {comparison.difference}")
     if arguments.json:
         print_json([comparison.document() for comparison in compared])
     else:

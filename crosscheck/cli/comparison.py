@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,7 @@ from crosscheck.cli.request import Choice
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.study import sweep
 from crosscheck.study.comparison import Collection, Notice, Wanted, collected
-from crosscheck.study.fair_timing import model_difference
+from crosscheck.study.fair_timing import force_differences, model_differences
 from crosscheck.study.grid import TIME_LIMIT, Record
 from crosscheck.study.record_view import error, is_completed, public
 from crosscheck.study.sentences import Verdict, verdict
@@ -39,11 +39,12 @@ class Comparison:
     Attributes
     ----------
     judged : Judged
-        The scene, the record of its truth, and the records of all runs.
+        The scene, the record of its truth, the records of all runs, and for each engine that simulates
+        another mechanism how it differs.
     path : str
         Name of the scene in commands.
     difference : str or None
-        One sentence on how the mechanisms of the engines differ. None if they agree.
+        One sentence on the first engine whose mechanism differs. None if all agree.
     """
 
     judged: Judged
@@ -53,7 +54,12 @@ class Comparison:
     @cached_property
     def verdict(self) -> Verdict:
         """Sentences of the verdict: headline, right, fast, breaks and truth."""
-        return verdict([self.judged], self.difference)
+        return verdict([self.judged], self._unlike)
+
+    @property
+    def _unlike(self) -> str | None:
+        """The difference, where no truth shows which engine it is due to."""
+        return None if self.judged.differences else self.difference
 
     @property
     def records(self) -> Sequence[Record]:
@@ -79,7 +85,8 @@ class Comparison:
         """Return the document of `crosscheck compare --json`."""
         truth = {name: self.judged.truth[name] for name in TRUTH}
         return {"scene": self.judged.scene.name, "records": [public(r) for r in self.records],
-                "verdict": self.verdict._asdict(), "truth": truth, "difference": self.difference}  # fmt: skip
+                "verdict": self.verdict._asdict(), "truth": truth, "difference": self.difference,
+                "differences": dict(self.judged.differences)}  # fmt: skip
 
     def save(self, path: str | Path) -> None:
         """Write ``document`` as JSON."""
@@ -87,7 +94,7 @@ class Comparison:
 
     def print(self, console: Console) -> None:
         """Print the verdict, tables and a plot."""
-        tables.print_comparison(console, self.judged, self.verdict, self.path, with_ratio=not self.difference)
+        tables.print_comparison(console, self.judged, self.verdict, self.path, with_ratio=not self._unlike)
 
     def __str__(self) -> str:
         text = io.StringIO()
@@ -146,7 +153,8 @@ def compare(
     limit = time_limit or (sweep.QUICK_LIMIT if is_quick else TIME_LIMIT)
     chosen = Choice(families, is_quick=is_quick)
     found = collected(
-        [lasting], names, Wanted(times, reference_time, is_quick, None if out is None else Path(out)),
+        [lasting], names,
+        Wanted(times, reference_time, is_quick, None if out is None else Path(out), is_named=chosen.is_named),
         lambda: request.plan([lasting], names, chosen, times, limit, tell), tell,
     )  # fmt: skip
     path = f"{given.name}.toml" if isinstance(scene, Scene) else str(scene)
@@ -158,15 +166,16 @@ def comparisons(found: Collection, paths: dict[str, str], reference_time: float)
 
     ``paths`` are the names of the scenes in commands.
     """
-    of_scene = {
-        scene.name: [record for record in found.identities if record["scene"] == scene.name]
-        for scene in found.scenes
-    }
-    return [
-        Comparison(group, paths[group.scene.name],
-                   model_difference(group.scene, of_scene[group.scene.name], reference_time))
-        for group in judged(found.scenes, found.truths, found.records)
-    ]  # fmt: skip
+    compared = []
+    for group in judged(found.scenes, found.truths, found.records):
+        scene, gates = group.scene, [r for r in found.identities if r["scene"] == group.scene.name]
+        differences = model_differences(scene, gates, reference_time)
+        if group.truth["kind"]:
+            differences |= force_differences(scene, group.records)
+        first = next(iter(differences.values()), None)
+        blamed = differences if group.truth["kind"] else {}
+        compared.append(Comparison(replace(group, differences=blamed), paths[scene.name], first))
+    return compared
 
 
 def _row(record: Record) -> Row:

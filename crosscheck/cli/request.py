@@ -188,6 +188,11 @@ class Choice(NamedTuple):
     rtol: float | None = None
     is_quick: bool = True
 
+    @property
+    def is_named(self) -> bool:
+        """Whether families, or one setting, are named."""
+        return self.families is not None or self.setting is not None
+
 
 def choice(
     engines: Sequence[str], families: Sequence[str], options: Sequence[tuple[str, Any]] | None,

@@ -26,7 +26,7 @@ from crosscheck.study.record_view import (
     varied_settings,
 )
 from crosscheck.study.sentences import LEVEL, SAID, Verdict, title
-from crosscheck.study.verdict import Grade, Judged, grade
+from crosscheck.study.verdict import Grade, Judged
 
 MEASURED = ("violation_position", "energy_error")  # metrics that the table of runs shows beside the error
 SETTINGS_WIDTH, NUMBER_WIDTH = 15, 8  # least widths of columns, so that numbers stay whole
@@ -55,20 +55,27 @@ def print_comparison(console: Console, group: Judged, said: Verdict, path: str, 
     console.print(f"\n{group.scene.name}, {group.scene.duration:g} s: {_counts(group)}\n")
     _print_verdict(console, said)
     letters = _letters(records)
-    console.print(_ranked(records, letters, with_ratio=with_ratio))
+    console.print(_ranked(group, letters, with_ratio=with_ratio))
     console.print(scatter(records, letters))
     _print_best(console, group)
     _print_advice(console, group, path)
     _print_messages(console, records)
 
 
-def _ranked(records: Sequence[Record], letters: Mapping[tuple[str, str], str], with_ratio: bool) -> Table:
+def _ranked(group: Judged, letters: Mapping[tuple[str, str], str], with_ratio: bool) -> Table:
     """The runs with the least error first, and times as multiples of the fastest if asked for."""
-    fastest = min((_cost(r) for r in records if is_completed(r)), default=math.nan)
+    records = group.records
+    fastest = min((_cost(r) for r in group.comparable if is_completed(r)), default=math.nan)
     header = ("", "engine, family", "settings", "verdict", "error", "time (s)", *["ratio"] * with_ratio)
     table = _table("runs", header, 4)
     for r in sorted(records, key=lambda r: (not is_completed(r), error(r))):
-        row = letters[engine_and_family(r)], *_identity(r, records), _graded(r), error_text(r), _seconds(r)
+        row = (
+            letters[engine_and_family(r)],
+            *_identity(r, records),
+            _graded(group, r),
+            error_text(r),
+            _seconds(r),
+        )
         ratio = f"{_cost(r) / fastest:.1f}" if is_completed(r) and fastest > 0 else "–"
         table.add_row(*row, *[ratio] * with_ratio)
     return table
@@ -169,8 +176,8 @@ def _options(record: Record) -> str:
                      for k, v in record["asked"]["options"].items())  # fmt: skip
 
 
-def _graded(record: Record) -> str:
-    found = grade(record)
+def _graded(group: Judged, record: Record) -> str:
+    found = group.grade(record)
     return str(found) if found is not Grade.FAILED else f"{_outcome(record)}{_at(record)}"
 
 

@@ -1,23 +1,39 @@
 """Model identity: do two engines simulate the same mechanism? Asked before their speeds are compared.
 
 Every engine makes a short run.  The initial poses and the changes of the velocities must agree, so that
-masses, inertias, axes and loads are the same.
+masses, inertias, axes and loads are the same.  Differences are relative to the largest value, and to none
+less than a part of what gravity, loads, drivers and velocities of the scene can cause: where these balance,
+accelerations are rounding.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.constraints import initial_twists, jacobian, joint_coordinates, scene_length
 from crosscheck.judge.energy import kinetic_energy, potential_energy
+from crosscheck.judge.gauss_motion import accelerations
+from crosscheck.judge.joint_residuals import driver_value
 from crosscheck.judge.metrics import in_scene_order
-from crosscheck.judge.tolerances import GATE_TIME, SAME_CHANGE, SAME_START
+from crosscheck.judge.tolerances import (
+    GATE_TIME,
+    LEAST_CHANGE,
+    NEXT_TO_SINGULAR,
+    RANK,
+    SAME_CHANGE,
+    SAME_FORCES,
+    SAME_START,
+)
 from mbref import rotations
-from mbref.scene import Scene
+from mbref.scene import Force, Load, Moment, Scene, Spring, TorsionSpring
 from mbref.trajectory import Trajectory
+
+ALONG = 6  # samples of a run at which its accelerations are compared
+DRIVEN_SAMPLES = 101  # of a driver's motion, whose largest acceleration is looked for
 
 
 @dataclass(frozen=True)
@@ -44,12 +60,94 @@ def gate(scene: Scene, trajectories: Sequence[Trajectory]) -> Difference | None:
 
     Trajectories are runs at `gate_times`; put the truth's first when there is one.
     """
+    return next(iter(differences(scene, trajectories).values()), None)
+
+
+def differences(scene: Scene, trajectories: Sequence[Trajectory]) -> dict[str, Difference]:
+    """By engine, the first field in which its trajectory differs from the first one; as `gate`."""
     reference, *others = (in_scene_order(scene, trajectory) for trajectory in trajectories)
+    found: dict[str, Difference] = {}
     for other in others:
         for field, by, allowed in _differences(scene, reference, other):
             if not by <= allowed:
-                return Difference(field, (reference.engine, other.engine), by, allowed)
+                found[other.engine] = Difference(field, (reference.engine, other.engine), by, allowed)
+                break
+    return found
+
+
+def along(scene: Scene, run: Trajectory) -> Difference | None:
+    """The first difference of the accelerations that a run reports from those that the judge's own equations
+    give at the run's own states, at some samples; None without accelerations or masses.
+
+    The run is so compared with the mechanism and not with a motion: errors of an integration do not count.
+    Samples next to singular positions are left out.
+    """
+    if run.acceleration is None or run.angular_acceleration is None or not scene.has_mass():
+        return None
+    run, length = in_scene_order(scene, run), scene_length(scene)
+    pose = run.times, run.position, run.orientation, run.angular_velocity
+    angles = joint_coordinates(scene, *pose)
+    twisted = [load.joint for load in scene.load if isinstance(load, TorsionSpring)]
+    chosen = np.unique(np.linspace(0, len(run.times) - 1, ALONG).round().astype(int)).tolist()
+    for k in _regular(scene, run, chosen if len(run.times) else []):
+        turned = np.array([angles[name][k, 0] for name in twisted])
+        state = run.position[k], run.orientation[k], run.velocity[k], run.angular_velocity[k], turned
+        if not np.isfinite(turned).all():
+            continue
+        own = accelerations(scene, run.times[k], state) * np.repeat([1.0, length], 3)
+        theirs = np.hstack([run.acceleration[k], length * run.angular_acceleration[k]])
+        scale = max(_size(own.reshape(-1, 3)), LEAST_CHANGE * acceleration_scale(scene))
+        by = _apart(own.reshape(-1, 3), theirs.reshape(-1, 3), scale)
+        if not by <= SAME_FORCES:
+            field = f"acceleration at t = {run.times[k]:.3g} s"
+            return Difference(field, ("the judge", run.engine), by, SAME_FORCES)
     return None
+
+
+def acceleration_scale(scene: Scene) -> float:
+    """The acceleration (m/s²) that gravity, loads, drivers and velocities of the scene can cause: beside it,
+    accelerations that balance to zero are rounding."""
+    length, mass = scene_length(scene), sum(body.mass or 0.0 for body in scene.body)
+    speed = _initial_speed(scene)
+    parts = [math.hypot(*scene.gravity), speed**2 / length]
+    for driver in scene.driver:
+        of_length = 1.0 if scene.joint_named(driver.joint).facts.driven == "displacement" else length
+        times = np.linspace(0.0, scene.duration, DRIVEN_SAMPLES)
+        rate, change = (of_length * np.abs(driver_value(driver, times, k)).max() for k in (1, 2))
+        parts += [float(change), float(rate) ** 2 / length]
+    if mass > 0:
+        parts += [_force(scene, load, length, speed) / mass for load in scene.load]
+    return max(parts)
+
+
+def _force(scene: Scene, load: Load, length: float, speed: float) -> float:
+    """The size (N) of a load at the start; moments count over the scene's length."""
+    if isinstance(load, Force):
+        return math.hypot(*load.force)
+    if isinstance(load, Moment):
+        return math.hypot(*load.moment) / length
+    if isinstance(load, Spring):
+        stretch = abs(math.dist(*load.points) - load.natural_length)
+        return load.stiffness * stretch + load.damping * speed
+    return (load.stiffness * abs(load.natural_angle) + load.damping * speed / length) / length
+
+
+def _initial_speed(scene: Scene) -> float:
+    """The largest initial velocity (m/s), or angular velocity times the scene's length."""
+    velocity, angular_velocity = initial_twists(scene)
+    return max(_size(velocity), scene_length(scene) * _size(angular_velocity))
+
+
+def _regular(scene: Scene, run: Trajectory, chosen: Sequence[int]) -> list[int]:
+    """The chosen samples that are not at or next to a pose at which the rank of the joints' rows drops."""
+    if not scene.joint:
+        return list(chosen)
+    units = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))
+    rows = (jacobian(scene, run.times[k], run.position[k], run.orientation[k])[0] * units for k in chosen)
+    values = [np.linalg.svd(matrix, compute_uv=False) for matrix in rows]
+    ranks = [int(np.sum(v > RANK * v[0])) for v in values]
+    near = [bool(v[rank - 1] < NEXT_TO_SINGULAR * v[0]) for v, rank in zip(values, ranks, strict=True)]
+    return [k for k, r, n in zip(chosen, ranks, near, strict=True) if r == max(ranks) and not n]
 
 
 def _differences(
@@ -73,36 +171,28 @@ def _differences(
         energies = [_energy(scene, t) for t in (first, second)]
         scale = max(*map(abs, energies), _energy_unit(scene))
         yield "initial energy", abs(energies[0] - energies[1]) / scale, 4 * SAME_START
-    yield from _changes(first, second, length, speed)
+    yield from _changes(scene, first, second, speed)
 
 
 def _changes(
-    first: Trajectory, second: Trajectory, length: float, speed: float
+    scene: Scene, first: Trajectory, second: Trajectory, speed: float
 ) -> Iterator[tuple[str, float, float]]:  # fmt: skip
+    length, least = scene_length(scene), LEAST_CHANGE * acceleration_scale(scene)
     changes = [
         (np.diff(t.velocity, axis=0), length * np.diff(t.angular_velocity, axis=0)) for t in (first, second)
     ]
-    change = max(*map(_size, changes[0]), SAME_START * speed)
+    change = max(*map(_size, changes[0]), least * float(first.times[1]), SAME_START * speed)
     yield "change of velocity", _apart(changes[0][0], changes[1][0], change), SAME_CHANGE
     yield "change of angular velocity", _apart(changes[0][1], changes[1][1], change), SAME_CHANGE
-    yield from _given_accelerations(first, second, length)
-
-
-def _given_accelerations(
-    first: Trajectory, second: Trajectory, length: float
-) -> Iterator[tuple[str, float, float]]:  # fmt: skip
     linear = (first.acceleration, second.acceleration)
     angular = (first.angular_acceleration, second.angular_acceleration)
     if linear[0] is None or linear[1] is None or angular[0] is None or angular[1] is None:
         return
-    scale = max(_size(linear[0][0]), length * _size(angular[0][0]))
+    scale = max(_size(linear[0][0]), length * _size(angular[0][0]), least)
     if scale > 0:
+        turned = _apart(angular[0][0], angular[1][0], scale / length)
         yield "initial acceleration", _apart(linear[0][0], linear[1][0], scale), SAME_CHANGE
-        yield (
-            "initial angular acceleration",
-            _apart(angular[0][0], angular[1][0], scale / length),
-            SAME_CHANGE,
-        )
+        yield "initial angular acceleration", turned, SAME_CHANGE
 
 
 def _size(vectors: np.ndarray) -> float:
@@ -125,5 +215,7 @@ def _energy(scene: Scene, trajectory: Trajectory) -> float:
 
 
 def _energy_unit(scene: Scene) -> float:
-    """An energy (J) of the scene's size: all its mass at one length per duration."""
-    return sum(body.mass or 0.0 for body in scene.body) * (scene_length(scene) / scene.duration) ** 2
+    """An energy (J) of the scene's size: all its mass at one length per duration, or moved by its length
+    against gravity."""
+    mass, length = sum(body.mass or 0.0 for body in scene.body), scene_length(scene)
+    return mass * max((length / scene.duration) ** 2, math.hypot(*scene.gravity) * length)

@@ -75,6 +75,19 @@ SAME_CHANGE = 1e-4
 percent of one body's mass changes them by 5e-4 or more in most built-in scenes; integration errors of an
 engine at its finer settings are below 1e-6 over so short a time."""
 
+LEAST_CHANGE = 1e-3
+"""Part of the accelerations that gravity, loads, drivers and velocities can cause, below which differences
+count relative to it: engines solve for accelerations that balance to 1e-8 of it or better."""
+
+SAME_FORCES = 1e-2
+"""Relative difference of accelerations that a run reports from the judge's own at the run's states, before a
+wrong motion is blamed on the model: soft closures and integrators of first order report them to 1e-3, and a
+load that is lost changes them by more where it matters to the motion."""
+
+NEXT_TO_SINGULAR = 1e-3
+"""Least singular value, of the largest, of a pose at which accelerations are compared: nearer to a singular
+position, closure errors of 1e-6 change them by more than a thousandth."""
+
 GATE_TIME = 1e-3
 """Part of the scene's duration that the gate simulates: long enough that changes are 1e10 roundings,
 short enough that they are accelerations times time."""

@@ -3,7 +3,7 @@ end."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from pathlib import Path
@@ -17,7 +17,7 @@ from crosscheck.study import pictures, sweep
 from crosscheck.study.between import MOST_COARSER
 from crosscheck.study.chains import Chains
 from crosscheck.study.fair_timing import identity_cases
-from crosscheck.study.grid import Case, Record, key, known, record_of, study
+from crosscheck.study.grid import Case, Record, default_cases, key, known, record_of, study
 from crosscheck.study.hurried import Hurried
 from crosscheck.study.ladder import Family, beyond, families, finest, first
 from crosscheck.study.progress import counted, shown
@@ -25,6 +25,7 @@ from crosscheck.study.scouting import scout, unasked
 from crosscheck.study.timings import REPEATS, with_timings
 from crosscheck.study.truths import key as truth_key
 from crosscheck.study.truths import truth_record
+from crosscheck.study.verdict import Grade, grade
 from mbref.records import append, stored
 from mbref.scene import Scene
 
@@ -48,13 +49,15 @@ class Collection(NamedTuple):
 
 class Wanted(NamedTuple):
     """The sample times (k,) of every scene, the CPU seconds a reference may take, the folder that keeps the
-    records, and whether only a few settings are run (`study.ladder`) and only short runs timed again."""
+    records, and whether only a few settings are run (`study.ladder`) and only short runs timed again; whether
+    their families were named, so that no others are tried where those do not serve."""
 
     times: Sequence[np.ndarray]
     reference_time: float
     is_quick: bool
     out: Path | None = None
     repeats: int = REPEATS
+    is_named: bool = False
 
 
 def collected(
@@ -97,12 +100,36 @@ def _measured(
     if path is not None and (there := len(known(cases, path))):
         notice(f"{path} has {there} of the runs")
     groups, by_key = (_few if wanted.is_quick else _all)(families(cases), gates, path)
+    if wanted.is_quick and not wanted.is_named:
+        others, more = _few(_other_families(groups, by_key), [], path)
+        groups, by_key = [*groups, *others], by_key | more
     run = [case for group in groups for case in group if key(case) in by_key]
     told, found = [by_key[key(case)] for case in run], truths.result()
     moving = _pictures(list(zip(run, told, strict=True)), found, wanted.out)
     long = sweep.QUICK_LONG if wanted.is_quick else sweep.LONG
     timed = with_timings(run, told, _file(wanted, "timings.jsonl"), notice, long, wanted.repeats)
     return Collection(scenes, timed, [by_key[key(gate)] for gate in gates], found, *moving)
+
+
+def _other_families(groups: Sequence[Family], records: Mapping[str, Record]) -> list[Family]:
+    """The families that were not run of every engine that is not right on a scene by those that were: only
+    then it is known whether the engine completes no run, or is inaccurate."""
+    found: list[Family] = []
+    by_pair: dict[tuple[str, str], list[Family]] = {}
+    for group in groups:
+        by_pair.setdefault((group[0].scene.name, group[0].engine), []).append(group)
+    for run in by_pair.values():
+        case = run[0][0]
+        if Grade.RIGHT in {grade(records[key(c)]) for group in run for c in group if key(c) in records}:
+            continue
+        cases, _ = default_cases(case.scene, [case.engine], None, case.times, case.time_limit)
+        there = {group[0].setting.family for group in run}
+        found += [
+            [c._replace(reference_time=case.reference_time) for c in group]
+            for group in families(cases)
+            if group[0].setting.family not in there
+        ]
+    return found
 
 
 def _few(groups: Sequence[Family], gates: Sequence[Case], path: Path | None) -> Made:

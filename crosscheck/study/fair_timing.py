@@ -7,14 +7,16 @@ from collections.abc import Callable, Sequence
 from statistics import median
 
 from crosscheck.engine import Setting
-from crosscheck.judge.model_identity import gate, gate_times
+from crosscheck.judge.model_identity import along, differences, gate_times
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth import NoSolution, truth_for
 from crosscheck.processes.pool import ChildFailed, time_interleaved
 from crosscheck.study.grid import Case, Record
+from crosscheck.study.least_errors import least_errors
 from crosscheck.study.record_view import is_completed
 from crosscheck.study.scouting import settings
 from crosscheck.study.sentences import COMPILED
+from crosscheck.study.verdict import Grade, grade
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
@@ -33,14 +35,40 @@ def _called_from_python(found: Sequence[Setting]) -> Sequence[Setting]:
 def model_difference(scene: Scene, records: Sequence[Record], reference_time: float = SECONDS) -> str | None:
     """The first field in which the records of `identity_cases` differ from the truth where there is one, else
     from the first of them, as a sentence; None when all agree. Runs that did not complete say nothing."""
+    return next(iter(model_differences(scene, records, reference_time).values()), None)
+
+
+def model_differences(
+    scene: Scene, records: Sequence[Record], reference_time: float = SECONDS
+) -> dict[str, str]:
+    """By engine the sentence on the first such field."""
     truth = truth_for(scene, reference_time)
     try:
         exact = [] if truth is None else [truth.poses(gate_times(scene))]
     except NoSolution:
         exact = []
-    runs = [Trajectory.from_record(scene.name, record) for record in records if is_completed(record)]
-    found = gate(scene, [*exact, *runs]) if exact or runs else None
-    return None if found is None else str(found)
+    done = [record for record in records if is_completed(record)]
+    runs = [_motion(scene, r) for r in done]
+    found = differences(scene, [*exact, *runs]) if exact or runs else {}
+    return {name: str(difference) for name, difference in found.items()}
+
+
+def force_differences(scene: Scene, records: Sequence[Record]) -> dict[str, str]:
+    """By engine that is wrong at its best setting, how the accelerations of its runs differ from those of the
+    scene at the same states; an engine is left out where those of one of its wrong runs do not."""
+    found = {}
+    for least in least_errors(records):
+        if grade(least.best) is not Grade.WRONG:
+            continue
+        wrong = [r for r in least.records if grade(r) is Grade.WRONG]
+        differing = [along(scene, _motion(scene, r)) for r in wrong]
+        if all(differing):
+            found[least.engine] = str(min(filter(None, differing), key=lambda difference: difference.by))
+    return found
+
+
+def _motion(scene: Scene, record: Record) -> Trajectory:
+    return Trajectory.from_record(scene.name, record)
 
 
 def timed(

@@ -183,6 +183,7 @@ def record_of(case: Case, trajectory: Trajectory) -> Record:
         "scene": case.scene.name,
         "mechanism": mechanism(case.scene),
         **trajectory.to_record(),
+        "engine": shown_name(case.engine),
         "family": case.setting.family,
         "asked": _asked(case),
         "time_limit": case.time_limit,
@@ -190,6 +191,15 @@ def record_of(case: Case, trajectory: Trajectory) -> Record:
         "seed": 0,
         **made_by(),
     }
+
+
+def shown_name(engine_name: str) -> str:
+    """The name by which an engine is shown: that of its object, where it was asked for as
+    ``module:attribute``."""
+    try:
+        return engine(engine_name).name if ":" in engine_name else engine_name
+    except Exception:  # a module that cannot be imported: each run says so as its outcome
+        return engine_name
 
 
 def made_by() -> dict[str, Any]:

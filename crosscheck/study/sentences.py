@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import NamedTuple
 
+from crosscheck.engine import engine
 from crosscheck.judge.tolerances import ERROR_LEVELS
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error, error_text
@@ -54,8 +55,8 @@ class Verdict(NamedTuple):
 
 
 def verdict(groups: Sequence[Judged], difference: str | None = None) -> Verdict:
-    """The verdict on one scene or several, of the same engines where they can run them; where their
-    mechanisms have a ``difference``, times are not compared."""
+    """The verdict on one scene or several, of the same engines where they can run them; where there is no
+    truth and their mechanisms have a ``difference``, times are not compared."""
     times = f"Times are not compared, the engines simulate different mechanisms: {difference}."
     return Verdict(
         headline(groups), right(groups), times if difference else fast(groups), breaks(groups), truth(groups)
@@ -70,6 +71,9 @@ def title(engine: str) -> str:
 def headline(groups: Sequence[Judged]) -> str:
     """Who is right at best and at the defaults, in one line, and of how much of the motions that is known."""
     told = [group for group in groups if _is_judged(group)]
+    others = not_judged(groups)
+    if not told and others:
+        return f"{others}."
     if not told:
         these = "this motion" if len(groups) == 1 else "these motions"
         return f"There is no reference for {these}: the engines are compared with each other."
@@ -85,14 +89,37 @@ def headline(groups: Sequence[Judged]) -> str:
     far = up_to(told)
     if far:
         first = f"{far}, as far as the motion is known, {uncapitalised(first)}"
-    return f"{first}{_where_known(groups, told, good)}; {_defaults_in_short(told)}."
+    end = f"; {others}" if others else ""
+    return f"{first}{_where_known(groups, told, good)}; {_defaults_in_short(told)}{end}."
+
+
+def not_judged(groups: Sequence[Judged]) -> str:
+    """The engines that simulate another mechanism than a scene, as a clause; empty without any."""
+    found = list(dict.fromkeys(name for group in groups for name in group.differences))
+    if not found:
+        return ""
+    scenes = [group for group in groups if group.differences]
+    where = "" if len(groups) == 1 else f" on {names(scenes)}"
+    names_of = listed(map(title, found))
+    return f"{names_of} {is_or_are(found)} not judged{where}: the adapter or the scene differs"
+
+
+def _reasons(groups: Sequence[Judged]) -> list[str]:
+    """A sentence on each engine that is not judged."""
+    return [
+        f"{title(name)} is not judged{'' if len(groups) == 1 else f' on {group.scene.name}'}, because the "
+        f"adapter or the scene differs: {difference}."
+        for group in groups
+        for name, difference in group.differences.items()
+    ]
 
 
 def right(groups: Sequence[Judged]) -> str:
     """Errors of the engines at their best settings; without a truth, how far they agree."""
     told = [group for group in groups if _is_judged(group)]
     if not told:
-        return " ".join(map(_agreement, groups))
+        alike = [group for group in groups if not group.differences]
+        return " ".join([*map(_agreement, alike), *_reasons(groups)])
     errors: dict[str, list[float]] = {}
     for group in told:
         for name, record in group.best().items():
@@ -108,11 +135,13 @@ def right(groups: Sequence[Judged]) -> str:
         where = _on(told, good) if len(told) == len(groups) else f" on {names(told)}"
         far = " as far as it is known" if any(group.truth["reason"] for group in told) else ""
         sentences = [f"{listed(map(title, good))} {agree(good)} with the truth to {most}{where}{far}."]
-    return " ".join([*sentences, *(_less_than_right(told, name) for name in worst if name not in good)])
+    sentences += [_less_than_right(told, name) for name in worst if name not in good]
+    return " ".join([*sentences, *_reasons(groups)])
 
 
 def fast(groups: Sequence[Judged]) -> str:
-    """Times of stepping that reach LEVEL, as multiples of the fastest engine's."""
+    """Times of stepping that reach LEVEL, as multiples of the fastest engine's, and the integrators that are
+    crosscheck's."""
     found = {group.scene.name: group.costs(LEVEL) for group in groups}
     costs = {name: cost for name, cost in found.items() if cost}
     if not any(_is_judged(group) for group in groups):
@@ -121,8 +150,42 @@ def fast(groups: Sequence[Judged]) -> str:
         return f"No engine reaches an error of {SAID}, so speeds are not compared."
     never = [n for n in _engines(groups) if not any(n in cost for cost in costs.values())]
     end = f" {listed(map(title, never))} {'does' if len(never) == 1 else 'do'} not reach it." if never else ""
-    text = _fast_on_one(*costs.values()) if len(groups) == 1 else _fast_on_several(costs)
-    return text + end + CLOCK + (WITHOUT_PYTHON if _has_compiled(groups) else ADAPTERS)
+    aided = {n for g in groups for n, (_, r) in g.fastest(LEVEL).items() if is_integrated_here(r)}
+    text = _fast_on_one(*costs.values(), aided) if len(groups) == 1 else _fast_on_several(costs, aided)
+    return text + end + _integrated(groups) + CLOCK + (WITHOUT_PYTHON if _has_compiled(groups) else ADAPTERS)
+
+
+def _integrated(groups: Sequence[Judged]) -> str:
+    """The engines whose fastest runs crosscheck integrates, with the time of the engine's own integrators."""
+    found: dict[str, dict[str, None]] = {}
+    for group in groups:
+        for name, (_, record) in group.fastest(LEVEL).items():
+            if is_integrated_here(record):
+                found.setdefault(name, {})[record["family"]] = None
+    return "".join(_by_crosscheck(groups, name, [*families]) for name, families in found.items())
+
+
+def _by_crosscheck(groups: Sequence[Judged], name: str, families: Sequence[str]) -> str:
+    quoted = listed(f"“{family}”" for family in families)
+    text = f" {title(name)}'s fastest runs are integrated by crosscheck ({quoted})"
+    if all(is_integrated_here(r) for group in groups for r in group.comparable if r["engine"] == name):
+        return f"{text}, as all of its runs here are."
+    own = [group.fastest(LEVEL, without=is_integrated_here).get(name) for group in groups]
+    reached = [found for found in own if found is not None]
+    if not reached:
+        return f"{text}; its own integrators do not reach {SAID}."
+    if len(groups) > 1:
+        return f"{text}; its own integrators reach {SAID} on {len(reached)} of {len(groups)} scenes."
+    [(cost, record)] = reached
+    return f"{text}; its own integrator needs {seconds(cost)} (“{record['family']}”)."
+
+
+def is_integrated_here(record: Record) -> bool:
+    """Whether crosscheck integrates the runs of a record's family, with the engine's accelerations."""
+    try:
+        return record["family"] in engine(record["asked"]["engine"]).integrated_here
+    except LookupError:
+        return False
 
 
 def _has_compiled(groups: Sequence[Judged]) -> bool:
@@ -153,8 +216,8 @@ def _no_bad_defaults(groups: Sequence[Judged]) -> str:
 
 
 def _is_judged(group: Judged) -> bool:
-    """Whether a run of the scene has an error."""
-    return any(record["metrics"].get("error") is not None for record in group.records)
+    """Whether a run of the scene by an engine that is judged has an error."""
+    return any(record["metrics"].get("error") is not None for record in group.comparable)
 
 
 def _agreement(group: Judged) -> str:
@@ -190,9 +253,9 @@ def _of_those_that_end(groups: Sequence[Judged], scene: str, name: str) -> str:
     return f" of the settings that end within {max(limits):g} s" if limits else ""
 
 
-def _fast_on_one(costs: Mapping[str, float]) -> str:
+def _fast_on_one(costs: Mapping[str, float], aided: Collection[str]) -> str:
     (first, least), *others = sorted(costs.items(), key=lambda item: item[1])
-    text = f"{title(first)} reaches an error of {SAID} in {seconds(least)} of stepping"
+    text = f"{_whose(first, aided)} reaches an error of {SAID} in {seconds(least)} of stepping"
     if not others:
         return f"{text}."
     return (
@@ -200,14 +263,20 @@ def _fast_on_one(costs: Mapping[str, float]) -> str:
     )
 
 
-def _fast_on_several(costs: Mapping[str, Mapping[str, float]]) -> str:
+def _whose(name: str, aided: Collection[str]) -> str:
+    """The engine at the beginning of a sentence on its fastest runs, and whether crosscheck integrates
+    them."""
+    return f"{title(name)}, integrated by crosscheck," if name in aided else title(name)
+
+
+def _fast_on_several(costs: Mapping[str, Mapping[str, float]], aided: Collection[str]) -> str:
     winners = {scene: min(cost, key=lambda n: cost[n]) for scene, cost in costs.items()}
     count = {name: list(winners.values()).count(name) for name in dict.fromkeys(winners.values())}
     first = max(count, key=lambda n: count[n])
     ratios = [min(c for n, c in cost.items() if n != first) / cost[first]
               for scene, cost in costs.items() if winners[scene] == first and len(cost) > 1]  # fmt: skip
     share = f"{count[first]} of {len(costs)}" if count[first] < len(costs) else f"all {len(costs)}"
-    text = f"{title(first)} is the fastest to an error of {SAID} on {share} scenes"
+    text = f"{_whose(first, aided)} is the fastest to an error of {SAID} on {share} scenes"
     if ratios:
         text += f"; the best other engine takes {span(min(ratios), max(ratios))} as long"
     others = [f"{title(n)} on {listed(s for s, w in winners.items() if w == n)}" for n in count if n != first]
@@ -257,7 +326,7 @@ def _wrong(name: str, scenes: Sequence[Judged], groups: Sequence[Judged]) -> str
 
 def _other_failures(groups: Sequence[Judged]) -> str:
     """Runs at other settings than defaults that failed or were wrong, counted."""
-    runs = [r for group in groups for r in group.records if r["family"] != "defaults"]
+    runs = [r for group in groups for r in group.comparable if r["family"] != "defaults"]
     bad = {verdict: [r for r in runs if grade(r) is verdict] for verdict in (Grade.FAILED, Grade.WRONG)}
     verbs = {Grade.FAILED: "", Grade.WRONG: f"{is_or_are(bad[Grade.WRONG])} "}
     told = [f"{len(found)} {verbs[verdict]}{verdict}" for verdict, found in bad.items() if found]
@@ -272,11 +341,17 @@ def _defaults_in_short(groups: Sequence[Judged]) -> str:
     if len(at_defaults) == 1:
         only = f"with its library's defaults {title(*at_defaults)} is"
         return f"{only}, too" if good else f"{only} not"
+    shown = listed(map(title, at_defaults))
     if not good:
-        return "with their libraries' defaults none is"
+        none = (
+            f"neither {' nor '.join(map(title, at_defaults))}"
+            if len(at_defaults) == 2
+            else f"none of {shown}"
+        )
+        return f"with their libraries' defaults {none} is"
     if len(good) == len(at_defaults):
-        return "so are their libraries' defaults"
-    return f"with their libraries' defaults only {listed(map(title, good))} {is_or_are(good)}"
+        return f"so are the libraries' defaults of {shown}"
+    return f"with the libraries' defaults of {shown} only {listed(map(title, good))} {is_or_are(good)}"
 
 
 def _worst(groups: Sequence[Judged], records: Callable[[Judged], Mapping[str, Record]]) -> dict[str, Grade]:

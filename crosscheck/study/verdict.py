@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from crosscheck.study.record_view import error, is_completed
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
+Fastest = tuple[float, Record]  # CPU seconds, and a record of the family
 DEFAULTS = "defaults"  # the family of an engine's settings as its library has them
 
 
@@ -48,20 +49,34 @@ def grade(record: Record) -> Grade:
 
 @dataclass(frozen=True)
 class Judged:
-    """A scene, the record of its truth (`study.truths`), and the records of its runs."""
+    """A scene, the record of its truth (`study.truths`), and the records of its runs.
+
+    ``differences`` has, by engine, how the mechanism that it simulates differs from the scene; such an
+    engine is not judged.
+    """
 
     scene: Scene
     truth: Record
     records: Sequence[Record]
+    differences: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def redundant(self) -> int:
         """Rows of the constraints that depend on others at the start."""
         return self.scene.counts().redundant
 
+    @property
+    def comparable(self) -> Sequence[Record]:
+        """The records of the engines that simulate this mechanism."""
+        return [record for record in self.records if record["engine"] not in self.differences]
+
+    def grade(self, record: Record) -> Grade:
+        """The grade of a record; UNJUDGED where its engine simulates another mechanism."""
+        return Grade.UNJUDGED if record["engine"] in self.differences else grade(record)
+
     def engines(self) -> dict[str, LeastError]:
-        """The families' best records by engine, in the order of the records."""
-        return {least.engine: least for least in least_errors(self.records)}
+        """The families' best records by engine that is judged, in the order of the records."""
+        return {least.engine: least for least in least_errors(self.comparable)}
 
     def best(self) -> dict[str, Record]:
         """Of every engine the record of least error, else the one that got furthest."""
@@ -74,18 +89,28 @@ class Judged:
 
     def costs(self, level: float) -> dict[str, float]:
         """CPU seconds of stepping in which an engine's best family reaches an error; only those that do."""
-        found = {name: _least_cost(least, level) for name, least in self.engines().items()}
-        return {name: cost for name, cost in found.items() if math.isfinite(cost)}
+        return {name: cost for name, (cost, _) in self.fastest(level).items()}
+
+    def fastest(self, level: float, without: Callable[[Record], bool] | None = None) -> dict[str, Fastest]:
+        """Those seconds, and a record of the family; ``without`` leaves out families by their records."""
+        found = {}
+        for name, least in self.engines().items():
+            costs = _family_costs(least, level)
+            if without:
+                costs = [pair for pair in costs if not without(pair[1])]
+            if costs:
+                found[name] = min(costs, key=lambda pair: pair[0])
+        return found
 
     def cheapest(self, level: float) -> dict[str, Record]:
         """Of every engine the fastest completed record within an error; only those that have one."""
-        reached = [r for r in self.records if is_completed(r) and error(r) <= level]
+        reached = [r for r in self.comparable if is_completed(r) and error(r) <= level]
         by_cost = sorted(reached, key=lambda r: r["cost"]["seconds"])
         return {r["engine"]: r for r in reversed(by_cost)}
 
     def agreement(self) -> dict[tuple[str, str], float]:
         """Largest differences between the finest completed runs of two engines, where there is no truth."""
-        finest = {r["engine"]: r for r in self.records if is_completed(r)}
+        finest = {r["engine"]: r for r in self.comparable if is_completed(r)}
         motions = {n: Trajectory.from_record(self.scene.name, r) for n, r in finest.items()}
         names = list(motions)
         return {
@@ -96,19 +121,29 @@ class Judged:
         }
 
 
-def _least_cost(least: LeastError, level: float) -> float:
+def _family_costs(least: LeastError, level: float) -> list[Fastest]:
+    """Of every family that reaches an error the CPU seconds, and its record of least error."""
     costs = []
-    for family in least.families:
+    for family, best in least.families.items():
         usable = [
             r for r in least.records if r["family"] == family and is_completed(r) and math.isfinite(error(r))
         ]
         cost = cost_at_error([r["cost"]["seconds"] for r in usable], [error(r) for r in usable], level)
-        costs.append(math.inf if cost is None else cost)
-    return min(costs, default=math.inf)
+        if cost is not None:
+            costs.append((cost, best))
+    return costs
 
 
-def judged(scenes: Sequence[Scene], truths: Sequence[Record], records: Sequence[Record]) -> list[Judged]:
-    """The scenes that have records, each with its truth and its records."""
+def judged(
+    scenes: Sequence[Scene], truths: Sequence[Record], records: Sequence[Record],
+    differences: Mapping[str, Mapping[str, str]] | None = None,
+) -> list[Judged]:  # fmt: skip
+    """The scenes that have records, each with its truth, its records and the ``differences`` of its engines,
+    which are given by the scene's name."""
+    given = differences or {}
     truth_of: dict[str, Any] = {truth["scene"]: truth for truth in truths}
-    groups = [Judged(s, truth_of[s.name], [r for r in records if r["scene"] == s.name]) for s in scenes]
+    groups = [
+        Judged(s, truth_of[s.name], [r for r in records if r["scene"] == s.name], given.get(s.name, {}))
+        for s in scenes
+    ]
     return [group for group in groups if group.records]

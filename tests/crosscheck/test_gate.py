@@ -5,9 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crosscheck.judge.model_identity import gate, gate_times
+from crosscheck.engine import engine
+from crosscheck.judge.gauss_motion import gauss_motion
+from crosscheck.judge.model_identity import acceleration_scale, along, differences, gate, gate_times
+from crosscheck.judge.tolerances import LEAST_CHANGE, SAME_CHANGE
 from crosscheck.judge.truth import truth_for
-from mbref.scene import Body
+from crosscheck.processes.serve import run_once
+from mbref.scene import Body, Driver, Force, Moment, Revolute, Scene, Spring, TorsionSpring
 from mbref.scenes import SCENES
 from tests.crosscheck.truth_scenes import ALL, CLOSED
 
@@ -101,3 +105,131 @@ def test_orientation_turned_is_named():
     orientation[0, 1] = [np.cos(1e-6), 0, 0, np.sin(1e-6)]
     found = gate(scene, [run, replace(run, orientation=orientation)])
     assert found.field == "initial orientation" and found.by == pytest.approx(2e-6, rel=1e-6), found
+
+
+ARM = Body(name="arm", mass=2.0, inertia=(1e-3, 0.1, 0.1), position=(0.5, 0.0, 0.0))
+HINGE = Revolute(name="A", bodies=("ground", "arm"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+HOLDING = Spring(bodies=("ground", "arm"), points=((1.0, 1.0, 0.0), (1.0, 0.0, 0.0)), stiffness=9.81,
+                 damping=0.0, natural_length=0.0)  # fmt: skip
+
+
+def arm(**parts):
+    given = {"body": (ARM,), "joint": (HINGE,), "gravity": (0.0, -9.81, 0.0), "duration": 1.0, **parts}
+    return Scene(name="arm", **given)
+
+
+BALANCED = {
+    "a boom held by a spring": arm(load=(HOLDING,)),
+    "a rod that hangs": arm(gravity=(9.81, 0.0, 0.0)),
+    "a body in free fall": arm(joint=()),
+    "a body at rest without gravity": arm(joint=(), gravity=(0.0, 0.0, 0.0)),
+}
+
+
+@pytest.mark.parametrize("name", ["mujoco", "pinocchio"])
+@pytest.mark.parametrize("balanced", BALANCED)
+def test_rounding_of_forces_in_balance_is_no_difference(balanced, name):
+    scene = BALANCED[balanced]
+    setting = engine(name).best_settings(scene)[-1]
+    run = run_once(name, scene, gate_times(scene), setting)
+    exact = gauss_motion(scene, tuple(gate_times(scene)))
+    assert gate(scene, [exact, run]) is None, gate(scene, [exact, run])
+
+
+@pytest.mark.parametrize(("part", "passes"), [(0.9, True), (1.1, False)])
+def test_differences_in_balance_count_against_what_gravity_can_cause(part, passes):
+    scene = BALANCED["a boom held by a spring"]
+    exact = gauss_motion(scene, tuple(gate_times(scene)))
+    shift = np.zeros_like(exact.velocity)
+    shift[1, 0, 1] = part * SAME_CHANGE * LEAST_CHANGE * 9.81 * gate_times(scene)[1]
+    found = gate(scene, [exact, replace(exact, velocity=exact.velocity + shift)])
+    assert (found is None) is passes, found
+
+
+def test_scales_of_accelerations_by_hand():
+    """A scene of length 0.5 m and mass 2 kg: each cause alone, m/s²."""
+    still = {"gravity": (0.0, 0.0, 0.0)}
+    twist = TorsionSpring(joint="A", stiffness=6.0, damping=0.0, natural_angle=-0.5)
+    loads = {
+        Force(body="arm", point=(0.0, 0.0, 0.0), force=(3.0, 4.0, 0.0)): 5.0 / 2,
+        Moment(body="arm", moment=(0.0, 0.0, 7.0)): 7.0 / 0.5 / 2,
+        replace_field(HOLDING, natural_length=0.25): 9.81 * 0.75 / 2,
+        twist: 6.0 * 0.5 / 0.5 / 2,
+    }
+    for load, expected in loads.items():
+        assert acceleration_scale(arm(load=(load,), **still)) == pytest.approx(expected), load
+    assert acceleration_scale(arm()) == pytest.approx(9.81)
+    driven = arm(driver=(Driver(joint="A", polynomial=(0.0, 2.0, 1.5)),), **still)
+    assert acceleration_scale(driven) == pytest.approx((0.5 * 5.0) ** 2 / 0.5), "rates grow to 5 rad/s"
+    slow = arm(driver=(Driver(joint="A", polynomial=(0.0, 0.0, 0.05)),), **still)
+    assert acceleration_scale(slow) == pytest.approx(0.5 * 0.1)
+    turning = Body(**{**dict(ARM), "angular_velocity": (0.0, 0.0, 3.0), "velocity": (0.0, 1.5, 0.0)})
+    assert acceleration_scale(arm(body=(turning,), **still)) == pytest.approx(1.5**2 / 0.5)
+
+
+def replace_field(item, **changes):
+    return type(item)(**{**dict(item), **changes})
+
+
+def test_energies_at_rest_count_against_the_weight_over_the_length():
+    """A rod at the height zero has no energy; 2 kg · 9.81 m/s² · 0.5 m is its scale."""
+    scene = arm()
+    exact = gauss_motion(scene, tuple(gate_times(scene)))
+    for height, passes in ((0.9 * 4e-8 * 0.5, True), (1.1 * 4e-8 * 0.5, False)):
+        lifted = exact.position + np.array([0.0, height, 0.0])
+        found = gate(scene, [exact, replace(exact, position=lifted)])
+        assert found is not None and found.field == "initial position", "the position is asked first"
+        from crosscheck.judge.model_identity import _differences
+
+        off = {
+            field: by <= allowed
+            for field, by, allowed in _differences(scene, exact, replace(exact, position=lifted))
+        }
+        assert off["initial energy"] is passes, off
+
+
+LATER = TorsionSpring(joint="A", stiffness=30.0, damping=0.0, natural_angle=0.0)  # no moment at the start
+
+
+def test_a_load_that_acts_later_is_seen_along_the_run():
+    """The gate passes a spring that is left out while it is slack; the run's own accelerations show it."""
+    scene, without = arm(load=(LATER,)), arm()
+    times = tuple(np.linspace(0.0, 0.3, 7))
+    lost = replace(gauss_motion(without, times), engine="other")
+    short = [gauss_motion(s, tuple(gate_times(scene))) for s in (scene, without)]
+    assert gate(scene, short) is None
+    assert along(scene, gauss_motion(scene, times)) is None
+    found = along(scene, lost)
+    assert found is not None and found.engines == ("the judge", "other"), found
+    assert found.field.startswith("acceleration at t = 0."), found
+
+
+@pytest.mark.parametrize(("part", "passes"), [(0.009, True), (0.011, False)])
+def test_accelerations_along_a_run_may_be_off_by_a_hundredth(part, passes):
+    scene = arm()
+    run = gauss_motion(scene, (0.0, 0.1))
+    off = replace(run, acceleration=(1 + part) * run.acceleration,
+                  angular_acceleration=(1 + part) * run.angular_acceleration)  # fmt: skip
+    assert (along(scene, off) is None) is passes, along(scene, off)
+    assert along(scene, replace(off, acceleration=None)) is None, "nothing is reported"
+
+
+def test_samples_next_to_singular_positions_are_not_compared_along():
+    scene = SCENES["four_bar_gravity"]()
+    run = gauss_motion(scene, (0.0,))
+    off = replace(run, acceleration=2 * run.acceleration)
+    assert along(scene, off) is not None
+    straight = SCENES["four_bar_straight"]()
+    exact = truth_for(straight).poses(np.array([0.0, 0.004]))
+    wrong = np.where(np.arange(2)[:, None, None] == 0, 7.0, 0.0)  # at the flat start alone
+    assert along(straight, replace(exact, acceleration=exact.acceleration + wrong)) is None
+    both = along(straight, replace(exact, acceleration=exact.acceleration + 1e6))
+    assert both is not None and both.field == "acceleration at t = 0.004 s", both
+
+
+def test_differences_are_given_by_engine():
+    scene = MODELS["four_bar_gravity"]
+    run = short_run(scene)
+    heavier = short_run(with_body(scene, -1, mass=scene.body[-1].mass * 1.05), gate_times(scene))
+    found = differences(scene, [run, replace(heavier, engine="a"), replace(run, engine="b")])
+    assert list(found) == ["a"] and found["a"].field.startswith("change of"), found

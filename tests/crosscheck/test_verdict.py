@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -86,7 +87,7 @@ def test_grades_by_the_error_alone(error, verdict):
 def test_sentences_of_one_scene():
     assert headline([group()]) == (
         "mbref, MuJoCo and Pinocchio are right at their best settings; "
-        "with their libraries' defaults none is."
+        "with their libraries' defaults none of MuJoCo, Pinocchio and Exudyn is."
     )
     assert right([group()]) == (
         "mbref, MuJoCo and Pinocchio agree with the truth to 6.1e-9. "
@@ -94,13 +95,53 @@ def test_sentences_of_one_scene():
     ), right([group()])
     assert fast([group()]) == (
         "mbref reaches an error of 1e-6 in 1 ms of stepping; Pinocchio takes 32 times as long and MuJoCo "
-        "takes 500 times as long. Exudyn does not reach it." + CLOCK + ADAPTERS
+        "takes 500 times as long. Exudyn does not reach it. Pinocchio's fastest runs are integrated by "
+        "crosscheck (“tuned”), as all of its runs here are." + CLOCK + ADAPTERS
     ), fast([group()])
     assert breaks([group()]) == (
         "The defaults of Pinocchio and Exudyn end at t = 0 s, where a constraint is redundant. "
         "MuJoCo's defaults complete, but with an error of 2.8 at best."
     ), breaks([group()])
     assert "known to 3e-14: two formulations that share no code agree; it took 2.4 s" in truth([group()])
+
+
+def test_the_time_of_an_engines_own_integrator_is_given_beside_crosschecks():
+    both = [record("mujoco", "newton, compiled", 1e-9, 0.002), record("mujoco", "tuned", 1e-7, 0.05)]
+    others = [record("mbref", "own", 1e-9, 0.004)]
+    assert fast([group([*both, *others])]).startswith(
+        "MuJoCo, integrated by crosscheck, reaches an error of 1e-6 in 2 ms of stepping; mbref takes 2.0 "
+        "times as long. MuJoCo's fastest runs are integrated by crosscheck (“newton, compiled”); its own "
+        "integrator needs 50 ms (“tuned”)."
+    ), fast([group([*both, *others])])
+    rough = [both[0], record("mujoco", "tuned", 1e-3, 0.05)]
+    assert "; its own integrators do not reach 1e-6." in fast([group(rough)]), fast([group(rough)])
+    elsewhere = [{**r, "scene": SOUND.name} for r in [*both, *others]]
+    truths = [{"scene": scene.name, **TRUTH} for scene in (REDUNDANT, SOUND)]
+    several = judged([REDUNDANT, SOUND], truths, [*rough, *others, *elsewhere])
+    assert fast(several).startswith("MuJoCo, integrated by crosscheck, is the fastest"), fast(several)
+    assert "; its own integrators reach 1e-6 on 1 of 2 scenes." in fast(several), fast(several)
+
+
+def test_engines_of_another_mechanism_are_not_judged():
+    """Right at their best settings or wrong: the sentences name the term, and no verdict counts them."""
+    why = {"mujoco": "change of velocity: truth and mujoco differ by 0.317 (allowed 1e-04)"}
+    found = replace(group(), differences=why)
+    assert headline([found]) == (
+        "mbref and Pinocchio are right at their best settings; with their libraries' defaults neither "
+        "Pinocchio nor Exudyn is; MuJoCo is not judged: the adapter or the scene differs."
+    ), headline([found])
+    assert right([found]) == (
+        "mbref and Pinocchio agree with the truth to 6.1e-9. Exudyn is inaccurate at best: off by 1.70e-04. "
+        "MuJoCo is not judged, because the adapter or the scene differs: change of velocity: truth and "
+        "mujoco differ by 0.317 (allowed 1e-04)."
+    ), right([found])
+    assert "MuJoCo" not in fast([found]) and "MuJoCo" not in breaks([found])
+    assert [found.grade(r) for r in RECORDS[:2]] == [Grade.RIGHT, Grade.UNJUDGED]
+    alone = replace(group([record("mujoco", "tuned", 1.0)]), differences=why)
+    assert headline([alone]) == "MuJoCo is not judged: the adapter or the scene differs."
+    assert right([alone]).startswith("MuJoCo is not judged, because the adapter")
+    both = [found, group([record("mbref", "own", 1e-9, scene=SOUND.name)], SOUND)]
+    assert f"MuJoCo is not judged on {REDUNDANT.name}: the adapter or" in headline(both), headline(both)
 
 
 @pytest.mark.parametrize(("error", "said"), [(2.8, "is not"), (1e-10, "is, too")])
@@ -114,12 +155,16 @@ def test_the_only_engine_with_defaults_is_named(error, said):
 def test_other_results_and_other_sentences():
     good = [record(name, family, 1e-10) for name in ("mujoco", "exudyn") for family in ("defaults", "tuned")]
     assert headline([group(good)]) == (
-        "Both engines are right at their best settings; so are their libraries' defaults."
+        "Both engines are right at their best settings; so are the libraries' defaults of MuJoCo and Exudyn."
     )
     assert breaks([group(good)]) == "No engine's defaults fail or are wrong."
     assert "No engine reaches an error of 1e-6" in fast([group([record("mujoco", "tuned", 1e-3)])])
     compiled = record("mujoco", "forward, compiled", 1e-9, 0.1)
-    assert fast([group([compiled])]).endswith("in 100 ms of stepping." + CLOCK + WITHOUT_PYTHON)
+    assert fast([group([compiled])]) == (
+        "MuJoCo, integrated by crosscheck, reaches an error of 1e-6 in 100 ms of stepping. MuJoCo's fastest "
+        "runs are integrated by crosscheck (“forward, compiled”), as all of its runs here are."
+        + CLOCK + WITHOUT_PYTHON
+    ), fast([group([compiled])])  # fmt: skip
     lost = [record("mbref", "own", 1e-15), failed("exudyn", "tuned", 0.25)]
     assert right([group(lost)]) == (
         "mbref agrees with the truth to less than the truth's own bound, 3e-14. "
@@ -155,7 +200,7 @@ def test_a_motion_that_is_not_known_beside_one_that_is():
     groups = [group(), group(still, SOUND, kind="", reason="two ways", bound=None)]
     assert headline(groups) == (
         "mbref, MuJoCo and Pinocchio are right at their best settings on planar_slider_crank, whose motion "
-        "is known; with their libraries' defaults none is."
+        "is known; with their libraries' defaults none of MuJoCo, Pinocchio and Exudyn is."
     ), headline(groups)
     assert "agree with the truth to 6.1e-9 on planar_slider_crank." in right(groups), right(groups)
 
