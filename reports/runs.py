@@ -14,7 +14,7 @@ from crosscheck.judge.metrics import exact_motion
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.tolerances import ERROR_LEVELS, EXCESS, FALSE_SUCCESS
 from crosscheck.judge.truth import NoSolution, Truth, truth_for
-from crosscheck.study.fair_timing import model_difference
+from crosscheck.study.fair_timing import force_differences, model_difference, model_differences
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import drawn, error_text, varied_settings
 from mbref.scene import Scene
@@ -121,6 +121,14 @@ class SceneRuns:
     def difference(self) -> str | None:
         """The first field in which an engine's mechanism is another one; None when all agree."""
         return model_difference(self.scene, self.gate) if self.gate else None
+
+    @cached_property
+    def differences(self) -> Mapping[str, str]:
+        """By engine, how the mechanism that it simulates differs from the scene; empty without a truth."""
+        if not (self.truth and self.truth["kind"]):
+            return {}
+        at_start = model_differences(self.scene, self.gate) if self.gate else {}
+        return at_start | force_differences(self.scene, [run.record for run in self.runs])
 
     def exact(self, times: np.ndarray) -> Trajectory | None:
         """The true motion at times (k,), in the time that its record was given; None where unknown."""

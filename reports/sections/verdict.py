@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from crosscheck.judge.tolerances import FALSE_SUCCESS, FLOOR
 from crosscheck.study.record_view import ended
 from crosscheck.study.sentences import title, verdict
-from crosscheck.study.verdict import DEFAULTS, Judged, grade
+from crosscheck.study.verdict import DEFAULTS, Grade, Judged, grade
 from reports import places
 from reports.blocks import Block, Heading, Matrix, Opening, Verdict
 from reports.engine_looks import SIGNS, mark, named, tone
@@ -46,7 +46,7 @@ def _figure(group: SceneRuns) -> list[Block]:
 def judged(group: SceneRuns) -> Judged:
     """A scene's runs as the sentences take them."""
     assert group.truth is not None
-    return Judged(group.scene, group.truth, [run.record for run in group.runs])
+    return Judged(group.scene, group.truth, [run.record for run in group.runs], group.differences)
 
 
 def motion(group: SceneRuns | None) -> tuple[str, str]:
@@ -101,7 +101,8 @@ def _row(group: SceneRuns) -> dict[str, list[Verdict]]:
 
 
 def _verdict(group: SceneRuns, run: Run) -> Verdict:
-    found, runs = grade(run.record), group.curves()[run.curve]
+    is_judged = run.curve[0] not in group.differences
+    found, runs = grade(run.record) if is_judged else Grade.UNJUDGED, group.curves()[run.curve]
     lines = [run.said, duration(run.seconds)] if run.completed else [ended(run.record)]
     if failed := sum(not other.completed for other in runs) * run.completed:
         lines.append(f"{failed} of {len(runs)} failed")

@@ -214,6 +214,38 @@ class Scalars(Fake):
                        velocity=good.velocity.tolist(), bodies=list(good.bodies))  # fmt: skip
 
 
+class LosesLoads(Engine):
+    """Pinocchio, given scenes without their loads."""
+
+    name, package = "loses loads", "pin"
+
+    def version(self) -> str:
+        return "1"
+
+    def cannot(self, scene: Scene) -> Cannot | None:
+        return None
+
+    def settings(self, scene: Scene) -> Sequence[Setting]:
+        from crosscheck.engines.pinocchio import ENGINE
+
+        return ENGINE.settings(scene)
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        from crosscheck.engines.pinocchio import ENGINE
+
+        return replace(ENGINE.run(scene.with_(load=()), times, setting), engine=self.name, version="1")
+
+
+class LastOneRuns(Fake):
+    """Has four families, of which the last completes."""
+
+    name = "last"
+
+    def settings(self, scene: Scene) -> list[Setting]:
+        lost = [Setting(family, {"outcome": "NOT_CONVERGED"}) for family in ("first", "second", "third")]
+        return [*lost, Setting("fourth", {})]
+
+
 class Versionless(Fake):
     def version(self) -> str:
         raise RuntimeError("no licence")
@@ -224,6 +256,7 @@ THREADS, MISSING, RECORDER, AGING = Threads(), Missing(), Recorder(), Aging()
 KEEPING, HERALD = Keeping(), Herald()
 SLOW, STUCK, NO_SETTINGS, REFUSING = Slow(), Stuck(), NoSettings(), Refusing()
 MALFORMED, SCALARS, VERSIONLESS = Malformed(), Scalars(), Versionless()
+LOSES_LOADS, LAST_ONE_RUNS = LosesLoads(), LastOneRuns()
 
 
 def converse(text: str) -> tuple[str, int]:

@@ -25,7 +25,7 @@ from crosscheck.study.fair_timing import timed
 from crosscheck.study.hurried import NOT_STARTED, Hurried
 from crosscheck.study.record_view import PUBLIC, is_judged
 from crosscheck.study.truth_sentences import unknown
-from mbref.scene import Body, Moment, Scene
+from mbref.scene import Body, Moment, Revolute, Scene, TorsionSpring
 from mbref.scenes import SCENES
 from mbref.scenes.four_bar import four_bar_gravity
 from mbref.trajectory import Cost, Outcome
@@ -473,10 +473,49 @@ def test_another_mechanism_and_a_comparison_refused(capsys, still):
     asked = ("--engine", FAKE, "--engine", "elsewhere:ENGINE")
     status, out, err = run_main(capsys, "compare", still, *asked)
     assert status == 1, err
-    assert "still: times are not compared" in err and "initial position: truth and elsewhere differ" in err, (
+    assert "still: elsewhere: the adapter or the scene differs: initial position: truth and elsewhere" in err
+    assert "fake is right at its best settings" in out and "plain" in out and " ratio" in out, out
+    assert "elsewhere is not judged, because the adapter or the scene" in " ".join(out.split()), out
+    status, out, _ = run_main(capsys, "compare", still, *asked, "--json")
+    document = json.loads(out)
+    assert status == 1 and list(document["differences"]) == ["elsewhere"], document["differences"]
+    assert document["difference"] == document["differences"]["elsewhere"]
+
+
+def test_mechanisms_that_differ_without_a_truth_and_times_not_compared(capsys, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    asked = ("--engine", FAKE, "--engine", "elsewhere:ENGINE", "--reference-time", "0")
+    status, out, err = run_main(capsys, "compare", two_blocks(tmp_path), *asked)
+    assert status == 1, err
+    assert "two: the engines simulate different mechanisms, so times are not compared: initial pos" in err, (
         err
     )
-    assert "plain" in out and " ratio" not in out, out
+    assert "the engines simulate different mechanisms: initial position" in " ".join(out.split()), out
+    assert " ratio" not in out, "times of different mechanisms were compared"
+
+
+def test_an_adapter_that_loses_a_load_is_not_judged(capsys, tmp_path):
+    """A spring that pulls only once the rod has turned: at the start nothing differs."""
+    block = Body(name="rod", mass=2.0, inertia=(1e-3, 0.1, 0.1), position=(0.5, 0.0, 0.0))
+    hinge = Revolute(name="A", bodies=("ground", "rod"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+    later = TorsionSpring(joint="A", stiffness=30.0, damping=0.0, natural_angle=0.0)
+    Scene(name="later", body=(block,), joint=(hinge,), load=(later,), gravity=(0.0, -9.81, 0.0),
+          duration=0.5).save(tmp_path / "later.toml")  # fmt: skip
+    asked = ("--engine", "pinocchio", "--engine", "fake_engines:LOSES_LOADS", "--setting", "tuned")
+    status, out, err = run_main(capsys, "compare", str(tmp_path / "later.toml"), *asked)
+    assert status == 1, (out, err)
+    said = " ".join(out.split())
+    assert "Pinocchio is right at its best settings" in said, out
+    assert "loses loads is not judged, because the adapter or the scene differs: acceleration at t =" in said
+
+
+def test_other_families_are_tried_before_an_engine_is_said_to_complete_no_run(capsys, still):
+    """An engine of four families of which the first three fail: the fourth is run, and is right."""
+    status, out, _ = run_main(capsys, "compare", still, "--engine", "fake_engines:LAST_ONE_RUNS")
+    assert status == 0 and "last is right at its best settings" in out and "fourth" in out, out
+    asked = ("--engine", "fake_engines:LAST_ONE_RUNS", "--setting", "first")
+    status, out, _ = run_main(capsys, "compare", still, *asked)
+    assert "last completes no run" in " ".join(out.split()) and "fourth" not in out, out
 
 
 def test_fewer_than_five_repeats_is_a_fault(capsys, still):
