@@ -86,16 +86,10 @@ class Mbref(Engine):
         return None
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
-        methods = WITH_SINGULAR_MASS if _has_singular_mass(scene) else METHODS
-        return [setting for family in methods for setting in self.settings_of(scene, family)]
+        return [setting for family in _methods(scene) for setting in self.settings_of(scene, family)]
 
     def best_settings(self, scene: Scene) -> Sequence[Setting]:
-        from mbref.method import default_method
-
-        methods = WITH_SINGULAR_MASS if _has_singular_mass(scene) else METHODS
-        default = default_method(scene).removesuffix("/dop853")
-        order = (default, *methods) if default in methods else methods
-        return next(filter(None, (self.settings_of(scene, family) for family in order)), ())
+        return next(filter(None, (self.settings_of(scene, family) for family in _methods(scene))), ())
 
     def settings_of(self, scene: Scene, family: str) -> Sequence[Setting]:
         if not self.serves(scene, family):
@@ -149,6 +143,16 @@ class Mbref(Engine):
 
         code = "generated" if setting.family.endswith(GENERATED) else "generic"
         return simulate(scene, _method(setting.family), times, Limits(code=code, **setting.options))
+
+
+def _methods(scene: Scene) -> Sequence[str]:
+    """The methods that serve a scene, its default method first, then that with generated code."""
+    from mbref.method import default_method
+
+    if _has_singular_mass(scene):
+        return WITH_SINGULAR_MASS
+    default = default_method(scene).removesuffix("/dop853")
+    return sorted(METHODS, key=lambda method: method.removesuffix(GENERATED) != default)
 
 
 def _has_singular_mass(scene: Scene) -> bool:

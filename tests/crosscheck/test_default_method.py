@@ -1,0 +1,16 @@
+"""mbref as an engine / the default method at quick depth."""
+
+from crosscheck.engine import engine
+from crosscheck.study.grid import default_cases
+from crosscheck.study.sweep import of_few_families
+from mbref.method import default_method
+from mbref.scenes import SCENES
+
+
+def test_a_quick_comparison_has_mbref_at_its_default_method():
+    for scene in (SCENES["four_bar_gravity"](), SCENES["four_bar_chain"]().with_(name="chain")):
+        cases, _ = default_cases(scene, ["mbref"])
+        families = dict.fromkeys(case.setting.family for case in of_few_families(cases))
+        default = default_method(scene).removesuffix("/dop853")
+        assert default in families, (default, list(families))
+        assert engine("mbref").best_settings(scene)[0].family == default
