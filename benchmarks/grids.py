@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 from crosscheck.engine import Setting
-from crosscheck.study.sentences import COMPILED
+from crosscheck.study.speed_sentences import COMPILED
 from mbref.scene import Scene
 from mbref.simulation.simulate import simulate
 

@@ -6,7 +6,7 @@ import functools
 from collections.abc import Mapping
 
 from crosscheck.engine import engine_names
-from crosscheck.study.sentences import title
+from crosscheck.study.speed_sentences import title
 from crosscheck.study.verdict import DEFAULTS, Grade
 
 TONES = 7  # colours of the style sheet; engines of third parties share the last

@@ -25,7 +25,8 @@ from crosscheck.study.record_view import (
     never_moved,
     varied_settings,
 )
-from crosscheck.study.sentences import LEVEL, SAID, Verdict, title
+from crosscheck.study.sentences import Verdict
+from crosscheck.study.speed_sentences import LEVEL, SAID, title
 from crosscheck.study.verdict import Grade, Judged
 
 MEASURED = ("violation_position", "energy_error")  # metrics that the table of runs shows beside the error

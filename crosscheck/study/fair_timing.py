@@ -15,7 +15,7 @@ from crosscheck.study.grid import Case, Record
 from crosscheck.study.least_errors import least_errors
 from crosscheck.study.record_view import is_completed
 from crosscheck.study.scouting import settings
-from crosscheck.study.sentences import COMPILED
+from crosscheck.study.speed_sentences import COMPILED
 from crosscheck.study.verdict import Grade, grade
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory

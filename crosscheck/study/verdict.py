@@ -70,6 +70,11 @@ class Judged:
         """The records of the engines that simulate this mechanism."""
         return [record for record in self.records if record["engine"] not in self.differences]
 
+    @property
+    def is_judged(self) -> bool:
+        """Whether a run by an engine that is judged has an error."""
+        return any(record["metrics"].get("error") is not None for record in self.comparable)
+
     def grade(self, record: Record) -> Grade:
         """The grade of a record; UNJUDGED where its engine simulates another mechanism."""
         return Grade.UNJUDGED if record["engine"] in self.differences else grade(record)

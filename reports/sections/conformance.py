@@ -11,7 +11,7 @@ from typing import Any
 
 from crosscheck.conformance.explained import explanations, proofs
 from crosscheck.conformance.suite import CANNOT, FAIL, MARKS, OUTSIDE, PASS, abouts
-from crosscheck.study.sentences import title
+from crosscheck.study.speed_sentences import title
 from reports.blocks import Block, Heading, Table, Text
 
 Verified = Mapping[str, Any]  # an engine, its version and its verdicts

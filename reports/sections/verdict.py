@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from crosscheck.judge.tolerances import FALSE_SUCCESS, FLOOR
 from crosscheck.study.record_view import ended
-from crosscheck.study.sentences import title, verdict
+from crosscheck.study.sentences import verdict
+from crosscheck.study.speed_sentences import title
 from crosscheck.study.verdict import DEFAULTS, Grade, Judged, grade
 from reports import places
 from reports.blocks import Block, Heading, Matrix, Opening, Verdict

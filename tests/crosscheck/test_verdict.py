@@ -15,16 +15,8 @@ from crosscheck.cli import differences, tables
 from crosscheck.cli.terminal_plot import scatter
 from crosscheck.judge.reference.cache import mechanism
 from crosscheck.study.difference import changes, circumstances, load
-from crosscheck.study.sentences import (
-    ADAPTERS,
-    CLOCK,
-    WITHOUT_PYTHON,
-    breaks,
-    fast,
-    headline,
-    right,
-    verdict,
-)
+from crosscheck.study.sentences import breaks, headline, right, verdict
+from crosscheck.study.speed_sentences import ADAPTERS, CLOCK, WITHOUT_PYTHON, fast
 from crosscheck.study.truth_sentences import truth
 from crosscheck.study.verdict import Grade, Judged, grade, judged
 from crosscheck.study.wording import multiple, span

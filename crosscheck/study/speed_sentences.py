@@ -1,0 +1,117 @@
+"""Sentences on speed: the times in which engines reach an error, and whose integrators do."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+from crosscheck.engine import engine
+from crosscheck.judge.tolerances import ERROR_LEVELS
+from crosscheck.study.grid import Record
+from crosscheck.study.verdict import Judged
+from crosscheck.study.wording import listed, multiple, seconds, span
+
+TITLES = {"mujoco": "MuJoCo", "pinocchio": "Pinocchio", "exudyn": "Exudyn", "simbody": "Simbody",
+          "sundials": "SUNDIALS IDA", "ondsel": "OndselSolver", "casadi": "CasADi"}  # fmt: skip
+LEVEL = ERROR_LEVELS[1]  # the error at which speeds are compared in words
+SAID = f"{LEVEL:.0e}".replace("e-0", "e-")
+
+COMPILED = ", compiled"  # how families end that call an engine's library without Python
+CLOCK = " Times are CPU seconds of stepping"
+ADAPTERS = ", each engine as crosscheck's Python adapter calls it."
+WITHOUT_PYTHON = (
+    ": families with “compiled” in their names call an engine's library without Python, all others are "
+    "called by crosscheck's Python adapter."
+)
+
+
+def title(engine: str) -> str:
+    """An engine's name as its makers write it."""
+    return TITLES.get(engine, engine)
+
+
+def engines_of(groups: Sequence[Judged]) -> list[str]:
+    return list(dict.fromkeys(name for group in groups for name in group.engines()))
+
+
+def fast(groups: Sequence[Judged]) -> str:
+    """Times of stepping that reach LEVEL, as multiples of the fastest engine's, and the integrators that are
+    crosscheck's."""
+    found = {group.scene.name: group.costs(LEVEL) for group in groups}
+    costs = {name: cost for name, cost in found.items() if cost}
+    if not any(group.is_judged for group in groups):
+        return "Without a truth no error is known, so speeds are not compared."
+    if not costs:
+        return f"No engine reaches an error of {SAID}, so speeds are not compared."
+    never = [n for n in engines_of(groups) if not any(n in cost for cost in costs.values())]
+    end = f" {listed(map(title, never))} {'does' if len(never) == 1 else 'do'} not reach it." if never else ""
+    aided = {n for g in groups for n, (_, r) in g.fastest(LEVEL).items() if is_integrated_here(r)}
+    text = _fast_on_one(*costs.values(), aided) if len(groups) == 1 else _fast_on_several(costs, aided)
+    return text + end + _integrated(groups) + CLOCK + (WITHOUT_PYTHON if _has_compiled(groups) else ADAPTERS)
+
+
+def _integrated(groups: Sequence[Judged]) -> str:
+    """The engines whose fastest runs crosscheck integrates, with the time of the engine's own integrators."""
+    found: dict[str, dict[str, None]] = {}
+    for group in groups:
+        for name, (_, record) in group.fastest(LEVEL).items():
+            if is_integrated_here(record):
+                found.setdefault(name, {})[record["family"]] = None
+    return "".join(_by_crosscheck(groups, name, [*families]) for name, families in found.items())
+
+
+def _by_crosscheck(groups: Sequence[Judged], name: str, families: Sequence[str]) -> str:
+    quoted = listed(f"“{family}”" for family in families)
+    text = f" {title(name)}'s fastest runs are integrated by crosscheck ({quoted})"
+    if all(is_integrated_here(r) for group in groups for r in group.comparable if r["engine"] == name):
+        return f"{text}, as all of its runs here are."
+    own = [group.fastest(LEVEL, without=is_integrated_here).get(name) for group in groups]
+    reached = [found for found in own if found is not None]
+    if not reached:
+        return f"{text}; its own integrators do not reach {SAID}."
+    if len(groups) > 1:
+        return f"{text}; its own integrators reach {SAID} on {len(reached)} of {len(groups)} scenes."
+    [(cost, record)] = reached
+    return f"{text}; its own integrator needs {seconds(cost)} (“{record['family']}”)."
+
+
+def is_integrated_here(record: Record) -> bool:
+    """Whether crosscheck integrates the runs of a record's family, with the engine's accelerations."""
+    try:
+        return record["family"] in engine(record["asked"]["engine"]).integrated_here
+    except LookupError:
+        return False
+
+
+def _has_compiled(groups: Sequence[Judged]) -> bool:
+    """Whether a family calls an engine's library without Python."""
+    return any(record["family"].endswith(COMPILED) for group in groups for record in group.records)
+
+
+def _fast_on_one(costs: Mapping[str, float], aided: Collection[str]) -> str:
+    (first, least), *others = sorted(costs.items(), key=lambda item: item[1])
+    text = f"{_whose(first, aided)} reaches an error of {SAID} in {seconds(least)} of stepping"
+    if not others:
+        return f"{text}."
+    return (
+        f"{text}; {listed(f'{title(name)} takes {multiple(cost / least)} as long' for name, cost in others)}."
+    )
+
+
+def _whose(name: str, aided: Collection[str]) -> str:
+    """The engine at the beginning of a sentence on its fastest runs, and whether crosscheck integrates
+    them."""
+    return f"{title(name)}, integrated by crosscheck," if name in aided else title(name)
+
+
+def _fast_on_several(costs: Mapping[str, Mapping[str, float]], aided: Collection[str]) -> str:
+    winners = {scene: min(cost, key=lambda n: cost[n]) for scene, cost in costs.items()}
+    count = {name: list(winners.values()).count(name) for name in dict.fromkeys(winners.values())}
+    first = max(count, key=lambda n: count[n])
+    ratios = [min(c for n, c in cost.items() if n != first) / cost[first]
+              for scene, cost in costs.items() if winners[scene] == first and len(cost) > 1]  # fmt: skip
+    share = f"{count[first]} of {len(costs)}" if count[first] < len(costs) else f"all {len(costs)}"
+    text = f"{_whose(first, aided)} is the fastest to an error of {SAID} on {share} scenes"
+    if ratios:
+        text += f"; the best other engine takes {span(min(ratios), max(ratios))} as long"
+    others = [f"{title(n)} on {listed(s for s, w in winners.items() if w == n)}" for n in count if n != first]
+    return text + (f". Elsewhere the fastest is {listed(others)}." if others else ".")
