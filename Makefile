@@ -37,8 +37,10 @@ fuzz: $(VENV)/ready ## mutated scenes, runs and command lines against both packa
 kills: $(VENV)/ready ## processes of studies and ensembles killed at random moments: is a record lost?
 	$(BIN)/python -m tests.kills
 
-mutants: $(VENV)/ready ## one-line defects planted one at a time: which do the tests see?
-	$(BIN)/python -m tests.mutants
+SEED := 1
+
+mutants: $(VENV)/ready ## 300 defects drawn from the syntax trees (make mutants SEED=2): which do the tests see?
+	$(BIN)/python -m tests.mutants --seed $(SEED) --count 300
 
 coverage: $(VENV)/ready ## coverage of mbref, its kernels run as plain Python
 	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run --source=mbref -m pytest -q tests/properties \

@@ -30,6 +30,7 @@ def title(engine: str) -> str:
 
 
 def engines_of(groups: Sequence[Judged]) -> list[str]:
+    """Return the engines that are judged on any of the scenes."""
     return list(dict.fromkeys(name for group in groups for name in group.engines()))
 
 

@@ -1,9 +1,14 @@
-"""Plant every defect in turn in a copy of the tree, and see whether its tests fail.
+"""Plant drawn mutants one at a time in a copy of the tree, and see whether tests fail that import the file.
 
-``python -m tests.mutants`` prints a line a defect and the score; exit status 1 where a defect survives whose
-table gives no reason.  Results stay in ``build/mutants.jsonl``, and are taken from there as long as the
-defect, its file and its tests are the same: an interrupted run goes on where it ended.
-Kernels run as plain Python, so that none is compiled for a defect.
+``python -m tests.mutants --seed 1 --count 300`` draws so many places of the syntax trees of the packages, and
+prints a line for each and the score of each package.  A mutant is killed where a test fails; where the tests
+run out of time it is counted apart.  ``--only mbref/taylor`` draws from files of that path alone, and
+``--list`` prints the mutants without running tests.  Mutants that change nothing are listed with the reason
+in ``tests/mutants/equivalent.py``.
+
+Results stay in ``build/mutants.jsonl`` and are taken from there as long as the file and its tests are the
+same, so that an interrupted run goes on where it ended.  Kernels run as plain Python, so that none is
+compiled for a mutant.  Exit status 1 where a mutant survives or runs out of time.
 """
 
 from __future__ import annotations
@@ -12,130 +17,178 @@ import argparse
 import hashlib
 import json
 import os
+import random
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from tests.mutants.defects import DEFECTS, Defect
+from tests.mutants.equivalent import reason
+from tests.mutants.importers import PACKAGES, importers
+from tests.mutants.operators import Mutant, mutants
 
 ROOT = Path(__file__).parents[2]
-COPIED = ("mbref", "crosscheck", "reports", "tests", "examples", "benchmarks", "pyproject.toml", "README.md")
+COPIED = (*PACKAGES, "tests", "examples", "benchmarks", "docs", "pyproject.toml", "README.md")
 KEPT = ROOT / "build" / "mutants.jsonl"
-MINUTES = 4  # after which the tests of a defect count as failed: it hangs
+KILLED, SURVIVED, TIMED_OUT = "killed", "survived", "timed out"
+EQUIVALENT, UNTESTED = "equivalent", "untested"
+LEAST, FACTOR = 60.0, 4.0  # s that tests may take with a mutant, and multiples of their time without
+LONGEST = 240.0  # s that they may take without; tests that take longer are left out
 JITTED = ("mbref/kernels/",)  # what plain Python does not run
 
 
 class Tree:
-    """A copy of the sources, in which defects are planted."""
+    """A copy of the sources, in which mutants are planted."""
 
-    def __init__(self, place: Path) -> None:
-        self.place = place
-        self.sound: set[str] = set()
-        for name in COPIED:
-            copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
-            copy(ROOT / name, place / name)
+    def __init__(self, place: Path, root: Path = ROOT, copied: Sequence[str] = COPIED) -> None:
+        self.place, self._seconds = place, {}  # type: ignore[var-annotated]
+        for name in (name for name in copied if (root / name).exists()):
+            copy = shutil.copytree if (root / name).is_dir() else shutil.copy
+            copy(root / name, place / name)
 
-    def kills(self, defect: Defect) -> bool:
-        """Whether the defect's tests, which pass without it, fail with it; the tree is left as it was."""
-        jitted = defect.file.startswith(JITTED)
-        self._check_soundness(defect.tests, jitted)
-        path = self.place / defect.file
+    def result(self, mutant: Mutant, tests: Sequence[str]) -> str:
+        """Return whether the tests see a mutant: KILLED, SURVIVED or TIMED_OUT, or UNTESTED where no test
+        passes without it.  The tree is left as it was."""
+        jitted = mutant.file.startswith(JITTED)
+        sound = [test for test in tests if self._time(test, jitted) <= LONGEST]
+        path = self.place / mutant.file
         good = path.read_text()
-        if good.count(defect.old) != 1:
-            raise ValueError(f"{defect.file}: has {defect.old!r} {good.count(defect.old)} times, not once")
-        path.write_text(good.replace(defect.old, defect.new))
+        path.write_text(mutant.planted(good))
         try:
-            return not self._passes(defect.tests, jitted)
+            for test in sound:
+                limit = max(LEAST, FACTOR * self._time(test, jitted))
+                status = self._run(test, jitted, limit)
+                if status != 0:
+                    return TIMED_OUT if status is None else KILLED
         finally:
             path.write_text(good)
+        return SURVIVED if sound else UNTESTED
 
-    def _check_soundness(self, tests: str, jitted: bool) -> None:
-        if tests not in self.sound and not self._passes(tests, jitted):
-            raise RuntimeError(f"{tests}: fails without a defect, or takes longer than {MINUTES} minutes")
-        self.sound.add(tests)
+    def _time(self, test: str, jitted: bool) -> float:
+        """The seconds that a test file takes without a mutant; infinite where it fails."""
+        if (test, jitted) not in self._seconds:
+            begun = time.monotonic()
+            passed = self._run(test, jitted, LONGEST) == 0
+            self._seconds[test, jitted] = time.monotonic() - begun if passed else float("inf")
+        return self._seconds[test, jitted]
 
-    def _passes(self, tests: str, jitted: bool) -> bool:
+    def _run(self, test: str, jitted: bool, limit: float) -> int | None:
+        """Return the exit status of pytest on a file: 0 passed, 1 failed, 2 not even collected, 5 without
+        a test, which passes; None when the time was up."""
         environment = {**os.environ, "PYTHONPATH": str(self.place), "PYTHONDONTWRITEBYTECODE": "1",
                        "HYPOTHESIS_PROFILE": "first"}  # fmt: skip
         if not jitted:
             environment["NUMBA_DISABLE_JIT"] = "1"
-        command = [sys.executable, "-P", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *tests.split()]
+        command = [sys.executable, "-P", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", test]
         try:
             done = subprocess.run(command, cwd=self.place, env=environment, capture_output=True, text=True,
-                                  timeout=60 * MINUTES, check=False)  # fmt: skip
+                                  timeout=limit, check=False)  # fmt: skip
         except subprocess.TimeoutExpired:
-            return False
-        if done.returncode not in (0, 1, 2):  # passed, failed, or not even collected
-            raise RuntimeError(done.stdout + done.stderr)
-        return done.returncode == 0
+            return None
+        return 0 if done.returncode == 5 else done.returncode
 
 
-def key(defect: Defect) -> str:
-    """A digest of the defect, its file and its tests."""
-    files = [defect.file, *(node.split("::")[0] for node in defect.tests.split())]
-    texts = [*map(str, defect), *((ROOT / name).read_text() for name in files)]
+def drawn(seed: int, count: int, only: str = "") -> list[Mutant]:
+    """Return ``count`` mutants, or all where there are fewer, of the files whose path begins with ``only``.
+
+    Half of them are drawn by file and then by place, the others by place alone, so that small files are seen,
+    too.
+    """
+    files = {name: mutants(name, (ROOT / name).read_text()) for name in _files(only)}
+    files = {name: found for name, found in files.items() if found}
+    draw = random.Random(f"{seed} {only}")
+    places = [mutant for found in files.values() for mutant in found]
+    chosen: dict[Mutant, None] = {}
+    while len(chosen) < min(count, len(places)):
+        pool = places if len(chosen) % 2 else files[draw.choice(list(files))]
+        chosen[draw.choice(pool)] = None
+    return list(chosen)
+
+
+def _files(only: str) -> Iterator[str]:
+    for package in PACKAGES:
+        for path in sorted((ROOT / package).rglob("*.py")):
+            name = path.relative_to(ROOT).as_posix()
+            if name.startswith(only):
+                yield name
+
+
+def key(mutant: Mutant, tests: Sequence[str]) -> str:
+    """Return a digest of the mutant, its file and its tests."""
+    texts = [*map(str, mutant), *((ROOT / name).read_text() for name in (mutant.file, *tests))]
     return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:16]
 
 
-def known() -> dict[str, bool]:
-    """Results of runs before, by key."""
-    lines = KEPT.read_text().splitlines() if KEPT.exists() else []
-    return {record["key"]: record["killed"] for record in map(json.loads, lines)}
+def known(path: Path = KEPT) -> dict[str, str]:
+    """Return the results of runs before, by key."""
+    lines = path.read_text().splitlines() if path.exists() else []
+    return {record["key"]: record["result"] for record in map(json.loads, lines) if "result" in record}
 
 
-def run(chosen: Sequence[Defect], seconds: float) -> dict[Defect, bool]:
-    """Which of the defects were killed; none is begun after that time."""
+def run(chosen: Sequence[Mutant], seconds: float) -> dict[Mutant, str]:
+    """Return the result of each mutant; none is begun after that time."""
     found, before, end = {}, known(), time.monotonic() + seconds
     KEPT.parent.mkdir(exist_ok=True)
     with ExitStack() as stack:
         tree: Tree | None = None
-        for k, defect in enumerate(chosen, 1):
-            name = key(defect)
-            if name not in before:
+        for k, mutant in enumerate(chosen, 1):
+            tests = importers(mutant.file)
+            name = key(mutant, tests)
+            if why := reason(mutant, (ROOT / mutant.file).read_text()):
+                before[name] = EQUIVALENT
+            elif name not in before:
                 if time.monotonic() > end:
                     break
                 tree = tree or Tree(Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="mutants-"))))
-                before[name] = tree.kills(defect)
+                before[name] = tree.result(mutant, tests)
                 with KEPT.open("a") as file:
-                    print(json.dumps({"key": name, "killed": before[name]}), file=file)
-            found[defect] = before[name]
-            print(f"{k:3} of {len(chosen)}: {_line(defect, found[defect])}", flush=True)
+                    print(json.dumps({"key": name, "result": before[name]}), file=file)
+            found[mutant] = before[name]
+            print(f"{k:3} of {len(chosen)}: {found[mutant]:10} {_line(mutant)}  {why or ''}", flush=True)
     return found
 
 
-def _line(defect: Defect, killed: bool) -> str:
-    word = "killed  " if killed else "SURVIVED" if not defect.unseen else "unseen  "
-    return f"{word} {defect.file}: {defect.old!r} → {defect.new!r}   ({defect.unseen or defect.tests})"
+def _line(mutant: Mutant) -> str:
+    old, new = (" ".join(text.split()) for text in (mutant.old, mutant.new))
+    return f"{mutant.file}:{mutant.line} {mutant.kind}: {old} → {new}"
+
+
+def score(results: Sequence[str]) -> str:
+    """Return the killed mutants of those that change something, and the numbers of the others."""
+    real = [result for result in results if result != EQUIVALENT]
+    killed = real.count(KILLED)
+    others = [f"{results.count(r)} {r}" for r in (TIMED_OUT, SURVIVED, UNTESTED, EQUIVALENT) if r in results]
+    return ", ".join([f"{killed} of {len(real)} killed ({killed / max(1, len(real)):.0%})", *others])
 
 
 def main() -> int:
     """Run the command line."""
-    parser = argparse.ArgumentParser(prog="python -m tests.mutants", description=__doc__)
-    parser.add_argument(
-        "--only", default="", metavar="TEXT", help="defects whose file or tests have the text"
-    )
-    parser.add_argument("--minutes", type=float, default=float("inf"), help="begin no defect after these")
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.mutants", description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    parser.add_argument("--seed", type=int, default=1, metavar="S", help="default: 1")
+    parser.add_argument("--count", type=int, default=300, metavar="N", help="default: 300")
+    parser.add_argument("--only", default="", metavar="PATH", help="files whose path begins so")
+    parser.add_argument("--minutes", type=float, default=float("inf"), help="begin no mutant after these")
+    parser.add_argument("--list", action="store_true", help="print the mutants and their tests, run nothing")
     options = parser.parse_args()
-    chosen = [d for d in DEFECTS if options.only in f"{d.file} {d.tests}"]
+    chosen = drawn(options.seed, options.count, options.only)
+    if options.list:
+        for mutant in chosen:
+            print(f"{_line(mutant)}   ({' '.join(importers(mutant.file)) or 'no test imports it'})")
+        return 0
     found = run(chosen, 60 * options.minutes)
-    areas = sorted({_area(d) for d in found})
-    print(", ".join(f"{area} {_score([found[d] for d in found if _area(d) == area])}" for area in areas))
+    for package in PACKAGES:
+        if results := [result for mutant, result in found.items() if mutant.file.startswith(f"{package}/")]:
+            print(f"{package}: {score(results)}")
     left = len(chosen) - len(found)
-    print(f"{_score([*found.values()])} killed" + (f", {left} not run" if left else ""))
-    return 0 if not left and all(dead or defect.unseen for defect, dead in found.items()) else 1
-
-
-def _area(defect: Defect) -> str:
-    return defect.file.rsplit("/", 1)[0]
-
-
-def _score(killed: Sequence[bool]) -> str:
-    return f"{sum(killed)} of {len(killed)} ({sum(killed) / max(1, len(killed)):.0%})"
+    print(f"all: {score([*found.values()])}" + (f", {left} not run" if left else ""))
+    return 0 if not left and set(found.values()) <= {KILLED, EQUIVALENT} else 1
 
 
 if __name__ == "__main__":

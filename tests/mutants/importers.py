@@ -1,0 +1,61 @@
+"""The tests that import a source file, the nearest first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+
+from tests.meta.imports import ROOT, imported, module_name, sources
+
+PACKAGES = ("mbref", "crosscheck", "reports")
+FEWEST = 4  # test files that are run, where so many reach the source
+FARTHEST = 3  # imports between a test and the source
+SNAPSHOTS = ("tests/reports/test_reference_report.py",)  # they see that a text changed, not that it is wrong
+
+
+def importers(file: str) -> list[str]:
+    """Return the test files that import a source file, directly or through other sources, until there are
+    FEWEST of them; tests that only compare a stored text are left out."""
+    wanted, seen = {_module(file)}, {_module(file)}
+    found: list[str] = []
+    for _ in range(FARTHEST):
+        found += [test for test in _tests() if test not in found and _tests()[test] & wanted]
+        if len(found) >= FEWEST:
+            break
+        wanted = {module for module, targets in _arrows().items() if targets & seen}
+        seen |= wanted
+    return found
+
+
+def _module(file: str) -> str:
+    return module_name(ROOT / file)
+
+
+@cache
+def _arrows() -> Mapping[str, set[str]]:
+    """Module → modules of the packages that it imports."""
+    modules = {name: path for package in PACKAGES for name, path in sources(package).items()}
+    return {name: _known(path, modules) - {name} for name, path in modules.items()}
+
+
+@cache
+def _tests() -> Mapping[str, set[str]]:
+    """Test file → modules that it imports; helpers that it imports count as a part of it."""
+    modules = [name for package in PACKAGES for name in sources(package)]
+    helpers = {module_name(path): path for path in sorted((ROOT / "tests").rglob("*.py"))}
+    found = {}
+    for path in sorted((ROOT / "tests").rglob("test_*.py")):
+        name = path.relative_to(ROOT).as_posix()
+        if name in SNAPSHOTS or name.startswith(("tests/meta/", "tests/mutants/")):
+            continue
+        used = _known(path, modules)
+        for helper in _known(path, helpers):
+            used |= _known(helpers[helper], modules)
+        found[name] = used
+    return found
+
+
+def _known(path: Path, modules: Sequence[str] | Mapping[str, Path]) -> set[str]:
+    """The modules, of those given, that a file imports."""
+    return set(imported(path)) & set(modules)

@@ -1,0 +1,159 @@
+"""The mutants of a source: every change of one place in its syntax tree that an operator makes."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from typing import NamedTuple
+
+SIGNS = {ast.Add: "-", ast.Sub: "+"}
+FACTORS = {ast.Mult: "/", ast.Div: "*"}
+COMPARISONS = {ast.Lt: "<=", ast.LtE: "<", ast.Gt: ">=", ast.GtE: ">", ast.Eq: "!=", ast.NotEq: "==",
+               ast.In: "not in", ast.NotIn: "in", ast.Is: "is not", ast.IsNot: "is"}  # fmt: skip
+EXTREMES = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum", "argmin": "argmax",
+            "argmax": "argmin", "any": "all", "all": "any", "sin": "cos", "cos": "sin"}  # fmt: skip
+KINDS = ("sign", "factor", "comparison", "constant", "index", "extreme", "argument order", "statement",
+         "condition", "bodies")  # fmt: skip
+
+
+class Mutant(NamedTuple):
+    """The bytes ``start`` to ``end`` of a file, in a ``line``, become ``new`` instead of ``old``."""
+
+    file: str
+    line: int
+    kind: str
+    old: str
+    new: str
+    start: int
+    end: int
+
+    def planted(self, source: str) -> str:
+        """Return the source with the mutant."""
+        data = source.encode()
+        return (data[: self.start] + self.new.encode() + data[self.end :]).decode()
+
+
+def mutants(file: str, source: str) -> list[Mutant]:
+    """Return all mutants of a file, in the order of their places; none of annotations, docstrings, texts and
+    imports for types alone."""
+    lines = source.encode().splitlines(keepends=True)
+    starts = [sum(map(len, lines[:k])) for k in range(len(lines))]
+
+    def place(node: ast.AST) -> tuple[int, int]:
+        at = starts[node.lineno - 1] + node.col_offset  # type: ignore[attr-defined]
+        return at, starts[node.end_lineno - 1] + node.end_col_offset  # type: ignore[attr-defined]
+
+    found = []
+    for node in _nodes(ast.parse(source)):
+        for kind, part, new in _changes(node):
+            start, end = place(part)
+            old = source.encode()[start:end].decode()
+            found.append(Mutant(file, part.lineno, kind, old, new, start, end))  # type: ignore[attr-defined]
+    return sorted(set(found), key=lambda m: (m.start, m.end, m.new))
+
+
+def _nodes(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield the nodes of a tree whose changes can be seen."""
+    yield node
+    for name, value in ast.iter_fields(node):
+        if name in ("annotation", "returns", "decorator_list") or isinstance(value, ast.JoinedStr):
+            continue
+        for child in value if isinstance(value, list) else [value]:
+            if isinstance(child, ast.AST) and not _is_left(child):
+                yield from _nodes(child)
+
+
+def _is_left(node: ast.AST) -> bool:
+    if isinstance(node, ast.If):
+        return ast.unparse(node.test) == "TYPE_CHECKING"
+    return isinstance(node, ast.JoinedStr)
+
+
+def _changes(node: ast.AST) -> Iterator[tuple[str, ast.AST, str]]:
+    """Yield kind, the part of the node that is replaced, and its new text."""
+    for kind in (_operations, _comparisons, _numbers, _calls, _statements, _conditions):
+        yield from kind(node)
+
+
+Changes = Iterator[tuple[str, ast.AST, str]]
+
+
+def _operations(node: ast.AST) -> Changes:
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        yield "sign", node, f"(+{ast.unparse(node.operand)})"
+    if not isinstance(node, ast.BinOp) or _is_text(node.left) or _is_text(node.right):
+        return
+    for kind, table in (("sign", SIGNS), ("factor", FACTORS)):
+        if type(node.op) in table:
+            left, right = f"({ast.unparse(node.left)})", f"({ast.unparse(node.right)})"
+            yield kind, node, f"({left} {table[type(node.op)]} {right})"
+
+
+def _is_text(node: ast.AST) -> bool:
+    return isinstance(node, ast.JoinedStr | ast.List) or (
+        isinstance(node, ast.Constant) and isinstance(node.value, str)
+    )
+
+
+def _comparisons(node: ast.AST) -> Changes:
+    if isinstance(node, ast.Compare) and len(node.ops) == 1 and type(node.ops[0]) in COMPARISONS:
+        left, right = ast.unparse(node.left), ast.unparse(node.comparators[0])
+        yield "comparison", node, f"({left} {COMPARISONS[type(node.ops[0])]} {right})"
+
+
+def _numbers(node: ast.AST) -> Changes:
+    if isinstance(node, ast.Subscript) and not isinstance(node.value, ast.Name | ast.Attribute):
+        return
+    if isinstance(node, ast.Subscript) and (isinstance(node.slice, ast.Constant)):
+        if type(node.slice.value) is int:
+            yield "index", node.slice, str(node.slice.value + 1)
+    elif isinstance(node, ast.Constant) and isinstance(node.value, bool):
+        yield "constant", node, str(not node.value)
+    elif isinstance(node, ast.Constant) and type(node.value) is int:
+        yield "constant", node, str(node.value + 1)
+    elif isinstance(node, ast.Constant) and type(node.value) is float:
+        yield "constant", node, repr(2 * node.value or 1.0)
+
+
+def _calls(node: ast.AST) -> Changes:
+    if not isinstance(node, ast.Call):
+        return
+    called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+    if called in EXTREMES:
+        whole = ast.unparse(node.func)
+        yield "extreme", node.func, whole.removesuffix(called) + EXTREMES[called]
+    pairs = zip(node.args, node.args[1:], strict=False)
+    if called in ("isinstance", "getattr", "hasattr", "replace", "open"):
+        return
+    for k, (first, second) in enumerate(pairs):
+        if isinstance(first, ast.Starred) or isinstance(second, ast.Starred):
+            continue
+        if ast.unparse(first) != ast.unparse(second):
+            swapped = [*node.args[:k], second, first, *node.args[k + 2 :]]
+            changed = ast.Call(node.func, swapped, node.keywords)
+            yield "argument order", node, ast.unparse(changed)
+
+
+def _statements(node: ast.AST) -> Changes:
+    is_call = isinstance(node, ast.Expr) and isinstance(node.value, ast.Call | ast.Yield | ast.YieldFrom)
+    if is_call or isinstance(node, ast.AugAssign | ast.Break | ast.Continue | ast.Raise):
+        yield "statement", node, "pass"
+
+
+def _conditions(node: ast.AST) -> Changes:
+    if isinstance(node, ast.BoolOp):
+        for k in range(len(node.values)):
+            rest = [*node.values[:k], *node.values[k + 1 :]]
+            text = ast.unparse(rest[0] if len(rest) == 1 else ast.BoolOp(node.op, rest))
+            yield "condition", node, f"({text})"
+    if isinstance(node, ast.comprehension):
+        for test in node.ifs:
+            yield "condition", test, "True"
+    if isinstance(node, ast.If | ast.While):
+        yield "condition", node.test, f"(not ({ast.unparse(node.test)}))"
+    if isinstance(node, ast.IfExp):
+        yield (
+            "bodies",
+            node,
+            (f"({ast.unparse(node.orelse)} if {ast.unparse(node.test)} else {ast.unparse(node.body)})"),
+        )
