@@ -50,5 +50,5 @@ def _changed(first: Setting, second: Setting, change: Callable[[float, float], f
         pair = options[name], second.options.get(name)
         if not all(isinstance(value, float) and value > 0 for value in pair):
             return None
-        options[name] = float(f"{change(*map(float, pair)):.{DIGITS}g}")  # type: ignore[arg-type]
+        options[name] = float(f"{change(*map(float, pair)):.{DIGITS}g}")
     return None if options == dict(first.options) else Setting(first.family, options)

@@ -51,15 +51,15 @@ def at_start(model: Model, q: np.ndarray, v: np.ndarray) -> Terms:
 def patterns(model: Model, terms: Terms) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which entries (m, 12) of the Jacobian are other than zero at one of k states; which rows (m,) ask for a
     motion, and on which columns (n,) a force acts."""
-    entries, rows, columns = (found.any(axis=0) for found in nonzero(model, terms))
-    return entries, rows, columns
+    entries, rows, columns = (np.any(found, axis=0) for found in nonzero(model, terms))
+    return np.asarray(entries), np.asarray(rows), np.asarray(columns)
 
 
 def nonzero(model: Model, terms: Terms) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """``patterns`` of each state: entries (…, m, 12), rows (…, m) and columns (…, n)."""
-    entries = (terms.jacobian != 0) & model.structure.of_bodies
-    rows = (terms.gamma != 0) | (terms.phi != 0) | (terms.nu != 0)
-    return entries, rows, terms.force != 0
+    entries: np.ndarray = (terms.jacobian != 0) & model.structure.of_bodies
+    rows: np.ndarray = (terms.gamma != 0) | (terms.phi != 0) | (terms.nu != 0)
+    return entries, rows, np.not_equal(terms.force, 0)
 
 
 def reached(

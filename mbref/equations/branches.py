@@ -243,7 +243,7 @@ def _roots_of_many(forms: np.ndarray) -> tuple[list[np.ndarray], bool] | None:
     simple: list[np.ndarray] = []
     multiple: list[np.ndarray] = []
     for _ in range(STARTS if len(forms) >= d - 1 else 0):
-        a, left, is_simple = _root_from(forms, random.normal(size=d))
+        a, left, is_simple = _root_from(forms, np.asarray(random.normal(size=d)))
         known, near = (simple, SAME) if is_simple else (multiple, BROAD)
         if left <= ZERO and all(_angle(a, b) >= near for b in known):
             known.append(a)

@@ -117,7 +117,8 @@ class Evidence:
 def _of_rounds(found: np.ndarray, rounds: int) -> np.ndarray:
     """Whether something is so at one of the states (s, k, …) of a round, which have as many each."""
     scenes, states = found.shape[:2]
-    return found.reshape(scenes, rounds, states // max(rounds, 1), *found.shape[2:]).any(axis=2)
+    each: np.ndarray = found.reshape(scenes, rounds, states // max(rounds, 1), *found.shape[2:])
+    return np.any(each, axis=2)
 
 
 class Trials:

@@ -98,9 +98,9 @@ def consistent_starts(scenes: Alike) -> list[Start | SceneError]:
     (v, given), model = given_velocities(scenes.bodies, q), scenes.model
     if not (v.any() or terms.nu.any()):
         return [faults.get(k) or Start(q[k], v[k], float(before[k]), 0.0, v[k]) for k in range(len(q))]
-    scale = np.ones((len(q), model.nb, 2, 3))
-    scale[:, :, 1] = 1 / scenes.length[:, None, None]
-    scale = scale.reshape(v.shape)
+    by_body = np.ones((len(q), model.nb, 2, 3))
+    by_body[:, :, 1] = 1 / scenes.length[:, None, None]
+    scale = by_body.reshape(v.shape)
     jacobian = terms.jacobian if model.m > LARGE else model.dense(terms.jacobian) * scale[:, None]
     rates = map(Rates, v, given, terms.nu, scale, jacobian)
     states = enumerate(zip(q, before.tolist(), rates, strict=True))
@@ -126,7 +126,7 @@ def _start(scenes: Alike, k: int, q: np.ndarray, before: float, rates: Rates) ->
         return fault
     along = _along_branch(scenes.model_of(k), q, v, rates.given) if is_open and np.any(v) else None
     follows = along is not None
-    return Start(q, along if follows else v, before, off, rates.v, follows)
+    return Start(q, v if along is None else along, before, off, rates.v, follows)
 
 
 def _along_branch(model: Model, q: np.ndarray, v: np.ndarray, given: np.ndarray) -> np.ndarray | None:

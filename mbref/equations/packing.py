@@ -108,13 +108,13 @@ class Packs:
     def _places(self, primitives: Sequence[Sequence[Primitive]], driven: Mapping[str, int]) -> Places:
         """All of a scene but its numbers, from the primitives of each joint, the first scene's first."""
         scene, joints = self.scenes[0], self.joints[0]
-        ends = [tuple(map(self.index.__getitem__, joint.bodies)) for joint in joints]
+        ends = [(self.index[joint.bodies[0]], self.index[joint.bodies[1]]) for joint in joints]
         loads = () if self.kinematic else scene.load
         return Places(
             nb=self.nb,
             primitives=tuple(
-                PrimitivePlace(p.kind, joint.name, *bodies, driven[joint.name] if p.driven else -1)
-                for joint, bodies, found in zip(joints, ends, primitives, strict=False)
+                PrimitivePlace(p.kind, joint.name, first, second, driven[joint.name] if p.driven else -1)
+                for joint, (first, second), found in zip(joints, ends, primitives, strict=False)
                 for p in found
             ),
             loads=tuple(self._load_place(k, load) for k, load in enumerate(loads)),
@@ -189,15 +189,12 @@ class Packs:
         )
         own = self.in_bodies(world)
         of_primitives, vectors = own[:, : 5 * p].reshape(s, p, 5, 3), own[:, 5 * p :].reshape(s, l, 6, 3)
-        primitives = Primitives(
-            self._all(structure.kind), self._all(structure.first), self._all(structure.second),
-            self._all(structure.driver), self._all(structure.row),
-            *(of_primitives[:, :, k] for k in range(5)), numbers[..., 15],
-        )  # fmt: skip
-        loads = Loads(
-            *map(self._all, structure.load), self._all(structure.angle), of_loads[..., :3],
-            *(vectors[:, :, k] for k in range(6)), *(of_loads[..., k] for k in range(21, 24)),
-        )  # fmt: skip
+        places = (structure.kind, structure.first, structure.second, structure.driver, structure.row)
+        directions = [of_primitives[:, :, k] for k in range(5)]
+        primitives = Primitives._make([*map(self._all, places), *directions, numbers[..., 15]])
+        ends = [*map(self._all, structure.load), self._all(structure.angle), of_loads[..., :3]]
+        constants = [of_loads[..., k] for k in range(21, 24)]
+        loads = Loads._make([*ends, *(vectors[:, :, k] for k in range(6)), *constants])
         return primitives, loads
 
     def in_bodies(self, vectors: np.ndarray) -> np.ndarray:
@@ -310,5 +307,5 @@ def _numbers_of(load: Load, scene: Scene) -> tuple[float, ...]:
     if isinstance(load, Spring):
         first, second = load.points
         return *NONE, *first, *second, *NONE * 4, load.stiffness, load.damping, load.natural_length
-    x, y, z = frame(scene.joint_named(load.joint).axis)
+    x, y, z = frame(scene.joint_named(load.joint).directions[0])
     return *NONE * 3, *z, *x, *y, *x, load.stiffness, load.damping, load.natural_angle

@@ -77,9 +77,11 @@ def _static_rows(entries: np.ndarray, columns: np.ndarray, held: Sequence[Held])
     """The rows that hold; a column's other entries are of rows whose multipliers are known by then."""
     row, entry = np.nonzero(entries)
     in_column: dict[int, list[int]] = {}
-    for r, e in zip(row, entry, strict=True):
-        in_column.setdefault(int(columns[r, e]), []).append(12 * int(r) + int(e))
-    rows, starts, own, own_columns, firsts, others = [], [0], [], [], [0], []
+    for r, e in zip(row.tolist(), entry.tolist(), strict=True):
+        in_column.setdefault(int(columns[r, e]), []).append(12 * r + e)
+    rows: list[int] = []
+    starts, own, own_columns, firsts = [0], list[int](), list[int](), [0]
+    others: list[int] = []
     for each in reversed(held):
         for r in each.rows:
             for column in each.columns:
@@ -218,7 +220,7 @@ class _Rows:
     def at(self, row: int, columns: Sequence[int]) -> list[list[float]]:
         """The numbers of a row in these columns, state by state."""
         numbers, entry = self.numbers[row], self.entry[row]
-        return list(zip(*(numbers[entry[column]] for column in columns), strict=True))
+        return [list(state) for state in zip(*(numbers[entry[column]] for column in columns), strict=True)]
 
 
 def _tries(

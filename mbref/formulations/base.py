@@ -134,5 +134,5 @@ class Formulation:
             options=self.packed_options(options),
             scratch=packed(self.linear_algebra.scratch(m, n, factor)),
         )
-        status = self.accelerate.callable(packed(system).argument)
+        status: Any = self.accelerate.callable(packed(system).argument)
         return status, system.acceleration, system.multipliers

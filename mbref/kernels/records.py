@@ -5,12 +5,14 @@ from __future__ import annotations
 import functools
 import operator
 import typing
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
+Schema = TypeVar("Schema")
 
-class Numbers(np.void):
+
+class Numbers(np.void):  # type: ignore[misc]  # NumPy's stubs call it final
     """Numbers of a schema in memory of their own; a class of its own gives each schema's numbers by name."""
 
     __slots__ = ()
@@ -46,6 +48,7 @@ def _number(name: str) -> property:
     return property(operator.itemgetter(name), put)
 
 
-def record(values: Any) -> Numbers:
-    """The numbers of a record in memory of their own, to be read and written by name."""
-    return np.array([values], dtype=numbers_of(type(values)))[0]
+def record(values: Schema) -> Schema:
+    """Return the numbers of a record in memory of their own, to be read and written by name."""
+    kind: Any = type(values)
+    return np.array([values], dtype=numbers_of(kind))[0]

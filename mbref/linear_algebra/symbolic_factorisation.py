@@ -154,7 +154,8 @@ def _products(
         pairs.append((group[first], group[second]))
     left, right = (np.concatenate(side) for side in zip(*pairs, strict=True))
     target = np.searchsorted(l_key, row[right] * size + row[left])
-    return tuple(_sorted_by(target, left, right))
+    target, left, right = _sorted_by(target, left, right)
+    return target, left, right
 
 
 def _updates(
@@ -169,4 +170,5 @@ def _updates(
         keys.append(l_row[below[first]] * size + l_row[below[second]])
         pairs.append((below[first], below[second]))
     left, right = (np.concatenate(side) for side in zip(*pairs, strict=True))
-    return tuple(_sorted_by(np.searchsorted(l_key, np.concatenate(keys)), left, right))
+    target, left, right = _sorted_by(np.searchsorted(l_key, np.concatenate(keys)), left, right)
+    return target, left, right
