@@ -22,6 +22,7 @@ from crosscheck.judge.truth import truth_for
 from mbref import find_scene, simulate
 from mbref.drawing.picture import moving, still
 from mbref.drawing.view import View
+from mbref.formulations import FORMULATIONS
 from mbref.scene import JOINT_TYPES, Scene
 
 ROOT = Path(__file__).parents[1]
@@ -57,10 +58,22 @@ LOADS = {
 }  # fmt: skip
 
 
+sys.path.insert(0, str(ROOT / "docs"))
+from method_pages import TABLE, pages, table, with_formulations  # noqa: E402
+
+
+def on_config(config: Any) -> Any:
+    """Adds the pages of the formulations to the contents."""
+    config["nav"] = with_formulations(config["nav"])
+    return config
+
+
 def on_files(files: Any, config: Any) -> Any:
     """Adds the figures, and the files of the project that pages link to."""
     for name, picture in figures().items():
         files.append(File.generated(config, f"figures/{name}.svg", content=picture))
+    for path, text in pages().items():
+        files.append(File.generated(config, path, content=text))
     for path in sorted(
         {link for file in files.documentation_pages() for link in _outside(file.content_string)}
     ):
@@ -100,6 +113,7 @@ def joint_scene(kind: str) -> Scene:
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     """Runs commands, fills tables of measurements, sets formulas, leads links to copies of files."""
+    markdown = markdown.replace(TABLE, table(FORMULATIONS.values()))
     markdown = re.sub(r"^```run\n(.*?)^```$", _Commands(), markdown, flags=re.S | re.M)
     markdown = re.sub(r"<!-- measured: (.+?) -->", lambda m: measured(m[1].split()), markdown)
     up = "../" * page.file.src_uri.count("/")

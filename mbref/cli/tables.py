@@ -18,17 +18,7 @@ from mbref.stabilisation import STABILISATIONS
 
 METHOD = "a method: formulation+stabilisation/integrator, such as lm2+baumgarte[alpha=10,beta=10]/rk4"
 SHELLS = ("bash", "zsh", "tcsh")
-MEANINGS = {  # of the parts of a method
-    "lm1": "Lagrange multipliers with the accelerations by LU; no redundant rows",
-    "lm2": "multipliers first, by Cholesky; cheap; no redundant rows",
-    "lm2-first-rows": "lm2 without the rows that are dependent at t = 0",
-    "lm2-step-rows": "lm2 without the rows that are dependent at each step",
-    "alf": "augmented Lagrangian, a penalty iterated; bodies may lack inertia",
-    "alf-dual": "augmented Lagrangian on the multipliers; redundant rows; with the default of many bodies",
-    "mpi-svd": "Moore-Penrose inverse by singular values; any rank; dear",
-    "mpi-gs": "Moore-Penrose inverse by Gram-Schmidt; any rank",
-    "mpi-gs-literal": "Gram-Schmidt as the paper prints it; fully driven mechanisms only",
-    "mpi-qr": "Moore-Penrose inverse by pivoted QR; any rank; the cheapest of them",
+MEANINGS = {  # of stabilisations and integrators
     "none": "constraint violations grow",
     "baumgarte": "violations decay by feedback; an error in the motion remains",
     "partitioning": "integrates independent coordinates and solves for the others",
@@ -87,10 +77,11 @@ def _methods() -> Table:
     parts: Mapping[str, Mapping[str, Any]] = {
         "formulation": FORMULATIONS, "stabilisation": STABILISATIONS, "integrator": INTEGRATORS,
     }  # fmt: skip
+    meanings = MEANINGS | {name: entry.about.meaning for name, entry in FORMULATIONS.items()}
     for part, entries in parts.items():
         for name, entry in entries.items():
             options = ", ".join(f"{k}={v:g}" for k, v in entry.options.items())
-            table.add_row(part, name, f"{MEANINGS[name]}\n[{options}]" if options else MEANINGS[name])
+            table.add_row(part, name, f"{meanings[name]}\n[{options}]" if options else meanings[name])
         table.add_section()
     return table
 

@@ -16,13 +16,30 @@ from typing import Annotated, NamedTuple
 
 from numpy import sqrt
 
-from mbref.formulations.base import Dense, Formulation
+from mbref.formulations.base import About, Dense, Formulation
 from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import ACCELERATE, NOT_CONVERGED, OK, SINGULAR
 from mbref.kernels.named_memory import Matrix, Vector, opener
 from mbref.linear_algebra.elimination import cholesky_factor, cholesky_solve
 from mbref.linear_algebra.orthogonal_factorisations import equilibrate
 from mbref.linear_algebra.vectors import copy
+
+ABOUT = About(
+    title="Augmented Lagrangian",
+    meaning="augmented Lagrangian, a penalty iterated; bodies may lack inertia",
+    formula=(
+        r"(M + \Phi_q^T \alpha \Phi_q)\, \ddot q_{i+1} = M \ddot q_i + \Phi_q^T \alpha\, (\gamma - 2 "
+        r"\omega \mu \dot\Phi - \omega^2 \Phi), \qquad M \ddot q_0 = g"
+    ),
+    text=(
+        "Eqs. 17 to 20, with the load of Eq. 19 as it must be: the violation of velocities and of positions."
+    ),
+    use="Redundant rows and singular mass matrices at once; as the method of the paper.",
+    fails=(
+        "The penalty α multiplies rounding errors: α times those of the accelerations. For accuracy take"
+        " `alf-dual`."
+    ),
+)
 
 
 class Options(NamedTuple):
@@ -132,6 +149,7 @@ def iterate(alpha, scratch):
 
 ALF = Formulation(
     name="alf",
+    about=ABOUT,
     equations="Eqs. 17-20",
     accelerate=accelerate,
     linear_algebra=Dense(Scratch),

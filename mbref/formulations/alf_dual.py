@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from mbref.equations.static_multipliers import add_static_multipliers
 from mbref.formulations.alf import feedback
-from mbref.formulations.base import Formulation, Sparse
+from mbref.formulations.base import About, Formulation, Sparse
 from mbref.kernels.compilation import exchangeable, inlined, kernel
 from mbref.kernels.layout import ACCELERATE, NOT_CONVERGED, OK, SINGULAR, SparseFactor
 from mbref.kernels.named_memory import opener
@@ -31,6 +31,21 @@ from mbref.linear_algebra.sparse_cholesky import (
     least_squared_pivot,
     substitute_back,
     substitute_forward,
+)
+
+ABOUT = About(
+    title="Augmented Lagrangian on the multipliers",
+    meaning="augmented Lagrangian on the multipliers; redundant rows; with the default of many bodies",
+    formula=(
+        r"(S + I/\alpha)\, \Delta\lambda = \Phi_q \ddot q_i - \gamma, \qquad \ddot q_{i+1} = \ddot q_i - "
+        r"M^{-1} \Phi_q^T \Delta\lambda, \qquad S = \Phi_q M^{-1} \Phi_q^T"
+    ),
+    text=(
+        "The iterates are those of `alf` by the Woodbury identity. A large α costs no digits here, no "
+        "rank is decided, and the matrix is factored sparsely."
+    ),
+    use="Any mechanism with all masses, redundant or not; the default for more than 40 bodies.",
+    fails="Bodies without mass or inertia: $M^{-1}$ does not exist.",
 )
 
 
@@ -180,6 +195,7 @@ def find_residual(x, system):
 
 ALF_DUAL = Formulation(
     name="alf-dual",
+    about=ABOUT,
     equations="Eqs. 17-19 in the multipliers",
     accelerate=accelerate,
     linear_algebra=Sparse(),

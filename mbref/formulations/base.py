@@ -21,6 +21,17 @@ class NoOptions(NamedTuple):
     """A formulation without numbers of its own."""
 
 
+class About(NamedTuple):
+    """Texts on a formulation, from which `mbref list` and the pages of the documentation are made."""
+
+    title: str
+    meaning: str  # one line, for `mbref list methods`
+    formula: str  # LaTeX
+    text: str  # equations of the source, in a sentence
+    use: str  # situations that it suits
+    fails: str
+
+
 class LinearAlgebra(ABC):
     """Which Jacobian a formulation reads, and the memory that its kernel needs."""
 
@@ -85,6 +96,7 @@ class Formulation:
     """
 
     name: str
+    about: About
     equations: str  # of the paper
     accelerate: Exchangeable
     linear_algebra: LinearAlgebra

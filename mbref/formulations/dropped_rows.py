@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from mbref.formulations.base import Dense, Formulation
+from mbref.formulations.base import About, Dense, Formulation
 from mbref.formulations.lm2 import factor_schur_complement
 from mbref.formulations.moore_penrose import transpose
 from mbref.kernels.compilation import exchangeable, kernel
@@ -25,6 +25,43 @@ from mbref.kernels.layout import ACCELERATE, OK, SINGULAR
 from mbref.kernels.named_memory import Indices, Matrix, Vector, opener
 from mbref.linear_algebra.elimination import cholesky_solve
 from mbref.linear_algebra.orthogonal_factorisations import equilibrate, qr_pivoted
+
+ABOUT_STEP_ROWS = About(
+    title="Dependent rows dropped at every step",
+    meaning="lm2 without the rows that are dependent at each step",
+    formula=(
+        r"(\Phi_k M^{-1} \Phi_k^T)\, \lambda_k = \Phi_k M^{-1} g - \gamma_k, \qquad \lambda = 0 \text{ on"
+        " dropped rows}"
+    ),
+    text=(
+        "As `lm2-first-rows`, but the rows are chosen anew at the first evaluation after every accepted step."
+    ),
+    use="Mechanisms whose dependent rows change with the pose.",
+    fails=(
+        "Singular positions without projection: a row that is dropped there leaves the motion free to "
+        "change its branch. The multipliers of redundant rows jump from one row to another with the "
+        "choice."
+    ),
+)
+
+ABOUT_FIRST_ROWS = About(
+    title="Dependent rows dropped once",
+    meaning="lm2 without the rows that are dependent at t = 0",
+    formula=(
+        r"(\Phi_k M^{-1} \Phi_k^T)\, \lambda_k = \Phi_k M^{-1} g - \gamma_k, \qquad \lambda = 0 \text{ on"
+        " dropped rows}"
+    ),
+    text=(
+        "A pivoted QR of the constraint Jacobian at the first evaluation finds as many independent rows "
+        "as its rank; the other rows are dropped for the whole run, as many codes of industry do."
+    ),
+    use=("Comparisons with such codes; mechanisms whose redundant rows stay the same all along the motion."),
+    fails=(
+        "Mechanisms whose dependent rows change: `SINGULAR_MATRIX` where the rows kept become dependent."
+        " At a singular start it drops a row that is needed later. Reactions of redundant rows are those"
+        " of the choice, not unique ones."
+    ),
+)
 
 
 class Choice(NamedTuple):
@@ -116,6 +153,7 @@ def accelerate_by_step_rows(system):
 
 LM2_FIRST_ROWS = Formulation(
     name="lm2-first-rows",
+    about=ABOUT_FIRST_ROWS,
     equations="Eqs. 6-8 on rows chosen once",
     accelerate=accelerate_by_first_rows,
     linear_algebra=Dense(Scratch),
@@ -125,6 +163,7 @@ LM2_FIRST_ROWS = Formulation(
 )
 LM2_STEP_ROWS = Formulation(
     name="lm2-step-rows",
+    about=ABOUT_STEP_ROWS,
     equations="Eqs. 6-8 on rows chosen at every step",
     accelerate=accelerate_by_step_rows,
     linear_algebra=Dense(Scratch),

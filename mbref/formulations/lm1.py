@@ -12,12 +12,27 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from mbref.formulations.base import Dense, Formulation
+from mbref.formulations.base import About, Dense, Formulation
 from mbref.kernels.compilation import exchangeable
 from mbref.kernels.layout import ACCELERATE, OK, SINGULAR
 from mbref.kernels.named_memory import Indices, Matrix, Vector, opener
 from mbref.linear_algebra.elimination import lu_factor, lu_solve
 from mbref.linear_algebra.orthogonal_factorisations import equilibrate
+
+ABOUT = About(
+    title="Lagrange multipliers, the augmented matrix",
+    meaning="Lagrange multipliers with the accelerations by LU; no redundant rows",
+    formula=(
+        r"\begin{pmatrix} M & \Phi_q^T \\ \Phi_q & 0 \end{pmatrix} \begin{pmatrix} \ddot q \\ \lambda "
+        r"\end{pmatrix} = \begin{pmatrix} g \\ \gamma \end{pmatrix}"
+    ),
+    text="Eq. 5. The matrix is scaled symmetrically and solved by LU with partial pivoting.",
+    use=(
+        "Bodies without mass or inertia, held by the constraints; mechanisms without redundant rows; as "
+        "the textbook method to compare with."
+    ),
+    fails="Redundant rows make the matrix singular: `SINGULAR_MATRIX` at t = 0.",
+)
 
 SINGULAR_PIVOT = 1e-12  # of the scaled matrix, whose rows and columns have unit size
 
@@ -62,6 +77,7 @@ def accelerate(system):
 
 LM1 = Formulation(
     name="lm1",
+    about=ABOUT,
     equations="Eq. 5",
     accelerate=accelerate,
     linear_algebra=Dense(Scratch),

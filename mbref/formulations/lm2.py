@@ -9,11 +9,25 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from mbref.formulations.base import Dense, Formulation
+from mbref.formulations.base import About, Dense, Formulation
 from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import ACCELERATE, OK, SINGULAR
 from mbref.kernels.named_memory import Matrix, Vector, opener
 from mbref.linear_algebra.elimination import cholesky_factor, cholesky_solve, gram
+
+ABOUT = About(
+    title="Lagrange multipliers, the Schur complement",
+    meaning="multipliers first, by Cholesky; cheap; no redundant rows",
+    formula=(
+        r"(\Phi_q M^{-1} \Phi_q^T)\, \lambda = \Phi_q M^{-1} g - \gamma, \qquad \ddot q = M^{-1} (g - "
+        r"\Phi_q^T \lambda)"
+    ),
+    text="Eqs. 6 to 8, by Cholesky.",
+    use="Mechanisms without redundant rows and with all masses: the fewest operations.",
+    fails=(
+        "Redundant rows, and bodies without inertia. A row within 3e-6 rad of dependent counts as redundant."
+    ),
+)
 
 SINGULAR_PIVOT = 1e-11  # of its diagonal entry: the square of the sine between a row and those before
 
@@ -72,6 +86,7 @@ def accelerate(system):
 
 LM2 = Formulation(
     name="lm2",
+    about=ABOUT,
     equations="Eqs. 6-8",
     accelerate=accelerate,
     linear_algebra=Dense(Scratch),

@@ -9,12 +9,24 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from mbref.formulations.base import Dense, Formulation
+from mbref.formulations.base import About, Dense, Formulation
 from mbref.formulations.moore_penrose import recover_solution, scaled_residual, transpose
 from mbref.kernels.compilation import exchangeable
 from mbref.kernels.layout import ACCELERATE, OK, SINGULAR
 from mbref.kernels.named_memory import Indices, Matrix, Vector, opener
 from mbref.linear_algebra.orthogonal_factorisations import gram_schmidt_solve
+
+ABOUT = About(
+    title="Moore–Penrose inverse by Gram–Schmidt",
+    meaning="Moore-Penrose inverse by Gram-Schmidt; any rank",
+    formula=r"D P = Q R, \qquad R = L Z^T, \qquad D^+ = P Z L^{-1} Q^T",
+    text=(
+        "Eqs. 29 and 30, completed for any rank: columns in order of their size, dependent ones left "
+        "out, then the rows of R orthogonalised."
+    ),
+    use="As `mpi-svd`, at less cost.",
+    fails="Bodies without mass; the rank is decided by the size of a column's remainder.",
+)
 
 
 class Scratch(NamedTuple):
@@ -49,6 +61,7 @@ def accelerate(system):
 
 MPI_GS = Formulation(
     name="mpi-gs",
+    about=ABOUT,
     equations="Eqs. 26, 29, 30",
     accelerate=accelerate,
     linear_algebra=Dense(Scratch),

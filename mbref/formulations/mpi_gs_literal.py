@@ -8,13 +8,25 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from mbref.formulations.base import Dense, Formulation
+from mbref.formulations.base import About, Dense, Formulation
 from mbref.formulations.moore_penrose import recover_solution, scaled_residual, transpose
 from mbref.kernels.compilation import exchangeable
 from mbref.kernels.layout import ACCELERATE, OK, SINGULAR
 from mbref.kernels.named_memory import Matrix, Vector, opener
 from mbref.linear_algebra.elimination import back_substitute
 from mbref.linear_algebra.orthogonal_factorisations import gram_schmidt
+
+ABOUT = About(
+    title="Moore–Penrose inverse as printed",
+    meaning="Gram-Schmidt as the paper prints it; fully driven mechanisms only",
+    formula=r"D = Q R, \qquad D^+ = R^{-1} Q^T",
+    text="Eqs. 29 and 30 as the paper prints them.",
+    use=(
+        "Fully driven mechanisms, where all columns of D are independent; to see what the printed "
+        "equations need."
+    ),
+    fails="Every mechanism with a freedom left: `SINGULAR_MATRIX` at t = 0.",
+)
 
 
 class Scratch(NamedTuple):
@@ -61,6 +73,7 @@ def accelerate(system):
 
 MPI_GS_LITERAL = Formulation(
     name="mpi-gs-literal",
+    about=ABOUT,
     equations="Eqs. 26, 29, 30 as printed",
     accelerate=accelerate,
     linear_algebra=Dense(Scratch),

@@ -9,12 +9,23 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from mbref.formulations.base import Dense, Formulation
+from mbref.formulations.base import About, Dense, Formulation
 from mbref.formulations.moore_penrose import recover_solution, scaled_residual, transpose
 from mbref.kernels.compilation import exchangeable
 from mbref.kernels.layout import ACCELERATE, OK, SINGULAR
 from mbref.kernels.named_memory import Indices, Matrix, Vector, opener
 from mbref.linear_algebra.orthogonal_factorisations import minimum_norm, qr_pivoted, row_multipliers
+
+ABOUT = About(
+    title="Moore–Penrose inverse by pivoted QR",
+    meaning="Moore-Penrose inverse by pivoted QR; any rank; the cheapest of them",
+    formula=r"D^T P = Q R, \qquad x = Q_1 R_1^{-T} b_1",
+    text="Householder QR of the transpose; rows behind the rank are left out (Kim & Vanderploeg, 1986).",
+    use="The cheapest dense method that accepts redundant rows.",
+    fails=(
+        "Bodies without mass. Redundant rows get no multiplier, so that reactions lean on the rows chosen."
+    ),
+)
 
 
 class Scratch(NamedTuple):
@@ -50,6 +61,7 @@ def accelerate(system):
 
 MPI_QR = Formulation(
     name="mpi-qr",
+    about=ABOUT,
     equations="Eq. 26 with a pivoted QR",
     accelerate=accelerate,
     linear_algebra=Dense(Scratch),

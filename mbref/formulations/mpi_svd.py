@@ -8,12 +8,30 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from mbref.formulations.base import Dense, Formulation
+from mbref.formulations.base import About, Dense, Formulation
 from mbref.formulations.moore_penrose import recover_solution, scaled_residual
 from mbref.kernels.compilation import exchangeable
 from mbref.kernels.layout import ACCELERATE, NOT_FINITE, OK, SINGULAR
 from mbref.kernels.named_memory import Matrix, Vector, opener
 from mbref.linear_algebra.orthogonal_factorisations import svd_solve
+
+ABOUT = About(
+    title="Moore–Penrose inverse by singular values",
+    meaning="Moore-Penrose inverse by singular values; any rank; expensive",
+    formula=(
+        r"\ddot q = \ddot q_u + M^{-1/2} D^+ (\gamma - \Phi_q \ddot q_u), \qquad D = \Phi_q M^{-1/2} = U "
+        r"S V^T, \qquad D^+ = V S^+ U^T"
+    ),
+    text=(
+        r"Eqs. 26 to 28, with $\ddot q_u = M^{-1} g$. Singular values up to the rank tolerance count as "
+        "zero; the multipliers are those of least norm."
+    ),
+    use="Redundant rows of any kind, with multipliers that are well defined; small mechanisms.",
+    fails=(
+        "Bodies without mass. The cost grows with the cube of the size; near a singular position the "
+        "rank is a decision."
+    ),
+)
 
 
 class Scratch(NamedTuple):
@@ -42,6 +60,7 @@ def accelerate(system):
 
 MPI_SVD = Formulation(
     name="mpi-svd",
+    about=ABOUT,
     equations="Eqs. 26-28",
     accelerate=accelerate,
     linear_algebra=Dense(Scratch),

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import shlex
+import sys
 from pathlib import Path
 
 import pytest
 import yaml
 
-from mbref.cli.commands import parser
+from mbref.cli.commands import main, parser
 from mbref.formulations import FORMULATIONS
 from mbref.integrators import INTEGRATORS
 from mbref.method import Method
@@ -18,7 +20,11 @@ from mbref.stabilisation import STABILISATIONS
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
+sys.path.insert(0, str(DOCS))
+import method_pages  # noqa: E402
+
 PAGES = sorted(DOCS.rglob("*.md"))
+MADE = method_pages.pages()
 METHODS = [*FORMULATIONS, *STABILISATIONS, *INTEGRATORS]
 
 
@@ -31,19 +37,36 @@ def paths(entry: object) -> list[str]:
 
 
 def test_the_contents_name_every_page_once():
-    contents = yaml.safe_load((ROOT / "mkdocs.yml").read_text())["nav"]
-    assert sorted(paths(contents)) == sorted(str(page.relative_to(DOCS)) for page in PAGES)
+    contents = method_pages.with_formulations(yaml.safe_load((ROOT / "mkdocs.yml").read_text())["nav"])
+    assert sorted(paths(contents)) == sorted([*(str(page.relative_to(DOCS)) for page in PAGES), *MADE])
 
 
 @pytest.mark.parametrize("name", METHODS)
 def test_a_method_s_page_has_equations_use_limits_and_measurements(name):
-    text = (DOCS / "methods" / f"{name}.md").read_text()
+    text = MADE.get(f"methods/{name}.md") or (DOCS / "methods" / f"{name}.md").read_text()
     assert text.startswith(f"# `{name}`: ") and "$$" in text
     assert "**Use it for**: " in text and "**It fails on**: " in text and "## Measured" in text
 
 
+def test_a_new_formulation_is_one_file_and_one_line(monkeypatch, capsys):
+    """Listing, table, page and contents follow from the formulation's own file and its line."""
+    about = FORMULATIONS["lm1"].about._replace(
+        title="Thrown away", meaning="made by a test", formula="x", text="y", use="nothing", fails="all"
+    )
+    made = dataclasses.replace(FORMULATIONS["lm1"], name="thrown-away", about=about, equations="Eq. 0")
+    monkeypatch.setitem(FORMULATIONS, made.name, made)
+    assert main(["list", "methods"]) == 0 and "made by a test" in capsys.readouterr().out
+    assert str(Method.parse("thrown-away+none/rk4"))
+    assert "| Eq. 0 | fails | handled |" in method_pages.table(FORMULATIONS.values())
+    text = method_pages.pages()["methods/thrown-away.md"]
+    assert text.startswith("# `thrown-away`: Thrown away") and "**It fails on**: all" in text
+    contents = method_pages.with_formulations([{"Choose": "methods.md"}, {"End": "end.md"}])
+    assert {"thrown-away": "methods/thrown-away.md"} in contents and contents[-1] == {"End": "end.md"}
+
+
 def test_measured_methods_are_methods():
-    found = [m for page in PAGES for m in re.findall(r"<!-- measured: (.+?) -->", page.read_text())]
+    texts = [*(page.read_text() for page in PAGES), *MADE.values()]
+    found = [m for text in texts for m in re.findall(r"<!-- measured: (.+?) -->", text)]
     names = [name for row in found for name in row.split()]
     assert len(names) > len(METHODS) and all(str(Method.parse(name)) for name in names)
 

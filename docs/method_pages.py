@@ -1,0 +1,67 @@
+"""Pages and tables of the documentation that are made from the formulations' own texts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from mbref.formulations import FORMULATIONS, Formulation
+
+TABLE = "<!-- formulations -->"  # replaced by the table of formulations
+CHOOSE = "methods.md"  # the pages of formulations follow it in the contents
+
+
+def page(formulation: Formulation) -> str:
+    """Return the page of a formulation: equations, use, limits, and measurements made by the build."""
+    name, about = formulation.name, formulation.about
+    return f"""# `{name}`: {about.title}
+
+$${about.formula}$$
+
+{about.text}
+
+**Use it for**: {about.use}
+
+**It fails on**: {about.fails}
+
+## Measured
+
+<!-- measured: {name}+projection {name} -->
+
+Runs of 0.1 s: how each ended, and its largest error against the exact motion, relative to the size of the
+mechanism or in rad.
+
+![The planar slider-crank](../figures/motion_planar_slider_crank.svg)
+"""
+
+
+def pages() -> dict[str, str]:
+    """Return the text of every formulation's page by its path in the documentation."""
+    return {f"methods/{name}.md": page(formulation) for name, formulation in FORMULATIONS.items()}
+
+
+def table(formulations: Iterable[Formulation]) -> str:
+    """Return the table of formulations: equations, and what each does with redundancy and singular masses."""
+    rows = ["| formulation | equations | redundant rows | singular mass matrix |", "|---|---|---|---|"]
+    for f in formulations:
+        redundant = "handled" if f.handles_redundancy else "fails"
+        if f.needs_independent_columns:
+            redundant = "driven mechanisms only"
+        masses = "handled" if f.handles_singular_mass else "fails"
+        rows.append(f"| [`{f.name}`](methods/{f.name}.md) | {f.equations} | {redundant} | {masses} |")
+    return "\n".join(rows)
+
+
+def with_formulations(contents: Any) -> Any:
+    """Return the contents of the site with the pages of the formulations behind the guide for choosing."""
+    if isinstance(contents, list):
+        found = [with_formulations(entry) for entry in contents]
+        places = [
+            i for i, entry in enumerate(contents) if isinstance(entry, dict) and CHOOSE in entry.values()
+        ]
+        for i in places:
+            found[i + 1 : i + 1] = [{name: f"methods/{name}.md"} for name in FORMULATIONS]
+        return found
+    if isinstance(contents, dict):
+        return {title: with_formulations(inside) for title, inside in contents.items()}
+    return contents
