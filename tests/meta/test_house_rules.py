@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from mbref.formulations import FORMULATIONS
 from mbref.integrators import INTEGRATORS
 from mbref.scenes import SCENES
 from mbref.stabilisation import STABILISATIONS
@@ -98,10 +97,12 @@ def test_public_functions_say_what_they_do(package):
     assert not silent, silent
 
 
-@pytest.mark.parametrize("table", [FORMULATIONS, STABILISATIONS], ids=["formulations", "stabilisations"])
-def test_documentation_tells_every_method(table):
-    told = set(re.findall(r"^\| `([\w-]+)`", (ROOT / "docs" / "methods.md").read_text(), flags=re.M))
-    assert set(table) <= told, f"docs/methods.md does not tell {set(table) - told}"
+def test_the_guide_lists_every_method():
+    """The table of formulations is made from their files where the guide has its mark."""
+    text = (ROOT / "docs" / "methods.md").read_text()
+    listed = set(re.findall(r"^\| `([\w-]+)`", text, flags=re.M))
+    assert "<!-- formulations -->" in text
+    assert set(STABILISATIONS) <= listed, f"docs/methods.md does not list {set(STABILISATIONS) - listed}"
 
 
 def test_readme_is_short_and_its_links_lead_somewhere():
