@@ -119,6 +119,13 @@ def _verify_drawn(engine: str, arguments: argparse.Namespace) -> int:
     return COMPLETED if found.conforms else OTHERWISE
 
 
+def _findings(arguments: argparse.Namespace) -> int:
+    from crosscheck.cli.findings import show
+
+    show(console(), arguments.name, arguments.recheck)
+    return COMPLETED
+
+
 def _report(arguments: argparse.Namespace) -> int:
     """The report stands above this package, so it is started as a program and never imported."""
     with subprocess.Popen([sys.executable, "-m", "reports", *_report_options(arguments)]) as program:
@@ -148,6 +155,7 @@ COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "compare": compare,
     "tune": tune,
     "verify": _verify,
+    "findings": _findings,
     "report": _report,
     "diff": _diff,
     "certify": certify,

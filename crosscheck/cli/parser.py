@@ -55,6 +55,7 @@ def parser() -> argparse.ArgumentParser:
         _add_compare,
         _add_tune,
         _add_verify,
+        _add_findings,
         _add_report,
         _add_diff,
         _add_certify,
@@ -144,6 +145,15 @@ def _add_verify(commands: Commands) -> None:
         "--beside", action="append", metavar="E[=F]", help="an engine (and family) to agree with; may repeat"
     )
     add_limits(parser)
+
+
+def _add_findings(commands: Commands) -> None:
+    about = "violations found in engines, each with a proof; --recheck asks the installed versions"
+    parser = _add(commands, "findings", about, "crosscheck findings --recheck")
+    parser.add_argument("name", nargs="*", metavar="NAME", help="a finding; default: all")
+    parser.add_argument(
+        "--recheck", action="store_true", help="run the proofs, and say which findings are present or gone"
+    )
 
 
 def _add_report(commands: Commands) -> None:

@@ -31,7 +31,8 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["__main__"],
     ),
     "crosscheck": (
-        ["judge"], ["engine"], ["engines"], ["processes"], ["study"], ["conformance"], ["paper"], ["cli"],
+        ["judge"], ["engine"], ["engines"], ["processes"], ["study"], ["conformance"], ["findings"],
+        ["paper"], ["cli"],
         ["__main__"],
     ),
     "reports": (

@@ -1,0 +1,39 @@
+"""`crosscheck findings`: the stored findings, and which of them the installed engines still have."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Table
+
+from crosscheck.cli.request import RequestError
+from crosscheck.findings.finding import Finding, findings
+from crosscheck.study.progress import counted
+from mbref.scene_fields import meant
+
+
+def chosen(names: Sequence[str]) -> list[Finding]:
+    """The findings of those names, or all; RequestError for an unknown name."""
+    known = {found.name: found for found in findings()}
+    if faults := [f"unknown finding {name!r}; known: {', '.join(known)}{meant(name, known)}"
+                  for name in names if name not in known]:  # fmt: skip
+        raise RequestError(*faults)
+    return [known[name] for name in names or known]
+
+
+def show(console: Console, names: Sequence[str], recheck: bool) -> None:
+    """Print the findings; with ``recheck`` each proof is run, and the answer stands beside it."""
+    wanted = chosen(names)
+    columns = ["finding", "engine", "found in", "what it does"]
+    table = Table(*columns, *(["installed", "status", "measured"] if recheck else []), box=SIMPLE)
+    with counted("running proofs", len(wanted) if recheck else 0) as advance:
+        for found in wanted:
+            cells = [found.name, found.engine, found.version, found.does]
+            if recheck:
+                answer = found.recheck()
+                cells += [answer.version or "–", answer.status.value, answer.words]
+                advance(found.name)
+            table.add_row(*cells)
+    console.print(table)

@@ -1,0 +1,55 @@
+"""The findings as a page: ``python -m crosscheck.findings.document docs/findings.md`` writes it anew."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from crosscheck.findings.finding import FOLDER, Finding, findings
+
+HEAD = """# Findings
+
+What crosscheck found in other engines, each with a proof that runs again: `crosscheck findings` lists them,
+and `crosscheck findings --recheck` asks the installed versions which of them are still there. Scripts need
+the engine alone. Made by `python -m crosscheck.findings.document docs/findings.md` from
+`crosscheck/findings/findings.toml`.
+"""
+
+
+def page() -> str:
+    """The page in Markdown."""
+    return "\n".join([HEAD, *_table(), *(line for found in findings() for line in _entry(found))]) + "\n"
+
+
+def _table() -> Iterator[str]:
+    yield "| finding | engine | version | measured |"
+    yield "| --- | --- | --- | --- |"
+    for found in findings():
+        yield f"| [{found.name}](#{found.name}) | {found.engine} | {found.version} | {_measured(found)} |"
+    yield ""
+
+
+def _measured(found: Finding) -> str:
+    return "the process ends" if found.crashes else f"{found.measured:.3g} {found.unit}".strip()
+
+
+def _entry(found: Finding) -> Iterator[str]:
+    yield f"## {found.name}\n"
+    yield f"{found.package} {found.version}. {found.does}\n"
+    yield f"Right is: {found.right}\n"
+    yield f"{found.cause}\n"
+    if found.script:
+        yield f"```python\n{found.script.strip()}\n```\n"
+    else:
+        options = ", ".join(f"{name} {value:g}" for name, value in found.options.items())
+        yield f"Scene `{found.scene}` at the setting `{found.family}` ({options}):\n"
+        yield f"```toml\n{(FOLDER / found.scene).read_text().strip()}\n```\n"
+    yield f"`{found.command()}`\n"
+
+
+if __name__ == "__main__":
+    if sys.argv[1:]:
+        Path(sys.argv[1]).write_text(page())
+    else:
+        print(page(), end="")

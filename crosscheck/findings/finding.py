@@ -1,0 +1,126 @@
+"""A finding: what an engine does wrong, the proof of it, and whether the installed version still does it.
+
+The proof is a script that needs the engine alone, or a scene that is run at a setting and judged by its
+truth.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+import subprocess
+import sys
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import metadata
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from crosscheck.engine import Setting
+from crosscheck.judge.metrics import error_series
+from crosscheck.judge.truth import truth_for
+from crosscheck.processes.pool import run_isolated
+from mbref.scene import Scene
+from mbref.trajectory import Outcome
+
+FOLDER = Path(__file__).parent
+SAMPLES = 11
+TIME_LIMIT = 900.0  # s; some engines compile their code first
+
+
+class Status(enum.Enum):
+    """Whether the installed version does what a finding says."""
+
+    PRESENT = "present"
+    GONE = "gone"
+    ABSENT = "not installed"
+    UNCLEAR = "unclear"
+
+
+class Answer(NamedTuple):
+    """The status with the version asked, and the number measured or the reason."""
+
+    status: Status
+    version: str
+    measured: float | None
+    words: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """``does`` and ``right`` are sentences: what the engine does, and what is right by whose truth.
+
+    A finding is present where the number that its proof measures, in ``unit``, is above ``wrong_above``, or
+    where the process of its ``script`` is ended by a signal if ``crashes``.  ``measured`` was the number at
+    ``version`` of ``package``.
+    """
+
+    name: str
+    engine: str
+    package: str
+    version: str
+    does: str
+    right: str
+    cause: str
+    unit: str = ""
+    measured: float = math.nan
+    wrong_above: float = math.inf
+    script: str = ""
+    crashes: bool = False
+    scene: str = ""
+    family: str = ""
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def recheck(self) -> Answer:
+        """Run the proof against the installed version."""
+        try:
+            version = metadata.version(self.package)
+        except metadata.PackageNotFoundError:
+            return Answer(Status.ABSENT, "", None, f"pip install {self.package}")
+        return self._of_script(version) if self.script else self._of_scene(version)
+
+    def _of_script(self, version: str) -> Answer:
+        try:
+            ended = subprocess.run(
+                [sys.executable, "-c", self.script],
+                capture_output=True,
+                text=True,
+                check=False,
+                timeout=TIME_LIMIT,
+            )
+        except subprocess.TimeoutExpired:
+            return Answer(Status.UNCLEAR, version, None, f"no answer within {TIME_LIMIT:g} s")
+        if self.crashes:
+            found = Status.PRESENT if ended.returncode < 0 else Status.GONE
+            return Answer(found, version, None, f"the process ended with status {ended.returncode}")
+        try:
+            return self._of_number(version, float(ended.stdout.split()[-1]))
+        except (IndexError, ValueError):
+            said = (ended.stderr.strip() or "nothing").splitlines()[-1]
+            return Answer(Status.UNCLEAR, version, None, f"the script gave no number: {said}")
+
+    def _of_scene(self, version: str) -> Answer:
+        scene = Scene.from_file(FOLDER / self.scene)
+        times = np.linspace(0.0, scene.duration, SAMPLES)
+        run = run_isolated(self.engine, scene, times, Setting(self.family, self.options), TIME_LIMIT)
+        if run.outcome is not Outcome.COMPLETED:
+            return Answer(Status.UNCLEAR, version, None, f"{run.outcome.label} {run.message}".strip())
+        truth = truth_for(scene)
+        assert truth is not None, scene.name
+        return self._of_number(version, float(error_series(scene, run, truth.poses(times)).max()))
+
+    def _of_number(self, version: str, measured: float) -> Answer:
+        found = Status.PRESENT if not measured <= self.wrong_above else Status.GONE
+        return Answer(found, version, measured, f"{measured:.3g} {self.unit}".strip())
+
+    def command(self) -> str:
+        """The command that runs the proof again."""
+        return f"crosscheck findings --recheck {self.name}"
+
+
+def findings() -> Sequence[Finding]:
+    """The stored findings."""
+    return [Finding(**entry) for entry in tomllib.loads((FOLDER / "findings.toml").read_text())["finding"]]
