@@ -196,7 +196,7 @@ def put_force(i, memory):
     response, forces, mass, coupled = solver.response, solver.forces, inertia.mass, inertia.coupled
     first, end = inertia.first[i], inertia.first[i + 1]
     for j in range(0, lanes, WIDTH):
-        left = 0.0 * load(forces, 0)
+        left = 0.0 * load(mass, 0)  # forces may be infinite behind a pivot of zero
         for e in range(first, end):
             left = left - mass[i, coupled[e]] * load(response, coupled[e] * lanes + j)
         store(left, forces, i * lanes + j)
@@ -231,7 +231,7 @@ def respond(memory):
 def put_inverse(solver):
     """Compute the response of variables that rows determine, so that no force moves any."""
     response, particular, nz = solver.response, solver.particular, solver.pivot_columns.shape[0]
-    zero, lanes = 0.0 * load(response, 0), response.shape[1]
+    zero, lanes = 0.0 * load(solver.linear, 0), response.shape[1]
     for j in range(0, (nz + solver.pivot_rows.shape[0]) * lanes, WIDTH):
         store(zero, response, j)
     for e in range(nz, nz + solver.pivot_rows.shape[0]):
