@@ -12,12 +12,11 @@ from mbref.equations.initial_state import Start
 from mbref.equations.model import Model
 from mbref.kernels.layout import SINGULAR_AHEAD, Memory
 from mbref.simulation.control import STEPS_PER_CALL
+from mbref.simulation.pace import Pace
 from mbref.simulation.ranks import ranks_at
 from mbref.simulation.run import NEARLY, Run
 from mbref.simulation.singular_start import begins_on_singular_position
-from mbref.simulation.stepping import CREEPING, PAUSED, advance_to_end
-
-OUT_OF_REACH, PACE_STEPS = 100.0, 20_000  # limits of steps that the end is away, at the pace of so many
+from mbref.simulation.stepping import PAUSED, advance_to_end
 
 
 class ExplicitStepper:
@@ -25,7 +24,7 @@ class ExplicitStepper:
 
     def __init__(self, run: Run):
         self.run = run
-        self._judged = 0.0, 0  # time (s) and steps when the pace was last judged
+        self._pace = Pace(run)
         self.enter()
 
     def enter(self) -> None:
@@ -41,7 +40,7 @@ class ExplicitStepper:
         if self.run.times[-1] > 0.0 and begins_on_singular_position(self.run):
             status = SINGULAR_AHEAD
         while status == PAUSED:
-            status = self._judge_pace(int(advance_to_end(self.run.packed.argument)))
+            status = self._pace.judge(int(advance_to_end(self.run.packed.argument)))
             self._look_at_rows_again()
             if progress is not None:
                 progress(float(self.run.memory.loop.clock.time))
@@ -76,19 +75,6 @@ class ExplicitStepper:
         """Advance by one call of kernels: the status, and the process CPU time of the stepping alone (s)."""
         began = time.process_time()
         return int(advance_to_end(self.run.packed.argument)), time.process_time() - began
-
-    def _judge_pace(self, status: int) -> int:
-        """CREEPING instead of PAUSED where at the pace of the last steps the end is out of all reach."""
-        if status != PAUSED:
-            return status
-        memory, limits = self.run.memory, self.run.limits
-        now, steps = float(memory.loop.clock.time), int(memory.equations.system.counts.steps)
-        before, taken = self._judged[0], steps - self._judged[1]
-        if taken < PACE_STEPS:
-            return status
-        self._judged = now, steps
-        creeps = taken * (self.run.times[-1] - now) > OUT_OF_REACH * limits.most_steps * (now - before)
-        return CREEPING if creeps else status
 
     def _look_at_rows_again(self) -> None:
         """Have rows that were nearly dependent at the start not be so away from that, if they are not."""

@@ -66,9 +66,13 @@ def complete_until(end, memory):
 
 @kernel
 def complete_sample(memory):
-    """Record the sample at which the clock stands: OK or the reason why it cannot be."""
+    """Record the sample at which the clock stands: OK or the reason why it cannot be.
+
+    Its quaternions are on the side of those at the sample before, or at the start.
+    """
     run, waiting, slot = memory.run, memory.waiting, memory.polynomials.torsions.slot
-    k, status = run.loop.clock.sample, OK
+    k, status, before = run.loop.clock.sample, OK, run.loop.samples.coordinates
+    copy(before[k - 1] if k > 0 else run.previous.coordinates, run.state.coordinates)
     copy(waiting.state[k], memory.state.reshape(-1))
     copy(waiting.angles[k], memory.angles)
     for s in range(slot.shape[0]):

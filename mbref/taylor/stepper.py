@@ -17,6 +17,7 @@ from mbref.kernels.layout import OK, SINGULAR_AHEAD
 from mbref.kernels.machine_code import NoGeneratedCode
 from mbref.kernels.memory_pool import release
 from mbref.simulation.limits import AUTO, GENERATED, GENERIC
+from mbref.simulation.pace import Pace
 from mbref.simulation.run import Run
 from mbref.simulation.singular_start import fits_no_branch, leaving
 from mbref.simulation.stepping import DONE, PAUSED, UNDECIDED
@@ -70,7 +71,9 @@ class SeriesStepper:
 
     def __init__(self, run: Run):
         self.run = run
+        self._pace = Pace(run)
         self._decide_rank()
+        self._put_side()
         prepare_series()
         columns = run.memory.active.velocities.size
         self.is_driven = run.ranks.rank == columns and not run.model.has_angles
@@ -152,6 +155,11 @@ class SeriesStepper:
         put_equations(self.taylor, self.geometry, self.polynomials)
         self._put_options()
         self._decide_rank()
+        self._put_side()
+
+    def _put_side(self) -> None:
+        """Have the quaternions of the first sample be on the side of the start's."""
+        self.run.memory.previous.coordinates[:] = self.run.start.q
 
     def parameters(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
         """Return where memory has numbers that differ between scenes, and their values for ``lengths``
@@ -210,6 +218,7 @@ class SeriesStepper:
                 status = self._begin_again(self._cross() if status == SINGULAR_AHEAD else self._take_branch())
             else:
                 status = self._complete_samples(status, go_on=status == PAUSED)
+            status = self._pace.judge(status)
             if status == PAUSED:
                 self._generate_where_it_pays()
             if progress is not None:
