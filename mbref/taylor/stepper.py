@@ -73,7 +73,6 @@ class SeriesStepper:
         self.run = run
         self._pace = Pace(run)
         self._decide_rank()
-        self._put_side()
         prepare_series()
         columns = run.memory.active.velocities.size
         self.is_driven = run.ranks.rank == columns and not run.model.has_angles
@@ -134,6 +133,7 @@ class SeriesStepper:
         self.taylor.progress.end = self.run.times[-1]
         mode, options = self.taylor.mode, self._options
         mode.kind, mode.tolerance, mode.order = REGULAR, options.regular_tolerance, options.regular_order
+        self.run.memory.previous.coordinates[:] = self.run.start.q  # whose quaternions give the side
 
     # --- another scene of equal structure, whose numbers memory holds --------------------------------------
     @property
@@ -155,11 +155,6 @@ class SeriesStepper:
         put_equations(self.taylor, self.geometry, self.polynomials)
         self._put_options()
         self._decide_rank()
-        self._put_side()
-
-    def _put_side(self) -> None:
-        """Have the quaternions of the first sample be on the side of the start's."""
-        self.run.memory.previous.coordinates[:] = self.run.start.q
 
     def parameters(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
         """Return where memory has numbers that differ between scenes, and their values for ``lengths``
