@@ -12,7 +12,7 @@ from mbref.taylor.stepping import begin_once
 
 
 @entry(INT(SERIES))
-def enter(memory):
+def enter_series(memory):
     """Begin a series at the present state: OK or why that cannot be."""
     memory.progress.begun = 0
     return begin_once(memory)

@@ -8,10 +8,10 @@ from mbref.linear_algebra.vectors import larger
 from mbref.taylor.generated_calls import close_by_code, violation_by_code
 from mbref.taylor.partition import least_pivot
 from mbref.taylor.simd import WIDTH, gather, load, store
-from mbref.taylor.solver import factorise, solution
+from mbref.taylor.solver import factorise_equations, solution
 
-SMALL = 1e-6  # a violation whose correction leaves its square
-CORRECTIONS = 8
+MAX_VIOLATION = 1e-6  # a violation whose correction leaves its square
+MAX_CORRECTIONS = 8
 
 
 @kernel
@@ -43,7 +43,7 @@ def violation_in_loops(memory):
 
 
 @inlined
-def violation_rate(memory):
+def violation_rate_in_loops(memory):
     """Evaluate Φ' of every row at the first two coefficients."""
     rows, products, terms = memory.polynomials.rows, memory.polynomials.products, memory.series.terms
     phi, nz, lanes = memory.solver.phi, memory.solver.pivot_columns.shape[0], memory.series.terms.shape[1]
@@ -91,7 +91,7 @@ def close_rate(memory):
     if code.close_rate != 0:
         close_by_code(code.close_rate, terms, solver.phi, solver.response, solver.change)
     else:
-        violation_rate(memory)
+        violation_rate_in_loops(memory)
         subtract_violation(1, memory)
 
 
@@ -116,23 +116,23 @@ def changes_factor(left, memory):
 
 
 @kernel
-def correct(memory):
+def correct_state(memory):
     """Correct positions and velocities, the first coefficients: OK, SINGULAR or NOT_CONVERGED."""
     step, left = memory.step, 1.0
-    for attempt in range(CORRECTIONS):
+    for attempt in range(MAX_CORRECTIONS):
         left = violation(memory)
         if attempt == 0:
             step.violation = left
-        status = factorise(memory)
+        status = factorise_equations(memory)
         if status != OK:
             return status
         close(memory)
-        if left <= SMALL:
+        if left <= MAX_VIOLATION:
             break
-    if not left <= SMALL:
+    if not left <= MAX_VIOLATION:
         return NOT_CONVERGED
     step.correction = largest_change(memory)
     if changes_factor(left, memory):
-        status = factorise(memory)
+        status = factorise_equations(memory)
     close_rate(memory)
     return status

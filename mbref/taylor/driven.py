@@ -41,7 +41,10 @@ from mbref.taylor.stepping import (
 PREDICTOR_TOLERANCE = 3e-7  # of the last terms of the series, away from singular positions
 ACCURATE_TOLERANCE = 1e-13  # of high-accuracy steps
 MIN_PREDICTOR_RATIO = 0.25  # of a crossing step: a shorter predictor step before it does not pay
-ORDER, LEAST_ORDER = 16, 12  # of the series unless another order is requested; the least one that crosses
+PREDICTOR_ORDER, LEAST_PREDICTOR_ORDER = (
+    16,
+    12,
+)  # of the series unless another order is requested; the least one that crosses
 
 
 @entry(INT(SERIES))

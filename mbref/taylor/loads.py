@@ -25,7 +25,7 @@ E1, E2, F, COS, SIN, ANGLE, MOMENT, MOMENT_COS, MOMENT_SIN, TORSION_SERIES = (
 
 
 @inlined
-def product(a, b, k):
+def product_order(a, b, k):
     """Return order k of the product of two series."""
     value = 0.0
     for i in range(k + 1):
@@ -73,7 +73,7 @@ def grow_springs(k, memory):
         square = 0.0
         for c in range(3):
             grow_form(springs.constant[s, c], springs.form[3 * s + c], k, variables, of[c])
-            square += product(of[c], of[c], k)
+            square += product_order(of[c], of[c], k)
         length, inverse = of[LENGTH], of[INVERSE]
         if k == 0:
             length[0] = sqrt(square)
@@ -95,11 +95,11 @@ def add_springs(k, memory):
     springs, sums, nz = memory.polynomials.springs, memory.series.sums, memory.solver.pivot_columns.shape[0]
     for s in range(springs.stiffness.shape[0]):
         of = memory.series.springs[SPRING_SERIES * s : SPRING_SERIES * (s + 1)]
-        pull = springs.damping[s] * product(of[RATE], of[INVERSE], k)
+        pull = springs.damping[s] * product_order(of[RATE], of[INVERSE], k)
         pull -= springs.stiffness[s] * springs.natural[s] * of[INVERSE, k]
         of[PULL, k] = pull + springs.stiffness[s] if k == 0 else pull
         for c in range(3):
-            value, form = product(of[PULL], of[c], k), springs.form[3 * s + c]
+            value, form = product_order(of[PULL], of[c], k), springs.form[3 * s + c]
             for i in range(nz):
                 sums[k, i] += value * form[i]
 
@@ -153,8 +153,8 @@ def grow_torsions(k, memory):
             grow_form(torsions.constant[s, c], torsions.form[9 * s + c], k, variables, of[c])
         cosine, sine = 0.0, 0.0
         for c in range(3):
-            cosine += product(of[E1 + c], of[F + c], k)
-            sine += product(of[E2 + c], of[F + c], k)
+            cosine += product_order(of[E1 + c], of[F + c], k)
+            sine += product_order(of[E2 + c], of[F + c], k)
         of[COS, k], of[SIN, k] = cosine, sine
         if k == 0:
             angle, near = arctan2(sine, cosine), memory.angles[s]
@@ -174,11 +174,14 @@ def add_torsions(k, memory):
         of = memory.series.torsions[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
         angle = of[ANGLE, k] - torsions.natural[s] if k == 0 else of[ANGLE, k]
         of[MOMENT, k] = torsions.stiffness[s] * angle + torsions.damping[s] * (k + 1) * of[ANGLE, k + 1]
-        of[MOMENT_COS, k] = product(of[MOMENT], of[COS], k)
-        of[MOMENT_SIN, k] = product(of[MOMENT], of[SIN], k)
+        of[MOMENT_COS, k] = product_order(of[MOMENT], of[COS], k)
+        of[MOMENT_SIN, k] = product_order(of[MOMENT], of[SIN], k)
         for c in range(3):
-            on_e2, on_e1 = product(of[MOMENT_COS], of[F + c], k), product(of[MOMENT_SIN], of[F + c], k)
-            on_f = product(of[MOMENT_COS], of[E2 + c], k) - product(of[MOMENT_SIN], of[E1 + c], k)
+            on_e2, on_e1 = (
+                product_order(of[MOMENT_COS], of[F + c], k),
+                product_order(of[MOMENT_SIN], of[F + c], k),
+            )
+            on_f = product_order(of[MOMENT_COS], of[E2 + c], k) - product_order(of[MOMENT_SIN], of[E1 + c], k)
             e1, e2 = torsions.form[9 * s + E1 + c], torsions.form[9 * s + E2 + c]
             f = torsions.form[9 * s + F + c]
             for i in range(nz):

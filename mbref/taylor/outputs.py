@@ -26,7 +26,7 @@ from mbref.taylor.series import expand_series
 from mbref.taylor.simd import WIDTH, load, store
 from mbref.taylor.solver import factorise_anew
 
-CORRECTIONS = 2  # of the state at a sample of a loose series: the second one leaves rounding
+SAMPLE_CORRECTIONS = 2  # of the state at a sample of a loose series: the second one leaves rounding
 
 
 @entry(INT(INT, SERIES))
@@ -96,7 +96,7 @@ def expand_at_sample(memory):
     for j in range(0, lanes, WIDTH):
         store(load(variable, j) * load(state, j), terms, j)
         store(load(variable, j) * load(state, lanes + j), terms, lanes + j)
-    for _ in range(CORRECTIONS if memory.options.follows_drivers else 1):
+    for _ in range(SAMPLE_CORRECTIONS if memory.options.follows_drivers else 1):
         status = memory.kernels.expand(t, memory)
         if status != OK:
             return status

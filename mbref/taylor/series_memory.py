@@ -13,10 +13,10 @@ from mbref.simulation.run import Run
 from mbref.taylor.layout import Polynomials, Series, SeriesKernels, TaylorMemory
 from mbref.taylor.polynomials import Geometry
 from mbref.taylor.simd import padded_size
-from mbref.taylor.stepping import begin, expand_from, step
+from mbref.taylor.stepping import begin_series, expand_from, take_step
 
 KEPT = 16  # singular positions that are passed in a call
-CALLED = (begin, expand_from, step)  # the SeriesKernels
+CALLED = (begin_series, expand_from, take_step)  # the SeriesKernels
 
 
 def acquire_memory(run: Run, geometry: Geometry, polynomials: Polynomials, order: int) -> Pooled:

@@ -14,7 +14,7 @@ from mbref.taylor.generated_calls import factorise_by_code
 from mbref.taylor.partition import choose, put_rows, save_replaced_pivot
 from mbref.taylor.simd import WIDTH, load, store
 
-KEPT = 0.5  # a pivot over its first below which rows and variables are chosen again
+MIN_PIVOT_KEPT = 0.5  # a pivot over its first below which rows and variables are chosen again
 WITHOUT_INERTIA = 1e-13  # of the largest inertia of a variable
 
 
@@ -207,7 +207,7 @@ def put_force(i, memory):
 def is_sharp(solver):
     """Return whether all pivots are nearly as large as when they were chosen."""
     for k in range(solver.first.shape[0]):  # noqa: SIM110 - no generators in kernels
-        if not abs(solver.last[k]) > KEPT * solver.first[k]:
+        if not abs(solver.last[k]) > MIN_PIVOT_KEPT * solver.first[k]:
             return False
     return True
 
@@ -254,7 +254,7 @@ def respond_in_loops(memory):
 
 
 @kernel
-def factorise(memory):
+def factorise_equations(memory):
     """Compute the response at the first coefficients; return OK, or SINGULAR where rows or inertia change
     rank."""
     memory.run.equations.system.counts.factorisations += 1

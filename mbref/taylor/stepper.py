@@ -21,7 +21,7 @@ from mbref.simulation.pace import Pace
 from mbref.simulation.run import Run
 from mbref.simulation.singular_start import fits_no_branch, leaving
 from mbref.simulation.stepping import DONE, PAUSED, UNDECIDED
-from mbref.taylor.advance import advance_series, enter
+from mbref.taylor.advance import advance_series, enter_series
 from mbref.taylor.crossing.departure import Departure
 from mbref.taylor.crossing.long_crossing import (
     begin_crossing,
@@ -31,8 +31,13 @@ from mbref.taylor.crossing.long_crossing import (
     put_state_along,
 )
 from mbref.taylor.crossing.thresholds import MIN_CHANGE, START_ERROR
-from mbref.taylor.driven import ACCURATE_TOLERANCE, ORDER, PREDICTOR_TOLERANCE, follow_drivers
-from mbref.taylor.driven import LEAST_ORDER as LEAST_DRIVEN_ORDER
+from mbref.taylor.driven import (
+    ACCURATE_TOLERANCE,
+    LEAST_PREDICTOR_ORDER,
+    PREDICTOR_ORDER,
+    PREDICTOR_TOLERANCE,
+    follow_drivers,
+)
 from mbref.taylor.geometry import geometry_of
 from mbref.taylor.layout import Options, Polynomials, TaylorMemory
 from mbref.taylor.mode import REGULAR
@@ -43,7 +48,7 @@ from mbref.taylor.series_memory import CALLED, acquire_memory, put_equations, sh
 EXACT, EXACT_ORDER = 1e-13, 22  # rtol and atol of steps that pass singular positions, and their least order
 SHARE = 0.05  # of rtol + atol: the tolerance of a step that is clear of singular positions
 KERNELS_OF_SERIES = (
-    *CALLED, enter, advance_series, follow_drivers, complete_samples, begin_crossing, cross_position,
+    *CALLED, enter_series, advance_series, follow_drivers, complete_samples, begin_crossing, cross_position,
     continue_crossing, end_crossing, put_state_along,
 )  # fmt: skip
 ROUNDING = 1e-16  # of a singular value
@@ -103,8 +108,12 @@ class SeriesStepper:
         """Return whether steps are predictor steps, and the tolerance and the order of their series."""
         run, code = self.run, self.run.limits.code
         wanted = run.method.options_of(run.method.integrator)["order"]
-        if self.is_driven and not run.limits.branches and (wanted == 0 or wanted >= LEAST_DRIVEN_ORDER):
-            return True, PREDICTOR_TOLERANCE, order_of(PREDICTOR_TOLERANCE, wanted or ORDER, GENERIC)
+        if self.is_driven and not run.limits.branches and (wanted == 0 or wanted >= LEAST_PREDICTOR_ORDER):
+            return (
+                True,
+                PREDICTOR_TOLERANCE,
+                order_of(PREDICTOR_TOLERANCE, wanted or PREDICTOR_ORDER, GENERIC),
+            )
         tolerance = SHARE * (run.memory.control.rtol + run.memory.control.atol)
         return False, tolerance, order_of(tolerance, wanted, GENERATED if code == GENERATED else GENERIC)
 
@@ -230,7 +239,7 @@ class SeriesStepper:
     def expand(self) -> int:
         """Expand at the present time and state, for steps until the end: OK or the reason why not."""
         self.taylor.progress.end = self.run.times[-1]
-        return int(enter(self.argument))
+        return int(enter_series(self.argument))
 
     def _begin_again(self, status: int) -> int:
         """Complete the samples of a crossing and begin a series behind it; return the status."""

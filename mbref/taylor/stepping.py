@@ -16,7 +16,7 @@ from mbref.kernels.layout import NOT_FINITE, OK, SINGULAR_AHEAD
 from mbref.linear_algebra.vectors import larger
 from mbref.simulation.stepping import STEP_TOO_SMALL, UNDECIDED, share
 from mbref.taylor.coefficients import largest_used
-from mbref.taylor.correction import correct
+from mbref.taylor.correction import correct_state
 from mbref.taylor.crossing.acceptance import crossing_tolerance, judge_branch, step_tolerance
 from mbref.taylor.crossing.detection import save_pivots, time_to_singular_position
 from mbref.taylor.crossing.location import count_crossings
@@ -52,7 +52,7 @@ SHORTER = 0.7  # length of the next attempt, relative to the one that failed
 def expand_from(t, memory):
     """Correct the state at time t and expand it; return OK or the failure status."""
     expand_drivers(t, memory)
-    status = correct(memory)
+    status = correct_state(memory)
     if status == OK:
         expand_series(memory)
     return status
@@ -210,7 +210,7 @@ def attempt_step(h, last, memory):
 
 
 @exchangeable(STEP)
-def step(memory):
+def take_step(memory):
     """Take one step in as many attempts as it needs, and its samples; return OK or the failure status."""
     clock, counts, state, left = (
         memory.run.loop.clock, memory.run.equations.system.counts, memory.step,
@@ -265,7 +265,7 @@ def begin_once(memory):
 
 
 @exchangeable(BEGIN)
-def begin(memory):
+def begin_series(memory):
     """Choose the partition at the present state and expand there; return OK or the failure status."""
     t, slot = memory.run.loop.clock.time, memory.polynomials.torsions.slot
     for s in range(slot.shape[0]):

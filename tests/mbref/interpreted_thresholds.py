@@ -373,27 +373,27 @@ def _(_):
 # --- acceptance -----------------------------------------------------------------------------------------
 @check("VIOLATION_FLOOR")
 def _(_):
-    return acceptance.largest_violation(memory(start_pivot=1e-9)) == 1e-15
+    return acceptance.violation_by_rounding(memory(start_pivot=1e-9)) == 1e-15
 
 
 @check("VIOLATION_NEAR")
 def _(_):
-    return acceptance.largest_violation(memory()) == 1e-14
+    return acceptance.violation_by_rounding(memory()) == 1e-14
 
 
 @check("VIOLATION_ACROSS")
 def _(_):
-    return acceptance.largest_violation(memory(crossed=1)) == 1e-13
+    return acceptance.violation_by_rounding(memory(crossed=1)) == 1e-13
 
 
 @check("VIOLATION_LEFT")
 def _(_):
-    return acceptance.largest_violation(memory(start_violation=1e-9)) == 2e-9
+    return acceptance.violation_by_rounding(memory(start_violation=1e-9)) == 2e-9
 
 
 @check("TIME_ROUNDING")
 def _(_):
-    found = acceptance.largest_violation(memory(drivers=1, time=100.0, speed=5.0))
+    found = acceptance.violation_by_rounding(memory(drivers=1, time=100.0, speed=5.0))
     return found == pytest.approx(1.5e-13)
 
 

@@ -67,7 +67,7 @@ def crossing_tolerance(memory):
 
 
 @kernel
-def largest_violation(memory):
+def violation_by_rounding(memory):
     """Return the violation of the rows that rounding explains at the end of a step near a singular position.
 
     Drivers have the rounding of the time.  Of rows that depend on others, corrections leave what they had.
@@ -109,7 +109,11 @@ def judge_crossing(pivot, turned, last, memory):
     if step.start_pivot < min(MIN_PIVOT_ACROSS * progress.largest_pivot, progress.entry_pivot):
         return UNDECIDED
     is_shallow = pivot < MIN_PIVOT_RATIO_ACROSS * step.start_pivot and not last
-    if is_shallow or not step.violation <= largest_violation(memory) or step.correction > MAX_SHIFT * pivot:
+    if (
+        is_shallow
+        or not step.violation <= violation_by_rounding(memory)
+        or step.correction > MAX_SHIFT * pivot
+    ):
         return STEP_TOO_SMALL
     return OK
 
@@ -119,7 +123,7 @@ def judge_approach(h, pivot, turned, last, memory):
     """Return OK, or the status that refuses a high-accuracy step near a singular position."""
     step, progress = memory.step, memory.progress
     is_deep = pivot < MIN_PIVOT_RATIO * step.start_pivot and not last
-    if is_deep or not step.violation <= largest_violation(memory):
+    if is_deep or not step.violation <= violation_by_rounding(memory):
         return STEP_TOO_SMALL
     if step.correction > MAX_SHIFT * pivot:
         return STEP_TOO_SMALL if last else UNDECIDED

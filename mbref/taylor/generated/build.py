@@ -31,7 +31,7 @@ def put_code(taylor: TaylorMemory) -> Code:
     """
     names = functions_of(taylor)
     code, addresses = code_of(taylor, names), taylor.code
-    addresses.rank = rank_of(taylor)
+    addresses.rank = rank_of_rows(taylor)
     for name in names:
         addresses[name] = code.address(name)
     return code
@@ -53,14 +53,14 @@ def functions_of(taylor: TaylorMemory) -> tuple[str, ...]:
     """Return the names of a scene's functions: loads of springs are no sums of products of series, and
     elimination of many rows is left to the kernels' loops."""
     springs = taylor.polynomials.springs.damping.size + taylor.polynomials.torsions.damping.size
-    rank, nr, nz = rank_of(taylor), taylor.solver.pivot_rows.size, taylor.solver.pivot_columns.size
+    rank, nr, nz = rank_of_rows(taylor), taylor.solver.pivot_rows.size, taylor.solver.pivot_columns.size
     is_short = (rank * rank + nr * nz) * taylor.series.terms.shape[1] // WIDTH <= MOST_VECTORS
     by_power = power_orders.serves(taylor)
     names = {EXPAND: not springs, POWER: not springs and by_power, FACTORISE: is_short}
     return *(name for name, served in names.items() if served), *corrections.POINTERS
 
 
-def rank_of(taylor: TaylorMemory) -> int:
+def rank_of_rows(taylor: TaylorMemory) -> int:
     """Return the rank of the rows where all of the start's freedoms are left."""
     return taylor.solver.pivot_columns.size - int(taylor.options.start_freedoms)
 
@@ -68,7 +68,7 @@ def rank_of(taylor: TaylorMemory) -> int:
 def _key(taylor: TaylorMemory, names: Sequence[str]) -> str:
     """Return a digest of all that the code depends on."""
     polynomials, solver = taylor.polynomials, taylor.solver
-    digest = hashlib.sha256(f"{names} {rank_of(taylor)} {processor()}".encode())
+    digest = hashlib.sha256(f"{names} {rank_of_rows(taylor)} {processor()}".encode())
     arrays = (
         *polynomials.products,
         *polynomials.inertia,
@@ -86,7 +86,7 @@ def write_code(taylor: TaylorMemory, names: Sequence[str]) -> str:
     module = ir.Module()
     if EXPAND in names:
         write = Instructions(module, EXPAND, multiplier_orders.POINTERS, counts=orders.COUNTS)
-        is_driven = rank_of(taylor) == taylor.solver.pivot_columns.size
+        is_driven = rank_of_rows(taylor) == taylor.solver.pivot_columns.size
         (DrivenOrders if is_driven else MultiplierOrders)(taylor, write).put()
         write.end()
     if POWER in names:
@@ -96,7 +96,7 @@ def write_code(taylor: TaylorMemory, names: Sequence[str]) -> str:
     if FACTORISE in names:
         write = Instructions(module, FACTORISE, *elimination.POINTERS)
         kind = EliminationOfRows if POWER in names else Elimination
-        kind(taylor, rank_of(taylor), write).put()
+        kind(taylor, rank_of_rows(taylor), write).put()
         write.end()
     for name, pointers in corrections.POINTERS.items():
         write = Instructions(module, name, pointers)
