@@ -209,7 +209,7 @@ class Clock(NamedTuple):
     y_size: int = 0  # length of y
     sample: int = 0  # the next one to take
     restart: int = 0  # the step since which the states are one smooth piece
-    passage: float = 0.0  # s, the end of the step that meets a singular position
+    attempt_end: float = 0.0  # s, the end of the step that meets a singular position
     violated_row: int = -1
 
 

@@ -45,7 +45,7 @@ def met_by(run: Run, inside: bool) -> Met:
     q, v = _accepted(run)
     if run.model.m > MOST_ROWS:
         return Met(start, q, v, ())
-    width = max(float(memory.loop.clock.passage) - start, 0.0) if inside else 0.0
+    width = max(float(memory.loop.clock.attempt_end) - start, 0.0) if inside else 0.0
     after, speeds = (memory.state.coordinates.copy(), memory.state.velocities.copy()) if width else (q, v)
     way, rank = displacement(q, after), max(_rank(run, start, q), _rank(run, start + width, after))
 

@@ -155,7 +155,7 @@ def accept_step(now, h, suggested, ratio, memory):
     if status == OK and meets_singular_position(now - clock.time, memory):
         status = SINGULAR_AHEAD
     if status == SINGULAR_AHEAD:
-        clock.passage = now
+        clock.attempt_end = now
     if status == OK or status == CHANGED:  # noqa: SIM109 - no containers in kernels
         counts.steps += 1
         copy(loop.y_new, loop.y)

@@ -224,14 +224,14 @@ def take_step(memory):
         save_series_without_pole(memory)
         regular, h = first_lengths(left, memory)
     if 0.0 < state.time_to_pole < h and not is_accurate(memory):
-        clock.passage = clock.time + h
+        clock.attempt_end = clock.time + h
         return SINGULAR_AHEAD
     while True:
         status = attempt_step(h, h >= left, memory)
         if status == OK and (state.crossed or h <= regular):
             break
         if status == SINGULAR_AHEAD or (status == UNDECIDED and (state.crossed or h <= regular)):
-            clock.passage, state.time_to_crossing = clock.time + h, time_to_singular_position(h, memory)
+            clock.attempt_end, state.time_to_crossing = clock.time + h, time_to_singular_position(h, memory)
             return status
         counts.rejected += 1
         h = min(next_length(h, regular, memory), left)

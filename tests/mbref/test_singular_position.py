@@ -138,7 +138,7 @@ def test_kernels_end_before_the_step_that_crosses():
     run = start_run(scene, Method.parse("alf-dual+projection"), np.array([end]), Limits())
     status, _ = run.stepper.advance(None)
     clock = run.memory.loop.clock
-    assert status == SINGULAR_AHEAD and clock.time < first_crossing(scene, end) < clock.passage
+    assert status == SINGULAR_AHEAD and clock.time < first_crossing(scene, end) < clock.attempt_end
 
 
 @pytest.mark.parametrize("name", ["point_pendulum", "bricard_thin"])

@@ -85,7 +85,7 @@ def judge_clearance(memory):
     """Decide whether regular steps can follow."""
     progress, clock, before = memory.progress, memory.run.loop.clock, memory.progress.clearance
     progress.clearance = least_pivot(memory) / (PIVOT_CLEAR * progress.largest_pivot)
-    progress.is_clear = progress.clearance >= max(before, 1.0) and clock.time >= clock.passage
+    progress.is_clear = progress.clearance >= max(before, 1.0) and clock.time >= clock.attempt_end
 
 
 @entry(INT(INT, SERIES))

@@ -56,7 +56,7 @@ def cross_briefly(memory):
     clock, counts = memory.run.loop.clock, memory.run.equations.system.counts
     if not may_be_short(memory) or is_full(memory):
         return False
-    time, sample, passage = clock.time, clock.sample, clock.passage
+    time, sample, attempt_end = clock.time, clock.sample, clock.attempt_end
     steps, crossings = counts.steps, counts.crossings
     save_step_start(memory)
     return_to_start(memory)
@@ -68,7 +68,7 @@ def cross_briefly(memory):
     has_crossed = status == OK and take_crossing_steps(memory)
     set_regular(memory)
     if not has_crossed:
-        clock.time, clock.sample, clock.passage = time, sample, passage
+        clock.time, clock.sample, clock.attempt_end = time, sample, attempt_end
         counts.steps, counts.crossings = steps, crossings
         restore_step_start(memory)
     return has_crossed
