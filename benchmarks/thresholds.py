@@ -132,7 +132,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("name", nargs="*", metavar="NAME", default=[t.name for t in thresholds.TABLE])
+    parser.add_argument(
+        "name", nargs="*", metavar="NAME", default=[name for name in vars(thresholds) if name.isupper()]
+    )
     parser.add_argument("--factor", type=float, default=10.0)
     given = parser.parse_args()
     before = {name: fingerprint(scene, end) for name, scene, end in sweep()}
