@@ -124,8 +124,7 @@ class SeriesStepper:
             settings.rank_tolerance = (least * max(rounding, ROUNDING)) ** 0.5
 
     def equations_of(self, model: Model, start: Start) -> tuple[Geometry, Polynomials]:
-        """Return the natural coordinates and equations of a scene that differs from the run's in numbers
-        alone, from its start."""
+        """Return natural coordinates and equations of a scene that differs in numbers, from its start."""
         moving = np.zeros(model.n, dtype=bool)
         moving[self.run.memory.active.velocities] = True
         geometry = geometry_of(model, start, moving, self.follows_drivers)
@@ -166,8 +165,7 @@ class SeriesStepper:
         self._decide_rank()
 
     def parameters(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
-        """Return where memory has numbers that differ between scenes, and their values for ``lengths``
-        (s,)."""
+        """Return where memory has numbers that differ between scenes, and values for ``lengths`` (s,)."""
         return [(self.taylor.options, START_ERROR * np.maximum(1.0, lengths), "start_distance")]
 
     def takes(self, model: Callable[[], Model], start: Start) -> bool:
@@ -231,8 +229,7 @@ class SeriesStepper:
         return status, seconds - self._sampling - (self.run.making - making)
 
     def take_steps(self) -> int:
-        """Take as many steps as are taken at a time: PAUSED after them, DONE at the end, or the reason why
-        there are none."""
+        """Take the steps of one call; return PAUSED, DONE at the end, or the failure status."""
         self._calls += 1
         return int((follow_drivers if self.follows_drivers else advance_series)(self.argument))
 
@@ -247,8 +244,7 @@ class SeriesStepper:
         return UNDECIDED if status == PAUSED and self.expand() != OK else status
 
     def _complete_samples(self, status: int, go_on: bool) -> int:
-        """Complete the samples of steps; return the status of the steps, or of the completion if that
-        failed."""
+        """Complete the samples of steps; return the status of the steps, or of a failed completion."""
         began = time.process_time()
         completed = int(complete_samples(int(go_on), self.argument))
         self._sampling += time.process_time() - began
@@ -286,8 +282,7 @@ class SeriesStepper:
         return self._until_clear(self._departure.along_branch(taken[0]), taken)
 
     def _leave_start(self) -> int:
-        """Leave a singular position at t = 0: PAUSED, also where there is none, DONE at the end, else the
-        reason why the motion cannot be followed."""
+        """Leave a singular position at t = 0, if any; return PAUSED, DONE, or the failure status."""
         way = leaving(self.run) if self.run.times[-1] > 0.0 else None
         if way is None:
             return UNDECIDED if fits_no_branch(self.run) else PAUSED
@@ -296,8 +291,7 @@ class SeriesStepper:
         return self._begin_again(self._until_clear(self._departure.from_start(way), []))
 
     def _until_clear(self, status: int, crossed: list[Passed]) -> int:
-        """Take high-accuracy steps until they are clear of singular positions; return the status.  Those
-        ``crossed`` being the first, and whose motion is determined."""
+        """Take high-accuracy steps until they are clear of singular positions, the first ones ``crossed``."""
         counts: Any = self.run.memory.equations.system.counts
         while status in (PAUSED, DONE):
             branch = self._record(crossed)
@@ -314,8 +308,7 @@ class SeriesStepper:
         return status
 
     def _record(self, crossed: list[Passed]) -> Passed | None:
-        """Add the singular positions that the last step crossed, up to one to be left along another branch:
-        that one, or None."""
+        """Add the crossings of the last step, up to one with a requested branch; return that one or None."""
         for passed in self.recorded():
             taken = self._asked(len(self.run.crossings) + len(crossed) + 1)
             crossed.append(passed._replace(taken=taken))
