@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help check test lint deep shuffle fuzz kills mutants coverage report quick reference picture docs site bench clean drawn
+.PHONY: help check test lint deep shuffle fuzz kills mutants coverage report quick reference picture docs site bench clean drawn paper
 
 help: ## show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -77,6 +77,12 @@ drawn: $(VENV)/ready ## every card on drawn mechanisms, for the committed report
 	$(BIN)/crosscheck verify mbref --family taylor --mechanisms 2000 --json \
 	    --records build/drawn/mbref.jsonl > reports/reference/conformance/mbref_drawn.json
 	$(BIN)/crosscheck report --render reports/reference
+
+PAPER := reports/paper
+
+paper: $(VENV)/ready ## the committed page on the paper with its records, anew, into reports/paper/
+	rm -rf build/paper && $(BIN)/crosscheck paper --out build/paper
+	rm -rf $(PAPER) && mv build/paper $(PAPER)
 
 picture: $(VENV)/ready ## the README's moving picture, into reports/rendered/
 	$(BIN)/python -m reports --picture reports/rendered/passage.svg

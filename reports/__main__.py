@@ -19,6 +19,7 @@ from reports.runs import Run, by_scene
 
 NEEDS = {"matplotlib": "matplotlib", "jinja2": "jinja2", "resvg_py": "resvg-py"}  # package by module
 PAPER, STABILITY = "paper", "stability"  # the sections whose runs are their own
+OF_PAPER = "Stabilisation methods for redundant constraints"  # title of a page of the paper alone
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -46,7 +47,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         _notice(f"interrupted; what has been run is in {arguments.out}, the same command goes on from there")
         return 130
-    _write(blocks, Path(arguments.out))
+    _write(blocks, Path(arguments.out), names)
     return 0
 
 
@@ -64,13 +65,18 @@ def _picture(path: Path) -> int:
 def _render(folder: Path, names: Sequence[str]) -> int:
     """Render a folder of records again; nothing is run."""
     from reports import sections, stored
+    from reports.sections import paper
 
     try:
-        groups = stored.groups(folder)
+        blocks = [] if names == [PAPER] else sections.blocks(
+            stored.groups(folder), names, stored.verified(folder)
+        )  # fmt: skip
+        if PAPER in names:
+            blocks += paper.render(*collection.stored_paper(folder))
     except (FileNotFoundError, SceneError) as error:
         _notice(str(error))
         return 2
-    _write(sections.blocks(groups, names, stored.verified(folder)), folder)
+    _write(blocks, folder, names)
     return 0
 
 
@@ -88,16 +94,16 @@ def _blocks(out: Path, wanted: collection.Runs, names: Sequence[str]) -> list[Bl
     if STABILITY in names:
         blocks += stability.render(collection.stability_ladders(out, _notice))
     if PAPER in names:
-        records_of_paper, illustration = collection.paper(out, _notice)
-        print(paper.score(records_of_paper))
-        blocks += paper.render(records_of_paper, illustration)
+        found_of_paper = collection.paper(out, not wanted.is_quick, _notice)
+        print(paper.score(found_of_paper.records))
+        blocks += paper.render(*found_of_paper)
     return blocks
 
 
-def _write(blocks: Sequence[Block], out: Path) -> None:
+def _write(blocks: Sequence[Block], out: Path, names: Sequence[str]) -> None:
     from reports import render
 
-    render.write(blocks, out)
+    render.write(blocks, out, OF_PAPER if list(names) == [PAPER] else render.TITLE)
     _notice(f"written: {out / 'index.html'} and {out / 'report.md'}")
 
 

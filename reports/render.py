@@ -33,7 +33,7 @@ NUMBER = re.compile(r"(?:&lt; )?\d[\d.]*e[-+]?\d+|t = [\d.e-]*\d s|\d[\d.]* (?:m
 TITLE = "Closed-loop mechanisms: engines against truth"
 
 
-def write(blocks: Sequence[Block], out: Path) -> None:
+def write(blocks: Sequence[Block], out: Path, title: str = TITLE) -> None:
     """Write ``out``/index.html, ``out``/report.md and ``out``/figures/NAME.svg and .png."""
     pictures = out / "figures"
     pictures.mkdir(parents=True, exist_ok=True)
@@ -46,11 +46,11 @@ def write(blocks: Sequence[Block], out: Path) -> None:
             name = file_name(figure.name)
             (pictures / f"{name}.svg").write_text(drawn[figure.name], encoding="utf-8")
             (pictures / f"{name}.png").write_bytes(figures.png(drawing))
-    (out / "index.html").write_text(html(blocks, drawn), encoding="utf-8")
-    (out / "report.md").write_text(markdown(blocks), encoding="utf-8")
+    (out / "index.html").write_text(html(blocks, drawn, title), encoding="utf-8")
+    (out / "report.md").write_text(markdown(blocks, title), encoding="utf-8")
 
 
-def html(blocks: Sequence[Block], drawn: dict[str, str]) -> str:
+def html(blocks: Sequence[Block], drawn: dict[str, str], title: str = TITLE) -> str:
     """The page; ``drawn`` has the SVG element of every figure by name."""
     environment = Environment(
         loader=PackageLoader("reports"), autoescape=True, undefined=StrictUndefined,
@@ -58,7 +58,7 @@ def html(blocks: Sequence[Block], drawn: dict[str, str]) -> str:
     )  # fmt: skip
     environment.filters |= {"slug": slug, "numbers": numbers, "breakable": breakable}
     return environment.get_template("page.html").render(
-        title=TITLE,
+        title=title,
         chapters=[b.text for b in blocks if isinstance(b, Heading) and b.level == 2],
         blocks=[(type(b).__name__.lower(), b) for b in blocks],
         has_opening=any(isinstance(b, Opening) for b in blocks),
@@ -66,9 +66,9 @@ def html(blocks: Sequence[Block], drawn: dict[str, str]) -> str:
     )
 
 
-def markdown(blocks: Iterable[Block]) -> str:
+def markdown(blocks: Iterable[Block], title: str = TITLE) -> str:
     """The report as Markdown that shows figures/NAME.png."""
-    return "\n\n".join([f"# {TITLE}", *map(_markdown, blocks)]) + "\n"
+    return "\n\n".join([f"# {title}", *map(_markdown, blocks)]) + "\n"
 
 
 def _markdown(block: Block) -> str:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from crosscheck.engine import engine_names
 from crosscheck.judge.model_identity import gate_times
 from crosscheck.study.grid import Record
-from crosscheck.study.record_view import of_scenes
+from crosscheck.study.record_view import of_scenes, with_time
 from mbref.records import looked_at
 from mbref.scene import Scene
 from reports.runs import SceneRuns, by_scene
@@ -30,7 +29,7 @@ def groups(folder: Path) -> list[SceneRuns]:
         for name in ("records", "truths", "motions", "branches")
     )
     gates = [r for r in records if _is_gate(named[r["scene"]], r)]
-    runs = [_timed(r, times) for r in records if not any(r is gate for gate in gates)]
+    runs = [with_time(r, times) for r in records if not any(r is gate for gate in gates)]
     return by_scene(_ordered(runs), named, gates, *more)
 
 
@@ -44,13 +43,6 @@ def verified(folder: Path) -> list[Record]:
 
 def _is_gate(scene: Scene, record: Record) -> bool:
     return np.array_equal(record["asked"].get("times", ()), gate_times(scene))
-
-
-def _timed(record: Record, times: dict[str, dict[str, Any]]) -> Record:
-    if record["key"] not in times:
-        return record
-    entry = times[record["key"]]
-    return {**record, "cost": {**record["cost"], "seconds": entry["seconds"]}, "timing": entry["timing"]}
 
 
 def _ordered(records: Sequence[Record]) -> list[Record]:

@@ -9,15 +9,19 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck.cli.request import RequestError, find_engines
-from crosscheck.paper import runs
+from crosscheck.paper import runs, store
 from crosscheck.paper.illustration import Illustration, illustration
 from crosscheck.study import stability, sweep
 from crosscheck.study.comparison import Collection, Wanted, collected
 from crosscheck.study.grid import Case, Record
 from crosscheck.study.progress import shown
+from crosscheck.study.record_view import with_time
 from crosscheck.study.timings import with_timings
+from mbref.records import looked_at
 from mbref.scene import Scene
 
+TIMINGS, ILLUSTRATION = "paper-timings.jsonl", "paper-illustration.jsonl"
+REPEATS = 3  # of the timed runs, in turns
 Notice = Callable[[str], None]  # takes one sentence for the user
 
 
@@ -67,17 +71,26 @@ def stability_ladders(out: Path, notice: Notice) -> list[Record]:
     return stability.run(out / "stability.jsonl", find_engines(None, notice))
 
 
-def paper(out: Path, notice: Notice) -> Paper:
-    """The records of the paper's runs, stored in ``out``/paper*.jsonl."""
+def paper(out: Path, is_whole: bool, notice: Notice) -> Paper:
+    """The records of the paper's runs, stored in ``out``/paper*: those of the tables and figures, or with the
+    studies of the settings."""
     out.mkdir(parents=True, exist_ok=True)
-    path, cases = out / "paper.jsonl", runs.cases()
+    path, timed = out / store.FILE, runs.timed()
+    cases = runs.cases() | timed | (runs.studies() if is_whole else {})
     with shown("the paper's runs", len(cases)) as progress:
-        records = runs.run(path, cases, progress)
+        records = store.run(path, cases, progress)
     more = runs.follow_ups(records)
     with shown("their errors", len(more)) as progress:
-        records |= runs.run(path, more, progress)
-    cases = runs.timed()
-    single = runs.run(path, cases)
-    timed = with_timings(list(cases.values()), list(single.values()), out / "paper-timings.jsonl", notice)
-    records |= dict(zip(cases, timed, strict=True))
-    return Paper(records, illustration(out / "paper-illustration.jsonl"))
+        records |= store.run(path, more, progress)
+    single = [records[label] for label in timed]
+    in_turns = with_timings(list(timed.values()), single, out / TIMINGS, notice, repeats=REPEATS)
+    records |= dict(zip(timed, in_turns, strict=True))
+    store.index(path, cases | more)
+    return Paper(records, illustration(out / ILLUSTRATION))
+
+
+def stored_paper(out: Path) -> Paper:
+    """The paper's records of a folder; nothing is run.  Raises FileNotFoundError where it has none."""
+    records, times = store.indexed(out), looked_at(out / TIMINGS)
+    timed = {label: with_time(record, times) for label, record in records.items()}
+    return Paper(timed, illustration(out / ILLUSTRATION))

@@ -1,4 +1,4 @@
-"""The command `crosscheck`: list, run, compare, tune, verify, report, diff and certify."""
+"""The command `crosscheck`: list, run, compare, tune, verify, report, paper, diff and certify."""
 
 from __future__ import annotations
 
@@ -127,8 +127,16 @@ def _findings(arguments: argparse.Namespace) -> int:
 
 
 def _report(arguments: argparse.Namespace) -> int:
+    return _rendered(_report_options(arguments))
+
+
+def _paper(arguments: argparse.Namespace) -> int:
+    return _rendered(["--section", "paper", "--out", arguments.out, "--depth", arguments.depth])
+
+
+def _rendered(options: Sequence[str]) -> int:
     """The report stands above this package, so it is started as a program and never imported."""
-    with subprocess.Popen([sys.executable, "-m", "reports", *_report_options(arguments)]) as program:
+    with subprocess.Popen([sys.executable, "-m", "reports", *options]) as program:
         try:
             return program.wait()
         except KeyboardInterrupt:  # the program is interrupted too, stores its records and ends by itself
@@ -157,6 +165,7 @@ COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "verify": _verify,
     "findings": _findings,
     "report": _report,
+    "paper": _paper,
     "diff": _diff,
     "certify": certify,
 }

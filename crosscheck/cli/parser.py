@@ -57,6 +57,7 @@ def parser() -> argparse.ArgumentParser:
         _add_verify,
         _add_findings,
         _add_report,
+        _add_paper,
         _add_diff,
         _add_certify,
     ):
@@ -178,6 +179,20 @@ def _add_report(commands: Commands) -> None:
     parser.add_argument("--out", default="report", metavar="DIR", help="folder to write (default: report)")
     parser.add_argument("--render", metavar="DIR", help="render a report's records again, run nothing")
     add_reference_time(parser)
+
+
+def _add_paper(commands: Commands) -> None:
+    example = "crosscheck paper --out paper"
+    about = (
+        "run the tables and figures of Neto & Ambrósio (2003) and render them beside the printed ones; "
+        "resumes where it was interrupted"
+    )
+    parser = _add(commands, "paper", about, example)
+    parser.add_argument(
+        "--depth", choices=("quick", "whole"), default="quick",
+        help="quick: the tables and figures; whole: also the sweeps of settings and every pair of methods",
+    )  # fmt: skip
+    parser.add_argument("--out", default="paper", metavar="DIR", help="folder to write (default: paper)")
 
 
 def _add_diff(commands: Commands) -> None:

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -15,8 +11,7 @@ from crosscheck.engine import Setting, engine
 from crosscheck.paper import settings
 from crosscheck.paper.cells import CELLS, COUNTS_III, COUNTS_IV, FIVE_BAR, FOUR_BAR_COLUMNS, SPATIAL, Cell
 from crosscheck.paper.settings import BASE, DRAWN, END, FEW, SEEDS, SIZED, STRICT, SWEEP, TIGHT, Variant
-from crosscheck.study.grid import Case, Record, run_here, study
-from crosscheck.study.grid import Progress as Advance
+from crosscheck.study.grid import Case, Record
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome
@@ -25,7 +20,7 @@ ENGINE = "mbref"  # the engine that has the paper's methods
 SHARE = 0.95  # of the end time of a failed run, where its error is taken
 SAMPLES = np.linspace(0.0, END, 101)
 SHORT = np.linspace(0.0, 0.12, 61)  # every 2 ms over two revolutions
-TURNS = np.linspace(0.0, END, 401)
+TURNS = np.linspace(0.0, END, 201)
 SECOND = np.linspace(0.0, 1.0, 6)
 FINE = np.linspace(0.0, END, 2001)  # every 10 ms, to see the peaks at singular positions
 SIZED_ROWS = ("MPI (SVD)", "ALF", "ALF + CP")  # whose end times are shown over the size of the data errors
@@ -53,6 +48,12 @@ DIGITS_EPSILON = 1e-14  # so that only rounding is left
 EXACT, PENALTY, DUAL = "mpi-svd", "alf", "alf-dual"
 
 
+ERRORS = tuple(10.0**-k for k in range(4, 10))  # tolerances at which the growth of the violation is shown
+GAINS = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # α = β of Baumgarte, 1/s
+GROWTH, GAIN = "growth", "gain"
+TEACHING = np.linspace(0.0, 2.0, 101)  # s, of the runs for teaching
+
+
 class Label(NamedTuple):
     """The place of a run: table, figure or sweep; its row and column; the varied setting."""
 
@@ -61,6 +62,11 @@ class Label(NamedTuple):
     column: str
     variant: str = BASE.name
 
+    def __str__(self) -> str:
+        part = f"Table {self.part}" if self.part in ("I", "II", "III") else self.part
+        varied = (self.variant,) if self.variant != BASE.name else ()
+        return ", ".join(filter(None, (part, self.row, self.column, *varied)))
+
 
 PEAKS = Label("peaks", "MPI (GS) + CP", HEAVY)
 Cases = dict[Label, Case]
@@ -68,20 +74,16 @@ Records = dict[Label, Record]
 
 
 def cases() -> Cases:
-    """Every run but the follow-ups and the timings."""
+    """Every run that the tables and figures need, except the follow-ups and the timings."""
     return {
-        **tables(),
-        **drawn(),
-        **sweep(),
-        **sized(),
-        **strict(),
-        **figures(),
-        **dynamic(),
-        **kept(),
-        **tight(),
-        **pairs(),
-        **digits(),
-    }
+        **tables(), **drawn(), **strict(), **figures(), **dynamic(), **kept(), **tight(), **growth(),
+        **gains(),
+    }  # fmt: skip
+
+
+def studies() -> Cases:
+    """The runs behind the studies of settings and methods that stand after the tables and figures."""
+    return {**sweep(), **sized(), **settings_of_cranks(), **pairs(), **digits()}
 
 
 def tables() -> Cases:
@@ -152,24 +154,53 @@ def dynamic_scene(column: str) -> Scene:
 
 
 def dynamic() -> Cases:
-    """Figures 11 to 16 and Table IV; for a = b also other settings, finely, and on the smooth branch."""
+    """Figures 11 to 16 and Table IV; for a = b also finely, and by series on the smooth branch."""
     out = {
         Label("dynamic", row, column): _case(dynamic_scene(column), row, TURNS)
         for column, rows in DYNAMIC.items()
         for row in rows
     }
+    out[PEAKS] = _case(dynamic_scene(HEAVY), PEAKS.row, FINE)
+    out[Label("dynamic", TRUE_BRANCH, HEAVY)] = Case(
+        dynamic_scene(HEAVY), TURNS, ENGINE, Setting("taylor", {"rtol": 1e-9})
+    )
+    return out
+
+
+def settings_of_cranks() -> Cases:
+    """The planar slider-cranks of Figures 11 to 14 at other settings."""
+    scene, out = dynamic_scene(HEAVY), {}
     for variant in HEAVY_SWEEP:
         for row in CROSSING:
             if not variant.alf or "ALF" in row:
-                out[Label("dynamic", row, HEAVY, variant.name)] = _case(
-                    dynamic_scene(HEAVY), row, TURNS, variant
-                )
-    out[PEAKS] = _case(dynamic_scene(HEAVY), PEAKS.row, FINE)
+                out[Label("dynamic", row, HEAVY, variant.name)] = _case(scene, row, TURNS, variant)
     raised = _case(dynamic_scene(UNEQUAL), "MPI (SVD)", TURNS, RAISED)
-    out[Label("dynamic", "MPI (SVD)", UNEQUAL, RAISED.name)] = raised
-    branch = Setting("taylor", {"rtol": 1e-9})
-    out[Label("dynamic", TRUE_BRANCH, HEAVY)] = Case(dynamic_scene(HEAVY), TURNS, "mbref", branch)
-    return out
+    return out | {Label("dynamic", "MPI (SVD)", UNEQUAL, RAISED.name): raised}
+
+
+def teaching_scene() -> Scene:
+    """A mechanism without redundant constraints and singular positions: the spatial slider-crank, 100 N m."""
+    return dynamic_scene(SPATIAL_DYNAMIC)
+
+
+def growth() -> Cases:
+    """Figure 2's procedure by LM2 over the tolerance: nothing corrects the violation."""
+    return {
+        Label(GROWTH, "LM2", SPATIAL_DYNAMIC, f"{rtol:g}"): _case(
+            teaching_scene(), "LM2", TEACHING, Variant(f"{rtol:g}", {"rtol": rtol, "violation": 1e9})
+        )
+        for rtol in ERRORS
+    }
+
+
+def gains() -> Cases:
+    """LM2 with Baumgarte's stabilisation over α = β."""
+    return {
+        Label(GAIN, "LM2 + B", SPATIAL_DYNAMIC, f"{gain:g}"): _named(
+            teaching_scene(), f"lm2+baumgarte[{gain:g},{gain:g}]/{settings.INTEGRATOR}", TEACHING
+        )
+        for gain in GAINS
+    }
 
 
 def kept() -> Cases:
@@ -235,14 +266,9 @@ def timed() -> Cases:
     return one | {Label("timed", row, SPATIAL_DYNAMIC): _case(scene, row, TURNS) for row in COUNTS_IV}
 
 
-def run(path: str | Path, chosen: Cases, progress: Advance | None = None) -> Records:
-    """Records of the cases, stored at ``path`` as they end and taken from there where they are known.
-
-    In a process pool: mbref's runs are short, and end by themselves after ``most_steps``.
-    """
-    with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
-        records = study(list(chosen.values()), pool, path, progress, run_here)
-    return dict(zip(chosen, records, strict=True))
+def has(records: Iterable[Label], part: str) -> bool:
+    """Whether there are runs of a part."""
+    return any(label.part == part for label in records)
 
 
 def found(records: Mapping[Label, Record], cell: Cell, parts: Iterable[str]) -> dict[str, Record]:

@@ -31,6 +31,7 @@ INTERVAL = 0.2  # s, at which the CPU time of a child is read
 LOADED = 10.0  # times its limit, in wall time, that a call may take where other processes have the cores
 ORPHAN_SECONDS = 10.0  # beyond that, a child whose parent has died ends itself
 ENDING_SECONDS = 10.0  # for a child that has hung up to end by itself, with an exit status that tells why
+TAIL = 4000  # bytes in which the last printed line is looked for
 PRINTED = 200  # characters of the last printed line that a message quotes
 
 Function = Callable[..., Any]
@@ -89,6 +90,12 @@ class Child:
         except BaseException:
             self.kill()
             raise
+
+    def last_printed(self) -> str:
+        """The last line that the present call has printed so far."""
+        size = os.fstat(self._printed.fileno()).st_size
+        text = os.pread(self._printed.fileno(), TAIL, max(0, size - TAIL))  # moves no place that both share
+        return _last_line(text.decode(errors="replace"))
 
     def kill(self) -> None:
         """End the process and what it started; a call under way fails."""
@@ -171,8 +178,12 @@ class Child:
 
     def _failure(self, outcome: Outcome, sentence: str) -> ChildFailed:
         """The sentence, with the last line printed."""
-        last = next((line.strip() for line in reversed(self._said().split("\n")) if line.strip()), "")
+        last = _last_line(self._said())
         return ChildFailed(outcome, sentence + (f"; last printed: {last[:PRINTED]}" if last else ""))
+
+
+def _last_line(text: str) -> str:
+    return next((line.strip() for line in reversed(text.split("\n")) if line.strip()), "")
 
 
 def stop_all() -> None:

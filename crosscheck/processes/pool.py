@@ -11,7 +11,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
-from threading import Lock
+from threading import Lock, get_ident
 from typing import Any
 
 import numpy as np
@@ -24,11 +24,13 @@ from mbref.trajectory import Outcome, Trajectory
 
 MOST_IDLE = 8  # children that wait for a run: one of every engine, so that scouting has started them
 COPIES = sys.platform == "linux"  # elsewhere a forked process may miss what libraries of the system began
+NO_ENGINE = ""  # served by a child that computes for the judge
 READY_SECONDS = 600.0  # for imports and compiling, before the time of a run begins
 
 _idle: list[tuple[str, Child]] = []  # with their engines, the one used last at the end
 _lending = Lock()
 _preparing: dict[str, Lock] = {}  # by engine
+_starting: dict[int, Child] = {}  # by thread: children that are made ready
 _prepared: set[tuple[str, str]] = set()  # engines and families that a child has made ready
 
 
@@ -48,6 +50,22 @@ def run_isolated(
         if run.outcome is not Outcome.COMPLETED:
             child.kill()
     return run
+
+
+def run_in_turn(
+    engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, time_limit: float
+) -> Trajectory:
+    """`run_isolated` in a child that serves on after a run that ended early: for many short runs of an engine
+    that ends by itself and leaves nothing behind."""
+    _check(engine_name)
+    with _lent(engine_name) as child:
+        return _observed(child, engine_name, scene, times, setting, time_limit).value
+
+
+def apart(function: Callable[..., Any], arguments: tuple[Any, ...], time_limit: float) -> Any:
+    """``function(*arguments)`` in a child process, within CPU time (s); raises ChildFailed."""
+    with _lent(NO_ENGINE) as child:
+        return child.call(function, arguments, time_limit).value
 
 
 def observe(
@@ -91,7 +109,7 @@ def ask(engine_name: str, question: Callable[..., Any], about: tuple[Any, ...], 
     Raises ChildFailed when that fails, LookupError for an unknown engine.
     """
     _check(engine_name)
-    with _lent(engine_name) as child:
+    with _lent(engine_name) as child, _starts(child):
         return child.call(question, (engine_name, *about), time_limit).value
 
 
@@ -152,12 +170,28 @@ def _observed(
 def _made_ready(child: Child, engine_name: str, family: str) -> Observation:
     """The engine's version; what is compiled once a machine is not compiled by two children at a time."""
     arguments = serve.get_ready, (engine_name, [family]), READY_SECONDS
-    if (engine_name, family) in _prepared:
-        return child.call(*arguments)
-    with _preparing.setdefault(engine_name, Lock()):
-        ready = child.call(*arguments)
-        _prepared.add((engine_name, family))
-    return ready
+    with _starts(child):
+        if (engine_name, family) in _prepared:
+            return child.call(*arguments)
+        with _preparing.setdefault(engine_name, Lock()):
+            ready = child.call(*arguments)
+            _prepared.add((engine_name, family))
+        return ready
+
+
+@contextmanager
+def _starts(child: Child) -> Iterator[None]:
+    """Count a child as starting in the block."""
+    _starting[get_ident()] = child
+    try:
+        yield
+    finally:
+        del _starting[get_ident()]
+
+
+def starting() -> dict[int, str]:
+    """What engines print while they are made ready, such as that they compile, by the thread that waits."""
+    return {thread: child.last_printed() or "starting" for thread, child in _starting.copy().items()}
 
 
 @contextmanager

@@ -2,35 +2,76 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any, Protocol
 
 from rich.console import Console
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
+    ProgressColumn,
+    Task,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from rich.text import Text
 
-from crosscheck.study.grid import Progress as Advance
+from crosscheck.processes.pool import starting
 from crosscheck.study.grid import Record
 
 PARTS = 10  # lines of a progress that no terminal shows
+QUIET = 20.0  # s without a line, after which one names the work under way
+LOOKED = 0.5  # s after which that is looked at again
 HUNDREDTHS = 100  # parts in which the progress of one motion is told
-COLUMNS = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-           TextColumn("left"), TimeRemainingColumn(),
-           TextColumn("{task.fields[last]}", markup=False))  # fmt: skip
 Show = Callable[[int, int, str], None]  # done, in all, what was done last
+
+
+class Shown(Protocol):
+    """A progress: called with the runs done, those in all and the record made last."""
+
+    under_way: UnderWay
+
+    def __call__(self, done: int, total: int, record: Record) -> None:
+        """Show the progress."""
+
+
+class UnderWay:
+    """The work under way by name, each with the time (s) since it began, and what engines print while they
+    are made ready, such as that kernels are compiled; several threads may work."""
+
+    def __init__(self) -> None:
+        self._began: dict[int, tuple[str, float]] = {}  # by thread
+
+    def named(self, run: Callable[[Any], Any], name: Callable[[Any], str]) -> Callable[[Any], Any]:
+        """The function, whose calls are under way by the name of what they are given."""
+
+        def called(given: Any) -> Any:
+            self._began[threading.get_ident()] = name(given), time.monotonic()
+            try:
+                return run(given)
+            finally:
+                del self._began[threading.get_ident()]
+
+        return called
+
+    def __str__(self) -> str:
+        now, starts = time.monotonic(), starting()
+        named = {
+            thread: f"{name}, for {now - since:.0f} s" for thread, (name, since) in self._began.copy().items()
+        }
+        with_starts = [f"{text} ({starts.pop(k)})" if k in starts else text for k, text in named.items()]
+        return "; ".join([*with_starts, *dict.fromkeys(starts.values())])
 
 
 @contextmanager
 def counted(what: str, total: int) -> Iterator[Callable[[str], None]]:
     """Progress from 0 to ``total``; yields a function that moves it one on and names what is done."""
-    with _display(what, total) as show:
+    with _display(what, total) as (show, _):
         done = 0
 
         def advance(last: str) -> None:
@@ -42,21 +83,29 @@ def counted(what: str, total: int) -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
-def shown(what: str, total: int) -> Iterator[Advance]:
-    """Progress from 0 to ``total`` while the context lasts; yields what ``study`` takes as ``progress``."""
-    with _display(what, total) as show:
+def shown(what: str, total: int) -> Iterator[Shown]:
+    """Progress from 0 to ``total`` while the context lasts; yields what ``study`` takes as ``progress``, with
+    the work ``under_way``, which it names."""
+    with _display(what, total) as (show, under_way):
+        yield _OfRecords(show, under_way)
 
-        def advance(done: int, total: int, record: Record) -> None:
-            show(done, total, f"{record['scene']} {record['engine']} {record['family']}: {record['outcome']}")
 
-        yield advance
+class _OfRecords:
+    """Shows records by scene, engine, family and outcome."""
+
+    def __init__(self, show: Show, under_way: UnderWay):
+        self._show, self.under_way = show, under_way
+
+    def __call__(self, done: int, total: int, record: Record) -> None:
+        last = f"{record['scene']} {record['engine']} {record['family']}: {record['outcome']}"
+        self._show(done, total, last)
 
 
 @contextmanager
 def followed(what: str, end: float) -> Iterator[Callable[[float], None]]:
     """Progress of a motion from t = 0 to ``end`` (s), in hundredths; yields a function that takes the time
     reached."""
-    with _display(what, HUNDREDTHS) as show:
+    with _display(what, HUNDREDTHS) as (show, _):
 
         def reached(t: float) -> None:
             done = min(int(HUNDREDTHS * t / end), HUNDREDTHS)
@@ -66,29 +115,72 @@ def followed(what: str, end: float) -> Iterator[Callable[[float], None]]:
 
 
 @contextmanager
-def _display(what: str, total: int) -> Iterator[Show]:
-    """A bar on a terminal, else a line of text for every tenth."""
-    console = Console(stderr=True)
+def _display(what: str, total: int) -> Iterator[tuple[Show, UnderWay]]:
+    """A bar on a terminal, else a line of text for every tenth, and after QUIET seconds without one."""
+    console, under_way = Console(stderr=True), UnderWay()
     if not console.is_terminal:
-        yield _Lines(what, console)
+        with _Lines(what, total, console, under_way) as lines:
+            yield lines, under_way
         return
-    with Progress(*COLUMNS, console=console, transient=True) as bar:
+    with Progress(*_columns(under_way), console=console, transient=True) as bar:
         task = bar.add_task(what, total=total, last="")
-        yield lambda done, total, last: bar.update(task, completed=done, total=total, last=last)
+        yield lambda done, total, last: bar.update(task, completed=done, total=total, last=last), under_way
+
+
+def _columns(under_way: UnderWay) -> tuple[ProgressColumn, ...]:
+    return (
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+        TextColumn("left"), TimeRemainingColumn(), _Working(under_way),
+    )  # fmt: skip
+
+
+class _Working(ProgressColumn):
+    """The work under way; without any, what was done last."""
+
+    max_refresh = 1.0
+
+    def __init__(self, under_way: UnderWay):
+        super().__init__()
+        self._under_way = under_way
+
+    def render(self, task: Task) -> Text:
+        """The column's text."""
+        return Text(str(self._under_way) or task.fields["last"])
 
 
 class _Lines:
     """Progress as lines, the time left told from the time taken."""
 
-    def __init__(self, what: str, console: Console):
-        self._what, self._console = what, console
-        self._start, self._told = time.monotonic(), 0
+    def __init__(self, what: str, total: int, console: Console, under_way: UnderWay):
+        self._what, self._total, self._console, self._under_way = what, total, console, under_way
+        self._start, self._told, self._done = time.monotonic(), 0, 0
+        self._printed, self._over = self._start, threading.Event()
+        self._watch = threading.Thread(target=self._name_work, daemon=True)
+
+    def __enter__(self) -> _Lines:
+        self._watch.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._watch.join()
 
     def __call__(self, done: int, total: int, last: str) -> None:
+        self._done, self._total = done, total
         if PARTS * done // total == PARTS * self._told // total:
             return
         self._told = done
         taken = time.monotonic() - self._start
         left = f", about {taken / done * (total - done):.0f} s left" if done < total else ""
-        line = f"{self._what}: {done} of {total}, {taken:.0f} s{left}; {last}"
+        self._print(f"{left}; {last}")
+
+    def _name_work(self) -> None:
+        """Print a line that names the work under way whenever none was printed for QUIET seconds."""
+        while not self._over.wait(LOOKED):
+            if time.monotonic() - self._printed >= QUIET and (working := str(self._under_way)):
+                self._print(f"; now {working}")
+
+    def _print(self, rest: str) -> None:
+        self._printed = time.monotonic()
+        line = f"{self._what}: {self._done} of {self._total}, {self._printed - self._start:.0f} s{rest}"
         self._console.print(line, markup=False, highlight=False, soft_wrap=True)

@@ -111,3 +111,12 @@ def varied_settings(record: Record, records: Sequence[Record]) -> str:
     if len(settings) == 1:
         own = names = record["asked"]["options"]
     return ", ".join(f"{k}={own[k]:g}" if isinstance(own[k], float) else f"{k}={own[k]}" for k in names)
+
+
+def with_time(record: Record, known: dict[str, dict[str, Any]]) -> Record:
+    """The record with the time that is known by its key, if there is one."""
+    if record["key"] not in known:
+        return record
+    entry = known[record["key"]]
+    cost = {**record["cost"], "seconds": entry["seconds"]}
+    return {**record, "cost": cost, "timing": entry["timing"]}

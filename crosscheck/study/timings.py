@@ -8,6 +8,7 @@ from typing import Any
 
 from crosscheck.study.fair_timing import timed
 from crosscheck.study.grid import Case, Record
+from crosscheck.study.record_view import with_time
 from mbref.records import append, stored
 from mbref.trajectory import Outcome
 
@@ -33,20 +34,12 @@ def with_timings(
                     known[record["key"]] = _entry(record)
                     append(path, known[record["key"]])
         for i in places:
-            done[i] = _with_cost(records[i], known)
+            done[i] = with_time(records[i], known)
     return done
 
 
 def _is_short(record: Record, long: float) -> bool:
     return record["outcome"] == Outcome.COMPLETED.label and record["cost"]["seconds"] <= long
-
-
-def _with_cost(record: Record, known: dict[str, dict[str, Any]]) -> Record:
-    if record["key"] not in known:
-        return record
-    entry = known[record["key"]]
-    cost = {**record["cost"], "seconds": entry["seconds"]}
-    return {**record, "cost": cost, "timing": entry["timing"]}
 
 
 def _entry(record: Record) -> dict[str, Any]:

@@ -9,7 +9,6 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from crosscheck.judge.metrics import violation_series
 from crosscheck.paper.cells import FIVE_BAR
 from crosscheck.paper.runs import (
     FINE,
@@ -28,6 +27,7 @@ from mbref.trajectory import Trajectory
 from reports import figures, mechanisms
 from reports.blocks import Block, Figure, Heading
 from reports.runs import Run
+from reports.sections.paper_teaching import violation
 
 HALF = "θ₂ = π/2"
 POSES = 12
@@ -47,8 +47,8 @@ def render(records: Records) -> list[Block]:
     return [
         Heading("Figures 4 to 8: kinematic analysis"),
         _poses(4, four_bar, _only(four, ("ALF", *free, "MPI (GS) + B")), "The four-bar from θ₂ = π/2"),
-        _violations(5, four_bar, _only(four, free), "without partitioning"),
-        _violations(6, four_bar, _only(four, partitioned), "with partitioning"),
+        _violations(5, _only(four, free), "without partitioning"),
+        _violations(6, _only(four, partitioned), "with partitioning"),
         _poses(8, five_bar, _only(five, (*free, "MPI (SVD) + CP")), "The five-bar"),
         Heading("Figures 11 to 16: dynamic analysis, 100 N m on the crank"),
         _rates(11, _only(heavy, branches), "planar slider-crank, a = b: the first singular position comes "
@@ -103,36 +103,26 @@ def plot_poses(scene: Scene, runs: Named, span: tuple[float, float] | None) -> s
     return mechanisms.poses_side_by_side(scene, shown, POSES)
 
 
-def _violations(paper: int, scene: Scene, runs: Named, what: str) -> Figure:
-    worst = {name: float(np.max(_violation(scene, run))) for name, run in runs.items()}
+def _violations(paper: int, runs: Named, what: str) -> Figure:
+    worst = {name: float(violation(run).max()) for name, run in runs.items()}
     sizes = ", ".join(f"{name} {size:.1e}" for name, size in worst.items())
     caption = (
         f"Figure {paper}. The largest violation of a constraint of the four-bar from θ₂ = π/2, MPI {what}; "
         f"at most: {sizes}. Dashed: θ₂ = kπ."
     )
-    return Figure(f"paper-figure-{paper}", caption, partial(plot_violations, scene, runs))
+    return Figure(f"paper-figure-{paper}", caption, partial(plot_violations, runs))
 
 
-def _violation(scene: Scene, run: Run) -> np.ndarray:
-    values = violation_series(scene, run.trajectory, 0)
-    assert values is not None
-    return np.maximum(values, SMALLEST)
-
-
-def plot_violations(scene: Scene, runs: Named) -> Drawing:
+def plot_violations(runs: Named) -> Drawing:
     """Largest violation over time, logarithmic."""
     drawing, (axes,) = figures.canvas(7.2, 3.4)
     last = 0.0
     for i, (name, run) in enumerate(runs.items()):
         t = run.trajectory.times
         last = max(last, float(t[-1]))
-        axes.plot(
-            t, _violation(scene, run), label=name, color=figures.COLOURS[i], linestyle=figures.DASHES[i]
-        )
+        axes.plot(t, violation(run), label=name, color=figures.COLOURS[i], linestyle=figures.DASHES[i])
         if not run.completed:
-            axes.plot(
-                t[-1], _violation(scene, run)[-1], figures.FAILED, color=figures.COLOURS[i], markersize=8
-            )
+            axes.plot(t[-1], violation(run)[-1], figures.FAILED, color=figures.COLOURS[i], markersize=8)
     for k in range(1, 10):
         if (crossing := (2 * k - 1) * math.pi / 2 / 124.8) < last * 1.05:
             axes.axvline(crossing, color=figures.GREY, linestyle="--", linewidth=0.8, zorder=0)

@@ -13,13 +13,26 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
     runs = [run for group in groups for run in group.runs]
     return [
         Heading("Provenance", 2),
-        Text(f"{len(runs)} records; seed {_all({str(run.record['seed']) for run in runs})}. {_timing(runs)}"),
+        Text(
+            f"{len(runs)} records{_made(runs)}; seed {_all({str(run.record['seed']) for run in runs})}. "
+            f"{_timing(runs)}"
+        ),
         _versions(runs),
         _machines(runs),
         _settings(runs),
         Text("These commands, in the folder of this page, make the missing records and render it again:"),
         Listing(_commands(groups)),
     ]
+
+
+def _made(runs: Sequence[Run]) -> str:
+    """The commit and the date of the code that made the records; empty without records."""
+    commits = sorted({f"`{commit}`" for run in runs if (commit := run.record.get("commit"))})
+    dates = sorted({date[:10] for run in runs if (date := run.record.get("date"))})
+    if not dates:
+        return ""
+    when = dates[0] if len(dates) == 1 else f"{dates[0]} to {dates[-1]}"
+    return f" of commit {', '.join(commits)}, {when}" if commits else f" of {when}"
 
 
 def _timing(runs: Sequence[Run]) -> str:

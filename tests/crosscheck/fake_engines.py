@@ -166,6 +166,12 @@ class Herald(Recorder):
         self.is_ready = True
 
 
+class Compiling(Fake):
+    def prepare(self, families: Sequence[str]) -> None:
+        print("compiling kernels", flush=True)
+        time.sleep(0.5)
+
+
 class Stuck(Fake):
     def prepare(self, families: Sequence[str]) -> None:
         time.sleep(600)
@@ -254,7 +260,8 @@ class Versionless(Fake):
 FAKE, SEGFAULT, HANG, CHATTER, RAISE, QUIT = Fake(), Segfault(), Hang(), Chatter(), Raise(), Quit()
 THREADS, MISSING, RECORDER, AGING = Threads(), Missing(), Recorder(), Aging()
 KEEPING, HERALD = Keeping(), Herald()
-SLOW, STUCK, NO_SETTINGS, REFUSING = Slow(), Stuck(), NoSettings(), Refusing()
+SLOW, STUCK, COMPILING = Slow(), Stuck(), Compiling()
+NO_SETTINGS, REFUSING = NoSettings(), Refusing()
 MALFORMED, SCALARS, VERSIONLESS = Malformed(), Scalars(), Versionless()
 LOSES_LOADS, LAST_ONE_RUNS = LosesLoads(), LastOneRuns()
 

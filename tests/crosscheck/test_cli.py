@@ -31,7 +31,7 @@ from mbref.scenes.four_bar import four_bar_gravity
 from mbref.trajectory import Cost, Outcome
 
 FAKE = "fake_engines:FAKE"
-COMMANDS = ("list", "run", "compare", "tune", "verify", "report", "diff", "certify")
+COMMANDS = ("list", "run", "compare", "tune", "verify", "report", "paper", "diff", "certify")
 COST = {"seconds", "build_seconds", "steps", "rejected", "rhs", "factorisations", "newton"}
 
 

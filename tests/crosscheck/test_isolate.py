@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,7 +18,14 @@ import pytest
 
 from crosscheck.engine import Setting
 from crosscheck.processes.child import ChildFailed, stop_all
-from crosscheck.processes.pool import end_idle, observe, run_isolated, time_interleaved
+from crosscheck.processes.pool import (
+    end_idle,
+    observe,
+    run_in_turn,
+    run_isolated,
+    starting,
+    time_interleaved,
+)
 from mbref.scene import Body, Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
@@ -136,6 +144,21 @@ def test_runs_of_an_engine_share_a_process_until_one_does_not_complete(tmp_path:
     assert len(set(processes)) == 4, processes
 
 
+def test_runs_in_turn_share_a_process_until_one_is_ended(tmp_path: Path):
+    """An engine that ends early by itself serves on; one that hangs ends at its limit."""
+    log = tmp_path / "log"
+    ways = [({}, 60.0), ({"outcome": "NOT_CONVERGED"}, 60.0), ({}, 60.0), ({"sleep": 60.0}, 1.0), ({}, 60.0)]
+    outcomes = [
+        run_in_turn("fake_engines:RECORDER", still(str(log)), TIMES, Setting("a", way), limit).outcome.name
+        for way, limit in ways
+    ]
+    completed = "COMPLETED"
+    assert outcomes == [completed, "NOT_CONVERGED", completed, "TIMED_OUT", completed], outcomes
+    processes = [line.split()[1] for line in log.read_text().splitlines()]
+    alike = [first == second for first, second in pairwise(processes)]
+    assert alike == [True, True, True, False], processes
+
+
 def test_run_after_a_time_out_has_its_whole_time(tmp_path: Path):
     """Getting ready takes this engine longer than its runs may."""
     log, limit = tmp_path / "log", 1.5
@@ -152,6 +175,17 @@ def test_engine_that_hangs_while_it_gets_ready_times_out(monkeypatch: pytest.Mon
     monkeypatch.setattr("crosscheck.processes.pool.READY_SECONDS", 1.0)
     ended = run("STUCK", time_limit=60.0)
     assert (ended.outcome, ended.message) == (Outcome.TIMED_OUT, "no result after 1 s"), ended.message
+
+
+def test_engine_that_compiles_and_what_it_prints_meanwhile():
+    with ThreadPoolExecutor(1) as thread:
+        setting = Setting("plain", {"seconds": 0.25})
+        made = thread.submit(run_in_turn, "fake_engines:COMPILING", still(), TIMES, setting, 60.0)
+        seen = set()
+        while not made.done():
+            seen |= set(starting().values())
+        assert made.result().outcome is Outcome.COMPLETED, made.result().message
+    assert "compiling kernels" in seen and not starting(), seen
 
 
 def test_engines_do_not_share_a_process(tmp_path: Path):

@@ -24,7 +24,7 @@ from mbref.trajectory import Outcome, Trajectory
 
 @cache
 def all_cases() -> runs.Cases:
-    return runs.cases()
+    return runs.cases() | runs.studies()
 
 
 def simulated(label: Label, times: np.ndarray | None = None) -> Trajectory:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
@@ -11,8 +12,8 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting
-from crosscheck.study import grid, timings
-from crosscheck.study.grid import Case, default_cases, key, run_case, run_here, study
+from crosscheck.study import grid, progress, timings
+from crosscheck.study.grid import Case, default_cases, key, run_case, run_here, run_in_turn, study
 from mbref.records import append
 from mbref.scene import Body, Force, Scene
 from mbref.scenes import SCENES
@@ -60,6 +61,24 @@ def test_stored_lines_and_returned_records_agree(tmp_path: Path):
     assert sorted(r["family"] for r in lines) == ["a", "b", "c"], "one line for each different case"
     assert all(r in records for r in lines), (lines, records)
     assert seen == [(1, 3), (2, 3), (3, 3)], seen
+
+
+def test_case_that_hangs_is_named_while_it_runs_and_ends_at_its_limit(tmp_path: Path, monkeypatch, capsys):
+    monkeypatch.setattr(progress, "QUIET", 0.0)
+    cases = [case("a"), case("hangs", "HANG", still(str(tmp_path / "pid")), limit=2.0), case("b")]
+    with progress.shown("runs", len(cases)) as shown:
+        named = shown.under_way.named(run_in_turn, lambda case: f"the run {case.setting.family}")
+        records = study(cases, None, None, shown, named)
+    assert [r["outcome"] for r in records] == ["COMPLETED", "TIMED_OUT", "COMPLETED"], records
+    lines = capsys.readouterr().err.splitlines()
+    assert any(re.search(r"of 3, \d+ s; now .*the run hangs, for \d+ s", line) for line in lines), lines
+
+
+def test_case_whose_measuring_ends_at_its_limit_has_no_error(monkeypatch):
+    """Its reference is not waited for any longer than that."""
+    monkeypatch.setattr(grid, "MEASURED", 0.0)
+    [record] = study([case("a", scene=SCENES["bennett"]())], None, None, None, run_in_turn)
+    assert record["outcome"] == "COMPLETED" and record["metrics"]["error"] is None, record["metrics"]
 
 
 def test_rerun_and_first_run_agree_without_running_again(tmp_path: Path):

@@ -53,5 +53,8 @@ def test_scenes_are_those_of_today(groups):
 
 def test_the_report_is_of_one_commit_and_small(groups):
     commits = {run.record["commit"] for group in groups for run in group.runs}
-    assert len(commits) == 1 and "+" not in commits.pop(), "made from a clean checkout"
+    [commit] = commits
+    assert "+" not in commit, "made from a clean checkout"
+    text = (FOLDER / "report.md").read_text()
+    assert f"records of commit `{commit}`, " in text, "the report names the commit of its records"
     assert sum(path.stat().st_size for path in FOLDER.rglob("*") if path.is_file()) < 15e6

@@ -1,0 +1,78 @@
+"""The records of the paper's runs: made with limits and names, thinned for figures, found by label."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from crosscheck.judge.metrics import violation_series
+from crosscheck.paper.runs import GROWTH, PEAKS, Cases, Label, Records
+from crosscheck.study.grid import Case, Record, key, run_in_turn, study
+from crosscheck.study.progress import Shown
+from mbref.records import looked_at
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+
+DRAWN_PARTS = ("figures", "dynamic", "peaks")  # whose motions figures draw
+PLACES = 6  # significant digits of a motion that is drawn
+FILE = "paper.jsonl"
+INDEX = "paper-runs.json"  # label → key of the record, beside the records
+
+
+def run(path: str | Path, chosen: Cases, progress: Shown) -> Records:
+    """Records of the cases, stored at ``path`` as they end and taken from there where they are known.
+
+    Every run has a limit of CPU time, and the progress names it by its label.
+    """
+    labels = {id(case): label for label, case in chosen.items()}
+
+    def made(case: Case) -> Record:
+        return drawable(labels[id(case)], case.scene, run_in_turn(case))
+
+    named = progress.under_way.named(made, lambda case: str(labels[id(case)]))
+    records = study(list(chosen.values()), None, path, progress, named)
+    return dict(zip(chosen, records, strict=True))
+
+
+def drawable(label: Label, scene: Scene, record: Record) -> Record:
+    """The record with the motion that figures draw, in PLACES digits, and its ``violation`` (k,) of positions
+    at the samples, taken before; without motion where no figure draws it."""
+    if label.part == "digits":  # whose accelerations are compared digit by digit
+        return record
+    drawn = label.part in DRAWN_PARTS
+    shown = list(record["bodies"].items())[: 1 if label == PEAKS else None]
+    bodies = {
+        name: {field: _short(values if drawn else []) for field, values in motion.items()}
+        for name, motion in shown
+    }
+    return record | {
+        "bodies": bodies, "times": record["times"] if drawn or label.part == GROWTH else [],
+        "violation": _violation(scene, record) if drawn or label.part == GROWTH else [],
+        "reactions": {}, "open_reactions": None, "crossings": None,
+    }  # fmt: skip
+
+
+def _violation(scene: Scene, record: Record) -> list[float]:
+    values = violation_series(scene, Trajectory.from_record(scene.name, record), 0)
+    return [] if values is None else _short(values.tolist())
+
+
+def _short(values: Any) -> Any:
+    """Nested lists of numbers in PLACES significant digits."""
+    if isinstance(values, list):
+        return [_short(value) for value in values]
+    return float(f"{values:.{PLACES}g}")
+
+
+def index(path: str | Path, chosen: Cases) -> None:
+    """Write the keys of the cases by label beside their records, so that these are rendered on their own."""
+    known = {json.dumps(label, ensure_ascii=False): key(case) for label, case in chosen.items()}
+    Path(path).with_name(INDEX).write_text(json.dumps(known, indent=0, ensure_ascii=False) + "\n")
+
+
+def indexed(folder: Path) -> Records:
+    """Records of a folder by label; raises FileNotFoundError where it has none."""
+    known = looked_at(folder / FILE)
+    keys = json.loads((folder / INDEX).read_text())
+    return {Label(*json.loads(label)): known[k] for label, k in keys.items() if k in known}
