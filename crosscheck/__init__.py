@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from crosscheck.engine import engine as find_engine
     from crosscheck.judge.metrics import METRICS, measure
     from crosscheck.judge.truth import Truth, truth_for
+    from crosscheck.recorded.exact import reference_table
+    from crosscheck.recorded.judgement import judge_motion
     from crosscheck.study import Case, default_cases
     from crosscheck.study import study as run_study
 
@@ -35,6 +37,8 @@ _PLACE_OF = {
     "engine_names": ("crosscheck.engine", "engine_names"),
     "find_engine": ("crosscheck.engine", "engine"),
     "measure": ("crosscheck.judge.metrics", "measure"),
+    "judge_motion": ("crosscheck.recorded.judgement", "judge_motion"),
+    "reference_table": ("crosscheck.recorded.exact", "reference_table"),
     "run_study": ("crosscheck.study", "study"),
     "truth_for": ("crosscheck.judge.truth", "truth_for"),
 }
@@ -42,7 +46,8 @@ _PLACE_OF = {
 __all__ = [
     "METRICS", "Cannot", "Case", "Comparison", "Engine", "Owner", "Setting", "Supports", "Truth", "compare",
     "default_cases",
-    "default_engines", "engine_names", "find_engine", "measure", "run_study", "truth_for",
+    "default_engines", "engine_names", "find_engine", "judge_motion", "measure", "reference_table",
+    "run_study", "truth_for",
 ]  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""The command `crosscheck`: list, run, compare, tune, verify, report, paper, diff and certify."""
+"""The command `crosscheck`: studies, verdicts, recorded motions, the suite, reports and references."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from crosscheck.cli import listing, request, tables
 from crosscheck.cli.certifying import certify
 from crosscheck.cli.comparing import compare, tune
+from crosscheck.cli.judging import judge, write_reference
 from crosscheck.cli.parser import parser
 from crosscheck.cli.request import RequestError
 from crosscheck.cli.running import (
@@ -168,4 +169,6 @@ COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "paper": _paper,
     "diff": _diff,
     "certify": certify,
+    "judge": judge,
+    "reference": write_reference,
 }

@@ -45,7 +45,7 @@ def add_selection(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     add_depth(parser)
     when = parser.add_mutually_exclusive_group()
-    when.add_argument("--times", type=_numbers, metavar="a,b,c", help="sample times (s), increasing")
+    when.add_argument("--times", type=numbers, metavar="a,b,c", help="sample times (s), increasing")
     when.add_argument("--samples", type=int, metavar="N", help="equally spaced samples, both ends included")
     parser.add_argument(
         "--rtol", type=float, help="one relative tolerance instead of the sweep over tolerances"
@@ -92,7 +92,8 @@ def _not_negative(text: str) -> float:
     return number
 
 
-def _numbers(text: str) -> list[float]:
+def numbers(text: str) -> list[float]:
+    """Numbers separated by commas."""
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:

@@ -15,6 +15,7 @@ from crosscheck.cli.options import (
     add_reference_time,
     add_selection,
     digits,
+    numbers,
     positive,
     whole,
 )
@@ -60,6 +61,8 @@ def parser() -> argparse.ArgumentParser:
         _add_paper,
         _add_diff,
         _add_certify,
+        _add_judge,
+        _add_reference,
     ):
         add(known)
     return found
@@ -81,6 +84,43 @@ def _add_certify(commands: Commands) -> None:
     parser.add_argument("--samples", type=int, default=3, metavar="N", help="from 0 to the end (default: 3)")
     parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
     parser.add_argument("--out", metavar="FILE", help="default: standard output")
+
+
+def _add_judge(commands: Commands) -> None:
+    example = "crosscheck judge four_bar.toml run.csv --unit mm --unit deg --column coupler.position.x=2"
+    about = (
+        "compare a motion recorded by any tool with the reference: the error of each column with its bound, "
+        "when it begins, and what would explain it; 0 where all columns are right, 1 otherwise"
+    )
+    parser = _add(commands, "judge", about, example)
+    parser.add_argument("scene", metavar="SCENE", help="a built-in name or a .toml file")
+    parser.add_argument("table", metavar="TABLE", help="a table with a column of times, such as run.csv")
+    parser.add_argument(
+        "--column", action="append", default=[], metavar="NAME=PLACE[:UNIT]",
+        help="a column of the scene or `time`, and its number (from 1) or header in the table; may repeat",
+    )  # fmt: skip
+    parser.add_argument(
+        "--unit", action="append", default=[], metavar="U",
+        help="unit of all columns of its quantity, such as mm, deg, mm/s or rpm; may repeat; default: SI",
+    )  # fmt: skip
+    parser.add_argument(
+        "--quaternion", choices=("wxyz", "xyzw"), default="wxyz", help="order of quaternion columns"
+    )
+    add_reference_time(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+
+
+def _add_reference(commands: Commands) -> None:
+    example = "crosscheck reference four_bar.toml --out ref.csv --samples 201"
+    about = "write the reference motion with the bound on its error as a table for other tools"
+    parser = _add(commands, "reference", about, example)
+    parser.add_argument("scene", metavar="SCENE", help="a built-in name or a .toml file")
+    parser.add_argument("--out", required=True, metavar="FILE", help="the .csv file")
+    when = parser.add_mutually_exclusive_group()
+    when.add_argument("--times", type=numbers, metavar="a,b,c", help="sample times (s), increasing")
+    when.add_argument("--samples", type=int, default=101, metavar="N", help="equally spaced (default: 101)")
+    parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
+    add_reference_time(parser)
 
 
 def _add_list(commands: Commands) -> None:

@@ -31,8 +31,8 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["__main__"],
     ),
     "crosscheck": (
-        ["judge"], ["engine"], ["engines"], ["processes"], ["study"], ["conformance"], ["findings"],
-        ["paper"], ["cli"],
+        ["judge"], ["recorded"], ["engine"], ["engines"], ["processes"], ["study"], ["conformance"],
+        ["findings"], ["paper"], ["cli"],
         ["__main__"],
     ),
     "reports": (

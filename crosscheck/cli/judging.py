@@ -1,0 +1,80 @@
+"""`crosscheck judge` and `crosscheck reference`: a recorded motion judged, and the reference as a table."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.table import Table
+
+from crosscheck.cli import request
+from crosscheck.cli.request import RequestError
+from crosscheck.cli.running import COMPLETED, OTHERWISE, console
+from crosscheck.recorded.columns import SI, kind_of
+from crosscheck.recorded.exact import reference_table, write
+from crosscheck.recorded.judgement import Judgement, judge_motion
+from crosscheck.recorded.reading import read
+
+
+def judge(arguments: argparse.Namespace) -> int:
+    """Print the judgement of a table; 0 where all columns are right.  Raises RequestError, SceneError."""
+    (scene,) = request.find_scenes([arguments.scene])
+    columns = dict(_assigned(text) for text in arguments.column)
+    try:
+        recording = read(Path(arguments.table), scene, columns, arguments.unit, arguments.quaternion)
+    except OSError as error:
+        raise RequestError(f"{arguments.table}: {error.strerror}") from None
+    found = judge_motion(scene, recording, arguments.reference_time)
+    if arguments.json:
+        print(json.dumps({**found.to_record(), "ignored": list(recording.ignored)}, allow_nan=False))
+    else:
+        _show(found, recording.ignored)
+    return COMPLETED if found.is_right else OTHERWISE
+
+
+def _assigned(text: str) -> tuple[str, str]:
+    name, equals, place = text.partition("=")
+    if not equals or not place:
+        raise RequestError(f"--column {text}: must be NAME=PLACE, such as rod.position.x=3")
+    return name, place
+
+
+def _show(found: Judgement, ignored: Sequence[str]) -> None:
+    table = Table("column", "largest error", "bound", "", "begins at", title="against the reference")
+    for c in found.columns:
+        begins = "" if c.begins is None else f"{c.begins:.4g} s"
+        verdict = "right within the bound" if c.is_right else "[bold]off[/bold]"
+        unit = SI[kind_of(c.name)]
+        table.add_row(c.name, f"{c.largest:.2e} {unit}", f"{c.bound:.2e} {unit}", verdict, begins)
+    console().print(table)
+    if found.reason:
+        console().print(f"The reference ends at t = {found.until:.6g} s: {found.reason}", soft_wrap=True)
+    if not found.is_right and not found.explanations:
+        console().print("No explanation that was tried removes half of the difference.")
+    for e in found.explanations:
+        console().print(f"{e.sentence}: {100 * e.remains:.2g} % of the difference remains", soft_wrap=True)
+    if ignored:
+        console().print(f"not read: {', '.join(ignored)}", soft_wrap=True)
+
+
+def write_reference(arguments: argparse.Namespace) -> int:
+    """Write the reference as a table; 0 where it reaches the end.  Raises RequestError."""
+    (scene,) = request.find_scenes([arguments.scene])
+    scene = request.lasting(scene, arguments.times, arguments.duration)
+    times = request.sample_times(scene, arguments.times, arguments.samples)
+    table = reference_table(scene, times, arguments.reference_time)
+    if not len(table["time"]):
+        raise RequestError(f"{scene.name}: has no reference in {arguments.reference_time:g} CPU seconds")
+    try:
+        write(table, Path(arguments.out))
+    except OSError as error:
+        raise RequestError(f"--out: {arguments.out}: {error.strerror}") from None
+    reached = float(table["time"][-1])
+    console().print(
+        f"{arguments.out}: {len(table['time'])} samples to t = {reached:g} s, error at most "
+        f"{table['bound'].max():.1e} of the scene's length or rad",
+        soft_wrap=True,
+    )
+    return COMPLETED if reached == times[-1] else OTHERWISE

@@ -1,0 +1,77 @@
+"""The exact motion at any times with the bound on its error, and the same as a table."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from crosscheck.judge.reference.reference import SECONDS, NoReference, reference
+from crosscheck.judge.truth import NoSolution, closed_form
+from crosscheck.judge.truth.reference_truth import trajectory
+from crosscheck.recorded.columns import SI, kind_of, values
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Exact:
+    """The motion at the times (k,) that are known, the bound (k,) on its error, and why later ones are not.
+
+    The bound is a distance over the scene's length, or an angle (rad).
+    """
+
+    motion: Trajectory
+    bound: np.ndarray
+    reason: str
+
+
+def exact(scene: Scene, times: Sequence[float] | np.ndarray, seconds: float = SECONDS) -> Exact:
+    """The exact motion at increasing times (s): a closed form, or the reference in so many CPU seconds."""
+    times = np.asarray(times, dtype=float)
+    family, reason = closed_form(scene), ""
+    if family is not None:
+        try:
+            motion = family.poses(times)
+        except NoSolution as end:
+            motion, reason = family.poses(times[times <= end.until]), str(end)
+        return Exact(motion, np.full(len(motion.times), family.accuracy), reason)
+    found = reference(scene, times.tolist(), seconds)
+    part = found.part if isinstance(found, NoReference) else found
+    return Exact(trajectory(scene, part), part.bound, getattr(found, "reason", ""))
+
+
+def reference_table(
+    scene: Scene, times: Sequence[float] | np.ndarray, seconds: float = SECONDS
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """Return the reference motion as columns: ``time``, ``bound`` and every column of ``values``.
+
+    Parameters
+    ----------
+    scene : Scene
+        The mechanism.
+    times : sequence of float
+        Increasing sample times ≥ 0, s.
+    seconds : float
+        CPU time that the reference may take, s.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (k,)
+        SI units. ``bound`` is on the error: a distance over the scene's length, or an angle (rad). The
+        columns end where the reference ends.
+    """
+    found = exact(scene, times, seconds)
+    return {"time": found.motion.times, "bound": found.bound, **values(scene, found.motion)}
+
+
+def write(table: dict[str, np.ndarray], path: Path) -> None:
+    """Write columns as CSV, the unit of each in its header: ``rod.position.x [m]``."""
+    headers = [f"{name} [{SI['time'] if name == 'time' else SI.get(kind_of(name), '1')}]" for name in table]
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(headers)
+        writer.writerows(zip(*(map(repr, column.tolist()) for column in table.values()), strict=True))

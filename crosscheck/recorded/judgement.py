@@ -1,0 +1,146 @@
+"""A recorded motion against the exact one: the error of each column, when it begins, and what explains it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from crosscheck.judge.reference.reference import SECONDS
+from crosscheck.recorded.changed_scenes import changed
+from crosscheck.recorded.columns import kind_of, scales, values
+from crosscheck.recorded.exact import Exact, exact
+from crosscheck.recorded.explanations import Difference, Explanation, ranked, with_signs
+from crosscheck.recorded.reading import Recording, read
+from mbref.scene import Scene, SceneError
+
+BEGINS = 0.01  # of the largest error: an error begins where it first exceeds this part
+DENSE = 400  # further times at which the exact motion is known, for shifts in time
+TRIED = 20.0  # CPU seconds for motions of changed scenes
+
+
+@dataclass(frozen=True)
+class ColumnError:
+    """The largest error of a column, the bound below which it means nothing, and when (s) it begins."""
+
+    name: str
+    largest: float
+    bound: float
+    begins: float | None
+
+    @property
+    def is_right(self) -> bool:
+        """Whether the error is within the bound of the reference and the last digit of the table."""
+        return self.largest <= self.bound
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """Errors by column, explanations with the best first, and why the exact motion ends early, if it does."""
+
+    columns: tuple[ColumnError, ...]
+    explanations: tuple[Explanation, ...]
+    until: float
+    reason: str
+
+    @property
+    def is_right(self) -> bool:
+        """Whether every column is right within its bound."""
+        return all(column.is_right for column in self.columns)
+
+    def to_record(self) -> dict[str, Any]:
+        """The judgement as numbers, lists and text, for JSON."""
+        return {
+            "right": self.is_right, "until": self.until, "reason": self.reason,
+            "columns": [{**vars(c), "right": c.is_right} for c in self.columns],
+            "explanations": [vars(e) for e in self.explanations],
+        }  # fmt: skip
+
+
+def judge_motion(
+    scene: Scene, motion: str | Path | Mapping[str, np.ndarray] | Recording, seconds: float = SECONDS
+) -> Judgement:
+    """Return the errors of a recorded motion and what would explain them.
+
+    Parameters
+    ----------
+    scene : Scene
+        The mechanism.
+    motion : str, Path, mapping of str to ndarray of shape (k,), or Recording
+        A table, or its columns in SI units: ``time`` and columns such as ``rod.position.x``.
+    seconds : float
+        CPU time that the reference may take, s.
+
+    Returns
+    -------
+    Judgement
+
+    Raises
+    ------
+    SceneError
+        If the table has no column of the scene, or the scene has no reference.
+    """
+    recording = _as_recording(scene, motion)
+    found = exact(scene, _with_dense(recording.times), seconds)
+    if not len(found.motion.times):
+        raise SceneError([f"{scene.name}: has no reference: {found.reason}"])
+    return _judged(scene, recording, found)
+
+
+def _with_dense(times: np.ndarray) -> np.ndarray:
+    """Times (k,) and further ones from 0 to their end, none nearer to a given one than a tenth of a step."""
+    dense = np.linspace(0.0, times[-1], DENSE + 1)
+    after = np.minimum(np.searchsorted(times, dense), len(times) - 1)
+    nearest = np.minimum(np.abs(times[after] - dense), np.abs(times[np.maximum(after - 1, 0)] - dense))
+    return np.union1d(times, dense[nearest > 0.1 * times[-1] / DENSE])
+
+
+def _as_recording(scene: Scene, motion: Any) -> Recording:
+    if isinstance(motion, Recording):
+        return motion
+    if isinstance(motion, Mapping):
+        columns = {name: np.asarray(column, dtype=float) for name, column in motion.items()}
+        times = columns.pop("time")
+        return Recording(times, {n: c for n, c in columns.items() if kind_of(n)})
+    return read(Path(motion), scene, {})
+
+
+def _judged(scene: Scene, recording: Recording, found: Exact) -> Judgement:
+    known = recording.times <= found.motion.times[-1]
+    times = recording.times[known]
+    places = np.searchsorted(found.motion.times, times)
+    size = scales(scene, found.motion)
+    whole = {n: c for n, c in values(scene, found.motion).items() if np.isfinite(c).all()}
+    recorded = {n: c[known] for n, c in recording.columns.items() if n in whole}
+    right = with_signs(recorded, {n: whole[n][places] for n in whole})
+    scale = {n: size[kind_of(n)] for n in recorded}
+    errors = tuple(
+        _column(
+            n, recorded[n] - right[n], times, scale[n] * found.bound[places], recording.resolution.get(n, 0.0)
+        )
+        for n in recorded
+    )
+    explanations: list[Explanation] = []
+    if not all(e.is_right for e in errors):
+        later = _splines(found.motion.times, whole)
+        exact_columns = {n: right[n] for n in recorded}
+        difference = Difference(times, recorded, exact_columns, scale, later)
+        noise = float(np.sqrt(np.mean([(e.bound / scale[e.name]) ** 2 for e in errors])))
+        explanations = ranked(difference, changed(scene, difference, TRIED), noise)
+    return Judgement(errors, tuple(explanations), float(times[-1]), found.reason)
+
+
+def _column(name: str, error: np.ndarray, times: np.ndarray, bound: np.ndarray, digit: float) -> ColumnError:
+    size = np.abs(error)
+    largest, allowed = float(size.max()), float(bound.max()) + digit
+    begins = float(times[int(np.argmax(size > BEGINS * largest))]) if largest > allowed else None
+    return ColumnError(name, largest, allowed, begins)
+
+
+def _splines(times: np.ndarray, whole: Mapping[str, np.ndarray]) -> Any:
+    splines = {name: CubicSpline(times, column) for name, column in whole.items()}
+    return lambda t: {name: spline(t) for name, spline in splines.items()}

@@ -1,0 +1,213 @@
+"""Recorded motions / the reference: exact ones are right, planted differences are the first explanation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from crosscheck.cli.commands import main
+from crosscheck.judge.reference.reference import NoReference, reference
+from crosscheck.recorded import exact as exactly
+from crosscheck.recorded.exact import reference_table, write
+from crosscheck.recorded.judgement import judge_motion
+from crosscheck.recorded.reading import read
+from mbref import rotations
+from mbref.scene import Body, Revolute, Scene, SceneError, Spring, TorsionSpring
+
+TIMES = np.linspace(0.0, 0.8, 161)
+SCENE = Scene(
+    name="double_pendulum", gravity=(0.3, -9.81, 0.5), duration=0.8,
+    body=[
+        Body(name="upper", mass=2.0, inertia=(0.02, 0.05, 0.06), position=(0.3, 0.0, 0.0)),
+        Body(name="lower", mass=1.0, inertia=(0.01, 0.04, 0.03), position=(0.9, 0.1, 0.0),
+             orientation=(0.8, 0.0, 0.0, 0.6)),
+    ],
+    joint=[
+        Revolute(name="A", bodies=("ground", "upper"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),
+        Revolute(name="B", bodies=("upper", "lower"), anchor=(0.6, 0.0, 0.0), axis=(0.0, 0.6, 0.8)),
+    ],
+)  # fmt: skip
+
+
+SPRUNG = SCENE.with_(
+    load=[
+        Spring(bodies=("ground", "lower"), points=((1.0, 0.5, 0.2), (0.9, 0.1, 0.0)), stiffness=30.0,
+               natural_length=0.3)
+    ]
+)  # fmt: skip  # a spring, without which only ratios of masses matter
+
+
+@pytest.fixture(scope="module")
+def table() -> dict[str, np.ndarray]:
+    found = reference_table(SCENE, TIMES)
+    found.pop("bound")
+    return found
+
+
+def turned(table, change) -> dict[str, np.ndarray]:
+    """The table with every quaternion changed."""
+    found = dict(table)
+    for body in ("upper", "lower"):
+        names = [f"{body}.orientation.{a}" for a in "wxyz"]
+        found.update(zip(names, change(np.array([table[n] for n in names]).T).T, strict=True))
+    return found
+
+
+def of_other(scene: Scene = SCENE, **changes) -> dict[str, np.ndarray]:
+    """The reference motion of a changed scene."""
+    found = reference_table(scene.with_(**changes), TIMES)
+    found.pop("bound")
+    return found
+
+
+def another_point(table) -> dict[str, np.ndarray]:
+    q = np.array([table[f"lower.orientation.{a}"] for a in "wxyz"]).T
+    arm = rotations.rotate(q, np.array([0.1, -0.2, 0.05]))
+    kept = {n: c for n, c in table.items() if "velocity" not in n}
+    return kept | {
+        f"lower.position.{a}": kept[f"lower.position.{a}"] + arm[:, i] for i, a in enumerate("xyz")
+    }
+
+
+def shifted(table) -> dict[str, np.ndarray]:
+    found = reference_table(SCENE, np.maximum(TIMES[8:] - 0.0125, 0.0))
+    return {**{n: c for n, c in found.items() if n != "bound"}, "time": TIMES[8:]}
+
+
+def coarse(table) -> dict[str, np.ndarray]:
+    return {n: np.interp(TIMES, TIMES[::8], c[::8]) for n, c in table.items()}
+
+
+def lighter(body: str, factor: float) -> list[Body]:
+    return [
+        b if b.name != body else b.model_copy(
+            update={"mass": b.mass * factor, "inertia": tuple(factor * i for i in b.inertia)}
+        )
+        for b in SCENE.body
+    ]  # fmt: skip
+
+
+def of_kind(table, kind: str, factor: float) -> dict[str, np.ndarray]:
+    return {n: c * factor if f".{kind}" in n else c for n, c in table.items()}
+
+
+PLANTED = {
+    "millimetres": (lambda t: of_kind(t, "position", 1e3), "all columns of position: in mm, not m"),
+    "degrees": (lambda t: of_kind(t, "angle", 180 / np.pi), "all columns of angle: in degrees, not rad"),
+    "sign": (
+        lambda t: {**t, "lower.position.y": -t["lower.position.y"]}, "lower.position.y: of opposite sign",
+    ),
+    "shift": (shifted, "all columns: later by 0.0125 s"),
+    "axes": (
+        lambda t: {**t, "lower.position.y": t["lower.position.z"], "lower.position.z": t["lower.position.y"]},
+        "lower.position: x, y, z hold x, z, y",
+    ),
+    "order": (
+        lambda t: turned(t, lambda q: q[:, [1, 2, 3, 0]]), "all columns of orientation: quaternions in",
+    ),
+    "inverse": (lambda t: turned(t, rotations.conjugate), "all columns of orientation: quaternions of"),
+    "point": (another_point, "lower: a point at (0.1, -0.2, 0.05) m in the body's frame"),
+    "interpolation": (coarse, "all columns: straight lines between samples 0.04 s apart"),
+    "gravity": (
+        lambda t: of_other(gravity=tuple(g * 9.80665 / 9.81 for g in SCENE.gravity)), "gravity of ",
+    ),
+    "damping": (
+        lambda t: of_other(load=[TorsionSpring(joint="B", stiffness=0.0, damping=0.02)]),
+        "damping of 0.02 N m s/rad in joint 'B'",
+    ),
+    "mass": (
+        lambda t: of_other(SPRUNG, body=lighter("lower", 0.9)), "mass and inertia of body 'lower' times 0.9",
+    ),
+}  # fmt: skip
+
+
+def test_an_exact_motion_is_right_within_the_bound(table):
+    found = judge_motion(SCENE, table)
+    assert found.is_right and not found.explanations and len(found.columns) == 30
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_the_planted_difference_is_the_first_explanation(name, table):
+    plant, says = PLANTED[name]
+    found = judge_motion(SPRUNG if name == "mass" else SCENE, plant(table))
+    assert not found.is_right
+    assert found.explanations[0].sentence.startswith(says), found.explanations
+    assert found.explanations[0].remains < 1e-3
+
+
+def test_errors_begin_where_the_motions_part(table):
+    late = {**table, "upper.position.x": table["upper.position.x"] + 1e-3 * (TIMES > 0.5)}
+    column = next(c for c in judge_motion(SCENE, late).columns if not c.is_right)
+    assert column.name == "upper.position.x" and column.begins == pytest.approx(0.505)
+    assert column.largest == pytest.approx(1e-3)
+
+
+def test_a_written_reference_is_read_and_right(table, tmp_path):
+    write(reference_table(SCENE, TIMES), tmp_path / "ref.csv")
+    assert (tmp_path / "ref.csv").read_text().startswith("time [s],bound [1],upper.position.x [m]")
+    recording = read(tmp_path / "ref.csv", SCENE, {})
+    assert recording.ignored == ["bound [1]"]
+    assert judge_motion(SCENE, recording).is_right
+
+
+def test_tables_of_other_tools(table, tmp_path):
+    """Numbers of columns, units in headers or given, decimal commas, quaternions with w last."""
+    x, angle = table["lower.position.x"] * 1e3, np.degrees(table["A.angle"])
+    rows = zip(TIMES * 1e3, x, angle, strict=True)
+    text = "\n".join(" ".join(f"{v:.9f}" for v in row) for row in rows)
+    (tmp_path / "plain.txt").write_text("# exported\n" + text)
+    columns = {"time": "1:ms", "lower.position.x": "2", "A.angle": "3"}
+    found = read(tmp_path / "plain.txt", SCENE, columns, units=["mm", "deg"])
+    assert judge_motion(SCENE, found).is_right
+    rows = zip(TIMES, x, angle, strict=True)
+    lines = [";".join(f"{v:.9f}".replace(".", ",") for v in row) for row in rows]
+    (tmp_path / "german.csv").write_text("\n".join(["Time;lower.x [mm];A.angle (deg)", *lines]))
+    assert judge_motion(SCENE, read(tmp_path / "german.csv", SCENE, {})).is_right
+    last = turned(table, lambda q: q[:, [1, 2, 3, 0]])
+    write(last, tmp_path / "last.csv")
+    assert judge_motion(SCENE, read(tmp_path / "last.csv", SCENE, {}, order="xyzw")).is_right
+
+
+@pytest.mark.parametrize(
+    ("text", "columns", "says"),
+    [
+        ("time,upper.x\n", {}, "has no row of numbers"),
+        ("a,upper.x\n0,1\n", {}, "has no column time"),
+        ("time,speed\n0,1\n", {}, "no column of the scene among time, speed"),
+        ("time,upper.x\n0,1\n0,1\n", {}, "must increase"),
+        ("time,upper.x\n0,1\n1,\n", {}, "row 2 of numbers is not 2 numbers"),
+        ("time,upper.x\n0,1\n800,1\n", {}, "if they are in ms"),
+        ("time,upper.x\n0,1\n", {"uper.position.x": "2"}, "did you mean 'upper.position.x'"),
+        ("time,upper.x\n0,1\n", {"upper.position.x": "3"}, "no column '3'"),
+        ("time,upper.x [furlong]\n0,1\n", {}, "unknown unit 'furlong'"),
+        ("time,upper.x [deg]\n0,1\n", {}, "'deg' is no unit of a quantity in m"),
+    ],
+)  # fmt: skip
+def test_faulty_tables_are_refused(text, columns, says, tmp_path):
+    (tmp_path / "faulty.csv").write_text(text)
+    with pytest.raises(SceneError, match=says):
+        read(tmp_path / "faulty.csv", SCENE, columns)
+
+
+def test_commands_write_and_judge(tmp_path, capsys):
+    SCENE.save(tmp_path / "s.toml")
+    scene, out = str(tmp_path / "s.toml"), str(tmp_path / "ref.csv")
+    assert main(["reference", scene, "--out", out, "--samples", "161"]) == 0
+    assert "161 samples to t = 0.8 s, error at most" in capsys.readouterr().out
+    assert main(["judge", scene, out]) == 0
+    assert main(["judge", scene, out, "--quaternion", "xyzw"]) == 1
+    assert "quaternions in the order" in capsys.readouterr().out
+    assert main(["judge", scene, str(tmp_path / "none.csv")]) == 2
+    assert main(["judge", scene, out, "--column", "upper"]) == 2
+
+
+def test_a_reference_without_time_is_reported(monkeypatch):
+    found = reference(SCENE, TIMES.tolist())
+    part = NoReference("no time is left", 0.4, found.at(TIMES[:81]))
+    monkeypatch.setattr(exactly, "reference", lambda *_: part)
+    known = judge_motion(SCENE, {"time": TIMES[:81], "upper.position.x": found.position[:81, 0, 0]})
+    assert known.reason == "no time is left" and known.until == pytest.approx(0.4) and known.is_right
+    nothing = NoReference("no time is left", 0.0, found.at(TIMES[:0]))
+    monkeypatch.setattr(exactly, "reference", lambda *_: nothing)
+    with pytest.raises(SceneError, match="has no reference: no time is left"):
+        judge_motion(SCENE, {"time": TIMES, "upper.position.x": TIMES})
