@@ -19,7 +19,8 @@ class Parser(argparse.ArgumentParser):
     """A parser whose commands answer for options that they do not have."""
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """The options; an unknown one is told by its command, with the option that was probably meant."""
+        """Return the options; the command refuses an unknown one and names the option that was probably
+        meant."""
         found, unknown = self.parse_known_args(args, namespace)
         if unknown:
             command = getattr(found, "parser_of_command", self)

@@ -23,7 +23,7 @@ def kinetic(scene: Scene, motion: Trajectory) -> np.ndarray:
 
 
 def potential(scene: Scene, motion: Trajectory) -> np.ndarray:
-    """Of gravity, springs and torsion springs (k,), J, zero of gravity at the origin.
+    """Return the potential energy (k,), J, of gravity (zero at the origin), springs and torsion springs.
 
     Constant forces and moments have none here: their work changes the energy.  Raises ValueError where a
     body has no mass.

@@ -15,7 +15,7 @@ GROUP = "mbref.formats"
 
 @dataclass(frozen=True)
 class ImportOptions:
-    """How a file is read.
+    """Options for reading a file.
 
     Attributes
     ----------

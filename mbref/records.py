@@ -25,7 +25,8 @@ class RecordsError(ValueError):
 def stored(path: str | Path | None) -> dict[str, dict[str, Any]]:
     """Records of the file by ``key``, the last of each; none where there is no file.
 
-    Lines that hold no record are told by number on stderr and left alone.  Raises RecordsError where no line
+    Lines that hold no record are reported by number on stderr and left alone.  Raises RecordsError where
+    no line
     holds one, OSError where the file cannot be read.
     """
     records, whole, size = _parsed(path)
@@ -35,7 +36,7 @@ def stored(path: str | Path | None) -> dict[str, dict[str, Any]]:
 
 
 def looked_at(path: str | Path | None) -> dict[str, dict[str, Any]]:
-    """As ``stored``, but the file is left as it is, with a last line that is cut short."""
+    """Read records like ``stored``, without repairing a last line that is cut short."""
     return _parsed(path)[0]
 
 
@@ -56,7 +57,8 @@ def _parsed(path: str | Path | None) -> tuple[dict[str, dict[str, Any]], int, in
 
 
 def opened(path: str | Path | None) -> dict[str, dict[str, Any]]:
-    """As ``stored``, of a file that can be appended to and is made where there is none; raises OSError."""
+    """Read records like ``stored`` from a file that can be appended to; make a missing file.  Raises
+    OSError."""
     if path is not None:
         open(path, "ab").close()
     return stored(path)
@@ -76,7 +78,7 @@ def append(path: str | Path | None, record: dict[str, Any]) -> None:
             while line:  # one write, but on a disk that is nearly full: the next one raises
                 line = line[file.write(line) :]
         except BaseException:
-            with contextlib.suppress(OSError):  # what failed first is what is told
+            with contextlib.suppress(OSError):  # the first failure is the one reported
                 file.truncate(before)
             raise
 

@@ -2,7 +2,7 @@
 
 Units are SI, angles radians; positions, axes and velocities are in the world frame at t = 0
 unless a field says otherwise.  ``"ground"`` names the fixed frame wherever a body is asked for.
-The field names in Python are those of the file, so a fault's path (``body[2].mass``) is also the
+Field names are equal in Python and in the file, so that a fault's path (``body[2].mass``) is also the
 Python expression of the offending value.
 """
 

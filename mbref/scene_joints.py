@@ -58,7 +58,8 @@ class JointEntry(Entry):
 
     @classmethod
     def at(cls, name: str, bodies: tuple[str, str], **places: Any) -> Self:
-        """A joint of this type with those of the ``places`` (anchor, anchors, axis, axes) that it has."""
+        """Return a joint of this type, with the ``places`` (anchor, anchors, axis, axes) that the type
+        needs."""
         return cls(name=name, bodies=bodies, **{k: v for k, v in places.items() if k in cls.model_fields})
 
     @property

@@ -71,7 +71,7 @@ def checked_inertia(value: Any) -> tuple[Any, ...]:
 def field_faults(error: ValidationError, tables: Mapping[str, Sequence[str]]) -> Iterator[tuple[str, str]]:
     """(path, message) of every fault pydantic found, in the words of the file.
 
-    ``tables`` has the names of the fields by table; those of joints and loads are known here.
+    ``tables`` has the names of the fields by table; names of fields of joints and loads are known here.
     """
     for fault in error.errors(include_url=False):
         kind, got, limit = fault["type"], shown(fault["input"]), fault.get("ctx", {})

@@ -12,7 +12,7 @@ import numpy as np
 
 
 class Outcome(enum.Enum):
-    """How a run ended.
+    """Outcome of a run.
 
     Attributes
     ----------

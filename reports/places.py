@@ -1,4 +1,4 @@
-"""Ids of places in the page: those of runs, and of families on scenes."""
+"""Ids of places in the page, for runs and for families on scenes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Blocks as one self-contained HTML page and as Markdown with pictures beside it."""
+"""Blocks as one self-contained HTML page, and as Markdown with pictures in files."""
 
 from __future__ import annotations
 
@@ -94,8 +94,8 @@ def _markdown(block: Block) -> str:
         case Matrix():
             return f"{block.caption}\n\n{_matrix(block)}"
         case Record():
-            told = [f"{card.settings}: {card.grade}\n    {card.command}" for card in block.cards]
-            return "\n\n".join([f"### {_words(f'{block.scene}: {block.title}')}", *(f"- {t}" for t in told)])
+            shown = [f"{card.settings}: {card.grade}\n    {card.command}" for card in block.cards]
+            return "\n\n".join([f"### {_words(f'{block.scene}: {block.title}')}", *(f"- {t}" for t in shown)])
         case Listing():
             return f"```\n{block.text}\n```"
 

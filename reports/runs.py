@@ -74,7 +74,7 @@ class Run:
 
     @property
     def by_error(self) -> tuple[bool, float]:
-        """The key that sorts runs by their error, those of unknown error last."""
+        """Return the key that sorts runs by their error; unknown errors come last."""
         return math.isnan(self.error), self.error
 
     @property
@@ -160,7 +160,7 @@ class SceneRuns:
         return [run for run in self.runs if run.completed]
 
     def best(self) -> dict[Curve, Run]:
-        """Of every curve the completed run of least error, else the one that got furthest."""
+        """Return for each curve the completed run of least error, otherwise the run that got furthest."""
         return {curve: min(runs, key=_rank) for curve, runs in self.curves().items()}
 
 
@@ -182,7 +182,7 @@ def by_scene(
 
 
 def _of_scenes(records: Iterable[Record], scenes: Collection[str]) -> dict[str, list[Record]]:
-    """The records of every scene, in their order; those of others are left out."""
+    """Return the records of every scene, in their order; records of other scenes are left out."""
     found: dict[str, list[Record]] = {name: [] for name in scenes}
     for record in records:
         if record["scene"] in found:

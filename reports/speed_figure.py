@@ -34,7 +34,7 @@ def speed_svg(scene_runs: SceneRuns, description: str) -> str:
 
 
 def toggles(scene_runs: SceneRuns) -> list[tuple[str, int, str, list[str]]]:
-    """Of every engine its name, tone, mark and families: the legend, and what switches its curves."""
+    """Return name, tone, mark and families of each engine, for the legend and for switching its curves."""
     families: dict[str, list[str]] = {}
     for engine, family in scene_runs.curves():
         families.setdefault(engine, []).append(family)

@@ -15,7 +15,7 @@ from crosscheck.study.progress import followed
 def certify(arguments: argparse.Namespace) -> int:
     """Write the table, or print it; returns 0.
 
-    Raises RequestError for a bad request, and where the digits are not those of both formulations.
+    Raises RequestError for a bad request, and where the digits of both formulations differ.
     """
     from crosscheck.judge.reference.certify import NotCertified, certified
 

@@ -62,7 +62,7 @@ def show(console: Console, old: str, new: str, is_all: bool) -> bool:
 
 
 def _of_one_set(changed: Sequence[Change]) -> Iterator[str]:
-    """How many runs of every engine one set alone has."""
+    """Return for every engine the number of runs that only one set has."""
     alone = [change for change in changed if change.old is None or change.new is None]
     counts = Counter((change.identity[1], *change.sentences) for change in alone)
     yield from (f"{engine}: {runs(number)} {sentence}" for (engine, sentence), number in counts.items())

@@ -64,7 +64,7 @@ def add_engines(parser: argparse.ArgumentParser) -> None:
 
 
 def add_depth(parser: argparse.ArgumentParser) -> None:
-    """How many settings of the engines are run."""
+    """Add the option for the number of settings of each engine."""
     parser.add_argument(
         "--depth", choices=("quick", "whole"), default="quick",
         help="quick: a few families of an engine and three settings of a family; whole: every setting",

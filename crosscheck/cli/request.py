@@ -303,7 +303,7 @@ def _having(family: str, cases: Sequence[Case]) -> list[str]:
 
 
 def _of_first_family(cases: Sequence[Case], engines: Sequence[str]) -> list[Case]:
-    """Of every one of these engines the cases of the first family of its sweep."""
+    """Return for each engine the cases of the first family of its sweep."""
     first = {name: next(c.setting.family for c in cases if c.engine == name) for name in engines}
     return [case for case in cases if first.get(case.engine) == case.setting.family]
 

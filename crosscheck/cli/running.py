@@ -91,7 +91,7 @@ def by_scene(cases: Sequence[Case], records: Sequence[Record]) -> list[Document]
 
 
 def print_json(documents: Sequence[Document]) -> None:
-    """The document of one scene, or the list of those of several."""
+    """Print the document of one scene, or a list with the documents of several scenes."""
     print(json.dumps(documents[0] if len(documents) == 1 else documents, allow_nan=False))
 
 

@@ -85,7 +85,7 @@ def _ranked(group: Judged, letters: Mapping[tuple[str, str], str], with_ratio: b
 def print_tuning(
     console: Console, level: float, reached: Sequence[Record], records: Sequence[Record], path: str
 ) -> None:
-    """The settings that reach an error, first those of the engine itself, then those that crosscheck
+    """Print settings that reach an error, first the engine's own, then settings that crosscheck
     integrates, either the cheapest first, with the cheapest's commands; else the nearest run."""
     if not reached:
         nearest = min(records, key=lambda r: (not is_completed(r), error(r), -r["t_end"]))
@@ -203,7 +203,7 @@ def _seconds(record: Record) -> str:
 
 
 def _print_messages(console: Console, records: Sequence[Record]) -> None:
-    """Why runs failed; settings of a family that failed alike are told together."""
+    """Print the causes of failed runs; settings of a family with equal causes share a line."""
     told: dict[tuple[str, str], list[str]] = {}
     for r in records:
         if not is_completed(r):

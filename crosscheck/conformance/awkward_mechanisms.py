@@ -1,5 +1,5 @@
 """Mechanisms from seeds, awkward in one way each: fast tops, thin links, stiff dampers, drivers with a phase,
-and those of `awkward_loops.py`.
+and the loops of `awkward_loops.py`.
 
 Poses are consistent by construction, velocities follow from those that are given.
 """

@@ -76,7 +76,8 @@ class Tally:
         return sum(counts[status] for status in DECIDED)
 
     def add(self, record: dict[str, Any]) -> None:
-        """Count a record's verdicts, but those of older cards, and of a run that ended alone that card's."""
+        """Count a record's verdicts except for older cards; of a run that ended early count only that
+        card."""
         self.version, self.seeds = record["version"], self.seeds + 1
         ended = [v["scene"] for v in record["verdicts"] if v["property"] == RUN and v["status"] == FAIL]
         for verdict in record["verdicts"]:
@@ -160,7 +161,7 @@ def _record(plan: Plan, seed: int, wanted: Collection[str]) -> dict[str, Any]:
 
 
 def _verdicts(plan: Plan, bench: Bench, cards: Sequence[str]) -> Iterator[Verdict]:
-    """The verdicts of the cards; that of the run alone where it does not complete."""
+    """Return the verdicts of the cards; only the verdict on the run if it does not complete."""
     if not bench.cannot and REFUSAL not in cards and (run := suite.first_run(bench)).status == FAIL:
         yield run
         return
@@ -174,7 +175,7 @@ def _verdicts(plan: Plan, bench: Bench, cards: Sequence[str]) -> Iterator[Verdic
 
 
 def agreement(bench: Bench, other: str) -> Verdict:
-    """Whether the motion is that of another engine (NAME or NAME=FAMILY), by the finest settings of both."""
+    """Check the motion against another engine (NAME or NAME=FAMILY), by the finest settings of both."""
     name, (called, _, family) = bench.scene.name, other.partition("=")
     beside = set_up(InProcess(engine(called), called), bench.specimen, family)
     if beside.cannot:

@@ -50,7 +50,7 @@ DRIVEN = Driver(joint="J", polynomial=(-0.3 * float(np.sin(0.7)), 0.8, -0.5),
 
 
 def moving_probes() -> dict[str, Scene]:
-    """Scenes by feature; the names of joints, drivers and loads are those of `feature_scenes`."""
+    """Scenes by feature; the names of joints, drivers and loads agree with `feature_scenes`."""
     found = {f"{kind} joint": _pair(joint) for kind, joint in JOINTS.items()}
     found |= {f"{kind} driver": _pair(JOINTS[kind], driver=(DRIVEN,)) for kind in DRIVERS}
     found |= {f"{kind} load": _pair(_carrier(kind), load=(_load(kind),)) for kind in LOADS}

@@ -24,7 +24,8 @@ def double_precision(bench: Bench) -> Finding | Outside:
 
 
 def smooth(bench: Bench) -> Finding:
-    """States at neighbouring times lie on smooth curves, but for the rounding that the engine claims."""
+    """Check that states at neighbouring times lie on smooth curves, up to the rounding that the engine
+    claims."""
     noise, where = grain(bench.scene, bench.close)
     return Finding(noise, max(SAME_MOTION, GRAINS * bench.rounding), where)
 

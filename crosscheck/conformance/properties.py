@@ -54,8 +54,8 @@ Check = Callable[[Bench], Finding | Cannot | Outside]
 
 
 class Property(NamedTuple):
-    """A card: ``about`` is what is checked, against what; ``of`` tells which specimens it is checked on, and
-    ``version`` is counted up when the check becomes another, so that verdicts of different ones are told."""
+    """A card: ``about`` is what is checked, against what; ``of`` selects the specimens, and ``version``
+    grows when the check changes, so that verdicts of different versions are kept apart."""
 
     about: str
     check: Check
@@ -213,7 +213,8 @@ def silence(bench: Bench) -> Finding:
 
 
 def determinism(bench: Bench) -> Finding:
-    """The same run again gives the same bits: in another process, and in one that has run another scene."""
+    """Check that a run repeated gives equal bits: in another process, and in one that has run another
+    scene."""
     others = [bench.run(bench.scene, bench.times), *bench.shared_runs]
     return Finding(float(np.max([_bits_apart(bench.motion, other) for other in others])), 0.0)
 
@@ -257,7 +258,7 @@ def related(name: str, bench: Bench) -> Finding | Cannot | Outside:
 
 
 def _accuracy_of(bench: Bench, scene: Scene, run: Trajectory) -> float:
-    """As `Bench.own_accuracy`, of a changed scene by its two finest settings; 0 where there is but one."""
+    """Return `Bench.own_accuracy` of a changed scene from its two finest settings; 0 if it has only one."""
     if len(bench.settings) < 2:
         return 0.0
     coarser = bench.observed(scene, run.times, bench.settings[-2]).value

@@ -34,7 +34,7 @@ FLIP = np.diag([1.0, -1.0, 1.0])  # of the body frames of a mirrored scene, whic
 
 @dataclass(frozen=True)
 class Relation:
-    """``about`` says it; ``change(scene, motion)`` is another scene, or why there is none, and
+    """``about`` says it; ``change(scene, motion)`` is another scene, or the reason why there is none, and
     ``expect(scene, motion)`` the other scene's motion, made of the motion of the first."""
 
     about: str

@@ -119,7 +119,7 @@ def _backwards(scene: Scene, motion: Trajectory) -> Trajectory:
 def _samples(
     scene: Scene, motion: Trajectory, chosen: np.ndarray, times: np.ndarray, sense: float
 ) -> Trajectory:
-    """Samples of a motion; of the reactions those of joints whose anchors stay together."""
+    """Return samples of a motion, and reactions of the joints whose anchors stay together."""
     second, turning = motion.acceleration, motion.angular_acceleration
     kept = joints_kept(motion, pinned(scene)).reactions
     return replace(

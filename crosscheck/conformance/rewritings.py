@@ -1,4 +1,4 @@
-"""The same mechanism written in another way: other names, other orders, joints twice, a body in halves."""
+"""Mechanisms written in another way: other names, other orders, joints twice, a body in halves."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def _in_halves(scene: Scene, body: Body) -> Scene:
 
 
 def of_halves(scene: Scene, motion: Trajectory) -> Trajectory:
-    """The motion with the last body's as that of its halves; without accelerations."""
+    """Return the motion with two halves in place of the last body, without accelerations."""
     arm = rotations.rotate(motion.orientation[:, -1], _arm(scene.body[-1]))
     swing = np.cross(motion.angular_velocity[:, -1], arm)
     name = scene.body[-1].name
@@ -155,7 +155,7 @@ def of_halves(scene: Scene, motion: Trajectory) -> Trajectory:
 
 
 def _arm(body: Body) -> np.ndarray:
-    """From the centre of a body to that of its first half (body axes), along its least moment's axis."""
+    """Return the vector from the centre of a body to the centre of its first half, in body axes."""
     moments, axes = np.linalg.eigh(_inertia(body))
     spare = min(moments[1], moments[1] + moments[2] - moments[0]) * LIMIT
     return np.sqrt(spare / (body.mass or 1.0)) * axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0])), 0])

@@ -1,4 +1,4 @@
-"""How the suite runs an engine: in child processes, or in this process for tests of small pure ones."""
+"""Runners of engines for the suite: in child processes, or in this process for tests."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Runner(Protocol):
         """Relative rounding of numbers that the engine claims."""
 
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
-        """Version, the reason of a refusal, and else the settings of the engine, or those of a family."""
+        """Return the version, and the reason of a refusal or the settings of the engine or of one family."""
 
     def refuses(self, scene: Scene, family: str) -> Cannot | None:
         """Why the engine cannot run a scene at settings of a family."""

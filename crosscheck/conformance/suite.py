@@ -86,7 +86,7 @@ def held_against(
     family: str = "",
 ) -> Conformance:
     """The verdicts on a runner's engine in its best family of settings, or the one named; runs in this
-    process take place one after another.  ``progress`` is told the scene just done."""
+    process take place one after another.  ``progress`` receives the scene just done."""
     versions: set[str] = set()
 
     def examined(specimen: Specimen) -> list[Verdict]:
@@ -214,7 +214,7 @@ def abouts() -> dict[str, str]:
 
 
 def _count(verdicts: Sequence[Verdict], status: str) -> Text:
-    """How many verdicts have a status; nothing for none."""
+    """Return the number of verdicts with a status in words; empty for none."""
     number = sum(verdict.status == status for verdict in verdicts)
     return Text(str(number or ""), style=MARKS[status][1])
 

@@ -44,7 +44,7 @@ NEIGHBOURS = 4  # on either side of the middle
 TURN = 1e-3  # rad: the most that a motion turns from one neighbouring sample to the next
 SWEPT = 3  # settings from which order and floor are measured
 FASTEST, SLOWEST = 0.1, 0.5  # contractions that are believed: adaptive steps and a floor make others
-COARSER = 1e-8  # tolerance of the second integration of Gauss's principle, 100 times that of the first
+COARSER = 1e-8  # tolerance of the second integration of Gauss's principle, 100 times the first tolerance
 SHARE = 0.1  # of what those two differ by is the most that the first is off by: 0.01 to 0.03 was measured
 SHORT = {  # built-in scenes with a truth, and end times (s) before their first singular position
     "four_bar": 0.01,
@@ -237,7 +237,7 @@ class Bench:
 
     @cached_property
     def own_pushes(self) -> float:
-        """As `own_accuracy`, of accelerations and unique reactions."""
+        """Return `own_accuracy` of accelerations and unique reactions."""
         twins = pushes_apart(self.scene, self.motion, self.twin, self.rank)[0]
         coarser = self.sweep[1] if len(self.sweep) > 1 else self.motion
         steps = pushes_apart(self.scene, self.motion, coarser, self.rank)[0]

@@ -71,7 +71,7 @@ class _Row:
 
 
 def _rows(scene: Scene, k: int, joint: Joint, driver: Driver | None) -> list[_Row]:
-    """The rows of joint k; those of its driver last."""
+    """Return the rows of joint k, the rows of its driver last."""
     facts, anchors = joint.facts, joint.anchor_pair
     points = np.array([point_in_body(scene, *end) for end in zip(joint.bodies, anchors, strict=True)])
     indices = (scene.body_index(joint.bodies[0]), scene.body_index(joint.bodies[1]))

@@ -21,7 +21,7 @@ def hashed(*parts: str) -> str:
 
 
 def kept(name: str, origin: str, suffix: str) -> Path | None:
-    """The file of an origin in a folder of the cache whose bytes are those of its name."""
+    """Return the file of an origin in a folder of the cache, named after its content."""
     for path in sorted(_folder(name).glob(f"{origin}-*{suffix}")):
         with contextlib.suppress(OSError):
             if path.stem.partition("-")[2] == _hash(path.read_bytes()):

@@ -1,7 +1,8 @@
 """A planar mechanism with the fewest joint coordinates: joints that allow more than its motion are exchanged.
 
 A universal joint whose motion stays in a plane is a hinge there, and a hinge that closes a planar loop need
-only be a point.  A scene is rewritten where its joints leave as many velocities as those of the rewritten
+only be a point.  A scene is rewritten where its joints leave as many velocities as the joints of the
+rewritten
 one: the motions that the latter allows are then all that it has.
 """
 

@@ -7,9 +7,9 @@ keeps the stiff joints, and every driven one; every joint that is cut closes a l
 - a cut joint of another type that the engine closes by itself is a closure of that type;
 - any other cut joint carries a *ghost*: its second body's mass and inertia are divided in equal shares
   between the body and its ghosts, the ghost hangs from the first body by the joint itself, and a weld
-  holds it to its body.  The motion is exactly that of the undivided body.
+  holds it to its body.  The motion equals the motion of the undivided body.
 
-A distance joint is a *rod* with a spherical joint at either end.  Its inertia is that of two point masses
+A distance joint is a *rod* with a spherical joint at either end.  It has the inertia of two point masses
 at its ends, taken out of the two bodies, so the motion is again exactly the scene's; the moment of inertia
 about its own axis is arbitrary, because a rod that starts without spin never spins.
 """

@@ -23,8 +23,9 @@ NO_AXIS = np.zeros(3)  # no shared axis of turning: torsion springs are added he
 
 
 def gauss(scene: Scene) -> np.ndarray:
-    """Accelerations at t = 0 as `stacked`: of all that joints and drivers allow, those of least constraint,
-    ½ aᵀ M a - aᵀ f.  The scene has masses; moments of inertia may be zero where joints leave no such turn."""
+    """Accelerations at t = 0 as `stacked`: of all that joints and drivers allow, the ones that minimise
+    ½ aᵀ M a - aᵀ f.  The scene has masses; moments of inertia may be zero where joints leave no such
+    turn."""
     mass, force = _unbound(scene)
     weights = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))  # of `stacked`
     rows = jacobian(scene, 0.0, *initial_poses(scene))[0] * weights
@@ -71,14 +72,15 @@ def _torsion(scene: Scene, angular_velocity: np.ndarray) -> np.ndarray:
 
 
 def singular_values(scene: Scene) -> np.ndarray:
-    """Of the Jacobian at t = 0, rows of unit length, lengths over the scene's; largest first."""
+    """Return singular values of the Jacobian at t = 0, rows of unit length, lengths over the scene's;
+    largest first."""
     rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
     scaled = rows * np.tile(np.repeat([scene_length(scene), 1.0], 3), len(scene.body))
     return np.linalg.svd(scaled / np.linalg.norm(scaled, axis=1, keepdims=True), compute_uv=False)
 
 
 def rank_of(values: np.ndarray) -> int:
-    """How many singular values (k,) are more than rounding beside the largest."""
+    """Return the number of singular values (k,) above rounding relative to the largest."""
     return int(np.sum(values > RANK * values.max(initial=0.0)))
 
 

@@ -65,7 +65,7 @@ def measure(scene: Scene, trajectory: Trajectory, truth: Truth | None = None) ->
     """
     trajectory = in_scene_order(scene, trajectory)
     exact = exact_motion(trajectory, truth)
-    with np.errstate(all="ignore"):  # states that are not finite are told by the metrics, not by warnings
+    with np.errstate(all="ignore"):  # metrics report states that are not finite, without warnings
         found = {name: metric.function(scene, trajectory, exact) for name, metric in METRICS.items()}
     if truth is None or exact is None or not trajectory.times.size:
         return found | {"error_bound": None, "error_until": None}
@@ -190,7 +190,8 @@ def _largest(series: np.ndarray | None) -> float | None:
 
 
 def reaction_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
-    """Largest difference of what redundancy leaves unique in the reactions from those of the exact motion,
+    """Return the largest difference of the unique part of the reactions from the reactions of the exact
+    motion,
     relative to the largest of them, at some samples; None without reactions, masses or a truth, and for more
     than MANY bodies."""
     given = exact is not None and trajectory.reactions is not None and len(trajectory.times)

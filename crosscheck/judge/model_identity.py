@@ -105,7 +105,7 @@ def along(scene: Scene, run: Trajectory) -> Difference | None:
 
 
 def acceleration_scale(scene: Scene) -> float:
-    """The acceleration (m/s²) that gravity, loads, drivers and velocities of the scene can cause: beside it,
+    """Return the acceleration (m/s²) that gravity, loads, drivers and velocities can cause: relative to it,
     accelerations that balance to zero are rounding."""
     length, mass = scene_length(scene), sum(body.mass or 0.0 for body in scene.body)
     speed = _initial_speed(scene)

@@ -1,6 +1,6 @@
 """Published hard problems: the values printed for them, how errors are measured, what is accepted, and where.
 
-The printed values are data to be checked, not truths: `benchmarks/errata.py` tells how far each is from the
+The printed values are data to be checked, not truths: `benchmarks/errata.py` prints how far each is from the
 reference.  An observation is one number of a motion at one time.  Problems without published acceptance are
 accepted at OURS, a level of this project.
 """

@@ -1,4 +1,4 @@
-"""How the error of a published problem is measured: energy, the place of a body, what a linkage keeps.
+"""Measures of the error of published problems: energy, the place of a body, invariants of a linkage.
 
 A measure takes the scene, a trajectory and the exact motion at the same times or at the first of them; it is
 None where it says nothing, as where it needs the exact motion and there is none.

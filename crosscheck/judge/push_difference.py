@@ -15,8 +15,8 @@ Part = tuple[float, str]
 
 def pushes_apart(scene: Scene, expected: Trajectory, found: Trajectory, rank: float = RANK) -> Part:
     """The larger of both differences, each relative to the largest expected one, and its name; of a scene
-    and two runs of the same sample times.  What one of the runs does not give is not compared.  ``rank`` is
-    that of `shared_wrenches`."""
+    and two runs of the same sample times.  Quantities that one of the runs does not give are not
+    compared.  ``rank`` is the one of `shared_wrenches`."""
     accelerations = accelerations_apart(scene, expected, found), "accelerations"
     return max(accelerations, _reactions(scene, expected, found, rank))
 

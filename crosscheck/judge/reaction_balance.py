@@ -1,4 +1,4 @@
-"""Joint reactions of the exact motion, and those of a run: they move the bodies, and do no work."""
+"""Joint reactions of the exact motion and of a run: they move the bodies, and do no work."""
 
 from __future__ import annotations
 

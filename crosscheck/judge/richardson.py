@@ -23,7 +23,7 @@ HIGHEST_ORDER = 12.0
 @dataclass(frozen=True)
 class Limit:
     """``motion`` is the extrapolated one (poses alone are meaningful), ``discretisation`` how far the finest
-    run is from it, ``order`` that of the runs' differences."""
+    run is from it, ``order`` the order of the runs' differences."""
 
     motion: Trajectory
     order: float

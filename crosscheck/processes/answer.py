@@ -62,7 +62,7 @@ def well_formed(answer: Any, scene: Scene, times: np.ndarray) -> Trajectory:
 
 
 def answered(simulator: Engine, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-    """The engine's run, `well_formed`, and told as of this engine, its version and these options; raises
+    """Return the engine's run, `well_formed`, labelled by engine, version and options; raises
     MalformedAnswer."""
     answer = well_formed(simulator.run(scene, times, setting), scene, times)
     named = {"engine": simulator.name, "version": str(simulator.version())}
@@ -108,7 +108,7 @@ def _reactions(value: Any, scene: Scene, reached: int) -> dict[str, np.ndarray] 
 
 
 def _settings(value: Any) -> dict[str, Any]:
-    """As JSON gives them back, numbers of numpy made plain."""
+    """Return the settings as JSON reads them, with plain numbers in place of numpy's."""
     try:
         return json.loads(json.dumps(dict(value), default=lambda number: number.item()))
     except (TypeError, ValueError, AttributeError):

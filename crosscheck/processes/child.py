@@ -30,7 +30,7 @@ ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUM
 INTERVAL = 0.2  # s, at which the CPU time of a child is read
 LOADED = 10.0  # times its limit, in wall time, that a call may take where other processes have the cores
 ORPHAN_SECONDS = 10.0  # beyond that, a child whose parent has died ends itself
-ENDING_SECONDS = 10.0  # for a child that has hung up to end by itself, with an exit status that tells why
+ENDING_SECONDS = 10.0  # for a child that has hung up to end by itself, with an exit status that shows why
 TAIL = 4000  # bytes in which the last printed line is looked for
 PRINTED = 200  # characters of the last printed line that a message quotes
 
@@ -144,8 +144,8 @@ class Child:
         return False
 
     def _cpu_seconds(self) -> float:
-        """Of the process and the copy that calls for it, without others that they have started; 0 where it
-        has ended."""
+        """Return CPU seconds of the process and the copy that calls for it, without their children; 0
+        once it has ended."""
         try:
             process = psutil.Process(self._process.pid)
             copies = process.children() if self._copies else []

@@ -64,7 +64,7 @@ def capabilities(engine_name: str, scene: Scene) -> Capabilities:
 
 
 def offered(engine_name: str, scene: Scene, family: str) -> Capabilities:
-    """As `offers_of` the engine of that name."""
+    """Return `offers_of` for the engine of that name."""
     return offers_of(engine(engine_name), scene, family)
 
 
@@ -79,7 +79,7 @@ def offers_of(simulator: Engine, scene: Scene, family: str) -> Capabilities:
 
 
 def refused(engine_name: str, scene: Scene, family: str) -> Cannot | None:
-    """As `refusal_of` the engine of that name."""
+    """Return `refusal_of` for the engine of that name."""
     return refusal_of(engine(engine_name), scene, family)
 
 

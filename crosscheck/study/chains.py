@@ -1,4 +1,4 @@
-"""Runs of several engines at a time, those of one engine one after another, measured aside."""
+"""Runs of several engines at a time, the runs of each engine one after another, measured separately."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Chains(ThreadPoolExecutor):
 
 
 def _told(future: Future[Record], function: Callable[..., Any], *arguments: Any) -> Any:
-    """The function's value; None where it raises, which the future's owner is told, as by any executor."""
+    """Return the function's value; None if it raises, which the future then raises for its owner."""
     try:
         return function(*arguments)
     except BaseException as error:

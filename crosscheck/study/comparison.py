@@ -133,7 +133,7 @@ def _other_families(groups: Sequence[Family], records: Mapping[str, Record]) -> 
 
 
 def _few(groups: Sequence[Family], gates: Sequence[Case], path: Path | None) -> Made:
-    """Of every family the coarsest and the middle setting, coarser ones that serve, then the finest
+    """Run the coarsest and the middle setting of each family, coarser ones that serve, then the finest
     affordable."""
     begun = _made("running", [*(case for group in groups for case in first(group)), *gates], path)
     fine = [case for group in groups for case in finest(group, begun)]

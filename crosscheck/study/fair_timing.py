@@ -22,8 +22,8 @@ from mbref.trajectory import Trajectory
 
 
 def identity_cases(scene: Scene, engines: Sequence[str], time_limit: float) -> list[Case]:
-    """The short runs from which `model_difference` tells whether all engines simulate the scene: each at the
-    finest of its settings, but for compiled families, whose compilation may take a minute."""
+    """Return short runs by which `model_difference` checks that all engines simulate the scene: each at
+    its finest setting, without compiled families, whose compilation may take a minute."""
     finest = {name: found[-1] for name in engines if (found := _called_from_python(settings(name, scene)))}
     return [Case(scene, gate_times(scene), name, s, time_limit) for name, s in finest.items()]
 
@@ -54,8 +54,8 @@ def model_differences(
 
 
 def force_differences(scene: Scene, records: Sequence[Record]) -> dict[str, str]:
-    """By engine that is wrong at its best setting, how the accelerations of its runs differ from those of the
-    scene at the same states; an engine is left out where those of one of its wrong runs do not."""
+    """Return by engine that is wrong at its best setting the difference of its accelerations from the
+    scene's at equal states; an engine with a wrong run without any difference is left out."""
     found = {}
     for least in least_errors(records):
         if grade(least.best) is not Grade.WRONG:

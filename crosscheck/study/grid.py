@@ -187,7 +187,7 @@ def run_in_turn(case: Case) -> Record:
 
 
 def run_here(case: Case) -> Record:
-    """As ``run_case`` in the calling process, without its time limit and its protection."""
+    """Run a case like ``run_case`` in the calling process, without its time limit and its protection."""
     return record_of(case, run_once(case.engine, case.scene, case.times, case.setting))
 
 
@@ -210,7 +210,7 @@ def record_of(case: Case, trajectory: Trajectory) -> Record:
 
 
 def shown_name(engine_name: str) -> str:
-    """The name by which an engine is shown: that of its object, where it was asked for as
+    """Return the name by which an engine is shown: its object's, if it was asked for as
     ``module:attribute``."""
     try:
         return engine(engine_name).name if ":" in engine_name else engine_name
@@ -294,7 +294,7 @@ def _worth_repeating(record: Record, time_limit: float) -> bool:
 
 @functools.cache
 def _version(engine_name: str) -> str:
-    """The engine's version; empty where it tells none, which each run then says as its outcome."""
+    """Return the engine's version; empty if it gives none, which each run then reports as its outcome."""
     try:
         return str(engine(engine_name).version())
     except Exception:

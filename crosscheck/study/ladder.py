@@ -66,7 +66,7 @@ def _cost(record: Record) -> float | None:
 
 def _expected(family: Family, costs: Sequence[float | None], i: int) -> float:
     """CPU seconds expected of setting i: by the step from the middle run, else by the growth so far for each
-    setting; 0 where neither run has a cost, so that the run itself tells."""
+    setting; 0 if neither run has a cost, so that the run itself decides."""
     coarse, middle = costs
     known = middle if middle is not None else coarse
     if known is None:

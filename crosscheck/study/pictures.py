@@ -23,7 +23,8 @@ Run = tuple[Case, Record]
 
 
 def worst_runs(runs: Sequence[Run], truths: Sequence[Record], path: Path | None) -> list[Record]:
-    """Of each scene whose true motion is shown the completed run of largest error, again at its instants."""
+    """Return for each scene with a true motion its completed run of largest error, sampled at that
+    motion's times."""
     cases = []
     for truth in truths:
         own = [run for run in runs if run[1]["scene"] == truth["scene"] and is_completed(run[1])]
@@ -34,7 +35,7 @@ def worst_runs(runs: Sequence[Run], truths: Sequence[Record], path: Path | None)
 
 
 def branches(runs: Sequence[Run], path: Path | None) -> list[Record]:
-    """Of each scene the runs along every branch of a few of its singular positions."""
+    """Return for each scene the runs along every branch of a few of its singular positions."""
     by_scene: dict[str, list[Run]] = {}
     for run in runs:
         if is_completed(run[1]) and run[1]["crossings"] and BRANCHES in engine(run[0].engine).options:
@@ -44,7 +45,8 @@ def branches(runs: Sequence[Run], path: Path | None) -> list[Record]:
 
 
 def shown(crossings: Sequence[Mapping[str, Any]]) -> list[int]:
-    """The numbers, from 1, of the singular positions that are shown: those of several branches come first."""
+    """Return numbers, from 1, of the singular positions that are shown; positions with several branches
+    come first."""
     several = [number for number, crossing in enumerate(crossings, 1) if len(crossing["velocity"]) > 1]
     return (several or [1])[:MOST]
 

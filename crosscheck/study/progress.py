@@ -27,7 +27,7 @@ from crosscheck.study.grid import Record
 PARTS = 10  # lines of a progress that no terminal shows
 QUIET = 20.0  # s without a line, after which one names the work under way
 LOOKED = 0.5  # s after which that is looked at again
-HUNDREDTHS = 100  # parts in which the progress of one motion is told
+HUNDREDTHS = 100  # parts in which the progress of one motion is reported
 Show = Callable[[int, int, str], None]  # done, in all, what was done last
 
 
@@ -149,7 +149,7 @@ class _Working(ProgressColumn):
 
 
 class _Lines:
-    """Progress as lines, the time left told from the time taken."""
+    """Progress as lines, with the time left estimated from the time taken."""
 
     def __init__(self, what: str, total: int, console: Console, under_way: UnderWay):
         self._what, self._total, self._console, self._under_way = what, total, console, under_way

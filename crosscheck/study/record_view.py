@@ -37,7 +37,7 @@ def is_completed(record: Record) -> bool:
 
 
 def of_scenes(records: Sequence[Record], scenes: Sequence[Scene]) -> list[Record]:
-    """The records of these scenes; without those of another mechanism, as a scene had before it was edited.
+    """Return the records of these scenes, without records of a scene's earlier version.
     Records that name no mechanism count as of the scene they name."""
     known = {scene.name: mechanism(scene) for scene in scenes}
     return [r for r in records if r["scene"] in known and r.get("mechanism") in (None, known[r["scene"]])]

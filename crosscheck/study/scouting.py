@@ -17,7 +17,7 @@ _found: dict[tuple[str, Scene], Offer] = {}
 
 
 def scout(engines: Sequence[str], scenes: Sequence[Scene], advance: Callable[[str], None]) -> None:
-    """Find out the offers in child processes, one a core; ``advance`` is told each pair that is done.
+    """Find out the offers in child processes, one a core; ``advance`` receives each pair that is done.
 
     An engine that crashes or hangs over a scene is counted as refusing it, with the reason.
     """

@@ -50,7 +50,7 @@ class Ladder(NamedTuple):
 
 
 def scene_name(ladder: str, difficulty: float) -> str:
-    """The name of a rung's scene, which tells its place in the records: ``gap[1e-05]``."""
+    """Return the name of a rung's scene, which gives its place in the records: ``gap[1e-05]``."""
     return f"{ladder}[{difficulty:g}]"
 
 
@@ -214,7 +214,7 @@ def scenes() -> list[Scene]:
 
 
 def cases(engines: Sequence[str]) -> list[Case]:
-    """Every rung by mbref's methods, and by those of the engines that can run it."""
+    """Return every rung by mbref's methods, and by the engines that can run it."""
     return [
         Case(scene, np.linspace(0.0, scene.duration, SAMPLES), name, setting, TIME_LIMIT)
         for scene in scenes()

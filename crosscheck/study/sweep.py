@@ -58,7 +58,7 @@ def _sweep(scenes: Sequence[Scene], engines: Sequence[str], samples: int, limit:
 
 
 def of_few_families(cases: Sequence[Case], named: Collection[str] = ()) -> list[Case]:
-    """Of every scene and engine the ``named`` families, else the QUICK_FAMILIES, else the first
+    """Keep for each scene and engine the ``named`` families, or the QUICK_FAMILIES, or the first
     MOST_FAMILIES."""
     groups: dict[tuple[str, str], list[Case]] = {}
     for case in cases:
@@ -67,7 +67,7 @@ def of_few_families(cases: Sequence[Case], named: Collection[str] = ()) -> list[
 
 
 def thinned(cases: Sequence[Case]) -> list[Case]:
-    """Of every family at most MOST_SETTINGS settings, ends included."""
+    """Keep at most MOST_SETTINGS settings of each family, ends included."""
     return [case for family in families(cases) for case in spread(family, MOST_SETTINGS)]
 
 

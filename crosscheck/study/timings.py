@@ -13,7 +13,7 @@ from mbref.records import append, stored
 from mbref.trajectory import Outcome
 
 REPEATS = 5
-LONG = 0.5  # s; a run that takes longer is timed by its single run, whose noise is small beside it
+LONG = 0.5  # s; a run that takes longer is timed by its single run, whose noise is relatively small
 
 
 def with_timings(

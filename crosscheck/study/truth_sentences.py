@@ -45,7 +45,7 @@ def _reference(group: Judged) -> str:
 
 
 def _until(scene: Scene, known: Mapping[str, Any]) -> str:
-    """How far a truth is known, and why no further; nothing where it is known to the end."""
+    """Return up to which time a truth is known, and why no further; empty if it is known to the end."""
     if not known["reason"]:
         return ""
     end = f"{known['until']:.4g} s of {scene.duration:.4g} s"
@@ -53,8 +53,8 @@ def _until(scene: Scene, known: Mapping[str, Any]) -> str:
 
 
 def up_to(groups: Sequence[Judged]) -> str:
-    """How far the least known of the motions is known, as a sentence begins; nothing where all are to their
-    ends."""
+    """Return the beginning of a sentence on how far the motions are known; empty if all are known to
+    their ends."""
     ends = [group.truth["until"] for group in groups if group.truth["reason"]]
     return f"Up to t = {min(ends):.4g} s" if ends else ""
 

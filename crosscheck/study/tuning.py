@@ -133,7 +133,8 @@ class _Search:
         return case, record
 
     def _reaches(self, record: Record) -> bool:
-        """Whether a run is known to be so near: an error below the bound of the truth tells no more."""
+        """Return whether a run is known to be so near; an error below the bound of the truth is no
+        evidence."""
         return is_completed(record) and max(error(record), error_bound(record)) <= self._level
 
 

@@ -84,11 +84,11 @@ class Judged:
         return {least.engine: least for least in least_errors(self.comparable)}
 
     def best(self) -> dict[str, Record]:
-        """Of every engine the record of least error, else the one that got furthest."""
+        """Return for each engine the record of least error, otherwise the one that got furthest."""
         return {name: least.best for name, least in self.engines().items()}
 
     def defaults(self) -> dict[str, Record]:
-        """Of every engine that has a family of the library's defaults, the best record of it."""
+        """Return the best record by library defaults of each engine that has this family."""
         found = self.engines().items()
         return {name: least.families[DEFAULTS] for name, least in found if DEFAULTS in least.families}
 
@@ -97,7 +97,8 @@ class Judged:
         return {name: cost for name, (cost, _) in self.fastest(level).items()}
 
     def fastest(self, level: float, without: Callable[[Record], bool] | None = None) -> dict[str, Fastest]:
-        """Those seconds, and a record of the family; ``without`` leaves out families by their records."""
+        """Return the least seconds and a record of the family; ``without`` leaves out families by their
+        records."""
         found = {}
         for name, least in self.engines().items():
             costs = _family_costs(least, level)
@@ -108,7 +109,7 @@ class Judged:
         return found
 
     def cheapest(self, level: float) -> dict[str, Record]:
-        """Of every engine the fastest completed record within an error; only those that have one."""
+        """Return the fastest completed record within an error of each engine that has one."""
         reached = [r for r in self.comparable if is_completed(r) and error(r) <= level]
         by_cost = sorted(reached, key=lambda r: r["cost"]["seconds"])
         return {r["engine"]: r for r in reversed(by_cost)}
@@ -127,7 +128,7 @@ class Judged:
 
 
 def _family_costs(least: LeastError, level: float) -> list[Fastest]:
-    """Of every family that reaches an error the CPU seconds, and its record of least error."""
+    """Return for each family that reaches an error its CPU seconds, and its record of least error."""
     costs = []
     for family, best in least.families.items():
         usable = [

@@ -1,4 +1,4 @@
-"""The commands of mbref, what they exit with, and how faults are told."""
+"""Commands of mbref, their exit statuses and the printing of faults."""
 
 from __future__ import annotations
 

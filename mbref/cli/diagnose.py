@@ -65,7 +65,7 @@ def _diagnose(options: argparse.Namespace) -> int:
 
 
 def _along(scene: Scene) -> AlongMotion | str:
-    """The diagnosis along the motion, or why there is none."""
+    """Return the diagnosis along the motion, or the reason why there is none."""
     from mbref.design.along_motion import along_motion
 
     try:

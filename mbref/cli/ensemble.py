@@ -92,7 +92,7 @@ def _show_spread(
 
 
 def _early_ends(runs: Mapping[int, Trajectory]) -> Iterator[str]:
-    """Of every outcome but COMPLETED the number of runs, by place, and the cause of the first."""
+    """Return for every outcome except COMPLETED the number of runs and the cause of the first."""
     ends: dict[str, list[int]] = {}
     for place, run in sorted(runs.items()):
         if run.outcome.name != "COMPLETED":

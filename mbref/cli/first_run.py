@@ -89,7 +89,7 @@ def _raced(
 def _compile(method: str) -> None:
     """The work of the compiling process; an interrupt is its parent's affair."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    sys.stderr = open(os.devnull, "w")  # noqa: SIM115 - its parent has told that kernels are compiled
+    sys.stderr = open(os.devnull, "w")  # noqa: SIM115 - its parent has reported that kernels are compiled
     prepare(Method.parse(method))
 
 

@@ -76,7 +76,8 @@ def sample_times(options: argparse.Namespace, scene: Scene) -> np.ndarray:
 
 
 def limits_of(options: argparse.Namespace, branches: Mapping[int, int] | None = None) -> Limits:
-    """The limits; ValueError names their field, which is the option's but for --max-step and --branch."""
+    """Return the limits; a ValueError names the field, which is the option except for --max-step and
+    --branch."""
     from mbref.simulation.limits import Limits
 
     try:

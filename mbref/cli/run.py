@@ -76,7 +76,7 @@ def _branches(words: list[str]) -> dict[int, int]:
 
 
 def _writer(out: str | None) -> Any:
-    """How a motion is written to a file of that name; ValueError where its ending says nothing."""
+    """Return the writer for a file of that name; ValueError for an unknown file suffix."""
     from mbref.motion import Motion
 
     writers = {".csv": Motion.to_csv, ".json": Motion.save}

@@ -12,7 +12,7 @@ from mbref.cli.options import TEXT, add_scene
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 
-STILL = 1e-12  # m or rad, of what is not told as moved
+STILL = 1e-12  # m or rad, a smaller displacement is not reported
 
 
 def add(commands: Any) -> None:

@@ -25,16 +25,16 @@ ROUNDING = (
 MOST_ROWS = 300  # beyond it dense singular values at every pose take too long
 SAME = 1e-9  # part of a length, radian or singular value that is no difference between two poses
 POSES = 5  # at which freedoms are looked at to second order
-MOST_STEPS = 20_000  # a motion that creeps is told as far as it gets
+MOST_STEPS = 20_000  # a slow motion is diagnosed up to the time that it reaches
 
 
 @dataclass(frozen=True)
 class AlongMotion:
     """Ranks and singular values of Φ_q, rows of unit length, at the poses of a motion from t = 0.
 
-    ``rank`` is that of most poses, ``redundant`` the rows beyond it.  ``by_rounding`` singular values are
-    small at every pose but not zero: rows that would be redundant but for rounding in the scene's numbers.
-    ``crossings`` are the singular positions that the motion passes; ``shaky`` tells whether second order
+    ``rank`` is the rank at most poses, ``redundant`` the rows beyond it.  ``by_rounding`` singular values are
+    small at every pose but not zero: rows that are redundant up to rounding in the scene's numbers.
+    ``crossings`` are the singular positions that the motion passes; ``shaky`` says whether second order
     takes away freedoms of first order at every pose: they are none (A. Müller, Mech. Mach. Theory 2016).
     ``nearest`` is the least of the smallest singular values, over the largest one at the pose, at time
     ``nearest_time`` (s): 0 in a singular position.  ``stopped`` says why the motion ended before the scene's

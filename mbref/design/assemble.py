@@ -142,7 +142,7 @@ def _apart(scene: Scene, first: str, second: str, body: str) -> float:
 
 
 def _compared(old: Scene, new: Scene, pairs: Mapping[tuple[str, str], str]) -> Assembled:
-    """How the new scene differs from the old."""
+    """Return the differences of the new scene from the old one."""
     joints = {
         a.name: max(map(math.dist, a.anchor_pair, b.anchor_pair))
         for a, b in zip(old.joint, new.joint, strict=True)

@@ -196,7 +196,7 @@ def _joined(motions: Sequence[Trajectory]) -> Trajectory:
 
 
 def _samples(motions: Sequence[Trajectory], choose: Callable[[list[np.ndarray]], np.ndarray]) -> Trajectory:
-    """Return poses and velocities chosen from those of motions."""
+    """Return poses and velocities that a function chooses from several motions."""
     fields = ("times", "position", "orientation", "velocity", "angular_velocity")
     chosen: dict[str, Any] = {name: choose([getattr(motion, name) for motion in motions]) for name in fields}
     first = motions[0]

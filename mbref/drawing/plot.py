@@ -19,7 +19,7 @@ DEFAULT = ("angle", "displacement", "energy")
 
 
 def plot(columns: Mapping[str, np.ndarray], names: Sequence[str]) -> Any:
-    """A figure with one panel for each quantity of the named columns; those of ``DEFAULT`` without names.
+    """Return a figure with one panel for each quantity of the named columns, by default of ``DEFAULT``.
 
     Raises ValueError for a name of no column, ImportError without matplotlib.
     """

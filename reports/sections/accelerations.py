@@ -1,4 +1,4 @@
-"""Initial accelerations of the engines beside those of Gauss's principle; distance to singularity."""
+"""Initial accelerations of the engines compared with Gauss's principle; distance to singularity."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ HEADER = ("Engine", "Family", "Difference")
 
 
 def render(scene_runs: SceneRuns) -> list[Block]:
-    """Of every family's best run with accelerations at t = 0, how far they are from the least-constraint
-    ones; nothing for a scene without masses."""
+    """Compare accelerations at t = 0 of each family's best run with Gauss's principle; empty for a scene
+    without masses."""
     if not scene_runs.scene.has_mass():
         return []
     exact = gauss(scene_runs.scene)

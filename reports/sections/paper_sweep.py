@@ -42,7 +42,7 @@ def render(records: Records) -> list[Block]:
 
 
 def _variants(records: Records, cell: Cell) -> dict[str, Run]:
-    """The cell's runs by variant, those of the tables as ``BASE.name``."""
+    """Return the cell's runs by variant; runs of the tables are under ``BASE.name``."""
     return {name: Run(r) for name, r in found(records, cell, ("tables", "sweep", "drawn")).items()}
 
 

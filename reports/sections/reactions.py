@@ -44,7 +44,7 @@ def render(scene_runs: SceneRuns) -> list[Block]:
 
 
 def _best(scene_runs: SceneRuns) -> dict[str, Run]:
-    """Of every engine the completed run with reactions of least error."""
+    """Return for each engine the completed run with reactions of least error."""
     best: dict[str, Run] = {}
     for run in scene_runs.best().values():
         engine = run.curve[0]

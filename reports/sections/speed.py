@@ -67,7 +67,7 @@ def _caption(scene_runs: SceneRuns, drawable: Sequence[Run]) -> str:
 
 
 def _strip(scene_runs: SceneRuns) -> str:
-    """How failed runs are drawn where the picture cannot be asked."""
+    """Draw failed runs in the picture without interaction."""
     if len(scene_runs.completed()) == len(scene_runs.runs):
         return ""
     return (

@@ -90,7 +90,7 @@ def _scene(group: SceneRuns) -> tuple[str, str]:
 
 
 def _row(group: SceneRuns) -> dict[str, list[Verdict]]:
-    """Of every engine the best family, and the library's defaults where that is another one."""
+    """Return for each engine the best family, and the library's defaults if that is another one."""
     best = group.best()
     found: dict[str, list[Verdict]] = {}
     for engine in dict.fromkeys(engine for engine, _ in best):

@@ -1,7 +1,7 @@
 """CasADi: C code generated from a mechanism's equations in joint coordinates, in a compiled DOP853.
 
 CasADi eliminates common subexpressions, and a C compiler optimises its code and the integrator as one piece
-for this machine; the step control is that of crosscheck's compiled DOP853.
+for this machine; the step control equals crosscheck's compiled DOP853.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class CasADi(Generator):
     families, options, integrated_here = FAMILIES, OPTIONS, tuple(FAMILIES)
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """As its equations, and every scene where there is no C compiler."""
+        """Refuse what the equations refuse, and every scene without a C compiler."""
         if found := super().refuses(scene):
             return found
         return Cannot(Owner.ADAPTER, reason) if (reason := why_not()) else None
@@ -107,7 +107,7 @@ class _Run:
         return self.samples[: self.counts[3]]
 
     def failure(self) -> Failed | None:
-        """How the integration ended before the last time."""
+        """Return the failure of an integration that ended before the last time."""
         if self.status == 0:
             return None
         outcome, sentence = ENDS[self.status]

@@ -196,7 +196,8 @@ def accept(system, t, memory):
 
 @njit(cache=True)
 def step(system, target, end, memory):
-    """One accepted step towards a sample, or why there is none; the slope of the state is known."""
+    """Take one accepted step towards a sample, from a state with known slope; return OK or the failure
+    status."""
     clock = memory.clock
     while True:
         left, wanted = target - clock[0], min(max(clock[1], system.shortest), system.longest)
@@ -221,7 +222,7 @@ def step(system, target, end, memory):
 
 @njit(cache=True)
 def advance(system, target, end, memory):
-    """Steps to a sample time; REACHED, or why it is not."""
+    """Step to a sample time; return REACHED or the failure status."""
     while memory.clock[0] < target:
         if memory.counts[STEPS] >= system.most_steps:
             return TOO_MANY

@@ -1,7 +1,7 @@
 """The coefficients of DOP853: nodes C, weights A of the stages and B of the step, and two error estimates.
 
 E. Hairer, S. P. Nørsett and G. Wanner, Solving Ordinary Differential Equations I, 2nd edition, 1993, section
-II.5; the numbers are those of Hairer's code dop853.f.
+II.5; the numbers are taken from Hairer's code dop853.f.
 """
 
 from __future__ import annotations

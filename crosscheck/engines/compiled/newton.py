@@ -28,7 +28,7 @@ class System(NamedTuple):
 
 @njit(cache=True)
 def advance(system, target, memory, numbers):
-    """Equal steps to a sample time; REACHED, or why it is not."""
+    """Take equal steps to a sample time; return REACHED or the failure status."""
     start = memory.clock[0]
     count = max(1, math.ceil((target - start) / system.longest * (1.0 - STRETCH)))
     for k in range(count):

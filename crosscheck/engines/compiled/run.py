@@ -58,7 +58,7 @@ def trajectory(
 
 
 def _stepped(system: System, times: np.ndarray, samples: np.ndarray, memory: dop853.Memory) -> Any:
-    """How the stepping ended, and the number of samples reached."""
+    """Return the status of the stepping, and the number of samples reached."""
     stepper = dop853 if isinstance(system, dop853.System) else newton
     return stepper.integrate(system, times, samples, memory)
 

@@ -82,7 +82,7 @@ class _ExtrapolatedRuns:
 
     def advance(self, to: np.ndarray, times: np.ndarray) -> tuple[Samples, Ending | None]:
         """Samples at ``to``, of which those at ``times`` are kept; where a run fails nothing has changed, and
-        the samples are those of the run that failed."""
+        the samples belong to the run that failed."""
         runs = []
         for solver, divisor in zip(self.solvers, RICHARDSON, strict=True):
             solver.put(self.state)
@@ -139,6 +139,6 @@ def _onto(times: np.ndarray, nodes: np.ndarray, spacing: float) -> np.ndarray:
 
 
 def _at(samples: Samples, times: np.ndarray) -> Samples:
-    """Those of the samples that are at one of ``times``."""
+    """Return the samples that are at one of ``times``."""
     kept = np.isin(samples[0], times)
     return samples[0][kept], samples[1][:, kept], samples[2][kept]

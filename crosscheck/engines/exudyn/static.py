@@ -1,7 +1,7 @@
 """Exudyn's static solver as kinematic analysis: poses of a fully driven mechanism, one after another.
 
-No mass and no force takes part.  Velocities come from Exudyn's own constraint Jacobian, whose rank
-also tells when a pose is singular: there the solver may jump to another branch without a word.
+No mass and no force takes part.  Velocities come from Exudyn's own constraint Jacobian, whose rank also
+shows when a pose is singular: there the solver may jump to another branch without a word.
 The functions take the exudyn module and do not import it.
 """
 

@@ -67,7 +67,7 @@ class MuJoCo(Engine):
         return sweep(scene, fastest_rate(scene, lambda step: self._coarse(scene, step)))
 
     def serves(self, scene: Scene, family: str) -> bool:
-        """As the sweep says, which has the tuned family for every scene."""
+        """Return what the sweep offers, which has the tuned family for every scene."""
         return family == "tuned" or super().serves(scene, family)
 
     def prepare(self, families: Sequence[str]) -> None:
@@ -254,7 +254,7 @@ class _MujocoSimulation:
         )
 
     def link_motion(self) -> LinkMotion:
-        """The motion of the links; the data's forces are those of this state afterwards."""
+        """Return the motion of the links; afterwards the data's forces belong to this state."""
         mujoco, model, data, links = self.mujoco, self.model, self.data, self.compiled.links
         mujoco.mj_forward(model, data)
         mujoco.mj_rnePostConstraint(model, data)

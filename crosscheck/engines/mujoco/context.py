@@ -37,7 +37,7 @@ class Context(NamedTuple):
 
     @property
     def address(self) -> int:
-        """Of the numbers."""
+        """Return the address of the numbers."""
         return int(self.numbers.ctypes.data)
 
 

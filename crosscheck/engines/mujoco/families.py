@@ -15,7 +15,7 @@ from crosscheck.engines.planar_scene import planar_scene
 from crosscheck.engines.spanning_tree import spanning_tree
 from mbref.scene import Scene
 
-HARD = 1e-7  # factor of the regulariser: its error is below 1e-9, and so is rounding, which 1e-8 lets grow
+HARD = 1e-7  # factor of the regulariser: its error and rounding are below 1e-9; at 1e-8 rounding grows
 RK4 = "mjINT_RK4"
 STOCK = {"stock": RK4, "euler": "mjINT_EULER", "implicit": "mjINT_IMPLICIT",
          "implicitfast": "mjINT_IMPLICITFAST"}  # fmt: skip

@@ -22,7 +22,8 @@ CONSTANT = (Moment, Force)  # loads that MJCF does not know
 
 
 def write(scene: Scene) -> Exported:
-    """The MJCF text; drivers and constant loads are told as left out.  SceneError without masses."""
+    """Return the MJCF text; drivers and constant loads are reported as left out.  SceneError without
+    masses."""
     if not scene.has_mass():
         raise SceneError([f"{scene.name}: MJCF needs the mass and inertia of every body"])
     bare = scene.with_(driver=(), load=[load for load in scene.load if not isinstance(load, CONSTANT)])

@@ -125,7 +125,8 @@ class _OndselSimulation:
             self.pose = (samples[-1].position, samples[-1].orientation)
 
     def _samples(self, t0: float, t1: float, frames: int, taken: Sequence[int]) -> list[Sample]:
-        """The frames ``taken`` of an analysis in a world where all their orientations can be told."""
+        """The frames ``taken`` of an analysis in a world where the solver's angles determine all
+        orientations."""
         names = [f"b{k}" for k in range(len(self.scene.body))]
         for assembly in self.assemblies:
             text = assembly.text(t0, t1, frames, *self.pose)

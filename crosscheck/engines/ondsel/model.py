@@ -58,7 +58,7 @@ class Table:
 class Assembly:
     """A scene in a turned world, with bodies in their principal axes.
 
-    The solver tells orientations as angles that lose their meaning where a body's third axis is along the
+    The solver gives orientations as angles that lose their meaning where a body's third axis is along the
     first of the world.  So ``world`` (4,) first turns the scene such that the first driver's axis is the
     third; ``tilted``, another turn follows.  ``principal`` (nb, 4) turns principal to body axes, the third
     of them the nearest to the driver's axis.

@@ -86,7 +86,7 @@ class Pinocchio(Engine):
         return sweep(scene, rate)
 
     def serves(self, scene: Scene, family: str) -> bool:
-        """As the sweep says, which has the tuned family for every scene."""
+        """Return what the sweep offers, which has the tuned family for every scene."""
         return family == "tuned" or super().serves(scene, family)
 
     def prepare(self, families: Sequence[str]) -> None:

@@ -21,7 +21,7 @@ FLAGS = (
     "-DBOOST_MPL_LIMIT_VECTOR_SIZE=30", "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",
     "-DBOOST_FUSION_INVOKE_MAX_ARITY=12",
 )  # fmt: skip
-EIGEN = Path("/usr/include/eigen3")  # of the system, beside that of the prefix
+EIGEN = Path("/usr/include/eigen3")  # of the system, in addition to the one of the prefix
 
 
 def why_not() -> str:

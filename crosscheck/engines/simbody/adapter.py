@@ -1,7 +1,7 @@
 """Simbody, through OpenSim: joint coordinates, constraints met to the tolerance at every accepted step.
 
 Redundant closures are borne (least-norm multipliers).  The families are Simbody's error-controlled
-integrators; the one option is their ``accuracy``, a tolerance of one step.  OpenSim tells no counts of
+integrators; the one option is their ``accuracy``, a tolerance of one step.  OpenSim reports no counts of
 steps, so the cost has none.
 """
 

@@ -168,7 +168,7 @@ def _point_force(mechanism: Mechanism, name: str, load: Force) -> Any:
 
 
 def _spring(mechanism: Mechanism, name: str, load: Spring) -> Any:
-    """Of the distance d and its rate; positive pulls together."""
+    """Return the force of a spring at distance d and its rate; positive pulls together."""
     force = mechanism.opensim.ExpressionBasedPointToPointForce()
     links = [mechanism.link_of(body) for body in load.bodies]
     first, second = (mechanism.frame(link) for link in links)

@@ -103,7 +103,7 @@ class Equations:
         return matrix + cj * by_rate
 
     def projected(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Motion (motion,) near that of y with Φ = 0, by Newton's method, and Φ' = 0."""
+        """Return the motion (motion,) nearest to y with Φ = 0, by Newton's method, and Φ' = 0."""
         s = self.state(y)
         r, p = s.r, s.p / np.linalg.norm(s.p, axis=-1, keepdims=True)
         for _ in range(CORRECTIONS):

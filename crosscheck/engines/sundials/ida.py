@@ -18,7 +18,7 @@ from mbref.scene import Scene
 from mbref.trajectory import Outcome
 
 INCREMENT = 1e-7  # of the difference quotients, relative to a component's scale
-WORSE = 1e-2  # the chosen rows' least pivot over that of the best choice, below which they are replaced
+WORSE = 1e-2  # replace the chosen rows if their least pivot falls below this part of the best choice's
 LOST = 1e-2  # of the length and of a radian: a row left out that is off by more was no redundant one
 LOOSE = 1e2  # of the scale of the integral of μ: of no interest, and at first order its error rules the steps
 LEAST_STEP = 1e-12  # of the duration

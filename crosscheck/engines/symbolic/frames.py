@@ -35,7 +35,7 @@ class Frame:
     """A link in motion: the point that was at ``reference`` is at ``origin``, turned by ``rotation``.
 
     ``columns`` are the coordinates that move it: place, whether it turns, axis, and a point of the axis.
-    The accelerations are those of q̈ = 0.
+    The accelerations hold for q̈ = 0.
     """
 
     reference: np.ndarray
@@ -53,7 +53,7 @@ class Frame:
         return self.rotation @ (point - self.reference)
 
     def moved(self, arm: Vector, reference: np.ndarray) -> Frame:
-        """The same link with another origin."""
+        """Return the link with another origin."""
         turned = cross(self.spin, arm)
         return Frame(
             reference, self.origin + arm, self.rotation, self.velocity + turned, self.spin,

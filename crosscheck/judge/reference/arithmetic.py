@@ -42,7 +42,7 @@ class Arithmetic:
         return np.full(shape, self.number(0.0), dtype=self.dtype)
 
     def settled(self, values: np.ndarray) -> np.ndarray:
-        """The same numbers without the radii of their balls, which grow from operation to operation."""
+        """Return the numbers without the radii of their balls, which grow from operation to operation."""
         return _objects([x.mid() for x in np.ravel(values)], np.shape(values)) if self.digits else values
 
 

@@ -1,4 +1,4 @@
-"""How far a reference is from the true motion at most, from the difference of independent motions.
+"""Bound on the distance of a reference from the true motion, from the difference of independent motions.
 
 The bound is SAFETY times the largest difference so far, and never less than LEAST.  Where two formulations of
 held-out scenes with truths of forty digits differed by d, formulation A was off by at most 1.5 d and B by at
@@ -23,8 +23,8 @@ USEFUL = 1e-6
 
 
 def differences(scene: Scene, one: Motion, other: Motion) -> np.ndarray:
-    """How far two motions are apart (k,) at the samples that both reached: the larger of distance, over the
-    scene's length, and angle (rad)."""
+    """Return the difference (k,) of two motions at the samples that both reached: the larger of
+    distance, over the scene's length, and angle (rad)."""
     k = min(len(one.times), len(other.times))
     apart = doubles(one.position[:k] - other.position[:k])
     distance = np.linalg.norm(apart, axis=-1).max(axis=-1, initial=0.0) / scene_length(scene)

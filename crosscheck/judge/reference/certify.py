@@ -2,7 +2,8 @@
 
 The scene's doubles count as exact.  The digits are those on which formulations A and B agree in arithmetics
 of more; the bound is ten times their difference.  Where redundant rows contradict each other, the table is of
-the mechanism without them, and tells which joints were replaced.  Tables are never edited, only superseded.
+the mechanism without them, and names the joints that were replaced.  Tables are never edited, only
+superseded.
 """
 
 from __future__ import annotations

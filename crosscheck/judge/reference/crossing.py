@@ -1,4 +1,4 @@
-"""Singular positions inside a panel: told by the least singular value, bridged by a polynomial.
+"""Singular positions inside a panel: found by the smallest singular value, bridged by a polynomial.
 
 On a smooth branch that crosses a singular position transversally, the least singular value of the constraint
 Jacobian is |s(t)| with s smooth and s(t*) = 0.  The accelerations stay smooth, but the equations for them
@@ -13,9 +13,9 @@ from numpy.polynomial import chebyshev
 
 NEAR = 0.15  # of the median distance from singularity: points to be bridged
 MOST = 0.25  # of the points may be bridged
-DEGREE = 8  # of the polynomial that tells whether the distance changes its sign
+DEGREE = 8  # of the polynomial that shows whether the distance changes its sign
 WINDOW = 12  # points on either side that it goes through
-SIGNED = 0.1  # misfit of the signed distance, relative to that of the unsigned one
+SIGNED = 0.1  # misfit of the signed distance, relative to the misfit of the unsigned distance
 
 
 def near_singular(distance: np.ndarray) -> np.ndarray:

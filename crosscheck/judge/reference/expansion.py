@@ -97,7 +97,7 @@ class Series:
         return float(np.exp(self._pairs(h).min()))
 
     def terms(self, h: float) -> int:
-        """How many terms serve for a step h (s)."""
+        """Return the number of terms that a step h (s) needs."""
         return LEAST_TERMS + 1 + int(np.argmin(self._pairs(h)))
 
     def _pairs(self, h: float) -> np.ndarray:

@@ -50,7 +50,7 @@ class NaturalCoordinates:
 
     Coordinates X (3, n) hold the ground's [0 1] last.  Lengths are in the unit ``length`` (m), a power of two
     near the scene's size, so that all coordinates are about one and no digit changes.  Products 0 … m - 1 are
-    those of the rows; further ones are the second products of driven angles.
+    the rows' products; further ones are the second products of driven angles.
     """
 
     def __init__(self, scene: Scene, arithmetic: Arithmetic):
@@ -198,7 +198,8 @@ class NaturalCoordinates:
     def _driven(
         self, kind: str, driver: Driver, e: Sequence[np.ndarray], f: Sequence[np.ndarray], apart: np.ndarray
     ) -> Row:
-        """Of an angle ψ: the first axis on the second body stays perpendicular to cos ψ e₂ - sin ψ e₁."""
+        """Return the row of an angle ψ: the first axis on the second body is perpendicular to cos ψ e₂ -
+        sin ψ e₁."""
         if kind == "translational":
             return Row(e[2], apart, 0.0, driver)
         return Row(e[1], f[0], 0.0, driver, -1 * e[0])

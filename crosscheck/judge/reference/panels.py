@@ -21,8 +21,8 @@ SWEEPS = 60  # Picard iterations before a panel is shortened
 MANY = 35  # a panel that took more is not followed by a longer one
 SETTLED = 2000.0  # rounding units of the last change, and of the end of the series
 BRIDGED = 1e4  # times more, across a singular position
-TELLING = 1e-3  # change below which the series tells how long a panel may be
-ROUGHLY = 1.2  # doubt in what the series of an iterate tells
+TELLING = 1e-3  # change below which the series determines the length of a panel
+ROUGHLY = 1.2  # safety factor on the length that the series of an iterate gives
 SPARE = 0.9  # of the length that the series could resolve
 LONGEST, SHORTER, SHORTEST = 1.6, 0.6, 0.5  # factors on the length of the next panel
 FLOOR = 1e-3  # of the largest column, below which a column counts as small
@@ -129,7 +129,7 @@ class Panels:
         return better, self._size(better, np.concatenate([moves, rates], axis=1) * length, light)
 
     def _told(self, panel: Panel, size: np.ndarray, change: float, distance: np.ndarray) -> Panel | None:
-        """The panel once an iterate tells that it has settled, or how much shorter it has to be."""
+        """Return the panel once an iterate has converged, or the factor by which it must be shorter."""
         tolerance = self.tolerance * (1 if panel.crossing is None else BRIDGED)
         if change > (TELLING if panel.crossing is None else tolerance):  # bridged iterates tell nothing
             return None
@@ -159,10 +159,10 @@ class Panels:
         return NOISE * float(last) if noisy else 0.0
 
     def _fits(self, series: np.ndarray, change: float, tolerance: float) -> float:
-        """How many times longer a panel its points could resolve.
+        """Return the factor by which a panel could be longer with its points.
 
         The series falls geometrically: if an iterate needs k coefficients down to the size of its change,
-        the solution needs k log(tolerance) / log(change); if they do not reach so far, the last tells.
+        the solution needs k log(tolerance) / log(change); if they do not reach so far, the last one is used.
         """
         level = max(change, tolerance)
         above = np.flatnonzero(series > level)

@@ -36,7 +36,7 @@ _computing: dict[str, Lock] = {}  # by what determines the motion
 @dataclass(frozen=True)
 class Reference:
     """Samples of the reference motion in double precision, as in Motion, and the ``bound`` (k,) on their
-    error: distance over the scene's length, or angle (rad).  ``both`` (k,) tells where A and B agree and
+    error: distance over the scene's length, or angle (rad).  ``both`` (k,) marks where A and B agree and
     not two runs of one of them alone; ``seconds`` of CPU time were spent."""
 
     times: np.ndarray
@@ -51,7 +51,7 @@ class Reference:
     seconds: float
 
     def at(self, times: np.ndarray) -> Reference:
-        """The same at some of its times (k,)."""
+        """Return the reference at some of its times (k,)."""
         chosen = np.searchsorted(self.times, times)
         arrays = {name: getattr(self, name)[chosen] for name in ("times", *FIELDS, "bound", "both")}
         return Reference(**arrays, seconds=self.seconds)
@@ -165,7 +165,7 @@ class _Kept:
         return float(self.samples.times.max(initial=0.0))
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """As arrays, for the cache."""
+        """Return the reference as arrays, for the cache."""
         known = {name: np.asarray(getattr(self.samples, name)) for name in Reference.__dataclass_fields__}
         return known | {"reason": np.array(self.reason), "given": np.array(self.seconds)}
 

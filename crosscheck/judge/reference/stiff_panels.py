@@ -42,7 +42,7 @@ class SlopedEquations(Equations, Protocol):
     """Equations with the same in double precision."""
 
     def in_doubles(self) -> Equations:
-        """The same equations in double precision."""
+        """Return these equations in double precision."""
 
 
 class StiffPanels:
@@ -97,7 +97,7 @@ class StiffPanels:
         return Panel(panel.start, panel.length, panel.states, panel.rates, True, min(SPARE * fits, LONGEST))
 
     def _fits(self, y: np.ndarray, size: np.ndarray) -> float:
-        """How many times longer a panel its points could resolve."""
+        """Return the factor by which a panel could be longer with its points."""
         level = RESOLVED * self.panels.tolerance
         series = (np.abs(doubles(self.panels.times(self.panels.series, y))) / size).max(axis=1)
         needed = np.flatnonzero(series > level).max(initial=0) + 1

@@ -165,7 +165,7 @@ class Stepper:
         return HeldRows(self.of, rows), int((pivots > NEW_ROW).sum())
 
     def _sharp(self, x: np.ndarray, t: Any) -> float:
-        """How far the held rows are from dependent: their least singular value, being of length one."""
+        """Return the smallest singular value of the held rows, scaled to unit length."""
         ask()
         return float(np.linalg.svd(self._held.unit_gradient(x, t), compute_uv=False)[-1])
 
@@ -298,7 +298,8 @@ class Stepper:
         return True
 
     def _crossing(self, x: np.ndarray, series: Series, h: float) -> float:
-        """How far ahead (s) the held rows are dependent, as far as the series tells; 0 when nowhere."""
+        """Return the time (s) until the held rows become dependent, by the series; 0 if they stay
+        independent."""
 
         def sharp(length: float) -> float:
             return self._ahead(x, series, length)

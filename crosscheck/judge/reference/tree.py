@@ -142,7 +142,8 @@ class _Run:
         return panel
 
     def _guess(self, tried: Panel | None, length: Any) -> np.ndarray:
-        """States at the points of a panel: as now, or those of a longer panel that was tried before."""
+        """Return states at the points of a panel: the present state, or states of a longer panel tried
+        before."""
         if tried is None or tried.settled:
             return np.repeat(self.state[None], self.panels.count, axis=0)
         guess, _ = self.panels.sampled(tried, self.t + length / 2 * (self.panels.nodes + 1))

@@ -34,7 +34,7 @@ class Rows:
     jacobian: np.ndarray
 
     def joined(self, other: Rows) -> Rows:
-        """These rows and then the other ones."""
+        """Return these rows followed by others."""
         pairs = ((self.value, other.value), (self.drift, other.drift), (self.jacobian, other.jacobian))
         return Rows(*(np.concatenate(pair, axis=1) for pair in pairs))
 
@@ -70,7 +70,8 @@ class Closures:
         self.cosine = dot(self.angles.vectors[:, 0], self.angles.vectors[:, 1])
 
     def sizes(self, length: float) -> np.ndarray:
-        """How far each closure (m,) changes when its joint parts by a length (m), or turns by a radian."""
+        """Return the change of each closure (m,) when its joint parts by a length (m), or turns by a
+        radian."""
         spans = np.sqrt(2 * doubles(self.half_square))
         counts = len(self.shifts.bodies), len(self.angles.bodies)
         return np.concatenate([np.full(counts[0], length), length * spans, np.ones(counts[1])])

@@ -96,7 +96,7 @@ class TreeEquations:
         return np.concatenate([turning, acceleration], axis=1), distance
 
     def in_doubles(self) -> TreeEquations:
-        """The same equations, with the same rows, in double precision."""
+        """Return the equations, with equal rows, in double precision."""
         if self._doubles is None:
             self._doubles = TreeEquations(self.scene, DOUBLE)
         self._doubles.kept = self.kept
@@ -203,10 +203,10 @@ class TreeEquations:
             self.kept = best
 
     def _rank(self, rows: np.ndarray) -> int:
-        """How many of the rows (m, nv) are independent."""
+        """Return the number of independent rows (m, nv)."""
         size = np.linalg.norm(rows, axis=1, keepdims=True)
         largest = max(size.max(initial=0.0), min(1.0, self.length**2))  # one joint rate moves so much
-        rows = rows / np.where(size > RANK * largest, size, largest)  # those of rounding size stay small
+        rows = rows / np.where(size > RANK * largest, size, largest)  # rows of rounding size stay small
         pivots = np.abs(np.diag(qr(rows.T, mode="r", pivoting=True)[0]))
         return int((pivots > RANK).sum())
 

@@ -19,7 +19,7 @@ from mbref.scene import Force, Moment, Spring, TorsionSpring
 
 
 class Loads:
-    """Masses, inertias, gravity and loads, packed; ``measured`` tells the row of a torsion spring's joint.
+    """Masses, inertias, gravity and loads, packed; ``measured`` has the row of a torsion spring's joint.
 
     A scene without all its masses has no loads, and mass 1 and inertia 1 stand for the missing ones: its
     drivers determine the motion, whatever they are.
@@ -44,7 +44,8 @@ class Loads:
         return self._mass_matrix(placed, self._world_inertia(placed))
 
     def terms(self, placed: Placed, angles: Rows, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mass matrix, and the forces (K, nv) of loads less those of inertia without joint accelerations."""
+        """Return the mass matrix, and forces (K, nv) of loads minus inertia forces without joint
+        accelerations."""
         spin, inertia = placed.spin[:, :-1], self._world_inertia(placed)
         turning = cross(spin, apply(inertia, spin)) + apply(inertia, placed.spin_drift[:, :-1])
         force = self.mass * (self.gravity - placed.drift[:, :-1])

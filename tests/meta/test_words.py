@@ -1,0 +1,71 @@
+"""Plain words: docstrings that begin with a verb or a noun, and no private words in docstrings and comments."""
+
+from __future__ import annotations
+
+import ast
+import io
+import re
+import tokenize
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+NOT_YET = (  # folders that still have to be rewritten
+    "mbref/ensembles", "mbref/equations", "mbref/formulations", "mbref/integrators", "mbref/kernels",
+    "mbref/linear_algebra", "mbref/simulation", "mbref/stabilisation", "mbref/taylor",
+)  # fmt: skip
+FILES = [
+    path
+    for package in ("mbref", "crosscheck", "reports")
+    for path in sorted((ROOT / package).rglob("*.py"))
+    if not str(path.relative_to(ROOT)).startswith(NOT_YET)
+]
+BEGINNINGS = re.compile(r"(Have|Those|The same|Of|As|What|That|How|Whether those)\b")
+WORDS = re.compile(
+    r"\b(told|tells|untold|but for|or why|those of|that of|as by|so is|beside it|dear|the other ones)\b"
+)
+CODE = re.compile(r"``.*?``|`.*?`|\"[^\"]*\"", re.S)  # names and quotations
+
+
+def docstrings(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and text of every docstring of a file."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module) and (
+            text := ast.get_docstring(node)
+        ):
+            yield getattr(node, "lineno", 1), text
+
+
+def comments(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and text of every comment of a file."""
+    for token in tokenize.generate_tokens(io.StringIO(path.read_text()).readline):
+        if token.type == tokenize.COMMENT:
+            yield token.start[0], token.string
+
+
+def faults(path: Path) -> list[str]:
+    """Places of a file at which a docstring begins with a word of BEGINNINGS, or a private word stands."""
+    found = [(line, text) for line, text in docstrings(path) if BEGINNINGS.match(text)]
+    every = [*docstrings(path), *comments(path)]
+    found += [(line, text) for line, text in every if WORDS.search(CODE.sub("", text))]
+    return [f"{path.name}:{line}: {text[:80]}" for line, text in found]
+
+
+def test_docstrings_and_comments_are_in_plain_words():
+    found = [fault for path in FILES for fault in faults(path)]
+    assert len(FILES) > 200 and not found, "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
+        ('"""Those of the rows."""\n', 1), ('"""Return the rows."""\n', 0), ('"""Rows, but for one."""\n', 1),
+        ("x = 1  # that of the other\n", 1), ('"""Return ``told`` rows."""\n', 0), ('told = "or why"\n', 0),
+    ],
+)  # fmt: skip
+def test_faults_are_found(tmp_path, text, count):
+    path = tmp_path / "module.py"
+    path.write_text(text)
+    assert len(faults(path)) == count
