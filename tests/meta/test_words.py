@@ -1,4 +1,4 @@
-"""Plain words: docstrings that begin with a verb or a noun, and no private words in docstrings and comments."""
+"""Plain words in docstrings and comments: a verb or a noun at the beginning, and no private words."""
 
 from __future__ import annotations
 
