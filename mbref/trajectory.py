@@ -35,11 +35,7 @@ class Outcome(enum.Enum):
         "",
         "the motion comes to a singular position, which the method does not cross",
     )
-    UNDECIDED = (
-        "UNDECIDED",
-        "",
-        "rounding hides on which branch the motion continues at a singular position",
-    )
+    UNDECIDED = ("UNDECIDED", "", "rounding hides the branch of the motion at a singular position")
     LEFT_MOTION = ("LEFT_MOTION", "", "the run went on along another motion than the one of its start")
     TIMED_OUT = ("TIMED_OUT", "", "the time limit was reached")
     CRASHED = ("CRASHED", "", "the process ended without a result")
