@@ -190,7 +190,7 @@ def _starts(child: Child) -> Iterator[None]:
 
 
 def starting() -> dict[int, str]:
-    """What engines print while they are made ready, such as that they compile, by the thread that waits."""
+    """Return the last line that each engine printed while it starts, by the thread that waits for it."""
     return {thread: child.last_printed() or "starting" for thread, child in _starting.copy().items()}
 
 

@@ -274,7 +274,7 @@ def _drift(cell: Cell, run: Run, records: Records) -> str:
 
 
 def _message(run: Run) -> list[str]:
-    """What the run says of an end for which the paper has no letter."""
+    """Return the run's words on an end for which the paper has no letter."""
     return [] if run.completed or run.outcome.letter else [run.reason]
 
 
