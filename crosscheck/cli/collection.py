@@ -72,7 +72,7 @@ def stability_ladders(out: Path, notice: Notice) -> list[Record]:
 
 
 def paper(out: Path, is_whole: bool, notice: Notice) -> Paper:
-    """Return records of the paper's runs, stored in ``out``/paper*: for tables and figures, or with studies."""
+    """Return records of the paper's runs, stored in ``out``/paper*: for its tables, or for all studies."""
     out.mkdir(parents=True, exist_ok=True)
     path, timed = out / store.FILE, runs.timed()
     cases = runs.cases() | timed | (runs.studies() if is_whole else {})

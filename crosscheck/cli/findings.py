@@ -24,7 +24,7 @@ def chosen(names: Sequence[str]) -> list[Finding]:
 
 
 def show(console: Console, names: Sequence[str], recheck: bool) -> None:
-    """Print the findings; with ``recheck`` each proof is run, and its answer is printed in a further column."""
+    """Print the findings; with ``recheck`` run each proof and print its answer in a further column."""
     wanted = chosen(names)
     columns = ["finding", "engine", "found in", "what it does"]
     table = Table(*columns, *(["installed", "status", "measured"] if recheck else []), box=SIMPLE)

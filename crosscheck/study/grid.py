@@ -173,7 +173,9 @@ def run_case(case: Case) -> Record:
 
 
 def run_in_turn(case: Case) -> Record:
-    """Run a case in a child that serves many short runs of an engine: it serves on after a run that ended early, and another child measures, so that no truth holds up this process.
+    """Run a case in a child that serves many short runs of an engine, also after a run that ended early.
+
+    Another child measures, so that no truth holds up this process.
 
     Measuring ends at MEASURED times the case's limits; the record then has no error.
     """
