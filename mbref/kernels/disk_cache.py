@@ -8,9 +8,11 @@ them, and their kernels are compiled again.
 from __future__ import annotations
 
 import contextlib
+import errno
 import functools
 import hashlib
 import os
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -19,6 +21,7 @@ from pathlib import Path
 import numba
 
 CHECKSUMS = "checksums.txt"  # a line a file: SHA-256, blank, path in the folder
+LEAST_FREE = 1 << 27  # bytes of the disk: kernels of all methods take 40 MB, and numba fails on a full disk
 LINE = hashlib.sha256().digest_size * 2 + 1  # characters before the path
 
 
@@ -38,6 +41,8 @@ def is_writable(folder: Path) -> bool:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
+        if shutil.disk_usage(folder).free < LEAST_FREE:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     except OSError as error:
         _report(f"nothing can be kept in {folder} ({error.strerror}); kernels are compiled each time")
         return False

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import multiprocessing
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -15,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from mbref.kernels import checked_file
+from mbref.kernels import checked_file, disk_cache
 from mbref.simulation.simulate import simulate
 
 ROOT = Path(__file__).parents[2]
@@ -182,6 +183,16 @@ def test_without_a_place_for_the_cache_code_is_made_each_time(script, says, tmp_
     (tmp_path / "file").write_text("no folder")
     out, error = ran(script, tmp_path, tmp_path / "file")
     assert out == says and "nothing can be kept in" in error and "Traceback" not in error, error
+
+
+def test_kernels_are_not_kept_on_a_disk_that_is_nearly_full(tmp_path: Path, monkeypatch, capsys):
+    usage = shutil.disk_usage(tmp_path)
+    for free, kept_there in ((disk_cache.LEAST_FREE, True), (disk_cache.LEAST_FREE - 1, False)):
+        monkeypatch.setattr(shutil, "disk_usage", lambda _, free=free: usage._replace(free=free))
+        disk_cache.is_writable.cache_clear()
+        assert disk_cache.is_writable(tmp_path) is kept_there
+    disk_cache.is_writable.cache_clear()
+    assert capsys.readouterr().err.count("(No space left on device)") == 1
 
 
 def test_compiled_code_is_found_again(tmp_path: Path):
