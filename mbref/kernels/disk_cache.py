@@ -63,8 +63,12 @@ def files_of(folder: Path, function: Callable) -> list[Path]:
 
 
 def remove_damaged(folder: Path, function: Callable) -> None:
-    """Remove the files of a function unless the list has all their checksums; stderr names damaged ones."""
-    paths, is_whole = files_of(folder, function), True
+    """Remove the files of a function unless the list has all their checksums; stderr names damaged ones.
+
+    Files written since this process began to use the folder are of a process that compiles now, and stay.
+    """
+    since = begin(folder)
+    paths, is_whole = [path for path in files_of(folder, function) if _time_of(path) < since], True
     for path in paths:
         known, found = _known(folder, path), _checksum(path)
         is_whole = is_whole and found in known
