@@ -175,7 +175,7 @@ def test_contradictions_and_the_numbers_of_the_tables():
 
 
 def test_ratios_of_steps_and_the_paper(blocks):
-    third, fourth = tables(blocks, "Paper: steps, ratio")
+    third, fourth = tables(blocks, "steps, ratio printed")
     assert third.rows[2][3] == f"{103 / 3303:.3f}", third.rows[2]
     assert fourth.rows[-1][3] == f"{1368 / 2428:.3f}", fourth.rows[-1]
     assert third.rows[2][4] == f"{2.5 / 20:.3f}", f"50 steps/s to 20 s over 400 to 2.5 s: {third.rows[2]}"
