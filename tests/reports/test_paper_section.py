@@ -132,7 +132,8 @@ def test_printed_times_and_later_digits(records):
 
 
 def test_tables_and_figures_without_the_studies(records, blocks):
-    some = {label: r for label, r in records.items() if label in runs.cases() | runs.timed()}
+    needed = runs.cases() | runs.timed()
+    some = {label: record for label, record in records.items() if label in needed}
     found = paper.render(some, ILLUSTRATION)
     whole, here = ({b.text for b in shown if isinstance(b, Heading)} for shown in (blocks, found))
     assert whole - here == {
