@@ -13,7 +13,7 @@ from mbref.taylor.stepping import begin_once
 
 @entry(INT(SERIES))
 def enter_series(memory):
-    """Begin a series at the present state: OK or why that cannot be."""
+    """Begin a series at the present state; return OK or the failure status."""
     memory.progress.begun = 0
     return begin_once(memory)
 

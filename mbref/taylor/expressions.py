@@ -15,7 +15,7 @@ Polynomial = dict[tuple[int, int], float]
 
 ONE = -1
 ROUNDING = 1e-12  # relative; coefficients below it are roundings of zero
-VANISHING = 1e-9  # coefficients of an equation that follows from others, but for the rounding of the scene
+VANISHING = 1e-9  # an equation with smaller coefficients follows from others, within rounding
 DEPENDENT = 1e-9  # of a polynomial, left by the elimination of others
 
 

@@ -56,7 +56,7 @@ class Inertia(NamedTuple):
 
     mass: Annotated[Matrix, "nz", "lanes"]
     coupled: Annotated[Indices, "couplings"]  # variables with an inertia in common with one, itself included
-    first: Annotated[Indices, "nz + 1"]  # place in ``coupled`` where those of a variable begin
+    first: Annotated[Indices, "nz + 1"]  # index in ``coupled`` of the first variable coupled with each
     force: Annotated[Vector, "lanes"]
     source: Annotated[Indices, "moments"]  # lanes, of which each block of lanes has its blocks
     weight: Annotated[Vector, "moments"]
@@ -215,7 +215,7 @@ class Step(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """How far a run has come."""
+    """Progress of a run: its end, what is recorded, and its largest pivots."""
 
     end: float = 0.0  # s at which the last step ends
     begun: int = 0  # whether a series has been begun

@@ -1,4 +1,4 @@
-"""How the bodies of a scene can be oriented: with the fixed frame, about an axis at rest, or freely."""
+"""Orientations of the bodies of a scene: with the fixed frame, about an axis at rest, or freely."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Outputs of a series: accelerations and multipliers at the samples that its steps have kept.
 
-Accelerations are those of a series of second order about the sample.  Near a singular position, where
-rounding over the distance would spoil that series, steps are exact, and their own second derivative serves.
+A series of second order about the sample gives the accelerations.  Near a singular position rounding over the
+distance would spoil that series: there the second derivative of the high-accuracy step is used.
 Multipliers balance the forces in the metric of a projection, so that bodies may lack inertia.
 """
 
@@ -111,7 +111,7 @@ def expand_at_sample(memory):
 def balance_forces(t, run):
     """Compute multipliers λ with Φ_qᵀ λ = g - M q̈ at the state and accelerations in memory: OK or SINGULAR.
 
-    Of redundant rows, those of the least norm in unit rows.
+    For redundant rows, the multipliers of least norm in unit rows.
     """
     equations, system, factor = run.equations, run.equations.system, run.factor
     system.counts.evaluations += 1

@@ -150,7 +150,7 @@ def least_pivot(memory):
 
 @kernel
 def save_start_pivots(memory):
-    """Save pivots, null vector and partition of the last factorisation as those of the start of a step."""
+    """Save pivots, null vector and partition of the last factorisation for the start of a step."""
     solver, step, partition, progress = memory.solver, memory.step, memory.partition, memory.progress
     copy(solver.last, solver.past)
     for i in range(solver.pivot_columns.shape[0]):

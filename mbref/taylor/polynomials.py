@@ -20,9 +20,9 @@ from mbref.taylor.simd import WIDTH, padded_size
 
 
 class Geometry:
-    """The equations of a scene in natural coordinates, but for masses and loads, which may be any.
+    """The equations of a scene in natural coordinates, without masses and loads.
 
-    ``pose_maps`` are those of the variables, ``tableau`` the ``linear`` and ``place`` of a ``layout.Solver``.
+    ``pose_maps`` evaluate the variables, ``tableau`` has ``linear`` and ``place`` of a ``layout.Solver``.
     """
 
     def __init__(self, of: NaturalCoordinates):

@@ -2,8 +2,8 @@
 
 All variables are z = N b + T u of the independent ones u.  N and T come from Gauss–Jordan elimination of the
 tableau [G 1] by rows and dependent variables (R. A. Wehage and E. J. Haug, J. Mech. Design 104, 1982), u from
-the reduced mass matrix Tᵀ M T: a mass matrix that is singular but for the motions that the rows allow does no
-harm.  Rows that depend on others have no multiplier.  The inverse is symmetric.
+the reduced mass matrix Tᵀ M T: the mass matrix need be regular only for the motions that the
+rows allow.  Rows that depend on others have no multiplier.  The inverse is symmetric.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ WITHOUT_INERTIA = 1e-13  # of the largest inertia of a variable
 def exchange(memory):
     """Eliminate the dependent variables of the independent rows (Gauss–Jordan).
 
-    Behind it a row of the tableau has N in the lanes of multipliers and -T in those of independent variables.
+    Afterwards a row of the tableau has N in the lanes of multipliers and -T in the lanes of independent
+    variables.
     """
     solver, rank = memory.solver, memory.partition.rank
     tableau, rows, columns, last = solver.tableau, solver.pivot_rows, solver.pivot_columns, solver.last

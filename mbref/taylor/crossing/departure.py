@@ -98,8 +98,10 @@ class Departure:
     def _come_from(
         self, start: Passed | SingularPosition, velocities: np.ndarray, ahead: float, moved: State
     ) -> int:
-        """Go on a time ahead (s) of a singular position that is left with velocities (n,), from a state near
-        that of the motion, which is corrected: PAUSED, or the reason why that cannot be."""
+        """Continue a time ahead (s) of a singular position that is left with velocities (n,).
+
+        ``moved`` is a state near the motion, which is corrected.  Return PAUSED or the failure status.
+        """
         memory, progress = self._run.memory, self._taylor.progress
         memory.loop.clock.time = start.time + ahead
         settings: Any = memory.equations.system.settings

@@ -1,7 +1,7 @@
 """Machine code of the orders of a driven scene's series: rows that determine all variables.
 
-No force moves any variable then, and no multiplier is needed: of the products there are those of rows, which
-may have several lanes.  The response adds up the sums of a row's lanes.
+No force moves any variable, and no multiplier is needed.  Only products of rows remain; a row may have
+several lanes, whose sums the response adds up.
 """
 
 from __future__ import annotations
