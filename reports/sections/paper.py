@@ -38,7 +38,7 @@ def render(records: Records, illustration: Illustration) -> list[Block]:
         Text(
             "M. A. Neto and J. Ambrósio, Stabilization methods for the integration of DAE in the presence of "
             "redundant constraints, Multibody System Dynamics 10 (2003) 81–105. Every table stands beside "
-            "the printed one, every figure beside its data. `crosscheck paper` runs all of it."
+            "the printed one, every figure beside its data. The command crosscheck paper runs all of it."
         ),
         Text(score(records)),
         Text(

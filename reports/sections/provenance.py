@@ -27,7 +27,7 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
 
 def _made(runs: Sequence[Run]) -> str:
     """The commit and the date of the code that made the records; empty without records."""
-    commits = sorted({f"`{commit}`" for run in runs if (commit := run.record.get("commit"))})
+    commits = sorted({commit for run in runs if (commit := run.record.get("commit"))})
     dates = sorted({date[:10] for run in runs if (date := run.record.get("date"))})
     if not dates:
         return ""

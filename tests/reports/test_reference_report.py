@@ -56,5 +56,5 @@ def test_the_report_is_of_one_commit_and_small(groups):
     [commit] = commits
     assert "+" not in commit, "made from a clean checkout"
     text = (FOLDER / "report.md").read_text()
-    assert f"records of commit `{commit}`, " in text, "the report names the commit of its records"
+    assert f"records of commit {commit}, " in text, "the report names the commit of its records"
     assert sum(path.stat().st_size for path in FOLDER.rglob("*") if path.is_file()) < 15e6
