@@ -114,7 +114,15 @@ class Motion(Trajectory):
             writer.writerows(zip(*(column.tolist() for column in table.values()), strict=True))
 
     def save(self, path: str | Path) -> None:
-        """Write scene and trajectory as one JSON object, which ``Motion.load`` reads."""
+        """Write scene and trajectory as one JSON object, which ``Motion.load`` reads.
+
+        Raises
+        ------
+        ValueError
+            If the file's name does not end in ``.json``.
+        """
+        if Path(path).suffix.lower() != ".json":
+            raise ValueError(f"{path}: a motion is saved as .json; for a picture use animate or plot")
         whole = {"scene": self.mechanism.to_dict(), "record": self.to_record()}
         Path(path).write_text(strict_json(whole) + "\n", encoding="utf-8")
 

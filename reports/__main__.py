@@ -36,6 +36,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _render(Path(arguments.render), arguments.section or NAMES)
     is_quick, out = arguments.depth == "quick", Path(arguments.out)
     names = arguments.section or (NAMES if is_quick or arguments.scene else (*NAMES, STABILITY, PAPER))
+    if set(names) <= {PAPER, STABILITY} and (arguments.scene or arguments.engine):
+        given = "scenes" if arguments.scene else "engines"
+        _notice(f"--section {names[0]}: has {given} of its own; leave them out, or ask for another section")
+        return 2
     try:
         scenes = find_scenes(arguments.scene) if arguments.scene else None
         wanted = collection.Runs(scenes, arguments.engine, is_quick, arguments.reference_time)

@@ -90,7 +90,7 @@ def _verify(arguments: argparse.Namespace) -> int:
     (engine,) = request.find_engines([arguments.engine], notice)
     if arguments.mechanisms:
         return _verify_drawn(engine, arguments)
-    chosen = request.find_specimens(arguments.scene, arguments.reference_time)
+    chosen = request.find_specimens(arguments.scene, arguments.reference_time, engine)
     with counted("verifying", len(chosen) + 1) as advance:
         runner = suite.runner(engine, arguments.time_limit, arguments.in_process)
         found = suite.held_against(runner, chosen, advance, arguments.family)
@@ -110,7 +110,7 @@ def _verify_drawn(engine: str, arguments: argparse.Namespace) -> int:
     for other in beside:
         request.find_engines([other.partition("=")[0]], notice)
     plan = deep.Plan(engine, arguments.mechanisms, arguments.first_seed, arguments.family, beside)
-    with counted("verifying", plan.mechanisms) as advance:
+    with counted("verifying, at most", deep.MOST * plan.mechanisms) as advance:
         found = deep.examined(plan, arguments.records, advance)
     if arguments.json:
         print(json.dumps({**found.to_record(), **made_by()}, allow_nan=False))

@@ -89,7 +89,15 @@ class Comparison:
                 "differences": dict(self.judged.differences)}  # fmt: skip
 
     def save(self, path: str | Path) -> None:
-        """Write ``document`` as JSON."""
+        """Write ``document`` as JSON.
+
+        Raises
+        ------
+        ValueError
+            If the file's name does not end in ``.json``.
+        """
+        if Path(path).suffix.lower() != ".json":
+            raise ValueError(f"{path}: a comparison is saved as .json")
         Path(path).write_text(json.dumps(self.document(), allow_nan=False) + "\n")
 
     def print(self, console: Console) -> None:
@@ -106,7 +114,8 @@ class Comparison:
 
 
 def compare(
-    scene: Scene | str | Path, engines: Sequence[str] | None = None, *, families: Sequence[str] | None = None,
+    scene: Scene | str | Path, engines: str | Sequence[str] | None = None, *,
+    families: str | Sequence[str] | None = None,
     depth: str = "quick", duration: float | None = None, samples: int = sweep.QUICK_SAMPLES,
     time_limit: float | None = None, reference_time: float = SECONDS, out: str | Path | None = None,
     notice: Notice | None = None,
@@ -117,9 +126,9 @@ def compare(
     ----------
     scene : Scene, str or path
         A Scene, the name of a built-in one, or a .toml file.
-    engines : sequence of str, optional
+    engines : str or sequence of str, optional
         Names of engines. Default: all that are installed.
-    families : sequence of str, optional
+    families : str or sequence of str, optional
         Families of settings. Default: a few; all if ``depth`` is ``"whole"``.
     depth : {"quick", "whole"}
         How many families and settings run.
@@ -148,10 +157,10 @@ def compare(
     tell, is_quick = notice or _silent, depth == "quick"
     given = scene if isinstance(scene, Scene) else request.find_scenes([str(scene)])[0]
     lasting = request.lasting(given, None, duration)
-    names = request.find_engines(engines, tell)
+    names = request.find_engines(_several(engines), tell)
     times = [request.sample_times(lasting, None, samples)]
     limit = time_limit or (sweep.QUICK_LIMIT if is_quick else TIME_LIMIT)
-    chosen = Choice(families, is_quick=is_quick)
+    chosen = Choice(_several(families), is_quick=is_quick)
     found = collected(
         [lasting], names,
         Wanted(times, reference_time, is_quick, None if out is None else Path(out), is_named=chosen.is_named),
@@ -159,6 +168,11 @@ def compare(
     )  # fmt: skip
     path = f"{given.name}.toml" if isinstance(scene, Scene) else str(scene)
     return comparisons(found, {lasting.name: path}, reference_time)[0]
+
+
+def _several(names: str | Sequence[str] | None) -> Sequence[str] | None:
+    """Return the names, one of which may be given alone."""
+    return [names] if isinstance(names, str) else names
 
 
 def comparisons(found: Collection, paths: dict[str, str], reference_time: float) -> list[Comparison]:

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from crosscheck.conformance.trial import Specimen, specimens
+from crosscheck.conformance.planar import is_planar
+from crosscheck.conformance.trial import Specimen, planar_specimens, specimens
 from crosscheck.engine import ALL, BUILT_IN, Setting, all_engines, default_engines, engine
 from crosscheck.judge.constraints import initial_twists
 from crosscheck.study.grid import Case, default_cases
@@ -94,13 +95,18 @@ def find_engines(names: Sequence[str] | None, notice: Notice) -> list[str]:
     return [name for name in wanted if name not in missing]
 
 
-def find_specimens(names: Sequence[str] | None, reference_time: float) -> list[Specimen]:
+def find_specimens(
+    names: Sequence[str] | None, reference_time: float, engine_name: str = ""
+) -> list[Specimen]:  # fmt: skip
     """The conformance suite's specimens of those scenes, or all, with so much time (s) for a reference.
 
-    A ``.toml`` file is a specimen of its own, held against every card.  RequestError for a name the suite
-    has not, SceneError for a faulty file.
+    Planar loops are among all where the engine runs no spatial ones.  A ``.toml`` file is a specimen of its
+    own, held against every card.  RequestError for a name the suite has not, SceneError for a faulty file.
     """
-    known = {s.scene.name: dataclasses.replace(s, reference_time=reference_time) for s in specimens()}
+    planar = planar_specimens()
+    known = {
+        s.scene.name: dataclasses.replace(s, reference_time=reference_time) for s in [*specimens(), *planar]
+    }
     given = {
         name: Specimen(Scene.from_file(name), None, True, reference_time=reference_time)
         for name in names or ()
@@ -111,7 +117,9 @@ def find_specimens(names: Sequence[str] | None, reference_time: float) -> list[S
         raise RequestError(
             *(f"unknown scene of the suite {name!r}; known: {listed}{meant(name, known)}" for name in unknown)
         )
-    return [{**known, **given}[name] for name in dict.fromkeys(names or known)]
+    left_out = set() if engine_name and is_planar(engine(engine_name)) else {s.scene.name for s in planar}
+    default = [name for name in known if name not in left_out]
+    return [{**known, **given}[name] for name in dict.fromkeys(names or default)]
 
 
 def _unknown_engine(name: str) -> str | None:

@@ -9,7 +9,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from crosscheck.conformance.deep import Tally, about, card_of
-from crosscheck.conformance.suite import CANNOT, FAIL, OUTSIDE, PASS
+from crosscheck.conformance.suite import CANNOT, FAIL, OUTSIDE, PASS, RUN
 
 COLUMNS = (PASS, FAIL, CANNOT, OUTSIDE)
 
@@ -29,4 +29,12 @@ def tables(tally: Tally) -> Iterator[Table | Text]:
     for v in tally.violations:
         numbers_of = "" if v["measured"] is None else f" {v['measured']:.3g}, allowed {v['allowed']:.3g}"
         yield Text(f"fail: {v['scene']}, {v['card']}:{numbers_of} {v['reason']}".rstrip())
-    yield Text(f"{plan.engine}: {len(tally.violations)} violations in {tally.seeds} seeds")
+    yield Text(_summary(tally))
+
+
+def _summary(tally: Tally) -> str:
+    """Return the number of violations, and of how many mechanisms that is known."""
+    ran, drawn = tally.decided(RUN), f"{tally.seeds} drawn mechanisms"
+    if not ran:
+        return f"{tally.plan.engine}: ran none of {drawn}, so nothing is known of it"
+    return f"{tally.plan.engine}: {len(tally.violations)} violations; it ran {ran} of {drawn}"

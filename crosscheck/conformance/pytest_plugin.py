@@ -52,17 +52,21 @@ class Session:
 
     def __init__(self, config: pytest.Config):
         from crosscheck.conformance.features import undetermined
+        from crosscheck.conformance.planar import is_planar
         from crosscheck.conformance.random_mechanisms import random_mechanism
         from crosscheck.conformance.suite import runner
-        from crosscheck.conformance.trial import Specimen, specimens
+        from crosscheck.conformance.trial import Specimen, planar_specimens, specimens
+        from crosscheck.engine import engine
 
         self.config, self.name = config, config.getoption("engine")
+        _check(self.name)
         limit = config.getoption("time_limit")
         self.runner = runner(self.name, limit, config.getoption("in_process"))
         deep, first = config.getoption("depth") == "deep", config.getoption("mechanism_seed")
         seeds = range(first, first + config.getoption("mechanisms"))
         drawn = [Specimen(random_mechanism(seed), None, deep) for seed in seeds]
-        known = [Specimen(undetermined()), *specimens(deep), *drawn]
+        planar = planar_specimens() if is_planar(engine(self.name)) else []
+        known = [Specimen(undetermined()), *specimens(deep), *planar, *drawn]
         if not deep:  # Gauss's principle in the place of references, which take 20 s for a mechanism
             known = [replace(specimen, reference_time=0.0) for specimen in known]
         self.specimens = {specimen.scene.name: specimen for specimen in known}
@@ -103,6 +107,19 @@ class Session:
         if self.cache:
             self.cache.set(KEPT, self.known)
         return found
+
+
+def _check(name: str) -> None:
+    """Raise pytest.UsageError before any test if the name leads to no engine.
+
+    A module of the working directory is found, and child processes find it as well.
+    """
+    from crosscheck.engine import engine
+
+    try:
+        engine(name)
+    except (LookupError, ImportError, AttributeError, ValueError) as error:
+        raise pytest.UsageError(f"--engine {name}: {error}") from error
 
 
 def pytest_configure(config: pytest.Config) -> None:

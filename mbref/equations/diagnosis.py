@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from mbref.equations.units import row_lengths
 from mbref.linear_algebra.redundancy import Redundancy
 from mbref.scene import Scene
 from mbref.scene_services import Counts
+from mbref.scenes import find_scene
 
 RANK_TOLERANCE = 1e-10  # relative to the largest singular value of the scaled Jacobian
 UNIQUE_TOLERANCE = 1e-8  # a row takes part in a redundancy when its weight in it exceeds this
@@ -63,7 +65,7 @@ def rank_at_start(model: Model, start: Start) -> int:
     return rank_of(scaled_jacobian(model, 0.0, start.q))
 
 
-def diagnose(scene: Scene) -> Diagnosis:
+def diagnose(scene: Scene | str | Path) -> Diagnosis:
     """Return counts, redundancy by joint and the distance to a singular position at t = 0.
 
     A multiplier is unique if its row takes part in no vanishing combination of rows, that is in no left null
@@ -71,15 +73,15 @@ def diagnose(scene: Scene) -> Diagnosis:
 
     Parameters
     ----------
-    scene : Scene
-        The mechanism; masses are not needed.
+    scene : Scene, str or path
+        The mechanism, the name of a built-in one, or a .toml file. Masses are not needed.
 
     Raises
     ------
     SceneError
-        If the initial positions contradict the joints.
+        If the scene is faulty, or its initial positions contradict the joints.
     """
-    model = Model(scene)
+    model = Model(scene if isinstance(scene, Scene) else find_scene(str(scene)))
     start = consistent_start(model)
     if model.m > LARGE:
         found = _redundancy(model, start)

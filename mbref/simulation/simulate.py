@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,9 @@ def simulate(
     times: Sequence[float] | np.ndarray | None = None,
     limits: Limits | None = None,
     progress: Callable[[float], None] | None = None,
+    *,
+    duration: float | None = None,
+    rtol: float | None = None,
 ) -> Motion:
     """Simulate a scene from t = 0.
 
@@ -49,6 +53,10 @@ def simulate(
         Tolerances, steps and branches of the run.
     progress
         Called with the time reached (s) between steps.
+    duration
+        End time, s, of the default sample times; by default the scene's.
+    rtol
+        Relative tolerance, in the place of that of ``limits``.
 
     Returns
     -------
@@ -60,16 +68,23 @@ def simulate(
     SceneError
         The scene cannot be simulated.
     ValueError
-        Times do not increase, or the integrator does not have the order.
+        Times do not increase or are given beside a duration, or the integrator does not have the order.
     MethodError
         The method is unknown, has no generated code, or crosses no singular position at which ``limits`` ask
         for a branch.
     """
     scene = scene if isinstance(scene, Scene) else find_scene(str(scene))
+    if duration is not None:
+        if times is not None:
+            raise ValueError("give sample times or a duration, not both")
+        scene = scene.with_(duration=duration)
+    limits = limits or Limits()
+    if rtol is not None:
+        limits = replace(limits, rtol=rtol)
     times = checked_times(np.linspace(0.0, scene.duration, SAMPLES) if times is None else times)
     method = default_method(scene) if method is None else method
     method = Method.parse(method) if isinstance(method, str) else method
-    run = checked_run(scene, method, times, limits or Limits())
+    run = checked_run(scene, method, times, limits)
     motion = finish_run(run, progress)
     run.release()
     return motion

@@ -95,3 +95,11 @@ def test_a_run_that_raises_is_told_to_the_owner_of_its_future():
 
     with Chains(lambda asked, got: {}) as threads, pytest.raises(OSError, match="no disk"):
         study([Case(BLOCK, np.array([0.0, 1.0]), "e", Setting("f", {}))], threads, run=run)
+
+
+def test_one_engine_and_one_family_are_named_without_a_list(tmp_path):
+    found = crosscheck.compare(BLOCK, FAKE, families="plain", samples=3)
+    assert {row["engine"] for row in found.rows} == {"fake"}, "one name for the engine"
+    assert {row["family"] for row in found.rows} == {"plain"}
+    with pytest.raises(ValueError, match=r"a.mp4: a comparison is saved as .json"):
+        found.save(tmp_path / "a.mp4")

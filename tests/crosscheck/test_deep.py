@@ -10,6 +10,7 @@ import pytest
 
 from crosscheck.cli.commands import main
 from crosscheck.conformance import deep, drawn
+from crosscheck.conformance.deep_table import tables
 from crosscheck.conformance.properties import PROPERTIES
 from crosscheck.conformance.relations import RELATIONS
 from crosscheck.conformance.runners import InProcess
@@ -123,7 +124,7 @@ def test_command_and_its_records(known, capsys, tmp_path):
     counts = record["cards"]["agreement"]
     assert counts["pass"] == 1 and record["first_seed"] == 2, record["cards"]
     assert main(arguments) == 0
-    assert "0 violations" in capsys.readouterr().out
+    assert "mbref: 0 violations; it ran 1 of 1 drawn mechanisms" in capsys.readouterr().out
 
 
 def test_tally_and_seeds_that_decide_nothing(known):
@@ -136,6 +137,8 @@ def test_tally_and_seeds_that_decide_nothing(known):
     known(Refusing())
     found = deep.examined(deep.Plan("example", 2))
     assert found.seeds == deep.MOST * 2 and set(found.open()) >= {"truth"}, found.counts
+    *_, last = tables(found)
+    assert str(last) == "example: ran none of 6 drawn mechanisms, so nothing is known of it"
     assert all(not set(c) - {"cannot", "pass"} for c in itertools.islice(found.counts.values(), 5))
 
 

@@ -22,21 +22,24 @@ from tests.zoo.defects import DEFECTS, SOURCE, engine
 ROOT = Path(__file__).parents[2]
 
 
-def held(place: Path, chosen: str, *options: str) -> subprocess.CompletedProcess[str]:
+def held(
+    place: Path, chosen: str, *options: str, name: str = "spatial_engine:ENGINE", path: str | None = None
+) -> subprocess.CompletedProcess[str]:
     """pytest on the suite in an empty directory, the example engine in this place."""
     plugin = ["-p", "crosscheck.conformance.pytest_plugin", "-p", "cacheprovider", "-o", "addopts="]
     named = [
         "--pyargs",
         "crosscheck.conformance",
         "--engine",
-        "spatial_engine:ENGINE",
-        "--in-process",
+        name,
+        *([] if path else ["--in-process"]),
         "-k",
         chosen,
     ]
     return subprocess.run(
         [sys.executable, "-m", "pytest", "-q", *plugin, "--rootdir", place, *named, *options], cwd=place,
-        env={**os.environ, "PYTHONPATH": f"{place}{os.pathsep}{ROOT}", "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
+        env={**os.environ, "PYTHONPATH": path or f"{place}{os.pathsep}{ROOT}",
+             "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
         capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
 
@@ -49,6 +52,22 @@ def test_sound_engine_and_a_second_run_that_resumes(tmp_path):
     (tmp_path / "spatial_engine.py").write_text(faulty)
     assert held(tmp_path, "free_fall", "--resume").returncode == 0, "passes of the run before were not taken"
     assert held(tmp_path, "free_fall").returncode == 1, "an engine without gravity passed"
+
+
+def test_an_engine_of_the_working_directory_and_its_child_processes(tmp_path):
+    (tmp_path / "spatial_engine.py").write_text(SOURCE.read_text())
+    run = held(tmp_path, "free_fall and refusal", path=str(ROOT))
+    assert run.returncode == 0 and " passed" in run.stdout, run.stdout[-1500:] + run.stderr[-500:]
+
+
+@pytest.mark.parametrize(
+    ("name", "says"), [("no_such_module:ENGINE", "No module named 'no_such_module'"),
+                       ("nothing", "unknown engine 'nothing'")],
+)  # fmt: skip
+def test_a_name_that_leads_to_no_engine_ends_before_any_test(tmp_path, name, says):
+    run = held(tmp_path, "free_fall", name=name)
+    assert run.returncode == pytest.ExitCode.USAGE_ERROR, run.stdout[-1500:]
+    assert f"--engine {name}: " in run.stderr and says in run.stderr, run.stderr
 
 
 def test_faulty_engine_and_its_finding(tmp_path, capsys, monkeypatch):

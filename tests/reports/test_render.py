@@ -175,6 +175,22 @@ def test_program_interrupted_and_what_to_do(tmp_path, of_fakes, capsys, monkeypa
     assert "the same command goes on from there" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("asked", "given"), [(["four_bar"], "scenes"), (["--engine", "mbref"], "engines")])
+def test_sections_with_scenes_of_their_own_take_no_others(tmp_path, capsys, asked, given):
+    folder = tmp_path / "report"
+    assert program.main([*asked, "--section", "paper", "--depth", "whole", "--out", str(folder)]) == 2
+    assert f"--section paper: has {given} of its own; leave them out" in capsys.readouterr().err
+    assert not folder.exists(), "something was run"
+
+
+def test_words_of_tables_may_break_where_the_page_is_narrow():
+    """So that the last column of a table stays on a page of 900 to 1100 px; numbers are never broken."""
+    style = (Path(program.__file__).parent / "templates" / "style.css").read_text()
+    [narrow] = [line for line in style.splitlines() if line.startswith("@media (max-width: 1120px)")]
+    assert ".scroll td:not(.right) { white-space: normal; overflow-wrap: anywhere; }" in narrow, narrow
+    assert ".scroll table { font-size: 13px; width: 100%; }" in narrow, narrow
+
+
 def test_program_without_its_packages_and_what_to_install(capsys, monkeypatch):
     monkeypatch.setattr(program, "find_spec", lambda package: None)
     assert program.main([]) == 2

@@ -1,0 +1,55 @@
+"""Planar probes: an engine of hinges and slides / the scenes that the suite holds it against."""
+
+from __future__ import annotations
+
+import pytest
+
+from crosscheck.cli.request import find_specimens
+from crosscheck.conformance.planar import is_planar, planar_loops
+from crosscheck.engine import Cannot, Owner, Supports, engine
+from mbref.scene import GROUND, Scene
+from tests.crosscheck.fake_engines import Fake
+
+
+class Planar(Fake):
+    """Maps hinges along z and slides across it, and no load but forces, moments and springs."""
+
+    supports = Supports(("revolute", "translational"), ("angle",), ("force", "moment", "spring"))
+
+    def cannot(self, scene: Scene) -> Cannot | None:
+        tilted = [j for j in scene.joint if j.type == "revolute" and tuple(j.axis) != (0.0, 0.0, 1.0)]
+        return self.supports.missing(scene) or (Cannot(Owner.ENGINE, "not planar") if tilted else None)
+
+
+PLANAR = Planar()
+ENGINE = "tests.crosscheck.test_planar_probes:PLANAR"
+
+
+def loops(scene: Scene) -> int:
+    """Joints beyond those of a tree that ties every body to the ground."""
+    return len(scene.joint) - len(scene.body)
+
+
+def test_an_engine_of_planar_mechanisms_is_run_on_twenty_loops():
+    scenes = [specimen.scene for specimen in find_specimens(None, 0.0, ENGINE)]
+    able = [s for s in scenes if PLANAR.cannot(s) is None and loops(s) > 0]
+    assert len(able) >= 20 and len({s.name for s in scenes}) == len(scenes), [s.name for s in able]
+
+
+@pytest.mark.parametrize("name", ["pinocchio", "mujoco"])
+def test_an_engine_of_spatial_mechanisms_is_held_against_the_suite_as_before(name):
+    assert not is_planar(engine(name))
+    assert not {s.scene.name for s in find_specimens(None, 0.0, name)} & set(planar_loops())
+    assert find_specimens(["planar four-bar: spring"], 0.0, name)[0].scene.load, "it can be asked for by name"
+
+
+@pytest.mark.parametrize("name", planar_loops())
+def test_planar_probes_are_loops_in_the_plane(name):
+    scene = planar_loops()[name]
+    assert loops(scene) >= 1 and scene.name == name
+    assert {joint.type for joint in scene.joint} <= set(Planar.supports.joints)
+    assert all(body.position[2] == 0.0 and body.orientation[1:3] == (0.0, 0.0) for body in scene.body)
+    assert any(GROUND in joint.bodies for joint in scene.joint)
+    part = name.partition(": ")[2]
+    given = [load.type.replace("_", " ") for load in scene.load] + ["driver"] * len(scene.driver)
+    assert given == ([] if part == "gravity" else [part]), given
