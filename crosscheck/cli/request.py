@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from crosscheck.conformance.planar import is_planar
-from crosscheck.conformance.trial import Specimen, planar_specimens, specimens
+from crosscheck.conformance.planar import left_out, planar_specimens
+from crosscheck.conformance.trial import Specimen, specimens
 from crosscheck.engine import ALL, BUILT_IN, Setting, all_engines, default_engines, engine
 from crosscheck.judge.constraints import initial_twists
 from crosscheck.study.grid import Case, default_cases
@@ -95,31 +95,25 @@ def find_engines(names: Sequence[str] | None, notice: Notice) -> list[str]:
     return [name for name in wanted if name not in missing]
 
 
-def find_specimens(
-    names: Sequence[str] | None, reference_time: float, engine_name: str = ""
-) -> list[Specimen]:  # fmt: skip
+def find_specimens(names: Sequence[str] | None, reference_time: float, name: str = "") -> list[Specimen]:
     """The conformance suite's specimens of those scenes, or all, with so much time (s) for a reference.
 
-    Planar loops are among all where the engine runs no spatial ones.  A ``.toml`` file is a specimen of its
-    own, held against every card.  RequestError for a name the suite has not, SceneError for a faulty file.
+    Planar loops are among all if the engine of that ``name`` runs no spatial ones; a ``.toml`` file is held
+    against every card.  RequestError for a name the suite has not, SceneError for a faulty file.
     """
-    planar = planar_specimens()
-    known = {
-        s.scene.name: dataclasses.replace(s, reference_time=reference_time) for s in [*specimens(), *planar]
-    }
+    suite = [*specimens(), *planar_specimens()]
+    known = {s.scene.name: dataclasses.replace(s, reference_time=reference_time) for s in suite}
     given = {
         name: Specimen(Scene.from_file(name), None, True, reference_time=reference_time)
         for name in names or ()
         if name.endswith(".toml")
     }
     if unknown := [name for name in names or () if name not in known and name not in given]:
-        listed = ", ".join(known)
-        raise RequestError(
-            *(f"unknown scene of the suite {name!r}; known: {listed}{meant(name, known)}" for name in unknown)
-        )
-    left_out = set() if engine_name and is_planar(engine(engine_name)) else {s.scene.name for s in planar}
-    default = [name for name in known if name not in left_out]
-    return [{**known, **given}[name] for name in dict.fromkeys(names or default)]
+        said = f"; known: {', '.join(known)}"
+        raise RequestError(*(f"unknown scene of the suite {n!r}{said}{meant(n, known)}" for n in unknown))
+    others = left_out(engine(name) if name else None)
+    chosen = names or [scene for scene in known if scene not in others]
+    return [{**known, **given}[scene] for scene in dict.fromkeys(chosen)]
 
 
 def _unknown_engine(name: str) -> str | None:

@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from crosscheck.conformance.features import feature_scenes
+from crosscheck.conformance.trial import Specimen
 from crosscheck.engine import Engine
 from mbref.scene import (
     Body,
@@ -37,7 +38,7 @@ def planar_loops() -> dict[str, Scene]:
     found = {}
     for name, (links, joints) in MECHANISMS.items():
         bodies, first = [_rod(body, *ends) for body, ends in links.items()], next(iter(links))
-        last, place = next(reversed(links)), _middle(*links[next(reversed(links))])
+        last, place = [*links][-1], _middle(*[*links.values()][-1])
         loads: dict[str, Sequence[Load]] = {
             "gravity": (),
             "force": (Force(body=last, point=place, force=(2.0, -1.0, 0.0)),),
@@ -51,6 +52,16 @@ def planar_loops() -> dict[str, Scene]:
         driver = Driver(joint="A", polynomial=(0.0, 1.0), sine=Sine(amplitude=0.1, frequency=5.0))
         found[f"planar {name}: driver"] = _scene(name, "driver", bodies, joints, (), (driver,))
     return found
+
+
+def planar_specimens() -> list[Specimen]:
+    """Return the planar loops as specimens of the suite."""
+    return [Specimen(scene) for scene in planar_loops().values()]
+
+
+def left_out(simulator: Engine | None) -> set[str]:
+    """Return the names of the planar loops, none for an engine that runs no spatial ones."""
+    return set() if simulator is not None and is_planar(simulator) else set(planar_loops())
 
 
 def is_planar(simulator: Engine) -> bool:

@@ -52,10 +52,10 @@ class Session:
 
     def __init__(self, config: pytest.Config):
         from crosscheck.conformance.features import undetermined
-        from crosscheck.conformance.planar import is_planar
+        from crosscheck.conformance.planar import is_planar, planar_specimens
         from crosscheck.conformance.random_mechanisms import random_mechanism
         from crosscheck.conformance.suite import runner
-        from crosscheck.conformance.trial import Specimen, planar_specimens, specimens
+        from crosscheck.conformance.trial import Specimen, specimens
         from crosscheck.engine import engine
 
         self.config, self.name = config, config.getoption("engine")

@@ -15,7 +15,6 @@ from crosscheck.conformance.closed_forms import CLOSED_FORMS, Exact
 from crosscheck.conformance.drawn import mechanism
 from crosscheck.conformance.features import feature_scenes
 from crosscheck.conformance.moving import dead_end, moving_probes
-from crosscheck.conformance.planar import planar_loops
 from crosscheck.conformance.runners import Runner
 from crosscheck.engine import Cannot, Setting
 from crosscheck.judge.gauss_motion import NAME as GAUSS
@@ -109,11 +108,6 @@ def specimens(deep: bool = False) -> list[Specimen]:
     scenes += [*(probes | moving_probes()).values(), *drawn]
     found = forms + [Specimen(scene, None, deep or scene.name in RELATED) for scene in scenes]
     return [*found, Specimen(dead_end(), dead_end=True)]
-
-
-def planar_specimens() -> list[Specimen]:
-    """Planar loops, for engines that run no spatial ones (`planar.is_planar`)."""
-    return [Specimen(scene) for scene in planar_loops().values()]
 
 
 @dataclass(frozen=True)

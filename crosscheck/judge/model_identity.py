@@ -82,9 +82,10 @@ def along(scene: Scene, run: Trajectory) -> Difference | None:
     The run is so compared with the mechanism and not with a motion: errors of an integration do not count.
     Samples next to singular positions are left out.
     """
-    if run.acceleration is None or run.angular_acceleration is None or not scene.has_mass():
-        return None
     run, length = in_scene_order(scene, run), scene_length(scene)
+    linear, angular = run.acceleration, run.angular_acceleration
+    if linear is None or angular is None or not scene.has_mass():
+        return None
     pose = run.times, run.position, run.orientation, run.angular_velocity
     angles = joint_coordinates(scene, *pose)
     twisted = [load.joint for load in scene.load if isinstance(load, TorsionSpring)]
@@ -95,7 +96,7 @@ def along(scene: Scene, run: Trajectory) -> Difference | None:
         if not np.isfinite(turned).all():
             continue
         own = accelerations(scene, run.times[k], state) * np.repeat([1.0, length], 3)
-        theirs = np.hstack([run.acceleration[k], length * run.angular_acceleration[k]])
+        theirs = np.hstack([linear[k], length * angular[k]])
         scale = max(_size(own.reshape(-1, 3)), LEAST_CHANGE * acceleration_scale(scene))
         by = _apart(own.reshape(-1, 3), theirs.reshape(-1, 3), scale)
         if not by <= SAME_FORCES:

@@ -46,7 +46,8 @@ def fast(groups: Sequence[Judged]) -> str:
     never = [n for n in engines_of(groups) if not any(n in cost for cost in costs.values())]
     end = f" {listed(map(title, never))} {'does' if len(never) == 1 else 'do'} not reach it." if never else ""
     aided = {n for g in groups for n, (_, r) in g.fastest(LEVEL).items() if is_integrated_here(r)}
-    text = _fast_on_one(*costs.values(), aided) if len(groups) == 1 else _fast_on_several(costs, aided)
+    [single, *_] = costs.values()
+    text = _fast_on_one(single, aided) if len(groups) == 1 else _fast_on_several(costs, aided)
     return text + end + _integrated(groups) + CLOCK + (WITHOUT_PYTHON if _has_compiled(groups) else ADAPTERS)
 
 
