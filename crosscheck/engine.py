@@ -23,7 +23,7 @@ from mbref.scene_fields import meant
 from mbref.trajectory import Cost, Outcome, Trajectory
 
 __all__ = [
-    "ALL", "BUILT_IN", "ENTRY_POINTS", "GENERATORS", "GROUND", "ON_REQUEST", "OPTIONAL", "Cannot",
+    "ALL", "BUILT_IN", "ENTRY_POINTS", "GENERATORS", "GROUND", "LARGE", "ON_REQUEST", "OPTIONAL", "Cannot",
     "Cost", "Engine", "Outcome", "Owner", "Scene", "Setting", "Supports", "Trajectory", "all_engines",
     "default_engines", "engine", "engine_names", "inertia_matrices", "initial_poses", "initial_twists",
     "installed", "rotations",
@@ -228,7 +228,7 @@ class Engine(ABC):
 BUILT_IN = ("mbref", "mujoco", "pinocchio", "exudyn")
 OPTIONAL = ("simbody", "sundials", "ondsel")  # take part where their packages are installed
 GENERATORS = ("casadi", "heyoka")  # take part where they are named: each scene is compiled first
-LARGE = ("drake", "dart", "bullet")  # take part where they are named: their packages are large
+LARGE = ("drake", "dart", "bullet", "mjx", "warp")  # take part where they are named: packages are large
 ON_REQUEST = (*GENERATORS, *LARGE)
 ALL = "all"  # names every engine that is installed
 ENTRY_POINTS = "crosscheck.engines"

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from crosscheck.conformance.features import feature_scenes, undetermined
-from crosscheck.engine import BUILT_IN, OPTIONAL, Cannot, engine
+from crosscheck.engine import BUILT_IN, LARGE, OPTIONAL, Cannot, engine
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 
 CAN = "✓"
 BEGIN, END = "<!-- support -->", "<!-- /support -->"
-KNOWN = (*BUILT_IN, *OPTIONAL)  # the engines of the document's block, installed or not
+KNOWN = (*BUILT_IN, *OPTIONAL, *LARGE)  # the engines of the document's block, installed or not
 Ask = Callable[[str, Scene], Cannot | None]  # (engine name, scene)
 
 

@@ -1,0 +1,88 @@
+"""What MuJoCo's ports to other machines share: MuJoCo's model of a scene, their settings and samples.
+
+A port steps MuJoCo's model by code of its own.  Poses and velocities at the samples are computed from its
+joint coordinates by MuJoCo in C, which adds rounding alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engine import Cannot, Owner, Setting
+from crosscheck.engines.driver_motion import stated_rate
+from crosscheck.engines.fixed_steps import steps
+from crosscheck.engines.initial_velocities import lacks_mass
+from crosscheck.engines.mujoco.model import SUPPORTS, compiled
+from crosscheck.engines.sampling import UNKNOWN
+from crosscheck.engines.tree_reactions import LinkMotion
+from mbref.scene import Scene
+
+DEFAULT_STEP = 2e-3  # s
+STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance, as far as it is not clamped
+FAMILIES = {
+    "stock": "closures as stiff as documented (time constant two steps, impedance 0.9999), RK4",
+    "euler": "stock closures, its first-order integrator Euler",
+    "defaults": "the library's own options",
+}
+OPTIONS = {"step": "time step, s"}
+
+
+def refusal(scene: Scene, port: str) -> Cannot | None:
+    """The refusal of drivers, which need a callback into the step, and of bodies without mass."""
+    if scene.driver:
+        reason = f"{port} has no callback in which the driver of joint {scene.driver[0].joint!r} could act"
+        return Cannot(Owner.ENGINE, reason)
+    return lacks_mass(scene)
+
+
+def sweep(scene: Scene) -> Sequence[Setting]:
+    """Fixed steps by the angle turned in one, coarse to fine in each family."""
+    fine = steps(scene, stated_rate(scene))
+    plain = sorted({*fine, DEFAULT_STEP}, reverse=True)
+    return [
+        Setting(family, {"step": h}) for family in FAMILIES for h in (plain if family == "defaults" else fine)
+    ]
+
+
+class PortedModel:
+    """MuJoCo's model and data of a scene at a setting, and the motion of its links at a state."""
+
+    def __init__(self, scene: Scene, setting: Setting):
+        import mujoco
+
+        self.mujoco, self.built = mujoco, compiled(scene)
+        self.model = model = self.built.model
+        model.opt.timestep = setting.options["step"]
+        model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+        if setting.family != "defaults":
+            kind = mujoco.mjtIntegrator
+            model.opt.integrator = kind.mjINT_RK4 if setting.family == "stock" else kind.mjINT_EULER
+            model.eq_solref[:], model.eq_solimp[:] = (2 * setting.options["step"], 1.0), STIFFEST
+        self.data = mujoco.MjData(model)
+        self.data.qvel[:] = self.built.rates
+        self.data.xfrc_applied[:] = self.built.applied
+        mujoco.mj_forward(model, self.data)
+
+    def motion(self, qpos: Any, qvel: Any) -> LinkMotion:
+        """The motion of the links at joint coordinates (nq,) and velocities (nv,)."""
+        mujoco, model, data, links = self.mujoco, self.model, self.data, self.built.links
+        data.qpos[:], data.qvel[:] = np.asarray(qpos, dtype=float), np.asarray(qvel, dtype=float)
+        mujoco.mj_normalizeQuat(model, data.qpos)
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        twists = np.zeros((len(links), 6))
+        for twist, body in zip(twists, links, strict=True):
+            mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, body, twist, 0)
+        coordinates = np.zeros(model.nv)
+        single = np.isin(model.jnt_type, [int(k) for k in self.built.single])
+        coordinates[model.jnt_dofadr[single]] = data.qpos[model.jnt_qposadr[single]]
+        return LinkMotion(
+            data.xmat[links].reshape(-1, 3, 3), data.xpos[links], twists[:, 3:], twists[:, :3],
+            UNKNOWN, UNKNOWN, coordinates, data.qvel.copy(),
+        )  # fmt: skip
+
+
+__all__ = ["FAMILIES", "OPTIONS", "SUPPORTS", "PortedModel", "refusal", "sweep"]

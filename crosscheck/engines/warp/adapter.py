@@ -1,0 +1,82 @@
+"""MuJoCo Warp: MuJoCo's model stepped by Warp's kernels in single precision, here on the processor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engine import Cannot, Engine, Setting
+from crosscheck.engines.fixed_steps import FixedSteps, simulated
+from crosscheck.engines.mujoco.ports import FAMILIES, OPTIONS, SUPPORTS, PortedModel, refusal, sweep
+from crosscheck.engines.tree_reactions import LinkMotion
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+
+
+class Warp(Engine):
+    """MuJoCo Warp (PyPI ``mujoco-warp``)."""
+
+    name = "warp"
+    package = "mujoco-warp"
+    supports = SUPPORTS
+    families, options = FAMILIES, OPTIONS
+    rounding = 2.0**-23
+
+    def version(self) -> str:
+        """Version of MuJoCo Warp; raises ImportError when it is not installed."""
+        return metadata.version(self.package)
+
+    def prepare(self, families: Sequence[str]) -> None:
+        _warp()
+
+    def refuses(self, scene: Scene) -> Cannot | None:
+        """Drivers, and what MuJoCo's adapter refuses."""
+        return refusal(scene, "MuJoCo Warp")
+
+    def settings(self, scene: Scene) -> Sequence[Setting]:
+        """Steps by the angle turned in one."""
+        return sweep(scene)
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        """Simulate; raises ValueError for a family it does not have."""
+        return simulated(self, scene, times, setting, lambda: _simulation(scene, setting))
+
+
+def _warp() -> Any:
+    """The module mujoco_warp; Warp's kernels print nothing while they are compiled."""
+    import warp
+
+    warp.config.log_level = warp.LOG_ERROR
+    import mujoco_warp
+
+    return mujoco_warp
+
+
+def _simulation(scene: Scene, setting: Setting) -> FixedSteps:
+    world = _World(PortedModel(scene, setting))
+    return FixedSteps(scene, world.ported.built.tree, world, setting.options["step"])
+
+
+class _World:
+    """A model and its data in Warp."""
+
+    def __init__(self, ported: PortedModel):
+        self.warp, self.ported = _warp(), ported
+        self.model = self.warp.put_model(ported.model)
+        self.data = self.warp.put_data(ported.model, ported.data)
+
+    def step(self, t: float, h: float, count: int) -> None:
+        """Takes steps of length h (s)."""
+        self.model.opt.timestep.fill_(h)
+        for _ in range(count):
+            self.warp.step(self.model, self.data)
+
+    def motion(self) -> LinkMotion:
+        """The motion of the links."""
+        return self.ported.motion(self.data.qpos.numpy()[0], self.data.qvel.numpy()[0])
+
+
+ENGINE = Warp()
