@@ -18,7 +18,7 @@ from tests.crosscheck.measured import MARGIN
 
 MODULES = {"mjx": "mujoco.mjx", "warp": "mujoco_warp"}
 IN_C = 8.2e-9  # error of MuJoCo in C over 0.05 s at a step of 1 ms
-LOOP = {"mjx": 6.1e-6, "warp": 1e-5}  # MJX leaves J' v out of the closures; Warp rounds to single precision
+LOOP = {"mjx": 6.1e-6, "warp": 1.4e-7}  # MJX leaves J' v out of the closures; Warp rounds to single precision
 
 
 def is_installed(module: str) -> bool:
