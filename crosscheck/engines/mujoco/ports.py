@@ -1,4 +1,4 @@
-"""What MuJoCo's ports to other machines share: MuJoCo's model of a scene, their settings and samples.
+"""Parts shared by MuJoCo's ports to other machines: MuJoCo's model of a scene, settings and samples.
 
 A port steps MuJoCo's model by code of its own.  Poses and velocities at the samples are computed from its
 joint coordinates by MuJoCo in C, which adds rounding alone.
