@@ -113,7 +113,7 @@ def test_command_and_its_records(known, capsys, tmp_path):
     arguments = ["verify", "mbref", "--mechanisms", "1", "--records", str(tmp_path / "r.jsonl")]
     arguments += [
         "--family",
-        "alf-dual+projection",
+        "taylor",
         "--first-seed",
         "2",
         "--beside",
@@ -147,5 +147,5 @@ def test_drawn_mechanism_that_mbref_did_not_run(seed, change):
     """A driven displacement had a part in series where none should be, and a wrong unit of length."""
     scene = drawn.mechanism(seed)
     scene = RELATIONS[change].change(scene, None) if change else scene
-    run = simulate(scene, "alf-dual+projection", np.linspace(0.0, scene.duration, 3), Limits(rtol=1e-9))
+    run = simulate(scene, "taylor", np.linspace(0.0, scene.duration, 3), Limits(rtol=1e-9))
     assert run.outcome is Outcome.COMPLETED, run.message

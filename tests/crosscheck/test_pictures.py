@@ -17,7 +17,7 @@ RHOMBUS = SCENES["four_bar"]().with_(duration=0.05)
 
 @pytest.fixture(scope="module")
 def run():
-    case = Case(RHOMBUS, np.linspace(0.0, 0.05, 3), "mbref", Setting("alf-dual+projection", {"rtol": 1e-9}))
+    case = Case(RHOMBUS, np.linspace(0.0, 0.05, 3), "mbref", Setting("taylor", {"rtol": 1e-9}))
     return case, run_case(case)
 
 
@@ -42,7 +42,7 @@ def test_runs_along_branches_part_behind_the_crossing(run, tmp_path):
 def test_the_run_of_largest_error_is_kept_as_poses_alone(run):
     case, record = run
     worse = {**record, "metrics": {**record["metrics"], "error": 1.0}}
-    coarse = case._replace(setting=Setting("alf-dual+projection", {"rtol": 1e-3}))
+    coarse = case._replace(setting=Setting("taylor", {"rtol": 1e-3}))
     truth = {"scene": RHOMBUS.name, "motion": {"times": [0.0, 0.01]}}
     (kept,) = worst_runs([run, (coarse, worse)], [truth], None)
     assert kept["asked"]["options"] == {"rtol": 1e-3} and kept["times"] == [0.0, 0.01]
@@ -64,7 +64,7 @@ def test_positions_of_several_branches_are_shown_first():
 
 
 def test_an_option_beyond_the_sweep_is_taken(capsys):
-    asked = "run four_bar --engine mbref --setting alf-dual+projection --option branches=[[2,2]] --times 0.05"
+    asked = "run four_bar --engine mbref --setting taylor --option branches=[[2,2]] --times 0.05"
     assert main([*asked.split(), "--json"]) == 0
     assert '"branches": [[2, 2]]' in capsys.readouterr().out
     assert main([*asked.replace("branches", "branch").split()]) == 2

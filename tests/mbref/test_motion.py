@@ -184,7 +184,7 @@ def test_without_names_joints_and_energy_are_plotted(crank):
 
 def test_repr_is_one_short_line(crank):
     assert repr(crank) == (
-        "<Motion of 'planar_slider_crank' by mbref alf-dual+projection/dop853: COMPLETED, "
+        "<Motion of 'planar_slider_crank' by mbref alf-dual+projection/taylor: COMPLETED, "
         "21 samples to t = 0.1 s>"
     )
     assert len(repr(crank["rod"])) < 80 and len(repr(crank.joint("A"))) < 80

@@ -24,7 +24,7 @@ from mbref.equations.diagnosis import diagnose
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
-METHOD = "alf-dual+projection"
+METHOD = "taylor"
 NEAR = 1e-4  # least singular value below which a scene counts as at a singular position
 EXACT, MOVED = (
     1e-7,

@@ -84,7 +84,7 @@ def test_support_section_and_engines_of_the_records():
 def test_singular_positions_passed_with_branches_and_reactions_left_open():
     scene = SCENES["four_bar"]().with_(duration=0.05)
     flat = 0.01258650902880526  # s, of the driven rhombus
-    record = run_case(Case(scene, np.array([0.0, flat, 0.05]), "mbref", Setting("alf-dual+projection", {})))
+    record = run_case(Case(scene, np.array([0.0, flat, 0.05]), "mbref", Setting("taylor", {})))
     (group,) = by_scene([record], {scene.name: scene})
     blocks = crossings.render(group)
     assert [row[:2] for row in cells(blocks)] == [["1", "0.012586509"], ["2", "0.037759527"]]
@@ -98,7 +98,7 @@ def test_singular_positions_passed_with_branches_and_reactions_left_open():
 def parted() -> SceneRuns:
     """The driven rhombus with its motions on both branches where they part."""
     scene = SCENES["four_bar"]().with_(duration=0.05)
-    case = Case(scene, np.linspace(0.0, 0.05, 3), "mbref", Setting("alf-dual+projection", {"rtol": 1e-9}))
+    case = Case(scene, np.linspace(0.0, 0.05, 3), "mbref", Setting("taylor", {"rtol": 1e-9}))
     record = run_case(case)
     (group,) = by_scene([record], {scene.name: scene}, branches=pictures.branches([(case, record)], None))
     return group
