@@ -105,7 +105,8 @@ class Batch:
         self._seconds = np.zeros(count)
 
     def _begin(self) -> int:
-        """Have memory as the run begins; the independent rows there, -1 where it begins extraordinarily."""
+        """Reset memory to the start of the run. Return the number of independent rows, -1 for a start that
+        needs care."""
         run = self._run
         run.begin_again()
         run.stepper.enter()

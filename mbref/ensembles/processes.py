@@ -51,7 +51,7 @@ class Processes(Executor):
 
 
 class Worker:
-    """One process; it ends when it is told to, or when its parent has ended."""
+    """One process. It ends on request, or when its parent has ended."""
 
     def __init__(self) -> None:
         context = get_context("spawn")

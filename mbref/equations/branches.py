@@ -35,7 +35,8 @@ CONE = "a cone of directions, of which the smooth one is listed"
 
 
 class Branches(NamedTuple):
-    """Velocities (b, n) of the branches, that of the motion first, and what second order says of them."""
+    """Velocities (b, n) of the branches, the branch of the motion first, and a sentence on what second order
+    decides."""
 
     velocities: np.ndarray
     sentence: str
@@ -110,7 +111,7 @@ def tangents(model: Model, q: np.ndarray) -> np.ndarray:
 
 
 def fit_to_branches(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Fit | None:
-    """How velocities v (n,) fit the branches at q (7 nb,), t (s); None where no branches meet."""
+    """Return how velocities v (n,) fit the branches at q (7 nb,), t (s); None where no branches meet."""
     found = second_order(model, t, q, v)
     if not _is_singular(found):
         return None
@@ -123,10 +124,11 @@ def fit_to_branches(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Fit
 
 
 def velocities_along(model: Model, q: np.ndarray, v: np.ndarray, given: np.ndarray) -> list[np.ndarray]:
-    """Velocities (n,) of the branches at q (7 nb,), t = 0, that agree with the given entries (n,) of v (n,).
+    """Return velocities (n,) of the branches at q (7 nb,), t = 0, that agree with the given entries (n,) of v
+    (n,).
 
-    Those of the least kinetic energy come first; there are none where v fits a branch itself, or where second
-    order tells none.
+    Branches with the least kinetic energy come first. The list is empty if v fits a branch itself, or if
+    second order decides no branch.
     """
     found = second_order(model, 0.0, q, v)
     if not _is_singular(found) or _fits(found, _direction(found, v)):
@@ -186,7 +188,7 @@ def _rates(model: Model, t: float, q: np.ndarray, directions: np.ndarray) -> np.
 
 
 def _independent(forms: np.ndarray) -> np.ndarray:
-    """As few forms as have the same zeros, of unit size."""
+    """Return the smallest set of forms, of unit size, that have equal zeros."""
     count, d, _ = forms.shape
     if not forms.size:
         return np.zeros((0, d, d))

@@ -1,4 +1,4 @@
-"""Freedoms that the drivers of a scene leave, told apart from those of a singular start."""
+"""Degrees of freedom that the drivers of a scene leave, without the additional ones of a singular start."""
 
 from __future__ import annotations
 

@@ -30,10 +30,10 @@ class Answers(NamedTuple):
 
 
 class Evidence:
-    """The questions asked of a scene at its start, and its answers.
+    """The questions about a scene's numbers that decide its reduction, and their answers.
 
-    The choice of active ``entries`` (m, 12) has read the terms at each of ``read``, that of statically
-    determined rows has asked the rest.
+    The choice of active ``entries`` (m, 12) evaluates the terms at each of ``read``; the choice of statically
+    determined rows asks the remaining questions.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class Evidence:
         self._reached = self._reach(model, self._found.acting[0])
 
     def agrees(self, model: Model, start: Start, terms: Terms) -> bool:
-        """Whether a scene of the same structure gives the same answers, from its ``terms``."""
+        """Return whether a scene of equal structure gives equal answers, from its ``terms``."""
         return bool(self._agree(model, self._of_one(model, start, terms))[0])
 
     def terms(self, model: Model, start: Start) -> Terms:
@@ -61,7 +61,7 @@ class Evidence:
     def which_agree(
         self, model: Model, q: np.ndarray, v: np.ndarray, mass: np.ndarray, terms: Terms
     ) -> np.ndarray:
-        """Which of s scenes of the structure of a model give the same answers.
+        """Return which of s scenes of equal structure give equal answers.
 
         From their starts q (s, 7 nb) and v (s, 6 nb), masses (s, 6 nb) and terms (s, k, …) at ``states``.
         """
@@ -79,7 +79,8 @@ class Evidence:
         return part, places, velocities
 
     def _agree(self, model: Model, answers: Answers) -> np.ndarray:
-        """Which of s scenes give the same answers, but for rows and columns that reach the same."""
+        """Return which of s scenes give equal answers; rows and columns may differ if they reach equal
+        ones."""
         same: np.ndarray = (answers.decisive == self._found.decisive).all(axis=1)
         differ = (answers.acting != self._found.acting).any(axis=(1, 2))
         for k in np.flatnonzero(same & differ):

@@ -55,11 +55,11 @@ class Start:
 
 
 class Alike(NamedTuple):
-    """s scenes of the structure of a model, as their consistent starts ask for them.
+    """Scenes of equal structure whose consistent starts are computed together.
 
-    Coordinates (s, 7 nb) of their poses, masses (s, n), lengths (s,) in m, and the bodies of each.
-    ``terms``, with blocks (k, m, 12), are those of the scenes at places (k,), at coordinates (k, 7 nb) and
-    velocities (k, n); ``model_of`` is the model of the one at a place.
+    Coordinates (s, 7 nb) of their poses, masses (s, n), lengths (s,) in m, and the bodies of each of s
+    scenes. ``terms`` evaluates the scenes at places (k,), with coordinates (k, 7 nb) and velocities (k, n),
+    and returns blocks (k, m, 12); ``model_of`` returns the model of the scene at a place.
     """
 
     model: Model
@@ -130,8 +130,11 @@ def _start(scenes: Alike, k: int, q: np.ndarray, before: float, rates: Rates) ->
 
 
 def _along_branch(model: Model, q: np.ndarray, v: np.ndarray, given: np.ndarray) -> np.ndarray | None:
-    """Velocities (6 nb,) along a branch of a singular start that agree with the given ones of v (6 nb,); None
-    where v are along one, or where second order tells no such branch."""
+    """Return velocities (6 nb,) along a branch of a singular start that agree with the given entries of v (6
+    nb,).
+
+    None if v is along a branch, or if second order decides no such branch.
+    """
     if not model.closed_loops or model.m > MOST_ROWS:
         return None
     along = velocities_along(model, q, v, given)
@@ -146,8 +149,12 @@ def rate_violation(model: Model, q: np.ndarray, v: np.ndarray) -> float:
 
 
 def _best_met(model: Model, q: np.ndarray, along: list[np.ndarray]) -> np.ndarray:
-    """Of velocities (6 nb,) along branches the first, where all meet Φ_q v = ν; else those that meet it best,
-    as one branch does beside a singular position.  They are corrected as far as rounding allows."""
+    """Return the first of velocities (6 nb,) along branches if all satisfy Φ_q v = ν; otherwise the most
+    accurate one.
+
+    Near a singular position only one branch satisfies the equation. Its velocities are corrected as far as
+    rounding allows.
+    """
     off = [rate_violation(model, q, w) for w in along]
     best = along[int(np.argmin(off)) if max(off) > MET else 0]
     terms = model.terms(0.0, q, best)
@@ -298,7 +305,8 @@ def _velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float,
 
 
 def _sparse_velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float, bool]:
-    """The same by sparse solutions: nearest to the given velocities first, then least where open."""
+    """Return velocities by sparse solutions: nearest to the given velocities first, then of least norm where
+    open."""
     from scipy.sparse import csr_array, vstack
 
     model, mass, (v, given, nu, scale, blocks) = scenes.model, scenes.mass[k], rates
@@ -324,6 +332,6 @@ def _sparse_velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray,
 
 
 def _unit_rows(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The same equations with rows of unit length, so that their rank does not depend on units."""
+    """Return the equations with rows of unit length, so that their rank does not depend on units."""
     lengths = row_lengths(matrix)
     return matrix / lengths[..., None], rhs / lengths

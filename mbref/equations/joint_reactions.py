@@ -135,7 +135,7 @@ def open_dimensions(model: Model, blocks: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _singular_values(matrices: np.ndarray) -> np.ndarray:
-    """Those (k, …) of matrices (k, r, c): the length of a single column."""
+    """Return singular values (k, …) of matrices (k, r, c): the length of a single column."""
     if matrices.shape[-1] < 2:
         return np.sqrt((matrices * matrices).sum(axis=1))
     return np.asarray(np.linalg.svd(matrices, compute_uv=False))

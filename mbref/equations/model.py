@@ -103,7 +103,8 @@ class Model:
         return found
 
     def put_numbers(self, equations: Equations, data: SceneData) -> None:
-        """Have memory of evaluations hold the numbers of a scene of its structure and this model's masses."""
+        """Write the numbers of a scene of equal structure, and this model's masses, into memory of
+        evaluations."""
         for mine, theirs in zip(equations.scene.numbers, data.numbers, strict=True):
             mine[...] = theirs
         equations.system.mass[:] = self.mass

@@ -265,8 +265,8 @@ def _of_body(body: Body) -> tuple[tuple[float, ...], np.ndarray | None]:
 
 
 def _principal_axes(inertia: Any) -> tuple[Sequence[float], np.ndarray | None]:
-    """Principal moments, and the rotation from the principal frame to that of a moment of inertia; None for
-    the same frame."""
+    """Return principal moments and the rotation from the principal frame to the body's frame; None if they
+    are equal."""
     if inertia is None:
         return (1.0, 1.0, 1.0), None
     if not isinstance(inertia[0], tuple):

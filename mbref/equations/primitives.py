@@ -89,7 +89,7 @@ def place_of(b, s, sign, row, column, equations):
 
 @kernel
 def put_translations(row, blocks):
-    """The entries that no state changes, in the three rows of a point: those of both bodies' positions."""
+    """Write the constant entries in the three rows of a point: the derivatives by both bodies' positions."""
     for k in range(3):
         blocks[row + k, k] = 1.0
         blocks[row + k, 6 + k] = -1.0

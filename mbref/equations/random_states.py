@@ -19,7 +19,8 @@ class RandomStates(NamedTuple):
     velocity: np.ndarray
 
     def of(self, displacing: np.ndarray, moving: np.ndarray | None = None) -> RandomStates:
-        """The same with only these coordinates (n,) displaced, and these velocities (n,) or none."""
+        """Return states in which only these coordinates (n,) are displaced and only these velocities (n,) are
+        nonzero."""
         velocity = np.zeros_like(self.velocity) if moving is None else moving * self.velocity
         return RandomStates(self.part, displacing * self.displacement, velocity)
 

@@ -1,8 +1,9 @@
-"""Reduction: the primitives, rows and columns of a scene that a run needs, found once for scenes that agree.
+"""Reduction: the primitives, rows and columns of a scene that a run needs, computed once for scenes that
+agree.
 
-The numbers of a scene decide which primitives, rows and columns a run leaves out.  A scene of equal structure
-is asked for the same answers (``evidence``): where all are the same, every decision would be, and the
-reduction is that of the scene before.
+The numbers of a scene decide which primitives, rows and columns a run leaves out. A scene of equal structure
+is asked equal questions (``evidence``). If all answers are equal, all decisions are, and the reduction is
+reused.
 """
 
 from __future__ import annotations
@@ -66,14 +67,14 @@ class Reduction:
 
     @cached_property
     def _all_moving(self) -> tuple[np.ndarray, np.ndarray]:
-        """The same where all of them move."""
+        """Primitives as in ``_moving``, if all of them move."""
         return np.arange(self.resting.size), np.zeros(0, dtype=np.int64)
 
 
 def reduction_of(model: Model, start: Start) -> tuple[Reduction, np.ndarray]:
-    """The reduction of a scene at its start: one that is known for its structure and agrees, or found now.
+    """Return the reduction of a scene at its start, and the blocks (m, 12) of Φ_q there.
 
-    And the blocks (m, 12) of Φ_q there, which decide with others.
+    The reduction is reused if one is known for the structure and its evidence agrees.
     """
     known = _known.get(model.structure, [])
     for reduction in known:

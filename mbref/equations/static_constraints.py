@@ -96,7 +96,7 @@ def _static_rows(entries: np.ndarray, columns: np.ndarray, held: Sequence[Held])
 
 
 class Tried(NamedTuple):
-    """Rows that may hold these columns, in a round of random states, and those of them that do."""
+    """Rows that may hold these columns in a round of random states, and the rows among them that do."""
 
     round: int
     rows: list[int]
@@ -132,7 +132,7 @@ def held_by_rows(
 
 
 def at_rest(start: Start, columns: Sequence[int]) -> Start:
-    """The start with zero for the roundings of zero in the velocities held."""
+    """Return the start with velocities of round-off size set to zero in the columns held."""
     if not columns:
         return start
     v = start.v.copy()
@@ -143,7 +143,7 @@ def at_rest(start: Start, columns: Sequence[int]) -> Start:
 def _found(
     model: Model, q: np.ndarray, moving: np.ndarray, entries: np.ndarray, can_rest: np.ndarray, asked: Asked
 ) -> tuple[list[Held], np.ndarray]:
-    """As ``held_by_rows``, of the columns that can rest (n,)."""
+    """Return groups and entries as ``held_by_rows`` does, for the columns that can rest (n,)."""
     resting = can_rest
     while resting.any():
         states = random_states(2, STATES, model.n).of(moving & ~resting)

@@ -36,9 +36,10 @@ class LoadPlace(NamedTuple):
 
 
 class Places(NamedTuple):
-    """All of nb bodies, primitives, loads and drivers but their numbers; the fixed frame is body nb.
+    """Kinds and bodies of all primitives, loads and drivers, without numbers; body nb is the fixed frame.
 
-    ``anchored`` are the bodies of the joints' anchors, ``terms`` those of the longest driver's polynomial.
+    ``anchored`` are the bodies of the joints' anchors, ``terms`` is the length of the longest driver
+    polynomial.
     """
 
     nb: int
@@ -51,10 +52,10 @@ class Places(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """The primitives of p and loads of l, the m rows and their columns; nobody changes the arrays.
+    """The p primitives, l loads, m rows and their columns. The arrays are read-only.
 
-    ``entry_columns`` (m, 12) says the column of every entry of the blocks; those of the fixed frame are ≥ n.
-    Vectors are those of the primitives, then those of the loads, as ``packing`` lists them.
+    ``entry_columns`` (m, 12) is the column of every entry of the blocks; columns of the fixed frame are ≥ n.
+    Vectors of the primitives come first, then vectors of the loads, in the order of ``packing``.
     """
 
     nb: int  # bodies; the fixed frame has this number

@@ -1,1 +1,1 @@
-"""How kernels are compiled, cached and given memory."""
+"""Compilation, cache and memory of kernels."""

@@ -35,7 +35,8 @@ class SavedNumbers:
 
 
 def arrays_in(values: Any) -> Iterator[np.ndarray]:
-    """The arrays of a schema and of the packed schemas in it; that of a record has one element."""
+    """Return the arrays of a schema and of the packed schemas in it. The array of a record has one
+    element."""
     if isinstance(values, Packed):
         yield from arrays_in(values.values)
     elif isinstance(values, tuple):

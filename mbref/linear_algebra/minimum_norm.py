@@ -129,7 +129,7 @@ def product(a, b):
 
 @inlined
 def solve_fixed_iterations(factor, iterations, target):
-    """As ``solve_to_tolerance`` with a fixed number of iterations."""
+    """Solve as ``solve_to_tolerance`` does, with a fixed number of iterations."""
     for k in range(iterations):
         if k > 0:
             subtract_product(factor, factor.change, factor.residual)

@@ -1,10 +1,10 @@
-"""Comparison of a run that nothing holds to its branch with the motion: it is completed on that motion alone.
+"""Comparison of a run with the motion that the default method follows.
 
-Without projection nothing but the accelerations holds a run to its branch.  At a singular position they are
-ill-determined, and a pseudo-inverse whose rank drops there lets the run go on along another branch with all
-constraints and its energy intact.  Beside one, the same happens to a partition whose dependent coordinates
-jump.  With projection it may happen where the run came near a singular position, or where a coarse rank
-tolerance drops rows that are independent.  The reference is a run of the default method, which crosses.
+Without projection only the accelerations keep a run on its branch. At a singular position they are ill-
+determined, and a pseudo-inverse whose rank drops there lets the run continue along another branch, with all
+constraints and its energy intact. Near one, a partition whose dependent coordinates jump does so too. A
+projected run may change branch where it came near a singular position, or where a coarse rank tolerance drops
+independent rows. Such runs are completed only on the motion of the default method.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ COARSE = 0.1  # lengths or rad by which a run in fixed steps may be off, whose e
 
 
 def compare_with_default(run: Run, ended: int) -> int:
-    """Return the status of a run that ended with one, after comparing its samples with the reference.
+    """Return the status of a run after comparing its samples with the default method.
 
-    LEFT_MOTION where it left the motion, whose samples end there; UNDECIDED, at the time of the clock, where
-    the reference cannot decide a branch of a run that is DONE, or does not cross the singular position there;
-    else as it was.  A run that is held to its motion, or that reached no sample, is not compared.
+    ``ended`` is the status before. LEFT_MOTION if a sample is off by more than allowed; samples then end
+    there. UNDECIDED if the run was DONE and the default method does not continue. Otherwise ``ended``. Runs
+    that cannot leave their motion, and runs without a sample, are not compared.
     """
     clock = run.memory.loop.clock
     if not (clock.sample and may_leave(run) and run.limits.compared):

@@ -1,4 +1,4 @@
-"""Control: the limits of the stepping loop, from those of the user, the method and the scene."""
+"""Control of the stepping loop: limits that follow from the options, the method and the scene."""
 
 from __future__ import annotations
 

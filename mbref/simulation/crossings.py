@@ -14,8 +14,7 @@ from mbref.trajectory import Crossing
 
 
 class Crossings(Sequence[Crossing]):
-    """Those of a run of a model, found when the first of them is asked for, which takes longer than to pass
-    them."""
+    """Lazy sequence of the singular positions that a run crossed. Branches are computed on first access."""
 
     def __init__(self, model: Model, passed: Sequence[Passed]):
         self._model, self._passed = model, passed

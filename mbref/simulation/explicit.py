@@ -60,10 +60,10 @@ class ExplicitStepper:
         return self.run.memory
 
     def begin_again(self) -> None:
-        """Have no memory be as when the run began: it has none of its own."""
+        """Do nothing: the stepper has no memory of its own."""
 
     def parameters(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
-        """No numbers: it has no memory of its own."""
+        """Return no numbers: the stepper has no memory of its own."""
         return []
 
     def takes(self, model: Callable[[], Model], start: Start) -> bool:
@@ -77,7 +77,8 @@ class ExplicitStepper:
         return int(advance_to_end(self.run.packed.argument)), time.process_time() - began
 
     def _look_at_rows_again(self) -> None:
-        """Have rows that were nearly dependent at the start not be so away from that, if they are not."""
+        """Clear the mark of nearly dependent rows once the run has left the start and the rows are
+        independent."""
         run, memory = self.run, self.run.memory
         settings = memory.equations.system.settings
         if run.method.stabilisation.projects and settings.nearly_dependent and memory.loop.clock.time > 0.0:

@@ -15,8 +15,7 @@ def prepare(method: Method) -> None:
 
 
 def kernels_of(method: Method) -> list[Exchangeable]:
-    """All kernels that a run by the method calls, but those of its formulation's helpers; of a series, those
-    that it has in common with others."""
+    """Return the kernels that a run by the method calls."""
     if method.is_series:
         return [evaluate_along]
     integrator, chart = method.integrator, method.stabilisation

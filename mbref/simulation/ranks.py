@@ -65,7 +65,7 @@ def _ranks(values: np.ndarray, tolerance: float) -> Ranks:
 
 
 def are_clear(model: Model, blocks: np.ndarray, factor: SparseFactor) -> bool:
-    """Whether all pivots of the factor of Φ_q as blocks (m, 12) are those of independent rows."""
+    """Return whether all pivots of the factor of Φ_q, given as blocks (m, 12), show independent rows."""
     positive = factorise_once(blocks.reshape(-1), model.data.metric_root, packed(factor).argument)
     squares = 1.0 / (factor.l[factor.symbolic.l_start[:-1]] * factor.diagonal)
     return bool(positive and squares.min() > INDEPENDENT)

@@ -43,7 +43,7 @@ MOST_COMPARED = 60  # rows whose gradients at both ends of a step are compared
 
 
 class Stepper(Protocol):
-    """The loop of steps of a run: that of an explicit integrator, or that of a Taylor series."""
+    """The loop of steps of a run, by an explicit integrator or by a Taylor series."""
 
     def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
         """Run to the end; the final status and the process CPU time of the stepping alone (s).
@@ -66,10 +66,11 @@ class Stepper(Protocol):
         """Start from the time of the clock and the state in memory."""
 
     def begin_again(self) -> None:
-        """Have memory of its own be as when the run began."""
+        """Reset memory of the stepper to the start of the run."""
 
     def parameters(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
-        """Where its memory has numbers in which scenes differ, and those of scenes of ``lengths`` (s,)."""
+        """Return (target array, values per scene) for numbers of the stepper that differ between scenes of
+        ``lengths`` (s,)."""
 
     def takes(self, model: Callable[[], Model], start: Start) -> bool:
         """Whether memory has room for a scene whose numbers it holds: then it is ready to be advanced."""
@@ -79,7 +80,7 @@ class Stepper(Protocol):
 
 
 class Run:
-    """One simulation: its memory, which its stepper advances; then samples, counts and clock can be read."""
+    """One simulation. Its stepper advances its memory; afterwards samples, counts and clock can be read."""
 
     def __init__(
         self,
@@ -103,7 +104,7 @@ class Run:
         self.stepper = stepper(self)
 
     def release(self) -> None:
-        """Release the memory to the next run; this one cannot be read any more."""
+        """Return the memory to the pool. Results must not be read afterwards."""
         self.stepper.release()
         release(self.pooled)
         self.model.release()
@@ -136,15 +137,18 @@ class Run:
             raise SceneError(missing_masses(self.scene))
 
     def begin_again(self) -> None:
-        """Have the memory that this run was given, with its numbers and its start."""
+        """Reset the memory to the scene's parameters and the initial state."""
         self.pooled.restore()
         self._put_numbers(self.memory, self.reduced(self.model.data))
         self.put_start()
         self.stepper.begin_again()
 
     def reduced(self, data: SceneData, axis: int = 0, all_move: bool = False) -> SceneData:
-        """The data of a scene with the primitives that the run needs, which ``axis`` counts; where asked all
-        of them are evaluated at every state."""
+        """Return the data of a scene with the primitives that the run needs.
+
+        ``axis`` is the axis that counts primitives. With ``all_move`` every primitive is evaluated at every
+        state.
+        """
         sparse = self.method.formulation.linear_algebra.sparse
         all_move = all_move or not self.method.stabilisation.projects  # others read the gradients of all rows
         return self.reduction.scene(data, all_move, axis) if self.reduction and sparse else data
@@ -158,7 +162,7 @@ class Run:
         return memory
 
     def _put_numbers(self, memory: Memory, data: SceneData) -> None:
-        """Have memory hold the numbers of the scene, the method and the limits."""
+        """Write the numbers of the scene, the method and the limits into memory."""
         self.model.put_numbers(memory.equations, data)
         write(memory.equations.system.settings, self.method.settings(self.limits.rank_tolerance))
         write(memory.control, self._control)
@@ -173,7 +177,7 @@ class Run:
         return self._kernels_on(stabilisation), schemas, numbers, *options
 
     def _allocate(self, data: SceneData) -> Memory:
-        """Memory of the method for the data of a scene, ready but for numbers."""
+        """Return memory of the method for the data of a scene, without numbers."""
         model, method = self.model, self.method
         formulation, stabilisation, integrator = method.parts
         factor, active = self._factor()
@@ -231,7 +235,7 @@ class Run:
         return Kernels(*(kernel.pointer if kernel else None for kernel in kernels))
 
     def put_start(self) -> None:
-        """Have memory hold the start and its ranks."""
+        """Write the initial state and its ranks into memory."""
         memory = self.memory
         memory.state.coordinates[:] = self.start.q
         memory.state.velocities[:] = self.start.v
@@ -247,7 +251,7 @@ class Run:
             settings.rounding *= min(1.0, self.model.length)
 
     def _ranks_at_start(self) -> Ranks:
-        """Of the constraint rows."""
+        """Return the rank of the constraint rows at the start, and what decides it."""
         factor, tolerance = self.memory.factor, self.limits.rank_tolerance
         return ranks_at(self.model, self.start.q, factor, tolerance, self._blocks)
 

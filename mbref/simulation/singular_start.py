@@ -21,7 +21,7 @@ STILL = 1e-12  # of a force along a branch over the largest: a body that nothing
 
 
 class Leaving(NamedTuple):
-    """How a motion leaves a singular position at t = 0: velocities (n,), from rest the acceleration (n,)."""
+    """How a motion leaves a singular position at t = 0: velocities (n,), or acceleration (n,) from rest."""
 
     coordinates: np.ndarray
     velocities: np.ndarray
@@ -29,8 +29,8 @@ class Leaving(NamedTuple):
 
 
 def leaving(run: Run) -> Leaving | None:
-    """How a run leaves its start where that is a singular position whose branches second order tells apart;
-    None elsewhere."""
+    """Return how a run leaves a start that is a singular position with branches that second order separates,
+    or None."""
     if begins_at_rest(run):
         acceleration = leaving_acceleration(run)
         return None if acceleration is None else Leaving(run.start.q, run.start.v, acceleration)
