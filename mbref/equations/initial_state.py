@@ -130,11 +130,9 @@ def _start(scenes: Alike, k: int, q: np.ndarray, before: float, rates: Rates) ->
 
 
 def _along_branch(model: Model, q: np.ndarray, v: np.ndarray, given: np.ndarray) -> np.ndarray | None:
-    """Return velocities (6 nb,) along a branch of a singular start that agree with the given entries of v (6
-    nb,).
+    """Return velocities (6 nb,) along a branch of a singular start that agree with the given entries of v.
 
-    None if v is along a branch, or if second order decides no such branch.
-    """
+    None if v is along a branch, or if no branch agrees."""
     if not model.closed_loops or model.m > MOST_ROWS:
         return None
     along = velocities_along(model, q, v, given)
@@ -149,12 +147,8 @@ def rate_violation(model: Model, q: np.ndarray, v: np.ndarray) -> float:
 
 
 def _best_met(model: Model, q: np.ndarray, along: list[np.ndarray]) -> np.ndarray:
-    """Return the first of velocities (6 nb,) along branches if all satisfy Φ_q v = ν; otherwise the most
-    accurate one.
-
-    Near a singular position only one branch satisfies the equation. Its velocities are corrected as far as
-    rounding allows.
-    """
+    """Return the first of velocities (6 nb,) along branches if all satisfy Φ_q v = ν, otherwise the most
+    accurate one, corrected as far as rounding allows."""
     off = [rate_violation(model, q, w) for w in along]
     best = along[int(np.argmin(off)) if max(off) > MET else 0]
     terms = model.terms(0.0, q, best)
@@ -305,8 +299,7 @@ def _velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float,
 
 
 def _sparse_velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float, bool]:
-    """Return velocities by sparse solutions: nearest to the given velocities first, then of least norm where
-    open."""
+    """Return velocities by sparse solutions: nearest to the given ones first, then of least norm."""
     from scipy.sparse import csr_array, vstack
 
     model, mass, (v, given, nu, scale, blocks) = scenes.model, scenes.mass[k], rates

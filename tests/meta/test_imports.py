@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from imports import children, circles, graph, imported, sources, upward
+from imports import ROOT, children, circles, graph, imported, sources, upward
 
 DOORS = (
     r"command_line|formats|scene|scene_fields|scene_joints|scene_lines|scene_loads|scenes(\.\w+)?|scene_validation|trajectory|rotations|records"
@@ -132,6 +132,14 @@ def reached(arrows: dict[str, set[str]], module: str) -> set[str]:
         found |= new
         waiting += new
     return found
+
+
+@pytest.mark.parametrize("package", FLOORS)
+def test_contributing_names_the_floor_of_every_folder(package):
+    text = (ROOT / "CONTRIBUTING.md").read_text().split("Folders have floors")[1].split("\n- ")[0]
+    folders = {path.parent.name for path in (ROOT / package).glob("*/__init__.py")} - {"reference"}
+    missing = {folder for folder in folders if not re.search(rf"\b{folder}\b", text)}
+    assert not missing, f"CONTRIBUTING.md names no floor of {missing}"
 
 
 def test_circles_and_upward_arrows_are_found():
