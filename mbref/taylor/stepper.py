@@ -99,6 +99,8 @@ class SeriesStepper:
         )
         self._put_options()
         self._departure = Departure(run, self.taylor, self.expand, self._state_at)
+        self._way = leaving(run) if run.times[-1] > 0.0 else None
+        self._fits_no_branch = self._way is None and fits_no_branch(run)
         self._wants_code = run.limits.code == AUTO
         if run.limits.code == GENERATED:
             self._put_code()
@@ -283,12 +285,11 @@ class SeriesStepper:
 
     def _leave_start(self) -> int:
         """Leave a singular position at t = 0, if any; return PAUSED, DONE, or the failure status."""
-        way = leaving(self.run) if self.run.times[-1] > 0.0 else None
-        if way is None:
-            return UNDECIDED if fits_no_branch(self.run) else PAUSED
+        if self._way is None:
+            return UNDECIDED if self._fits_no_branch else PAUSED
         self._calls += 1
         begin_crossing(self.argument)
-        return self._begin_again(self._until_clear(self._departure.from_start(way), []))
+        return self._begin_again(self._until_clear(self._departure.from_start(self._way), []))
 
     def _until_clear(self, status: int, crossed: list[Passed]) -> int:
         """Take high-accuracy steps until they are clear of singular positions, the first ones ``crossed``."""
