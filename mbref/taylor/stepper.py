@@ -105,7 +105,6 @@ class SeriesStepper:
         if run.limits.code == GENERATED:
             self._put_code()
 
-    # --- memory -------------------------------------------------------------------------------------------
     def _kind_of_steps(self) -> tuple[bool, float, int]:
         """Return whether steps are predictor steps, and the tolerance and the order of their series."""
         run, code = self.run, self.run.limits.code
@@ -145,7 +144,6 @@ class SeriesStepper:
         mode.kind, mode.tolerance, mode.order = REGULAR, options.regular_tolerance, options.regular_order
         self.run.memory.previous.coordinates[:] = self.run.start.q  # whose quaternions give the side
 
-    # --- another scene of equal structure, whose numbers memory holds --------------------------------------
     @property
     def was_short(self) -> bool:
         """Return whether the run was completed by one call of kernels."""
@@ -186,7 +184,6 @@ class SeriesStepper:
         self.run.crossings += self.recorded()
         return self._complete_samples(status, go_on=False), seconds
 
-    # --- generated code -----------------------------------------------------------------------------------
     def _generate_where_it_pays(self) -> None:
         """Go on with generated code where many steps are ahead."""
         if self._wants_code and self._steps_ahead() >= STEPS_WORTH_CODE:
@@ -210,15 +207,16 @@ class SeriesStepper:
         self._code = put_code(self.taylor)
         self.run.making += time.process_time() - began
 
-    # --- steps --------------------------------------------------------------------------------------------
     def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
         """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
         making, began = self.run.making, time.process_time()
         status = self._leave_start()
         while status == PAUSED:
             status = self.take_steps()
+            if status == DONE:
+                break
             self.run.crossings += self.recorded()
-            if status != DONE and (status == SINGULAR_AHEAD or self._leaves_branch()):
+            if status == SINGULAR_AHEAD or self._leaves_branch():
                 status = self._begin_again(self._cross() if status == SINGULAR_AHEAD else self._take_branch())
             else:
                 status = self._complete_samples(status, go_on=status == PAUSED)
@@ -227,8 +225,11 @@ class SeriesStepper:
                 self._generate_where_it_pays()
             if progress is not None:
                 progress(float(self.run.memory.loop.clock.time))
-        seconds = time.process_time() - began
-        return status, seconds - self._sampling - (self.run.making - making)
+        seconds = time.process_time() - began - self._sampling - (self.run.making - making)
+        self.run.crossings += self.recorded()
+        if progress is not None and status == DONE:
+            progress(float(self.run.memory.loop.clock.time))
+        return self._complete_samples(status, go_on=False), seconds
 
     def take_steps(self) -> int:
         """Take the steps of one call; return PAUSED, DONE at the end, or the failure status."""
@@ -261,7 +262,6 @@ class SeriesStepper:
         times, coordinates, velocities = (found[:count].copy() for found in self.taylor.crossings)
         return list(map(Passed, times.tolist(), coordinates, velocities, repeat(SMOOTH)))
 
-    # --- singular positions -------------------------------------------------------------------------------
     def _asked(self, number: int) -> int:
         """Return the branch to take at a singular position, both counted from 1."""
         return dict(self.run.limits.branches).get(number, SMOOTH)
