@@ -62,7 +62,7 @@ def test_the_pose_is_flat():
 @pytest.mark.parametrize("method", CROSSING)
 @pytest.mark.parametrize("loop", LOOPS)
 def test_a_method_that_claims_to_cross_is_right_behind_the_singular_position(loop, method):
-    """By regularisation it may fail there or leave the motion, which it says; it never completes elsewhere."""
+    """By regularisation it may fail or say that it left the motion; it never completes elsewhere."""
     scene, end = LOOPS[loop]
     crosses = Method.parse(method).crosses
     assert crosses == ("by series" if method == "taylor" else "by regularisation")
