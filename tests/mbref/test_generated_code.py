@@ -163,10 +163,10 @@ def test_auto_takes_the_code_where_many_steps_are_ahead():
 def test_one_process_loads_the_code_of_a_scene_once():
     crank = SCENES["planar_slider_crank"]()
     first, again = (start_run(crank, TAYLOR, np.array([0.1]), Limits(code="generated")) for _ in "ab")
-    assert first.taylor.code.expand == again.taylor.code.expand != 0
+    assert first.stepper.taylor.code.expand == again.stepper.taylor.code.expand != 0
     finer = start_run(crank, TAYLOR, np.array([0.1]), Limits(rtol=1e-12, code="generated"))
-    assert finer.taylor.mode.order > first.taylor.mode.order
-    assert finer.taylor.code.expand == first.taylor.code.expand, "one code serves all orders"
+    assert finer.stepper.taylor.mode.order > first.stepper.taylor.mode.order
+    assert finer.stepper.taylor.code.expand == first.stepper.taylor.code.expand, "one code serves all orders"
 
 
 def test_springs_are_left_to_the_kernels_and_long_eliminations_too():
