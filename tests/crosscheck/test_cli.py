@@ -171,7 +171,7 @@ def test_a_run_that_crashes_and_exit_status_one(capsys, still):
         (["--setting", "noisi"], "did you mean 'noisy'?"),
         (["--engine", "mujco"], "did you mean 'mujoco'?"),
         (["--engine", FAKE, "--setting", "plain", "--option", "secs=1"], "plain has no option 'secs'"),
-        (["--engine", "bullet"], "unknown engine 'bullet'; known: mbref, mujoco, pinocchio, exudyn"),
+        (["--engine", "ode"], "unknown engine 'ode'; known: mbref, mujoco, pinocchio, exudyn"),
         (["--engine", "no_such_module:ENGINE"], "engine 'no_such_module:ENGINE' cannot be loaded"),
     ],
 )  # fmt: skip

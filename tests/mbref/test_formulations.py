@@ -186,7 +186,7 @@ def test_only_coordinates_that_move_are_integrated(stabilisation):
     for formulation in ("alf-dual", "mpi-qr"):
         method = Method.parse(f"{formulation}+{stabilisation}/rk4[step=0.01]")
         run = start_run(scene, method, np.array([0.1]), Limits())
-        run.advance(None)
+        run.stepper.advance(None)
         sizes.append(int(run.memory.loop.clock.y_size))
         turns = run.memory.state.coordinates.reshape(-1, 7)[:, 3:]
         assert np.allclose(np.linalg.norm(turns, axis=1), 1.0, rtol=0, atol=1e-15)

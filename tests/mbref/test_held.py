@@ -127,7 +127,7 @@ def test_what_is_held_cannot_move_at_any_pose_of_the_motion(scene):
     moving, entries = active_entries(run.model, run.start.q, run.start.v)
     found, _ = held_by_rows(run.model, run.start, moving, entries)
     columns = [column for each in found for column in each.columns]
-    run.advance(None)
+    run.stepper.advance(None)
     for q in run.memory.loop.samples.coordinates:
         _, sizes, right = np.linalg.svd(run.model.terms(0.0, q, run.start.v).jacobian)
         null_space = right[np.sum(sizes > 1e-9 * sizes[0]) :]
@@ -151,7 +151,7 @@ MECHANISMS = (*(SCENES[name]() for name in NAMES), RAIL, SLEEVE, WELD, TWO_GUIDE
 def test_accelerations_and_multipliers_satisfy_all_equations_of_motion(scene, method):
     """M q̈ + Φ_qᵀ λ = g in every column, those held too, whose only equation this is."""
     run = start_run(scene, Method.parse(method), np.linspace(0.0, 0.05, 6), Limits())
-    run.advance(None)
+    run.stepper.advance(None)
     for t, q, v, acceleration, multipliers in zip(run.times, *run.memory.loop.samples, strict=True):
         terms = run.model.terms(t, q, v)
         left = terms.mass * acceleration + terms.jacobian.T @ multipliers - terms.force
