@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 
 MOST_NAMES = 256  # whose methods are remembered
 SERIES, SPARSE = "taylor", "alf-dual+projection/dop853"  # the default methods of few and of many bodies
-MOST_BODIES = 40  # with which ``taylor`` is the cheaper method (``benchmarks/default_method.py``)
+MOST_BODIES = 100  # up to here the dense ``taylor`` costs at most about 5 times the sparse method
+# (``benchmarks/default_method.py``); it is worth that, because it crosses singular positions
 SHORT = {
     "kinematic": "alf-dual+projection/predictor",  # Newton–Raphson on Eqs. 1 to 3: integrators/predictor.py
     "ali3-p": "mpi-qr+none/ali3",  # see integrators/ali3.py

@@ -44,7 +44,7 @@ ABOUT = About(
         "The iterates are those of `alf` by the Woodbury identity. A large α costs no digits here, no "
         "rank is decided, and the matrix is factored sparsely."
     ),
-    use="Any mechanism with all masses, redundant or not; the default for more than 40 bodies.",
+    use="Any mechanism with all masses, redundant or not; the default for more than 100 bodies.",
     fails="Bodies without mass or inertia: $M^{-1}$ does not exist.",
 )
 

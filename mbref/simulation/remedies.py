@@ -39,9 +39,10 @@ def _of_singular_matrix(run: Run) -> str:
     massless = [
         body.name for body, m in zip(scene.body, run.model.mass.reshape(-1, 6), strict=True) if not m.all()
     ]
-    if massless and not formulation.handles_singular_mass:
-        return f"body {massless[0]!r} lacks mass or a moment of inertia: {_bearing(mass=True)}"
     found = counts(scene)
+    if massless and not formulation.handles_singular_mass:
+        able = _bearing(mass=True, redundancy=found.redundant > 0)
+        return f"body {massless[0]!r} lacks mass or a moment of inertia: taylor, {able}"
     if found.redundant and not formulation.handles_redundancy:
         return (
             f"constraint rows are redundant ({found.redundant} of {found.rows}): {_bearing(redundancy=True)}"

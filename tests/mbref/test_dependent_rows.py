@@ -5,16 +5,8 @@ import pytest
 
 from mbref import Limits, simulate
 from mbref.scenes import SCENES
-from tests.mbref.test_singular_start import ratio, spherical_loop
 
-
-def spherical() -> object:
-    """A spherical four-bar in motion, far from its flat positions."""
-    k, half = ratio(0.7, 1.1), np.tan(0.25)
-    return spherical_loop(0.7, 1.1, 0.5, (2.0, 2.0 * k * (1 + half**2) / (1 + (k * half) ** 2)))
-
-
-LINKAGES = {"spherical": spherical, "bennett": SCENES["bennett"], "bricard": SCENES["bricard"]}
+LINKAGES = {"bennett": SCENES["bennett"], "bricard": SCENES["bricard"]}
 
 
 @pytest.mark.parametrize(
@@ -23,7 +15,7 @@ LINKAGES = {"spherical": spherical, "bennett": SCENES["bennett"], "bricard": SCE
 @pytest.mark.parametrize("name", LINKAGES)
 def test_redundant_rows_do_not_shorten_steps(name, method):
     """Runs by alf-dual took 63 to 338 steps, by mpi-svd 425 to 784 and as many that were rejected."""
-    times, limits = np.linspace(0.0, 1.0, 6), Limits(rtol=1e-6)
+    times, limits = np.linspace(0.0, 0.7, 6), Limits(rtol=1e-6)  # later Bennett's linkage is flat
     run = simulate(LINKAGES[name](), method, times, limits)
     series = simulate(LINKAGES[name](), "taylor", times, limits)
     assert run.outcome.label == series.outcome.label == "COMPLETED", run.message

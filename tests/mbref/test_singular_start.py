@@ -143,12 +143,12 @@ def test_a_spherical_loop_leaves_the_flat_position(rate, method):
 
 
 def test_rows_are_nearly_dependent_beside_the_flat_position_alone():
-    """A run that began there, two of whose hinges are given at the centre, took rows for nearly dependent to
-    its end, and 200000 steps."""
-    scene = spherical_loop(0.3, 0.6, 2e-5, (2.0, 2.0 * ratio(0.3, 0.6)))
+    """A run that began near it took rows for nearly dependent to its end, and 200000 steps; two of its hinges
+    are given at the centre."""
+    scene = spherical_loop(0.3, 0.6, 1e-4, (2.0, 2.0 * ratio(0.3, 0.6)))
     joints = (
         joint if joint.name in "AC" else joint.model_copy(update={"anchor": (0.0, 0.0, 0.0)})
         for joint in scene.joint
     )
     run = simulate(scene.with_(joint=tuple(joints)), "taylor", [1.0], Limits(rtol=1e-6))
-    assert run.outcome.label == "COMPLETED" and run.cost.steps < 2000, run.message
+    assert run.outcome.label == "COMPLETED" and run.cost.steps < 100, run.message

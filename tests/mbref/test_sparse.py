@@ -182,14 +182,14 @@ def test_counts_of_long_chains_and_their_formulas(loops):
 
 @pytest.mark.parametrize(
     ("name", "end", "method"),
-    [("four_bar_chain[8]", 2.0, "taylor"), ("slider_crank_chain[6]", 0.2, "alf-dual+projection")],
+    [("four_bar_chain[8]", 2.0, "taylor"), ("slider_crank_chain[6]", 0.2, "taylor")],
 )
 def test_large_scene_and_truth_past_singular_positions(name, end, method):
     scene, times = find_scene(name), np.linspace(0.0, end, 11)
     run = simulate(scene, method, times, Limits(rtol=1e-11))
     error = np.abs(run.position - truth_for(scene).poses(times).position).max()
     assert run.outcome.name == "COMPLETED"
-    assert ("singular positions passed" in run.message) == (method == "taylor"), run.message
+    assert ("singular positions passed" in run.message) == name.startswith("four_bar"), run.message
     assert error < 1e-8, f"error {error:.1e}"
 
 

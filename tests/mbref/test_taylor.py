@@ -50,7 +50,7 @@ SCREW = Scene(
 
 
 def largest(arrays):
-    return max(float(np.abs(array).max(initial=0.0)) for array in arrays)
+    return max((float(np.abs(array).max(initial=0.0)) for array in arrays), default=0.0)
 
 
 def assert_alike(a, b, tolerance):
@@ -62,8 +62,9 @@ def assert_alike(a, b, tolerance):
         assert np.abs(one - other).max() <= allowed * max(1.0, np.abs(one).max()), field
     if a.reactions:
         size = largest(a.reactions.values())
-        apart = largest(a.reactions[name] - b.reactions[name] for name in a.reactions)
-        assert apart <= max(tolerance, 1e-5) * size  # of redundant rows α decides the last digits
+        unique = [name for name in a.reactions if not np.any(a.open_reactions[name])]
+        apart = largest(a.reactions[name] - b.reactions[name] for name in unique)
+        assert apart <= max(tolerance, 1e-5) * size  # redundant rows share reactions in another way
 
 
 @pytest.mark.parametrize(
