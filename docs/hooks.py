@@ -26,6 +26,7 @@ from mbref.formulations import FORMULATIONS
 from mbref.scene import JOINT_TYPES, Scene
 
 ROOT = Path(__file__).parents[1]
+PAPER = ROOT / "reports" / "paper"
 LOG = logging.getLogger("mkdocs.hooks.mbref")
 OBLIQUE = View.parse("-60,22")
 MEASURED = ("planar_slider_crank", "spatial_slider_crank", "four_bar")
@@ -72,6 +73,8 @@ def on_files(files: Any, config: Any) -> Any:
     """Adds the figures, and the files of the project that pages link to."""
     for name, picture in figures().items():
         files.append(File.generated(config, f"figures/{name}.svg", content=picture))
+    for path in sorted((PAPER / "figures").glob("*.svg")):
+        files.append(File.generated(config, f"figures/{path.name}", content=path.read_bytes()))
     for path, text in pages().items():
         files.append(File.generated(config, path, content=text))
     for path in sorted(
@@ -116,6 +119,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     markdown = markdown.replace(TABLE, table(FORMULATIONS.values()))
     markdown = re.sub(r"^```run\n(.*?)^```$", _Commands(), markdown, flags=re.S | re.M)
     markdown = re.sub(r"<!-- measured: (.+?) -->", lambda m: measured(m[1].split()), markdown)
+    markdown = markdown.replace("<!-- paper -->", paper())
     up = "../" * page.file.src_uri.count("/")
     for path in _outside(markdown):
         markdown = re.sub(rf"\]\((?:\.\./)+{re.escape(path)}\)", f"]({up}source/{path})", markdown)
@@ -154,6 +158,13 @@ def formulas(markdown: str) -> str:
         )
         parts[i] = re.sub(r"\$([^$\n]+)\$", lambda m: f"<span>{convert(m[1])}</span>", parts[i])
     return "".join(parts)
+
+
+def paper() -> str:
+    """The committed report on the paper without its title, its figures among those of the site."""
+    _, _, text = (PAPER / "report.md").read_text().partition("\n## ")
+    body = text.partition("\n")[2].replace("\n### ", "\n## ")
+    return re.sub(r"\(figures/([\w-]+)\.png\)", r"(figures/\1.svg)", body)
 
 
 class _Commands:

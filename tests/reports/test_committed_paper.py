@@ -1,0 +1,63 @@
+"""The committed page on the paper: its text / its records, rendered again; the page of the site."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from crosscheck.cli import collection
+from crosscheck.paper.cells import CELLS
+from crosscheck.paper.runs import Label, has
+from reports import __main__ as program
+from reports import render
+from reports.sections import paper
+
+FOLDER = Path(__file__).parents[2] / "reports" / "paper"
+HOOKS = Path(__file__).parents[2] / "docs" / "hooks.py"
+
+
+@pytest.fixture(scope="module")
+def records():
+    return collection.stored_paper(FOLDER)
+
+
+def test_text_is_rendered_from_the_records(records):
+    text = render.markdown(paper.render(*records), program.OF_PAPER)
+    kept = (FOLDER / "report.md").read_text()
+    assert text == kept, "crosscheck report --section paper --render reports/paper renews it"
+
+
+def test_every_cell_and_figure_has_its_record(records):
+    missing = [c for c in CELLS if Label(c.table, c.row, c.column) not in records.records]
+    assert not missing, missing
+    text = (FOLDER / "report.md").read_text()
+    for number in (4, 5, 6, 8, *range(11, 17)):
+        assert f"](figures/paper-figure-{number}.png)" in text, number
+        assert (FOLDER / "figures" / f"paper-figure-{number}.png").stat().st_size > 1000, number
+    assert has(records.records, "growth") and has(records.records, "gain")
+
+
+def test_records_are_of_one_clean_commit_and_small(records):
+    commits = {record["commit"] for record in records.records.values()}
+    assert len(commits) == 1 and "+" not in commits.pop(), f"made from a clean checkout: {commits}"
+    assert sum(path.stat().st_size for path in FOLDER.rglob("*") if path.is_file()) < 9e6
+
+
+def test_no_run_ended_at_its_limit(records):
+    """A limit of time says nothing about a method."""
+    ended = [label for label, r in records.records.items() if r["outcome"] in ("TIMED_OUT", "CRASHED")]
+    assert not ended, ended
+
+
+def test_page_of_the_site_has_the_text_of_the_report():
+    pytest.importorskip("mkdocs", reason="the extra docs builds the site")
+    import importlib.util
+
+    found = importlib.util.spec_from_file_location("site_hooks", HOOKS)
+    hooks = importlib.util.module_from_spec(found)
+    found.loader.exec_module(hooks)
+    body, text = hooks.paper(), (FOLDER / "report.md").read_text()
+    assert len(re.findall(r"^\|", body, re.M)) == len(re.findall(r"^\|", text, re.M)) > 100
+    assert "](figures/paper-figure-4.svg)" in body and ".png" not in body
