@@ -88,13 +88,15 @@ def allocating(function: Callable) -> Callable:
 
 
 def _compiled(function: Callable, **options: bool) -> Callable:
-    return function if PLAIN else Helper(function, {**OPTIONS, **options})
+    return function if PLAIN else Helper(function, {**OPTIONS, "cache": False, **options})
 
 
 class Helper:
     """A kernel that other kernels call: numba's dispatcher, made when a kernel is compiled with it.
 
-    Of several hundred helpers a run from the cache asks for few; dispatchers of all take 0.1 s.
+    Of several hundred helpers a run from the cache asks for few; dispatchers of all take 0.1 s.  The disk
+    keeps no helper: numba's index of a helper that was compiled for a type of another program's module
+    cannot be read where that module is missing.
     """
 
     def __init__(self, function: Callable, options: dict[str, bool]):
@@ -111,12 +113,7 @@ class Helper:
 
     @functools.cached_property
     def _dispatcher(self) -> Callable:
-        """A closure is not kept on disk, where numba would not find it again."""
-        kept = self.function.__closure__ is None and is_writable(CACHE)
-        if kept:
-            remove_damaged(CACHE, self.function)
-        with cached_in(CACHE):
-            return njit(**{**self._options, "cache": kept})(self.function)
+        return njit(**self._options)(self.function)
 
 
 class Exchangeable:

@@ -36,6 +36,15 @@ def shifted(x):
 
 print(shifted(3.0))
 """
+FOREIGN = """
+from typing import NamedTuple
+
+class Pair(NamedTuple):
+    first: int
+    second: int
+
+PAIR = Pair(1, 2)
+"""
 SCENE = """
 import sys
 sys.path.insert(0, {root!r})
@@ -216,15 +225,16 @@ def test_compiled_code_is_found_again(tmp_path: Path):
     assert {file: file.stat().st_mtime_ns for file in kept(cache, "*.nbc")} == before != {}
 
 
-def test_a_new_kernel_is_compiled_with_a_kept_one(tmp_path: Path):
-    """Its bitcode is read at that moment: a kernel that is merely called needs machine code alone."""
-    cache = tmp_path / "cache"
-    ran(SMALL_KERNEL, tmp_path, cache)
-    (file,) = kept(cache, "*.shifted*.nbc")
-    file.unlink()
-    assert kept(cache, "*.twice*.nbc")
-    assert ran(SMALL_KERNEL, tmp_path, cache)[0] == "7.0\n"
-    assert file.exists()
+def test_a_helper_compiled_for_a_foreign_type_leaves_the_cache_readable(tmp_path: Path):
+    """The second program lacks the module of the type with which the first one calls a helper."""
+    call = "import sys\nsys.path.insert(0, {root!r})\nfrom mbref.integrators.dop853 import no_stage\n"
+    foreign = f"{call}from foreign import PAIR\nprint(no_stage(0, 0.0, 0.0, 0, 0, 0, PAIR)){SMALL_KERNEL}"
+    for name in ("first", "second"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "first" / "foreign.py").write_text(FOREIGN)
+    assert ran(foreign, tmp_path / "first", tmp_path / "cache")[0] == "0\n7.0\n"
+    own = f"{call}print(no_stage(0, 0.0, 0.0, 0, 0, 0, 0))"
+    assert ran(own, tmp_path / "second", tmp_path / "cache")[0] == "0\n"
 
 
 @pytest.mark.parametrize("damage", [lambda data: data[: len(data) // 2], lambda data: b"\0" * len(data)])
