@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from mbref.trajectory import Cost, Outcome, Trajectory
     from mbref.variation import Variation, variants
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _MODULE_OF = {
     "Cost": "mbref.trajectory",

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from mbref import __version__
 from mbref.cli import main
 from mbref.cli.output import Lines
 from mbref.cli.scene_files import schema, template
@@ -286,7 +287,7 @@ def test_lists_fit_eighty_columns_and_have_every_name(capsys):
 def test_version_and_completion(capsys):
     with pytest.raises(SystemExit, match="0"):
         main(["--version"])
-    assert capsys.readouterr().out.startswith("mbref 0.1.0 (Python 3.")
+    assert capsys.readouterr().out.startswith(f"mbref {__version__} (Python 3.")
     assert main(["completion", "bash"]) == 0
     assert "animate" in capsys.readouterr().out
 

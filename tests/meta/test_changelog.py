@@ -1,0 +1,37 @@
+"""The changelog: one plain line for each change, and a section for the version of the packages."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from mbref import __version__
+
+TEXT = (Path(__file__).parents[2] / "CHANGELOG.md").read_text()
+SECTIONS = re.split(r"^## ", TEXT, flags=re.M)[1:]
+MOST, LONGEST = 60, 125  # entries of a version, characters of an entry
+
+
+def entries(section: str) -> list[str]:
+    """Return the lines of a section that are neither blank nor headings."""
+    return [line for line in section.splitlines()[1:] if line and not line.startswith("### ")]
+
+
+def test_the_newest_section_has_the_version_of_the_packages():
+    assert SECTIONS[0].startswith(f"{__version__}\n"), SECTIONS[0][:20]
+
+
+def test_entries_are_few_single_lines_without_timings():
+    for section in SECTIONS:
+        lines = entries(section)
+        assert 0 < len(lines) <= MOST, f"{section[:6]} has {len(lines)} entries, at most {MOST} are allowed"
+        wrong = [line for line in lines if not line.startswith("- ") or len(line) > LONGEST]
+        assert not wrong, f"one line of at most {LONGEST} characters each: {wrong}"
+        assert not [line for line in lines if re.search(r"\d (ms|µs|s|min)\b", line)], (
+            "timings: docs/speed.md"
+        )
+
+
+def test_headings_are_those_of_keep_a_changelog():
+    found = re.findall(r"^### (.*)$", TEXT, flags=re.M)
+    assert found and set(found) <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
