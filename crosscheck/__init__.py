@@ -44,11 +44,26 @@ _PLACE_OF = {
 }
 
 __all__ = [
-    "METRICS", "Cannot", "Case", "Comparison", "Engine", "Owner", "Setting", "Supports", "Truth", "compare",
+    "METRICS",
+    "Cannot",
+    "Case",
+    "Comparison",
+    "Engine",
+    "Owner",
+    "Setting",
+    "Supports",
+    "Truth",
+    "compare",
     "default_cases",
-    "default_engines", "engine_names", "find_engine", "judge_motion", "measure", "reference_table",
-    "run_study", "truth_for",
-]  # fmt: skip
+    "default_engines",
+    "engine_names",
+    "find_engine",
+    "judge_motion",
+    "measure",
+    "reference_table",
+    "run_study",
+    "truth_for",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -23,11 +23,33 @@ from mbref.scene_fields import meant
 from mbref.trajectory import Cost, Outcome, Trajectory
 
 __all__ = [
-    "ALL", "BUILT_IN", "ENTRY_POINTS", "GENERATORS", "GROUND", "LARGE", "ON_REQUEST", "OPTIONAL", "Cannot",
-    "Cost", "Engine", "Outcome", "Owner", "Scene", "Setting", "Supports", "Trajectory", "all_engines",
-    "default_engines", "engine", "engine_names", "inertia_matrices", "initial_poses", "initial_twists",
-    "installed", "rotations",
-]  # fmt: skip
+    "ALL",
+    "BUILT_IN",
+    "ENTRY_POINTS",
+    "GENERATORS",
+    "GROUND",
+    "LARGE",
+    "ON_REQUEST",
+    "OPTIONAL",
+    "Cannot",
+    "Cost",
+    "Engine",
+    "Outcome",
+    "Owner",
+    "Scene",
+    "Setting",
+    "Supports",
+    "Trajectory",
+    "all_engines",
+    "default_engines",
+    "engine",
+    "engine_names",
+    "inertia_matrices",
+    "initial_poses",
+    "initial_twists",
+    "installed",
+    "rotations",
+]
 
 BRANCHES = "branches"  # the option that chooses branches at singular positions, where an engine has one
 BEST = "tuned"  # the family that is an engine's best, where it has one of that name
@@ -89,8 +111,10 @@ class Supports:
         for driver in scene.driver:
             coordinate = scene.joint_named(driver.joint).facts.driven
             if coordinate not in self.drivers:
-                reasons.append(f"the driver of joint {driver.joint!r} prescribes its {coordinate}, "
-                               "which the adapter does not map")  # fmt: skip
+                reasons.append(
+                    f"the driver of joint {driver.joint!r} prescribes its {coordinate}, "
+                    "which the adapter does not map"
+                )
         reasons += [
             f"load[{k}] is of type {load.type!r}, which the adapter does not map"
             for k, load in enumerate(scene.load)
@@ -116,8 +140,9 @@ class Setting:
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        return self.family + "".join(f" {k}={v:g}" if isinstance(v, float) else f" {k}={v}"
-                                     for k, v in self.options.items())  # fmt: skip
+        return self.family + "".join(
+            f" {k}={v:g}" if isinstance(v, float) else f" {k}={v}" for k, v in self.options.items()
+        )
 
 
 def best_family(settings: Sequence[Setting]) -> list[Setting]:

@@ -25,7 +25,7 @@ from crosscheck.cli.running import (
     notice,
     print_json,
     studied,
-)  # fmt: skip
+)
 from crosscheck.study.grid import Record, key, made_by
 from crosscheck.study.progress import counted
 from mbref.scene import SceneError

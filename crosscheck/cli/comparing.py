@@ -8,15 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from crosscheck.cli import request, tables
 from crosscheck.cli.comparison import WIDTH, comparisons
 from crosscheck.cli.request import Choice, RequestError
-from crosscheck.cli.running import (
-    COMPLETED,
-    OTHERWISE,
-    asked_of,
-    console,
-    missing_truths,
-    notice,
-    print_json,
-)  # fmt: skip
+from crosscheck.cli.running import COMPLETED, OTHERWISE, asked_of, console, missing_truths, notice, print_json
 from crosscheck.engine import engine
 from crosscheck.study import sweep
 from crosscheck.study.command import command
@@ -35,11 +27,15 @@ def compare(arguments: argparse.Namespace) -> int:
     if arguments.repeats < REPEATS:
         raise RequestError(f"--repeats: must be at least {REPEATS}, got {arguments.repeats}")
     asked = asked_of(arguments, sweep.QUICK_SAMPLES)
-    wanted = Wanted(asked.times, arguments.reference_time, asked.chosen.is_quick, None, arguments.repeats,
-                    asked.chosen.is_named)  # fmt: skip
-    found = collected(
-        asked.scenes, asked.engines, wanted, lambda: request.plan(*asked, notice), notice
-    )  # fmt: skip
+    wanted = Wanted(
+        asked.times,
+        arguments.reference_time,
+        asked.chosen.is_quick,
+        None,
+        arguments.repeats,
+        asked.chosen.is_named,
+    )
+    found = collected(asked.scenes, asked.engines, wanted, lambda: request.plan(*asked, notice), notice)
     paths = {request.find_scenes([path])[0].name: path for path in arguments.scene}
     compared = comparisons(found, paths, arguments.reference_time)
     for comparison in compared:

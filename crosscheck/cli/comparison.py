@@ -84,9 +84,14 @@ class Comparison:
     def document(self) -> dict[str, Any]:
         """Return the document of `crosscheck compare --json`."""
         truth = {name: self.judged.truth[name] for name in TRUTH}
-        return {"scene": self.judged.scene.name, "records": [public(r) for r in self.records],
-                "verdict": self.verdict._asdict(), "truth": truth, "difference": self.difference,
-                "differences": dict(self.judged.differences)}  # fmt: skip
+        return {
+            "scene": self.judged.scene.name,
+            "records": [public(r) for r in self.records],
+            "verdict": self.verdict._asdict(),
+            "truth": truth,
+            "difference": self.difference,
+            "differences": dict(self.judged.differences),
+        }
 
     def save(self, path: str | Path) -> None:
         """Write ``document`` as JSON.
@@ -114,12 +119,18 @@ class Comparison:
 
 
 def compare(
-    scene: Scene | str | Path, engines: str | Sequence[str] | None = None, *,
+    scene: Scene | str | Path,
+    engines: str | Sequence[str] | None = None,
+    *,
     families: str | Sequence[str] | None = None,
-    depth: str = "quick", duration: float | None = None, samples: int = sweep.QUICK_SAMPLES,
-    time_limit: float | None = None, reference_time: float = SECONDS, out: str | Path | None = None,
+    depth: str = "quick",
+    duration: float | None = None,
+    samples: int = sweep.QUICK_SAMPLES,
+    time_limit: float | None = None,
+    reference_time: float = SECONDS,
+    out: str | Path | None = None,
     notice: Notice | None = None,
-) -> Comparison:  # fmt: skip
+) -> Comparison:
     """Compare engines on a mechanism, as `crosscheck compare` does.
 
     Parameters
@@ -162,10 +173,12 @@ def compare(
     limit = time_limit or (sweep.QUICK_LIMIT if is_quick else TIME_LIMIT)
     chosen = Choice(_several(families), is_quick=is_quick)
     found = collected(
-        [lasting], names,
+        [lasting],
+        names,
         Wanted(times, reference_time, is_quick, None if out is None else Path(out), is_named=chosen.is_named),
-        lambda: request.plan([lasting], names, chosen, times, limit, tell), tell,
-    )  # fmt: skip
+        lambda: request.plan([lasting], names, chosen, times, limit, tell),
+        tell,
+    )
     path = f"{given.name}.toml" if isinstance(scene, Scene) else str(scene)
     return comparisons(found, {lasting.name: path}, reference_time)[0]
 
@@ -194,10 +207,16 @@ def comparisons(found: Collection, paths: dict[str, str], reference_time: float)
 
 def _row(record: Record) -> Row:
     return {
-        "engine": record["engine"], "family": record["family"], "settings": record["asked"]["options"],
-        "verdict": str(grade(record)), "outcome": record["outcome"], "t_end": record["t_end"],
-        **record["metrics"], "seconds": record["cost"]["seconds"], "steps": record["cost"]["steps"],
-    }  # fmt: skip
+        "engine": record["engine"],
+        "family": record["family"],
+        "settings": record["asked"]["options"],
+        "verdict": str(grade(record)),
+        "outcome": record["outcome"],
+        "t_end": record["t_end"],
+        **record["metrics"],
+        "seconds": record["cost"]["seconds"],
+        "steps": record["cost"]["steps"],
+    }
 
 
 def _silent(sentence: str) -> None:

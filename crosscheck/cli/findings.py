@@ -17,8 +17,11 @@ from mbref.scene_fields import meant
 def chosen(names: Sequence[str]) -> list[Finding]:
     """The findings of those names, or all; RequestError for an unknown name."""
     known = {found.name: found for found in findings()}
-    if faults := [f"unknown finding {name!r}; known: {', '.join(known)}{meant(name, known)}"
-                  for name in names if name not in known]:  # fmt: skip
+    if faults := [
+        f"unknown finding {name!r}; known: {', '.join(known)}{meant(name, known)}"
+        for name in names
+        if name not in known
+    ]:
         raise RequestError(*faults)
     return [known[name] for name in names or known]
 

@@ -40,9 +40,12 @@ def add_selection(parser: argparse.ArgumentParser) -> None:
         "depth these two or the first two, else all (`crosscheck list settings`)",
     )
     parser.add_argument(
-        "--option", action="append", type=_option, metavar="NAME=VALUE",
+        "--option",
+        action="append",
+        type=_option,
+        metavar="NAME=VALUE",
         help="an option of the one engine and family named, instead of its sweep; may repeat",
-    )  # fmt: skip
+    )
     add_depth(parser)
     when = parser.add_mutually_exclusive_group()
     when.add_argument("--times", type=numbers, metavar="a,b,c", help="sample times (s), increasing")
@@ -57,18 +60,22 @@ def add_selection(parser: argparse.ArgumentParser) -> None:
 def add_engines(parser: argparse.ArgumentParser) -> None:
     """The engines that run."""
     parser.add_argument(
-        "--engine", action="append", metavar="E",
+        "--engine",
+        action="append",
+        metavar="E",
         help=f"{', '.join(engine_names())}, or {ALL} for every installed one; may repeat; "
         f"default: all but {', '.join(ON_REQUEST)}",
-    )  # fmt: skip
+    )
 
 
 def add_depth(parser: argparse.ArgumentParser) -> None:
     """Add the option for the number of settings of each engine."""
     parser.add_argument(
-        "--depth", choices=("quick", "whole"), default="quick",
+        "--depth",
+        choices=("quick", "whole"),
+        default="quick",
         help="quick: a few families of an engine and three settings of a family; whole: every setting",
-    )  # fmt: skip
+    )
 
 
 def _option(text: str) -> tuple[str, Any]:
@@ -105,9 +112,12 @@ def add_limits(parser: argparse.ArgumentParser, time_limit: float | None = TIME_
     on the depth."""
     default = f"{time_limit:g}" if time_limit else f"{QUICK_LIMIT:g} at quick depth, {TIME_LIMIT:g} else"
     parser.add_argument(
-        "--time-limit", type=positive, default=time_limit, metavar="T",
+        "--time-limit",
+        type=positive,
+        default=time_limit,
+        metavar="T",
         help=f"CPU seconds a run may take, and seconds it may wait without computing; default: {default}",
-    )  # fmt: skip
+    )
     add_reference_time(parser)
     parser.add_argument("--json", action="store_true", help="print records as JSON on standard output")
 

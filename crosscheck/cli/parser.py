@@ -43,9 +43,11 @@ EXIT = (
 def parser() -> argparse.ArgumentParser:
     """The parser; its result has the name of the command as ``command``."""
     found = Parser(
-        prog="crosscheck", description="The same mechanism in several engines, against truth.",
-        epilog=FIRST + fill(EXIT, 79), formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
+        prog="crosscheck",
+        description="The same mechanism in several engines, against truth.",
+        epilog=FIRST + fill(EXIT, 79),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     found.add_argument(
         "--version", action="store_true", help="print the versions of crosscheck and the engines"
     )
@@ -70,9 +72,13 @@ def parser() -> argparse.ArgumentParser:
 
 def _add(commands: Commands, name: str, about: str, example: str) -> argparse.ArgumentParser:
     return commands.add_parser(
-        name, help=about, description=fill(about, 79), epilog=f"example:\n  {example}", allow_abbrev=False,
+        name,
+        help=about,
+        description=fill(about, 79),
+        epilog=f"example:\n  {example}",
+        allow_abbrev=False,
         formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
+    )
 
 
 def _add_certify(commands: Commands) -> None:
@@ -96,13 +102,19 @@ def _add_judge(commands: Commands) -> None:
     parser.add_argument("scene", metavar="SCENE", help="a built-in name or a .toml file")
     parser.add_argument("table", metavar="TABLE", help="a table with a column of times, such as run.csv")
     parser.add_argument(
-        "--column", action="append", default=[], metavar="NAME=PLACE[:UNIT]",
+        "--column",
+        action="append",
+        default=[],
+        metavar="NAME=PLACE[:UNIT]",
         help="a column of the scene or `time`, and its number (from 1) or header in the table; may repeat",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--unit", action="append", default=[], metavar="U",
+        "--unit",
+        action="append",
+        default=[],
+        metavar="U",
         help="unit of all columns of its quantity, such as mm, deg, mm/s or rpm; may repeat; default: SI",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--quaternion", choices=("wxyz", "xyzw"), default="wxyz", help="order of quaternion columns"
     )
@@ -202,9 +214,11 @@ def _add_report(commands: Commands) -> None:
     about = "make the missing records and render the report; resumes where it was interrupted"
     parser = _add(commands, "report", about, example)
     parser.add_argument(
-        "scene", nargs="*", metavar="SCENE",
+        "scene",
+        nargs="*",
+        metavar="SCENE",
         help="built-in scenes or .toml files; default: five short built-in ones, at whole depth all of them",
-    )  # fmt: skip
+    )
     add_engines(parser)
     add_depth(parser)
     parser.add_argument(
@@ -229,9 +243,11 @@ def _add_paper(commands: Commands) -> None:
     )
     parser = _add(commands, "paper", about, example)
     parser.add_argument(
-        "--depth", choices=("quick", "whole"), default="quick",
+        "--depth",
+        choices=("quick", "whole"),
+        default="quick",
         help="quick: the tables and figures; whole: also the sweeps of settings and every pair of methods",
-    )  # fmt: skip
+    )
     parser.add_argument("--out", default="paper", metavar="DIR", help="folder to write (default: paper)")
 
 

@@ -146,8 +146,10 @@ def _print_verdict(console: Console, said: Verdict) -> None:
 
 def _counts(group: Judged) -> str:
     counts = group.scene.counts()
-    return (f"bodies: {len(group.scene.body)}, degrees of freedom: {counts.degrees_of_freedom}, constraint "
-            f"rows: {counts.rows}, of which redundant: {counts.redundant}")  # fmt: skip
+    return (
+        f"bodies: {len(group.scene.body)}, degrees of freedom: {counts.degrees_of_freedom}, constraint "
+        f"rows: {counts.rows}, of which redundant: {counts.redundant}"
+    )
 
 
 def _print_best(console: Console, group: Judged) -> None:
@@ -173,8 +175,9 @@ def _print_advice(console: Console, group: Judged, path: str) -> None:
 
 
 def _options(record: Record) -> str:
-    return ", ".join(f"{k}={v:g}" if isinstance(v, float) else f"{k}={v}"
-                     for k, v in record["asked"]["options"].items())  # fmt: skip
+    return ", ".join(
+        f"{k}={v:g}" if isinstance(v, float) else f"{k}={v}" for k, v in record["asked"]["options"].items()
+    )
 
 
 def _graded(group: Judged, record: Record) -> str:
@@ -244,6 +247,12 @@ def _table(title: str, header: Sequence[str], words: int = TEXT_COLUMNS) -> Tabl
     for i, name in enumerate(header):
         width = SETTINGS_WIDTH if name == "settings" else 0 if i < words else NUMBER_WIDTH
         side: Literal["left", "right"] = "left" if i < words else "right"
-        table.add_column(name, justify=side, overflow="fold", no_wrap=i >= words, min_width=width,
-                         max_width=OUTCOME_WIDTH if name in ("outcome", "verdict") else None)  # fmt: skip
+        table.add_column(
+            name,
+            justify=side,
+            overflow="fold",
+            no_wrap=i >= words,
+            min_width=width,
+            max_width=OUTCOME_WIDTH if name in ("outcome", "verdict") else None,
+        )
     return table

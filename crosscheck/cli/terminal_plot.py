@@ -41,9 +41,11 @@ def _range(values: Sequence[float]) -> tuple[float, float]:
 
 
 def _framed(
-    grid: Sequence[Sequence[str]], across: tuple[float, float], up: tuple[float, float],
+    grid: Sequence[Sequence[str]],
+    across: tuple[float, float],
+    up: tuple[float, float],
     names: Mapping[str, tuple[str, str]],
-) -> Text:  # fmt: skip
+) -> Text:
     engines = list(dict.fromkeys(engine for engine, _ in names.values()))
     colours = {mark: COLOURS[engines.index(engine) % len(COLOURS)] for mark, (engine, _) in names.items()}
     text = Text("time (s)\n")

@@ -84,8 +84,9 @@ def rounded_platform(rng: Rng) -> Scene:
     top = rod("top", feet[0] + up, feet[2] + up, rng)
     pins = [hinge(f"L{k}", "ground", f"leg{k}", foot) for k, foot in enumerate(feet)]
     pins += [hinge(f"T{k}", f"leg{k}", "top", triple(foot + up)) for k, foot in enumerate(feet)]
-    scene = Scene(name="rounded_platform", gravity=(0.0, -9.81, 0.0), duration=0.4, body=(*legs, top),
-                  joint=tuple(pins))  # fmt: skip
+    scene = Scene(
+        name="rounded_platform", gravity=(0.0, -9.81, 0.0), duration=0.4, body=(*legs, top), joint=tuple(pins)
+    )
     return turned(rng, scene)
 
 

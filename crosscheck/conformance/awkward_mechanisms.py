@@ -122,9 +122,12 @@ def stiff_dampers(rng: Rng) -> Scene:
     places[:, :2] += 0.03 * rng.normal(size=(4, 2))
     stiffness = 10.0 ** rng.uniform(4, 6)
     spring = Spring(
-        bodies=("bar0", "bar2"), points=((0.05, 0.15, 0.0), (0.65, 0.2, 0.0)), stiffness=stiffness,
-        damping=100 * 2 * math.sqrt(stiffness), natural_length=0.55,
-    )  # fmt: skip
+        bodies=("bar0", "bar2"),
+        points=((0.05, 0.15, 0.0), (0.65, 0.2, 0.0)),
+        stiffness=stiffness,
+        damping=100 * 2 * math.sqrt(stiffness),
+        natural_length=0.55,
+    )
     base = linkage("stiff_dampers", [triple(p) for p in places])
     return turned(rng, base.with_(load=(spring,), duration=1.0))
 
@@ -145,8 +148,14 @@ def stiff_chain(rng: Rng) -> Scene:
         TorsionSpring(joint=f"R{k}", stiffness=10.0 * c, damping=c, natural_angle=0.4)
         for k, c in enumerate(dampings)
     ]
-    return Scene(name="stiff_chain", gravity=DOWN, duration=2.0, body=tuple(bodies), joint=tuple(joints),
-                 load=tuple(loads))  # fmt: skip
+    return Scene(
+        name="stiff_chain",
+        gravity=DOWN,
+        duration=2.0,
+        body=tuple(bodies),
+        joint=tuple(joints),
+        load=tuple(loads),
+    )
 
 
 def mass_ratios(rng: Rng) -> Scene:
@@ -164,12 +173,17 @@ def millimetres(rng: Rng) -> Scene:
     b = np.array([crank * math.cos(angle), crank * math.sin(angle), 0.0])
     c = np.array([b[0] + math.sqrt(length**2 - b[1] ** 2), 0.0, 0.0])
     a, b, c = far, far + b, far + c
-    bodies = (bar("crank", a, b, 2e-4), bar("rod", b, c, 5e-4),
-              Body(name="slider", mass=1e-3, inertia=(0.1, 0.1, 0.1), position=triple(c)))  # fmt: skip
+    bodies = (
+        bar("crank", a, b, 2e-4),
+        bar("rod", b, c, 5e-4),
+        Body(name="slider", mass=1e-3, inertia=(0.1, 0.1, 0.1), position=triple(c)),
+    )
     joints = (
-        hinge("A", "ground", "crank", a), hinge("B", "crank", "rod", b), hinge("C", "rod", "slider", c),
+        hinge("A", "ground", "crank", a),
+        hinge("B", "crank", "rod", b),
+        hinge("C", "rod", "slider", c),
         Translational(name="D", bodies=("slider", "ground"), anchor=triple(c), axis=(1.0, 0.0, 0.0)),
-    )  # fmt: skip
+    )
     push = Moment(body="crank", moment=(0.0, 0.0, float(rng.uniform(5, 20))))
     scene = Scene(name="millimetres", gravity=(0.0, -9810.0, 0.0), duration=0.3, body=bodies, joint=joints)
     return scene.with_(load=(push,))
@@ -199,10 +213,22 @@ def phased_slide(rng: Rng) -> Scene:
     bob = rod("bob", (0, 0, 0), 0.5 * direction(rng), rng)
     slide = Translational(name="J0", bodies=names[:2], anchor=(0.0, 0.0, 0.0), axis=triple(axis))
     cross = joint("U", "universal", names[1:], (0.0, 0.0, 0.0), direction(rng))
-    spring = Spring(bodies=("ground", "bob"), points=((0.7, 0.5, 0.3), bob.position), stiffness=80.0,
-                    damping=1.0, natural_length=0.3)  # fmt: skip
-    return Scene(name="phased_slide", gravity=DOWN, duration=0.5, body=(cart, bob), joint=(slide, cross),
-                 driver=(wave(rng, 0.2),), load=(spring,))  # fmt: skip
+    spring = Spring(
+        bodies=("ground", "bob"),
+        points=((0.7, 0.5, 0.3), bob.position),
+        stiffness=80.0,
+        damping=1.0,
+        natural_length=0.3,
+    )
+    return Scene(
+        name="phased_slide",
+        gravity=DOWN,
+        duration=0.5,
+        body=(cart, bob),
+        joint=(slide, cross),
+        driver=(wave(rng, 0.2),),
+        load=(spring,),
+    )
 
 
 # --- many bodies -------------------------------------------------------------------------------------------
@@ -222,10 +248,21 @@ def chain_of_twenty(rng: Rng) -> Scene:
         )
         for k in range(20)
     ]
-    spring = Spring(bodies=("b19", "ground"), points=(triple(points[-1]), (0.5, 0.5, -2.0)), stiffness=50.0,
-                    damping=2.0, natural_length=0.4)  # fmt: skip
-    return Scene(name="chain_of_twenty", gravity=DOWN, duration=0.3, body=tuple(bodies), joint=tuple(joints),
-                 load=(spring,))  # fmt: skip
+    spring = Spring(
+        bodies=("b19", "ground"),
+        points=(triple(points[-1]), (0.5, 0.5, -2.0)),
+        stiffness=50.0,
+        damping=2.0,
+        natural_length=0.4,
+    )
+    return Scene(
+        name="chain_of_twenty",
+        gravity=DOWN,
+        duration=0.3,
+        body=tuple(bodies),
+        joint=tuple(joints),
+        load=(spring,),
+    )
 
 
 def every_load(rng: Rng) -> Scene:
@@ -236,23 +273,46 @@ def every_load(rng: Rng) -> Scene:
     loads = (
         Moment(body="link1", moment=triple(rng.normal(size=3))),
         Force(body="link2", point=scene.body[2].position, force=triple(3 * rng.normal(size=3))),
-        Spring(bodies=("link1", "free"), points=(scene.body[1].position, (0.55, 1.0, 0.5)), stiffness=60.0,
-               damping=1.5, natural_length=0.4),
+        Spring(
+            bodies=("link1", "free"),
+            points=(scene.body[1].position, (0.55, 1.0, 0.5)),
+            stiffness=60.0,
+            damping=1.5,
+            natural_length=0.4,
+        ),
         TorsionSpring(joint="J0", stiffness=4.0, damping=0.2, natural_angle=-0.3),
         TorsionSpring(joint="J2", stiffness=2.0, damping=0.1, natural_angle=0.5),
-    )  # fmt: skip
+    )
     return scene.with_(body=(*scene.body, free), load=loads)
 
 
 AWKWARD: dict[str, Callable[[Rng], Scene]] = {
     make.__name__: make
     for make in (
-        fast_top, gimbal, tumbling_chain, thin_links, stiff_dampers, stiff_chain, mass_ratios, millimetres,
-        phased_crank, phased_slide, rccc, universal_loop, planar_loop, rounded_door, rounded_platform,
-        pushed_dead_centre, nearly_folding, nearly_parallel, two_straight, locking, chain_of_twenty,
+        fast_top,
+        gimbal,
+        tumbling_chain,
+        thin_links,
+        stiff_dampers,
+        stiff_chain,
+        mass_ratios,
+        millimetres,
+        phased_crank,
+        phased_slide,
+        rccc,
+        universal_loop,
+        planar_loop,
+        rounded_door,
+        rounded_platform,
+        pushed_dead_centre,
+        nearly_folding,
+        nearly_parallel,
+        two_straight,
+        locking,
+        chain_of_twenty,
         every_load,
     )
-}  # fmt: skip
+}
 
 
 def awkward(name: str, seed: int) -> Scene:

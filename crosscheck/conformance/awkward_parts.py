@@ -59,9 +59,11 @@ def rod(name: str, start: Place, stop: Place, rng: Rng, thickness: float = 0.05)
     turn = rotations.to_matrix(rotations.from_vector(0.2 * rng.normal(size=3)))
     inertia = mass * length**2 / 12 * (turn @ across @ turn.T)
     return Body(
-        name=name, mass=mass, position=triple(np.add(start, stop) / 2),
+        name=name,
+        mass=mass,
+        position=triple(np.add(start, stop) / 2),
         inertia=rows((inertia + inertia.T) / 2),
-    )  # fmt: skip
+    )
 
 
 def ring(rng: Rng, name: str, kinds: Sequence[str], axes: Sequence[np.ndarray], points: np.ndarray) -> Scene:
@@ -94,11 +96,15 @@ def slider_crank(angle: float, crank: float, length: float) -> Scene:
     """A planar slider-crank with its crank at an angle."""
     b = np.array([crank * math.cos(angle), crank * math.sin(angle), 0.0])
     c = np.array([b[0] + math.sqrt(length**2 - b[1] ** 2), 0.0, 0.0])
-    bodies = (bar("crank", (0, 0, 0), triple(b)), bar("rod", triple(b), triple(c)),
-              Body(name="slider", mass=2.0, inertia=(0.01, 0.01, 0.01), position=triple(c)))  # fmt: skip
+    bodies = (
+        bar("crank", (0, 0, 0), triple(b)),
+        bar("rod", triple(b), triple(c)),
+        Body(name="slider", mass=2.0, inertia=(0.01, 0.01, 0.01), position=triple(c)),
+    )
     joints = (
-        hinge("A", "ground", "crank", (0, 0, 0)), hinge("B", "crank", "rod", b),
+        hinge("A", "ground", "crank", (0, 0, 0)),
+        hinge("B", "crank", "rod", b),
         Spherical(name="C", bodies=("rod", "slider"), anchor=triple(c)),
         Translational(name="D", bodies=("slider", "ground"), anchor=triple(c), axis=(1.0, 0.0, 0.0)),
-    )  # fmt: skip
+    )
     return Scene(name="slider_crank", gravity=(0.0, -9.81, 0.0), duration=0.3, body=bodies, joint=joints)

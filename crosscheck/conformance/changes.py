@@ -41,10 +41,15 @@ def nudged(scene: Scene, rounding: float = ROUNDING) -> Scene:
         return None if values is None else tuple(factor * x for x in values)
 
     bodies = [
-        body.model_copy(update={"mass": body.mass and factor * body.mass, "position": grown(body.position),
-                                "velocity": grown(body.velocity)})
+        body.model_copy(
+            update={
+                "mass": body.mass and factor * body.mass,
+                "position": grown(body.position),
+                "velocity": grown(body.velocity),
+            }
+        )
         for body in scene.body
-    ]  # fmt: skip
+    ]
     return scene.with_(body=tuple(bodies), gravity=grown(scene.gravity))
 
 

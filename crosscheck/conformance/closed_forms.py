@@ -62,8 +62,13 @@ def oscillator() -> tuple[Scene, Exact]:
     stiffness, damping, length, start = 50.0, 3.0, 0.5, 0.8
     joint = Translational(name="slide", bodies=("ground", "body"), anchor=ORIGIN, axis=X)
     place = (start, 0.0, 0.0)
-    spring = Spring(bodies=("ground", "body"), points=(ORIGIN, place), stiffness=stiffness, damping=damping,
-                    natural_length=length)  # fmt: skip
+    spring = Spring(
+        bodies=("ground", "body"),
+        points=(ORIGIN, place),
+        stiffness=stiffness,
+        damping=damping,
+        natural_length=length,
+    )
     scene = Scene(name="oscillator", duration=0.8, body=(_body(place),), joint=(joint,), load=(spring,))
 
     def exact(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -93,8 +98,9 @@ def driven() -> tuple[Scene, Exact]:
     driver = Driver(joint="pivot", polynomial=(0.0, 1.0, -0.5), sine=Sine(amplitude=0.3, frequency=5.0))
     place = (ARM, 0.0, 0.0)
     joint = Revolute(name="pivot", bodies=("ground", "body"), anchor=ORIGIN, axis=Z)
-    scene = Scene(name="driven", gravity=DOWN, duration=0.8, body=(_body(place),), joint=(joint,),
-                  driver=(driver,))  # fmt: skip
+    scene = Scene(
+        name="driven", gravity=DOWN, duration=0.8, body=(_body(place),), joint=(joint,), driver=(driver,)
+    )
 
     def exact(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return _swung(t - 0.5 * t**2 + 0.3 * np.sin(5.0 * t), place)
@@ -107,8 +113,14 @@ def turntable() -> tuple[Scene, Exact]:
     driver = Driver(joint="pivot", polynomial=(0.0, 1.5, 2.0))
     place = (ARM, 0.0, 0.0)
     joint = Revolute(name="pivot", bodies=("ground", "body"), anchor=ORIGIN, axis=Z)
-    scene = Scene(name="turntable", gravity=(0.0, 0.0, -9.81), duration=0.8, body=(_body(place),),
-                  joint=(joint,), driver=(driver,))  # fmt: skip
+    scene = Scene(
+        name="turntable",
+        gravity=(0.0, 0.0, -9.81),
+        duration=0.8,
+        body=(_body(place),),
+        joint=(joint,),
+        driver=(driver,),
+    )
 
     def exact(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return _swung(1.5 * t + 2.0 * t**2, place)

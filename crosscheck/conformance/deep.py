@@ -94,13 +94,24 @@ class Tally:
     def to_record(self) -> dict[str, Any]:
         """The counts as JSON."""
         cards = {
-            name: {"card": card_of(name), "about": about(name), **counts,
-                   "worst": self.worst.get(name, (0.0, ""))}
+            name: {
+                "card": card_of(name),
+                "about": about(name),
+                **counts,
+                "worst": self.worst.get(name, (0.0, "")),
+            }
             for name, counts in self.counts.items()
-        }  # fmt: skip
-        return {"engine": self.plan.engine, "version": self.version, "family": self.plan.family,
-                "mechanisms": self.plan.mechanisms, "first_seed": self.plan.first, "seeds": self.seeds,
-                "cards": cards, "violations": self.violations}  # fmt: skip
+        }
+        return {
+            "engine": self.plan.engine,
+            "version": self.version,
+            "family": self.plan.family,
+            "mechanisms": self.plan.mechanisms,
+            "first_seed": self.plan.first,
+            "seeds": self.seeds,
+            "cards": cards,
+            "violations": self.violations,
+        }
 
 
 def card_of(name: str) -> str:

@@ -32,9 +32,11 @@ def mechanism(seed: int) -> Scene:
     scene = random_mechanism(seed)
     gravity = rng.normal(size=3)
     scene = scene.with_(
-        name=f"drawn_{seed}", gravity=triple(9.81 * gravity / np.linalg.norm(gravity)), duration=DURATION,
+        name=f"drawn_{seed}",
+        gravity=triple(9.81 * gravity / np.linalg.norm(gravity)),
+        duration=DURATION,
         load=(*scene.load, *_torsion(scene, rng)),
-    )  # fmt: skip
+    )
     return _driven(scene, rng) if seed % 2 else _undamped(scene)
 
 
@@ -57,15 +59,24 @@ def rotor(seed: int) -> Scene:
     base = random_mechanism(seed)
     axis = rng.normal(size=3)
     names = [GROUND, *(body.name for body in base.body[: rng.integers(1, 5)])]
-    hinge = Revolute(name="hinge", bodies=(GROUND, names[1]), anchor=triple(rng.normal(size=3)),
-                     axis=triple(axis))  # fmt: skip
-    welds = [Fixed(name=f"weld {b}", bodies=(a, b), anchor=triple(rng.normal(size=3)))
-             for a, b in pairwise(names[1:])]  # fmt: skip
+    hinge = Revolute(
+        name="hinge", bodies=(GROUND, names[1]), anchor=triple(rng.normal(size=3)), axis=triple(axis)
+    )
+    welds = [
+        Fixed(name=f"weld {b}", bodies=(a, b), anchor=triple(rng.normal(size=3)))
+        for a, b in pairwise(names[1:])
+    ]
     still = [replaced(body, velocity=None, angular_velocity=None) for body in base.body[: len(names) - 1]]
     driver = Driver(joint="hinge", polynomial=(0.0, *rng.uniform(-3, 3, 2).tolist()))
     gravity = 9.81 * axis / np.linalg.norm(axis)
-    return Scene(name=f"rotor_{seed}", gravity=triple(gravity), duration=DURATION, body=tuple(still),
-                 joint=(hinge, *welds), driver=(driver,))  # fmt: skip
+    return Scene(
+        name=f"rotor_{seed}",
+        gravity=triple(gravity),
+        duration=DURATION,
+        body=tuple(still),
+        joint=(hinge, *welds),
+        driver=(driver,),
+    )
 
 
 def without_masses(seed: int) -> Scene:
@@ -91,8 +102,7 @@ def _torsion(scene: Scene, rng: np.random.Generator) -> Iterator[TorsionSpring]:
     if joints and rng.random() < 2 / 3:
         joint = str(rng.choice(joints))
         stiffness, damping, angle = rng.uniform((1.0, 0.0, -1.0), (9.0, 0.2, 1.0)).tolist()
-        yield TorsionSpring(joint=joint, stiffness=stiffness, damping=damping,
-                            natural_angle=angle)  # fmt: skip
+        yield TorsionSpring(joint=joint, stiffness=stiffness, damping=damping, natural_angle=angle)
 
 
 def _driven(scene: Scene, rng: np.random.Generator) -> Scene:

@@ -27,9 +27,12 @@ PIVOT, PLACE, LINK = (0.0, 0.0, 0.0), (0.3, -0.2, 0.1), ("ground", "body")
 AXIS = (0.2, 0.1, 1.0)
 INERTIA = ((0.02, 0.002, -0.001), (0.002, 0.03, 0.003), (-0.001, 0.003, 0.025))
 BODY = Body(
-    name="body", mass=1.5, inertia=INERTIA, position=PLACE,
+    name="body",
+    mass=1.5,
+    inertia=INERTIA,
+    position=PLACE,
     orientation=tuple(rotations.from_vector(np.array([0.3, -0.2, 0.5])).tolist()),
-)  # fmt: skip
+)
 ACROSS = (1.0, -1.0, 0.5)  # axis of joints without rotation, along which the body can fall
 PLACES = {"anchor": PIVOT, "anchors": (PIVOT, (0.4, -0.1, 0.1)), "axes": ((0.0, 0.0, 1.0), (1.0, 0.3, 0.0))}
 JOINTS: Mapping[str, Joint] = {
@@ -40,10 +43,15 @@ PIVOTED, TURNS = JOINTS["revolute"], JOINTS["cylindrical"]
 LOADS: Mapping[str, Load] = {
     "moment": Moment(body="body", moment=(0.3, 0.2, -0.4)),
     "force": Force(body="body", point=(0.5, -0.1, 0.2), force=(1.0, -2.0, 3.0)),
-    "spring": Spring(bodies=LINK, points=((0.0, 0.8, 0.0), (0.4, -0.1, 0.1)), stiffness=30.0, damping=0.5,
-                     natural_length=0.5),
+    "spring": Spring(
+        bodies=LINK,
+        points=((0.0, 0.8, 0.0), (0.4, -0.1, 0.1)),
+        stiffness=30.0,
+        damping=0.5,
+        natural_length=0.5,
+    ),
     "torsion_spring": TorsionSpring(joint="J", stiffness=4.0, damping=0.1, natural_angle=0.4),
-}  # fmt: skip
+}
 POLYNOMIAL, WAVE = (0.0, 0.8, -0.5), Sine(amplitude=0.2, frequency=6.0)
 DRIVERS = {
     name: Driver(joint="J", polynomial=POLYNOMIAL, sine=WAVE)
@@ -92,8 +100,15 @@ def _carrier(load: Load) -> Joint:
 
 
 def _probe(name: str, *joint: Joint, driver: tuple[Driver, ...] = (), load: tuple[Load, ...] = ()) -> Scene:
-    return Scene(name=name, gravity=(0.0, -9.81, 0.0), duration=0.2, body=(BODY,), joint=joint,
-                 driver=driver, load=load)  # fmt: skip
+    return Scene(
+        name=name,
+        gravity=(0.0, -9.81, 0.0),
+        duration=0.2,
+        body=(BODY,),
+        joint=joint,
+        driver=driver,
+        load=load,
+    )
 
 
 def _short(name: str, duration: float) -> Scene:

@@ -88,10 +88,11 @@ def _without_bodies(scene: Scene) -> list[Callable[[], Scene]]:
         joints = tuple(filter(kept, scene.joint))
         names = {joint.name for joint in joints}
         return scene.with_(
-            body=tuple(body for body in scene.body if body.name != name), joint=joints,
+            body=tuple(body for body in scene.body if body.name != name),
+            joint=joints,
             driver=tuple(d for d in scene.driver if d.joint in names),
             load=tuple(x for x in scene.load if kept(x) and getattr(x, "joint", None) in (*names, None)),
-        )  # fmt: skip
+        )
 
     names = [body.name for body in scene.body] if len(scene.body) > 1 else []
     return [partial(without, name) for name in names if name != GROUND]
@@ -120,9 +121,9 @@ def _simpler(scene: Scene) -> list[Callable[[], Scene]]:
 
     def round_bodies(digits: int) -> Scene:
         names = ("mass", "inertia", "velocity", "angular_velocity")
-        return scene.with_(body=tuple(
-            replaced(b, **{n: rounded(getattr(b, n), digits) for n in names}) for b in scene.body
-        ))  # fmt: skip
+        return scene.with_(
+            body=tuple(replaced(b, **{n: rounded(getattr(b, n), digits) for n in names}) for b in scene.body)
+        )
 
     return [
         lambda: scene.with_(gravity=(0.0, 0.0, 0.0)),

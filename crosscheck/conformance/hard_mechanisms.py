@@ -38,9 +38,12 @@ def bar(name: str, start: Point, stop: Point, mass: float = 1.0) -> Body:
     half, length = math.atan2(way[1], way[0]) / 2, float(np.linalg.norm(way))
     long = mass * length**2 / 12
     return Body(
-        name=name, mass=mass, inertia=(0.1 * long, long, 1.1 * long), orientation=_q(half),
+        name=name,
+        mass=mass,
+        inertia=(0.1 * long, long, 1.1 * long),
+        orientation=_q(half),
         position=tuple((np.add(start, stop) / 2).tolist()),
-    )  # fmt: skip
+    )
 
 
 def _q(half: float) -> tuple[float, float, float, float]:
@@ -68,8 +71,13 @@ FOUR = ((0.0, 0.0, 0.0), (0.1, 0.3, 0.0), (0.6, 0.5, 0.0), (0.7, -0.1, 0.0))
 
 def stiff_spring() -> Scene:
     """A four-bar with a spring of 1e6 N/m across, which vibrates at 3000 rad/s."""
-    spring = Spring(bodies=("bar0", "bar2"), points=((0.05, 0.15, 0), (0.65, 0.2, 0)), stiffness=1e6,
-                    damping=20.0, natural_length=0.6)  # fmt: skip
+    spring = Spring(
+        bodies=("bar0", "bar2"),
+        points=((0.05, 0.15, 0), (0.65, 0.2, 0)),
+        stiffness=1e6,
+        damping=20.0,
+        natural_length=0.6,
+    )
     return linkage("stiff_spring", FOUR).with_(load=(spring,), duration=0.1)
 
 
@@ -116,8 +124,12 @@ def rounded_redundancy() -> Scene:
     base = linkage("rounded_redundancy", FOUR)
     mid, far, low = (0.35, 0.4, 0.0), (0.45, 1.0, 0.0), (1.0, 0.7, 0.0)
     bars = (*base.body, bar("bar3", mid, far), bar("bar4", far, low))
-    pins = (*base.joint, hinge("P4", "bar1", "bar3", mid), hinge("P5", "bar3", "bar4", far),
-            hinge("P6", "bar4", "ground", low))  # fmt: skip
+    pins = (
+        *base.joint,
+        hinge("P4", "bar1", "bar3", mid),
+        hinge("P5", "bar3", "bar4", far),
+        hinge("P6", "bar4", "ground", low),
+    )
     return TURNED.change(base.with_(body=bars, joint=pins, duration=0.3))
 
 
@@ -126,15 +138,17 @@ def fast_driver() -> Scene:
     b, c = (0.1, 0.1, 0.0), (0.5, 0.0, 0.0)
     slider = Body(name="slider", mass=0.5, inertia=(1e-3, 1e-3, 1e-3), position=c)
     joints = (
-        hinge("A", "ground", "crank", (0, 0, 0)), hinge("B", "crank", "rod", b),
+        hinge("A", "ground", "crank", (0, 0, 0)),
+        hinge("B", "crank", "rod", b),
         Spherical(name="C", bodies=("rod", "slider"), anchor=c),
         Translational(name="D", bodies=("slider", "ground"), anchor=c, axis=(1.0, 0.0, 0.0)),
-    )  # fmt: skip
+    )
     wave = Sine(amplitude=0.05, frequency=400.0, phase=1.3)
     driver = Driver(joint="A", polynomial=(-0.05 * math.sin(1.3), 20.0, 3.0), sine=wave)
     bodies = (bar("crank", (0, 0, 0), b), bar("rod", b, c), slider)
-    return Scene(name="fast_driver", gravity=GRAVITY, duration=0.3, body=bodies, joint=joints,
-                 driver=(driver,))  # fmt: skip
+    return Scene(
+        name="fast_driver", gravity=GRAVITY, duration=0.3, body=bodies, joint=joints, driver=(driver,)
+    )
 
 
 def point_masses() -> Scene:
@@ -147,20 +161,35 @@ def point_masses() -> Scene:
     ]
     pairs = ((None, 0), (0, 1), (1, 2), (0, 2), (2, 3))
     rods = [
-        Distance(name=f"L{k}", bodies=("ground" if i is None else names[i], names[j]),
-                 anchors=((0.0, 0.1, 0.0) if i is None else places[i], places[j]))
+        Distance(
+            name=f"L{k}",
+            bodies=("ground" if i is None else names[i], names[j]),
+            anchors=((0.0, 0.1, 0.0) if i is None else places[i], places[j]),
+        )
         for k, (i, j) in enumerate(pairs)
-    ]  # fmt: skip
-    pull = Spring(bodies=("p0", "p3"), points=(places[0], places[3]), stiffness=50.0, damping=1.0,
-                  natural_length=0.4)  # fmt: skip
-    return Scene(name="point_masses", gravity=GRAVITY, duration=1.0, body=tuple(bodies), joint=tuple(rods),
-                 load=(pull,))  # fmt: skip
+    ]
+    pull = Spring(
+        bodies=("p0", "p3"), points=(places[0], places[3]), stiffness=50.0, damping=1.0, natural_length=0.4
+    )
+    return Scene(
+        name="point_masses",
+        gravity=GRAVITY,
+        duration=1.0,
+        body=tuple(bodies),
+        joint=tuple(rods),
+        load=(pull,),
+    )
 
 
 def free_bodies() -> Scene:
     """Two free bodies, one tumbling about its middle axis, on a damped spring whose line passes both."""
-    racket = Body(name="racket", mass=1.0, inertia=(0.01, 0.02, 0.03), position=(0.0, 0.0, 0.0),
-                  angular_velocity=(1e-3, 12.0, 0.0))  # fmt: skip
+    racket = Body(
+        name="racket",
+        mass=1.0,
+        inertia=(0.01, 0.02, 0.03),
+        position=(0.0, 0.0, 0.0),
+        angular_velocity=(1e-3, 12.0, 0.0),
+    )
     stone = Body(
         name="stone",
         mass=3.0,
@@ -169,8 +198,13 @@ def free_bodies() -> Scene:
         velocity=(0.0, -0.3, 0.1),
         angular_velocity=(0.0, 2.0, -4.0),
     )
-    spring = Spring(bodies=("racket", "stone"), points=((0.1, 0.05, 0.0), (0.5, 0.2, 0.0)), stiffness=300.0,
-                    damping=2.0, natural_length=0.3)  # fmt: skip
+    spring = Spring(
+        bodies=("racket", "stone"),
+        points=((0.1, 0.05, 0.0), (0.5, 0.2, 0.0)),
+        stiffness=300.0,
+        damping=2.0,
+        natural_length=0.3,
+    )
     push = Force(body="stone", point=(0.6, 0.3, 0.1), force=(0.5, 1.0, -1.0))
     return Scene(name="free_bodies", duration=2.0, body=(racket, stone), load=(spring, push))
 
@@ -186,8 +220,7 @@ def whip() -> Scene:
         ball = Spherical(name=f"J{k}", bodies=pair, anchor=anchor)
         cross = Universal(name=f"J{k}", bodies=pair, anchor=anchor, axes=(Z, (0.0, 1.0, 0.0)))
         pins.append(cross if k % 2 else ball)
-    rod = Distance(name="rod", bodies=("b7", "ground"),
-                   anchors=(tuple(places[8].tolist()), (2.2, -1.0, 0.3)))  # fmt: skip
+    rod = Distance(name="rod", bodies=("b7", "ground"), anchors=(tuple(places[8].tolist()), (2.2, -1.0, 0.3)))
     return Scene(name="whip", gravity=GRAVITY, duration=0.5, body=tuple(bars), joint=(*pins, rod))
 
 
@@ -219,7 +252,17 @@ def planes() -> Scene:
 HARD: dict[str, Callable[[], Scene]] = {
     make.__name__: make
     for make in (
-        stiff_spring, strong_damping, near_singular, start_near_singular, two_crossings, rounded_redundancy,
-        fast_driver, point_masses, free_bodies, whip, mass_ratio, planes,
+        stiff_spring,
+        strong_damping,
+        near_singular,
+        start_near_singular,
+        two_crossings,
+        rounded_redundancy,
+        fast_driver,
+        point_masses,
+        free_bodies,
+        whip,
+        mass_ratio,
+        planes,
     )
-}  # fmt: skip
+}

@@ -43,10 +43,17 @@ def planar_loops() -> dict[str, Scene]:
             "gravity": (),
             "force": (Force(body=last, point=place, force=(2.0, -1.0, 0.0)),),
             "moment": (Moment(body=first, moment=(0.0, 0.0, 0.4)),),
-            "spring": (Spring(bodies=("ground", last), points=((0.1, 0.9, 0.0), place), stiffness=20.0,
-                              damping=0.3, natural_length=0.4),),
+            "spring": (
+                Spring(
+                    bodies=("ground", last),
+                    points=((0.1, 0.9, 0.0), place),
+                    stiffness=20.0,
+                    damping=0.3,
+                    natural_length=0.4,
+                ),
+            ),
             "torsion spring": (TorsionSpring(joint="A", stiffness=3.0, damping=0.05, natural_angle=0.5),),
-        }  # fmt: skip
+        }
         for load, given in loads.items():
             found[f"planar {name}: {load}"] = _scene(name, load, bodies, joints, tuple(given), ())
         driver = Driver(joint="A", polynomial=(0.0, 1.0), sine=Sine(amplitude=0.1, frequency=5.0))
@@ -72,11 +79,22 @@ def is_planar(simulator: Engine) -> bool:
 
 
 def _scene(
-    name: str, load: str, bodies: Sequence[Body], joints: Sequence[Joint], loads: tuple[Load, ...],
+    name: str,
+    load: str,
+    bodies: Sequence[Body],
+    joints: Sequence[Joint],
+    loads: tuple[Load, ...],
     drivers: tuple[Driver, ...],
-) -> Scene:  # fmt: skip
-    return Scene(name=f"planar {name}: {load}", gravity=DOWN, duration=DURATION, body=tuple(bodies),
-                 joint=tuple(joints), load=loads, driver=drivers)  # fmt: skip
+) -> Scene:
+    return Scene(
+        name=f"planar {name}: {load}",
+        gravity=DOWN,
+        duration=DURATION,
+        body=tuple(bodies),
+        joint=tuple(joints),
+        load=loads,
+        driver=drivers,
+    )
 
 
 def _middle(first: Point, second: Point) -> tuple[float, float, float]:
@@ -89,8 +107,13 @@ def _rod(name: str, first: Point, second: Point) -> Body:
     mass = 2.0 * length if length else 0.5
     across = mass * length**2 / 12 + 1e-4
     angle = math.atan2(second[1] - first[1], second[0] - first[0])
-    return Body(name=name, mass=mass, inertia=(2e-4, across, across), position=_middle(first, second),
-                orientation=(math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2)))  # fmt: skip
+    return Body(
+        name=name,
+        mass=mass,
+        inertia=(2e-4, across, across),
+        position=_middle(first, second),
+        orientation=(math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2)),
+    )
 
 
 def _hinge(name: str, bodies: tuple[str, str], at: Point) -> Joint:
@@ -102,50 +125,80 @@ def _slide(name: str, bodies: tuple[str, str], at: Point, along: Point) -> Joint
 
 
 def _four_bar() -> tuple[Links, Sequence[Joint]]:
-    links = {"crank": ((0.0, 0.0), (0.1, 0.2)), "coupler": ((0.1, 0.2), (0.6, 0.35)),
-             "rocker": ((0.6, 0.35), (0.5, 0.0))}  # fmt: skip
-    return links, (_hinge("A", ("ground", "crank"), (0.0, 0.0)),
-                   _hinge("B", ("crank", "coupler"), (0.1, 0.2)),
-                   _hinge("C", ("coupler", "rocker"), (0.6, 0.35)),
-                   _hinge("D", ("ground", "rocker"), (0.5, 0.0)))  # fmt: skip
+    links = {
+        "crank": ((0.0, 0.0), (0.1, 0.2)),
+        "coupler": ((0.1, 0.2), (0.6, 0.35)),
+        "rocker": ((0.6, 0.35), (0.5, 0.0)),
+    }
+    return links, (
+        _hinge("A", ("ground", "crank"), (0.0, 0.0)),
+        _hinge("B", ("crank", "coupler"), (0.1, 0.2)),
+        _hinge("C", ("coupler", "rocker"), (0.6, 0.35)),
+        _hinge("D", ("ground", "rocker"), (0.5, 0.0)),
+    )
 
 
 def _slider_crank() -> tuple[Links, Sequence[Joint]]:
-    links = {"crank": ((0.0, 0.0), (0.1, 0.15)), "rod": ((0.1, 0.15), (0.5, 0.05)),
-             "piston": ((0.5, 0.05), (0.5, 0.05))}  # fmt: skip
-    return links, (_hinge("A", ("ground", "crank"), (0.0, 0.0)), _hinge("B", ("crank", "rod"), (0.1, 0.15)),
-                   _hinge("C", ("rod", "piston"), (0.5, 0.05)),
-                   _slide("D", ("ground", "piston"), (0.5, 0.05), (1.0, 0.0)))  # fmt: skip
+    links = {
+        "crank": ((0.0, 0.0), (0.1, 0.15)),
+        "rod": ((0.1, 0.15), (0.5, 0.05)),
+        "piston": ((0.5, 0.05), (0.5, 0.05)),
+    }
+    return links, (
+        _hinge("A", ("ground", "crank"), (0.0, 0.0)),
+        _hinge("B", ("crank", "rod"), (0.1, 0.15)),
+        _hinge("C", ("rod", "piston"), (0.5, 0.05)),
+        _slide("D", ("ground", "piston"), (0.5, 0.05), (1.0, 0.0)),
+    )
 
 
 def _inverted_slider_crank() -> tuple[Links, Sequence[Joint]]:
     """A crank whose pin slides along a rocker."""
-    links = {"crank": ((0.0, 0.0), (0.15, 0.2)), "pin": ((0.15, 0.2), (0.15, 0.2)),
-             "rocker": ((0.5, 0.0), (0.15, 0.2))}  # fmt: skip
-    return links, (_hinge("A", ("ground", "crank"), (0.0, 0.0)), _hinge("B", ("crank", "pin"), (0.15, 0.2)),
-                   _slide("C", ("rocker", "pin"), (0.15, 0.2), (-0.35, 0.2)),
-                   _hinge("D", ("ground", "rocker"), (0.5, 0.0)))  # fmt: skip
+    links = {
+        "crank": ((0.0, 0.0), (0.15, 0.2)),
+        "pin": ((0.15, 0.2), (0.15, 0.2)),
+        "rocker": ((0.5, 0.0), (0.15, 0.2)),
+    }
+    return links, (
+        _hinge("A", ("ground", "crank"), (0.0, 0.0)),
+        _hinge("B", ("crank", "pin"), (0.15, 0.2)),
+        _slide("C", ("rocker", "pin"), (0.15, 0.2), (-0.35, 0.2)),
+        _hinge("D", ("ground", "rocker"), (0.5, 0.0)),
+    )
 
 
 def _five_bar() -> tuple[Links, Sequence[Joint]]:
-    links = {"left": ((0.0, 0.0), (-0.1, 0.25)), "upper left": ((-0.1, 0.25), (0.2, 0.5)),
-             "upper right": ((0.2, 0.5), (0.5, 0.3)), "right": ((0.5, 0.3), (0.4, 0.0))}  # fmt: skip
-    return links, (_hinge("A", ("ground", "left"), (0.0, 0.0)),
-                   _hinge("B", ("left", "upper left"), (-0.1, 0.25)),
-                   _hinge("C", ("upper left", "upper right"), (0.2, 0.5)),
-                   _hinge("D", ("upper right", "right"), (0.5, 0.3)),
-                   _hinge("E", ("ground", "right"), (0.4, 0.0)))  # fmt: skip
+    links = {
+        "left": ((0.0, 0.0), (-0.1, 0.25)),
+        "upper left": ((-0.1, 0.25), (0.2, 0.5)),
+        "upper right": ((0.2, 0.5), (0.5, 0.3)),
+        "right": ((0.5, 0.3), (0.4, 0.0)),
+    }
+    return links, (
+        _hinge("A", ("ground", "left"), (0.0, 0.0)),
+        _hinge("B", ("left", "upper left"), (-0.1, 0.25)),
+        _hinge("C", ("upper left", "upper right"), (0.2, 0.5)),
+        _hinge("D", ("upper right", "right"), (0.5, 0.3)),
+        _hinge("E", ("ground", "right"), (0.4, 0.0)),
+    )
 
 
 def _six_bar() -> tuple[Links, Sequence[Joint]]:
     """Watt's: a four-bar whose rocker drives a second loop."""
     links, joints = _four_bar()
     more = {"link": ((0.55, 0.175), (0.9, 0.3)), "arm": ((0.9, 0.3), (1.0, 0.0))}
-    return {**links, **more}, (*joints, _hinge("E", ("rocker", "link"), (0.55, 0.175)),
-                               _hinge("F", ("link", "arm"), (0.9, 0.3)),
-                               _hinge("G", ("ground", "arm"), (1.0, 0.0)))  # fmt: skip
+    return {**links, **more}, (
+        *joints,
+        _hinge("E", ("rocker", "link"), (0.55, 0.175)),
+        _hinge("F", ("link", "arm"), (0.9, 0.3)),
+        _hinge("G", ("ground", "arm"), (1.0, 0.0)),
+    )
 
 
-MECHANISMS = {"four-bar": _four_bar(), "slider-crank": _slider_crank(),
-              "inverted slider-crank": _inverted_slider_crank(), "five-bar": _five_bar(),
-              "six-bar": _six_bar()}  # fmt: skip
+MECHANISMS = {
+    "four-bar": _four_bar(),
+    "slider-crank": _slider_crank(),
+    "inverted slider-crank": _inverted_slider_crank(),
+    "five-bar": _five_bar(),
+    "six-bar": _six_bar(),
+}

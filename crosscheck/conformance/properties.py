@@ -21,7 +21,7 @@ from crosscheck.conformance.trial import (
     Specimen,
     completed,
     difference,
-)  # fmt: skip
+)
 from crosscheck.engine import Cannot
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.energy import energy_series
@@ -234,8 +234,10 @@ def other_times(bench: Bench) -> Finding:
     times = np.sort([*bench.times[1:], *between])
     common = _at(bench.run(bench.scene, times), np.isin(times, bench.times))
     alone = bench.run(bench.scene, bench.times[-1:])
-    apart = max(difference(bench.scene, _at(bench.motion, slice(1, None)), common),
-                difference(bench.scene, _at(bench.motion, slice(-1, None)), alone))  # fmt: skip
+    apart = max(
+        difference(bench.scene, _at(bench.motion, slice(1, None)), common),
+        difference(bench.scene, _at(bench.motion, slice(-1, None)), alone),
+    )
     return Finding(apart, bench.own_accuracy, bench.floors)
 
 

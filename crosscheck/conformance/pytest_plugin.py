@@ -43,8 +43,10 @@ def pytest_report_header(config: pytest.Config) -> list[str]:
     if not config.getoption("engine"):
         return []
     seed, count = config.getoption("mechanism_seed"), config.getoption("mechanisms")
-    return [f"crosscheck: engine {config.getoption('engine')}, {config.getoption('depth')}, "
-            f"{count} random mechanisms from seed {seed}"]  # fmt: skip
+    return [
+        f"crosscheck: engine {config.getoption('engine')}, {config.getoption('depth')}, "
+        f"{count} random mechanisms from seed {seed}"
+    ]
 
 
 class Session:

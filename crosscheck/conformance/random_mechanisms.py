@@ -131,8 +131,14 @@ class _Drawing:
 
     def moving(self, name: str) -> Scene | None:
         """The scene with random velocities and loads; None when the motion cannot go on."""
-        scene = Scene(name=name, gravity=(0.0, 0.0, -9.81), duration=DURATION, body=self.bodies,
-                      joint=tuple(self.joints), load=self.loads())  # fmt: skip
+        scene = Scene(
+            name=name,
+            gravity=(0.0, 0.0, -9.81),
+            duration=DURATION,
+            body=self.bodies,
+            joint=tuple(self.joints),
+            load=self.loads(),
+        )
         free = _null_space(scene)
         twists = (free @ (free.T @ self.rng.normal(size=len(free)))).reshape(-1, 6)
         moving = [
@@ -159,10 +165,12 @@ class _Drawing:
         turn = rotations.to_matrix(rotations.from_vector(self.rng.normal(size=3)))
         inertia = turn @ np.diag(moments.sum() - moments) @ turn.T
         return Body(
-            name=name, mass=float(self.rng.uniform(0.5, 3.0)), inertia=((inertia + inertia.T) / 2).tolist(),
+            name=name,
+            mass=float(self.rng.uniform(0.5, 3.0)),
+            inertia=((inertia + inertia.T) / 2).tolist(),
             position=triple(self.rng.uniform(-1, 1, 3)),
             orientation=tuple(rotations.from_vector(self.rng.normal(size=3)).tolist()),
-        )  # fmt: skip
+        )
 
     def joint(
         self, first: str, second: str, places: dict[str, np.ndarray], weights: Sequence[float]
@@ -175,9 +183,13 @@ class _Drawing:
         far = np.array(middle) + self.rng.uniform(0.3, 0.8) * across if kind == "distance" else across
         has_rotation = JOINT_TYPES[kind].facts.free_rotations > 0
         return JOINT_TYPES[kind].at(
-            f"J{len(self.joints)}", (first, second), anchor=middle, anchors=(middle, triple(far)),
-            axis=triple(along if has_rotation else across), axes=(triple(along), triple(across)),
-        )  # fmt: skip
+            f"J{len(self.joints)}",
+            (first, second),
+            anchor=middle,
+            anchors=(middle, triple(far)),
+            axis=triple(along if has_rotation else across),
+            axes=(triple(along), triple(across)),
+        )
 
     def second_hinge(self, hinge: Revolute) -> Joint:
         """Another joint on the axis of a revolute one, between the same bodies: redundant."""

@@ -76,11 +76,19 @@ class Isometry:
     def change(self, scene: Scene) -> Scene:
         """The scene moved as a whole, gravity and loads included."""
         fields = {
-            "position": self.place, "anchor": self.place, "anchors": self.place, "point": self.place,
-            "points": self.place, "velocity": self.polar, "force": self.polar, "axes": self.axial,
-            "angular_velocity": self.axial, "moment": self.axial, "inertia": self.inertia,
+            "position": self.place,
+            "anchor": self.place,
+            "anchors": self.place,
+            "point": self.place,
+            "points": self.place,
+            "velocity": self.polar,
+            "force": self.polar,
+            "axes": self.axial,
+            "angular_velocity": self.axial,
+            "moment": self.axial,
+            "inertia": self.inertia,
             "orientation": self.turn,
-        }  # fmt: skip
+        }
         # the axis of a driven displacement; others are of rotations
         along: dict[str | None, Callable[[Any], Any]] = {"displacement": self.polar}
         joints = [
@@ -97,9 +105,12 @@ class Isometry:
     def expect(self, motion: Trajectory) -> Trajectory:
         """The motion moved as a whole, accelerations and reactions too."""
         moved = replace(
-            motion, position=self.place(motion.position), orientation=self.turn(motion.orientation),
-            velocity=self.polar(motion.velocity), angular_velocity=self.axial(motion.angular_velocity),
-        )  # fmt: skip
+            motion,
+            position=self.place(motion.position),
+            orientation=self.turn(motion.orientation),
+            velocity=self.polar(motion.velocity),
+            angular_velocity=self.axial(motion.angular_velocity),
+        )
         return with_pushes(moved, motion, self.polar, self.axial, self.polar, self.axial)
 
 
@@ -113,10 +124,9 @@ def with_pushes(
         angular_acceleration=(
             None if motion.angular_acceleration is None else angular(motion.angular_acceleration)
         ),
-        reactions=motion.reactions and {
-            name: np.hstack([force(w[:, :3]), moment(w[:, 3:])]) for name, w in motion.reactions.items()
-        },
-    )  # fmt: skip
+        reactions=motion.reactions
+        and {name: np.hstack([force(w[:, :3]), moment(w[:, 3:])]) for name, w in motion.reactions.items()},
+    )
 
 
 def times(factor: float) -> Mapped:
@@ -171,12 +181,13 @@ def in_other_units(scene: Scene, length: float, time: float) -> Scene:
     turning = {"stiffness": times(length * push), "damping": times(length * speed)}
     slides = {joint.name for joint in scene.joint if joint.facts.driven == "displacement"}
     return scene.with_(
-        gravity=times(push)(scene.gravity).tolist(), duration=scene.duration * time,
+        gravity=times(push)(scene.gravity).tolist(),
+        duration=scene.duration * time,
         body=tuple(mapped(body, bodies) for body in scene.body),
         joint=tuple(mapped(joint, places) for joint in scene.joint),
         driver=tuple(_slower(d, length if d.joint in slides else 1.0, time) for d in scene.driver),
         load=tuple(mapped(x, {**loads, **(linear if x.type == "spring" else turning)}) for x in scene.load),
-    )  # fmt: skip
+    )
 
 
 def _slower(driver: Driver, amount: float, time: float) -> Driver:
@@ -191,9 +202,12 @@ def _other_units(about: str, length: float, time: float) -> Relation:
     def expect(scene: Scene, motion: Trajectory) -> Trajectory:
         push = length / time**2
         moved = replace(
-            motion, times=time * motion.times, position=length * motion.position,
-            velocity=length / time * motion.velocity, angular_velocity=motion.angular_velocity / time,
-        )  # fmt: skip
+            motion,
+            times=time * motion.times,
+            position=length * motion.position,
+            velocity=length / time * motion.velocity,
+            angular_velocity=motion.angular_velocity / time,
+        )
         turning = times(1 / time**2), times(push), times(length * push)
         return with_pushes(moved, motion, times(push), *turning)
 

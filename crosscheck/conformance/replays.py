@@ -26,11 +26,15 @@ def started(scene: Scene, motion: Trajectory, sample: int, sense: float) -> Scen
         scene, motion.times, motion.position, motion.orientation, motion.angular_velocity
     )
     bodies = [
-        replaced(body, position=motion.position[sample, b], orientation=motion.orientation[sample, b],
-                 velocity=sense * motion.velocity[sample, b],
-                 angular_velocity=sense * motion.angular_velocity[sample, b])
+        replaced(
+            body,
+            position=motion.position[sample, b],
+            orientation=motion.orientation[sample, b],
+            velocity=sense * motion.velocity[sample, b],
+            angular_velocity=sense * motion.angular_velocity[sample, b],
+        )
         for b, body in enumerate(scene.body)
-    ]  # fmt: skip
+    ]
     loads: list[Load] = []
     for load in scene.load:
         if load.type == "torsion_spring":
@@ -45,9 +49,11 @@ def started(scene: Scene, motion: Trajectory, sample: int, sense: float) -> Scen
         else:
             loads.append(load)
     return scene.with_(
-        body=tuple(bodies), joint=tuple(map(carry.joint, scene.joint)), load=tuple(loads),
+        body=tuple(bodies),
+        joint=tuple(map(carry.joint, scene.joint)),
+        load=tuple(loads),
         driver=tuple(_later(driver, t) for driver in scene.driver),
-    )  # fmt: skip
+    )
 
 
 class _Carry:
@@ -123,12 +129,16 @@ def _samples(
     second, turning = motion.acceleration, motion.angular_acceleration
     kept = joints_kept(motion, pinned(scene)).reactions
     return replace(
-        motion, times=times, position=motion.position[chosen], orientation=motion.orientation[chosen],
-        velocity=sense * motion.velocity[chosen], angular_velocity=sense * motion.angular_velocity[chosen],
+        motion,
+        times=times,
+        position=motion.position[chosen],
+        orientation=motion.orientation[chosen],
+        velocity=sense * motion.velocity[chosen],
+        angular_velocity=sense * motion.angular_velocity[chosen],
         acceleration=None if second is None else second[chosen],
         angular_acceleration=None if turning is None else turning[chosen],
         reactions=kept and {name: wrench[chosen] for name, wrench in kept.items()},
-    )  # fmt: skip
+    )
 
 
 def pinned(scene: Scene) -> list[str]:

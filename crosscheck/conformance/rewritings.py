@@ -127,10 +127,15 @@ def _in_halves(scene: Scene, body: Body) -> Scene:
     swing = np.cross(np.array(body.angular_velocity), reach)
     common = {"mass": (body.mass or 0.0) / 2, "inertia": (_inertia(body) - moved) / 2}
     halves = [
-        replaced(body, **common, name=name, position=np.array(body.position) + side * reach,
-                 velocity=np.array(body.velocity) + side * swing)
+        replaced(
+            body,
+            **common,
+            name=name,
+            position=np.array(body.position) + side * reach,
+            velocity=np.array(body.velocity) + side * swing,
+        )
         for name, side in ((body.name, 1.0), (body.name + HALF, -1.0))
-    ]  # fmt: skip
+    ]
     weld = Fixed(name="weld", bodies=(body.name, body.name + HALF), anchor=body.position)
     return scene.with_(body=(*scene.body[:-1], *halves), joint=(*scene.joint, weld))
 
@@ -150,8 +155,13 @@ def of_halves(scene: Scene, motion: Trajectory) -> Trajectory:
         key: np.concatenate([getattr(motion, key)[:, :-1], np.stack(ends, axis=1)], axis=1)
         for key, ends in parts.items()
     }
-    return replace(motion, bodies=(*motion.bodies[:-1], name, name + HALF), acceleration=None,
-                   angular_acceleration=None, **arrays)  # fmt: skip
+    return replace(
+        motion,
+        bodies=(*motion.bodies[:-1], name, name + HALF),
+        acceleration=None,
+        angular_acceleration=None,
+        **arrays,
+    )
 
 
 def _arm(body: Body) -> np.ndarray:

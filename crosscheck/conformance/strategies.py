@@ -53,8 +53,10 @@ def mechanisms(
     the axis of a first, whose rows are redundant by construction."""
     bodies = [draw(_bodies(f"b{k}", k)) for k in range(draw(st.integers(1, most_bodies)))]
     names = [GROUND, *(body.name for body in bodies)]
-    joints = [draw(_joints(f"J{k}", (names[draw(st.integers(0, k))], names[k + 1]), bodies, kinds))
-              for k in range(len(bodies))]  # fmt: skip
+    joints = [
+        draw(_joints(f"J{k}", (names[draw(st.integers(0, k))], names[k + 1]), bodies, kinds))
+        for k in range(len(bodies))
+    ]
     pairs = list(itertools.combinations(names, 2))
     for loop in range(draw(st.integers(0, most_loops)) if len(bodies) > 1 else 0):
         closing = draw(_joints(f"L{loop}", draw(st.sampled_from(pairs)), bodies, kinds))
@@ -63,8 +65,14 @@ def mechanisms(
     if redundant:
         joints += draw(_two_hinges(bodies, joints))
     gravity = draw(vectors.map(lambda v: (8 * v[0], 8 * v[1], 8 * v[2])))
-    scene = Scene(name="drawn", gravity=gravity, duration=0.05, body=tuple(bodies),
-                  joint=tuple(joints), load=tuple(draw(_loads(bodies))))  # fmt: skip
+    scene = Scene(
+        name="drawn",
+        gravity=gravity,
+        duration=0.05,
+        body=tuple(bodies),
+        joint=tuple(joints),
+        load=tuple(draw(_loads(bodies))),
+    )
     twists = np.array([[*draw(vectors), *draw(vectors)] for _ in bodies])
     moving = consistent(scene, twists)
     return moving if goes_on(moving) else consistent(scene, 0 * twists)
@@ -79,8 +87,15 @@ def paper_mechanisms(draw: st.DrawFn, names: Sequence[str] = PAPER) -> Scene:
     for body in scene.body:
         mass, inertia = draw(factors), draw(factors)
         moments = (inertia * np.array(body.inertia)).tolist()
-        bodies.append(Body(**{**{n: getattr(body, n) for n in Body.model_fields},
-                              "mass": mass * (body.mass or 1.0), "inertia": moments}))  # fmt: skip
+        bodies.append(
+            Body(
+                **{
+                    **{n: getattr(body, n) for n in Body.model_fields},
+                    "mass": mass * (body.mass or 1.0),
+                    "inertia": moments,
+                }
+            )
+        )
     return scene.with_(body=bodies)
 
 
@@ -107,8 +122,13 @@ def _bodies(draw: st.DrawFn, name: str, k: int) -> Body:
     spread = np.array(draw(st.tuples(*[st.integers(1, 4)] * 3))) / 100
     axes = rotations.to_matrix(principal)
     inertia = axes @ np.diag(spread.sum() - spread) @ axes.T
-    return Body(name=name, mass=draw(st.integers(1, 8)) / 2, inertia=(inertia + inertia.T) / 2,
-                position=place.tolist(), orientation=turn.tolist())  # fmt: skip
+    return Body(
+        name=name,
+        mass=draw(st.integers(1, 8)) / 2,
+        inertia=(inertia + inertia.T) / 2,
+        position=place.tolist(),
+        orientation=turn.tolist(),
+    )
 
 
 @st.composite

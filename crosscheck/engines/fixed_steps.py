@@ -77,8 +77,12 @@ def simulated(
     start = time.process_time()
     with np.errstate(all="ignore"):
         run = make()
-        labels: dict[str, Any] = {"engine": engine.name, "version": engine.version(),
-                                  "method": setting.family, "settings": dict(setting.options)}  # fmt: skip
+        labels: dict[str, Any] = {
+            "engine": engine.name,
+            "version": engine.version(),
+            "method": setting.family,
+            "settings": dict(setting.options),
+        }
         built = time.process_time() - start
         return run_through(scene, times, run.advance, run.sample, run.counts, built, labels)
 

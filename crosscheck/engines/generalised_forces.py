@@ -44,8 +44,9 @@ class Forces:
         ]
         self.springs = [
             (x, [self._end(*end) for end in zip(x.bodies, x.points, strict=True)])
-            for x in loads if isinstance(x, Spring)
-        ]  # fmt: skip
+            for x in loads
+            if isinstance(x, Spring)
+        ]
         self.twists = [(x, *self._hinge(x.joint)) for x in loads if isinstance(x, TorsionSpring)]
 
     def _end(self, name: str, point: Sequence[float]) -> tuple[int, np.ndarray]:

@@ -14,8 +14,14 @@ from scipy.integrate import DOP853
 from mbref.scene import Scene
 from mbref.trajectory import Cost, Outcome, Trajectory
 
-WIDTHS = {"position": 3, "orientation": 4, "velocity": 3, "angular_velocity": 3, "acceleration": 3,
-          "angular_acceleration": 3}  # fmt: skip
+WIDTHS = {
+    "position": 3,
+    "orientation": 4,
+    "velocity": 3,
+    "angular_velocity": 3,
+    "acceleration": 3,
+    "angular_acceleration": 3,
+}
 MAX_STEPS = 10**6  # of one interval; beyond it the run is not going to end
 
 UNKNOWN = np.zeros((0, 3))  # accelerations of an engine that gives none
@@ -60,9 +66,14 @@ class Sample:
 
 
 def run_through(
-    scene: Scene, times: np.ndarray, advance: Callable[[float, float], None],
-    sample: Callable[[float], Sample], counts: Counts, build_seconds: float, labels: dict[str, Any],
-) -> Trajectory:  # fmt: skip
+    scene: Scene,
+    times: np.ndarray,
+    advance: Callable[[float, float], None],
+    sample: Callable[[float], Sample],
+    counts: Counts,
+    build_seconds: float,
+    labels: dict[str, Any],
+) -> Trajectory:
     """Advances from sample to sample; the trajectory, complete or as far as it got.
 
     ``labels`` are the trajectory's engine, version, method and settings.
@@ -86,15 +97,22 @@ def run_through(
         outcome, t, message = failure.outcome, failure.t, str(failure)
     states = {name: _stacked(samples, name, len(scene.body), width) for name, width in WIDTHS.items()}
     return Trajectory(
-        scene=scene.name, **labels, times=np.array(times[: len(samples)], dtype=float),
+        scene=scene.name,
+        **labels,
+        times=np.array(times[: len(samples)], dtype=float),
         bodies=tuple(body.name for body in scene.body),
-        position=states["position"], orientation=states["orientation"],
-        velocity=states["velocity"], angular_velocity=states["angular_velocity"],
-        acceleration=states["acceleration"], angular_acceleration=states["angular_acceleration"],
+        position=states["position"],
+        orientation=states["orientation"],
+        velocity=states["velocity"],
+        angular_velocity=states["angular_velocity"],
+        acceleration=states["acceleration"],
+        angular_acceleration=states["angular_acceleration"],
         reactions=_by_joint([s.reactions for s in samples]),
-        outcome=outcome, t_end=t, message=message,
+        outcome=outcome,
+        t_end=t,
+        message=message,
         cost=Cost(seconds, build_seconds, counts.steps, counts.rejected, counts.rhs),
-    )  # fmt: skip
+    )
 
 
 def _finite(sample: Sample) -> bool:

@@ -256,8 +256,18 @@ def _depth_first(nodes: list[Link], edges: list[_Edge], closures: list[Closure],
             forward = edge.nodes[0] == node
             child = edge.nodes[1] if forward else edge.nodes[0]
             axes = edge.axes if forward else -edge.axes[::-1]
-            add(child, replace(nodes[child], kind=edge.kind, mobilities=mobilities(edge.facts, axes),
-                joint=edge.joint, parent=number[node], anchor=edge.anchor, axes=axes))  # fmt: skip
+            add(
+                child,
+                replace(
+                    nodes[child],
+                    kind=edge.kind,
+                    mobilities=mobilities(edge.facts, axes),
+                    joint=edge.joint,
+                    parent=number[node],
+                    anchor=edge.anchor,
+                    axes=axes,
+                ),
+            )
 
     grow(GROUND_LINK)
     for node in range(len(nodes)):

@@ -176,16 +176,28 @@ class Simulation:
     def _motion(self, terms: Terms, q: np.ndarray, v: np.ndarray) -> LinkMotion:
         twists = terms.jacobian @ v
         return LinkMotion(
-            terms.rotation, terms.position, twists[:, :3], twists[:, 3:], UNKNOWN, UNKNOWN,
-            self.at.of_velocities(q), v,
-        )  # fmt: skip
+            terms.rotation,
+            terms.position,
+            twists[:, :3],
+            twists[:, 3:],
+            UNKNOWN,
+            UNKNOWN,
+            self.at.of_velocities(q),
+            v,
+        )
 
     def _accelerated(self, terms: Terms, of: LinkMotion, a: np.ndarray) -> LinkMotion:
         change = terms.jacobian @ a + terms.drift
         return LinkMotion(
-            of.rotation, of.position, of.velocity, of.angular_velocity, change[:, :3], change[:, 3:],
-            of.coordinates, of.rates,
-        )  # fmt: skip
+            of.rotation,
+            of.position,
+            of.velocity,
+            of.angular_velocity,
+            change[:, :3],
+            change[:, 3:],
+            of.coordinates,
+            of.rates,
+        )
 
     def _forces(self, terms: Terms, of: LinkMotion) -> np.ndarray:
         """Generalised forces (nv,) of the loads."""

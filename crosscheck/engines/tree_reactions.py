@@ -173,8 +173,13 @@ def _at_second_anchor(
     anchor, _ = _point(tree, motion, link, joint.anchor_pair[1])
     force, moment = on_second[:3], on_second[3:] - cross(anchor, on_second[:3])
     if isinstance(joint, Distance):
-        rod = next(n for n in tree.links if n.ends and np.array_equal(n.ends[1][1], joint.anchors[1])
-                   and np.array_equal(n.ends[0][1], joint.anchors[0]))  # fmt: skip
+        rod = next(
+            n
+            for n in tree.links
+            if n.ends
+            and np.array_equal(n.ends[1][1], joint.anchors[1])
+            and np.array_equal(n.ends[0][1], joint.anchors[0])
+        )
         force = force + rod.mass / 2 * (_acceleration(tree, motion, link, joint.anchors[1]) - scene.gravity)
     return np.concatenate([force, moment])
 

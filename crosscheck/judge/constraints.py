@@ -27,9 +27,13 @@ def closure(scene: Scene, t: np.ndarray | float, position: np.ndarray, orientati
 
 
 def closure_rates(
-    scene: Scene, t: np.ndarray | float, position: np.ndarray, orientation: np.ndarray,
-    velocity: np.ndarray, angular_velocity: np.ndarray,
-) -> Residuals:  # fmt: skip
+    scene: Scene,
+    t: np.ndarray | float,
+    position: np.ndarray,
+    orientation: np.ndarray,
+    velocity: np.ndarray,
+    angular_velocity: np.ndarray,
+) -> Residuals:
     """Velocity residuals (…, rows), m/s and rad/s, of world velocities (…, nb, 3): the forbidden
     components of the frames' relative twist; on closed poses the time derivative of `closure`."""
     motion = (*_pose(position, orientation), _grounded(velocity), _grounded(angular_velocity))
@@ -40,10 +44,15 @@ def closure_rates(
 
 
 def closure_accelerations(
-    scene: Scene, t: np.ndarray | float, position: np.ndarray, orientation: np.ndarray,
-    velocity: np.ndarray, angular_velocity: np.ndarray,
-    acceleration: np.ndarray, angular_acceleration: np.ndarray,
-) -> Residuals:  # fmt: skip
+    scene: Scene,
+    t: np.ndarray | float,
+    position: np.ndarray,
+    orientation: np.ndarray,
+    velocity: np.ndarray,
+    angular_velocity: np.ndarray,
+    acceleration: np.ndarray,
+    angular_acceleration: np.ndarray,
+) -> Residuals:
     """Acceleration residuals (…, rows), m/s² and rad/s²: the time derivative of `closure_rates`."""
     rates = (velocity, angular_velocity, acceleration, angular_acceleration)
     motion = (*_pose(position, orientation), *map(_grounded, rates))
@@ -59,9 +68,12 @@ def length_rows(scene: Scene) -> dict[str, np.ndarray]:
 
 
 def joint_coordinates(
-    scene: Scene, times: np.ndarray, position: np.ndarray, orientation: np.ndarray,
+    scene: Scene,
+    times: np.ndarray,
+    position: np.ndarray,
+    orientation: np.ndarray,
     angular_velocity: np.ndarray,
-) -> dict[str, np.ndarray]:  # fmt: skip
+) -> dict[str, np.ndarray]:
     """(k, 2) angle (rad) and displacement (m) since t = 0 of every joint that can be driven, by name.
 
     Trajectory arrays (k, nb, ·).  The angle counts turns; it is NaN from where the samples are too far

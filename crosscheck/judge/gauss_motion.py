@@ -175,6 +175,19 @@ def _trajectory(scene: Scene, times: np.ndarray, samples: np.ndarray, rank: int)
     position, orientation, velocity, spin = (np.array([state[k] for state in states]) for k in range(4))
     names = tuple(body.name for body in scene.body)
     return Trajectory(
-        scene.name, NAME, "", "", {"rtol": RTOL}, times, names, position, orientation, velocity, spin,
-        second[..., :3], second[..., 3:], outcome=Outcome.COMPLETED, t_end=float(times[-1]),
-    )  # fmt: skip
+        scene.name,
+        NAME,
+        "",
+        "",
+        {"rtol": RTOL},
+        times,
+        names,
+        position,
+        orientation,
+        velocity,
+        spin,
+        second[..., :3],
+        second[..., 3:],
+        outcome=Outcome.COMPLETED,
+        t_end=float(times[-1]),
+    )

@@ -129,9 +129,13 @@ def position_rows(
 
 
 def velocity_rows(
-    joint: JointFrames, t: np.ndarray, position: np.ndarray, orientation: np.ndarray,
-    velocity: np.ndarray, angular_velocity: np.ndarray,
-) -> np.ndarray:  # fmt: skip
+    joint: JointFrames,
+    t: np.ndarray,
+    position: np.ndarray,
+    orientation: np.ndarray,
+    velocity: np.ndarray,
+    angular_velocity: np.ndarray,
+) -> np.ndarray:
     """Forbidden components (…, rows) of the frames' relative twist, of world velocities (…, nb + 1, 3)."""
     arms, offset, frames = _in_world(joint, position, orientation)
     w = [angular_velocity[..., b, :] for b in joint.bodies]
@@ -145,10 +149,15 @@ def velocity_rows(
 
 
 def acceleration_rows(
-    joint: JointFrames, t: np.ndarray, position: np.ndarray, orientation: np.ndarray,
-    velocity: np.ndarray, angular_velocity: np.ndarray,
-    acceleration: np.ndarray, angular_acceleration: np.ndarray,
-) -> np.ndarray:  # fmt: skip
+    joint: JointFrames,
+    t: np.ndarray,
+    position: np.ndarray,
+    orientation: np.ndarray,
+    velocity: np.ndarray,
+    angular_velocity: np.ndarray,
+    acceleration: np.ndarray,
+    angular_acceleration: np.ndarray,
+) -> np.ndarray:
     """Time derivative (…, rows) of `velocity_rows`, of world accelerations (…, nb + 1, 3)."""
     arms, offset, frames = _in_world(joint, position, orientation)
     w = [angular_velocity[..., b, :] for b in joint.bodies]
@@ -169,9 +178,12 @@ def acceleration_rows(
 
 
 def coordinates(
-    joint: JointFrames, times: np.ndarray, position: np.ndarray, orientation: np.ndarray,
+    joint: JointFrames,
+    times: np.ndarray,
+    position: np.ndarray,
+    orientation: np.ndarray,
     angular_velocity: np.ndarray,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """(k, 2) unwrapped angle about the axis and displacement along it since t = 0, over k samples."""
     _, offset, frames = _in_world(joint, position, orientation)
     twist = _twist(rotations.multiply(rotations.conjugate(frames[0]), frames[1]))

@@ -212,8 +212,15 @@ def _known(trajectory: Trajectory, exact: Trajectory) -> Trajectory:
 
 def _at(trajectory: Trajectory, chosen: np.ndarray) -> Trajectory:
     """The trajectory at some of its samples (n,)."""
-    keys = ("times", "position", "orientation", "velocity", "angular_velocity", "acceleration",
-            "angular_acceleration")  # fmt: skip
+    keys = (
+        "times",
+        "position",
+        "orientation",
+        "velocity",
+        "angular_velocity",
+        "acceleration",
+        "angular_acceleration",
+    )
     arrays: dict[str, Any] = {k: None if (a := getattr(trajectory, k)) is None else a[chosen] for k in keys}
     reactions = trajectory.reactions and {name: w[chosen] for name, w in trajectory.reactions.items()}
     return replace(trajectory, **arrays, reactions=reactions)

@@ -151,9 +151,7 @@ def _regular(scene: Scene, run: Trajectory, chosen: Sequence[int]) -> list[int]:
     return [k for k, r, n in zip(chosen, ranks, near, strict=True) if r == max(ranks) and not n]
 
 
-def _differences(
-    scene: Scene, first: Trajectory, second: Trajectory
-) -> Iterator[tuple[str, float, float]]:  # fmt: skip
+def _differences(scene: Scene, first: Trajectory, second: Trajectory) -> Iterator[tuple[str, float, float]]:
     """(field, difference relative to its scale, allowance), in the order in which causes come first."""
     missing = abs(len(first.times) - len(second.times)) + abs(2 - len(first.times))
     yield "samples reached", float(missing), 0.0
@@ -177,7 +175,7 @@ def _differences(
 
 def _changes(
     scene: Scene, first: Trajectory, second: Trajectory, speed: float
-) -> Iterator[tuple[str, float, float]]:  # fmt: skip
+) -> Iterator[tuple[str, float, float]]:
     length, least = scene_length(scene), LEAST_CHANGE * acceleration_scale(scene)
     changes = [
         (np.diff(t.velocity, axis=0), length * np.diff(t.angular_velocity, axis=0)) for t in (first, second)

@@ -39,8 +39,14 @@ def not_finite(run: Trajectory) -> list[str]:
 def _of_bodies(scene: Scene, run: Trajectory) -> Iterator[Series]:
     length, rate = scene_length(scene), motion_rate(scene, run)
     push = _acceleration(scene, run)
-    scales = {"position": length, "orientation": 1.0, "velocity": length * rate, "angular_velocity": rate,
-              "acceleration": push, "angular_acceleration": push / length}  # fmt: skip
+    scales = {
+        "position": length,
+        "orientation": 1.0,
+        "velocity": length * rate,
+        "angular_velocity": rate,
+        "acceleration": push,
+        "angular_acceleration": push / length,
+    }
     for name, scale in scales.items():
         if (array := getattr(run, name)) is not None:
             unit = np.full(array.shape[-1], scale)
@@ -81,9 +87,11 @@ def grain(scene: Scene, run: Trajectory) -> tuple[float, str]:
     first = run.orientation[:1]
     sides = np.where(np.sum(run.orientation * first, axis=-1, keepdims=True) < 0, -1.0, 1.0)
     parts = {
-        "positions": run.position / length, "orientations": run.orientation * sides,
-        "velocities": run.velocity / (length * rate), "angular velocities": run.angular_velocity / rate,
-    }  # fmt: skip
+        "positions": run.position / length,
+        "orientations": run.orientation * sides,
+        "velocities": run.velocity / (length * rate),
+        "angular velocities": run.angular_velocity / rate,
+    }
     return max((_noise(series), name) for name, series in parts.items())
 
 

@@ -46,10 +46,12 @@ def limit(scene: Scene, steps: Sequence[float], runs: Sequence[Trajectory]) -> L
         return None
     weight = 1 / ((h2 / h3) ** order - 1)
     motion = replace(
-        third, acceleration=None, angular_acceleration=None,
+        third,
+        acceleration=None,
+        angular_acceleration=None,
         position=third.position + weight * (third.position - second.position),
         orientation=_beyond(third.orientation, second.orientation, weight),
-    )  # fmt: skip
+    )
     return Limit(motion, order, float(error_series(scene, third, motion).max()))
 
 

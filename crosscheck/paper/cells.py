@@ -70,10 +70,18 @@ _TABLE_I = {
     "MPI (GS) + CP": "20 20 20",
 }
 _TABLE_II = {
-    "LM2": "0a", "LM2 + B": "0a", "LM2 + CP": "0a", "ALF": "0.012b", "ALF + CP": "0.012b",
-    "MPI (SVD)": "0.095c", "MPI (SVD) + B": "0.095c", "MPI (SVD) + CP": "3.538d",
-    "MPI (GS)": "0.059c", "MPI (GS) + B": "0.059c", "MPI (GS) + CP": "20",
-}  # fmt: skip
+    "LM2": "0a",
+    "LM2 + B": "0a",
+    "LM2 + CP": "0a",
+    "ALF": "0.012b",
+    "ALF + CP": "0.012b",
+    "MPI (SVD)": "0.095c",
+    "MPI (SVD) + B": "0.095c",
+    "MPI (SVD) + CP": "3.538d",
+    "MPI (GS)": "0.059c",
+    "MPI (GS) + B": "0.059c",
+    "MPI (GS) + CP": "20",
+}
 _TABLE_III = {  # outcome, steps a second of simulation, seconds of execution a second of simulation
     "LM2": ("6.163c", 3303, 53.95),
     "LM2 + B": ("8.079c", 3292, 52.53),
@@ -101,7 +109,12 @@ CELLS: tuple[Cell, ...] = (
 Counts = dict[str, tuple[int, float]]  # row → steps and seconds of execution, a second of simulation
 COUNTS_III: Counts = {row: (steps, seconds) for row, (_, steps, seconds) in _TABLE_III.items()}
 COUNTS_IV: Counts = {
-    "LM1": (2428, 30.31), "LM2": (2428, 30.34), "MPI (GS)": (2428, 55.52), "MPI (SVD)": (2428, 47.07),
-    "LM2 + CP": (1627, 39.5), "MPI (GS) + CP": (1768, 58.27), "MPI (SVD) + CP": (1774, 58.82),
+    "LM1": (2428, 30.31),
+    "LM2": (2428, 30.34),
+    "MPI (GS)": (2428, 55.52),
+    "MPI (SVD)": (2428, 47.07),
+    "LM2 + CP": (1627, 39.5),
+    "MPI (GS) + CP": (1768, 58.27),
+    "MPI (SVD) + CP": (1774, 58.82),
     "ALF + CP": (1368, 28.47),
-}  # fmt: skip
+}

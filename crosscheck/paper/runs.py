@@ -33,8 +33,16 @@ FIGURES: Mapping[str, tuple[str, ...]] = {  # column → rows whose motion is dr
     "θ₂ = π/2": ("ALF", "MPI (GS)", "MPI (SVD)", "MPI (GS) + B", "MPI (GS) + CP", "MPI (SVD) + CP"),
     FIVE_BAR: ("MPI (GS)", "MPI (SVD)", "MPI (SVD) + CP"),
 }
-CROSSING = ("ALF", "MPI (GS)", "MPI (SVD)", "MPI (GS) + B", "MPI (SVD) + B", "ALF + CP", "MPI (GS) + CP",
-            "MPI (SVD) + CP")  # fmt: skip
+CROSSING = (
+    "ALF",
+    "MPI (GS)",
+    "MPI (SVD)",
+    "MPI (GS) + B",
+    "MPI (SVD) + B",
+    "ALF + CP",
+    "MPI (GS) + CP",
+    "MPI (SVD) + CP",
+)
 DYNAMIC: Mapping[str, tuple[str, ...]] = {
     HEAVY: CROSSING,
     UNEQUAL: ("ALF + CP", "MPI (SVD) + CP", "MPI (GS) + CP", "ALF", "MPI (SVD)", "MPI (GS)"),
@@ -76,9 +84,16 @@ Records = dict[Label, Record]
 def cases() -> Cases:
     """Every run that the tables and figures need, except the follow-ups and the timings."""
     return {
-        **tables(), **drawn(), **strict(), **figures(), **dynamic(), **kept(), **tight(), **growth(),
+        **tables(),
+        **drawn(),
+        **strict(),
+        **figures(),
+        **dynamic(),
+        **kept(),
+        **tight(),
+        **growth(),
         **gains(),
-    }  # fmt: skip
+    }
 
 
 def studies() -> Cases:

@@ -56,10 +56,16 @@ REASONS: Mapping[str, str] = {
     "that the error bounds the steps, heavy enough that unstabilised runs last 20 s",
 }
 LIMITS: Mapping[str, float] = {
-    "rtol": 1e-6, "smallest_step": 3e-6, "forced_step": 3e-6, "largest_step": 0.01, "largest_turn": 1.2,
-    "violation": 3e-3, "rank_tolerance": 1e-10, "most_steps": 1_000_000,
+    "rtol": 1e-6,
+    "smallest_step": 3e-6,
+    "forced_step": 3e-6,
+    "largest_step": 0.01,
+    "largest_turn": 1.2,
+    "violation": 3e-3,
+    "rank_tolerance": 1e-10,
+    "most_steps": 1_000_000,
     "compared": False,
-}  # fmt: skip
+}
 
 FORMULATIONS = {"LM1": "lm1", "LM2": "lm2", "ALF": "alf", "MPI (SVD)": "mpi-svd", "MPI (GS)": "mpi-gs"}
 STABILISATIONS = {"": "none", "B": "baumgarte", "CP": "partitioning"}

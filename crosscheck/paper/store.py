@@ -47,10 +47,13 @@ def drawable(label: Label, scene: Scene, record: Record) -> Record:
         for name, motion in shown
     }
     return record | {
-        "bodies": bodies, "times": record["times"] if drawn or label.part == GROWTH else [],
+        "bodies": bodies,
+        "times": record["times"] if drawn or label.part == GROWTH else [],
         "violation": _violation(scene, record) if drawn or label.part == GROWTH else [],
-        "reactions": {}, "open_reactions": None, "crossings": None,
-    }  # fmt: skip
+        "reactions": {},
+        "open_reactions": None,
+        "crossings": None,
+    }
 
 
 def _violation(scene: Scene, record: Record) -> list[float]:

@@ -48,17 +48,25 @@ def well_formed(answer: Any, scene: Scene, times: np.ndarray) -> Trajectory:
         raise MalformedAnswer(f"scene: is {answer.scene!r}, not {scene.name!r}")
     if not str(answer.version).strip():
         raise MalformedAnswer("version: is empty")
-    plain: dict[str, Any] = {name: _array(name, getattr(answer, name), (reached.size, len(names), width))
-             for name, width in (WIDTHS | OPTIONAL).items()
-             if name in WIDTHS or getattr(answer, name) is not None}  # fmt: skip
+    plain: dict[str, Any] = {
+        name: _array(name, getattr(answer, name), (reached.size, len(names), width))
+        for name, width in (WIDTHS | OPTIONAL).items()
+        if name in WIDTHS or getattr(answer, name) is not None
+    }
     if np.any(np.abs(np.linalg.norm(plain["orientation"], axis=-1) - 1) > UNIT_TOLERANCE):
         raise MalformedAnswer("orientation: has a quaternion that is not of unit length")
     texts: dict[str, Any] = {name: str(getattr(answer, name)) for name in ("version", "method", "message")}
     return replace(
-        answer, **plain, **texts, times=reached, bodies=tuple(answer.bodies),
-        settings=_settings(answer.settings), cost=_cost(answer), t_end=_number("t_end", answer.t_end),
+        answer,
+        **plain,
+        **texts,
+        times=reached,
+        bodies=tuple(answer.bodies),
+        settings=_settings(answer.settings),
+        cost=_cost(answer),
+        t_end=_number("t_end", answer.t_end),
         reactions=_reactions(answer.reactions, scene, reached.size),
-    )  # fmt: skip
+    )
 
 
 def answered(simulator: Engine, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:

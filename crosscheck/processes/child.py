@@ -67,9 +67,12 @@ class Child:
         with theirs:
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "crosscheck.processes.serve"],
-                stdin=theirs.fileno(), stdout=self._printed, stderr=subprocess.STDOUT, env=_environment(),
+                stdin=theirs.fileno(),
+                stdout=self._printed,
+                stderr=subprocess.STDOUT,
+                env=_environment(),
                 start_new_session=True,
-            )  # fmt: skip
+            )
         _alive.add(self)
 
     @property

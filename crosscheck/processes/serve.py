@@ -92,9 +92,7 @@ def _unserved(family: str) -> Cannot:
     return Cannot(Owner.MODEL, f"{family} does not serve this scene")
 
 
-def run_interleaved(
-    scene: Scene, times: np.ndarray, jobs: Sequence[Job], repeats: int
-) -> list[list[float]]:  # fmt: skip
+def run_interleaved(scene: Scene, times: np.ndarray, jobs: Sequence[Job], repeats: int) -> list[list[float]]:
     """``cost.seconds`` of every repeat of every job, round-robin after a warm-up round.
 
     NaN where a run did not complete: the time of a part is not the time of the whole.
@@ -115,10 +113,15 @@ def failed(
 ) -> Trajectory:
     """The trajectory of a run that gave no state."""
     return Trajectory.failed(
-        scene=scene.name, engine=engine_name, version=version, method=setting.family,
-        settings=dict(setting.options), bodies=tuple(b.name for b in scene.body), outcome=outcome,
+        scene=scene.name,
+        engine=engine_name,
+        version=version,
+        method=setting.family,
+        settings=dict(setting.options),
+        bodies=tuple(b.name for b in scene.body),
+        outcome=outcome,
         message=message,
-    )  # fmt: skip
+    )
 
 
 def main() -> None:

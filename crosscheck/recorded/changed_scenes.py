@@ -45,9 +45,10 @@ def changes(scene: Scene) -> Iterator[Change]:
     size = float(np.linalg.norm(scene.gravity))
     if size:
         yield Change(
-            lambda x: scene.with_(gravity=tuple((1 + x) * g for g in scene.gravity)), 1e-3,
+            lambda x: scene.with_(gravity=tuple((1 + x) * g for g in scene.gravity)),
+            1e-3,
             lambda x: f"gravity of {_gravity((1 + x) * size)} m/s², not {size:.6g}",
-        )  # fmt: skip
+        )
     if not scene.has_mass():
         return
     weight = sum(body.mass or 0.0 for body in scene.body)

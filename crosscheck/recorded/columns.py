@@ -9,18 +9,37 @@ from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
 UNITS = {  # name → factor to SI
-    "s": 1.0, "ms": 1e-3, "min": 60.0, "m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "in": 0.0254,
+    "s": 1.0,
+    "ms": 1e-3,
+    "min": 60.0,
+    "m": 1.0,
+    "mm": 1e-3,
+    "cm": 1e-2,
+    "um": 1e-6,
+    "in": 0.0254,
     "ft": 0.3048,
-    "rad": 1.0, "deg": np.pi / 180, "rev": 2 * np.pi, "m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2,
-    "rad/s": 1.0, "deg/s": np.pi / 180, "rpm": np.pi / 30, "1": 1.0, "": 1.0,
-}  # fmt: skip
+    "rad": 1.0,
+    "deg": np.pi / 180,
+    "rev": 2 * np.pi,
+    "m/s": 1.0,
+    "mm/s": 1e-3,
+    "cm/s": 1e-2,
+    "rad/s": 1.0,
+    "deg/s": np.pi / 180,
+    "rpm": np.pi / 30,
+    "1": 1.0,
+    "": 1.0,
+}
 SI = {
-    "time": "s", "position": "m", "orientation": "1", "velocity": "m/s", "angular_velocity": "rad/s",
-    "angle": "rad", "displacement": "m",
-}  # fmt: skip
-VECTORS = {
-    "position": "xyz", "orientation": "wxyz", "velocity": "xyz", "angular_velocity": "xyz",
-}  # fmt: skip
+    "time": "s",
+    "position": "m",
+    "orientation": "1",
+    "velocity": "m/s",
+    "angular_velocity": "rad/s",
+    "angle": "rad",
+    "displacement": "m",
+}
+VECTORS = {"position": "xyz", "orientation": "wxyz", "velocity": "xyz", "angular_velocity": "xyz"}
 
 
 def kind_of(column: str) -> str:
@@ -68,6 +87,10 @@ def scales(scene: Scene, motion: Trajectory) -> dict[str, float]:
     turning = float(np.linalg.norm(motion.angular_velocity, axis=-1).max(initial=0.0))
     least = length / scene.duration
     return {
-        "position": length, "displacement": length, "orientation": 1.0, "angle": 1.0,
-        "velocity": max(speed, least), "angular_velocity": max(turning, least / length),
-    }  # fmt: skip
+        "position": length,
+        "displacement": length,
+        "orientation": 1.0,
+        "angle": 1.0,
+        "velocity": max(speed, least),
+        "angular_velocity": max(turning, least / length),
+    }

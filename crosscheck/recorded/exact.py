@@ -46,7 +46,7 @@ def exact(scene: Scene, times: Sequence[float] | np.ndarray, seconds: float = SE
 
 def reference_table(
     scene: Scene, times: Sequence[float] | np.ndarray, seconds: float = SECONDS
-) -> dict[str, np.ndarray]:  # fmt: skip
+) -> dict[str, np.ndarray]:
     """Return the reference motion as columns: ``time``, ``bound`` and every column of ``values``.
 
     Parameters

@@ -16,10 +16,15 @@ EXACTLY = 1e-6  # of the difference: what remains is of rounding and printed dig
 ALIKE = 20.0  # fits within this factor of the best count as equal, and the simplest of them comes first
 SHOWN = 3
 FACTORS = {
-    1e3: "in mm, not m", 1e2: "in cm, not m", 1e-3: "in km, not m", 180 / np.pi: "in degrees, not rad",
-    np.pi / 180: "in rad, read as degrees", 1 / (2 * np.pi): "in revolutions, not rad",
-    30 / np.pi: "in revolutions a minute, not rad/s", -1.0: "of opposite sign",
-}  # fmt: skip
+    1e3: "in mm, not m",
+    1e2: "in cm, not m",
+    1e-3: "in km, not m",
+    180 / np.pi: "in degrees, not rad",
+    np.pi / 180: "in rad, read as degrees",
+    1 / (2 * np.pi): "in revolutions, not rad",
+    30 / np.pi: "in revolutions a minute, not rad/s",
+    -1.0: "of opposite sign",
+}
 SHIFTS = np.linspace(-0.1, 0.1, 41)  # of the duration: shifts in time from which the best is refined
 
 

@@ -55,10 +55,12 @@ class Judgement:
     def to_record(self) -> dict[str, Any]:
         """The judgement as numbers, lists and text, for JSON."""
         return {
-            "right": self.is_right, "until": self.until, "reason": self.reason,
+            "right": self.is_right,
+            "until": self.until,
+            "reason": self.reason,
             "columns": [{**vars(c), "right": c.is_right} for c in self.columns],
             "explanations": [vars(e) for e in self.explanations],
-        }  # fmt: skip
+        }
 
 
 def judge_motion(

@@ -15,9 +15,11 @@ from crosscheck.recorded.columns import SI, UNITS, kind_of, names
 from mbref.scene import Scene, SceneError
 
 SHORT = {  # last part of a header → column
-    **{a: f"position.{a}" for a in "xyz"}, **{f"v{a}": f"velocity.{a}" for a in "xyz"},
-    **{f"w{a}": f"angular_velocity.{a}" for a in "xyz"}, **{f"q{a}": f"orientation.{a}" for a in "wxyz"},
-}  # fmt: skip
+    **{a: f"position.{a}" for a in "xyz"},
+    **{f"v{a}": f"velocity.{a}" for a in "xyz"},
+    **{f"w{a}": f"angular_velocity.{a}" for a in "xyz"},
+    **{f"q{a}": f"orientation.{a}" for a in "wxyz"},
+}
 ORDERS = ("wxyz", "xyzw")
 LATE = 50.0  # of the scene's duration: times beyond are in another unit
 
@@ -38,7 +40,7 @@ class Recording:
 
 def read(
     path: Path, scene: Scene, columns: Mapping[str, str], units: Sequence[str] = (), order: str = "wxyz"
-) -> Recording:  # fmt: skip
+) -> Recording:
     """The recording in a table.
 
     ``columns`` maps a column of the scene, or ``time``, to ``number`` (from 1) or header of the table, with
@@ -145,9 +147,13 @@ def _factor(name: str, own: str, units: Sequence[str]) -> float:
 def _dimension(unit: str) -> str:
     """The SI unit of a unit's quantity."""
     for si, known in (
-        ("s", ("s", "ms", "min")), ("m", ("m", "mm", "cm", "um", "in", "ft")), ("rad", ("rad", "deg", "rev")),
-        ("m/s", ("m/s", "mm/s", "cm/s")), ("rad/s", ("rad/s", "deg/s", "rpm")), ("1", ("1",)),
-    ):  # fmt: skip
+        ("s", ("s", "ms", "min")),
+        ("m", ("m", "mm", "cm", "um", "in", "ft")),
+        ("rad", ("rad", "deg", "rev")),
+        ("m/s", ("m/s", "mm/s", "cm/s")),
+        ("rad/s", ("rad/s", "deg/s", "rpm")),
+        ("1", ("1",)),
+    ):
         if unit in known:
             return si
     raise SceneError([f"unknown unit {unit!r}; known: {', '.join(filter(None, UNITS))}"])

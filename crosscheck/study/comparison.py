@@ -61,9 +61,12 @@ class Wanted(NamedTuple):
 
 
 def collected(
-    scenes: Sequence[Scene], engines: Sequence[str], wanted: Wanted,
-    plan: Callable[[], Sequence[Case]], notice: Notice,
-) -> Collection:  # fmt: skip
+    scenes: Sequence[Scene],
+    engines: Sequence[str],
+    wanted: Wanted,
+    plan: Callable[[], Sequence[Case]],
+    notice: Notice,
+) -> Collection:
     """The records of the cases that ``plan`` chooses, once the engines' settings are known, and what belongs
     to them.
 

@@ -17,8 +17,12 @@ from mbref.scene import Scene, SceneError
 ERROR_RATIO = 2.0  # of errors; rounding and another order of operations scatter them by less above NOISE
 NOISE = 1e-12  # errors below it are rounding
 EARLIER = 0.1  # part of its end time by which a run that fails ends at another time
-MEASURES = {"velocities": "velocity_error", "closure": "violation_position", "energy": "energy_error",
-            "reactions": "reaction_error"}  # fmt: skip
+MEASURES = {
+    "velocities": "velocity_error",
+    "closure": "violation_position",
+    "energy": "energy_error",
+    "reactions": "reaction_error",
+}
 """Metrics that are compared where the error did not change."""
 MEASURE_NOISE = 1e-11  # of these
 TIME_RATIO, SINGLE_RATIO = 1.5, 2.0  # of times: of interleaved repeats on the same machine, of single runs
@@ -118,8 +122,12 @@ def circumstances(old: Mapping[Identity, Record], new: Mapping[Identity, Record]
 def _circumstances(records: Mapping[Identity, Record]) -> dict[str, str]:
     found: dict[str, dict[str, None]] = {}
     for record in records.values():
-        told = {record["engine"]: record["version"], **record["versions"], **record["machine"],
-                "commit": record.get("commit")}  # fmt: skip
+        told = {
+            record["engine"]: record["version"],
+            **record["versions"],
+            **record["machine"],
+            "commit": record.get("commit"),
+        }
         for name, value in told.items():
             if value not in ("", None):
                 found.setdefault(name, {})[str(value)] = None

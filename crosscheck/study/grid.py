@@ -161,9 +161,14 @@ def known(cases: Sequence[Case], records_path: str | Path | None) -> dict[str, R
 def key(case: Case) -> str:
     """Hash of everything that determines a record: scene, times, engine, version and setting."""
     identity = [
-        SCHEMA, case.scene.to_dict(), list(map(float, case.times)), case.engine, _version(case.engine),
-        case.setting.family, dict(case.setting.options),
-    ]  # fmt: skip
+        SCHEMA,
+        case.scene.to_dict(),
+        list(map(float, case.times)),
+        case.engine,
+        _version(case.engine),
+        case.setting.family,
+        dict(case.setting.options),
+    ]
     return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
 
 

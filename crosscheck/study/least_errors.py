@@ -54,8 +54,16 @@ class LeastError:
         best = self.best
         within = [name for name, record in self.families.items() if _reaches(record)]
         others = [f"{name} {_said(r)}" for name, r in self.families.items() if not _reaches(r)]
-        return (self.scene, self.engine, best["family"], varied_settings(best, self.records), _said(best),
-                f"{best['cost']['seconds']:.2g}", "; ".join(within), "; ".join(others))  # fmt: skip
+        return (
+            self.scene,
+            self.engine,
+            best["family"],
+            varied_settings(best, self.records),
+            _said(best),
+            f"{best['cost']['seconds']:.2g}",
+            "; ".join(within),
+            "; ".join(others),
+        )
 
 
 def least_errors(records: Sequence[Record]) -> list[LeastError]:

@@ -129,9 +129,14 @@ def _display(what: str, total: int) -> Iterator[tuple[Show, UnderWay]]:
 
 def _columns(under_way: UnderWay) -> tuple[ProgressColumn, ...]:
     return (
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-        TextColumn("left"), TimeRemainingColumn(), _Working(under_way),
-    )  # fmt: skip
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        _Working(under_way),
+    )
 
 
 class _Working(ProgressColumn):

@@ -11,8 +11,20 @@ from crosscheck.study.grid import Record
 from mbref.scene import Scene
 from mbref.trajectory import Outcome
 
-PUBLIC = ("engine", "version", "method", "settings", "outcome", "message", "t_end", "times", "bodies",
-          "reactions", "metrics", "cost")  # fmt: skip
+PUBLIC = (
+    "engine",
+    "version",
+    "method",
+    "settings",
+    "outcome",
+    "message",
+    "t_end",
+    "times",
+    "bodies",
+    "reactions",
+    "metrics",
+    "cost",
+)
 SMALLEST = 1e-16  # an error of exactly zero is drawn here
 UNTIMED = 1e-6  # s; a run that reports no time is drawn no lower
 

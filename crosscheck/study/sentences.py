@@ -186,8 +186,10 @@ def _where(groups: Sequence[Judged], bad: Grade) -> dict[str, list[Judged]]:
 def _merged(found: Mapping[str, list[Judged]]) -> dict[tuple[str, ...], list[Judged]]:
     """Engines that do the same on the same scenes, together."""
     scenes = {name: tuple(g.scene.name for g in groups) for name, groups in found.items()}
-    return {tuple(n for n in found if scenes[n] == key): found[next(n for n in found if scenes[n] == key)]
-            for key in dict.fromkeys(scenes.values())}  # fmt: skip
+    return {
+        tuple(n for n in found if scenes[n] == key): found[next(n for n in found if scenes[n] == key)]
+        for key in dict.fromkeys(scenes.values())
+    }
 
 
 def _failed(groups: Sequence[Judged], names: Sequence[str], scenes: Sequence[Judged]) -> str:

@@ -10,8 +10,15 @@ from crosscheck.study.grid import Record
 from crosscheck.study.verdict import Judged
 from crosscheck.study.wording import listed, multiple, seconds, span
 
-TITLES = {"mujoco": "MuJoCo", "pinocchio": "Pinocchio", "exudyn": "Exudyn", "simbody": "Simbody",
-          "sundials": "SUNDIALS IDA", "ondsel": "OndselSolver", "casadi": "CasADi"}  # fmt: skip
+TITLES = {
+    "mujoco": "MuJoCo",
+    "pinocchio": "Pinocchio",
+    "exudyn": "Exudyn",
+    "simbody": "Simbody",
+    "sundials": "SUNDIALS IDA",
+    "ondsel": "OndselSolver",
+    "casadi": "CasADi",
+}
 LEVEL = ERROR_LEVELS[1]  # the error at which speeds are compared in words
 SAID = f"{LEVEL:.0e}".replace("e-0", "e-")
 
@@ -109,8 +116,11 @@ def _fast_on_several(costs: Mapping[str, Mapping[str, float]], aided: Collection
     winners = {scene: min(cost, key=lambda n: cost[n]) for scene, cost in costs.items()}
     count = {name: list(winners.values()).count(name) for name in dict.fromkeys(winners.values())}
     first = max(count, key=lambda n: count[n])
-    ratios = [min(c for n, c in cost.items() if n != first) / cost[first]
-              for scene, cost in costs.items() if winners[scene] == first and len(cost) > 1]  # fmt: skip
+    ratios = [
+        min(c for n, c in cost.items() if n != first) / cost[first]
+        for scene, cost in costs.items()
+        if winners[scene] == first and len(cost) > 1
+    ]
     share = f"{count[first]} of {len(costs)}" if count[first] < len(costs) else f"all {len(costs)}"
     text = f"{_whose(first, aided)} is the fastest to an error of {SAID} on {share} scenes"
     if ratios:

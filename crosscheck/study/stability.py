@@ -28,10 +28,20 @@ MOST_STEPS = 200_000  # of a run, for every 30 s
 SAMPLES = 21
 TIME_LIMIT = 20.0  # s of a run
 METHODS = (
-    "alf-dual+projection", "taylor", "mpi-svd+projection", "mpi-svd+partitioning", "mpi-svd+baumgarte",
-    "mpi-svd+none", "mpi-gs+none", "alf+baumgarte", "lm1+baumgarte", "mpi-qr+null-space", "ali3-p",
-    "lm2-first-rows+baumgarte", "lm2-step-rows+baumgarte",
-)  # fmt: skip
+    "alf-dual+projection",
+    "taylor",
+    "mpi-svd+projection",
+    "mpi-svd+partitioning",
+    "mpi-svd+baumgarte",
+    "mpi-svd+none",
+    "mpi-gs+none",
+    "alf+baumgarte",
+    "lm1+baumgarte",
+    "mpi-qr+null-space",
+    "ali3-p",
+    "lm2-first-rows+baumgarte",
+    "lm2-step-rows+baumgarte",
+)
 FIXED_STEPS = {"ali3-p": 10_000}  # steps of a run by methods without a tolerance
 RANK_TOLERANCE = "rank_tolerance"  # the ladder whose difficulty is an option of mbref's methods
 FAMILIES = {"mujoco": "projected", "pinocchio": "tuned", "exudyn": "tuned"}
@@ -64,7 +74,9 @@ def ladders() -> tuple[Ladder, ...]:
     """All ladders."""
     return (
         Ladder(
-            "start", "A driven rhombus begins so far before its flat position.", "distance, rad",
+            "start",
+            "A driven rhombus begins so far before its flat position.",
+            "distance, rad",
             [(d, four_bar(math.pi + d, "start").with_(duration=0.05)) for d in powers(-1, -14, 9)],
         ),
         Ladder(
@@ -74,50 +86,69 @@ def ladders() -> tuple[Ladder, ...]:
             [(d, four_bar_gravity(-d, "turning_back").with_(duration=1.5)) for d in powers(-1, -9, 9)],
         ),
         Ladder(
-            "gap", "The rod of a slider-crank is so much longer than its crank: branches miss each other.",
-            "gap, m", [(g, _gap(g)) for g in powers(-1, -13, 9)],
+            "gap",
+            "The rod of a slider-crank is so much longer than its crank: branches miss each other.",
+            "gap, m",
+            [(g, _gap(g)) for g in powers(-1, -13, 9)],
         ),
         Ladder(
-            "mass_ratio", "The slider of a slider-crank is so many times as heavy as its crank.",
-            "ratio", [(r, _heavy_slider(r)) for r in powers(0, 12, 9)],
+            "mass_ratio",
+            "The slider of a slider-crank is so many times as heavy as its crank.",
+            "ratio",
+            [(r, _heavy_slider(r)) for r in powers(0, 12, 9)],
         ),
         Ladder(
-            "length_ratio", "The rod of a slider-crank is so many times as long as its crank.",
-            "ratio", [(r, _long_rod(r)) for r in (1.5, *powers(1, 6, 6))],
+            "length_ratio",
+            "The rod of a slider-crank is so many times as long as its crank.",
+            "ratio",
+            [(r, _long_rod(r)) for r in (1.5, *powers(1, 6, 6))],
         ),
         Ladder(
-            "units", "A slider-crank of so many units of length, the same motion by Froude's scaling.",
-            "unit", [(s, _scaled(s)) for s in powers(-6, 4, 9)],
+            "units",
+            "A slider-crank of so many units of length, the same motion by Froude's scaling.",
+            "unit",
+            [(s, _scaled(s)) for s in powers(-6, 4, 9)],
         ),
         Ladder(
-            "speed", "The crank of a rhombus is driven so fast, for two turns.", "rad/s",
+            "speed",
+            "The crank of a rhombus is driven so fast, for two turns.",
+            "rad/s",
             [(w, _driven_at(w)) for w in powers(-6, 7, 9)],
         ),
         Ladder(
-            "stiffness", "A spring of such stiffness holds the slider of a slider-crank, for two periods.",
-            "N/m", [(k, _sprung(k)) for k in powers(0, 12, 9)],
+            "stiffness",
+            "A spring of such stiffness holds the slider of a slider-crank, for two periods.",
+            "N/m",
+            [(k, _sprung(k)) for k in powers(0, 12, 9)],
         ),
         Ladder(
-            "tilt", "The second of two hinges of a door is tilted so much: it holds the door unless the tilt "
+            "tilt",
+            "The second of two hinges of a door is tilted so much: it holds the door unless the tilt "
             "is rounding. Between 1e-7 and 1e-9 the judge cannot tell, so that no rung lies there.",
-            "rad", [(a, _door(a)) for a in (1e-1, 1e-3, 1e-5, 1e-6, 1e-10, 1e-11, 1e-13, 1e-15)],
+            "rad",
+            [(a, _door(a)) for a in (1e-1, 1e-3, 1e-5, 1e-6, 1e-10, 1e-11, 1e-13, 1e-15)],
         ),
         Ladder(
             "initial_violation",
             "The velocities given to a slider-crank miss its joints by so much of the crank pin's speed; the "
-            "nearest velocities that meet the joints are the start.", "violation over speed",
+            "nearest velocities that meet the joints are the start.",
+            "violation over speed",
             [(v, _missing(v)) for v in powers(-14, -2, 9)],
         ),
         Ladder(
-            RANK_TOLERANCE, "A slider-crank with three redundant rows turns under gravity, and singular "
+            RANK_TOLERANCE,
+            "A slider-crank with three redundant rows turns under gravity, and singular "
             "values or pivots below so much of the largest count as zero.",
-            "rank tolerance", [(r, _turning().with_(duration=0.5)) for r in powers(-16, -1, 9)],
+            "rank tolerance",
+            [(r, _turning().with_(duration=0.5)) for r in powers(-16, -1, 9)],
         ),
         Ladder(
-            "duration", "A slider-crank turns under gravity for so long.", "s",
+            "duration",
+            "A slider-crank turns under gravity for so long.",
+            "s",
             [(t, _turning().with_(duration=t)) for t in (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3)],
         ),
-    )  # fmt: skip
+    )
 
 
 def powers(first: float, last: float, count: int) -> Iterator[float]:
@@ -198,9 +229,11 @@ def _sprung(stiffness: float) -> Scene:
     scene = slider_crank(0.304, 0.4048, 0.3, "stiffness")
     at = scene.body[2].position
     spring = Spring(
-        bodies=("ground", "slider"), points=((1.0, 0.0, 0.0), at), stiffness=stiffness,
+        bodies=("ground", "slider"),
+        points=((1.0, 0.0, 0.0), at),
+        stiffness=stiffness,
         natural_length=0.9 * (1.0 - at[0]),
-    )  # fmt: skip
+    )
     return scene.with_(load=(spring,), duration=4 * math.pi / math.sqrt(stiffness))
 
 

@@ -17,9 +17,13 @@ LONG = 0.5  # s; a run that takes longer is timed by its single run, whose noise
 
 
 def with_timings(
-    cases: Sequence[Case], records: Sequence[Record], path: Path | None, notice: Callable[[str], None],
-    long: float = LONG, repeats: int = REPEATS,
-) -> list[Record]:  # fmt: skip
+    cases: Sequence[Case],
+    records: Sequence[Record],
+    path: Path | None,
+    notice: Callable[[str], None],
+    long: float = LONG,
+    repeats: int = REPEATS,
+) -> list[Record]:
     """The records with the times of ``path`` (JSON lines); a scene of which one is missing is timed.
 
     Only completed runs of up to ``long`` s are timed again, in turns.

@@ -17,8 +17,10 @@ def truth(groups: Sequence[Judged]) -> str:
     if closed:
         bounds = {g.truth["bound"] for g in closed}
         better = " or better" if len(bounds) > 1 else ""
-        parts.append(f"The exact motion of {names(closed)} is known in closed form or by a reduced "
-                     f"equation, to {max(bounds):.0e}{better}.")  # fmt: skip
+        parts.append(
+            f"The exact motion of {names(closed)} is known in closed form or by a reduced "
+            f"equation, to {max(bounds):.0e}{better}."
+        )
         parts += [
             f"That of {g.scene.name} is known{_until(g.scene, g.truth)}." for g in closed if g.truth["reason"]
         ]
@@ -40,8 +42,10 @@ def _reference(group: Judged) -> str:
     ways = (
         "two formulations that share no code agree" if known["both"] else "two runs of one formulation agree"
     )
-    return (f"The reference of {name} is known to {known['bound']:.0e}{_until(group.scene, known)}: {ways}; "
-            f"it took {known['seconds']:.1f} s of CPU time.")  # fmt: skip
+    return (
+        f"The reference of {name} is known to {known['bound']:.0e}{_until(group.scene, known)}: {ways}; "
+        f"it took {known['seconds']:.1f} s of CPU time."
+    )
 
 
 def _until(scene: Scene, known: Mapping[str, Any]) -> str:

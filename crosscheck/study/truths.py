@@ -69,8 +69,14 @@ def _of_family(scene: Scene, family: Truth, times: np.ndarray) -> dict[str, Any]
         if not times.max(initial=0.0) > 0:
             return _nothing(reason)
         exact = family.poses(times)
-    return {"kind": family.name, "bound": family.accuracy, "reason": reason, "until": float(times[-1]),
-            "both": True, "motion": _motion(exact)}  # fmt: skip
+    return {
+        "kind": family.name,
+        "bound": family.accuracy,
+        "reason": reason,
+        "until": float(times[-1]),
+        "both": True,
+        "motion": _motion(exact),
+    }
 
 
 def _of_reference(scene: Scene, times: np.ndarray, reference_time: float) -> dict[str, Any]:
@@ -81,10 +87,14 @@ def _of_reference(scene: Scene, times: np.ndarray, reference_time: float) -> dic
     if not part.times.max(initial=0.0) > 0:
         return _nothing(getattr(found, "reason", ""))
     return {
-        "kind": "reference", "bound": float(part.bound.max()), "both": bool(part.both.all()),
-        "reason": getattr(found, "reason", ""), "until": float(part.times.max()), "seconds": part.seconds,
+        "kind": "reference",
+        "bound": float(part.bound.max()),
+        "both": bool(part.both.all()),
+        "reason": getattr(found, "reason", ""),
+        "until": float(part.times.max()),
+        "seconds": part.seconds,
         "motion": _motion(trajectory(scene, part)),
-    }  # fmt: skip
+    }
 
 
 def _nothing(reason: str) -> dict[str, Any]:

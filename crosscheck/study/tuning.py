@@ -29,9 +29,12 @@ class Tuned(NamedTuple):
 
 
 def tuned(
-    cases: Sequence[Case], level: float, run: Run, integrated_here: Collection[str] = (),
+    cases: Sequence[Case],
+    level: float,
+    run: Run,
+    integrated_here: Collection[str] = (),
     advance: Callable[[str], None] = lambda family: None,
-) -> Tuned:  # fmt: skip
+) -> Tuned:
     """Find the cheapest setting of every family of one engine on one scene that reaches an error.
 
     The cheapest families begin.  A family is given up where it ran out of time, or costs more before it

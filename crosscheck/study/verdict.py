@@ -141,9 +141,11 @@ def _family_costs(least: LeastError, level: float) -> list[Fastest]:
 
 
 def judged(
-    scenes: Sequence[Scene], truths: Sequence[Record], records: Sequence[Record],
+    scenes: Sequence[Scene],
+    truths: Sequence[Record],
+    records: Sequence[Record],
     differences: Mapping[str, Mapping[str, str]] | None = None,
-) -> list[Judged]:  # fmt: skip
+) -> list[Judged]:
     """The scenes that have records, each with its truth, its records and the ``differences`` of its engines,
     which are given by the scene's name."""
     given = differences or {}

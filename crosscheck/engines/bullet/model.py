@@ -100,10 +100,8 @@ class Mechanism:
             "linkInertialFrameOrientations": [_xyzw(_axes(piece)) for piece in links],
             "linkParentIndices": [max(0, piece.parent - up) for piece in links],
             "linkJointTypes": [kinds[m.kind] if m else p.JOINT_FIXED for m in moved],
-            "linkJointAxis": [
-                unit(m.axis).tolist() if m and m.kind in (SLIDE, TURN) else O for m in moved
-            ],
-        }  # fmt: skip
+            "linkJointAxis": [unit(m.axis).tolist() if m and m.kind in (SLIDE, TURN) else O for m in moved],
+        }
 
     def _settle(self, body: int, j: int, piece: Piece) -> None:
         """Inertia, no motor, velocity at t = 0."""

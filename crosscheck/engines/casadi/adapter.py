@@ -96,11 +96,16 @@ class _Run:
         """From the start to the last time."""
         options = setting.options
         self.status = compiled.integrate(
-            _pointer(self.start), _pointer(self.times), ctypes.c_int64(len(self.times)),
-            ctypes.c_double(options["rtol"]), ctypes.c_double(options["min_step"]),
-            ctypes.c_int(setting.family == PROJECTED), _pointer(self.samples), _pointer(self.counts),
+            _pointer(self.start),
+            _pointer(self.times),
+            ctypes.c_int64(len(self.times)),
+            ctypes.c_double(options["rtol"]),
+            ctypes.c_double(options["min_step"]),
+            ctypes.c_int(setting.family == PROJECTED),
+            _pointer(self.samples),
+            _pointer(self.counts),
             _pointer(self.clock),
-        )  # fmt: skip
+        )
 
     def reached(self) -> np.ndarray:
         """States (k, 2 n) at the times that were reached."""

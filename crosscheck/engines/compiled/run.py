@@ -34,10 +34,15 @@ def prepare() -> None:
 
 
 def trajectory(
-    scene: Scene, times: np.ndarray, system: System, y: np.ndarray,
-    load: Callable[[float, np.ndarray], None], sample: Callable[[float], Sample], built: float,
+    scene: Scene,
+    times: np.ndarray,
+    system: System,
+    y: np.ndarray,
+    load: Callable[[float, np.ndarray], None],
+    sample: Callable[[float], Sample],
+    built: float,
     labels: dict[str, Any],
-) -> Trajectory:  # fmt: skip
+) -> Trajectory:
     """The trajectory from a state (n,); ``load`` puts a state at its time into the engine's data."""
     memory, samples = dop853.memory(y), np.zeros((len(times), len(y)))
     times = np.ascontiguousarray(times, dtype=float)

@@ -110,7 +110,12 @@ class Exudyn(Engine):
         forces = None if any(_accelerates(driver) for driver in scene.driver) else motion.forces
         seconds = None if forces is None else motion.coordinates[2]
         return Trajectory(
-            scene.name, self.name, self.version(), setting.family, dict(setting.options), motion.times,
+            scene.name,
+            self.name,
+            self.version(),
+            setting.family,
+            dict(setting.options),
+            motion.times,
             tuple(body.name for body in scene.body),
             position=start + q[..., :3],
             orientation=rotations.multiply(turn, orientation),
@@ -119,9 +124,11 @@ class Exudyn(Engine):
             acceleration=None if seconds is None else seconds[..., :3],
             angular_acceleration=None if seconds is None else _angular(turned, seconds[..., 3:]),
             reactions=None if forces is None else reactions(scene, q[..., :3], turn, forces),
-            outcome=motion.outcome, message=motion.message, cost=motion.cost,
+            outcome=motion.outcome,
+            message=motion.message,
+            cost=motion.cost,
             t_end=motion.t_end,
-        )  # fmt: skip
+        )
 
 
 def _exudyn() -> Any:

@@ -134,10 +134,14 @@ def finite(motion: Motion) -> Motion:
     k = int(np.argmin(good))
     message = f"the state at t = {motion.times[k]:g} s is not finite"
     return replace(
-        motion, times=motion.times[:k], coordinates=motion.coordinates[:, :k],
+        motion,
+        times=motion.times[:k],
+        coordinates=motion.coordinates[:, :k],
         forces=None if motion.forces is None else motion.forces[:k],
-        t_end=float(motion.times[k - 1]) if k else 0.0, outcome=Outcome.NOT_FINITE, message=message,
-    )  # fmt: skip
+        t_end=float(motion.times[k - 1]) if k else 0.0,
+        outcome=Outcome.NOT_FINITE,
+        message=message,
+    )
 
 
 def said(failure: Exception) -> str:

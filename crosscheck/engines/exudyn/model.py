@@ -177,8 +177,10 @@ class _Parts:
     def _spring(self, load: Any) -> None:
         spring = self.items.ObjectConnectorSpringDamper(
             markerNumbers=[self.marker(b, p) for b, p in zip(load.bodies, load.points, strict=True)],
-            referenceLength=load.natural_length, stiffness=load.stiffness, damping=load.damping,
-        )  # fmt: skip
+            referenceLength=load.natural_length,
+            stiffness=load.stiffness,
+            damping=load.damping,
+        )
         self.mbs.AddObject(spring)
 
     def _torsion_spring(self, load: Any) -> None:
@@ -187,9 +189,11 @@ class _Parts:
         ends = zip(joint.bodies, joint.anchor_pair, strict=True)
         spring = self.items.ObjectConnectorTorsionalSpringDamper(
             markerNumbers=[self.marker(body, point, frame) for body, point in ends],
-            nodeNumber=self._turns(), stiffness=load.stiffness, damping=load.damping,
+            nodeNumber=self._turns(),
+            stiffness=load.stiffness,
+            damping=load.damping,
             offset=load.natural_angle,
-        )  # fmt: skip
+        )
         self.mbs.AddObject(spring)
 
     def sensors(self, node: int) -> list[int]:

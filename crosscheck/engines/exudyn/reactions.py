@@ -41,9 +41,13 @@ def reactions(
 
 
 def _wrench(
-    scene: Scene, joint: Joint, axes: list[np.ndarray], moved: np.ndarray, turn: np.ndarray,
+    scene: Scene,
+    joint: Joint,
+    axes: list[np.ndarray],
+    moved: np.ndarray,
+    turn: np.ndarray,
     outputs: list[np.ndarray],
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray]:
     """Force and moment (k, 3) of the joint without its driver; ``axes`` are its frames (k, 3, 3)."""
     force, *torque = outputs
     moment = np.zeros((len(turn), 3))
@@ -69,7 +73,7 @@ def _turn(scene: Scene, body: str, turn: np.ndarray) -> np.ndarray:
 
 def _point(
     scene: Scene, body: str, point: tuple[float, ...], moved: np.ndarray, turn: np.ndarray
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """World positions (k, 3) of a point of a body, given at t = 0."""
     if body == GROUND:
         return np.broadcast_to(point, (len(turn), 3))

@@ -81,8 +81,12 @@ class MuJoCo(Engine):
             return replace(self.run(planar, times, setting), reactions=None)
         start = time.process_time()
         run = _MujocoSimulation(scene, setting)
-        labels = {"engine": self.name, "version": self.version(), "method": setting.family,
-                  "settings": dict(setting.options)}  # fmt: skip
+        labels = {
+            "engine": self.name,
+            "version": self.version(),
+            "method": setting.family,
+            "settings": dict(setting.options),
+        }
         with run.installed(), np.errstate(all="ignore"):
             if setting.family in COMPILED:
                 return run.integrated(times, start, labels)

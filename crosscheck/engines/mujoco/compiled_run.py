@@ -23,8 +23,18 @@ if TYPE_CHECKING:
     from crosscheck.engines.mujoco.context import Context
 
 ITERATIONS = 3  # of Newton's method: one meets equalities up to rounding
-UNUSED = ("CONTACT", "LIMIT", "FRICTIONLOSS", "ACTUATION", "SENSOR", "MIDPHASE", "CLAMPCTRL", "NATIVECCD",
-          "MULTICCD", "WARMSTART")  # fmt: skip
+UNUSED = (
+    "CONTACT",
+    "LIMIT",
+    "FRICTIONLOSS",
+    "ACTUATION",
+    "SENSOR",
+    "MIDPHASE",
+    "CLAMPCTRL",
+    "NATIVECCD",
+    "MULTICCD",
+    "WARMSTART",
+)
 
 
 def leave_out_unused(mujoco: Any, model: Any) -> None:
@@ -54,9 +64,13 @@ class CompiledRun:
     longest: float  # s; of a step
 
     def trajectory(
-        self, scene: Scene, times: np.ndarray, sample: Callable[[float], Sample], built: float,
+        self,
+        scene: Scene,
+        times: np.ndarray,
+        sample: Callable[[float], Sample],
+        built: float,
         labels: dict[str, Any],
-    ) -> Trajectory:  # fmt: skip
+    ) -> Trajectory:
         """The motion from the start; construction took ``built`` seconds."""
         from crosscheck.engines.compiled.run import trajectory
         from crosscheck.engines.mujoco.rates import load
@@ -76,9 +90,16 @@ class CompiledRun:
         rtol = self.options["rtol"]
         correction = settle.address if self.family == PROJECTED_COMPILED else 0
         return System(
-            int(rates.address or 0), self.context.address, self.context.quaternions, rtol, rtol,
-            self.options["min_step"], self.longest, MOST_STEPS, int(correction or 0),
-        )  # fmt: skip
+            int(rates.address or 0),
+            self.context.address,
+            self.context.quaternions,
+            rtol,
+            rtol,
+            self.options["min_step"],
+            self.longest,
+            MOST_STEPS,
+            int(correction or 0),
+        )
 
     def _newton(self) -> Any:
         from crosscheck.engines.compiled.newton import System
@@ -90,7 +111,7 @@ class CompiledRun:
 
 def compiled_run(
     scene: Scene, built: Compiled, data: Any, family: str, options: Mapping[str, float], longest: float
-) -> CompiledRun:  # fmt: skip
+) -> CompiledRun:
     """The run from the data's state; drivers become prescribed coordinates instead of equalities."""
     from crosscheck.engines.mujoco.context import context
 

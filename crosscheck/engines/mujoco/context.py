@@ -18,11 +18,46 @@ from mbref.scene import Driver
 
 ARMATURE = 1e15  # of a driven coordinate, in mean inertias of the model
 LIBRARIES = ("libmujoco.so*", "libmujoco*.dylib", "mujoco.dll")
-FUNCTIONS = ("mj_forward", "mj_fwdPosition", "mj_kinematics", "mj_comPos", "mj_makeConstraint", "mj_fullM",
-             "mj_integratePos")  # fmt: skip
-(FORWARD, POSITION_STAGE, KINEMATICS, CENTRES, CLOSURES, FULL_MASS, INTEGRATE, MODEL, DATA, QPOS, QVEL, QACC,
- FORCE, NQ, NV, SINGLE, SINGLES, TURN, TURNS, DRIVE, DRIVES, DRIVE_WIDTH, COUNT, RESIDUALS, JACOBIAN, WORK,
- MOST_ROWS, WEIGHTED, WIDTH) = range(29)  # places in the context  # fmt: skip
+FUNCTIONS = (
+    "mj_forward",
+    "mj_fwdPosition",
+    "mj_kinematics",
+    "mj_comPos",
+    "mj_makeConstraint",
+    "mj_fullM",
+    "mj_integratePos",
+)
+(
+    FORWARD,
+    POSITION_STAGE,
+    KINEMATICS,
+    CENTRES,
+    CLOSURES,
+    FULL_MASS,
+    INTEGRATE,
+    MODEL,
+    DATA,
+    QPOS,
+    QVEL,
+    QACC,
+    FORCE,
+    NQ,
+    NV,
+    SINGLE,
+    SINGLES,
+    TURN,
+    TURNS,
+    DRIVE,
+    DRIVES,
+    DRIVE_WIDTH,
+    COUNT,
+    RESIDUALS,
+    JACOBIAN,
+    WORK,
+    MOST_ROWS,
+    WEIGHTED,
+    WIDTH,
+) = range(29)  # places in the context
 POSITION, VELOCITY, INERTIA, AMPLITUDE, FREQUENCY, PHASE, POLYNOMIAL = range(7)  # numbers of a drive
 ROWS = 7  # of an equality at most
 NOTHING = 1e-12  # of the model's extent: a row of closures that nothing moves is rounding
@@ -63,11 +98,23 @@ def context(
     work[-1] = NOTHING * max(1.0, model.stat.extent)
     state = (data.qpos, data.qvel, data.qacc, data.qfrc_applied)
     numbers = [
-        *map(function, FUNCTIONS), model._address, data._address, *map(_address, state), model.nq, model.nv,
-        _address(single), len(single), _address(turn), len(turn), _address(drives), *drives.shape,
-        *(data._address + offset(field) for field in ("ne", "efc_pos", "efc_J")), _address(work), most,
+        *map(function, FUNCTIONS),
+        model._address,
+        data._address,
+        *map(_address, state),
+        model.nq,
+        model.nv,
+        _address(single),
+        len(single),
+        _address(turn),
+        len(turn),
+        _address(drives),
+        *drives.shape,
+        *(data._address + offset(field) for field in ("ne", "efc_pos", "efc_J")),
+        _address(work),
+        most,
         is_weighted,
-    ]  # fmt: skip
+    ]
     kept = (model, data, single, turn, drives, work)
     return Context(np.array(numbers, dtype=np.int64), turn[:, 0].copy(), kept)
 

@@ -17,8 +17,12 @@ from mbref.scene import Scene
 
 HARD = 1e-7  # factor of the regulariser: its error and rounding are below 1e-9; at 1e-8 rounding grows
 RK4 = "mjINT_RK4"
-STOCK = {"stock": RK4, "euler": "mjINT_EULER", "implicit": "mjINT_IMPLICIT",
-         "implicitfast": "mjINT_IMPLICITFAST"}  # fmt: skip
+STOCK = {
+    "stock": RK4,
+    "euler": "mjINT_EULER",
+    "implicit": "mjINT_IMPLICIT",
+    "implicitfast": "mjINT_IMPLICITFAST",
+}
 BETA = 5.0  # double root of the closure errors, in fastest rates of the scene: survives singular passages
 DEFAULT_STEP = 2e-3  # s
 STEPS = (0.15, 0.05, 0.015, 0.005, 0.0015)  # rad turned per step; 2 beta step stays below 2

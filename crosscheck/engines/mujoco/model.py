@@ -70,11 +70,14 @@ def compiled(scene: Scene) -> Compiled:
     for name, wrench in built.applied:
         applied[model.body(name).id] += wrench
     return Compiled(
-        model=model, tree=tree, applied=applied, rates=initial_rates(scene, tree),
+        model=model,
+        tree=tree,
+        applied=applied,
+        rates=initial_rates(scene, tree),
         links=np.array([model.body(_name(k)).id for k in range(len(tree.links))]),
         single=(mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE),
         drivers=[(model.equality(f"driver {d.joint}").id, d) for d in scene.driver],
-    )  # fmt: skip
+    )
 
 
 def description(scene: Scene, tree: Tree) -> Any:

@@ -80,9 +80,15 @@ class PortedModel:
         single = np.isin(model.jnt_type, [int(k) for k in self.built.single])
         coordinates[model.jnt_dofadr[single]] = data.qpos[model.jnt_qposadr[single]]
         return LinkMotion(
-            data.xmat[links].reshape(-1, 3, 3), data.xpos[links], twists[:, 3:], twists[:, :3],
-            UNKNOWN, UNKNOWN, coordinates, data.qvel.copy(),
-        )  # fmt: skip
+            data.xmat[links].reshape(-1, 3, 3),
+            data.xpos[links],
+            twists[:, 3:],
+            twists[:, :3],
+            UNKNOWN,
+            UNKNOWN,
+            coordinates,
+            data.qvel.copy(),
+        )
 
 
 __all__ = ["FAMILIES", "OPTIONS", "SUPPORTS", "PortedModel", "refusal", "sweep"]

@@ -22,9 +22,14 @@ Rows = Callable[[], Sequence[tuple[int, Driver]]]  # the driven constraint rows 
 
 
 def projected(
-    mujoco: Any, model: Any, data: Any, drivers: Rows, t: float, load: Callable[[float, np.ndarray], None],
+    mujoco: Any,
+    model: Any,
+    data: Any,
+    drivers: Rows,
+    t: float,
+    load: Callable[[float, np.ndarray], None],
     y: np.ndarray,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """The state (nq + nv,) nearest to ``y``, by kinetic energy, whose positions and velocities satisfy the
     equality constraints at time t (s); ``load`` puts a state into the data.  Raises Failed."""
     load(t, y)

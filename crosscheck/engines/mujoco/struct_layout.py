@@ -7,10 +7,17 @@ import functools
 from typing import Any
 
 SIMPLE: dict[str, Any] = {
-    "int": ctypes.c_int, "double": ctypes.c_double, "mjtNum": ctypes.c_double, "size_t": ctypes.c_size_t,
-    "uintptr_t": ctypes.c_size_t, "mjtSize": ctypes.c_int64, "mjtBool": ctypes.c_bool,
-    "mjtByte": ctypes.c_ubyte, "float": ctypes.c_float, "uint64_t": ctypes.c_uint64,
-}  # fmt: skip
+    "int": ctypes.c_int,
+    "double": ctypes.c_double,
+    "mjtNum": ctypes.c_double,
+    "size_t": ctypes.c_size_t,
+    "uintptr_t": ctypes.c_size_t,
+    "mjtSize": ctypes.c_int64,
+    "mjtBool": ctypes.c_bool,
+    "mjtByte": ctypes.c_ubyte,
+    "float": ctypes.c_float,
+    "uint64_t": ctypes.c_uint64,
+}
 
 
 @functools.cache

@@ -52,9 +52,13 @@ def _text(spec: Any) -> str:
     tendons = ET.SubElement(root, "tendon")
     for spring in spec.tendons:
         element = ET.SubElement(
-            tendons, "spatial", name=spring.name, springlength=_digits(spring.springlength),
-            stiffness=_digits(spring.stiffness[:1]), damping=_digits(spring.damping[:1]),
-        )  # fmt: skip
+            tendons,
+            "spatial",
+            name=spring.name,
+            springlength=_digits(spring.springlength),
+            stiffness=_digits(spring.stiffness[:1]),
+            damping=_digits(spring.damping[:1]),
+        )
         for i in range(2):
             ET.SubElement(element, "site", site=f"{spring.name}.{i}")
     for section in (equalities, tendons):
@@ -68,9 +72,13 @@ def _add_body(element: ET.Element, body: Any) -> None:
     """The inertia, joints, sites and children of a body."""
     if element.tag == "body":
         ET.SubElement(
-            element, "inertial", mass=_digits([body.mass]), pos=_digits(body.ipos), quat=_digits(body.iquat),
+            element,
+            "inertial",
+            mass=_digits([body.mass]),
+            pos=_digits(body.ipos),
+            quat=_digits(body.iquat),
             diaginertia=_digits(body.inertia),
-        )  # fmt: skip
+        )
     for joint in body.joints:
         kind = joint.type.name.removeprefix("mjJNT_").lower()
         turning = {} if kind in ("free", "ball") else {"axis": _digits(joint.axis)}

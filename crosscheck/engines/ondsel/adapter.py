@@ -75,8 +75,12 @@ class Ondsel(Engine):
             raise ValueError(f"ondsel has no family {setting.family!r}")
         start = time.process_time()
         run = _OndselSimulation(scene, np.array(times, dtype=float), setting.options["step"])
-        labels = {"engine": self.name, "version": self.version(), "method": setting.family,
-                  "settings": dict(setting.options)}  # fmt: skip
+        labels = {
+            "engine": self.name,
+            "version": self.version(),
+            "method": setting.family,
+            "settings": dict(setting.options),
+        }
         built = time.process_time() - start
         trajectory = run_through(scene, times, run.advance, run.sample, run.counts, built, labels)
         if any(joint.type in ACCURATE_ON_GROUND and GROUND not in joint.bodies for joint in scene.joint):
@@ -162,12 +166,14 @@ class _Reader:
         body = rotations.multiply(turned, rotations.conjugate(self.assembly.principal))
         position, orientation = self._vectors("X", "Y", "Z"), rotations.multiply(self.back, body)
         return Sample(
-            position=position, orientation=orientation, velocity=self._vectors("VX", "VY", "VZ"),
+            position=position,
+            orientation=orientation,
+            velocity=self._vectors("VX", "VY", "VZ"),
             angular_velocity=self._vectors("OmegaX", "OmegaY", "OmegaZ"),
             acceleration=self._vectors("AX", "AY", "AZ"),
             angular_acceleration=self._vectors("AlphaX", "AlphaY", "AlphaZ"),
             reactions=self._reactions(position, orientation),
-        )  # fmt: skip
+        )
 
     def _raw(self, labels: Sequence[str]) -> np.ndarray:
         names = [f"b{k}" for k in range(len(self.scene.body))]

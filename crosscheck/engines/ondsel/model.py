@@ -102,10 +102,15 @@ class Assembly:
         turned = rotations.multiply(self.world, rotations.multiply(orientation, self.principal))
         turned = rotations.to_matrix(turned)
         return [
-            Part(f"b{k}", _tuple(position[k]), _matrix(turned[k]), body.mass or 1.0,
-                 moments_of_inertia=_tuple(self.moments[k]))
+            Part(
+                f"b{k}",
+                _tuple(position[k]),
+                _matrix(turned[k]),
+                body.mass or 1.0,
+                moments_of_inertia=_tuple(self.moments[k]),
+            )
             for k, body in enumerate(self.scene.body)
-        ]  # fmt: skip
+        ]
 
     def _join(
         self, model: Any, parts: list[Any], k: int, joint: Joint, driver: Driver | None, t0: float

@@ -101,8 +101,12 @@ class Pinocchio(Engine):
         start = time.process_time()
         python = Setting("dop853", setting.options) if setting.family in COMPILED else setting
         run = _PinocchioSimulation(scene, python)
-        labels = {"engine": self.name, "version": self.version(), "method": setting.family,
-                  "settings": dict(setting.options)}  # fmt: skip
+        labels = {
+            "engine": self.name,
+            "version": self.version(),
+            "method": setting.family,
+            "settings": dict(setting.options),
+        }
         with np.errstate(all="ignore"):
             if setting.family in COMPILED:
                 return run.without_python(times, setting, start, labels)

@@ -72,9 +72,13 @@ class CompiledRun:
     def _opened(self, loads: Loads, solver: Solver) -> ctypes.c_void_p:
         mechanism = self.mechanism
         tables = (
-            _joints(mechanism), _closures(mechanism), np.array(mechanism.scene.gravity, dtype=float),
-            loads.constant.copy(), mechanism.model.armature.copy(), np.array(solver, dtype=float),
-        )  # fmt: skip
+            _joints(mechanism),
+            _closures(mechanism),
+            np.array(mechanism.scene.gravity, dtype=float),
+            loads.constant.copy(),
+            mechanism.model.armature.copy(),
+            np.array(solver, dtype=float),
+        )
         counts = np.array([len(tables[0]), len(tables[1])], dtype=np.int64)
         self._library.open_mechanism.restype = ctypes.c_void_p
         address = self._library.open_mechanism(_pointer(counts), *map(_pointer, tables))
@@ -83,19 +87,32 @@ class CompiledRun:
         return ctypes.c_void_p(address)
 
     def trajectory(
-        self, times: np.ndarray, options: Mapping[str, float], is_projected: bool, longest: float,
-        load: Callable[[float, np.ndarray], None], sample: Callable[[float], Sample], built: float,
+        self,
+        times: np.ndarray,
+        options: Mapping[str, float],
+        is_projected: bool,
+        longest: float,
+        load: Callable[[float, np.ndarray], None],
+        sample: Callable[[float], Sample],
+        built: float,
         labels: dict[str, Any],
-    ) -> Trajectory:  # fmt: skip
+    ) -> Trajectory:
         """The motion; ``load`` takes a state at its time, construction took ``built`` seconds."""
         from crosscheck.engines.compiled.dop853 import System
         from crosscheck.engines.compiled.run import MOST_STEPS, trajectory
 
         rtol, settle = options["rtol"], self._function("settle") if is_projected else 0
         system = System(
-            self._function("rates"), int(self._address.value or 0), self.quaternions, rtol, rtol,
-            options["min_step"], longest, MOST_STEPS, settle,
-        )  # fmt: skip
+            self._function("rates"),
+            int(self._address.value or 0),
+            self.quaternions,
+            rtol,
+            rtol,
+            options["min_step"],
+            longest,
+            MOST_STEPS,
+            settle,
+        )
         start = np.concatenate((self.mechanism.q0, self.mechanism.v0))
         return trajectory(self.mechanism.scene, times, system, start, load, sample, built, labels)
 
@@ -113,18 +130,32 @@ def _joints(mechanism: Mechanism) -> np.ndarray:
     for j, motion in enumerate(mechanism.motions, 1):
         inertia = model.inertias[j]
         place = model.jointPlacements[j].translation
-        rows.append([KINDS[motion.kind], model.parents[j], *motion.axis, *place, inertia.mass, *inertia.lever,
-                     *inertia.inertia.ravel()])  # fmt: skip
+        rows.append(
+            [
+                KINDS[motion.kind],
+                model.parents[j],
+                *motion.axis,
+                *place,
+                inertia.mass,
+                *inertia.lever,
+                *inertia.inertia.ravel(),
+            ]
+        )
     return np.array(rows, dtype=float).reshape(-1, 21)
 
 
 def _closures(mechanism: Mechanism) -> np.ndarray:
     """A row of 9 numbers a closure."""
     rows = [
-        [6 if closure.type == mechanism.pin.ContactType.CONTACT_6D else 3, closure.joint1_id,
-         closure.joint2_id, *closure.joint1_placement.translation, *closure.joint2_placement.translation]
+        [
+            6 if closure.type == mechanism.pin.ContactType.CONTACT_6D else 3,
+            closure.joint1_id,
+            closure.joint2_id,
+            *closure.joint1_placement.translation,
+            *closure.joint2_placement.translation,
+        ]
         for closure in mechanism.closures
-    ]  # fmt: skip
+    ]
     return np.array(rows, dtype=float).reshape(-1, 9)
 
 

@@ -16,11 +16,18 @@ from crosscheck.engines.compiler import CXX, NoLibrary
 FOLDER = "pinocchio"  # of the cache
 SOURCE = Path(__file__).with_name("rates.cpp")
 FLAGS = (
-    "-std=c++17", "-O2", "-DNDEBUG", "-shared", "-fPIC", "-Wno-deprecated-declarations",
-    "-DPINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION", "-DBOOST_MPL_LIMIT_LIST_SIZE=30",
-    "-DBOOST_MPL_LIMIT_VECTOR_SIZE=30", "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",
+    "-std=c++17",
+    "-O2",
+    "-DNDEBUG",
+    "-shared",
+    "-fPIC",
+    "-Wno-deprecated-declarations",
+    "-DPINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION",
+    "-DBOOST_MPL_LIMIT_LIST_SIZE=30",
+    "-DBOOST_MPL_LIMIT_VECTOR_SIZE=30",
+    "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",
     "-DBOOST_FUSION_INVOKE_MAX_ARITY=12",
-)  # fmt: skip
+)
 EIGEN = Path("/usr/include/eigen3")  # of the system, in addition to the one of the prefix
 
 

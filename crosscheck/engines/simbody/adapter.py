@@ -68,8 +68,12 @@ class Simbody(Engine):
             raise ValueError(f"simbody has no family {setting.family!r}")
         start = time.process_time()
         run = _SimbodySimulation(scene, INTEGRATORS[setting.family], setting.options["accuracy"])
-        labels = {"engine": self.name, "version": self.version(), "method": setting.family,
-                  "settings": dict(setting.options)}  # fmt: skip
+        labels = {
+            "engine": self.name,
+            "version": self.version(),
+            "method": setting.family,
+            "settings": dict(setting.options),
+        }
         built = time.process_time() - start
         return run_through(scene, times, run.advance, run.sample, Counts(), built, labels)
 
@@ -118,9 +122,16 @@ class _SimbodySimulation:
         """The motion of the links."""
         state, bodies = self.state, self.mechanism.bodies
         self.mechanism.model.realizeAcceleration(state)
-        of = {name: np.array([_three(getattr(body, f"get{name}InGround")(state)) for body in bodies])
-              for name in ("Position", "LinearVelocity", "AngularVelocity", "LinearAcceleration",
-                           "AngularAcceleration")}  # fmt: skip
+        of = {
+            name: np.array([_three(getattr(body, f"get{name}InGround")(state)) for body in bodies])
+            for name in (
+                "Position",
+                "LinearVelocity",
+                "AngularVelocity",
+                "LinearAcceleration",
+                "AngularAcceleration",
+            )
+        }
         coordinates = [self.mechanism.coordinates[k] for k in range(self.mechanism.tree.nv)]
         return LinkMotion(
             rotation=np.array([_matrix(body.getTransformInGround(state).R()) for body in bodies]),

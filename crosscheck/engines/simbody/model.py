@@ -84,8 +84,14 @@ class Mechanism:
         self.bodies.append(body)
         kind, frame, order = _joint(link)
         turned = self.vector(_angles(frame))
-        ends = [self.frame(link.parent), self.place(link.parent, link.anchor), turned, body,
-                self.place(k, link.anchor), turned]  # fmt: skip
+        ends = [
+            self.frame(link.parent),
+            self.place(link.parent, link.anchor),
+            turned,
+            body,
+            self.place(k, link.anchor),
+            turned,
+        ]
         if kind == "CylindricalJoint":
             joint = o.CustomJoint(f"joint{k}", *ends, self._cylindrical(k))
         else:

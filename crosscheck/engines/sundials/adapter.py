@@ -76,8 +76,12 @@ class Sundials(Engine):
 
         start = time.process_time()
         run = Run(IDA, scene, setting.options["rtol"])
-        labels = {"engine": self.name, "version": self.version(), "method": setting.family,
-                  "settings": dict(setting.options)}  # fmt: skip
+        labels = {
+            "engine": self.name,
+            "version": self.version(),
+            "method": setting.family,
+            "settings": dict(setting.options),
+        }
         built = time.process_time() - start
         return run_through(scene, times, run.advance, run.sample, run.counts, built, labels)
 

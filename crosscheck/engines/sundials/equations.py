@@ -63,9 +63,12 @@ class Equations:
         lead = y.shape[:-1]
         twist = y[..., self.at_v].reshape(*lead, self.nb, 6)
         return State(
-            y[..., self.at_r].reshape(*lead, self.nb, 3), y[..., self.at_p].reshape(*lead, self.nb, 4),
-            twist[..., :3], twist[..., 3:], y[..., self.at_angles],
-        )  # fmt: skip
+            y[..., self.at_r].reshape(*lead, self.nb, 3),
+            y[..., self.at_p].reshape(*lead, self.nb, 4),
+            twist[..., :3],
+            twist[..., 3:],
+            y[..., self.at_angles],
+        )
 
     def residual(self, t: float, y: np.ndarray, yp: np.ndarray) -> np.ndarray:
         """F (…, size) at y (…, size) and y' (size,)."""
@@ -77,10 +80,17 @@ class Equations:
         turned = rotations.multiply(s.p, pure(moved[..., 3:])) / 2
         acting = self.forces(f, s.omega, s.angles) + yp[self.at_lambda] @ jacobian
         flat = (*y.shape[:-1], -1)
-        return np.concatenate([
-            yp[self.at_r] - moved[..., :3].reshape(flat), yp[self.at_p] - turned.reshape(flat),
-            self.forces.mass @ yp[self.at_v] - acting, yp[self.at_angles] - self.forces.turning(f), phi, rate,
-        ], axis=-1)  # fmt: skip
+        return np.concatenate(
+            [
+                yp[self.at_r] - moved[..., :3].reshape(flat),
+                yp[self.at_p] - turned.reshape(flat),
+                self.forces.mass @ yp[self.at_v] - acting,
+                yp[self.at_angles] - self.forces.turning(f),
+                phi,
+                rate,
+            ],
+            axis=-1,
+        )
 
     def matrix(self, t: float, y: np.ndarray, yp: np.ndarray, cj: float, steps: np.ndarray) -> np.ndarray:
         """∂F/∂y + cj ∂F/∂y' (size, size): difference quotients for the motion, the rest written out."""

@@ -24,9 +24,13 @@ LOOSE = 1e2  # of the scale of the integral of μ: of no interest, and at first 
 LEAST_STEP = 1e-12  # of the duration
 MAX_STEPS = 10**6
 ENDINGS = {  # IDA's return flags
-    -1: Outcome.STEP_FAILED, -3: Outcome.STEP_FAILED, -4: Outcome.NOT_CONVERGED,
-    -5: Outcome.SINGULAR_MATRIX, -6: Outcome.SINGULAR_MATRIX, -7: Outcome.SINGULAR_MATRIX,
-}  # fmt: skip
+    -1: Outcome.STEP_FAILED,
+    -3: Outcome.STEP_FAILED,
+    -4: Outcome.NOT_CONVERGED,
+    -5: Outcome.SINGULAR_MATRIX,
+    -6: Outcome.SINGULAR_MATRIX,
+    -7: Outcome.SINGULAR_MATRIX,
+}
 
 
 class Run:
@@ -77,16 +81,28 @@ class Run:
         acceleration, multipliers = e.accelerations(t, s)
         m = len(e.rows)
         turned = rotations.multiply(s.p, pure(s.omega)) / 2
-        yp = np.concatenate([s.v.ravel(), turned.ravel(), acceleration, e.forces.turning(s.frames()),
-                             multipliers, np.zeros(m)])  # fmt: skip
+        yp = np.concatenate(
+            [
+                s.v.ravel(),
+                turned.ravel(),
+                acceleration,
+                e.forces.turning(s.frames()),
+                multipliers,
+                np.zeros(m),
+            ]
+        )
         self.y = np.concatenate([start, np.zeros(2 * m)])
         scale = self._scale(multipliers)
         self.steps = INCREMENT * scale[: e.motion]
         self.solver = self.ida(
-            self._residual, jacfn=self._matrix, rtol=self.rtol, atol=self.rtol * scale,
-            max_num_steps=MAX_STEPS, max_step=self.scene.duration,
+            self._residual,
+            jacfn=self._matrix,
+            rtol=self.rtol,
+            atol=self.rtol * scale,
+            max_num_steps=MAX_STEPS,
+            max_step=self.scene.duration,
             min_step=LEAST_STEP * self.scene.duration,
-        )  # fmt: skip
+        )
         self.solver.init_step(t, self.y, yp)
         self.evaluated = 0
 
@@ -95,8 +111,14 @@ class Run:
         e, rate = self.equations, stated_rate(self.scene)
         force = max(np.abs(multipliers).max(initial=0.0), np.abs(e.forces.mass).max() * rate**2 * self.length)
         twist = np.repeat([self.length * rate, rate], 3)
-        parts = [np.full(3 * e.nb, self.length), np.ones(4 * e.nb), np.tile(twist, e.nb), np.ones(e.springs),
-                 np.full(len(e.rows), force / rate), np.full(len(e.rows), LOOSE * self.length)]  # fmt: skip
+        parts = [
+            np.full(3 * e.nb, self.length),
+            np.ones(4 * e.nb),
+            np.tile(twist, e.nb),
+            np.ones(e.springs),
+            np.full(len(e.rows), force / rate),
+            np.full(len(e.rows), LOOSE * self.length),
+        ]
         return np.concatenate(parts)
 
     def _residual(self, t: float, y: np.ndarray, yp: np.ndarray, res: np.ndarray) -> None:
@@ -147,11 +169,14 @@ class Run:
         acceleration, multipliers = e.accelerations(t, s)
         rates = acceleration.reshape(-1, 6)
         return Sample(
-            position=s.r, orientation=s.p / np.linalg.norm(s.p, axis=1, keepdims=True), velocity=s.v,
-            angular_velocity=(a @ s.omega[..., None])[..., 0], acceleration=rates[:, :3],
+            position=s.r,
+            orientation=s.p / np.linalg.norm(s.p, axis=1, keepdims=True),
+            velocity=s.v,
+            angular_velocity=(a @ s.omega[..., None])[..., 0],
+            acceleration=rates[:, :3],
             angular_acceleration=(a @ rates[:, 3:, None])[..., 0],
             reactions=self._reactions(t, f, multipliers) if self.scene.has_mass() else {},
-        )  # fmt: skip
+        )
 
     def _reactions(self, t: float, f: Frames, multipliers: np.ndarray) -> dict[str, np.ndarray]:
         """Force and moment (6,) on each joint's second body at the anchor on it, world axes; rows left out
@@ -173,9 +198,10 @@ class Run:
     def _anchor(self, f: Frames, k: int) -> np.ndarray:
         """Joint k's anchor (3,) on its second body, world."""
         group, row = next(
-            (g, int(np.flatnonzero(g.joint == k)[0])) for g in self.equations.constraints.groups
+            (g, int(np.flatnonzero(g.joint == k)[0]))
+            for g in self.equations.constraints.groups
             if k in g.joint
-        )  # fmt: skip
+        )
         body = group.j[row]
         return (f.r[body] + f.a[body] @ group.sj[row])[:, 0]
 

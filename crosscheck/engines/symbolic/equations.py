@@ -153,8 +153,9 @@ class TreeEquations:
             name: np.array([getattr(frame, name) for frame in frames], dtype=float)
             for name in ("rotation", "origin", "velocity", "spin")
         }
-        motion = LinkMotion(of["rotation"], of["origin"], of["velocity"], of["spin"], np.array(along),
-                            np.array(about), q, v)  # fmt: skip
+        motion = LinkMotion(
+            of["rotation"], of["origin"], of["velocity"], of["spin"], np.array(along), np.array(about), q, v
+        )
         return motion, self._closing(frames, forces)
 
     def _solved(self, frames: Sequence[Frame]) -> tuple[np.ndarray, np.ndarray]:

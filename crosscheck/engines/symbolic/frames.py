@@ -56,10 +56,16 @@ class Frame:
         """Return the link with another origin."""
         turned = cross(self.spin, arm)
         return Frame(
-            reference, self.origin + arm, self.rotation, self.velocity + turned, self.spin,
-            self.acceleration + cross(self.spin_rate, arm) + cross(self.spin, turned), self.spin_rate,
-            list(self.columns), self.turned,
-        )  # fmt: skip
+            reference,
+            self.origin + arm,
+            self.rotation,
+            self.velocity + turned,
+            self.spin,
+            self.acceleration + cross(self.spin_rate, arm) + cross(self.spin, turned),
+            self.spin_rate,
+            list(self.columns),
+            self.turned,
+        )
 
 
 def cross(a: Vector, b: Vector) -> Vector:
@@ -73,8 +79,9 @@ def turn(axis: np.ndarray, angle: Any, arithmetic: Arithmetic) -> np.ndarray:
     s, c, still = arithmetic.sin(angle), arithmetic.cos(angle), np.outer(axis, axis)
     entries = [
         _sum((still[i, j], 1.0), (float(i == j) - still[i, j], c), (k[i, j], s))
-        for i in range(3) for j in range(3)
-    ]  # fmt: skip
+        for i in range(3)
+        for j in range(3)
+    ]
     return np.array(entries, dtype=object).reshape(3, 3)
 
 
@@ -93,10 +100,16 @@ def moved_by(
         turned = turned or Turned(frame.rotation, axis, q)
         rotation = turned.before @ turn(turned.axis, turned.angle, arithmetic)
         return Frame(
-            frame.reference, frame.origin, rotation, frame.velocity, frame.spin + along * v,
-            frame.acceleration, frame.spin_rate + rate, [*frame.columns, (place, True, along, frame.origin)],
+            frame.reference,
+            frame.origin,
+            rotation,
+            frame.velocity,
+            frame.spin + along * v,
+            frame.acceleration,
+            frame.spin_rate + rate,
+            [*frame.columns, (place, True, along, frame.origin)],
             turned,
-        )  # fmt: skip
+        )
     slid = frame.moved(along * q, frame.reference)
     slid.velocity = slid.velocity + along * v
     slid.acceleration = slid.acceleration + 2.0 * cross(frame.spin, along) * v

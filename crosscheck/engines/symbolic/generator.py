@@ -66,12 +66,21 @@ class Generator(Engine):
             raise ValueError(f"{self.name} has no family {setting.family!r}")
 
     def _trajectory(
-        self, scene: Scene, times: np.ndarray, setting: Setting, states: np.ndarray, failure: Failed | None,
+        self,
+        scene: Scene,
+        times: np.ndarray,
+        setting: Setting,
+        states: np.ndarray,
+        failure: Failed | None,
         cost: Cost,
-    ) -> Trajectory:  # fmt: skip
+    ) -> Trajectory:
         """The bodies and joints at the states (k, 2 n) reached; ``failure`` is the end of the others."""
-        labels = {"engine": self.name, "version": self.version(), "method": setting.family,
-                  "settings": dict(setting.options)}  # fmt: skip
+        labels = {
+            "engine": self.name,
+            "version": self.version(),
+            "method": setting.family,
+            "settings": dict(setting.options),
+        }
         reached = iter(states)
         current = np.zeros(0)
 

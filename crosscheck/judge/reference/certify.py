@@ -143,14 +143,19 @@ def _table(
     identity = canonical(scene) + json.dumps(motion.times.tolist())
     signs = np.where(np.asarray(motion.orientation[..., :1]).astype(float) < 0, -1, 1)
     table = {
-        "scene": scene.name, "id": hashlib.sha256(identity.encode()).hexdigest()[:16], "version": 1,
-        "digits": digits, "bound": f"{bound[0]:.0e}", "rate_bound": f"{bound[1]:.0e}",
-        "methods": ACROSS if motion.crossings else METHODS, "times": motion.times.tolist(),
+        "scene": scene.name,
+        "id": hashlib.sha256(identity.encode()).hexdigest()[:16],
+        "version": 1,
+        "digits": digits,
+        "bound": f"{bound[0]:.0e}",
+        "rate_bound": f"{bound[1]:.0e}",
+        "methods": ACROSS if motion.crossings else METHODS,
+        "times": motion.times.tolist(),
         "bodies": [body.name for body in scene.body],
         "position": _decimals(motion.position, digits),
         "orientation": _decimals(motion.orientation * signs, digits),
         **{name: _decimals(getattr(motion, name), digits) for name in RATES},
-    }  # fmt: skip
+    }
     if others := replaced(scene, moved):
         table["replaced"] = others
     return table | {"hash": digest(table)}

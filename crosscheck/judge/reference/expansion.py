@@ -25,9 +25,15 @@ class Expansion:
     """The series about a time t: coordinates ``x`` (order + 3, 3, n), and torsion angles."""
 
     def __init__(
-        self, of: NaturalCoordinates, held: HeldRows, loads: Loads, order: int, t: Any,
-        start: tuple[np.ndarray, np.ndarray], angles: Sequence[Any],
-    ):  # fmt: skip
+        self,
+        of: NaturalCoordinates,
+        held: HeldRows,
+        loads: Loads,
+        order: int,
+        t: Any,
+        start: tuple[np.ndarray, np.ndarray],
+        angles: Sequence[Any],
+    ):
         terms, zeros = order + 3, of.arithmetic.zeros
         m, p = len(held.numbers), len(held.products)
         self._held, self._drives = held, held.drives(t, terms)

@@ -15,8 +15,12 @@ from crosscheck.judge.deadline import ask
 from crosscheck.judge.tolerances import RANK
 from mbref.scene import JOINT_TYPES, Joint, Scene, Universal
 
-WEAKER = {"revolute": ("spherical", "planar", "cylindrical"), "translational": ("cylindrical",),
-          "universal": ("spherical",), "fixed": ("spherical",)}  # fmt: skip
+WEAKER = {
+    "revolute": ("spherical", "planar", "cylindrical"),
+    "translational": ("cylindrical",),
+    "universal": ("spherical",),
+    "fixed": ("spherical",),
+}
 """Types whose rows are among those of a type, with the same anchor and axis; the fewest rows first."""
 REMOVED = "removed"
 KEPT = 0.02  # part of the least singular value that rows keep without the redundant ones

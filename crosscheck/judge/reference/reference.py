@@ -26,9 +26,7 @@ SECONDS = 20.0
 TWIN_ORDER, TWIN_NODES, TWIN_SEED = 24, 1.8, 1  # of second runs: A's order, B's points a digit
 CONSISTENT = 32 * EXTENDED.eps  # residual that is of the motion's own rounding, not of the scene's
 SHARE = 0.4  # of the time that is left for each run of A
-FIELDS = (
-    "position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration"
-)  # fmt: skip
+FIELDS = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
 
 _computing: dict[str, Lock] = {}  # by what determines the motion
 
@@ -116,9 +114,14 @@ def _other_a(scene: Scene, times: np.ndarray, displaced: float, seconds: float) 
 def _other_b(scene: Scene, times: np.ndarray, displaced: float, seconds: float) -> Motion:
     """By B, on fewer points and with other rows, the joints displaced."""
     return tree_motion(
-        scene, times, EXTENDED, seconds=seconds, nodes_per_digit=TWIN_NODES, seed=TWIN_SEED,
+        scene,
+        times,
+        EXTENDED,
+        seconds=seconds,
+        nodes_per_digit=TWIN_NODES,
+        seed=TWIN_SEED,
         displaced=displaced,
-    )  # fmt: skip
+    )
 
 
 def judged(
@@ -133,9 +136,12 @@ def judged(
     good = int((bound <= USEFUL).sum())
     arrays = {name: doubles(getattr(one, name)[:good]) for name in FIELDS}
     samples = Reference(
-        times=one.times[:good], **arrays, bound=bound[:good], both=np.arange(good) < len(other.times),
+        times=one.times[:good],
+        **arrays,
+        bound=bound[:good],
+        both=np.arange(good) < len(other.times),
         seconds=one.seconds + twin.seconds + other.seconds,
-    )  # fmt: skip
+    )
     if good < len(apart):
         return (
             samples,

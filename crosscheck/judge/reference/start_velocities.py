@@ -44,9 +44,13 @@ def given(scene: Scene) -> Given:
 
 
 def start_velocities(
-    arithmetic: Arithmetic, rows: np.ndarray, rates: np.ndarray, fit: np.ndarray, wanted: np.ndarray,
+    arithmetic: Arithmetic,
+    rows: np.ndarray,
+    rates: np.ndarray,
+    fit: np.ndarray,
+    wanted: np.ndarray,
     mass: np.ndarray,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """z (n,) with rows (m, n) z = rates (m,), then |fit (g, n) z - wanted (g,)| least, then zᵀ mass (n, n) z
     least; the rows are independent."""
     z = least_squares(arithmetic, rows, rates)

@@ -52,10 +52,17 @@ class Ended(ArithmeticError):
 
 
 def natural_motion(
-    scene: Scene, times: Times, arithmetic: Arithmetic, *, seconds: float = np.inf,
-    order: int = ORDER, tolerance: float | None = None, seed: int = 0, displaced: float = 0.0,
+    scene: Scene,
+    times: Times,
+    arithmetic: Arithmetic,
+    *,
+    seconds: float = np.inf,
+    order: int = ORDER,
+    tolerance: float | None = None,
+    seed: int = 0,
+    displaced: float = 0.0,
     told: Told = untold,
-) -> Motion:  # fmt: skip
+) -> Motion:
     """The motion at ascending times (k,) ≥ 0 in natural coordinates (see Motion), by series of an order.
 
     ``tolerance`` is of a step, relative (default: the arithmetic's rounding unit).  Another ``seed`` prefers
@@ -73,11 +80,15 @@ def natural_motion(
     shape = (len(samples), 3, 3, 4 * len(scene.body) + 4)
     x, v, a = np.moveaxis(np.array(samples, dtype=arithmetic.dtype).reshape(shape), 1, 0)
     return Motion(
-        np.asarray(times[: len(samples)], dtype=float), *stepper.of.bodies(x, v, a),
-        reached=float(stepper.t if reason else max(times, default=0.0)), reason=reason,
-        steps=stepper.steps, crossings=tuple(stepper.crossings), seconds=time.thread_time() - began,
+        np.asarray(times[: len(samples)], dtype=float),
+        *stepper.of.bodies(x, v, a),
+        reached=float(stepper.t if reason else max(times, default=0.0)),
+        reason=reason,
+        steps=stepper.steps,
+        crossings=tuple(stepper.crossings),
+        seconds=time.thread_time() - began,
         contradiction=stepper.contradiction,
-    )  # fmt: skip
+    )
 
 
 class Stepper:

@@ -33,10 +33,16 @@ SEVERAL = 3  # panels across one singular position that do not settle before it 
 
 
 def tree_motion(
-    scene: Scene, times: np.ndarray, arithmetic: Arithmetic, *, seconds: float,
-    nodes_per_digit: float = NODES_PER_DIGIT, seed: int = 0, displaced: float = 0.0,
+    scene: Scene,
+    times: np.ndarray,
+    arithmetic: Arithmetic,
+    *,
+    seconds: float,
+    nodes_per_digit: float = NODES_PER_DIGIT,
+    seed: int = 0,
+    displaced: float = 0.0,
     told: Told = untold,
-) -> Motion:  # fmt: skip
+) -> Motion:
     """The motion of a scene at ascending times (k,) ≥ 0 in an arithmetic; see Motion.
 
     Another ``seed`` prefers other rows where some are redundant, and displaces the joints that close loops by

@@ -18,8 +18,15 @@ from crosscheck.judge.reference.vectors import apply, cross, matrices, product, 
 from mbref.scene import Scene
 
 AXES = np.eye(3)
-RIGIDITY = {"fixed": 6, "revolute": 5, "translational": 5, "universal": 4, "cylindrical": 4, "planar": 3,
-            "spherical": 3}  # fmt: skip
+RIGIDITY = {
+    "fixed": 6,
+    "revolute": 5,
+    "translational": 5,
+    "universal": 4,
+    "cylindrical": 4,
+    "planar": 3,
+    "spherical": 3,
+}
 PREFERRED = 10  # of joints with a driver or a torsion spring, whose coordinate is then at hand
 
 

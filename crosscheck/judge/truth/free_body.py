@@ -47,9 +47,14 @@ class FreeBody:
         spin = motion.angular_velocity[:, 0]
         rate = self._spin_of(motion.rotation[:, 0], moment[:, 0] - cross(spin, momentum))
         return trajectory(
-            self._scene, self.name, times, motion.position, motion.rotation,
-            (motion.velocity, motion.angular_velocity), (force / self._mass, rate[:, None]),
-        )  # fmt: skip
+            self._scene,
+            self.name,
+            times,
+            motion.position,
+            motion.rotation,
+            (motion.velocity, motion.angular_velocity),
+            (force / self._mass, rate[:, None]),
+        )
 
     def _derivative(self, state: np.ndarray) -> np.ndarray:
         motion, force, moment = self._loaded(state)
@@ -61,8 +66,9 @@ class FreeBody:
     def _loaded(self, state: np.ndarray) -> tuple[Motion, np.ndarray, np.ndarray]:
         rotation = _matrix(state[:, 6:10])
         spin = self._spin_of(rotation, state[:, 10:13])
-        motion = Motion(state[:, None, :3], rotation[:, None], state[:, None, 3:6], spin[:, None],
-                        state[:, :1] * np.nan)  # fmt: skip
+        motion = Motion(
+            state[:, None, :3], rotation[:, None], state[:, None, 3:6], spin[:, None], state[:, :1] * np.nan
+        )
         return motion, *wrenches(self._scene, motion, NO_TURN)
 
     def _inertia(self, rotation: np.ndarray) -> np.ndarray:

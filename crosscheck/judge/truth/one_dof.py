@@ -80,10 +80,14 @@ class OneDof:
         pose = self._path.poses(q)
         dq, ddq = dq[:, None, None], ddq[:, None, None]
         return trajectory(
-            self._scene, self.name, times, pose.position, pose.rotation,
+            self._scene,
+            self.name,
+            times,
+            pose.position,
+            pose.rotation,
             (pose.dposition * dq, pose.spin * dq),
             (pose.dposition * ddq + pose.ddposition * dq**2, pose.spin * ddq + pose.dspin * dq**2),
-        )  # fmt: skip
+        )
 
     def coordinate(self, times: np.ndarray) -> np.ndarray:
         """(k, 2) path coordinate and its rate at times (k,)."""
@@ -201,19 +205,33 @@ def initial_rate(scene: Scene, path: Path) -> float | None:
 
 
 def trajectory(
-    scene: Scene, family: str, times: np.ndarray, position: np.ndarray, rotation: np.ndarray,
-    rates: Pair, accelerations: Pair,
-) -> Trajectory:  # fmt: skip
+    scene: Scene,
+    family: str,
+    times: np.ndarray,
+    position: np.ndarray,
+    rotation: np.ndarray,
+    rates: Pair,
+    accelerations: Pair,
+) -> Trajectory:
     """A Trajectory of engine "truth" in double precision; rates and accelerations are pairs (k, nb, 3)."""
     velocity, spin = (np.asarray(a, dtype=float) for a in rates)
     acceleration, spin_rate = (np.asarray(a, dtype=float) for a in accelerations)
     return Trajectory(
-        scene=scene.name, engine="truth", version="", method=family, settings={}, times=times,
-        bodies=tuple(body.name for body in scene.body), position=np.asarray(position, dtype=float),
-        orientation=rotations.from_matrix(rotation), velocity=velocity, angular_velocity=spin,
-        acceleration=acceleration, angular_acceleration=spin_rate,
+        scene=scene.name,
+        engine="truth",
+        version="",
+        method=family,
+        settings={},
+        times=times,
+        bodies=tuple(body.name for body in scene.body),
+        position=np.asarray(position, dtype=float),
+        orientation=rotations.from_matrix(rotation),
+        velocity=velocity,
+        angular_velocity=spin,
+        acceleration=acceleration,
+        angular_acceleration=spin_rate,
         t_end=float(times[-1]) if len(times) else 0.0,
-    )  # fmt: skip
+    )
 
 
 def _times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:

@@ -47,11 +47,18 @@ class ReferenceTruth:
 def trajectory(scene: Scene, samples: Reference) -> Trajectory:
     """A reference as a Trajectory of engine "truth"."""
     return Trajectory(
-        scene=scene.name, engine="truth", version="", method="reference", 
-        settings={"bound": float(samples.bound.max(initial=0.0))}, times=samples.times,
+        scene=scene.name,
+        engine="truth",
+        version="",
+        method="reference",
+        settings={"bound": float(samples.bound.max(initial=0.0))},
+        times=samples.times,
         bodies=tuple(body.name for body in scene.body),
-        position=samples.position, orientation=samples.orientation,
-        velocity=samples.velocity, angular_velocity=samples.angular_velocity,
-        acceleration=samples.acceleration, angular_acceleration=samples.angular_acceleration,
+        position=samples.position,
+        orientation=samples.orientation,
+        velocity=samples.velocity,
+        angular_velocity=samples.angular_velocity,
+        acceleration=samples.acceleration,
+        angular_acceleration=samples.angular_acceleration,
         t_end=float(samples.times.max(initial=0.0)),
-    )  # fmt: skip
+    )

@@ -56,8 +56,11 @@ def spatial_slider_crank(scene: Scene) -> Path | None:
             rod: (centre + pins[0] + offset, pins[1] + swing, pins[2] + bend, w, dw),
             slider: (position0[slider] + along[0], *along[1:], still, still),
         }
-        rotations = {crank: turned(axis, q) @ rotation0[crank], rod: rod_rotation,
-                     slider: rotation0[slider] + 0 * rod_rotation}  # fmt: skip
+        rotations = {
+            crank: turned(axis, q) @ rotation0[crank],
+            rod: rod_rotation,
+            slider: rotation0[slider] + 0 * rod_rotation,
+        }
         turns = {crank: q, rod: q * np.nan, slider: 0 * q}
         position, dposition, ddposition, spin, dspin = (
             np.stack([paths[i][n] for i in range(3)], axis=1) for n in range(5)

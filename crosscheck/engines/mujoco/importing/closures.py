@@ -13,9 +13,15 @@ from mbref import rotations
 from mbref.scene import Cylindrical, Fixed, Joint, Revolute, SceneError, Spherical, Translational
 
 TYPES: dict[str, Any] = {
-    "spherical": Spherical, "ball": Spherical, "fixed": Fixed, "revolute": Revolute, "continuous": Revolute,
-    "prismatic": Translational, "translational": Translational, "cylindrical": Cylindrical,
-}  # fmt: skip
+    "spherical": Spherical,
+    "ball": Spherical,
+    "fixed": Fixed,
+    "revolute": Revolute,
+    "continuous": Revolute,
+    "prismatic": Translational,
+    "translational": Translational,
+    "cylindrical": Cylindrical,
+}
 
 
 @dataclass(frozen=True)

@@ -89,12 +89,14 @@ class Groups:
         inertia = (inertia + inertia.T) / 2
         plain = np.abs(inertia - np.diag(np.diag(inertia))).max() <= PLAIN * np.abs(inertia).max()
         return Body(
-            name=self.names[group], mass=self.mass[group],
+            name=self.names[group],
+            mass=self.mass[group],
             inertia=(np.diag(inertia) if plain else inertia).tolist(),
-            position=at.position.tolist(), orientation=at.orientation.tolist(),
+            position=at.position.tolist(),
+            orientation=at.orientation.tolist(),
             velocity=None if twist is None else twist[:3].tolist(),
             angular_velocity=None if twist is None else twist[3:].tolist(),
-        )  # fmt: skip
+        )
 
     def _rotor(self, data: Any, group: int) -> np.ndarray:
         """Inertia (3, 3), world, of a thin disc about the fixed axis of a group: its armature."""

@@ -100,12 +100,15 @@ def notes(mujoco: Any, model: Any) -> Iterator[str]:
     touching = int(np.sum((model.geom_contype != 0) | (model.geom_conaffinity != 0)))
     servos = int(np.sum(np.any(model.actuator_biasprm != 0, axis=1))) if model.nu else 0
     counts = {
-        "contact pairs": model.npair, "plugins": model.nplugin, "motion-capture bodies": model.nmocap,
-        "geoms that could touch others": touching if touching > 1 else 0, "sensors": model.nsensor,
+        "contact pairs": model.npair,
+        "plugins": model.nplugin,
+        "motion-capture bodies": model.nmocap,
+        "geoms that could touch others": touching if touching > 1 else 0,
+        "sensors": model.nsensor,
         "sites that hold nothing": model.nsite - len(_holding_sites(mujoco, model)),
         "limits of tendons": int(np.sum(model.tendon_limited != 0)),
         "limits of joints": int(np.sum(model.jnt_limited != 0)),
-    }  # fmt: skip
+    }
     if model.nu:
         yield f"{model.nu} actuators{f', {servos} of them servos' if servos else ''}: the scene has no motors"
     yield from (f"{number} {what}" for what, number in counts.items() if number)
@@ -126,9 +129,12 @@ def stripped(model: Any, kept: Collection[int]) -> None:
     """Take out of the model, in place, the parts of ``of_model`` that its matrices contain."""
     armature = model.dof_armature.copy()
     for numbers in (
-        model.dof_armature, model.tendon_armature, model.dof_frictionloss, model.tendon_frictionloss,
+        model.dof_armature,
+        model.tendon_armature,
+        model.dof_frictionloss,
+        model.tendon_frictionloss,
         model.body_gravcomp,
-    ):  # fmt: skip
+    ):
         numbers[...] = 0
     model.dof_armature[list(kept)] = armature[list(kept)]
     model.opt.density = model.opt.viscosity = 0.0

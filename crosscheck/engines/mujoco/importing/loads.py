@@ -83,6 +83,9 @@ def of_tendons(mujoco: Any, model: Any, data: Any, groups: Groups) -> Iterator[L
         sites = [int(model.wrap_objid[w]) for w in wraps]
         bodies: Any = tuple(groups.name_of(int(model.site_bodyid[s])) for s in sites)
         yield Spring(
-            bodies=bodies, points=tuple(data.site_xpos[s].tolist() for s in sites),
-            natural_length=float(low), stiffness=stiffness, damping=damping,
-        )  # fmt: skip
+            bodies=bodies,
+            points=tuple(data.site_xpos[s].tolist() for s in sites),
+            natural_length=float(low),
+            stiffness=stiffness,
+            damping=damping,
+        )

@@ -135,10 +135,13 @@ class _Reader:
         """The scene of the parts that were read."""
         gravity_off = self.model.opt.disableflags & self.mujoco.mjtDisableBit.mjDSBL_GRAVITY
         return Scene(
-            name=name, gravity=(0.0, 0.0, 0.0) if gravity_off else self.model.opt.gravity.tolist(),
-            body=tuple(self._bodies()), joint=tuple(self.joints), driver=tuple(self.drivers),
+            name=name,
+            gravity=(0.0, 0.0, 0.0) if gravity_off else self.model.opt.gravity.tolist(),
+            body=tuple(self._bodies()),
+            joint=tuple(self.joints),
+            driver=tuple(self.drivers),
             load=tuple(self.loads),
-        )  # fmt: skip
+        )
 
     def _bodies(self) -> Iterator[Body]:
         data = self.poses.data

@@ -15,8 +15,16 @@ from crosscheck.engines.mujoco.importing.left_out import Part
 from mbref.scene import SceneError
 
 PARTS = (
-    "visual", "collision", "loop", "coupling", "transmission", "gazebo", "ros2_control", "mimic", "mujoco",
-)  # fmt: skip
+    "visual",
+    "collision",
+    "loop",
+    "coupling",
+    "transmission",
+    "gazebo",
+    "ros2_control",
+    "mimic",
+    "mujoco",
+)
 LEAST = 1e-12  # kg and kg m²: MuJoCo compiles no moving body with less
 BodyOf = Callable[[str], int]
 
