@@ -72,9 +72,9 @@ def _render(folder: Path, names: Sequence[str]) -> int:
     from reports.sections import paper
 
     try:
-        blocks = [] if names == [PAPER] else sections.blocks(
-            stored.groups(folder), names, stored.verified(folder)
-        )  # fmt: skip
+        blocks = (
+            [] if names == [PAPER] else sections.blocks(stored.groups(folder), names, stored.verified(folder))
+        )
         if PAPER in names:
             blocks += paper.render(*collection.stored_paper(folder))
     except (FileNotFoundError, SceneError) as error:

@@ -11,13 +11,21 @@ from crosscheck.study.verdict import DEFAULTS, Grade
 
 TONES = 7  # colours of the style sheet; engines of third parties share the last
 SIGNS: Mapping[Grade, str] = {
-    Grade.RIGHT: "=", Grade.INACCURATE: "≈", Grade.WRONG: "≠", Grade.FAILED: "×", Grade.UNJUDGED: "?",
-}  # fmt: skip
+    Grade.RIGHT: "=",
+    Grade.INACCURATE: "≈",
+    Grade.WRONG: "≠",
+    Grade.FAILED: "×",
+    Grade.UNJUDGED: "?",
+}
 MARKS = (  # paths within five pixels of the origin
-    "M5 0A5 5 0 1 1-5 0 5 5 0 1 1 5 0Z", "M-4.4-4.4H4.4V4.4H-4.4Z", "M0-5.4 5 3.8H-5Z",
-    "M0-6 5.6 0 0 6-5.6 0Z", "M0 5.4-5-3.8H5Z",
-    "M-1.8-5H1.8V-1.8H5V1.8H1.8V5H-1.8V1.8H-5V-1.8H-1.8Z", "M-5-2.2-2.2-5 5 2.2 2.2 5Z",
-)  # fmt: skip
+    "M5 0A5 5 0 1 1-5 0 5 5 0 1 1 5 0Z",
+    "M-4.4-4.4H4.4V4.4H-4.4Z",
+    "M0-5.4 5 3.8H-5Z",
+    "M0-6 5.6 0 0 6-5.6 0Z",
+    "M0 5.4-5-3.8H5Z",
+    "M-1.8-5H1.8V-1.8H5V1.8H1.8V5H-1.8V1.8H-5V-1.8H-1.8Z",
+    "M-5-2.2-2.2-5 5 2.2 2.2 5Z",
+)
 
 
 def tone(engine: str) -> int:

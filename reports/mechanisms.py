@@ -52,11 +52,15 @@ def branches(scene: Scene, motions: Mapping[str, Trajectory], at: float, engine:
     timeline = Timeline.of(longest(every), [at])
     return {
         title: picture(
-            scene, [Panel(_run_over(first, motion, engine))], f"{scene.name}: {title}", timeline,
-            form=BRANCH, shown=every,
+            scene,
+            [Panel(_run_over(first, motion, engine))],
+            f"{scene.name}: {title}",
+            timeline,
+            form=BRANCH,
+            shown=every,
         )
         for title, motion in motions.items()
-    }  # fmt: skip
+    }
 
 
 def compared(scene: Scene, exact: Trajectory, runs: Sequence[Run], marks: Sequence[float]) -> str:

@@ -53,9 +53,12 @@ def write(blocks: Sequence[Block], out: Path, title: str = TITLE) -> None:
 def html(blocks: Sequence[Block], drawn: dict[str, str], title: str = TITLE) -> str:
     """The page; ``drawn`` has the SVG element of every figure by name."""
     environment = Environment(
-        loader=PackageLoader("reports"), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
+        loader=PackageLoader("reports"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     environment.filters |= {"slug": slug, "numbers": numbers, "breakable": breakable}
     return environment.get_template("page.html").render(
         title=title,

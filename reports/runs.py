@@ -170,15 +170,24 @@ def _rank(run: Run) -> tuple[bool, float, float]:
 
 
 def by_scene(
-    records: Iterable[Record], scenes: Mapping[str, Scene], gates: Iterable[Record] = (),
-    truths: Iterable[Record] = (), motions: Iterable[Record] = (), branches: Iterable[Record] = (),
-) -> list[SceneRuns]:  # fmt: skip
+    records: Iterable[Record],
+    scenes: Mapping[str, Scene],
+    gates: Iterable[Record] = (),
+    truths: Iterable[Record] = (),
+    motions: Iterable[Record] = (),
+    branches: Iterable[Record] = (),
+) -> list[SceneRuns]:
     """Runs grouped by scene, in the order of ``scenes``, with the scene's records of the gate, of its truth
     and of the motions shown; scenes without runs are left out."""
     runs, gate, along = (_of_scenes(found, scenes) for found in (records, gates, branches))
     truth, motion = ({record["scene"]: record for record in group} for group in (truths, motions))
-    return [SceneRuns(scene, [Run(r) for r in runs[name]], gate[name], truth.get(name), motion.get(name),
-                      along[name]) for name, scene in scenes.items() if runs[name]]  # fmt: skip
+    return [
+        SceneRuns(
+            scene, [Run(r) for r in runs[name]], gate[name], truth.get(name), motion.get(name), along[name]
+        )
+        for name, scene in scenes.items()
+        if runs[name]
+    ]
 
 
 def _of_scenes(records: Iterable[Record], scenes: Collection[str]) -> dict[str, list[Record]]:

@@ -25,12 +25,17 @@ def speed_svg(scene_runs: SceneRuns, description: str) -> str:
         return ""
     axes = _Axes(*zip(*(r.drawn for r in shown), strict=True))
     name = f"Time of stepping against the largest error on {scene_runs.scene.name}"
-    return "".join([
-        f'<svg class="plot" height="{TOP + HEIGHT + FOOT:g}" role="group" aria-label="{escape(name)}">',
-        f"<title>{escape(name)}</title><desc>{escape(description)}</desc>",
-        f'<svg y="{TOP:g}" height="{HEIGHT:g}" overflow="visible">', *_zones(axes), *_grid(axes),
-        *_curves(scene_runs, axes), "</svg></svg>",
-    ])  # fmt: skip
+    return "".join(
+        [
+            f'<svg class="plot" height="{TOP + HEIGHT + FOOT:g}" role="group" aria-label="{escape(name)}">',
+            f"<title>{escape(name)}</title><desc>{escape(description)}</desc>",
+            f'<svg y="{TOP:g}" height="{HEIGHT:g}" overflow="visible">',
+            *_zones(axes),
+            *_grid(axes),
+            *_curves(scene_runs, axes),
+            "</svg></svg>",
+        ]
+    )
 
 
 def toggles(scene_runs: SceneRuns) -> list[tuple[str, int, str, list[str]]]:
@@ -83,8 +88,10 @@ def _grid(axes: _Axes) -> Iterator[str]:
         yield f'<line class="grid" x2="100%" y1="{y:.1f}" y2="{y:.1f}"/>'
         yield f'<text x="-9" y="{y + 4:.1f}" text-anchor="end">{duration(10.0**k)}</text>'
     for k in _ticks(axes.x0, axes.x1):
-        yield (f'<text x="{axes.x(10.0**k):.2f}%" y="{HEIGHT + 20:g}" text-anchor="middle">'
-               f"10{str(k).translate(SUPERSCRIPT)}</text>")  # fmt: skip
+        yield (
+            f'<text x="{axes.x(10.0**k):.2f}%" y="{HEIGHT + 20:g}" text-anchor="middle">'
+            f"10{str(k).translate(SUPERSCRIPT)}</text>"
+        )
     yield f'<line class="axis" x2="100%" y1="{HEIGHT:g}" y2="{HEIGHT:g}"/>'
 
 
@@ -102,8 +109,10 @@ def _curves(scene_runs: SceneRuns, axes: _Axes) -> Iterator[str]:
         yield f'<g class="tone{tone(engine)} {look}" {told}>'
         dash = DASHES[order[engine] % len(DASHES)]
         for (x1, y1), (x2, y2) in itertools.pairwise(spots):
-            yield (f'<line class="curve" stroke-dasharray="{dash}" x1="{x1:.2f}%" y1="{y1:.1f}" '
-                   f'x2="{x2:.2f}%" y2="{y2:.1f}"/>')  # fmt: skip
+            yield (
+                f'<line class="curve" stroke-dasharray="{dash}" x1="{x1:.2f}%" y1="{y1:.1f}" '
+                f'x2="{x2:.2f}%" y2="{y2:.1f}"/>'
+            )
         yield from (_mark(scene_runs, run, *spot) for run, spot in zip(drawn, spots, strict=True))
         yield "</g>"
 
@@ -113,9 +122,16 @@ def _mark(scene_runs: SceneRuns, run: Run, x: float, y: float) -> str:
     settings, cost = scene_runs.varied_settings(run), run.record["cost"]
     measured = f"error {run.said}, {duration(run.seconds)}, {cost['steps']} steps"
     said = escape(f"{named(*run.curve)}, {settings}: {measured}")
-    data = {"error": f"{run.error:.4g}", "seconds": f"{run.seconds:.4g}", "setting": settings,
-            "steps": str(cost["steps"]), "outcome": run.outcome.label}  # fmt: skip
+    data = {
+        "error": f"{run.error:.4g}",
+        "seconds": f"{run.seconds:.4g}",
+        "setting": settings,
+        "steps": str(cost["steps"]),
+        "outcome": run.outcome.label,
+    }
     told = " ".join(f'data-{name}="{escape(value)}"' for name, value in data.items())
-    return (f'<a class="run" href="#{of_run(run)}" aria-label="{said}" {told}><title>{said}</title>'
-            f'<svg x="{x:.2f}%" y="{y:.1f}" overflow="visible"><circle class="hit" r="12"/>'
-            f'<path d="{mark(run.curve[0])}"/></svg></a>')  # fmt: skip
+    return (
+        f'<a class="run" href="#{of_run(run)}" aria-label="{said}" {told}><title>{said}</title>'
+        f'<svg x="{x:.2f}%" y="{y:.1f}" overflow="visible"><circle class="hit" r="12"/>'
+        f'<path d="{mark(run.curve[0])}"/></svg></a>'
+    )

@@ -100,13 +100,23 @@ def _drawn_violations(verified: Sequence[Verified]) -> list[Block]:
             known = explanations().get((found["engine"], name, ANY_DRAWN))
             cause, remedy = known or (worst["reason"] or UNEXPLAINED, "–")
             numbers = _number(worst["measured"]), _number(worst["allowed"])
-            rows.append((title(found["engine"]), worst["card"], str(len(here)), worst["scene"], *numbers,
-                         cause, remedy))  # fmt: skip
+            rows.append(
+                (
+                    title(found["engine"]),
+                    worst["card"],
+                    str(len(here)),
+                    worst["scene"],
+                    *numbers,
+                    cause,
+                    remedy,
+                )
+            )
     if not rows:
         return [Text("No drawn mechanism violates a card.")]
     header = ("Engine", "Card", "Times", "Worst", "Measured", "Allowed", "Cause", "Remedy")
-    return [Table("Violated cards on drawn mechanisms, each with its worst.", header, rows,
-                  frozenset({2, 4, 5}))]  # fmt: skip
+    return [
+        Table("Violated cards on drawn mechanisms, each with its worst.", header, rows, frozenset({2, 4, 5}))
+    ]
 
 
 def _engines(verified: Sequence[Verified]) -> str:
@@ -126,10 +136,14 @@ def _cards(verified: Sequence[Verified]) -> Table:
     names = {v["property"]: v["card"] for found in verified for v in found["verdicts"]}
     header = ("Card", "It checks", "Defects", *(title(found["engine"]) for found in verified))
     rows = [
-        (card, abouts().get(name, ""), str(sum(proof.card == name for proof in proofs())),
-         *(_cell([v["status"] for v in found["verdicts"] if v["property"] == name]) for found in verified))
+        (
+            card,
+            abouts().get(name, ""),
+            str(sum(proof.card == name for proof in proofs())),
+            *(_cell([v["status"] for v in found["verdicts"] if v["property"] == name]) for found in verified),
+        )
         for name, card in names.items()
-    ]  # fmt: skip
+    ]
     return Table(CAPTION, header, rows, frozenset({2}))
 
 
@@ -165,5 +179,9 @@ def _number(value: float | None) -> str:
 
 def _defects() -> Table:
     rows = [(proof.about, proof.scene, proof.card) for proof in proofs()]
-    return Table(f"The {len(rows)} planted defects, each with the card that tells it.",
-                 ("Defect", "Mechanism", "Card"), rows, folded=True)  # fmt: skip
+    return Table(
+        f"The {len(rows)} planted defects, each with the card that tells it.",
+        ("Defect", "Mechanism", "Card"),
+        rows,
+        folded=True,
+    )

@@ -12,8 +12,17 @@ from reports.runs import Curve, Run, SceneRuns, number, power
 
 STEP = "step"
 TELLING = 5.0  # times the discretisation error: a lesser bias may be the extrapolation's own
-LIMITS = ("Scene", "Engine", "Family", "Finest step (s)", "Order", "Its error", "Discretisation", "Bias",
-          "Larger")  # fmt: skip
+LIMITS = (
+    "Scene",
+    "Engine",
+    "Family",
+    "Finest step (s)",
+    "Order",
+    "Its error",
+    "Discretisation",
+    "Bias",
+    "Larger",
+)
 
 
 def render(groups: Sequence[SceneRuns]) -> list[Block]:
@@ -46,8 +55,11 @@ def _limits(groups: Sequence[SceneRuns]) -> list[Block]:
         return []
     biased = sum(row[-1] == "bias" for row in rows)
     caption = f"Limits of {len(rows)} sweeps; in {biased} of them bias outweighs discretisation."
-    return [Heading("The limit h → 0"), Text(text),
-            Table(caption, LIMITS, rows, right=frozenset(range(3, 8)), folded=True)]  # fmt: skip
+    return [
+        Heading("The limit h → 0"),
+        Text(text),
+        Table(caption, LIMITS, rows, right=frozenset(range(3, 8)), folded=True),
+    ]
 
 
 def _limit_rows(group: SceneRuns) -> list[tuple[str, ...]]:
@@ -63,8 +75,18 @@ def _limit_rows(group: SceneRuns) -> list[tuple[str, ...]]:
             bias = float(error_series(group.scene, found.motion, exact).max())
             finest = min(told, key=lambda run: run.record["settings"][STEP])
             more = _heavier(bias, found.discretisation)
-            rows.append((group.scene.name, *curve, f"{min(steps):.2g}", number(found.order, 2),
-                         power(finest.error), power(found.discretisation), power(bias), more))  # fmt: skip
+            rows.append(
+                (
+                    group.scene.name,
+                    *curve,
+                    f"{min(steps):.2g}",
+                    number(found.order, 2),
+                    power(finest.error),
+                    power(found.discretisation),
+                    power(bias),
+                    more,
+                )
+            )
     return rows
 
 

@@ -31,8 +31,13 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
     others = [least.row() for least in found]
     header = [name.capitalize() for name in HEADER]
     return [
-        Heading("Least errors", 2), Text(text),
+        Heading("Least errors", 2),
+        Text(text),
         Table(caption, [*header[:BEST], "Families"], rows, right=frozenset({4, 5, 6})),
-        Table("The families that are within it, and the best or the end of the others.",
-              [*header[:2], *header[BEST:]], [(*row[:2], *row[BEST:]) for row in others], folded=True),
-    ]  # fmt: skip
+        Table(
+            "The families that are within it, and the best or the end of the others.",
+            [*header[:2], *header[BEST:]],
+            [(*row[:2], *row[BEST:]) for row in others],
+            folded=True,
+        ),
+    ]

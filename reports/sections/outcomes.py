@@ -6,8 +6,18 @@ from reports.blocks import Block, Heading, Linked, Table
 from reports.places import of_run
 from reports.runs import Run, SceneRuns, duration
 
-HEADER = ("Engine", "Family", "Settings", "Outcome", "End time (s)", "Error", "Time", "Steps",
-          "Right-hand sides", "Message")  # fmt: skip
+HEADER = (
+    "Engine",
+    "Family",
+    "Settings",
+    "Outcome",
+    "End time (s)",
+    "Error",
+    "Time",
+    "Steps",
+    "Right-hand sides",
+    "Message",
+)
 
 
 def render(scene_runs: SceneRuns) -> list[Block]:
@@ -23,6 +33,13 @@ def _row(run: Run, settings: str) -> tuple[str, ...]:
     letter = f" ({run.outcome.letter})" if run.outcome.letter else ""
     settled = Linked(settings or "all", f"#{of_run(run)}")
     return (
-        *run.curve, settled, run.outcome.label + letter, f"{run.t_end:.4g}", run.said,
-        duration(run.seconds), str(cost["steps"]), str(cost["rhs"]), run.record["message"],
-    )  # fmt: skip
+        *run.curve,
+        settled,
+        run.outcome.label + letter,
+        f"{run.t_end:.4g}",
+        run.said,
+        duration(run.seconds),
+        str(cost["steps"]),
+        str(cost["rhs"]),
+        run.record["message"],
+    )

@@ -158,8 +158,17 @@ def _error(cell: Cell, records: Records) -> str:
 def _counts(records: Records) -> list[Block]:
     iii = _count_rows("III", SPATIAL, COUNTS_III, records)
     iv = _with_tight(_count_rows("dynamic", SPATIAL_DYNAMIC, COUNTS_IV, records), records)
-    header = ("Method", "steps/s printed", "ours", "steps, ratio printed", "ours", "time, ratio printed",
-              "ours", "ended", "error")  # fmt: skip
+    header = (
+        "Method",
+        "steps/s printed",
+        "ours",
+        "steps, ratio printed",
+        "ours",
+        "time, ratio printed",
+        "ours",
+        "ended",
+        "error",
+    )
     about = "Per second of simulation; ratios to the first row, of times by interleaved runs in one process. "
     right = frozenset({1, 2, 3, 4, 5, 6, 8})
     strict = [Run(records[Label("strict", row, SPATIAL, STRICT.name)]) for row in FREE]
@@ -168,7 +177,10 @@ def _counts(records: Records) -> list[Block]:
         Heading("Table III: steps and cost"),
         Table(
             f"{about}The {SPATIAL}. With rtol 1e-9 {', '.join(FREE)} take {steps} steps/s, the paper's 3303 "
-            "within 4 %: its Table III was probably run at such a tolerance.", header, iii, right=right,
+            "within 4 %: its Table III was probably run at such a tolerance.",
+            header,
+            iii,
+            right=right,
         ),
         Heading("Table IV: dynamic analysis of the spatial slider-crank"),
         Table(
@@ -176,10 +188,12 @@ def _counts(records: Records) -> list[Block]:
             "lightest flywheel, in steps of 10 kg m², that the unstabilised runs survive for 20 s. "
             "Partitioning restarts the integrator at order 1 whenever it chooses other coordinates: see the "
             "table after this one. At rtol 1e-9 it saves as many steps as in the paper with LM2.",
-            (*header[:5], "at 1e-9", *header[5:]), iv, right=frozenset({1, 2, 3, 4, 5, 6, 7, 9}),
+            (*header[:5], "at 1e-9", *header[5:]),
+            iv,
+            right=frozenset({1, 2, 3, 4, 5, 6, 7, 9}),
         ),
         _kept(records),
-    ]  # fmt: skip
+    ]
 
 
 def _count_rows(part: str, column: str, paper: Counts, records: Records) -> list[Sequence[str]]:
@@ -189,11 +203,19 @@ def _count_rows(part: str, column: str, paper: Counts, records: Records) -> list
     first_steps, first_time = paper[name]
     for row, (steps, time) in paper.items():
         run, timed = (Run(records[Label(p, row, column)]) for p in (part, "timed"))
-        rows.append((
-            row, f"{steps}", f"{run.rate('steps'):.0f}", f"{steps / first_steps:.3f}",
-            f"{run.rate('steps') / first.rate('steps'):.3f}", ratio(time / first_time),
-            ratio(timed.rate("seconds") / first_timed.rate("seconds")), ended(run), power(run.error),
-        ))  # fmt: skip
+        rows.append(
+            (
+                row,
+                f"{steps}",
+                f"{run.rate('steps'):.0f}",
+                f"{steps / first_steps:.3f}",
+                f"{run.rate('steps') / first.rate('steps'):.3f}",
+                ratio(time / first_time),
+                ratio(timed.rate("seconds") / first_timed.rate("seconds")),
+                ended(run),
+                power(run.error),
+            )
+        )
     return rows
 
 
@@ -263,10 +285,14 @@ def _drift(cell: Cell, run: Run, records: Records) -> str:
     """The reason for another end time of a row of Table III: drift, or its absence."""
     record = records.get(Label("strict", cell.row, cell.column, STRICT.name))
     strict = None if record is None else Run(record)
-    said = "" if strict is None else (
-        f"; at rtol 1e-9 and a violation of {STRICT.limits['violation']:g} it ends at {ended(strict)}, "
-        f"violation {power(strict.metric('violation_position'))}"
-    )  # fmt: skip
+    said = (
+        ""
+        if strict is None
+        else (
+            f"; at rtol 1e-9 and a violation of {STRICT.limits['violation']:g} it ends at {ended(strict)}, "
+            f"violation {power(strict.metric('violation_position'))}"
+        )
+    )
     if run.completed:
         return f"the violation stays at {power(run.metric('violation_position'))}, below the tolerance{said}"
     ends = sorted(Run(r).t_end for r in found(records, cell, ("tables", "drawn")).values())

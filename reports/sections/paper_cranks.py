@@ -24,8 +24,19 @@ def render(records: Records) -> list[Block]:
         for label, record in records.items()
         if label.part == "dynamic" and label.column == column
     ]
-    header = ("Lengths", "Method", "Settings", "Ended", "Error", "Violation", f"Off by {OFF:g} m from",
-              "Passed by then", "Out of plane", "Crank, rad/s", "True")  # fmt: skip
+    header = (
+        "Lengths",
+        "Method",
+        "Settings",
+        "Ended",
+        "Error",
+        "Violation",
+        f"Off by {OFF:g} m from",
+        "Passed by then",
+        "Out of plane",
+        "Crank, rad/s",
+        "True",
+    )
     caption = (
         "Every run of the planar slider-cranks. Passed: singular positions on the true branch before the "
         "run is off, or ends. Out of plane: largest z (m) or tilt (rad) over the run. Last: the crank's "
@@ -83,10 +94,15 @@ def _cells(column: str, run: Run) -> tuple[str, ...]:
     off = np.abs(motion.position - true.position).max(axis=(1, 2)) > OFF
     since = motion.times[np.argmax(off)] if off.any() else math.nan
     return (
-        ended_briefly(run), power(run.error), power(run.metric("violation_position")), number(since, 4),
-        str(_passed(column, since if off.any() else run.t_end)), power(_out_of_plane(motion)),
-        f"{motion.angular_velocity[-1, 0, 2]:.4g}", f"{true.angular_velocity[-1, 0, 2]:.4g}",
-    )  # fmt: skip
+        ended_briefly(run),
+        power(run.error),
+        power(run.metric("violation_position")),
+        number(since, 4),
+        str(_passed(column, since if off.any() else run.t_end)),
+        power(_out_of_plane(motion)),
+        f"{motion.angular_velocity[-1, 0, 2]:.4g}",
+        f"{true.angular_velocity[-1, 0, 2]:.4g}",
+    )
 
 
 @lru_cache(maxsize=64)

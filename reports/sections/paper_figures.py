@@ -51,16 +51,28 @@ def render(records: Records) -> list[Block]:
         _violations(6, _only(four, partitioned), "with partitioning"),
         _poses(8, five_bar, _only(five, (*free, "MPI (SVD) + CP")), "The five-bar"),
         Heading("Figures 11 to 16: dynamic analysis, 100 N m on the crank"),
-        _rates(11, _only(heavy, branches), "planar slider-crank, a = b: the first singular position comes "
-               "at 1.81 s. The flywheel outweighs the links, so the branches hardly differ here"),
-        _poses(12, dynamic_scene(HEAVY), _only(heavy, ("MPI (GS)", "MPI (GS) + B")),
-               "The slider-crank with a = b, in the last seconds of both runs", (3.4, 4.8)),
+        _rates(
+            11,
+            _only(heavy, branches),
+            "planar slider-crank, a = b: the first singular position comes "
+            "at 1.81 s. The flywheel outweighs the links, so the branches hardly differ here",
+        ),
+        _poses(
+            12,
+            dynamic_scene(HEAVY),
+            _only(heavy, ("MPI (GS)", "MPI (GS) + B")),
+            "The slider-crank with a = b, in the last seconds of both runs",
+            (3.4, 4.8),
+        ),
         _accelerations(13, {PEAKS.row: Run(records[PEAKS])}),
-        _rates(14, _only(unequal, held), "planar slider-crank, a ≠ b, partitioning; there is no singular "
-               "position"),
+        _rates(
+            14,
+            _only(unequal, held),
+            "planar slider-crank, a ≠ b, partitioning; there is no singular position",
+        ),
         _rates(15, _only(spatial, plain), "spatial slider-crank without partitioning"),
         _rates(16, _only(spatial, held), "spatial slider-crank with partitioning"),
-    ]  # fmt: skip
+    ]
 
 
 def _runs(records: Records, part: str, column: str) -> dict[str, Run]:

@@ -29,12 +29,15 @@ def explained(found: Illustration) -> list[Block]:
         Heading("Singular positions explained"),
         Text(_about(*found["fold"])),
         _crossings(found["crossings"]),
-        Figure("paper-singular-values", "The smallest and the next smallest singular value of the scaled "
-               "Jacobian over one revolution of the rhombus. At θ₂ = kπ one of them vanishes, linearly with "
-               "the distance; accelerations found from it carry errors divided by it.",
-               partial(plot_values, found["theta"], found["smallest"])),
+        Figure(
+            "paper-singular-values",
+            "The smallest and the next smallest singular value of the scaled "
+            "Jacobian over one revolution of the rhombus. At θ₂ = kπ one of them vanishes, linearly with "
+            "the distance; accelerations found from it carry errors divided by it.",
+            partial(plot_values, found["theta"], found["smallest"]),
+        ),
         _alf_near_a_crossing(found["alf_iterations"]),
-    ]  # fmt: skip
+    ]
 
 
 def _about(closed: float, opened: float) -> str:
@@ -54,10 +57,16 @@ def _about(closed: float, opened: float) -> str:
 
 def _crossings(found: Sequence[Sequence[Any]]) -> Table:
     rows = [
-        (start.removeprefix("θ₂ = "), f"{t:.4f}", singular.turns(k), str(rank), power(value),
-         "admits a turning crank" if k % 2 else "excludes a turning crank")
+        (
+            start.removeprefix("θ₂ = "),
+            f"{t:.4f}",
+            singular.turns(k),
+            str(rank),
+            power(value),
+            "admits a turning crank" if k % 2 else "excludes a turning crank",
+        )
         for start, t, k, rank, value in found
-    ]  # fmt: skip
+    ]
     header = ("Start θ₂", "t (s)", "θ₂", "Rank of 19 rows", "Smallest singular value", "The fold")
     return Table("The crossings up to 0.06 s.", header, rows, right=frozenset({1, 3, 4}))
 
@@ -83,8 +92,9 @@ def plot_values(theta: Sequence[float], smallest: Sequence[Sequence[float]]) -> 
     """The two smallest singular values (k, 2) over θ₂ (k,), rad, of one revolution."""
     drawing, (axes,) = figures.canvas(7.2, 3.4)
     for i, (name, values) in enumerate(zip(("smallest", "next"), zip(*smallest, strict=True), strict=True)):
-        axes.plot(np.array(theta) / math.pi, np.maximum(values, SMALLEST),
-                  color=figures.COLOURS[i], label=name)  # fmt: skip
+        axes.plot(
+            np.array(theta) / math.pi, np.maximum(values, SMALLEST), color=figures.COLOURS[i], label=name
+        )
     axes.set(yscale="log", xlabel="θ₂ / π", ylabel="singular value", ylim=(1e-4, 2))
     axes.invert_xaxis()
     figures.legend_below(drawing, axes)
@@ -118,10 +128,14 @@ def _pair(label: Label, run: Run) -> tuple[str, ...]:
     """A formulation's cells with a stabilisation."""
     seconds = 1e3 * run.rate("seconds")
     return (
-        label.row, label.column, ended_briefly(run), power(run.error),
-        power(run.metric("violation_position")), number(run.rate("steps"), 4),
+        label.row,
+        label.column,
+        ended_briefly(run),
+        power(run.error),
+        power(run.metric("violation_position")),
+        number(run.rate("steps"), 4),
         f"{seconds:.3g}" if math.isfinite(seconds) else "–",
-    )  # fmt: skip
+    )
 
 
 def digit_errors(records: Records) -> dict[str, list[float]]:

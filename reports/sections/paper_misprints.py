@@ -7,27 +7,43 @@ from reports.blocks import Block, Heading, Table
 
 MISPRINTS = (
     ("Eq. 16", "h from t^i to t^(i-1)", "from t^(i-1) to t^i: the estimate goes forwards"),
-    ("Eq. 19", "Φ_q q̈_i in the load's second term", "the velocity violation Φ_q q' − ν: the dimensions "
-     "of a velocity times 2 ω μ"),
+    (
+        "Eq. 19",
+        "Φ_q q̈_i in the load's second term",
+        "the velocity violation Φ_q q' − ν: the dimensions of a velocity times 2 ω μ",
+    ),
     ("Eq. 19", "ω² Φ_q in the third term", "ω² Φ, a vector as the others; β, said to be used, is not"),
     ("Sect. 4.1", "q̈ of the unconstrained system is M⁻¹ q", "M⁻¹ g, with g of Eq. 5"),
     ("Eq. 27", "U is m × n and square", "U is m × m, S is m × n"),
-    ("Eqs. 29, 30", "R is n × n and has an inverse", "only where all n columns of D are independent: with "
-     "free coordinates and m < n they are not; mpi-gs takes rows and any rank, mpi-gs-literal is as printed"),
-    ("Table III", "ALF takes 36.84 s, as LM2 + CP does", "3286 steps a second cannot cost as much as 103: "
-     "one of the two is probably a copy"),
-)  # fmt: skip
+    (
+        "Eqs. 29, 30",
+        "R is n × n and has an inverse",
+        "only where all n columns of D are independent: with free coordinates and m < n they are not; "
+        "mpi-gs takes rows and any rank, mpi-gs-literal is as printed",
+    ),
+    (
+        "Table III",
+        "ALF takes 36.84 s, as LM2 + CP does",
+        "3286 steps a second cannot cost as much as 103: one of the two is probably a copy",
+    ),
+)
 
 
 def render() -> list[Block]:
     """Two tables: misprints, and contradictions with the numbers of the tables."""
     return [
         Heading("Misprints found"),
-        Table("Places of the paper that cannot be meant as printed, and their reading here.",
-              ("Place", "Printed", "Read as"), MISPRINTS),
-        Table("Sentences of the paper beside the numbers of its own tables.",
-              ("Place", "Sentence", "Its tables"), _contradictions()),
-    ]  # fmt: skip
+        Table(
+            "Places of the paper that cannot be meant as printed, and their reading here.",
+            ("Place", "Printed", "Read as"),
+            MISPRINTS,
+        ),
+        Table(
+            "Sentences of the paper beside the numbers of its own tables.",
+            ("Place", "Sentence", "Its tables"),
+            _contradictions(),
+        ),
+    ]
 
 
 def _contradictions() -> list[tuple[str, str, str]]:
@@ -35,12 +51,24 @@ def _contradictions() -> list[tuple[str, str, str]]:
     svd, gs = COUNTS_III["MPI (SVD)"][1], COUNTS_III["MPI (GS)"][1]
     ratio = COUNTS_III["ALF"][0] / COUNTS_III["ALF + CP"][0]
     return [
-        ("Sect. 5.1.3", "without coordinate partitioning all methods fail after some time",
-         "Table III: ALF without partitioning converges"),
-        ("Sect. 5.1.3", "the costs of Gram–Schmidt and SVD do not differ",
-         f"Table III: {svd:g} s by SVD, {gs:g} s by Gram–Schmidt, {100 * (gs / svd - 1):.0f} % more"),
-        ("Sect. 5.1.3", "methods with partitioning are cheaper than those without",
-         f"Table III: ALF 36.84 s, ALF + CP 48.69 s, with {ratio:.0f} times fewer steps"),
-        ("Sects. 5.2.2, 6", "partitioning lengthens steps by 30 %",
-         f"Table IV: by {100 * (1 / max(shares) - 1):.0f} to {100 * (1 / min(shares) - 1):.0f} %"),
-    ]  # fmt: skip
+        (
+            "Sect. 5.1.3",
+            "without coordinate partitioning all methods fail after some time",
+            "Table III: ALF without partitioning converges",
+        ),
+        (
+            "Sect. 5.1.3",
+            "the costs of Gram–Schmidt and SVD do not differ",
+            f"Table III: {svd:g} s by SVD, {gs:g} s by Gram–Schmidt, {100 * (gs / svd - 1):.0f} % more",
+        ),
+        (
+            "Sect. 5.1.3",
+            "methods with partitioning are cheaper than those without",
+            f"Table III: ALF 36.84 s, ALF + CP 48.69 s, with {ratio:.0f} times fewer steps",
+        ),
+        (
+            "Sects. 5.2.2, 6",
+            "partitioning lengthens steps by 30 %",
+            f"Table IV: by {100 * (1 / max(shares) - 1):.0f} to {100 * (1 / min(shares) - 1):.0f} %",
+        ),
+    ]

@@ -30,12 +30,19 @@ def render(records: Records) -> list[Block]:
         ),
         Figure("paper-growth", _growth_caption(growth), partial(plot_growth, growth)),
         _gains(gains),
-        Figure("paper-gains", "The table above: violation (circles) and error (squares) over α = β, both "
-               "axes logarithmic; α = β = 0, no feedback, at the left end.", partial(plot_gains, gains)),
+        Figure(
+            "paper-gains",
+            "The table above: violation (circles) and error (squares) over α = β, both "
+            "axes logarithmic; α = β = 0, no feedback, at the left end.",
+            partial(plot_gains, gains),
+        ),
         _remedies(remedies),
-        Figure("paper-remedies", "Violation of the positions over time by the methods of the table above.",
-               partial(plot_violations, remedies)),
-    ]  # fmt: skip
+        Figure(
+            "paper-remedies",
+            "Violation of the positions over time by the methods of the table above.",
+            partial(plot_violations, remedies),
+        ),
+    ]
 
 
 def _varied(records: Records, part: str) -> dict[str, Run]:
@@ -77,8 +84,13 @@ def plot_growth(runs: dict[str, Run]) -> Drawing:
     for i, (name, run) in enumerate(runs.items()):
         t = np.array(run.record["times"])
         look = i % len(figures.COLOURS)
-        axes.plot(t[1:], violation(run)[1:], label=f"rtol {name}", color=figures.COLOURS[look],
-                  linestyle=figures.DASHES[i % len(figures.DASHES)])  # fmt: skip
+        axes.plot(
+            t[1:],
+            violation(run)[1:],
+            label=f"rtol {name}",
+            color=figures.COLOURS[look],
+            linestyle=figures.DASHES[i % len(figures.DASHES)],
+        )
     axes.set(xscale="log", yscale="log", xlabel="t (s)", ylabel="violation of positions")
     figures.legend_below(drawing, axes)
     return drawing
@@ -86,10 +98,16 @@ def plot_growth(runs: dict[str, Run]) -> Drawing:
 
 def _gains(runs: dict[str, Run]) -> Table:
     rows = [
-        (name, power(run.metric("violation_position")), power(run.metric("violation_velocity")),
-         power(run.error), f"{run.rate('steps'):.0f}", ended_briefly(run) if not run.completed else "2 s")
+        (
+            name,
+            power(run.metric("violation_position")),
+            power(run.metric("violation_velocity")),
+            power(run.error),
+            f"{run.rate('steps'):.0f}",
+            ended_briefly(run) if not run.completed else "2 s",
+        )
         for name, run in runs.items()
-    ]  # fmt: skip
+    ]
     best = min(runs, key=lambda name: runs[name].metric("violation_position"))
     caption = (
         "Baumgarte's stabilisation (Eq. 9) by LM2 over α = β (1/s); the paper takes 5. Feedback holds the "
@@ -115,10 +133,17 @@ def plot_gains(runs: dict[str, Run]) -> Drawing:
 
 def _remedies(runs: dict[str, Run]) -> Table:
     rows = [
-        (row, power(run.metric("violation_position")), power(run.metric("violation_velocity")),
-         power(run.error), f"{run.rate('steps'):.0f}", f"{1e3 * run.rate('seconds'):.2g}", ended_briefly(run))
+        (
+            row,
+            power(run.metric("violation_position")),
+            power(run.metric("violation_velocity")),
+            power(run.error),
+            f"{run.rate('steps'):.0f}",
+            f"{1e3 * run.rate('seconds'):.2g}",
+            ended_briefly(run),
+        )
         for row, run in runs.items()
-    ]  # fmt: skip
+    ]
     caption = (
         "Partitioning, augmented Lagrangian and Moore–Penrose side by side, at the settings of the tables. "
         "The pseudo-inverse solves for the accelerations and leaves the drift; ALF holds it by a penalty; "
@@ -133,8 +158,13 @@ def plot_violations(runs: dict[str, Run]) -> Drawing:
     drawing, (axes,) = figures.canvas(7.2, 3.8)
     for i, (name, run) in enumerate(runs.items()):
         look = i % len(figures.COLOURS)
-        axes.plot(run.record["times"], violation(run), label=name, color=figures.COLOURS[look],
-                  linestyle=figures.DASHES[i % len(figures.DASHES)])  # fmt: skip
+        axes.plot(
+            run.record["times"],
+            violation(run),
+            label=name,
+            color=figures.COLOURS[look],
+            linestyle=figures.DASHES[i % len(figures.DASHES)],
+        )
     axes.set(yscale="log", xlabel="t (s)", ylabel="violation of positions")
     figures.legend_below(drawing, axes)
     return drawing

@@ -11,8 +11,11 @@ from reports.blocks import Block, Card, Heading, Record, Text
 from reports.engine_looks import SIGNS, named, tone
 from reports.runs import Run, SceneRuns, duration, power
 
-NUMBERS = {"Joints open by": "violation_position", "Energy is off by": "energy_error",
-           "Reactions are off by": "reaction_error"}  # fmt: skip
+NUMBERS = {
+    "Joints open by": "violation_position",
+    "Energy is off by": "energy_error",
+    "Reactions are off by": "reaction_error",
+}
 
 
 def render(groups: Sequence[SceneRuns]) -> list[Block]:
@@ -44,13 +47,26 @@ def _card(group: SceneRuns, run: Run) -> Card:
     numbers |= {"Outcome": f"{run.outcome.label.lower().replace('_', ' ')}, t = {run.t_end:.4g} s"}
     numbers |= {label: power(run.metric(name)) for label, name in NUMBERS.items()}
     settings = group.varied_settings(run) or "no options"
-    return Card(places.of_run(run), settings, str(found), SIGNS[found], numbers, record["message"],
-                command(record, path(group)), _made(run))  # fmt: skip
+    return Card(
+        places.of_run(run),
+        settings,
+        str(found),
+        SIGNS[found],
+        numbers,
+        record["message"],
+        command(record, path(group)),
+        _made(run),
+    )
 
 
 def _made(run: Run) -> str:
     """The record's id, the version, commit, date and machine."""
     record = run.record
-    told = {"record": record["key"][:12], record["engine"]: record["version"], "commit": record.get("commit"),
-            "made": record.get("date"), "on": record["machine"].get("cpu")}  # fmt: skip
+    told = {
+        "record": record["key"][:12],
+        record["engine"]: record["version"],
+        "commit": record.get("commit"),
+        "made": record.get("date"),
+        "on": record["machine"].get("cpu"),
+    }
     return ", ".join(f"{name} {value}" for name, value in told.items() if value)

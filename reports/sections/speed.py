@@ -93,8 +93,12 @@ def plot(scene_runs: SceneRuns, failures: Failures) -> Drawing:
     looks = figures.looks(scene_runs.curves())
     for curve, runs in scene_runs.curves().items():
         _draw_curve(main, curve, [r for r in runs if r.completed and math.isfinite(r.error)], looks[curve])
-    main.set(xscale="log", yscale="log", xlabel="largest error (fraction of the scene's length, or rad)",
-             ylabel="time of stepping (s)")  # fmt: skip
+    main.set(
+        xscale="log",
+        yscale="log",
+        xlabel="largest error (fraction of the scene's length, or rad)",
+        ylabel="time of stepping (s)",
+    )
     if failures:
         times = [run.seconds for run in scene_runs.completed()]
         _draw_strip(_beside(figure, main), failures, looks, foot=max(min(times, default=UNTIMED), UNTIMED))
@@ -128,5 +132,6 @@ def _draw_strip(strip: Axes, failures: Failures, looks: Mapping[Curve, figures.L
         x = (number - 0.5) / len(failures)
         seconds = [max(run.seconds, foot) for run in runs]
         strip.plot([x] * len(runs), seconds, figures.FAILED, color=looks[curve]["color"], markersize=6)
-        strip.annotate(str(number), (x, max(seconds)), (0, 6), textcoords="offset points", ha="center",
-                       fontsize=8)  # fmt: skip
+        strip.annotate(
+            str(number), (x, max(seconds)), (0, 6), textcoords="offset points", ha="center", fontsize=8
+        )

@@ -17,9 +17,13 @@ from reports.runs import Curve
 ALLOWED = max(1e3 * RTOL, 1e-6)  # error of a method of mbref beyond which a completed run is a false success
 MOST_DIGITS = 15.0
 LETTERS = {  # of outcomes that the paper's tables do not have
-    "SINGULAR_POSITION": "s", "UNDECIDED": "u", "LEFT_MOTION": "m", "TIMED_OUT": "t", "CRASHED": "x",
+    "SINGULAR_POSITION": "s",
+    "UNDECIDED": "u",
+    "LEFT_MOTION": "m",
+    "TIMED_OUT": "t",
+    "CRASHED": "x",
     "NOT_FINITE": "n",
-}  # fmt: skip
+}
 HOW = (
     "Numbers are digits kept: minus the logarithm of the largest error. Red cells, bold in the text, are "
     f"false successes: completed with an error above {ALLOWED:g}, or {FALSE_SUCCESS:g} of engines and "

@@ -10,8 +10,16 @@ from crosscheck.judge.tolerances import EXCESS
 from reports.blocks import Block, Heading, Table, Text
 from reports.runs import LEVELS, WRONG, Curve, Run, SceneRuns, duration, ratio, short
 
-HEADER = ("Engine", "Family", "Completed", "Least error", "Its settings", "Its time",
-          *(f"At {short(level)}" for level in LEVELS), "Wrong or failed")  # fmt: skip
+HEADER = (
+    "Engine",
+    "Family",
+    "Completed",
+    "Least error",
+    "Its settings",
+    "Its time",
+    *(f"At {short(level)}" for level in LEVELS),
+    "Wrong or failed",
+)
 
 Costs = Mapping[Curve, Sequence[float]]  # seconds at each of LEVELS, NaN where it is not reached
 

@@ -27,8 +27,12 @@ KEY = (
 def render(groups: Sequence[SceneRuns]) -> list[Block]:
     """The opening and the matrix; the matrix alone where no truth was recorded."""
     known = [judged(group) for group in groups if group.truth]
-    matrix = Matrix(KEY, _engines(groups), [_scene(group) for group in groups],
-                    {group.scene.name: _row(group) for group in groups})  # fmt: skip
+    matrix = Matrix(
+        KEY,
+        _engines(groups),
+        [_scene(group) for group in groups],
+        {group.scene.name: _row(group) for group in groups},
+    )
     chapter: list[Block] = [Heading("Every scene in every engine", 2), matrix]
     if not known:
         return [*chapter]
