@@ -45,10 +45,25 @@ _MODULE_OF = {
 }
 
 __all__ = [
-    "SCENES", "Cost", "Diagnosis", "Limits", "Method", "MethodError", "Motion", "Outcome", "Scene",
-    "SceneError", "Trajectory", "Variation", "counts", "diagnose", "ensemble", "find_scene", "simulate",
+    "SCENES",
+    "Cost",
+    "Diagnosis",
+    "Limits",
+    "Method",
+    "MethodError",
+    "Motion",
+    "Outcome",
+    "Scene",
+    "SceneError",
+    "Trajectory",
+    "Variation",
+    "counts",
+    "diagnose",
+    "ensemble",
+    "find_scene",
+    "simulate",
     "variants",
-]  # fmt: skip
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -25,8 +25,11 @@ class Parser(argparse.ArgumentParser):
         if unknown:
             command = getattr(found, "parser_of_command", self)
             known = [option for action in command._actions for option in action.option_strings]
-            command.error(f"unknown option {unknown[0]!r}{meant(unknown[0], known)}"
-                          if unknown[0].startswith("-") else f"unknown argument {unknown[0]!r}")  # fmt: skip
+            command.error(
+                f"unknown option {unknown[0]!r}{meant(unknown[0], known)}"
+                if unknown[0].startswith("-")
+                else f"unknown argument {unknown[0]!r}"
+            )
         return found
 
     def error(self, message: str) -> NoReturn:

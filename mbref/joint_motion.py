@@ -89,7 +89,7 @@ def _axis(joint: Joint) -> np.ndarray:
 
 def _angle(
     scene: Scene, motion: Trajectory, joint: Joint, first: np.ndarray, relative: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray]:
     """The angle about the axis, its full turns found by the mean rate between samples; and the rate."""
     axis = _axis(joint)
     spins = [_angular_velocity(scene, motion, name) for name in joint.bodies]

@@ -45,10 +45,30 @@ from mbref.scene_validation import (
 )
 
 __all__ = [
-    "GROUND", "JOINT_TYPES", "LOAD_TYPES", "Body", "Cylindrical", "Distance", "Driver", "Fixed", "Force",
-    "Joint", "JointFacts", "Load", "Moment", "Planar", "Revolute", "Scene", "SceneError", "Sine", "Spherical",
-    "Spring", "TorsionSpring", "Translational", "Universal",
-]  # fmt: skip
+    "GROUND",
+    "JOINT_TYPES",
+    "LOAD_TYPES",
+    "Body",
+    "Cylindrical",
+    "Distance",
+    "Driver",
+    "Fixed",
+    "Force",
+    "Joint",
+    "JointFacts",
+    "Load",
+    "Moment",
+    "Planar",
+    "Revolute",
+    "Scene",
+    "SceneError",
+    "Sine",
+    "Spherical",
+    "Spring",
+    "TorsionSpring",
+    "Translational",
+    "Universal",
+]
 
 UNIT_TOLERANCE = 1e-6  # a quaternion further than this from unit length is a fault, nearer is rounding
 

@@ -28,11 +28,10 @@ def link_lengths(scene: Scene) -> dict[str, dict[str, float]]:
     for name in [*(body.name for body in scene.body), GROUND]:
         ends = [
             (joint.name, joint.anchor_pair[joint.bodies.index(name)])
-            for joint in scene.joint if name in joint.bodies
-        ]  # fmt: skip
-        found[name] = {
-            f"{a}–{b}": math.dist(p, q) for k, (a, p) in enumerate(ends) for b, q in ends[k + 1 :]
-        }  # fmt: skip
+            for joint in scene.joint
+            if name in joint.bodies
+        ]
+        found[name] = {f"{a}–{b}": math.dist(p, q) for k, (a, p) in enumerate(ends) for b, q in ends[k + 1 :]}
     return {name: lengths for name, lengths in found.items() if lengths}
 
 
@@ -60,8 +59,10 @@ def _lengths(scene: Scene) -> Iterator[str]:
     """A gap of a thousand between two neighbours among the lengths of links and guides."""
     every = sorted(
         (length, f"body[{body}]: {pair}")
-        for body, lengths in link_lengths(scene).items() for pair, length in lengths.items() if length > 0
-    )  # fmt: skip
+        for body, lengths in link_lengths(scene).items()
+        for pair, length in lengths.items()
+        if length > 0
+    )
     for (short, first), (long, second) in itertools.pairwise(every):
         if long >= APART * short:
             yield f"{second} is {long:g} m, {first.partition(': ')[2]} {short:g} m; is one in millimetres?"

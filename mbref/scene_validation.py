@@ -20,12 +20,17 @@ DRIVABLE = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.driv
 TORSIONAL = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.takes_torsion_spring)
 ACTS_ON = {name: load.acts_on for name, load in LOAD_TYPES.items()}
 NUMBERS = {  # field → what its list holds; of all others three numbers
-    "orientation": "four numbers (w, x, y, z)", "polynomial": "numbers, such as [0.0, 6.0]",
-    "bodies": "two names of bodies", "anchors": "two points of three numbers each",
-    "axes": "two axes of three numbers each", "points": "two points of three numbers each",
-    "body": "entries [[body]]", "joint": "entries [[joint]]", "driver": "entries [[driver]]",
+    "orientation": "four numbers (w, x, y, z)",
+    "polynomial": "numbers, such as [0.0, 6.0]",
+    "bodies": "two names of bodies",
+    "anchors": "two points of three numbers each",
+    "axes": "two axes of three numbers each",
+    "points": "two points of three numbers each",
+    "body": "entries [[body]]",
+    "joint": "entries [[joint]]",
+    "driver": "entries [[driver]]",
     "load": "entries [[load]]",
-}  # fmt: skip
+}
 INERTIA_TOLERANCE = 1e-9  # relative; discs and thin rods meet the triangle inequality with equality
 
 

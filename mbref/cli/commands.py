@@ -70,13 +70,18 @@ def _refuse(faults: Sequence[str]) -> int:
 def parser() -> argparse.ArgumentParser:
     """The command line's grammar."""
     whole = Parser(
-        prog="mbref", formatter_class=TEXT, epilog=EPILOG,
+        prog="mbref",
+        formatter_class=TEXT,
+        epilog=EPILOG,
         description="Reference implementation of the constraint-handling methods of multibody dynamics.",
-    )  # fmt: skip
+    )
     whole.add_argument(
-        "--version", action=_Version, nargs=0, dest=argparse.SUPPRESS,
+        "--version",
+        action=_Version,
+        nargs=0,
+        dest=argparse.SUPPRESS,
         help="show the versions of mbref and of the packages that it computes with",
-    )  # fmt: skip
+    )
     known = commands(whole, title="commands", required=True, metavar="COMMAND")
     for add in (add_scene_files, add_pictures, add_diagnose, add_run, add_ensemble, add_exchange, add_tables):
         add(known)

@@ -23,13 +23,15 @@ LISTED = 5  # singular positions of a motion
 def add(commands: Any) -> None:
     """The command's grammar."""
     diagnose = commands.add_parser(
-        "diagnose", help="links, redundant constraints, singular positions of a scene", formatter_class=TEXT,
+        "diagnose",
+        help="links, redundant constraints, singular positions of a scene",
+        formatter_class=TEXT,
         description="Lengths of links and joints; counts, rank, redundant rows by joint and unique\n"
         "reactions at t = 0; redundancy along the motion, which exchange of joints\n"
         "removes it, and the nearest singular position.",
         epilog="examples:\n  mbref diagnose five_bar\n  mbref diagnose mechanism.toml --json\n"
         "  mbref diagnose mechanism.toml --start",
-    )  # fmt: skip
+    )
     add_scene(diagnose)
     diagnose.add_argument("--start", action="store_true", help="at t = 0 only, without simulating")
     diagnose.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
@@ -87,9 +89,14 @@ def _record(
     if along is not None and not isinstance(along, str):
         motion = asdict(along) | {"crossings": [crossing.to_record() for crossing in along.crossings]}
     return {
-        "scene": scene.name, "ground": scene.ground, "links": link_lengths(scene), **asdict(found.counts),
-        **beyond, "along_motion": motion, "exchanges": swaps,
-    }  # fmt: skip
+        "scene": scene.name,
+        "ground": scene.ground,
+        "links": link_lengths(scene),
+        **asdict(found.counts),
+        **beyond,
+        "along_motion": motion,
+        "exchanges": swaps,
+    }
 
 
 def _scene_lines(scene: Scene) -> list[str]:

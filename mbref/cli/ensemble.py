@@ -21,19 +21,24 @@ from mbref.trajectory import Trajectory
 def add(commands: Any) -> None:
     """The command's grammar."""
     many = commands.add_parser(
-        "ensemble", help="simulate variants of a scene on every core", formatter_class=TEXT,
+        "ensemble",
+        help="simulate variants of a scene on every core",
+        formatter_class=TEXT,
         description="Simulate copies of a scene with numbers drawn at random; mean and standard deviation\n"
         "of every body at the last time. Interrupted, --out keeps the runs that ended;\n"
         "the same command goes on.",
         epilog="example:\n"
         "  mbref ensemble planar_slider_crank --vary 'joint[B].anchor[0]=0.304+-1e-4' \\\n"
         "      --vary 'body[slider].mass=0.9:1.1' --count 500 --duration 0.1 --out runs.jsonl",
-    )  # fmt: skip
+    )
     add_scene(many)
     many.add_argument(
-        "--vary", action="append", required=True, metavar="PATH=LOW:HIGH",
+        "--vary",
+        action="append",
+        required=True,
+        metavar="PATH=LOW:HIGH",
         help="a number that varies, uniform; PATH=MEAN+-DEVIATION: normal; may repeat",
-    )  # fmt: skip
+    )
     many.add_argument("--count", type=int, default=100, help="variants (default 100)")
     many.add_argument("--seed", type=int, default=0, help="of the random numbers (default 0)")
     many.add_argument("--workers", type=int, help="processes (default: one a core)")
@@ -77,9 +82,10 @@ def _show_spread(
     if options.json:
         spread = {
             f"{what}_{key}": {body.name: a[b].tolist() for b, body in enumerate(scene.body)}
-            for key, values in last.items() if completed
+            for key, values in last.items()
+            if completed
             for what, a in (("mean", values.mean(axis=0)), ("deviation", values.std(axis=0)))
-        }  # fmt: skip
+        }
         print(strict_json({"scene": scene.name, "time": end, "completed": len(completed), **spread}))
         return
     seconds = sum(run.cost.seconds for run in completed)

@@ -16,7 +16,9 @@ from mbref.scenes import find_scene
 def add(commands: Any) -> None:
     """The commands' grammar."""
     take = commands.add_parser(
-        "import", help="a scene file from MJCF or URDF", formatter_class=TEXT,
+        "import",
+        help="a scene file from MJCF or URDF",
+        formatter_class=TEXT,
         description="Make a scene file from a MuJoCo model (.xml) or a URDF (.urdf). Open loops are closed\n"
         "by moving the joints. Mass matrix, bias forces and rows of loops are compared with MuJoCo's own\n"
         "at three poses. A part that changes the motion and that a scene does not have is an error, unless\n"
@@ -24,34 +26,44 @@ def add(commands: Any) -> None:
         epilog="examples:\n  mbref import robot.xml --out robot.toml\n"
         "  mbref import robot.xml --keyframe home --without armature,damping\n"
         "  mbref import legs.urdf --close foot_a=foot_b:revolute:y --pose knee=0.4",
-    )  # fmt: skip
+    )
     take.add_argument("file", metavar="FILE", help="the .xml or .urdf file")
     take.add_argument("--out", metavar="FILE", help="the scene file (default: the same name with .toml)")
     take.add_argument(
-        "--without", metavar="KINDS", default="",
+        "--without",
+        metavar="KINDS",
+        default="",
         help="kinds of parts that may be left out although they change the motion, separated by commas:\n"
         "armature, couplings, damping, flexible-bodies, fluid, friction, gravity-compensation, motors,\n"
         "springs, or everything",
-    )  # fmt: skip
+    )
     take.add_argument("--keyframe", metavar="NAME", default="", help="begin at the pose of a keyframe (MJCF)")
     take.add_argument(
-        "--pose", metavar="JOINT=VALUE", action="append", default=[],
+        "--pose",
+        metavar="JOINT=VALUE",
+        action="append",
+        default=[],
         help="begin with a joint coordinate (rad or m); may be given several times",
-    )  # fmt: skip
+    )
     take.add_argument(
-        "--close", metavar="A=B[:TYPE[:AXIS]]", action="append", default=[],
+        "--close",
+        metavar="A=B[:TYPE[:AXIS]]",
+        action="append",
+        default=[],
         help="close a loop between two links, bodies or sites: spherical (default), revolute,\n"
         "translational, cylindrical or fixed, about the axis x, y or z (default) of both frames;\n"
         "or a .yaml file with closed_loop: [[A, B], ...] and type: [3d, 6d, ...]; may be given several times",
-    )  # fmt: skip
+    )
     take.set_defaults(action=_import)
 
     give = commands.add_parser(
-        "export", help="a scene as MJCF", formatter_class=TEXT,
+        "export",
+        help="a scene as MJCF",
+        formatter_class=TEXT,
         description="Write a scene as a MuJoCo model (.xml); lists everything that it cannot hold.\n"
         "Needs the extra engines.",
         epilog="example:\n  mbref export four_bar_gravity --out four_bar.xml",
-    )  # fmt: skip
+    )
     add_scene(give)
     give.add_argument("--out", metavar="FILE", required=True, help="the .xml file")
     give.set_defaults(action=_export)

@@ -32,14 +32,16 @@ def add_method_options(parser: argparse.ArgumentParser, json: bool = True) -> No
         help=f"formulation+stabilisation/integrator, or in short {', '.join(SHORT)};\n"
         f"formulations: {', '.join(FORMULATIONS)};\nstabilisations: {', '.join(STABILISATIONS)};\n"
         f"integrators: {', '.join(INTEGRATORS)} (default: {SERIES},\nfor many bodies {SPARSE})",
-    )  # fmt: skip
+    )
     add_time_options(parser)
     parser.add_argument("--rtol", type=float, default=1e-9, help="relative tolerance per step (default 1e-9)")
     parser.add_argument(
-        "--code", choices=("auto", "generic", "generated"), default="auto",
+        "--code",
+        choices=("auto", "generic", "generated"),
+        default="auto",
         help="of the method taylor: generic, the kernels that serve every scene; generated, machine code\n"
         "for this scene; auto (default), generated once 20 000 steps are ahead.  Both agree to rounding",
-    )  # fmt: skip
+    )
     parser.add_argument("--max-step", type=float, default=0.0, help="largest step, s (default: the duration)")
     if json:
         parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")

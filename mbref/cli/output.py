@@ -44,9 +44,11 @@ def rounded(vector: np.ndarray) -> np.ndarray:
 
 
 def body_table(
-    title: str, bodies: Sequence[str], justify: Literal["left", "right"],
+    title: str,
+    bodies: Sequence[str],
+    justify: Literal["left", "right"],
     cells: Callable[[int, str], Iterable[str]],
-) -> Table:  # fmt: skip
+) -> Table:
     """A table with a row x, y, z of ``cells(body, field of QUANTITIES)`` for every body and quantity."""
     from rich.table import Table
 

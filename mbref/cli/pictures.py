@@ -24,34 +24,41 @@ without: across the plane of a plane mechanism, else oblique"""
 def add(commands: Any) -> None:
     """The commands' grammar."""
     draw = commands.add_parser(
-        "draw", help="a picture of a scene at t = 0", formatter_class=TEXT,
+        "draw",
+        help="a picture of a scene at t = 0",
+        formatter_class=TEXT,
         description="A picture of a scene at t = 0: bodies, joints by type, ground, loads and drivers.",
         epilog="examples:\n  mbref draw mechanism.toml\n  mbref draw bricard --view xz --out bricard.png",
-    )  # fmt: skip
+    )
     add_scene(draw)
     draw.add_argument("--view", metavar="VIEW", help=VIEW)
     draw.add_argument("--out", metavar="FILE", help=".svg or .png (default: as the scene, with .svg)")
     draw.set_defaults(action=_draw)
 
     animate = commands.add_parser(
-        "animate", help="the moving mechanism as SVG", formatter_class=TEXT,
+        "animate",
+        help="the moving mechanism as SVG",
+        formatter_class=TEXT,
         description="Simulate a scene and write its motion as an SVG that every browser plays.",
         epilog="examples:\n  mbref animate mechanism.toml\n"
         "  mbref animate flyball_governor --duration 2 --view oblique --out governor.svg\n"
         "  mbref animate four_bar --branches",
-    )  # fmt: skip
+    )
     add_scene(animate)
     animate.add_argument("--view", metavar="VIEW", help=VIEW)
     animate.add_argument("--out", metavar="FILE", help=".svg (default: as the scene, with -moving.svg)")
     animate.add_argument(
-        "--branches", action="store_true",
+        "--branches",
+        action="store_true",
         help="the mechanism on every branch at a singular position that the motion passes, side by side",
-    )  # fmt: skip
+    )
     animate.add_argument(
-        "--crossing", type=int, metavar="NUMBER",
+        "--crossing",
+        type=int,
+        metavar="NUMBER",
         help="--branches at this singular position, counted from 1 (default: the first at which several\n"
         "branches meet)",
-    )  # fmt: skip
+    )
     add_method_options(animate, json=False)
     animate.set_defaults(action=_animate)
 

@@ -20,7 +20,9 @@ SHOWN = 10  # singular positions in the text; --json has all
 def add(commands: Any) -> None:
     """The command's grammar."""
     run = commands.add_parser(
-        "run", help="simulate a scene by one method", formatter_class=TEXT,
+        "run",
+        help="simulate a scene by one method",
+        formatter_class=TEXT,
         description="Simulate a scene by one method: formulation+stabilisation/integrator.",
         epilog="examples:\n"
         "  mbref run planar_slider_crank --method mpi-svd+projection --times 0.1,0.2,0.4 --rtol 1e-11\n"
@@ -28,18 +30,22 @@ def add(commands: Any) -> None:
         "  mbref run mechanism.toml --method 'lm1+baumgarte[alpha=10,beta=10]/rk4[step=1e-4]'\n"
         "  mbref run four_bar --duration 0.1 --branch 2=2\n"
         "  mbref run mechanism.toml --out run.csv",
-    )  # fmt: skip
+    )
     add_scene(run)
     add_method_options(run)
     run.add_argument(
-        "--out", metavar="FILE", help="write the whole motion: .csv is a table of columns, .json what\n"
-        "mbref.Motion.load reads",
-    )  # fmt: skip
+        "--out",
+        metavar="FILE",
+        help="write the whole motion: .csv is a table of columns, .json what\nmbref.Motion.load reads",
+    )
     run.add_argument(
-        "--branch", action="append", metavar="CROSSING=BRANCH", default=[],
+        "--branch",
+        action="append",
+        metavar="CROSSING=BRANCH",
+        default=[],
         help="at a singular position, counted from 1, take another branch than the smooth one, which is 1;\n"
         "a run lists the branches at every crossing; e.g. --branch 2=2.  May be repeated",
-    )  # fmt: skip
+    )
     run.set_defaults(action=_run)
 
 

@@ -18,35 +18,44 @@ STILL = 1e-12  # m or rad, a smaller displacement is not reported
 def add(commands: Any) -> None:
     """The commands' grammar."""
     new = commands.add_parser(
-        "new", help="a commented scene file to start from", formatter_class=TEXT,
+        "new",
+        help="a commented scene file to start from",
+        formatter_class=TEXT,
         description="Write a scene file to start from: a commented slider-crank, or a copy of a scene.",
         epilog="examples:\n  mbref new my.toml\n  mbref new my.toml --like four_bar_gravity",
-    )  # fmt: skip
+    )
     new.add_argument("out", metavar="FILE", help="the .toml file; an existing one is left alone")
     new.add_argument("--like", metavar="SCENE", help="a built-in name, or another .toml file")
     new.set_defaults(action=_new)
 
     assemble = commands.add_parser(
-        "assemble", help="close the loops of a scene with given lengths of its links", formatter_class=TEXT,
+        "assemble",
+        help="close the loops of a scene with given lengths of its links",
+        formatter_class=TEXT,
         description="Move the joints and bodies of a scene, as little as possible, so that its links have\n"
         "the given lengths and every joint holds; says what moved.",
         epilog="example:\n  mbref assemble my.toml --length A-B=0.35 --length B-C=0.9 --out closed.toml",
-    )  # fmt: skip
+    )
     add_scene(assemble)
     assemble.add_argument(
-        "--length", action="append", default=[], metavar="A-B=LENGTH",
+        "--length",
+        action="append",
+        default=[],
+        metavar="A-B=LENGTH",
         help="distance of the joints A and B of a link, m; may repeat",
-    )  # fmt: skip
+    )
     assemble.add_argument("--out", metavar="FILE", help="write the closed scene")
     assemble.set_defaults(action=_assemble)
 
     schema = commands.add_parser(
-        "schema", help="the JSON schema of scene files", formatter_class=TEXT,
+        "schema",
+        help="the JSON schema of scene files",
+        formatter_class=TEXT,
         description="The JSON schema of scene files, by which editors complete and check them. Editors with\n"
         "taplo (VS Code: Even Better TOML) take it from the file's first line:\n"
         "  #:schema ./scene.schema.json",
         epilog="example:\n  mbref schema > scene.schema.json",
-    )  # fmt: skip
+    )
     schema.set_defaults(action=_schema)
 
 

@@ -36,18 +36,22 @@ MEANINGS = {  # of stabilisations and integrators
 def add(commands: Any) -> None:
     """The commands' grammar."""
     listing = commands.add_parser(
-        "list", help="the built-in scenes and the methods", formatter_class=TEXT,
+        "list",
+        help="the built-in scenes and the methods",
+        formatter_class=TEXT,
         description="The built-in scenes, or the parts of a method with their options.",
         epilog="examples:\n  mbref list\n  mbref list methods",
-    )  # fmt: skip
+    )
     listing.add_argument("what", nargs="?", choices=list(TABLES), help="default: both")
     listing.set_defaults(action=_list)
 
     completion = commands.add_parser(
-        "completion", help="completion of commands and options by the shell", formatter_class=TEXT,
+        "completion",
+        help="completion of commands and options by the shell",
+        formatter_class=TEXT,
         description="A script by which the shell completes commands and options of mbref.",
         epilog="example:\n  mbref completion bash > ~/.local/share/bash-completion/completions/mbref",
-    )  # fmt: skip
+    )
     completion.add_argument("shell", choices=SHELLS)
     completion.set_defaults(action=_complete)
 
@@ -75,8 +79,10 @@ def _scenes() -> Table:
 def _methods() -> Table:
     table = Table("part", "name", "meaning; options and their defaults", title=METHOD)
     parts: Mapping[str, Mapping[str, Any]] = {
-        "formulation": FORMULATIONS, "stabilisation": STABILISATIONS, "integrator": INTEGRATORS,
-    }  # fmt: skip
+        "formulation": FORMULATIONS,
+        "stabilisation": STABILISATIONS,
+        "integrator": INTEGRATORS,
+    }
     meanings = MEANINGS | {name: entry.about.meaning for name, entry in FORMULATIONS.items()}
     for part, entries in parts.items():
         for name, entry in entries.items():

@@ -115,12 +115,17 @@ def _summary(model: Model, motion: Motion, values: np.ndarray) -> AlongMotion:
     at = int(np.argmax(nearest <= nearest.min() * (1 + SAME)))
     moved = np.ptp(motion.position, axis=0).max() / model.length, np.ptp(motion.orientation, axis=0).max()
     return AlongMotion(
-        end=float(times[-1]), moves=bool(max(moved) > SAME),
-        rank=rank, redundant=model.m - rank,
+        end=float(times[-1]),
+        moves=bool(max(moved) > SAME),
+        rank=rank,
+        redundant=model.m - rank,
         by_rounding=tuple(small[small > RANK_TOLERANCE].tolist()),
-        nearest=float(nearest[at]), nearest_time=float(times[at]), crossings=tuple(motion.crossings or ()),
-        shaky=_is_shaky(model, motion), stopped="" if motion.outcome is Outcome.COMPLETED else motion.message,
-    )  # fmt: skip
+        nearest=float(nearest[at]),
+        nearest_time=float(times[at]),
+        crossings=tuple(motion.crossings or ()),
+        shaky=_is_shaky(model, motion),
+        stopped="" if motion.outcome is Outcome.COMPLETED else motion.message,
+    )
 
 
 def general_pose(model: Model, seed: int = 1) -> np.ndarray:

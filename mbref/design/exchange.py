@@ -50,7 +50,7 @@ def exchanges(scene: Scene, most: int = 6) -> list[Exchange]:
 
 def _sets(
     rows: Mapping[str, np.ndarray], choices: Mapping[str, Mapping[str, np.ndarray]], rank: int, size: int
-) -> Iterator[Exchange]:  # fmt: skip
+) -> Iterator[Exchange]:
     """Exchanges of ``size`` joints that leave as many rows as the rank, all of them independent."""
     total, tried = sum(map(len, rows.values())), 0
     for names in itertools.combinations(choices, size):

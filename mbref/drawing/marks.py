@@ -132,7 +132,7 @@ SIGNS: dict[str, Callable[[], str]] = {
     "cylindrical": lambda: _ball(PAPER, 4),
     "planar": lambda: _ball(GREY, 4),
     "distance": lambda: _ball(PAPER, 3.5),
-}  # fmt: skip
+}
 
 
 def driver_mark(stage: Stage, driver: Driver) -> str:

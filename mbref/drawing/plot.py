@@ -11,10 +11,20 @@ from mbref.drawing.svg import COLOURS, GREY
 from mbref.scene_fields import meant
 
 UNITS = {
-    "position": "m", "velocity": "m/s", "angular_velocity": "rad/s", "acceleration": "m/s²",
-    "angular_acceleration": "rad/s²", "orientation": "", "angle": "rad", "rate": "rad/s", "displacement": "m",
-    "force": "N", "moment": "N m", "energy": "J", "open": "",
-}  # fmt: skip
+    "position": "m",
+    "velocity": "m/s",
+    "angular_velocity": "rad/s",
+    "acceleration": "m/s²",
+    "angular_acceleration": "rad/s²",
+    "orientation": "",
+    "angle": "rad",
+    "rate": "rad/s",
+    "displacement": "m",
+    "force": "N",
+    "moment": "N m",
+    "energy": "J",
+    "open": "",
+}
 DEFAULT = ("angle", "displacement", "energy")
 
 

@@ -104,9 +104,15 @@ def at_rest(scene: Scene) -> Trajectory:
     """The trajectory of one sample, t = 0, at the scene's own poses, with zero velocities."""
     nb = len(scene.body)
     return Trajectory(
-        scene=scene.name, engine="mbref", version="", method="", settings={}, times=np.zeros(1),
+        scene=scene.name,
+        engine="mbref",
+        version="",
+        method="",
+        settings={},
+        times=np.zeros(1),
         bodies=tuple(body.name for body in scene.body),
         position=np.array([[body.position for body in scene.body]]),
         orientation=np.array([[body.orientation for body in scene.body]]),
-        velocity=np.zeros((1, nb, 3)), angular_velocity=np.zeros((1, nb, 3)),
-    )  # fmt: skip
+        velocity=np.zeros((1, nb, 3)),
+        angular_velocity=np.zeros((1, nb, 3)),
+    )

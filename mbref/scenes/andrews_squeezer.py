@@ -35,27 +35,41 @@ def andrews_squeezer() -> Scene:
     e = _on(f, k2, -D)
     g, h = _on(A, k5, ZT), _on(A, k7, 0.0, -U)
     centres = (
-        _on((0.0, 0.0), k1, RA), _on(f, k2, -DA), _on(B, k3, SB, -SA), _on(g, k4, 0.0, EA - E),
-        _on(A, k5, TA, TB), _on(h, k6, ZF - FA), _on(A, k7, UB, -UA),
-    )  # fmt: skip
+        _on((0.0, 0.0), k1, RA),
+        _on(f, k2, -DA),
+        _on(B, k3, SB, -SA),
+        _on(g, k4, 0.0, EA - E),
+        _on(A, k5, TA, TB),
+        _on(h, k6, ZF - FA),
+        _on(A, k7, UB, -UA),
+    )
     bodies = [
         Body(name=f"K{n}", mass=m, inertia=(i / 2, i / 2, i), position=(*centre, 0.0), orientation=about_z(k))
         for n, m, i, centre, k in zip(range(1, 8), MASS, MOMENT, centres, ANGLES, strict=True)
     ]
     hinges = (
-        ("O", "ground", "K1", (0.0, 0.0)), ("F", "K1", "K2", f), ("B", "ground", "K3", B),
-        ("A5", "ground", "K5", A), ("A7", "ground", "K7", A), ("G", "K5", "K4", g), ("H", "K7", "K6", h),
-        ("E3", "K2", "K3", e), ("E4", "K2", "K4", e), ("E6", "K2", "K6", e),
-    )  # fmt: skip
+        ("O", "ground", "K1", (0.0, 0.0)),
+        ("F", "K1", "K2", f),
+        ("B", "ground", "K3", B),
+        ("A5", "ground", "K5", A),
+        ("A7", "ground", "K7", A),
+        ("G", "K5", "K4", g),
+        ("H", "K7", "K6", h),
+        ("E3", "K2", "K3", e),
+        ("E4", "K2", "K4", e),
+        ("E6", "K2", "K6", e),
+    )
     joints = [
         Revolute(name=name, bodies=(first, second), anchor=(*place, 0.0), axis=Z)
         for name, first, second, place in hinges
     ]
     end = _on(B, k3, SD, -SC)
     spring = Spring(
-        bodies=("K3", "ground"), points=((*end, 0.0), (*C, 0.0)), stiffness=STIFFNESS,
+        bodies=("K3", "ground"),
+        points=((*end, 0.0), (*C, 0.0)),
+        stiffness=STIFFNESS,
         natural_length=NATURAL_LENGTH,
-    )  # fmt: skip
+    )
     motor = Moment(body="K1", moment=(0.0, 0.0, MOTOR))
     return Scene(
         name="andrews_squeezer", duration=0.03, body=tuple(bodies), joint=tuple(joints), load=(motor, spring)

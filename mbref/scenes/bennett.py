@@ -48,9 +48,12 @@ def bennett() -> Scene:
 def _link(name: str, middle: np.ndarray, frame: np.ndarray, length: float) -> Body:
     mass = DENSITY * length
     return Body(
-        name=name, mass=mass, inertia=rod_inertia(mass, length), position=triple(middle),
+        name=name,
+        mass=mass,
+        inertia=rod_inertia(mass, length),
+        position=triple(middle),
         orientation=tuple(rotations.from_matrix(frame).tolist()),
-    )  # fmt: skip
+    )
 
 
 def _about(axis: int, angle: float) -> np.ndarray:

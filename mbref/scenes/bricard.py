@@ -13,8 +13,13 @@ from mbref.scene import Body, Revolute, Scene
 from mbref.scenes.links import midpoint, triple
 
 POINTS = (
-    (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, -1.0, 0.0), (1.0, -1.0, 1.0), (0.0, -1.0, 1.0), (0.0, 0.0, 1.0),
-)  # fmt: skip
+    (0.0, 0.0, 0.0),
+    (1.0, 0.0, 0.0),
+    (1.0, -1.0, 0.0),
+    (1.0, -1.0, 1.0),
+    (0.0, -1.0, 1.0),
+    (0.0, 0.0, 1.0),
+)
 AXES = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))  # of the hinges, in turn
 SIDE = 0.1  # m, of the square section
 

@@ -33,21 +33,33 @@ def flyball_governor() -> Scene:
         *(_hinge(side) for side in (1.0, -1.0)),
     ]
     return Scene(
-        name="flyball_governor", gravity=(0.0, 0.0, -9.81), duration=10.0, body=(shaft, slider, *arms),
-        joint=tuple(joints), load=(_spring(1.0), _spring(-1.0)),
-    )  # fmt: skip
+        name="flyball_governor",
+        gravity=(0.0, 0.0, -9.81),
+        duration=10.0,
+        body=(shaft, slider, *arms),
+        joint=tuple(joints),
+        load=(_spring(1.0), _spring(-1.0)),
+    )
 
 
 def _part(
-    name: str, mass: float, inertia: Triple, position: Triple,
+    name: str,
+    mass: float,
+    inertia: Triple,
+    position: Triple,
     orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
-) -> Body:  # fmt: skip
+) -> Body:
     """A body that turns with the shaft."""
     velocity = (-SPIN * position[1], SPIN * position[0], 0.0)
     return Body(
-        name=name, mass=mass, inertia=inertia, position=position, orientation=orientation, velocity=velocity,
+        name=name,
+        mass=mass,
+        inertia=inertia,
+        position=position,
+        orientation=orientation,
+        velocity=velocity,
         angular_velocity=(0.0, 0.0, SPIN),
-    )  # fmt: skip
+    )
 
 
 def _arm(side: float, rod: float, across: float, about: float) -> Body:
@@ -72,9 +84,12 @@ def _hinge(side: float) -> Revolute:
 def _spring(side: float) -> Spring:
     ends = (_along(side, LENGTH / 2), (side * OFFSET, 0.0, HEIGHT))
     return Spring(
-        bodies=(_name(side), "slider"), points=ends, stiffness=STIFFNESS, damping=DAMPING,
+        bodies=(_name(side), "slider"),
+        points=ends,
+        stiffness=STIFFNESS,
+        damping=DAMPING,
         natural_length=NATURAL_LENGTH,
-    )  # fmt: skip
+    )
 
 
 def _name(side: float) -> str:

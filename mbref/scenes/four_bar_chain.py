@@ -43,6 +43,10 @@ def four_bar_chain(loops: int = 2, name: str = "four_bar_chain") -> Scene:
 
 def _upright(i: int, orientation: tuple[float, float, float, float]) -> Body:
     return Body(
-        name=f"upright{i}", mass=1.0, inertia=INERTIA, position=(float(i), 0.5, 0.0),
-        orientation=orientation, angular_velocity=(0.0, 0.0, -1.0),
-    )  # fmt: skip
+        name=f"upright{i}",
+        mass=1.0,
+        inertia=INERTIA,
+        position=(float(i), 0.5, 0.0),
+        orientation=orientation,
+        angular_velocity=(0.0, 0.0, -1.0),
+    )

@@ -12,8 +12,11 @@ from mbref.scene import Body, Scene, Spherical
 def heavy_top() -> Scene:
     """From the published position, for 2 s; the velocity of the centre of mass follows from the joint."""
     top = Body(
-        name="top", mass=15.0, inertia=(0.234375, 0.46875, 0.234375), position=(0.0, 1.0, 0.0),
+        name="top",
+        mass=15.0,
+        inertia=(0.234375, 0.46875, 0.234375),
+        position=(0.0, 1.0, 0.0),
         angular_velocity=(0.0, 150.0, -4.61538),
-    )  # fmt: skip
+    )
     joint = Spherical(name="tip", bodies=("ground", "top"), anchor=(0.0, 0.0, 0.0))
     return Scene(name="heavy_top", gravity=(0.0, 0.0, -9.81), duration=2.0, body=(top,), joint=(joint,))

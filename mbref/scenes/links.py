@@ -48,9 +48,13 @@ def link(
     (a, b, c), (x, y, z) = start, end
     mass = DENSITY * length
     return Body(
-        name=name, mass=mass, inertia=rod_inertia(mass, length),
-        position=((a + x) / 2, (b + y) / 2, (c + z) / 2), orientation=orientation, **velocities,
-    )  # fmt: skip
+        name=name,
+        mass=mass,
+        inertia=rod_inertia(mass, length),
+        position=((a + x) / 2, (b + y) / 2, (c + z) / 2),
+        orientation=orientation,
+        **velocities,
+    )
 
 
 def slider(position: tuple[float, float, float], name: str = "slider") -> Body:

@@ -24,16 +24,22 @@ def rigid_slider_crank(middle: bool = False, name: str = "rigid_slider_crank") -
     end = (math.sqrt(ROD**2 - pin[1] ** 2 - pin[2] ** 2), 0.0, 0.0)
     centre = (0.0, PIVOT[1], PIVOT[2] + CRANK / 2) if middle else PIVOT
     crank = Body(
-        name="crank", mass=0.12, inertia=(1e-4, 1e-4, 1e-5), position=centre,
+        name="crank",
+        mass=0.12,
+        inertia=(1e-4, 1e-4, 1e-5),
+        position=centre,
         angular_velocity=(SPIN, 0.0, 0.0),
-    )  # fmt: skip
+    )
     along = (np.array(end) - pin) / ROD
     across = np.cross(along, X) / np.linalg.norm(np.cross(along, X))
     frame = np.column_stack([along, across, np.cross(along, across)])
     rod = Body(
-        name="rod", mass=0.5, inertia=(4e-4, 4e-3, 4e-3), position=tuple((np.array(end) + pin) / 2),
+        name="rod",
+        mass=0.5,
+        inertia=(4e-4, 4e-3, 4e-3),
+        position=tuple((np.array(end) + pin) / 2),
         orientation=tuple(rotations.from_matrix(frame).tolist()),
-    )  # fmt: skip
+    )
     slider = Body(name="slider", mass=2.0, inertia=(1e-4, 1e-4, 1e-4), position=end)
     joints = (
         Revolute(name="A", bodies=("ground", "crank"), anchor=PIVOT, axis=X),
