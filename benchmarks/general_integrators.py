@@ -109,11 +109,19 @@ class GeneralIntegrator(Engine):
         done = len(states) == len(times) and not message
         motion = f.motion(times[: len(states)], states)
         return Trajectory(
-            scene.name, self.name, self.version(), setting.family, dict(setting.options),
-            times[: len(states)], tuple(body.name for body in scene.body), **motion,
-            outcome=Outcome.COMPLETED if done else Outcome.STEP_FAILED, message=message,
-            t_end=float(times[len(states) - 1]) if len(states) else 0.0, cost=cost,
-        )  # fmt: skip
+            scene.name,
+            self.name,
+            self.version(),
+            setting.family,
+            dict(setting.options),
+            times[: len(states)],
+            tuple(body.name for body in scene.body),
+            **motion,
+            outcome=Outcome.COMPLETED if done else Outcome.STEP_FAILED,
+            message=message,
+            t_end=float(times[len(states) - 1]) if len(states) else 0.0,
+            cost=cost,
+        )
 
     @abstractmethod
     def solve(self, family: str, f: RightHandSide, times: np.ndarray, rtol: float) -> Solution:

@@ -157,17 +157,32 @@ def _integrated(
     """(k, 2) angle and rate at the times, and the cost of the stepping."""
     by_hand, integrator = BY_HAND[scene.name], INTEGRATORS["dop853"]
     control = Control(
-        order=integrator.order, fixed_step=0.0, smallest_step=0.0, largest_step=times[-1], largest_turn=0.0,
-        violation=0.0, most_steps=0.0, steps_per_call=0.0, forced_step=0.0, first_step=0.0, rtol=rtol,
-        atol=rtol, closed_loops=1.0,
-    )  # fmt: skip
+        order=integrator.order,
+        fixed_step=0.0,
+        smallest_step=0.0,
+        largest_step=times[-1],
+        largest_turn=0.0,
+        violation=0.0,
+        most_steps=0.0,
+        steps_per_call=0.0,
+        forced_step=0.0,
+        first_step=0.0,
+        rtol=rtol,
+        atol=rtol,
+        closed_loops=1.0,
+    )
     numbers = np.array(by_hand.numbers(scene))
     memory = packed(
         allocate(
-            OneDegreeOfFreedom, {}, control=record(control), loop=allocate(Stepping, {}), numbers=numbers,
-            equations=allocate(Counted, {}), integrator=packed(allocate(Stages, {"nb": 1})),
+            OneDegreeOfFreedom,
+            {},
+            control=record(control),
+            loop=allocate(Stepping, {}),
+            numbers=numbers,
+            equations=allocate(Counted, {}),
+            integrator=packed(allocate(Stages, {"nb": 1})),
         )
-    )  # fmt: skip
+    )
     start, samples, counts = (
         np.array([theta0, initial_rate(scene, path)]),
         np.zeros((len(times), 2)),
@@ -206,12 +221,21 @@ def _trajectory(
     """The bodies along the path at coordinates and rates ``motion`` (k, 2)."""
     pose, rate = path.poses(motion[:, 0]), motion[:, 1, None, None]
     return Trajectory(
-        scene.name, Limit.name, __version__, setting.family, dict(setting.options), times,
-        tuple(body.name for body in scene.body), np.asarray(pose.position, dtype=float),
-        rotations.from_matrix(pose.rotation), np.asarray(pose.dposition * rate, dtype=float),
+        scene.name,
+        Limit.name,
+        __version__,
+        setting.family,
+        dict(setting.options),
+        times,
+        tuple(body.name for body in scene.body),
+        np.asarray(pose.position, dtype=float),
+        rotations.from_matrix(pose.rotation),
+        np.asarray(pose.dposition * rate, dtype=float),
         np.asarray(pose.spin * rate, dtype=float),
-        outcome=Outcome.COMPLETED, t_end=float(times[-1]), cost=cost,
-    )  # fmt: skip
+        outcome=Outcome.COMPLETED,
+        t_end=float(times[-1]),
+        cost=cost,
+    )
 
 
 LIMIT = Limit()

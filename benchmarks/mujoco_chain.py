@@ -102,9 +102,16 @@ class Chain:
         data = self.start()
         numbers, start = context(self.model, data, []), np.concatenate([data.qpos, data.qvel])
         system = dop853.System(
-            int(rates.address or 0), numbers.address, numbers.quaternions, rtol, rtol, 0.0, duration,
-            MOST_STEPS, 0,
-        )  # fmt: skip
+            int(rates.address or 0),
+            numbers.address,
+            numbers.quaternions,
+            rtol,
+            rtol,
+            0.0,
+            duration,
+            MOST_STEPS,
+            0,
+        )
         memory, samples = dop853.memory(start), np.zeros((1, len(start)))
         began = time.process_time()
         status, _ = dop853.integrate(system, np.array([duration]), samples, memory)

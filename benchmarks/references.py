@@ -102,16 +102,23 @@ def examined(scene: Scene, duration: float, seconds: float, tight: float) -> Lin
     tighter = _tighter(scene, found.times, tight)
     apart = [] if tighter is None else differences(scene, one, tighter)[: len(found.times)]
     return {
-        "scene": scene.name, "duration": duration,
-        "bodies": len(scene.body), "joints": dict(Counter(joint.type for joint in scene.joint)),
-        "loads": dict(Counter(load.type for load in scene.load)), "redundant": scene.counts().redundant,
+        "scene": scene.name,
+        "duration": duration,
+        "bodies": len(scene.body),
+        "joints": dict(Counter(joint.type for joint in scene.joint)),
+        "loads": dict(Counter(load.type for load in scene.load)),
+        "redundant": scene.counts().redundant,
         "by": [motion.formulation for motion in motions],
-        "seconds": [motion.seconds for motion in motions], "apart": largest(differences(scene, one, other)),
-        "bound": None if reason else largest(found.bound), "reason": reason,
-        "other_to": None if found.both.all() else other.reached, "other_reason": other.reason,
-        "error": _compared(_error(scene, found), found), "tighter": _compared(apart, found),
+        "seconds": [motion.seconds for motion in motions],
+        "apart": largest(differences(scene, one, other)),
+        "bound": None if reason else largest(found.bound),
+        "reason": reason,
+        "other_to": None if found.both.all() else other.reached,
+        "other_reason": other.reason,
+        "error": _compared(_error(scene, found), found),
+        "tighter": _compared(apart, found),
         "tighter_reason": "" if tighter is None else tighter.reason,
-    }  # fmt: skip
+    }
 
 
 def _tighter(scene: Scene, times: np.ndarray, seconds: float) -> Motion | None:

@@ -113,9 +113,14 @@ def heavy(count: int) -> Iterator[tuple[Scene, float]]:
 
 
 SWEEPS = {
-    "light": (light, 922), "cart_poles": (cart_poles, 100), "turning": (turning, 48), "gaps": (gaps, 24),
-    "driven": (driven, 200), "starts": (starts, 72), "heavy": (heavy, 1),
-}  # fmt: skip
+    "light": (light, 922),
+    "cart_poles": (cart_poles, 100),
+    "turning": (turning, 48),
+    "gaps": (gaps, 24),
+    "driven": (driven, 200),
+    "starts": (starts, 72),
+    "heavy": (heavy, 1),
+}
 
 
 def outcome_of(scene: Scene, end: float, method: str, limits: Limits) -> tuple[str, float]:

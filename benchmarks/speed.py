@@ -43,14 +43,20 @@ from mbref.trajectory import Cost, Outcome
 
 OURS, LIMIT_NAME, SERIES = "mbref", LIMIT.name, "taylor"
 ENGINES = ("mbref", "mujoco", "pinocchio", "exudyn", "sundials", "casadi", "heyoka")
-OTHERS = (
-    "general_integrators:SCIPY", "general_integrators:SCIKIT_SUNDAE", "limit:LIMIT",
-)  # fmt: skip
+OTHERS = ("general_integrators:SCIPY", "general_integrators:SCIKIT_SUNDAE", "limit:LIMIT")
 PAPER = (
-    "four_bar", "five_bar", "spatial_slider_crank", "spatial_slider_crank_driven", "planar_slider_crank",
-    "planar_slider_crank_equal", "planar_slider_crank_heavy", "four_bar_gravity", "five_bar_gravity",
-    "spatial_slider_crank_gravity", "planar_slider_crank_gravity",
-)  # fmt: skip
+    "four_bar",
+    "five_bar",
+    "spatial_slider_crank",
+    "spatial_slider_crank_driven",
+    "planar_slider_crank",
+    "planar_slider_crank_equal",
+    "planar_slider_crank_heavy",
+    "four_bar_gravity",
+    "five_bar_gravity",
+    "spatial_slider_crank_gravity",
+    "planar_slider_crank_gravity",
+)
 SAMPLES = 11  # few, because adaptive integrators end a step at every sample time
 REPEATS = 5
 LONG, TOO_LONG = 0.7, 2.0  # s; such runs are not repeated; of their family nothing finer is tried
@@ -207,11 +213,14 @@ def rows(scene: Scene, runs: Sequence[Run]) -> list[dict[str, Any]]:
         curves.setdefault((run.engine, run.family), []).append(run)
     return [
         {
-            "engine": name, "family": family, "cost": [c / scene.duration for c in _costs(group)],
-            "runs": [_cheapest(group, level) for level in ERROR_LEVELS], "least": _least(group, scene),
+            "engine": name,
+            "family": family,
+            "cost": [c / scene.duration for c in _costs(group)],
+            "runs": [_cheapest(group, level) for level in ERROR_LEVELS],
+            "least": _least(group, scene),
         }
         for (name, family), group in curves.items()
-    ]  # fmt: skip
+    ]
 
 
 def _least(runs: Sequence[Run], scene: Scene) -> tuple[float, float]:

@@ -28,13 +28,19 @@ from mbref.simulation.simulate import Limits, simulate
 from mbref.trajectory import Outcome
 
 FAMILIES = (
-    ("taylor", "generated"), ("taylor", "generic"), ("lm2+projection", "generic"),
+    ("taylor", "generated"),
+    ("taylor", "generic"),
+    ("lm2+projection", "generic"),
     ("alf-dual+projection", "generic"),
-)  # fmt: skip
+)
 NAMES = (
-    "planar_slider_crank", "spatial_slider_crank", "planar_slider_crank_gravity",
-    "spatial_slider_crank_gravity", "four_bar_gravity", "five_bar_gravity",
-)  # fmt: skip
+    "planar_slider_crank",
+    "spatial_slider_crank",
+    "planar_slider_crank_gravity",
+    "spatial_slider_crank_gravity",
+    "four_bar_gravity",
+    "five_bar_gravity",
+)
 TOLERANCES = 10.0 ** np.arange(-2.0, -14.1, -0.5)
 SAMPLES, ROUNDS, BRIEF, MOST_TIMES = 11, 9, 5e-3, 10
 FINEST = min(ERROR_LEVELS)

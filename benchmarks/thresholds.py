@@ -148,8 +148,11 @@ def main() -> None:
             move(name, type(usual)(value) if isinstance(usual, float) else max(1, round(value)))
             found[word] = changes(before)
         move(name, usual)
-        print(f"{name:24} smaller: {'; '.join(found['smaller']) or '-':45} larger: "
-              f"{'; '.join(found['larger']) or '-'}", flush=True)  # fmt: skip
+        print(
+            f"{name:24} smaller: {'; '.join(found['smaller']) or '-':45} larger: "
+            f"{'; '.join(found['larger']) or '-'}",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

@@ -32,10 +32,17 @@ from mbref.scene import Scene
 from mbref.scenes import SCENES
 
 MECHANISMS = {  # end times, s
-    "planar_slider_crank_gravity": 0.3, "spatial_slider_crank_gravity": 0.2, "four_bar_gravity": 0.3,
-    "five_bar_gravity": 0.3, "point_pendulum": 2.0, "heavy_top": 0.5, "planar_slider_crank": 0.1,
-    "four_bar": 0.05, "random_3": 0.5, "random_11": 0.5,
-}  # fmt: skip
+    "planar_slider_crank_gravity": 0.3,
+    "spatial_slider_crank_gravity": 0.2,
+    "four_bar_gravity": 0.3,
+    "five_bar_gravity": 0.3,
+    "point_pendulum": 2.0,
+    "heavy_top": 0.5,
+    "planar_slider_crank": 0.1,
+    "four_bar": 0.05,
+    "random_3": 0.5,
+    "random_11": 0.5,
+}
 SAMPLES = 31
 FINER = 1.1  # ratio of neighbouring steps
 LOOSER = 10 ** (1 / 3)  # of neighbouring tolerances, whose work is about 1.1 apart at order 8
@@ -106,15 +113,21 @@ def compared(scene: Scene, name: str, level: float) -> Iterator[str]:
 
 
 def _line(
-    scene: Scene, name: str, is_ours: bool, tune: Sequence[Record], sweep: Sequence[Record],
+    scene: Scene,
+    name: str,
+    is_ours: bool,
+    tune: Sequence[Record],
+    sweep: Sequence[Record],
     runs: tuple[int, int],
-) -> str:  # fmt: skip
+) -> str:
     best = min(tune, key=lambda r: r["cost"]["seconds"])
     rival = min([*sweep, best], key=lambda r: r["cost"]["seconds"])
     ratio = best["cost"]["seconds"] / rival["cost"]["seconds"]
     whose = "crosscheck" if is_ours else "itself"
-    return (f"{scene.name:30s} {name:10s} {whose:10s} {_said(best):42s} {_said(rival):42s} {ratio:5.2f}"
-            f" {runs[0]:4d} {runs[1]:5d}")  # fmt: skip
+    return (
+        f"{scene.name:30s} {name:10s} {whose:10s} {_said(best):42s} {_said(rival):42s} {ratio:5.2f}"
+        f" {runs[0]:4d} {runs[1]:5d}"
+    )
 
 
 def _said(record: Record) -> str:

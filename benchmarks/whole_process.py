@@ -109,8 +109,14 @@ def show(console: Console, scene: str, stored: dict[str, Any]) -> None:
     table = Table(title=f"{scene}, {stored['duration']:g} s at an error of 1e-6: CPU ms of a process")
     for heading in ("engine", "family"):
         table.add_column(heading, no_wrap=True)
-    for heading in ("stepping, a simulated second", "construction", "start-up", "whole process",
-                    "mbref pays after simulated s, warm", "from start"):  # fmt: skip
+    for heading in (
+        "stepping, a simulated second",
+        "construction",
+        "start-up",
+        "whole process",
+        "mbref pays after simulated s, warm",
+        "from start",
+    ):
         table.add_column(heading, justify="right")
     ours, our_parts = min(
         (row for row in rows if row[0].engine == OURS), key=lambda row: row[0].cost, default=(None, None)

@@ -53,10 +53,15 @@ HINGE = {
 LOADS = {
     "moment": {"type": "moment", "body": "second", "moment": [0, 1, 0]},
     "force": {"type": "force", "body": "second", "point": [0.8, 0, 0.8], "force": [1, 0, 0]},
-    "spring": {"type": "spring", "bodies": ["first", "second"], "points": [[-0.7, 0, 0], [0.6, 0, 0.6]],
-               "stiffness": 1.0, "natural_length": 1.0},
+    "spring": {
+        "type": "spring",
+        "bodies": ["first", "second"],
+        "points": [[-0.7, 0, 0], [0.6, 0, 0.6]],
+        "stiffness": 1.0,
+        "natural_length": 1.0,
+    },
     "torsion_spring": {"type": "torsion_spring", "joint": "J", "stiffness": 1.0},
-}  # fmt: skip
+}
 
 
 sys.path.insert(0, str(ROOT / "docs"))
@@ -106,10 +111,11 @@ def figures() -> dict[str, str]:
 def joint_scene(kind: str) -> Scene:
     """Two bodies in a joint of a type, the first hinged to the ground."""
     places = {
-        "anchor": (0.0, 0.0, 0.0), "anchors": ((0.0, 0.0, 0.0), (0.3, 0.0, 0.5)),
+        "anchor": (0.0, 0.0, 0.0),
+        "anchors": ((0.0, 0.0, 0.0), (0.3, 0.0, 0.5)),
         "axis": (0.0, 1.0, 0.0) if kind == "revolute" else (1.0, 0.0, 0.0),
         "axes": ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
-    }  # fmt: skip
+    }
     joint = JOINT_TYPES[kind].at("J", ("first", "second"), **places)
     return Scene(name=kind, body=BODIES, joint=[HOLD, joint])
 
@@ -183,9 +189,14 @@ class _Commands:
     def _output(self, command: str) -> str:
         path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
         ran = subprocess.run(
-            command, shell=True, cwd=self._folder.name, capture_output=True, text=True, check=False,
+            command,
+            shell=True,
+            cwd=self._folder.name,
+            capture_output=True,
+            text=True,
+            check=False,
             env={**os.environ, "PATH": path, "COLUMNS": "100"},
-        )  # fmt: skip
+        )
         if ran.returncode:
             raise PluginError(f"{command} ended with {ran.returncode}: {ran.stderr}")
         return ran.stdout

@@ -63,8 +63,19 @@ def note() -> None:
 
 def split(seed: int, options: list[str]) -> tuple[bool, str]:
     """Whether both halves of a random split pass, run at a time, and what pytest says of them."""
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "tests.random_order",
-               "--order-seed", str(seed), *options]  # fmt: skip
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "-p",
+        "tests.random_order",
+        "--order-seed",
+        str(seed),
+        *options,
+    ]
     halves = [
         subprocess.Popen([*command, "--half", half], stdout=subprocess.PIPE, text=True) for half in "12"
     ]

@@ -18,9 +18,11 @@ from mbref.scene import (
 coordinate = st.floats(-1, 1, allow_subnormal=False)
 vectors = st.tuples(coordinate, coordinate, coordinate)
 directions = vectors.filter(lambda v: np.linalg.norm(v) > 0.1)
-quaternions = st.tuples(coordinate, coordinate, coordinate, coordinate).filter(
-    lambda q: np.linalg.norm(q) > 0.1
-).map(lambda q: tuple((np.array(q) / np.linalg.norm(q)).tolist()))  # fmt: skip
+quaternions = (
+    st.tuples(coordinate, coordinate, coordinate, coordinate)
+    .filter(lambda q: np.linalg.norm(q) > 0.1)
+    .map(lambda q: tuple((np.array(q) / np.linalg.norm(q)).tolist()))
+)
 DRIVABLE = tuple(kind for kind in JOINT_TYPES.values() if kind.facts.driven)
 
 

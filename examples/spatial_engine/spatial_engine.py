@@ -18,10 +18,24 @@ from mbref.trajectory import Cost, Outcome, Trajectory
 # axes of the first frame that displacement keeps off, and pairs of axes kept at right angles
 ALL, HINGE = (0, 1, 2), ((0, 2), (1, 2))
 RIGHT = ((0, 1), (1, 2), (2, 0))
-HELD = {"fixed": ALL, "revolute": ALL, "universal": ALL, "spherical": ALL, "translational": (0, 1),
-        "cylindrical": (0, 1), "planar": (2,), "distance": ()}  # fmt: skip
-SQUARE = {"fixed": RIGHT, "translational": RIGHT, "universal": ((2, 2),), "revolute": HINGE,
-          "cylindrical": HINGE, "planar": HINGE}  # fmt: skip
+HELD = {
+    "fixed": ALL,
+    "revolute": ALL,
+    "universal": ALL,
+    "spherical": ALL,
+    "translational": (0, 1),
+    "cylindrical": (0, 1),
+    "planar": (2,),
+    "distance": (),
+}
+SQUARE = {
+    "fixed": RIGHT,
+    "translational": RIGHT,
+    "universal": ((2, 2),),
+    "revolute": HINGE,
+    "cylindrical": HINGE,
+    "planar": HINGE,
+}
 UNMET = 1e-8  # residual of the joints' rows, relative; 3e-11 in regular positions
 RANK = 1e-11  # pivots of redundant rows are rounding, 1e-15
 
@@ -55,12 +69,25 @@ class Spatial(Engine):
         place, turn, velocity, spin = (np.array(part)[:, :-1] for part in list(zip(*states, strict=True))[:4])
         rates = np.array([rate for rate, _ in solved])
         return Trajectory(
-            scene.name, self.name, self.version(), setting.family, dict(setting.options), done.t,
-            tuple(body.name for body in scene.body), place, rotations.from_matrix(turn), velocity, spin,
-            rates[..., :3], rates[..., 3:], model.reactions(states, [push for _, push in solved]),
+            scene.name,
+            self.name,
+            self.version(),
+            setting.family,
+            dict(setting.options),
+            done.t,
+            tuple(body.name for body in scene.body),
+            place,
+            rotations.from_matrix(turn),
+            velocity,
+            spin,
+            rates[..., :3],
+            rates[..., 3:],
+            model.reactions(states, [push for _, push in solved]),
             Outcome.COMPLETED if done.status == 0 else Outcome.STEP_FAILED,
-            float(done.t[-1]), done.message, cost,
-        )  # fmt: skip
+            float(done.t[-1]),
+            done.message,
+            cost,
+        )
 
 
 class State(NamedTuple):
@@ -90,8 +117,9 @@ class Mechanism:
         self.scene, self.count = scene, len(scene.body)
         quaternions = np.array([body.orientation for body in scene.body])
         place = np.array([body.position for body in scene.body])
-        self.start = np.concatenate([place.ravel(), quaternions.ravel(), np.ravel(initial_twists(scene)),
-                                     np.zeros(len(scene.load))])  # fmt: skip
+        self.start = np.concatenate(
+            [place.ravel(), quaternions.ravel(), np.ravel(initial_twists(scene)), np.zeros(len(scene.load))]
+        )
         self.first = self.unpack(self.start)
         self.mass, self.inertia = np.array([body.mass for body in scene.body]), inertia_matrices(scene)
         self.mates = {joint.name: self.mate(joint) for joint in scene.joint}

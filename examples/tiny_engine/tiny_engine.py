@@ -56,10 +56,21 @@ class Tiny(Engine):
         outcome = Outcome.COMPLETED if np.isfinite(samples).all() else Outcome.NOT_FINITE
         flat = [[1.0, 1.0, 0.0]]
         return Trajectory(
-            scene.name, self.name, self.version(), setting.family, dict(setting.options), np.array(times),
-            tuple(body.name for body in scene.body), q * flat, turned(q[..., 2]), v * flat,
-            v * [[0.0, 0.0, 1.0]], outcome=outcome, t_end=t, cost=Cost(seconds, steps=steps, rhs=4 * steps),
-        )  # fmt: skip
+            scene.name,
+            self.name,
+            self.version(),
+            setting.family,
+            dict(setting.options),
+            np.array(times),
+            tuple(body.name for body in scene.body),
+            q * flat,
+            turned(q[..., 2]),
+            v * flat,
+            v * [[0.0, 0.0, 1.0]],
+            outcome=outcome,
+            t_end=t,
+            cost=Cost(seconds, steps=steps, rhs=4 * steps),
+        )
 
 
 def turned(angle):
@@ -89,8 +100,12 @@ class Plane:
         """Ends of joints: joint, body, sign and arm at t = 0; rows (joints, 3, nb, 3) where no arm counts,
         and those of x, y and angle that each joint keeps (joints, 2, 3)."""
         joints, nb = self.scene.joint, len(self.scene.body)
-        ends = [(k, self.scene.body_index(name), sign) for k, joint in enumerate(joints)
-                for sign, name in zip((-1.0, 1.0), joint.bodies, strict=True) if name != GROUND]  # fmt: skip
+        ends = [
+            (k, self.scene.body_index(name), sign)
+            for k, joint in enumerate(joints)
+            for sign, name in zip((-1.0, 1.0), joint.bodies, strict=True)
+            if name != GROUND
+        ]
         self.of, self.on, self.sign = (np.array(column) for column in zip(*ends, strict=True))
         self.arm = (np.array([joint.anchor[:2] for joint in joints])[self.of] - self.q0[self.on, :2]).T
         self.still = np.zeros((len(joints), 3, nb, 3))

@@ -41,12 +41,21 @@ class Fake(Engine):
         k, nb = len(times), len(scene.body)
         still = np.zeros((k, nb, 3))
         return Trajectory(
-            scene.name, self.name, self.version(), setting.family, dict(setting.options), np.array(times),
-            tuple(b.name for b in scene.body), still + [b.position for b in scene.body],
-            np.zeros((k, nb, 4)) + [b.orientation for b in scene.body], still, still,
-            outcome=Outcome[setting.options.get("outcome", "COMPLETED")], t_end=float(times[-1]),
+            scene.name,
+            self.name,
+            self.version(),
+            setting.family,
+            dict(setting.options),
+            np.array(times),
+            tuple(b.name for b in scene.body),
+            still + [b.position for b in scene.body],
+            np.zeros((k, nb, 4)) + [b.orientation for b in scene.body],
+            still,
+            still,
+            outcome=Outcome[setting.options.get("outcome", "COMPLETED")],
+            t_end=float(times[-1]),
             cost=Cost(seconds=setting.options.get("seconds", 0.1)),
-        )  # fmt: skip
+        )
 
     def misbehave(self, scene: Scene) -> None:
         pass
@@ -216,8 +225,14 @@ class Scalars(Fake):
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         good = super().run(scene, times, setting)
         cost = Cost(np.float32(0.5), np.float64(0.1), np.int64(7))
-        return replace(good, t_end=np.float64(good.t_end), cost=cost, settings={"seconds": np.float64(0.5)},
-                       velocity=good.velocity.tolist(), bodies=list(good.bodies))  # fmt: skip
+        return replace(
+            good,
+            t_end=np.float64(good.t_end),
+            cost=cost,
+            settings={"seconds": np.float64(0.5)},
+            velocity=good.velocity.tolist(),
+            bodies=list(good.bodies),
+        )
 
 
 class LosesLoads(Engine):

@@ -46,9 +46,20 @@ def inertia(random) -> tuple[float, np.ndarray]:
 
 
 IDIOMS = (
-    "hinge", "hinge", "slide", "ball", "universal", "cylindrical", "planar", "three hinges", "rod", "free",
-    "parallel", "skew", "fixed",
-)  # fmt: skip
+    "hinge",
+    "hinge",
+    "slide",
+    "ball",
+    "universal",
+    "cylindrical",
+    "planar",
+    "three hinges",
+    "rod",
+    "free",
+    "parallel",
+    "skew",
+    "fixed",
+)
 
 
 def motions(idiom: str, random) -> list[tuple[str, np.ndarray, np.ndarray]]:
@@ -57,7 +68,10 @@ def motions(idiom: str, random) -> list[tuple[str, np.ndarray, np.ndarray]]:
     b = across(random, a)
     c, p, q = np.cross(a, b), random.normal(size=3) * 0.1, random.normal(size=3) * 0.2
     return {
-        "hinge": [("hinge", p, a)], "slide": [("slide", p, a)], "ball": [("ball", p, a)], "fixed": [],
+        "hinge": [("hinge", p, a)],
+        "slide": [("slide", p, a)],
+        "ball": [("ball", p, a)],
+        "fixed": [],
         "universal": [("hinge", p + 0.1 * a, a), ("hinge", p, b)],
         "cylindrical": [("slide", zero, a), ("hinge", p, a)],
         "planar": [("slide", zero, b), ("slide", zero, b + 0.5 * c), ("hinge", p, a)],
@@ -66,7 +80,7 @@ def motions(idiom: str, random) -> list[tuple[str, np.ndarray, np.ndarray]]:
         "free": [("slide", zero, a), ("slide", zero, b), ("slide", zero, c), ("ball", p, a)],
         "parallel": [("hinge", p, a), ("hinge", p + 0.2 * b, a)],
         "skew": [("hinge", p, a), ("hinge", p, a + 0.5 * b)],
-    }[idiom]  # fmt: skip
+    }[idiom]
 
 
 def mjcf_tree(random) -> tuple[str, list[str], list[str]]:

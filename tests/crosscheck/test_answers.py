@@ -70,9 +70,13 @@ def test_numbers_of_numpy_become_plain():
 
 def test_a_study_goes_on_after_every_malformed_answer(tmp_path: Path):
     wanted = [
-        ("MALFORMED", {"damage": "nothing"}), ("MALFORMED", {"damage": "few samples"}), ("SCALARS", {}),
-        ("VERSIONLESS", {}), ("MALFORMED", {"damage": "a local class"}), ("FAKE", {}),
-    ]  # fmt: skip
+        ("MALFORMED", {"damage": "nothing"}),
+        ("MALFORMED", {"damage": "few samples"}),
+        ("SCALARS", {}),
+        ("VERSIONLESS", {}),
+        ("MALFORMED", {"damage": "a local class"}),
+        ("FAKE", {}),
+    ]
     cases = [Case(SCENE, TIMES, f"fake_engines:{name}", Setting("a", options)) for name, options in wanted]
     records = study(cases, None, tmp_path / "records.jsonl")
     outcomes = [record["outcome"] for record in records]

@@ -20,10 +20,18 @@ QUICK = {  # closed forms, and one of the equations, which take seconds to compi
     "planar_slider_crank_gravity",
 }
 BY_HAND = (
-    "four_bar", "five_bar", "spatial_slider_crank_driven", "four_bar_gravity", "five_bar_gravity",
-    "planar_slider_crank", "planar_slider_crank_equal", "planar_slider_crank_heavy",
-    "planar_slider_crank_gravity", "spatial_slider_crank", "spatial_slider_crank_gravity",
-)  # fmt: skip
+    "four_bar",
+    "five_bar",
+    "spatial_slider_crank_driven",
+    "four_bar_gravity",
+    "five_bar_gravity",
+    "planar_slider_crank",
+    "planar_slider_crank_equal",
+    "planar_slider_crank_heavy",
+    "planar_slider_crank_gravity",
+    "spatial_slider_crank",
+    "spatial_slider_crank_gravity",
+)
 
 
 @pytest.fixture(autouse=True)

@@ -21,9 +21,10 @@ from mbref.scene import Body, Distance, Driver, Scene, Sine
 from mbref.scenes import SCENES
 
 DRIVER = Driver(
-    joint="J", polynomial=(-0.3 * math.sin(0.4), 0.7, -0.2, 0.05),
+    joint="J",
+    polynomial=(-0.3 * math.sin(0.4), 0.7, -0.2, 0.05),
     sine=Sine(amplitude=0.3, frequency=2.0, phase=0.4),
-)  # fmt: skip
+)
 
 
 def driven(t: float) -> tuple[float, float, float]:
@@ -42,10 +43,17 @@ def test_driver_with_a_phase_in_the_adapters_and_in_the_judge(t: float):
 def test_units_and_labels_of_the_metrics():
     units = {name: metric.unit for name, metric in METRICS.items()}
     assert units == {
-        "error": "", "position_error": "", "rotation_error": "rad", "scd": "digits", "velocity_error": "",
-        "violation_position": "rad", "violation_velocity": "rad/s", "violation_acceleration": "rad/s²",
-        "energy_error": "", "reaction_error": "",
-    }  # fmt: skip
+        "error": "",
+        "position_error": "",
+        "rotation_error": "rad",
+        "scd": "digits",
+        "velocity_error": "",
+        "violation_position": "rad",
+        "violation_velocity": "rad/s",
+        "violation_acceleration": "rad/s²",
+        "energy_error": "",
+        "reaction_error": "",
+    }
     for level in ("position", "velocity", "acceleration"):
         assert METRICS[f"violation_{level}"].label == f"violation of {level} constraints"
 
@@ -67,9 +75,14 @@ def test_cost_is_cpu_time_of_the_steps_alone(monkeypatch: pytest.MonkeyPatch):
     still = sampling.Sample(*(np.zeros((1, 3)), np.array([[1.0, 0, 0, 0]]), *(np.zeros((1, 3)),) * 4))
     labels = {"engine": "e", "version": "1", "method": "m", "settings": {}}
     run = sampling.run_through(
-        Scene(name="s", body=(block,)), np.array([0.0, 1.0, 2.0]), lambda a, b: None, lambda t: still,
-        sampling.Counts(), 7.0, labels,
-    )  # fmt: skip
+        Scene(name="s", body=(block,)),
+        np.array([0.0, 1.0, 2.0]),
+        lambda a, b: None,
+        lambda t: still,
+        sampling.Counts(),
+        7.0,
+        labels,
+    )
     assert (run.cost.seconds, run.cost.build_seconds) == (3.0, 7.0)
 
 

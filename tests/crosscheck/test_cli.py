@@ -174,7 +174,7 @@ def test_a_run_that_crashes_and_exit_status_one(capsys, still):
         (["--engine", "ode"], "unknown engine 'ode'; known: mbref, mujoco, pinocchio, exudyn"),
         (["--engine", "no_such_module:ENGINE"], "engine 'no_such_module:ENGINE' cannot be loaded"),
     ],
-)  # fmt: skip
+)
 def test_bad_options_and_one_sentence(capsys, still, options, sentence):
     status, out, err = run_main(capsys, "run", still, "--engine", FAKE, "--json", *options)
     assert status == 2, (status, err)
@@ -289,9 +289,12 @@ def test_list_and_the_tables(capsys, what):
     from mbref.formulations import FORMULATIONS
 
     known = {
-        "scenes": SCENES, "engines": engine_names(), "methods": FORMULATIONS, "metrics": METRICS,
+        "scenes": SCENES,
+        "engines": engine_names(),
+        "methods": FORMULATIONS,
+        "metrics": METRICS,
         "settings": ["projected", "proximal", "SolveDynamic"],
-    }[what]  # fmt: skip
+    }[what]
     status, out, _ = run_main(capsys, "list", what)
     squeezed = "".join(out.split())
     assert status == 0
@@ -361,8 +364,10 @@ def test_one_option_and_the_run_it_names(capsys, still):
 def test_pasted_command_and_the_same_record(capsys, still):
     """Of a sweep's records, whatever their options, samples and end, the command that is printed."""
     scene = Scene.from_file(still).with_(duration=0.3)
-    asked = [(np.linspace(0, 0.3, 4), {"seconds": 1 / 3}),
-             (np.array([0.1, 0.25]), {"seconds": 0.5, "outcome": "NOT_FINITE"})]  # fmt: skip
+    asked = [
+        (np.linspace(0, 0.3, 4), {"seconds": 1 / 3}),
+        (np.array([0.1, 0.25]), {"seconds": 0.5, "outcome": "NOT_FINITE"}),
+    ]
     cases = [grid.Case(scene, times, FAKE, grid.Setting("a b", options)) for times, options in asked]
     for record in grid.study(cases):
         program, *words = shlex.split(command(record, still))
@@ -456,16 +461,25 @@ def test_comparison_and_interleaved_times(capsys, still):
     records = json.loads(out)["records"]
     costs = [(r["cost"]["seconds"], r["timing"]["median"], r["timing"]["repeats"]) for r in records]
     assert status == 0, err
-    assert costs == [        (0.1, 0.1, 5), (0.2, 0.2, 5), (0.5, 0.5, 5)
-    ], costs  # fmt: skip
+    assert costs == [(0.1, 0.1, 5), (0.2, 0.2, 5), (0.5, 0.5, 5)], costs
 
 
 def test_comparison_and_its_verdict(capsys, still):
     status, out, _ = run_main(capsys, "compare", still, "--engine", FAKE)
     assert status == 0
-    for word in ("ratio", "1.0", "2.0", "5.0", "fake plain", "Who is right: fake agrees with the truth",
-                 "How fast: fake reaches", "Where each breaks: ", "known in closed form", "settings to use",
-                 f"crosscheck run {still} --engine {FAKE} --setting plain --option seconds=0.1"):  # fmt: skip
+    for word in (
+        "ratio",
+        "1.0",
+        "2.0",
+        "5.0",
+        "fake plain",
+        "Who is right: fake agrees with the truth",
+        "How fast: fake reaches",
+        "Where each breaks: ",
+        "known in closed form",
+        "settings to use",
+        f"crosscheck run {still} --engine {FAKE} --setting plain --option seconds=0.1",
+    ):
         assert word in out, (word, out)
 
 
@@ -499,8 +513,9 @@ def test_an_adapter_that_loses_a_load_is_not_judged(capsys, tmp_path):
     block = Body(name="rod", mass=2.0, inertia=(1e-3, 0.1, 0.1), position=(0.5, 0.0, 0.0))
     hinge = Revolute(name="A", bodies=("ground", "rod"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
     later = TorsionSpring(joint="A", stiffness=30.0, damping=0.0, natural_angle=0.0)
-    Scene(name="later", body=(block,), joint=(hinge,), load=(later,), gravity=(0.0, -9.81, 0.0),
-          duration=0.5).save(tmp_path / "later.toml")  # fmt: skip
+    Scene(
+        name="later", body=(block,), joint=(hinge,), load=(later,), gravity=(0.0, -9.81, 0.0), duration=0.5
+    ).save(tmp_path / "later.toml")
     asked = ("--engine", "pinocchio", "--engine", "fake_engines:LOSES_LOADS", "--setting", "tuned")
     status, out, err = run_main(capsys, "compare", str(tmp_path / "later.toml"), *asked)
     assert status == 1, (out, err)

@@ -48,8 +48,10 @@ def test_rows_of_a_comparison_are_its_records(compared):
     rows, frame = compared.rows, compared.to_dataframe()
     assert [row["verdict"] for row in rows] == ["right"] * 3 and frame.shape[0] == 3
     assert {(row["family"], row["settings"]["seconds"]) for row in rows} == {
-        ("plain", 0.1), ("plain", 0.2), ("noisy", 0.5),
-    }  # fmt: skip
+        ("plain", 0.1),
+        ("plain", 0.2),
+        ("noisy", 0.5),
+    }
     assert list(frame["error"]) == [row["error"] for row in rows] == [0.0] * 3
     assert compared.difference is None
 
@@ -65,8 +67,9 @@ def test_runs_of_an_engine_follow_each_other_and_are_measured_aside():
     """Two engines of three runs each; measuring waits until all six are run."""
     cases = [
         Case(BLOCK, np.array([0.0, 1.0]), engine, Setting("f", {"k": k}))
-        for k in range(3) for engine in ("first", "second")
-    ]  # fmt: skip
+        for k in range(3)
+        for engine in ("first", "second")
+    ]
     going, order, all_run = set(), [], threading.Event()
 
     def run(asked):

@@ -71,9 +71,14 @@ TURNED, APART, ALONE = 1.3e-8, 2.3e-8, 1.1e-9  # m or rad
 
 
 def integrate(
-    rates: Callable[[float, np.ndarray], np.ndarray], y: list[float], times: list[float], rtol: float,
-    quaternions: tuple[int, ...] = (), shortest: float = 1e-12, most: int = MOST_STEPS,
-) -> tuple[int, int, np.ndarray, dop853.Memory]:  # fmt: skip
+    rates: Callable[[float, np.ndarray], np.ndarray],
+    y: list[float],
+    times: list[float],
+    rtol: float,
+    quaternions: tuple[int, ...] = (),
+    shortest: float = 1e-12,
+    most: int = MOST_STEPS,
+) -> tuple[int, int, np.ndarray, dop853.Memory]:
     """Status, samples reached, the samples and the memory; ``rates`` raises ArithmeticError to refuse."""
     n = len(y)
 
@@ -214,8 +219,14 @@ def test_mujoco_compiled_and_in_python_with_every_joint_and_load() -> None:
 
 def test_mujoco_compiled_on_a_free_body_and_truth() -> None:
     pytest.importorskip("mujoco")
-    body = Body(name="stone", mass=2.0, inertia=(0.1, 0.2, 0.3), position=(0, 0, 0),
-                angular_velocity=(0.1, 5.0, 0.1), velocity=(1.0, 0.0, 0.0))  # fmt: skip
+    body = Body(
+        name="stone",
+        mass=2.0,
+        inertia=(0.1, 0.2, 0.3),
+        position=(0, 0, 0),
+        angular_velocity=(0.1, 5.0, 0.1),
+        velocity=(1.0, 0.0, 0.0),
+    )
     scene = Scene(name="stone", body=(body,), gravity=(0.0, 0.0, -9.81), duration=2.0)
     run = simulate("mujoco", scene, 5, FAMILY, rtol=1e-10, min_step=1e-12, beta=1.0, hard=1e-9)
     error = measure(scene, run, truth_for(scene))["error"]
@@ -407,8 +418,14 @@ def test_pinocchio_compiled_and_in_python_with_many_joints(
 
 
 def test_pinocchio_compiled_on_a_free_body_and_truth(pinocchio: Engine) -> None:
-    body = Body(name="stone", mass=2.0, inertia=(0.1, 0.2, 0.3), position=(0, 0, 0),
-                angular_velocity=(0.1, 5.0, 0.1), velocity=(1.0, 0.0, 0.0))  # fmt: skip
+    body = Body(
+        name="stone",
+        mass=2.0,
+        inertia=(0.1, 0.2, 0.3),
+        position=(0, 0, 0),
+        angular_velocity=(0.1, 5.0, 0.1),
+        velocity=(1.0, 0.0, 0.0),
+    )
     scene = Scene(name="stone", body=(body,), gravity=(0.0, 0.0, -9.81), duration=2.0)
     run = simulate("pinocchio", scene, 5, "tuned, compiled", rtol=1e-10, min_step=1e-12)
     error = measure(scene, run, truth_for(scene))["error"]

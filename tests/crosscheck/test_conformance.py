@@ -93,7 +93,7 @@ def test_the_table_has_a_line_a_scene_in_eighty_columns():
         suite.Verdict("closure", "door", "pass", 1e-9, 1e-6),
         suite.Verdict("energy", "door", "outside", reason="a driver moves it"),
         suite.Verdict("truth", "pendulum", "fail", 2e-3, 1e-6),
-    ]  # fmt: skip
+    ]
     console = Console(file=io.StringIO(), width=80)
     console.print(next(iter(suite.tables(suite.Conformance("mine", "1.0", verdicts)))))
     lines = console.file.getvalue().splitlines()

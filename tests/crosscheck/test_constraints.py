@@ -18,10 +18,7 @@ from crosscheck.engines.sundials.equations import Equations
 from crosscheck.judge import constraints
 from mbref import rotations
 from mbref.equations.model import Model
-from mbref.scene import (
-    JOINT_TYPES,
-    Scene,
-)  # fmt: skip
+from mbref.scene import JOINT_TYPES, Scene
 from mbref.scenes import SCENES
 from tests.crosscheck.measured import MARGIN, ROUNDING
 from tests.crosscheck.tree_scenes import driven, every_joint, ring
@@ -80,8 +77,11 @@ class Consistent:
         phi = constraints.closure(*place)
         bias = constraints.closure_accelerations(*place, self.v, self.w, still, still)
         none = np.zeros(0)
-        return (np.concatenate([none, *phi.values()]), constraints.jacobian(*place)[0],
-                -np.concatenate([none, *bias.values()]))  # fmt: skip
+        return (
+            np.concatenate([none, *phi.values()]),
+            constraints.jacobian(*place)[0],
+            -np.concatenate([none, *bias.values()]),
+        )
 
 
 def assert_alike(state: Consistent) -> None:

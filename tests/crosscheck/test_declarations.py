@@ -83,9 +83,10 @@ def test_an_undeclared_load_type_is_refused_by_name(name: str) -> None:
     assert refusal is not None and "load[0]" in str(refusal) and "'magnet'" in str(refusal), refusal
 
 
-@pytest.mark.parametrize(("parts", "named"), [
-    ({"joint": screwed().joint}, ("'thread'", "'screw'")), ({"load": (Magnet(),)}, ("load[0]", "'magnet'")),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("parts", "named"),
+    [({"joint": screwed().joint}, ("'thread'", "'screw'")), ({"load": (Magnet(),)}, ("load[0]", "'magnet'"))],
+)
 def test_mbref_run_refuses_them_too(parts: dict, named: tuple, monkeypatch, capsys) -> None:
     monkeypatch.setattr(run, "find_scene", lambda name: with_unknown(**parts))
     assert main(["run", "unknown"]) == BAD_INPUT

@@ -93,8 +93,13 @@ def test_drawn_mechanisms_and_what_is_promised_of_them():
         kept = np.abs(rates[0] - [body.velocity for body in scene.body]).max()
         assert max(kept, *(np.abs(row).max() for row in rows)) < 1e-12, scene.name
     assert {load.type for scene in scenes for load in scene.load} >= {"torsion_spring", "spring"}
-    assert {joint.facts.driven for scene in scenes for d in scene.driver for joint in scene.joint
-            if joint.name == d.joint} == {"angle", "displacement"}  # fmt: skip
+    assert {
+        joint.facts.driven
+        for scene in scenes
+        for d in scene.driver
+        for joint in scene.joint
+        if joint.name == d.joint
+    } == {"angle", "displacement"}
     assert not any(scene.driver for scene in scenes[::2]), "an even seed has a driver"
     assert not any(GROUND in joint.bodies for joint in drawn.floating(3).joint)
 

@@ -16,9 +16,19 @@ def one(
 ) -> dict[str, dict[str, Any]]:
     """A set of one run."""
     found = {"error": error, "error_bound": bound, **metrics}
-    return {"run": {"outcome": "COMPLETED", "t_end": 1.0, "message": "", "metrics": found, "machine": SAME,
-                    "cost": {"seconds": seconds}, "asked": {"end": 1.0}, "repeated": repeated,
-                    "times": [0.0, 1.0]}}  # fmt: skip
+    return {
+        "run": {
+            "outcome": "COMPLETED",
+            "t_end": 1.0,
+            "message": "",
+            "metrics": found,
+            "machine": SAME,
+            "cost": {"seconds": seconds},
+            "asked": {"end": 1.0},
+            "repeated": repeated,
+            "times": [0.0, 1.0],
+        }
+    }
 
 
 def said(old: dict[str, Any], new: dict[str, Any]) -> list[str]:
@@ -41,9 +51,15 @@ def test_errors_change_by_more_than_twofold(ratio, changed):
 
 @pytest.mark.parametrize(
     ("both", "ratio", "changed"),
-    [((True, True), 1.45, False), ((True, True), 1.75, True), ((True, False), 1.75, False),
-     ((False, True), 1.75, False), ((False, False), 1.75, False), ((False, False), 2.05, True)],
-)  # fmt: skip
+    [
+        ((True, True), 1.45, False),
+        ((True, True), 1.75, True),
+        ((True, False), 1.75, False),
+        ((False, True), 1.75, False),
+        ((False, False), 1.75, False),
+        ((False, False), 2.05, True),
+    ],
+)
 def test_times_that_were_repeated_change_by_half_and_single_ones_by_twofold(both, ratio, changed):
     old, new = (one(1e-5, seconds=s, repeated=r) for s, r in zip((1.0, ratio), both, strict=True))
     assert bool(said(old, new)) is changed and bool(said(new, old)) is changed
@@ -57,8 +73,12 @@ def test_errors_are_raised_to_the_rounding_first(noise, changed):
 
 
 def test_another_measure_is_compared_where_the_error_is_the_same():
-    pairs = {"velocity_error": "velocities", "violation_position": "closure", "energy_error": "energy",
-             "reaction_error": "reactions"}  # fmt: skip
+    pairs = {
+        "velocity_error": "velocities",
+        "violation_position": "closure",
+        "energy_error": "energy",
+        "reaction_error": "reactions",
+    }
     for metric, name in pairs.items():
         old, new = one(1e-5, **{metric: 1e-9}), one(1e-5, **{metric: 3e-9})
         assert said(old, new) == [f"{name} 1.00e-09 → 3.00e-09"]

@@ -64,8 +64,14 @@ def test_momentum_and_the_ground():
 def test_tumbling_body_and_elliptic_functions():
     """Angular velocity along the body axes of a free asymmetric top: Jacobi's sn, cn, dn."""
     moments, spin = np.array([0.02, 0.03, 0.045]), np.array([4.0, 0.0, 5.0])
-    body = Body(name="top", mass=1.0, inertia=moments, position=(0.0, 0.0, 0.0),
-                velocity=(0.0, 0.0, 0.0), angular_velocity=spin)  # fmt: skip
+    body = Body(
+        name="top",
+        mass=1.0,
+        inertia=moments,
+        position=(0.0, 0.0, 0.0),
+        velocity=(0.0, 0.0, 0.0),
+        angular_velocity=spin,
+    )
     scene, times = Scene(name="top", duration=1.0, body=(body,)), np.linspace(0.0, 1.0, 6)
     energy2, momentum2 = moments @ spin**2, np.sum((moments * spin) ** 2)
     a, b, c = moments[::-1]  # of largest, middle, least moment, for momentum² > energy × the middle

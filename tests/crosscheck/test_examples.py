@@ -76,9 +76,13 @@ def example(name: str, tmp_path: Path) -> str:
     """The output of an example when it is run from an empty directory."""
     run = subprocess.run(
         [sys.executable, ROOT / "examples" / name],
-        cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
-        timeout=120, check=False,
-    )  # fmt: skip
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
     assert run.returncode == 0, f"{name}: status {run.returncode}: {run.stderr[-800:]}"
     assert not list(tmp_path.iterdir()), f"{name} left {list(tmp_path.iterdir())}"
     return run.stdout

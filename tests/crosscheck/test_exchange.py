@@ -72,11 +72,14 @@ def in_frames_of(scene: Scene, trajectory: Trajectory, own: Scene) -> Trajectory
     return Trajectory.from_record(
         scene.name,
         dataclasses.replace(
-            trajectory, bodies=tuple(body.name for body in scene.body), engine="again", reactions=None,
+            trajectory,
+            bodies=tuple(body.name for body in scene.body),
+            engine="again",
+            reactions=None,
             orientation=rotations.multiply(trajectory.orientation[:, places], turn),
             **{key: getattr(trajectory, key)[:, places] for key in keys},
         ).to_record(),
-    )  # fmt: skip
+    )
 
 
 def passes_the_gate(scene: Scene, again: Scene) -> None:
@@ -120,9 +123,13 @@ def test_an_exported_scene_is_the_same_mechanism(name, tmp_path):
 def test_joints_of_every_kind_are_named():
     scene = formats.read(MODELS / "delta_leg.xml").scene
     assert {joint.name: joint.type for joint in scene.joint} == {
-        "motor": "revolute", "ball_a": "spherical", "u1": "universal", "px": "planar",
-        "end_a": "spherical", "end_b": "spherical",
-    }  # fmt: skip
+        "motor": "revolute",
+        "ball_a": "spherical",
+        "u1": "universal",
+        "px": "planar",
+        "end_a": "spherical",
+        "end_b": "spherical",
+    }
     scissor = formats.read(MODELS / "scissor.xml")
     kinds = {joint.name: joint.type for joint in scissor.scene.joint}
     assert kinds["rail"] == "cylindrical" and "label" not in {body.name for body in scissor.scene.body}
@@ -161,7 +168,7 @@ def changed(tmp_path, old: str, new: str) -> Path:
         ("</worldbody>", '<site name="mark"/></worldbody>', "1 sites that hold nothing"),
         ("</equality>", '</equality><sensor><jointpos joint="A"/></sensor>', "1 sensors"),
     ],
-)  # fmt: skip
+)
 def test_parts_that_do_not_change_the_motion_are_listed(old, new, says, tmp_path):
     found = formats.read(changed(tmp_path, old, new))
     sentences = (*found.left_out, *found.notes)
@@ -177,7 +184,7 @@ def test_parts_that_do_not_change_the_motion_are_listed(old, new, says, tmp_path
         ("<worldbody>", '<option density="1.2"/><worldbody>', "fluid", "fluid"),
         ('<body name="crank"', '<body name="crank" gravcomp="1"', "gravity-compensation", "'crank'|crank"),
     ],
-)  # fmt: skip
+)
 def test_parts_that_change_the_motion_are_refused_unless_asked_for(old, new, kind, says, tmp_path):
     path = changed(tmp_path, old, new)
     with pytest.raises(SceneError, match=f"{says}.*it changes the motion; --without {kind} leaves it out"):
@@ -242,10 +249,10 @@ def test_roll_pitch_and_yaw_of_a_loop_turn_its_axis(tmp_path):
     [
         ('type="revolute"><pre', 'type="gear"><pre', "loop 'C': type 'gear' is none of"),
         ('<origin xyz="0.4 0 0"/></pre', '<origin xyz="1.4 0 0"/></pre', "closure 'C': cannot be closed"),
-        ('<successor link="rocker">', '<successor>', "loop 'C': names no successor"),
+        ('<successor link="rocker">', "<successor>", "loop 'C': names no successor"),
         ("</robot>", "", "URDF: is no XML"),
     ],
-)  # fmt: skip
+)
 def test_faulty_urdf_is_refused(old, new, says, tmp_path):
     text = (MODELS / "four_bar.urdf").read_text()
     assert old in text

@@ -210,9 +210,14 @@ def test_mechanism_of_every_joint_and_its_joint_equations_agree(monkeypatch: pyt
 
 def test_torque_free_body_and_truth_agree():
     body = Body(
-        name="top", mass=2.0, inertia=INERTIA, position=(1.0, 2.0, 3.0), orientation=TURNED,
-        velocity=(1.0, 0.0, -0.5), angular_velocity=(3.0, 8.0, -2.0),
-    )  # fmt: skip
+        name="top",
+        mass=2.0,
+        inertia=INERTIA,
+        position=(1.0, 2.0, 3.0),
+        orientation=TURNED,
+        velocity=(1.0, 0.0, -0.5),
+        angular_velocity=(3.0, 8.0, -2.0),
+    )
     scene = Scene(name="top", body=(body,), gravity=(0.0, -9.81, 0.0), duration=1.0)
     measured = measure(scene, run(scene, np.linspace(0, 1, 6), "tuned", 2e-3), truth_for(scene))
     assert measured["error"] < MARGIN * TUMBLING, measured

@@ -24,14 +24,19 @@ MEASURED = 1.6e-10  # part of the largest force
 SIDEWAYS = (0.6, 0.0, 0.8)  # an axis along no coordinate axis
 INERTIA = ((0.02, 0.002, -0.001), (0.002, 0.03, 0.003), (-0.001, 0.003, 0.025))
 BODY = Body(
-    name="b", mass=2.0, inertia=INERTIA, position=(0.0, 0.2, 0.0),
+    name="b",
+    mass=2.0,
+    inertia=INERTIA,
+    position=(0.0, 0.2, 0.0),
     orientation=tuple(rotations.from_vector([0.3, -0.5, 0.8]).tolist()),
-)  # fmt: skip
+)
 ANCHOR, OTHER = (0.1, 0.1, -0.2), (0.3, -0.1, 0.1)
 PLACES = {
-    "anchor": ANCHOR, "anchors": (ANCHOR, OTHER), "axis": SIDEWAYS,
+    "anchor": ANCHOR,
+    "anchors": (ANCHOR, OTHER),
+    "axis": SIDEWAYS,
     "axes": ((1.0, 0.0, 0.0), (0.0, 1.0, 1.0)),
-}  # fmt: skip
+}
 
 
 def needed_wrench(scene: Scene, trajectory: Trajectory) -> np.ndarray:

@@ -36,8 +36,18 @@ def test_every_finding_has_one_proof_and_its_words() -> None:
 
 
 def scripted(script: str, **changes: object) -> Finding:
-    fields = {"name": "n", "engine": "e", "package": "numpy", "version": "1", "does": "d", "right": "r",
-              "cause": "c", "unit": "m", "wrong_above": 0.5, "script": script}  # fmt: skip
+    fields = {
+        "name": "n",
+        "engine": "e",
+        "package": "numpy",
+        "version": "1",
+        "does": "d",
+        "right": "r",
+        "cause": "c",
+        "unit": "m",
+        "wrong_above": 0.5,
+        "script": script,
+    }
     return Finding(**{**fields, **changes})
 
 

@@ -15,8 +15,16 @@ from mbref.scene import Body, Driver, Force, Moment, Revolute, Scene, Spring, To
 from mbref.scenes import SCENES
 from tests.crosscheck.truth_scenes import ALL, CLOSED
 
-MODELS = {name: ALL[name] for name in ("planar_slider_crank_gravity", "spatial_slider_crank_gravity",
-          "four_bar_gravity", "slider_spring", "pendulum_all")}  # fmt: skip
+MODELS = {
+    name: ALL[name]
+    for name in (
+        "planar_slider_crank_gravity",
+        "spatial_slider_crank_gravity",
+        "four_bar_gravity",
+        "slider_spring",
+        "pendulum_all",
+    )
+}
 
 
 def short_run(scene, times=None):
@@ -109,8 +117,13 @@ def test_orientation_turned_is_named():
 
 ARM = Body(name="arm", mass=2.0, inertia=(1e-3, 0.1, 0.1), position=(0.5, 0.0, 0.0))
 HINGE = Revolute(name="A", bodies=("ground", "arm"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
-HOLDING = Spring(bodies=("ground", "arm"), points=((1.0, 1.0, 0.0), (1.0, 0.0, 0.0)), stiffness=9.81,
-                 damping=0.0, natural_length=0.0)  # fmt: skip
+HOLDING = Spring(
+    bodies=("ground", "arm"),
+    points=((1.0, 1.0, 0.0), (1.0, 0.0, 0.0)),
+    stiffness=9.81,
+    damping=0.0,
+    natural_length=0.0,
+)
 
 
 def arm(**parts):
@@ -208,8 +221,11 @@ def test_a_load_that_acts_later_is_seen_along_the_run():
 def test_accelerations_along_a_run_may_be_off_by_a_hundredth(part, passes):
     scene = arm()
     run = gauss_motion(scene, (0.0, 0.1))
-    off = replace(run, acceleration=(1 + part) * run.acceleration,
-                  angular_acceleration=(1 + part) * run.angular_acceleration)  # fmt: skip
+    off = replace(
+        run,
+        acceleration=(1 + part) * run.acceleration,
+        angular_acceleration=(1 + part) * run.angular_acceleration,
+    )
     assert (along(scene, off) is None) is passes, along(scene, off)
     assert along(scene, replace(off, acceleration=None)) is None, "nothing is reported"
 

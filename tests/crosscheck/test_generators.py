@@ -110,10 +110,15 @@ def test_sweeps_have_every_family_coarse_to_fine(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", GENERATORS)
-@pytest.mark.parametrize(("scene", "reason"), [
-    ("four_bar", "driver"), ("flyball_governor", "'spring'"), ("heavy_top", "ball joints"),
-    ("five_bar_gravity", "depend on each other"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("scene", "reason"),
+    [
+        ("four_bar", "driver"),
+        ("flyball_governor", "'spring'"),
+        ("heavy_top", "ball joints"),
+        ("five_bar_gravity", "depend on each other"),
+    ],
+)
 def test_scenes_whose_equations_are_not_derived_are_refused(name: str, scene: str, reason: str) -> None:
     found = engine(name).cannot(SCENES[scene]())
     assert found is not None and found.owner is Owner.ADAPTER and reason in found.reason, found

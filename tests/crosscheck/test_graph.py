@@ -35,10 +35,15 @@ def graphs(draw: st.DrawFn) -> Scene:
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1), label="seed"))
     n = draw(st.integers(1, 6), label="bodies")
     bodies = tuple(
-        Body(name=f"b{i}", mass=float(rng.uniform(0.5, 2)), inertia=INERTIA, position=rng.normal(size=3),
-             orientation=rotations.from_vector(rng.normal(size=3)))
+        Body(
+            name=f"b{i}",
+            mass=float(rng.uniform(0.5, 2)),
+            inertia=INERTIA,
+            position=rng.normal(size=3),
+            orientation=rotations.from_vector(rng.normal(size=3)),
+        )
         for i in range(n)
-    )  # fmt: skip
+    )
     names = ["ground", *(b.name for b in bodies)]
     joints = []
     for k, kind in enumerate(draw(st.lists(st.sampled_from(KINDS), max_size=9), label="joints")):

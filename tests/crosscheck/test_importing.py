@@ -238,9 +238,11 @@ def test_coincident_frames_are_named_and_closed_on_request(tmp_path):
         closed.imported.scene.joint
     )
     for wish, says in (
-        ("end_a", "must be frame_a=frame_b"), ("end_a=end_c", "did you mean 'end_b'"),
-        ("end_a=end_b:gear", "type 'gear' is none of"), ("end_a=end_b:revolute:w", "axis 'w' is none of"),
-    ):  # fmt: skip
+        ("end_a", "must be frame_a=frame_b"),
+        ("end_a=end_c", "did you mean 'end_b'"),
+        ("end_a=end_b:gear", "type 'gear' is none of"),
+        ("end_a=end_b:revolute:w", "axis 'w' is none of"),
+    ):
         with pytest.raises(SceneError, match=says):
             read(tmp_path, text, "wish.urdf", close=[wish])
 
@@ -300,7 +302,7 @@ def test_agreement_names_the_part_that_differs(tmp_path):
         (scene.with_(joint=[j for j in scene.joint if j.name != "D"]), "allow 8 motions without loops"),
         (scene.with_(joint=scene.joint[:-1]), "loops: the scene's rows have rank 0, the file's 2"),
         (scene.with_("joint[C].anchor", tuple(np.add(scene.joint_named("C").anchor, (1e-3, 0, 0)))), "loops"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(SceneError, match=says):
             agreement.check(changed, tree)
 

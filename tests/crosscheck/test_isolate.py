@@ -136,8 +136,17 @@ def test_runs_of_an_engine_share_a_process_until_one_does_not_complete(tmp_path:
         for way in ways
     ]
     completed, crashed = "COMPLETED", "CRASHED"
-    assert outcomes == [completed, completed, "NOT_CONVERGED", completed, crashed, completed, crashed,
-                        completed, completed], outcomes  # fmt: skip
+    assert outcomes == [
+        completed,
+        completed,
+        "NOT_CONVERGED",
+        completed,
+        crashed,
+        completed,
+        crashed,
+        completed,
+        completed,
+    ], outcomes
     processes = [line.split()[1] for line in log.read_text().splitlines()]
     alike = [first == second for first, second in pairwise(processes)]
     assert alike == [True, True, False, True, False, True, False, True], processes

@@ -7,15 +7,7 @@ from hypothesis import strategies as st
 
 from crosscheck.judge import constraints
 from mbref import rotations
-from mbref.scene import (
-    JOINT_TYPES,
-    Body,
-    Driver,
-    Scene,
-    SceneError,
-    Sine,
-    Spherical,
-)  # fmt: skip
+from mbref.scene import JOINT_TYPES, Body, Driver, Scene, SceneError, Sine, Spherical
 from mbref.scenes import SCENES
 from tests.crosscheck.truth_scenes import CLOSED
 

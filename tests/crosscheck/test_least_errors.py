@@ -11,10 +11,16 @@ def record(
     engine: str, family: str, error: float, outcome: str = "COMPLETED", t_end: float = 1.0
 ) -> dict[str, Any]:
     return {
-        "scene": "bar", "engine": engine, "family": family, "settings": {"step": error},
+        "scene": "bar",
+        "engine": engine,
+        "family": family,
+        "settings": {"step": error},
         "asked": {"options": {"step": error}},
-        "outcome": outcome, "t_end": t_end, "metrics": {"error": error}, "cost": {"seconds": 2.0},
-    }  # fmt: skip
+        "outcome": outcome,
+        "t_end": t_end,
+        "metrics": {"error": error},
+        "cost": {"seconds": 2.0},
+    }
 
 
 RECORDS = [
@@ -29,8 +35,16 @@ RECORDS = [
 
 def test_rows_and_records():
     good, bad = least_errors(RECORDS)
-    assert good.row() == ("bar", "good", "fine", "step=2e-10", "2.00e-10", "2", "fine",
-                          "coarse 1.00e-03; early not converged at 0.4 s")  # fmt: skip
+    assert good.row() == (
+        "bar",
+        "good",
+        "fine",
+        "step=2e-10",
+        "2.00e-10",
+        "2",
+        "fine",
+        "coarse 1.00e-03; early not converged at 0.4 s",
+    )
     assert (good.is_reached, bad.is_reached) == (True, False)
     assert bad.row()[4:] == ("2.00e-08", "2", "", "only 2.00e-08"), bad.row()
 

@@ -143,9 +143,15 @@ def test_damper_s_work_gives_no_energy():
 
 def test_a_run_without_samples_has_no_numbers():
     empty = Trajectory.failed(
-        scene=SCENE.name, engine="e", version="1", method="m", settings={}, bodies=EXACT.bodies,
-        outcome=Outcome.CRASHED, message="",
-    )  # fmt: skip
+        scene=SCENE.name,
+        engine="e",
+        version="1",
+        method="m",
+        settings={},
+        bodies=EXACT.bodies,
+        outcome=Outcome.CRASHED,
+        message="",
+    )
     found = measure(SCENE, empty, TRUTH)
     assert set(found.values()) == {None}, found
 
@@ -162,8 +168,16 @@ def test_states_that_are_not_finite_have_infinite_errors(value):
 def test_without_truth_only_errors_are_missing():
     found = measure(SCENE, EXACT)
     missing = {name for name, value in found.items() if value is None}
-    of_truth = {"error", "error_bound", "position_error", "rotation_error", "scd", "velocity_error",
-                "reaction_error", "error_until"}  # fmt: skip
+    of_truth = {
+        "error",
+        "error_bound",
+        "position_error",
+        "rotation_error",
+        "scd",
+        "velocity_error",
+        "reaction_error",
+        "error_until",
+    }
     assert missing == of_truth, missing
 
 
@@ -209,8 +223,19 @@ def test_energy_of_a_mechanism_at_rest_is_no_rounding_over_rounding():
     scene = pendulum(gravity=(0.0, -9.81, 0.0))
     times = np.linspace(0.0, 1.0, 5)
     noise = 1e-16 * np.random.default_rng(0).standard_normal((5, 1, 3))
-    rest = Trajectory("rest", "e", "1", "m", {}, times, ("bar",), scene.body[0].position + noise,
-                      np.tile([1.0, 0.0, 0.0, 0.0], (5, 1, 1)), noise, noise)  # fmt: skip
+    rest = Trajectory(
+        "rest",
+        "e",
+        "1",
+        "m",
+        {},
+        times,
+        ("bar",),
+        scene.body[0].position + noise,
+        np.tile([1.0, 0.0, 0.0, 0.0], (5, 1, 1)),
+        noise,
+        noise,
+    )
     assert energy_series(scene, rest) is None
 
 

@@ -24,7 +24,7 @@ from mbref.scene import (
     Spherical,
     Translational,
     Universal,
-)  # fmt: skip
+)
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN, ROUNDING
@@ -33,9 +33,11 @@ from tests.crosscheck.tree_scenes import INERTIA
 pytest.importorskip("pyondsel", reason="the optional engine OndselSolver needs pyondsel")
 
 DRIVEN = {  # scene: measured errors (m, rad), and of rates and accelerations, parts of the largest
-    "four_bar": (1.8e-14, 1.9e-10), "four_bar_quarter": (ROUNDING, 4.2e-13), "five_bar": (2.2e-14, 3.5e-10),
+    "four_bar": (1.8e-14, 1.9e-10),
+    "four_bar_quarter": (ROUNDING, 4.2e-13),
+    "five_bar": (2.2e-14, 3.5e-10),
     "spatial_slider_crank_driven": (3e-11, 2.1e-11),
-}  # fmt: skip
+}
 UNEVEN, SAME, PHASED = ROUNDING, ROUNDING, ROUNDING  # m, rad; m; rad
 TURNED, ALIKE, REACTION = (
     5.2e-14,
@@ -65,8 +67,12 @@ def test_ondsel_and_truth(name: str) -> None:
     assert run.outcome is Outcome.COMPLETED, f"{name}: {run.outcome.label} {run.message}"
     assert error(run, scene) < MARGIN * measured, f"{name}: {error(run, scene):.2e} from the truth"
     centripetal = abs(truth.angular_velocity).max() ** 2  # the size of what cancels in ω' of a steady crank
-    for field, size in (("velocity", 0.0), ("angular_velocity", 0.0), ("acceleration", 0.0),
-                        ("angular_acceleration", centripetal)):  # fmt: skip
+    for field, size in (
+        ("velocity", 0.0),
+        ("angular_velocity", 0.0),
+        ("acceleration", 0.0),
+        ("angular_acceleration", centripetal),
+    ):
         exact = getattr(truth, field)
         gap = abs(getattr(run, field) - exact).max() / max(size, abs(exact).max())
         assert gap < MARGIN * measured_rates, f"{name}: {field} is {gap:.1e} of the largest from the truth"
@@ -94,34 +100,48 @@ def clockwork(swapped: bool) -> Scene:
 
     rod_axes, link_axes = ((0.0, 0.0, 1.0), (0.3, -1.0, 0.0)), ((0.0, 1.0, 0.0), (1.0, 0.0, -0.5))
     return Scene(
-        name="clockwork", gravity=(0.5, -9.81, 2.0), duration=0.3,
+        name="clockwork",
+        gravity=(0.5, -9.81, 2.0),
+        duration=0.3,
         body=(
             body("crank", (0.15, 0.02, 0.1), (0.3, 0.1, 0.9)),
             body("lump", (0.1, -0.2, 0.3), (0.5, 0.6, 0.7)),
-            body("rod", (0.6, 0.1, 0.1), (0.1, 0.5, -0.2)), body("sled", (1.0, 0.15, 0.2), (-0.4, 0.2, 0.1)),
+            body("rod", (0.6, 0.1, 0.1), (0.1, 0.5, -0.2)),
+            body("sled", (1.0, 0.15, 0.2), (-0.4, 0.2, 0.1)),
             body("piston", (-0.5, 0.6, 0.4), (0.2, 0.2, 0.2)),
             body("link", (0.0, 0.7, 0.6), (0.4, -0.2, 0.1)),
         ),
         joint=(
-            Revolute(name="rev", bodies=pair("ground", "crank"), anchor=(0.0, 0.0, 0.0),
-                     axis=(0.1, 0.0, 2.0)),
+            Revolute(
+                name="rev", bodies=pair("ground", "crank"), anchor=(0.0, 0.0, 0.0), axis=(0.1, 0.0, 2.0)
+            ),
             Fixed(name="fix", bodies=pair("crank", "lump"), anchor=(0.1, 0.0, 0.1)),
-            Universal(name="uni", bodies=pair("crank", "rod"), anchor=(0.3, 0.05, 0.1),
-                      axes=rod_axes[::-1] if swapped else rod_axes),
+            Universal(
+                name="uni",
+                bodies=pair("crank", "rod"),
+                anchor=(0.3, 0.05, 0.1),
+                axes=rod_axes[::-1] if swapped else rod_axes,
+            ),
             Spherical(name="sph", bodies=pair("rod", "sled"), anchor=(0.9, 0.1, 0.1)),
-            Translational(name="tra", bodies=pair("ground", "sled"), anchor=(1.0, 0.1, 0.2),
-                          axis=(1.0, 0.2, 0.1)),
-            Cylindrical(name="cyl", bodies=pair("ground", "piston"), anchor=(-0.5, 0.5, 0.4),
-                        axis=(0.0, 1.0, 0.2)),
-            Universal(name="pin", bodies=pair("piston", "link"), anchor=(-0.4, 0.7, 0.5),
-                      axes=link_axes[::-1] if swapped else link_axes),
+            Translational(
+                name="tra", bodies=pair("ground", "sled"), anchor=(1.0, 0.1, 0.2), axis=(1.0, 0.2, 0.1)
+            ),
+            Cylindrical(
+                name="cyl", bodies=pair("ground", "piston"), anchor=(-0.5, 0.5, 0.4), axis=(0.0, 1.0, 0.2)
+            ),
+            Universal(
+                name="pin",
+                bodies=pair("piston", "link"),
+                anchor=(-0.4, 0.7, 0.5),
+                axes=link_axes[::-1] if swapped else link_axes,
+            ),
             Spherical(name="end", bodies=pair("link", "ground"), anchor=(0.4, 0.8, 0.7)),
         ),
         driver=(
             Driver(joint="rev", polynomial=(0.0, 3.0, 4.0)),
             Driver(joint="cyl", polynomial=(0.0, -1.0), sine=Sine(amplitude=0.3, frequency=5.0)),
         ),
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize("swapped", [False, True])

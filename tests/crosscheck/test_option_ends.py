@@ -23,11 +23,14 @@ SCENE = Scene(name="s", duration=2.0, body=(BLOCK,))
         (options.positive, ["5e-324", "1", "1e308"], ["0", "-1", "inf", "nan", "x"]),
         (options._not_negative, ["0", "5e-324", "1e308"], ["-5e-324", "inf", "nan", "x"]),
         (options.whole, ["1", "2"], ["0", "-1", "1.5", "x", ""]),
-        (options.digits, [str(FEWEST_DIGITS), str(MOST_DIGITS)],
-         [str(FEWEST_DIGITS - 1), str(MOST_DIGITS + 1), "x"]),
+        (
+            options.digits,
+            [str(FEWEST_DIGITS), str(MOST_DIGITS)],
+            [str(FEWEST_DIGITS - 1), str(MOST_DIGITS + 1), "x"],
+        ),
     ],
     ids=["positive", "not negative", "whole", "digits"],
-)  # fmt: skip
+)
 def test_numbers_at_the_ends_of_what_an_option_takes(parse, good, bad):
     for text in good:
         assert parse(text) == float(text), text
@@ -73,9 +76,11 @@ def test_sample_times_of_crosscheck_by_hand():
     with pytest.raises(RequestError, match="--samples: must be at least 2, got 1"):
         request.sample_times(SCENE, None, 1)
     refused = {
-        (0.0,): "must have a time after 0", (0.5, 0.5): "must increase, got 0.5 after 0.5",
-        (-0.1, 1.0): "not negative, got -0.1", (0.0, np.inf): "must be finite",
-    }  # fmt: skip
+        (0.0,): "must have a time after 0",
+        (0.5, 0.5): "must increase, got 0.5 after 0.5",
+        (-0.1, 1.0): "not negative, got -0.1",
+        (0.0, np.inf): "must be finite",
+    }
     for times, says in refused.items():
         with pytest.raises(RequestError, match=says):
             request.sample_times(SCENE, list(times), 2)

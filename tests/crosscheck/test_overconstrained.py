@@ -30,8 +30,13 @@ def bricard() -> Scene:
         Revolute(name=f"J{k}", bodies=(names[k], names[k + 1]), anchor=tuple(p), axis=tuple(unit[axis]))
         for k, (p, axis) in enumerate(zip(POINTS.tolist(), AXES, strict=True))
     ]
-    return Scene(name="bricard", gravity=(0.0, -9.81, 0.0), duration=TIMES[-1], joint=tuple(hinges),
-                 body=tuple(bar(k) for k in range(5)))  # fmt: skip
+    return Scene(
+        name="bricard",
+        gravity=(0.0, -9.81, 0.0),
+        duration=TIMES[-1],
+        joint=tuple(hinges),
+        body=tuple(bar(k) for k in range(5)),
+    )
 
 
 def bar(k: int) -> Body:
@@ -39,8 +44,13 @@ def bar(k: int) -> Body:
     y = np.roll(x, 1)
     turn = rotations.from_matrix(np.column_stack([x, y, np.cross(x, y)]))
     middle = (POINTS[k] + POINTS[k + 1]) / 2
-    return Body(name=f"bar{k}", mass=1.0, inertia=INERTIA, position=tuple(middle.tolist()),
-                orientation=tuple(turn.tolist()))  # fmt: skip
+    return Body(
+        name=f"bar{k}",
+        mass=1.0,
+        inertia=INERTIA,
+        position=tuple(middle.tolist()),
+        orientation=tuple(turn.tolist()),
+    )
 
 
 def test_counts_of_the_linkage():

@@ -37,8 +37,13 @@ def twist(joint: str, stiffness: float, damping: float, natural_angle: float) ->
 
 
 def spring(first: tuple, second: tuple, stiffness: float, natural_length: float) -> Spring:
-    return Spring(bodies=("ground", "bob"), points=(first, second), stiffness=stiffness, damping=0.3,
-                  natural_length=natural_length)  # fmt: skip
+    return Spring(
+        bodies=("ground", "bob"),
+        points=(first, second),
+        stiffness=stiffness,
+        damping=0.3,
+        natural_length=natural_length,
+    )
 
 
 def pull(point: tuple, force: tuple) -> Force:
@@ -53,12 +58,13 @@ PAIRS = {
     "a torsion damper and a torsion spring": (twist("B", 0.0, 0.7, 0.3), twist("B", 13.0, 0.0, 1.4)),
     "two springs between the same points": (spring(*ENDS, 30.0, 1.0), spring(*ENDS, 50.0, 2.5)),
     "two springs between the same bodies": (
-        spring(*ENDS, 30.0, 1.0), spring(ENDS[0], (1.0, 0.0, 0.4), 9.0, 0.0),
+        spring(*ENDS, 30.0, 1.0),
+        spring(ENDS[0], (1.0, 0.0, 0.4), 9.0, 0.0),
     ),
     "two moments": (Moment(body="bob", moment=(1.0, 0.0, 2.0)), Moment(body="bob", moment=(0.5, -1.0, 0.0))),
     "two forces at one point": (pull(ENDS[1], (1.0, 2.0, 0.0)), pull(ENDS[1], (0.0, -5.0, 3.0))),
     "two forces at two points": (pull(ENDS[1], (1.0, 2.0, 0.0)), pull((1.0, 0.0, 0.5), (0.0, -5.0, 3.0))),
-}  # fmt: skip
+}
 ROBUST = ("alpha",)  # where Exudyn's best family stops at redundant rows
 ENGINES = [name for name in BUILT_IN + OPTIONAL if name != "ondsel" and installed(name)]
 

@@ -27,10 +27,14 @@ FINE = {
 FREE = [name for name in FINE if name != "ondsel"]  # engines that move what is not driven
 PACKAGES = {"simbody": "opensim", "sundials": "sksundae", "ondsel": "pyondsel"}
 MEASURED = {  # largest error (m, rad), and of the block's reactions (N, N m)
-    "mbref": (1.3e-12, 1.1e-12), "mujoco": (3e-9, 1.7e-13), "pinocchio": (3.3e-12, 2.8e-11),
-    "exudyn": (9.9e-11, 4.6e-7), "simbody": (5.3e-9, 6.4e-8), "sundials": (1.4e-7, 7.6e-7),
+    "mbref": (1.3e-12, 1.1e-12),
+    "mujoco": (3e-9, 1.7e-13),
+    "pinocchio": (3.3e-12, 2.8e-11),
+    "exudyn": (9.9e-11, 4.6e-7),
+    "simbody": (5.3e-9, 6.4e-8),
+    "sundials": (1.4e-7, 7.6e-7),
     "ondsel": (3.3e-12, 0.0),
-}  # fmt: skip
+}
 DRIVEN = (ROUNDING, 2.5e-12)  # m, m/s² of 445
 CLOSE = {name: MARGIN * measured[0] for name, measured in MEASURED.items()}
 
@@ -55,9 +59,14 @@ def run_fine(name: str, scene: Scene, times: np.ndarray) -> Trajectory:
 def incline(bodies: tuple[str, str], joints: int = 1) -> Scene:
     """A block that slides on an inclined plane and spins about the normal, held off its centre of mass."""
     block = Body(
-        name="block", mass=MASS, inertia=INERTIA, position=PLACE, orientation=TURNED,
-        velocity=SPEED * ALONG, angular_velocity=RATE * NORMAL,
-    )  # fmt: skip
+        name="block",
+        mass=MASS,
+        inertia=INERTIA,
+        position=PLACE,
+        orientation=TURNED,
+        velocity=SPEED * ALONG,
+        angular_velocity=RATE * NORMAL,
+    )
     planes = tuple(
         Planar(name=f"plane{k}", bodies=bodies, anchor=ANCHOR + k * ALONG, axis=NORMAL) for k in range(joints)
     )
@@ -152,14 +161,19 @@ def swash_plate(bodies: tuple[str, str]) -> tuple[Scene, np.ndarray]:
     inertia, slope, radius, rate = (0.01, 0.02, 0.03), 0.3, 0.5, 3.0
     foot = (radius, 0.0, 0.0)
     scene = Scene(
-        name="swash_plate", duration=1.0,
-        body=(Body(name="plate", mass=1.0, inertia=inertia, position=(0.0, 0.0, 0.0)),
-              Body(name="pin", mass=1.0, inertia=inertia, position=(radius, 0.0, 0.2))),
-        joint=(Revolute(name="A", bodies=("ground", "plate"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),
-               Cylindrical(name="B", bodies=("ground", "pin"), anchor=foot, axis=(0.0, 0.0, 1.0)),
-               Planar(name="P", bodies=bodies, anchor=foot, axis=(slope, 0.0, 1.0))),
+        name="swash_plate",
+        duration=1.0,
+        body=(
+            Body(name="plate", mass=1.0, inertia=inertia, position=(0.0, 0.0, 0.0)),
+            Body(name="pin", mass=1.0, inertia=inertia, position=(radius, 0.0, 0.2)),
+        ),
+        joint=(
+            Revolute(name="A", bodies=("ground", "plate"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),
+            Cylindrical(name="B", bodies=("ground", "pin"), anchor=foot, axis=(0.0, 0.0, 1.0)),
+            Planar(name="P", bodies=bodies, anchor=foot, axis=(slope, 0.0, 1.0)),
+        ),
         driver=(Driver(joint="A", polynomial=(0.0, rate)),),
-    )  # fmt: skip
+    )
     return scene, 0.2 + slope * radius * (1 - np.cos(rate * TIMES))
 
 

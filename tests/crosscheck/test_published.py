@@ -20,15 +20,31 @@ from tests.crosscheck.measured import MARGIN, ROUNDING
 
 SECONDS = 100.0
 FREEDOMS = {
-    "point_pendulum": (1, 0), "andrews_squeezer": (1, 9), "bricard": (1, 1), "bricard_thin": (1, 1),
-    "flyball_governor": (4, 0), "rigid_slider_crank": (1, 0), "rigid_slider_crank_middle": (1, 0),
-    "heavy_top": (3, 0), "bennett": (1, 3), "sarrus": (1, 1), "h_frame": (1, 5),
-}  # fmt: skip
+    "point_pendulum": (1, 0),
+    "andrews_squeezer": (1, 9),
+    "bricard": (1, 1),
+    "bricard_thin": (1, 1),
+    "flyball_governor": (4, 0),
+    "rigid_slider_crank": (1, 0),
+    "rigid_slider_crank_middle": (1, 0),
+    "heavy_top": (3, 0),
+    "bennett": (1, 3),
+    "sarrus": (1, 1),
+    "h_frame": (1, 5),
+}
 MEASURED = {  # error of mbref (m)
-    "point_pendulum": 5.8e-12, "andrews_squeezer": 1.3e-13, "bricard": 9.2e-14, "bricard_thin": 5.4e-13,
-    "flyball_governor": ROUNDING, "rigid_slider_crank": 3.4e-13, "rigid_slider_crank_middle": 4.3e-13,
-    "heavy_top": 1.2e-11, "bennett": 4.7e-13, "sarrus": 1.6e-13, "h_frame": 8.1e-13,
-}  # fmt: skip
+    "point_pendulum": 5.8e-12,
+    "andrews_squeezer": 1.3e-13,
+    "bricard": 9.2e-14,
+    "bricard_thin": 5.4e-13,
+    "flyball_governor": ROUNDING,
+    "rigid_slider_crank": 3.4e-13,
+    "rigid_slider_crank_middle": 4.3e-13,
+    "heavy_top": 1.2e-11,
+    "bennett": 4.7e-13,
+    "sarrus": 1.6e-13,
+    "h_frame": 8.1e-13,
+}
 BRIEF = {"andrews_squeezer": 0.01, "flyball_governor": 0.05, "heavy_top": 0.1}  # s
 
 
@@ -64,9 +80,11 @@ def assert_own_measure(name: str, run: Trajectory, true: Trajectory) -> None:
     scene, (_, problem) = SCENES[name](), BY_SCENE[name]
     slight = rotations.from_vector(np.outer(np.arange(1, len(scene.body) + 1), (1e-3, 2e-3, 3e-3)))
     wrong = replace(
-        run, position=run.position + 1e-3, velocity=1.02 * run.velocity,
+        run,
+        position=run.position + 1e-3,
+        velocity=1.02 * run.velocity,
         orientation=rotations.multiply(slight, run.orientation),
-    )  # fmt: skip
+    )
     good, bad = (problem.measure(scene, motion, true) for motion in (run, wrong))
     assert good <= problem.acceptance < bad, f"{name}: {problem.words} {good:.1e} and {bad:.1e}"
 

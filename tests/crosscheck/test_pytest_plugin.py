@@ -37,11 +37,18 @@ def held(
         chosen,
     ]
     return subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", *plugin, "--rootdir", place, *named, *options], cwd=place,
-        env={**os.environ, "PYTHONPATH": path or f"{place}{os.pathsep}{ROOT}",
-             "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
-        capture_output=True, text=True, timeout=300, check=False,
-    )  # fmt: skip
+        [sys.executable, "-m", "pytest", "-q", *plugin, "--rootdir", place, *named, *options],
+        cwd=place,
+        env={
+            **os.environ,
+            "PYTHONPATH": path or f"{place}{os.pathsep}{ROOT}",
+            "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
+        },
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
 
 
 def test_sound_engine_and_a_second_run_that_resumes(tmp_path):
@@ -61,9 +68,9 @@ def test_an_engine_of_the_working_directory_and_its_child_processes(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "says"), [("no_such_module:ENGINE", "No module named 'no_such_module'"),
-                       ("nothing", "unknown engine 'nothing'")],
-)  # fmt: skip
+    ("name", "says"),
+    [("no_such_module:ENGINE", "No module named 'no_such_module'"), ("nothing", "unknown engine 'nothing'")],
+)
 def test_a_name_that_leads_to_no_engine_ends_before_any_test(tmp_path, name, says):
     run = held(tmp_path, "free_fall", name=name)
     assert run.returncode == pytest.ExitCode.USAGE_ERROR, run.stdout[-1500:]

@@ -16,25 +16,36 @@ from mbref.scene import Body, Revolute, Scene, SceneError, Spring, TorsionSpring
 
 TIMES = np.linspace(0.0, 0.8, 161)
 SCENE = Scene(
-    name="double_pendulum", gravity=(0.3, -9.81, 0.5), duration=0.8,
+    name="double_pendulum",
+    gravity=(0.3, -9.81, 0.5),
+    duration=0.8,
     body=[
         Body(name="upper", mass=2.0, inertia=(0.02, 0.05, 0.06), position=(0.3, 0.0, 0.0)),
-        Body(name="lower", mass=1.0, inertia=(0.01, 0.04, 0.03), position=(0.9, 0.1, 0.0),
-             orientation=(0.8, 0.0, 0.0, 0.6)),
+        Body(
+            name="lower",
+            mass=1.0,
+            inertia=(0.01, 0.04, 0.03),
+            position=(0.9, 0.1, 0.0),
+            orientation=(0.8, 0.0, 0.0, 0.6),
+        ),
     ],
     joint=[
         Revolute(name="A", bodies=("ground", "upper"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),
         Revolute(name="B", bodies=("upper", "lower"), anchor=(0.6, 0.0, 0.0), axis=(0.0, 0.6, 0.8)),
     ],
-)  # fmt: skip
+)
 
 
 SPRUNG = SCENE.with_(
     load=[
-        Spring(bodies=("ground", "lower"), points=((1.0, 0.5, 0.2), (0.9, 0.1, 0.0)), stiffness=30.0,
-               natural_length=0.3)
+        Spring(
+            bodies=("ground", "lower"),
+            points=((1.0, 0.5, 0.2), (0.9, 0.1, 0.0)),
+            stiffness=30.0,
+            natural_length=0.3,
+        )
     ]
-)  # fmt: skip  # a spring, without which only ratios of masses matter
+)  # a spring, without which only ratios of masses matter
 
 
 @pytest.fixture(scope="module")
@@ -80,11 +91,11 @@ def coarse(table) -> dict[str, np.ndarray]:
 
 def lighter(body: str, factor: float) -> list[Body]:
     return [
-        b if b.name != body else b.model_copy(
-            update={"mass": b.mass * factor, "inertia": tuple(factor * i for i in b.inertia)}
-        )
+        b
+        if b.name != body
+        else b.model_copy(update={"mass": b.mass * factor, "inertia": tuple(factor * i for i in b.inertia)})
         for b in SCENE.body
-    ]  # fmt: skip
+    ]
 
 
 def of_kind(table, kind: str, factor: float) -> dict[str, np.ndarray]:
@@ -95,7 +106,8 @@ PLANTED = {
     "millimetres": (lambda t: of_kind(t, "position", 1e3), "all columns of position: in mm, not m"),
     "degrees": (lambda t: of_kind(t, "angle", 180 / np.pi), "all columns of angle: in degrees, not rad"),
     "sign": (
-        lambda t: {**t, "lower.position.y": -t["lower.position.y"]}, "lower.position.y: of opposite sign",
+        lambda t: {**t, "lower.position.y": -t["lower.position.y"]},
+        "lower.position.y: of opposite sign",
     ),
     "shift": (shifted, "all columns: later by 0.0125 s"),
     "axes": (
@@ -103,22 +115,22 @@ PLANTED = {
         "lower.position: x, y, z hold x, z, y",
     ),
     "order": (
-        lambda t: turned(t, lambda q: q[:, [1, 2, 3, 0]]), "all columns of orientation: quaternions in",
+        lambda t: turned(t, lambda q: q[:, [1, 2, 3, 0]]),
+        "all columns of orientation: quaternions in",
     ),
     "inverse": (lambda t: turned(t, rotations.conjugate), "all columns of orientation: quaternions of"),
     "point": (another_point, "lower: a point at (0.1, -0.2, 0.05) m in the body's frame"),
     "interpolation": (coarse, "all columns: straight lines between samples 0.04 s apart"),
-    "gravity": (
-        lambda t: of_other(gravity=tuple(g * 9.80665 / 9.81 for g in SCENE.gravity)), "gravity of ",
-    ),
+    "gravity": (lambda t: of_other(gravity=tuple(g * 9.80665 / 9.81 for g in SCENE.gravity)), "gravity of "),
     "damping": (
         lambda t: of_other(load=[TorsionSpring(joint="B", stiffness=0.0, damping=0.02)]),
         "damping of 0.02 N m s/rad in joint 'B'",
     ),
     "mass": (
-        lambda t: of_other(SPRUNG, body=lighter("lower", 0.9)), "mass and inertia of body 'lower' times 0.9",
+        lambda t: of_other(SPRUNG, body=lighter("lower", 0.9)),
+        "mass and inertia of body 'lower' times 0.9",
     ),
-}  # fmt: skip
+}
 
 
 def test_an_exact_motion_is_right_within_the_bound(table):
@@ -182,7 +194,7 @@ def test_tables_of_other_tools(table, tmp_path):
         ("time,upper.x [furlong]\n0,1\n", {}, "unknown unit 'furlong'"),
         ("time,upper.x [deg]\n0,1\n", {}, "'deg' is no unit of a quantity in m"),
     ],
-)  # fmt: skip
+)
 def test_faulty_tables_are_refused(text, columns, says, tmp_path):
     (tmp_path / "faulty.csv").write_text(text)
     with pytest.raises(SceneError, match=says):

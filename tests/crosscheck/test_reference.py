@@ -46,12 +46,27 @@ SMOOTH = 1e-12  # bound where nothing is singular
 AGREE = 1e-15  # of two formulations over a short smooth motion
 SECONDS = 200.0
 KEPT = (2, 3, 4, 5, *range(10, 26))  # seeds of the random mechanisms in this file
-SINGULAR = ("four_bar", "four_bar_quarter", "four_bar_gravity", "five_bar", "five_bar_gravity",
-            "planar_slider_crank_equal", "planar_slider_crank_gravity", "planar_slider_crank_heavy",
-            "crank_torsion", "slider_spring")  # fmt: skip
-BRIEF = {"planar_slider_crank_heavy": 4.0, "planar_slider_crank": 0.1, "spatial_slider_crank": 0.03,
-         "slider_spring": 0.3, "crank_torsion": 0.3, "planar_slider_crank_gravity": 0.5,
-         "planar_slider_crank_equal": 0.1}  # fmt: skip
+SINGULAR = (
+    "four_bar",
+    "four_bar_quarter",
+    "four_bar_gravity",
+    "five_bar",
+    "five_bar_gravity",
+    "planar_slider_crank_equal",
+    "planar_slider_crank_gravity",
+    "planar_slider_crank_heavy",
+    "crank_torsion",
+    "slider_spring",
+)
+BRIEF = {
+    "planar_slider_crank_heavy": 4.0,
+    "planar_slider_crank": 0.1,
+    "spatial_slider_crank": 0.03,
+    "slider_spring": 0.3,
+    "crank_torsion": 0.3,
+    "planar_slider_crank_gravity": 0.5,
+    "planar_slider_crank_equal": 0.1,
+}
 
 
 def samples(scene: Scene, duration: float, count: int = 9, seconds: float = SECONDS) -> tuple[Reference, str]:
@@ -243,8 +258,13 @@ def test_momentum_of_free_bodies_is_kept():
         update={"name": "second", "position": (1.0, 0.4, -0.3), "velocity": (0.0, 1.0, 0.5)}
     )
     first = BODY.model_copy(update={"velocity": (0.5, 0.0, 0.0), "angular_velocity": (1.0, -2.0, 0.5)})
-    spring = Spring(bodies=("body", "second"), points=((0.4, 0, 0), (0.9, 0.5, 0)), stiffness=40.0,
-                    damping=0.7, natural_length=0.3)  # fmt: skip
+    spring = Spring(
+        bodies=("body", "second"),
+        points=((0.4, 0, 0), (0.9, 0.5, 0)),
+        stiffness=40.0,
+        damping=0.7,
+        natural_length=0.3,
+    )
     scene = Scene(name="pair", body=(first, second), load=(spring,))
     motion = natural_motion(scene, np.linspace(0.0, 1.0, 9), EXTENDED, seconds=SECONDS)
     mass = np.array([body.mass for body in scene.body])
@@ -273,26 +293,38 @@ def _scaled(scene: Scene, by: float) -> Scene:
         return np.asarray(value, dtype=float) * by**power
 
     bodies = [
-        body.model_copy(update={
-            "position": tuple(times(body.position)), "velocity": tuple(times(body.velocity)),
-            "inertia": tuple(map(tuple, times(body.inertia, 2))),
-        })
+        body.model_copy(
+            update={
+                "position": tuple(times(body.position)),
+                "velocity": tuple(times(body.velocity)),
+                "inertia": tuple(map(tuple, times(body.inertia, 2))),
+            }
+        )
         for body in scene.body
-    ]  # fmt: skip
+    ]
     joints = [
-        joint.model_copy(update={
-            key: tuple(times(getattr(joint, key)) if key == "anchor" else map(tuple, times(joint.anchors)))
-            for key in ("anchor", "anchors") if hasattr(joint, key)
-        })
+        joint.model_copy(
+            update={
+                key: tuple(
+                    times(getattr(joint, key)) if key == "anchor" else map(tuple, times(joint.anchors))
+                )
+                for key in ("anchor", "anchors")
+                if hasattr(joint, key)
+            }
+        )
         for joint in scene.joint
-    ]  # fmt: skip
+    ]
     moment, force, spring = scene.load
     loads = (
         moment.model_copy(update={"moment": tuple(times(moment.moment, 2))}),
         force.model_copy(update={"force": tuple(times(force.force)), "point": tuple(times(force.point))}),
-        spring.model_copy(update={"points": tuple(map(tuple, times(spring.points))),
-                                  "natural_length": float(times(spring.natural_length))}),
-    )  # fmt: skip
+        spring.model_copy(
+            update={
+                "points": tuple(map(tuple, times(spring.points))),
+                "natural_length": float(times(spring.natural_length)),
+            }
+        ),
+    )
     gravity = tuple(times(scene.gravity))
     return scene.with_(body=tuple(bodies), joint=tuple(joints), load=loads, gravity=gravity)
 

@@ -70,8 +70,11 @@ def test_finer_accuracies_and_smaller_errors(family: str) -> None:
     assert errors[1] < errors[0] / 5 and errors[2] < errors[1] / 5, f"{family}: errors {errors}"
 
 
-@pytest.mark.parametrize("scene", [every_joint(), *map(ring, ("revolute", "cylindrical", "universal",
-                         "spherical"))], ids=lambda scene: scene.name)  # fmt: skip
+@pytest.mark.parametrize(
+    "scene",
+    [every_joint(), *map(ring, ("revolute", "cylindrical", "universal", "spherical"))],
+    ids=lambda scene: scene.name,
+)
 def test_simbody_and_pinocchio_move_alike(scene: Scene) -> None:
     """Every joint and load; loops cut at joints of every kind; joint reactions where they are unique."""
     pytest.importorskip("pinocchio")
@@ -98,14 +101,19 @@ def test_drivers_and_the_motion_they_prescribe() -> None:
     pytest.importorskip("pinocchio")
     scene = prescribed(
         Driver(joint="cyl", polynomial=(0.0, 1.0, -2.0, 3.0)),
-        Driver(joint="tra", polynomial=(-0.05 * np.sin(0.4),),
-               sine=Sine(amplitude=0.05, frequency=7.0, phase=0.4)),
-    )  # fmt: skip
+        Driver(
+            joint="tra",
+            polynomial=(-0.05 * np.sin(0.4),),
+            sine=Sine(amplitude=0.05, frequency=7.0, phase=0.4),
+        ),
+    )
     run = simulate(scene, 0.4, 1e-10)
     moved = joint_coordinates(scene, run.times, run.position, run.orientation, run.angular_velocity)
     t = run.times
-    gaps = (abs(moved["cyl"][:, 0] - (t - 2 * t**2 + 3 * t**3)).max(),
-            abs(moved["tra"][:, 1] - 0.05 * (np.sin(7 * t + 0.4) - np.sin(0.4))).max())  # fmt: skip
+    gaps = (
+        abs(moved["cyl"][:, 0] - (t - 2 * t**2 + 3 * t**3)).max(),
+        abs(moved["tra"][:, 1] - 0.05 * (np.sin(7 * t + 0.4) - np.sin(0.4))).max(),
+    )
     assert max(gaps) < MARGIN * DRIVEN, f"off by {gaps} rad, m"
     other = engine("pinocchio").run(scene, t, Setting("tuned", {"rtol": 1e-11, "min_step": 1e-4}))
     gap = abs(run.acceleration - other.acceleration).max()

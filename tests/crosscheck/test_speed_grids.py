@@ -69,10 +69,16 @@ def test_every_family_says_whose_integrator_it_has(monkeypatch: pytest.MonkeyPat
     )
     assert _integrator("pinocchio", "tuned") not in (OWN, COMPILED_HERE)
     assert OPPONENTS["own integrators"][1] == (OWN,) and OPPONENTS["engines"][1] == ()
-    ours = {family: [w for w, belongs in OURSELVES.items() if belongs(family)] for family in
-            ("taylor", "taylor, generated", "kinematic", "lm2+projection")}  # fmt: skip
-    assert ours == {"taylor": ["series"], "taylor, generated": ["series"], "kinematic": ["other methods"],
-                    "lm2+projection": ["other methods"]}  # fmt: skip
+    ours = {
+        family: [w for w, belongs in OURSELVES.items() if belongs(family)]
+        for family in ("taylor", "taylor, generated", "kinematic", "lm2+projection")
+    }
+    assert ours == {
+        "taylor": ["series"],
+        "taylor, generated": ["series"],
+        "kinematic": ["other methods"],
+        "lm2+projection": ["other methods"],
+    }
 
 
 def test_a_whole_process_pays_after_the_construction_is_earned(monkeypatch: pytest.MonkeyPatch):
@@ -87,13 +93,27 @@ def test_a_whole_process_pays_after_the_construction_is_earned(monkeypatch: pyte
     assert even(theirs, 0.004, ours, 0.002, 1) == "until 2"
 
     def run(family: str, error: float | None, seconds: float) -> dict:
-        return {"engine": "mujoco", "family": family, "options": {"rtol": seconds}, "outcome": "COMPLETED",
-                "error": error, "seconds": [seconds], "cost": {"seconds": seconds}}  # fmt: skip
+        return {
+            "engine": "mujoco",
+            "family": family,
+            "options": {"rtol": seconds},
+            "outcome": "COMPLETED",
+            "error": error,
+            "seconds": [seconds],
+            "cost": {"seconds": seconds},
+        }
 
-    curves = [{"engine": "mujoco", "family": f, "cost": [1.0, c, None]} for f, c in
-              (("tuned", 3.0), ("stock", 2.0), ("forward, compiled", 1.0), ("defaults", None))]  # fmt: skip
-    made = (("tuned", 1e-7, 3.0), ("stock", 1e-7, 2.5), ("stock", 1e-8, 2.0), ("stock", None, 0.1),
-            ("forward, compiled", 1e-7, 1.0))  # fmt: skip
+    curves = [
+        {"engine": "mujoco", "family": f, "cost": [1.0, c, None]}
+        for f, c in (("tuned", 3.0), ("stock", 2.0), ("forward, compiled", 1.0), ("defaults", None))
+    ]
+    made = (
+        ("tuned", 1e-7, 3.0),
+        ("stock", 1e-7, 2.5),
+        ("stock", 1e-8, 2.0),
+        ("stock", None, 0.1),
+        ("forward, compiled", 1e-7, 1.0),
+    )
     runs = [run(*numbers) for numbers in made]
     found = candidates({"levels": [1e-3, 1e-6, 1e-9], "curves": curves, "runs": runs})
     assert [(c.family, c.options["rtol"]) for c in found] == [("stock", 2.0), ("forward, compiled", 1.0)]

@@ -29,9 +29,21 @@ def adaptive(rhs, rtol: float = 1e-9, **options) -> Adaptive:
 @pytest.mark.parametrize(("stiffness", "rate", "runs"), [(1e8, 5e2, 1), (1.0, 3.0, 1), (0.0, 2e3, 2)])
 def test_a_stated_rate_asks_for_no_second_coarse_run(stiffness: float, rate: float, runs: int) -> None:
     """A mass on a stiff spring turns slowly; without one the body spins faster than 2000 steps resolve."""
-    scene = Scene(name="mass", duration=2.0, body=[{"name": "m", "mass": 400.0, "inertia": (1, 1, 1),
-        "position": (1.0, 0.0, 0.0)}], load=[{"type": "spring", "bodies": ("ground", "m"), "damping": 0.0,
-        "points": ((0, 0, 0), (1, 0, 0)), "stiffness": stiffness, "natural_length": 1.0}])  # fmt: skip
+    scene = Scene(
+        name="mass",
+        duration=2.0,
+        body=[{"name": "m", "mass": 400.0, "inertia": (1, 1, 1), "position": (1.0, 0.0, 0.0)}],
+        load=[
+            {
+                "type": "spring",
+                "bodies": ("ground", "m"),
+                "damping": 0.0,
+                "points": ((0, 0, 0), (1, 0, 0)),
+                "stiffness": stiffness,
+                "natural_length": 1.0,
+            }
+        ],
+    )
     asked = []
 
     def coarse(step: float) -> Trajectory:

@@ -30,9 +30,12 @@ REGULAR = {  # scene: duration (s) without a singular position, measured error (
     "four_bar_gravity": (0.15, 7.9e-8),
 }
 ALIKE = {  # measured differences from Pinocchio: m, m/s, rad/s, m/s², rad/s²
-    "position": 2.8e-6, "velocity": 3.7e-5, "angular_velocity": 1.1e-4, "acceleration": 6.5e-4,
+    "position": 2.8e-6,
+    "velocity": 3.7e-5,
+    "angular_velocity": 1.1e-4,
+    "acceleration": 6.5e-4,
     "angular_acceleration": 2.5e-3,
-}  # fmt: skip
+}
 REACTION = 3e-5  # of the largest
 FREE_FALL, TURN, BARE, SPRUNG = 1.9e-7, 1.5e-3, 8.8e-9, 2.9e-7  # m, rad
 STOP, BEFORE = 2.6e-6, 2.9e-6  # s from the singular position; m, rad before it
@@ -74,8 +77,9 @@ def test_tighter_tolerances_and_smaller_errors() -> None:
     )
 
 
-@pytest.mark.parametrize("scene", [every_joint(), driven(), ring("universal"), ring("revolute")],
-                         ids=lambda scene: scene.name)  # fmt: skip
+@pytest.mark.parametrize(
+    "scene", [every_joint(), driven(), ring("universal"), ring("revolute")], ids=lambda scene: scene.name
+)
 def test_ida_and_pinocchio_move_alike(scene: Scene) -> None:
     """Every joint, driver and load; redundant loops; joint reactions where they are unique."""
     pytest.importorskip("pinocchio")

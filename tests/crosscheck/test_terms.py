@@ -88,9 +88,18 @@ def test_motion_and_reactions_of_terms_and_truth(name: str, label: str) -> None:
 
 ONE_STEP, TINY = 2e-4, 1e-5  # relative error of accelerations by a step of TINY (s), of first order
 ONE_STEP_OF = (
-    "pushed body", "force load", "moment load", "spring load", "torsion_spring load", "cylindrical joint",
-    "universal joint", "planar joint", "distance joint", "floating pair", "door",
-)  # fmt: skip
+    "pushed body",
+    "force load",
+    "moment load",
+    "spring load",
+    "torsion_spring load",
+    "cylindrical joint",
+    "universal joint",
+    "planar joint",
+    "distance joint",
+    "floating pair",
+    "door",
+)
 
 
 @pytest.mark.parametrize("name", [of("drake"), of("dart"), of("bullet")])
@@ -99,8 +108,11 @@ def test_one_step_of_an_engine_and_gauss_s_principle(name: str, label: str) -> N
     """Masses, frames, signs of loads, order of bodies and units, by the engine's own step; and the start."""
     scene = scenes()[label]
     run = simulate(name, scene, own_step(name, TINY), 0.0, TINY)
-    for found, given in zip((run.position[0], run.velocity[0], run.angular_velocity[0]),
-                            (initial_poses(scene)[0], *initial_twists(scene)), strict=True):  # fmt: skip
+    for found, given in zip(
+        (run.position[0], run.velocity[0], run.angular_velocity[0]),
+        (initial_poses(scene)[0], *initial_twists(scene)),
+        strict=True,
+    ):
         assert abs(found - given).max() < 1e-13 * max(1.0, abs(given).max()), f"{name}, {label}: {found}"
     changes = [
         np.diff(run.velocity, axis=0)[0],

@@ -113,10 +113,14 @@ def ring(**changes) -> Scene:
     """Two links on each other and on the ground, each joint of which is driven or has a spring."""
     places = ((0.0, 0.0), (0.3, 0.2), (0.7, 0.1), (0.9, 0.0))
     bodies = [
-        Body(name=f"b{k}", mass=1.0, inertia=(0.01, 0.01, 0.02),
-             position=((p[0] + q[0]) / 2, (p[1] + q[1]) / 2, 0.0))
+        Body(
+            name=f"b{k}",
+            mass=1.0,
+            inertia=(0.01, 0.01, 0.02),
+            position=((p[0] + q[0]) / 2, (p[1] + q[1]) / 2, 0.0),
+        )
         for k, (p, q) in enumerate(itertools.pairwise(places))
-    ]  # fmt: skip
+    ]
     chain = ["ground", "b0", "b1", "b2", "ground"]
     joints = [
         Revolute(name=f"J{k}", bodies=(chain[k], chain[k + 1]), anchor=(*place, 0.0), axis=Z)

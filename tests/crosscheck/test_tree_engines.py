@@ -26,7 +26,7 @@ from mbref.scene import (
     TorsionSpring,
     Translational,
     Universal,
-)  # fmt: skip
+)
 from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN
 from tests.crosscheck.tree_scenes import BODIES, INERTIA, JOINTS, driven, every_joint, ring
@@ -65,15 +65,23 @@ def pendulums() -> dict[str, Scene]:
     down, spin = (0.5, -9.81, 2.0), {"angular_velocity": (3.0, -2.0, 5.0)}
     sine = Sine(amplitude=0.4, frequency=8.0)
     pull = Force(body="bob", point=(0.5, 0.2, 0.1), force=(2.0, 3.0, -1.0))
-    tie = Spring(bodies=("bob", "ground"), points=((0.4, 0.1, 0.1), (0.0, 0.8, 0.0)), stiffness=60.0,
-                 damping=0.8, natural_length=0.3)  # fmt: skip
+    tie = Spring(
+        bodies=("bob", "ground"),
+        points=((0.4, 0.1, 0.1), (0.0, 0.8, 0.0)),
+        stiffness=60.0,
+        damping=0.8,
+        natural_length=0.3,
+    )
     twist = TorsionSpring(joint="J", stiffness=5.0, damping=0.05, natural_angle=0.7)
     return {
         "universal under gravity": solo("u", gravity=down, joint=on_ground(Universal, axes=(X, Y))),
         "universal to the ground": solo("v", gravity=down, joint=on_ground(Universal, True, axes=(X, Y))),
         "spherical": solo("s", gravity=down, joint=on_ground(Spherical), start=spin),
-        "distance": solo("d", gravity=down, joint=(Distance(name="J", bodies=("bob", "ground"),
-                         anchors=((0.3, 0.0, 0.2), (0.0, 0.5, 0.0))),)),
+        "distance": solo(
+            "d",
+            gravity=down,
+            joint=(Distance(name="J", bodies=("bob", "ground"), anchors=((0.3, 0.0, 0.2), (0.0, 0.5, 0.0))),),
+        ),
         "free and spinning": solo("f", gravity=down, start=spin | {"velocity": (1.0, 2.0, 3.0)}),
         "fixed": solo("x", gravity=down, joint=on_ground(Fixed)),
         "spring": solo("k", load=(tie,), joint=on_ground(Revolute, axis=Z)),
@@ -82,11 +90,18 @@ def pendulums() -> dict[str, Scene]:
         "torsion spring to the ground": solo("w", load=(twist,), joint=on_ground(Cylindrical, True, axis=Z)),
         "force at a point": solo("p", load=(pull,), joint=on_ground(Spherical)),
         "moment on a free body": solo("m", load=(Moment(body="bob", moment=(0.2, -0.1, 0.3)),)),
-        "sine on a cylindrical": solo("c", gravity=(0.0, 0.0, -9.81), joint=on_ground(Cylindrical, axis=Z),
-                                      driver=(Driver(joint="J", polynomial=(0.0, 2.0, 1.0), sine=sine),)),
-        "sine on a translational": solo("a", joint=on_ground(Translational, True, axis=(1.0, 2.0, 0.0)),
-                                        driver=(Driver(joint="J", sine=sine),)),
-    }  # fmt: skip
+        "sine on a cylindrical": solo(
+            "c",
+            gravity=(0.0, 0.0, -9.81),
+            joint=on_ground(Cylindrical, axis=Z),
+            driver=(Driver(joint="J", polynomial=(0.0, 2.0, 1.0), sine=sine),),
+        ),
+        "sine on a translational": solo(
+            "a",
+            joint=on_ground(Translational, True, axis=(1.0, 2.0, 0.0)),
+            driver=(Driver(joint="J", sine=sine),),
+        ),
+    }
 
 
 def chain_scenes() -> dict[str, Scene]:

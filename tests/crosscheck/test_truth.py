@@ -126,10 +126,16 @@ def multipliers_rhs(scene):
 
 @pytest.mark.parametrize(
     ("name", "end"),
-    [("four_bar_gravity", 0.05), ("five_bar_gravity", 0.05), ("planar_slider_crank", 0.01),
-     ("planar_slider_crank_gravity", 0.03), ("spatial_slider_crank", 0.003),
-     ("spatial_slider_crank_gravity", 0.03), ("slider_spring", 0.03)],
-)  # fmt: skip
+    [
+        ("four_bar_gravity", 0.05),
+        ("five_bar_gravity", 0.05),
+        ("planar_slider_crank", 0.01),
+        ("planar_slider_crank_gravity", 0.03),
+        ("spatial_slider_crank", 0.003),
+        ("spatial_slider_crank_gravity", 0.03),
+        ("slider_spring", 0.03),
+    ],
+)
 def test_truth_is_the_motion_of_the_multiplier_equations(name, end):
     scene = ALL[name]
     start = np.concatenate(
@@ -153,9 +159,13 @@ def test_truth_is_the_motion_of_the_multiplier_equations(name, end):
 @pytest.mark.parametrize("theta0", [0.4, math.pi / 2, math.pi])
 def test_parallelogram_is_the_circle_of_its_crank(theta0):
     name = {0.4: None, math.pi / 2: "four_bar", math.pi: "four_bar_straight"}[theta0]
-    scene = SCENES[name]() if name else SCENES["four_bar_gravity"]().with_(
-        driver=(Driver(joint="D", polynomial=(0.0, 3.0)),), gravity=(0, 0, 0)
-    )  # fmt: skip
+    scene = (
+        SCENES[name]()
+        if name
+        else SCENES["four_bar_gravity"]().with_(
+            driver=(Driver(joint="D", polynomial=(0.0, 3.0)),), gravity=(0, 0, 0)
+        )
+    )
     start, rate = (theta0, -124.8) if name else (0.3, 3.0)
     t = np.linspace(0, scene.duration, 30)
     angle = start + rate * t
@@ -243,8 +253,13 @@ def test_torsion_pendulum_is_the_damped_oscillator(sign):
 
 
 def test_block_is_the_damped_oscillator():
-    spring = Spring(bodies=("block", "ground"), points=((1.0, 2.0, 3.0), (7.0, 10.0, 3.0)), stiffness=50.0,
-                    damping=4.0, natural_length=9.0)  # fmt: skip
+    spring = Spring(
+        bodies=("block", "ground"),
+        points=((1.0, 2.0, 3.0), (7.0, 10.0, 3.0)),
+        stiffness=50.0,
+        damping=4.0,
+        natural_length=9.0,
+    )
     scene = block(gravity=(0.0, -9.81, 0.0), load=(spring,))
     t = np.linspace(0, 1, 30)
     rest = (50.0 * (10.0 - 9.0) - 2.0 * 9.81 * 0.8) / 50.0
@@ -256,10 +271,17 @@ def test_block_is_the_damped_oscillator():
 
 def test_a_truth_that_ends_tells_the_time_and_is_known_until_then():
     """A bar turned half round brings a spring to length zero, where its force jumps: no series goes on."""
-    bar = Body(name="bar", mass=1.0, inertia=(0.001, 0.0133, 0.0133), position=(0.2, 0, 0),
-               velocity=(0.0, 1.0, 0.0), angular_velocity=(0.0, 0.0, 5.0))  # fmt: skip
-    spring = Spring(bodies=("ground", "bar"), points=((-0.4, 0, 0), (0.4, 0, 0)), stiffness=20.0,
-                    natural_length=0.3)  # fmt: skip
+    bar = Body(
+        name="bar",
+        mass=1.0,
+        inertia=(0.001, 0.0133, 0.0133),
+        position=(0.2, 0, 0),
+        velocity=(0.0, 1.0, 0.0),
+        angular_velocity=(0.0, 0.0, 5.0),
+    )
+    spring = Spring(
+        bodies=("ground", "bar"), points=((-0.4, 0, 0), (0.4, 0, 0)), stiffness=20.0, natural_length=0.3
+    )
     pin = Revolute(name="A", bodies=("ground", "bar"), anchor=(0, 0, 0), axis=(0, 0, 1))
     truth = truth_for(Scene(name="bar", duration=2.0, body=(bar,), joint=(pin,), load=(spring,)))
     with pytest.raises(NoSolution) as caught:

@@ -131,20 +131,28 @@ STRANGERS = {
     "pivot of the rocker moved": moved_anchor(SCENES["four_bar"](), "D", (0.51, 0.0, 0.0)),
     "crank longer than the rod": planar_slider_crank(0.5, 0.4),
     "slider's line not in the crank's plane": SCENES["planar_slider_crank"]().with_(
-        joint=(*SCENES["planar_slider_crank"]().joint[:3], Translational(
-            name="D", bodies=("ground", "slider"), anchor=(0.7088, 0, 0), axis=(1, 0, 0.1)))),
+        joint=(
+            *SCENES["planar_slider_crank"]().joint[:3],
+            Translational(name="D", bodies=("ground", "slider"), anchor=(0.7088, 0, 0), axis=(1, 0, 0.1)),
+        )
+    ),
     "two freedoms": pendulum().with_(
         body=(pendulum().body[0], pendulum().body[0].model_copy(update={"name": "other"})),
-        joint=(pendulum().joint[0], Revolute(
-            name="p", bodies=("ground", "other"), anchor=(0, 0, 0), axis=Z))),
-    "spherical pendulum": pendulum(joint=(
-        Spherical(name="ball", bodies=("ground", "bar"), anchor=(0, 0, 0)),)),
-    "no mass, no driver": Scene(name="s", body=(Body(name="bar", position=(1, 0, 0)),), joint=(
-        Revolute(name="pivot", bodies=("ground", "bar"), anchor=(0, 0, 0), axis=Z),)),
+        joint=(pendulum().joint[0], Revolute(name="p", bodies=("ground", "other"), anchor=(0, 0, 0), axis=Z)),
+    ),
+    "spherical pendulum": pendulum(
+        joint=(Spherical(name="ball", bodies=("ground", "bar"), anchor=(0, 0, 0)),)
+    ),
+    "no mass, no driver": Scene(
+        name="s",
+        body=(Body(name="bar", position=(1, 0, 0)),),
+        joint=(Revolute(name="pivot", bodies=("ground", "bar"), anchor=(0, 0, 0), axis=Z),),
+    ),
     "slender free rod": free(body=(free().body[0].model_copy(update={"inertia": (0.0, 0.3, 0.3)}),)),
-    "two drivers": SCENES["four_bar"]().with_(driver=(
-        *SCENES["four_bar"]().driver, Driver(joint="D", polynomial=(0.0, -124.8)))),
-}  # fmt: skip
+    "two drivers": SCENES["four_bar"]().with_(
+        driver=(*SCENES["four_bar"]().driver, Driver(joint="D", polynomial=(0.0, -124.8)))
+    ),
+}
 
 
 @pytest.mark.parametrize("why", STRANGERS)

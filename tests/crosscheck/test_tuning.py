@@ -34,22 +34,28 @@ class Modelled:
         h = case.setting.options["step"]
         self.asked.append((case.setting.family, h))
         return {
-            "key": key(case), "family": case.setting.family,
-            "outcome": "COMPLETED" if h <= breaks else "NOT_FINITE", "t_end": 1.0,
+            "key": key(case),
+            "family": case.setting.family,
+            "outcome": "COMPLETED" if h <= breaks else "NOT_FINITE",
+            "t_end": 1.0,
             "metrics": {"error": factor * h**order, "error_bound": 1e-14},
             "cost": {"seconds": cost / h, "rhs": 1 / h},
-        }  # fmt: skip
+        }
 
     def cases(self, *steps: float) -> list[Case]:
         times = np.array([0.0, 1.0])
-        return [Case(SCENE, times, "fake_engines:FAKE", Setting(f, {"step": h}))
-                for f in self.families for h in steps]  # fmt: skip
+        return [
+            Case(SCENE, times, "fake_engines:FAKE", Setting(f, {"step": h}))
+            for f in self.families
+            for h in steps
+        ]
 
 
 def found(engine: Modelled, level: float, *steps: float, ours: tuple[str, ...] = ()) -> dict[str, float]:
     done = tuned(engine.cases(*steps), level, engine, ours)
-    return {r["family"]: case.setting.options["step"]
-            for case, r in zip(done.cases, done.reached, strict=True)}  # fmt: skip
+    return {
+        r["family"]: case.setting.options["step"] for case, r in zip(done.cases, done.reached, strict=True)
+    }
 
 
 @pytest.mark.parametrize("level", [1e-2, 3e-4, 1e-6])

@@ -34,11 +34,21 @@ def record(
 ) -> dict[str, Any]:
     asked = {"engine": engine, "options": {"s": seconds}, "samples": 3, "end": 1.0}
     found = {
-        "scene": REDUNDANT.name, "engine": engine, "family": family, "settings": {"seconds": seconds},
-        "outcome": "COMPLETED", "message": "", "t_end": 1.0, "cost": {"seconds": seconds}, "versions": {},
-        "metrics": {"error": error, "error_bound": 3e-14}, "key": f"{engine} {family} {seconds}",
-        "version": "1", "machine": {"cpu": "a"}, "asked": asked,
-    }  # fmt: skip
+        "scene": REDUNDANT.name,
+        "engine": engine,
+        "family": family,
+        "settings": {"seconds": seconds},
+        "outcome": "COMPLETED",
+        "message": "",
+        "t_end": 1.0,
+        "cost": {"seconds": seconds},
+        "versions": {},
+        "metrics": {"error": error, "error_bound": 3e-14},
+        "key": f"{engine} {family} {seconds}",
+        "version": "1",
+        "machine": {"cpu": "a"},
+        "asked": asked,
+    }
     return {**found, "time_limit": 60.0, **more}
 
 
@@ -47,10 +57,14 @@ def failed(engine: str, family: str, t_end: float = 0.0) -> dict[str, Any]:
 
 
 RECORDS = (
-    record("mbref", "own", 5e-12, 0.001), record("mujoco", "tuned", 4e-9, 0.5),
-    record("mujoco", "defaults", 2.8), failed("pinocchio", "defaults"), failed("exudyn", "defaults"),
-    record("pinocchio", "tuned", 6.04e-9, 0.032), record("exudyn", "tuned", 1.7e-4, 0.2),
-)  # fmt: skip
+    record("mbref", "own", 5e-12, 0.001),
+    record("mujoco", "tuned", 4e-9, 0.5),
+    record("mujoco", "defaults", 2.8),
+    failed("pinocchio", "defaults"),
+    failed("exudyn", "defaults"),
+    record("pinocchio", "tuned", 6.04e-9, 0.032),
+    record("exudyn", "tuned", 1.7e-4, 0.2),
+)
 
 
 def group(records=RECORDS, scene=REDUNDANT, **known: Any) -> Judged:
@@ -68,9 +82,14 @@ def test_runs_without_a_result_are_not_told_as_an_end_at_0():
 
 @pytest.mark.parametrize(
     ("error", "verdict"),
-    [(1e-8, Grade.RIGHT), (1.1e-8, Grade.INACCURATE), (1e-2, Grade.INACCURATE), (1.1e-2, Grade.WRONG),
-     (None, Grade.UNJUDGED)],
-)  # fmt: skip
+    [
+        (1e-8, Grade.RIGHT),
+        (1.1e-8, Grade.INACCURATE),
+        (1e-2, Grade.INACCURATE),
+        (1.1e-2, Grade.WRONG),
+        (None, Grade.UNJUDGED),
+    ],
+)
 def test_grades_by_the_error_alone(error, verdict):
     assert grade(record("a", "b", error)) is verdict
     assert grade(record("a", "b", error, outcome="TIMED_OUT")) is Grade.FAILED
@@ -155,8 +174,9 @@ def test_other_results_and_other_sentences():
     assert fast([group([compiled])]) == (
         "MuJoCo, integrated by crosscheck, reaches an error of 1e-6 in 100 ms of stepping. MuJoCo's fastest "
         "runs are integrated by crosscheck (“forward, compiled”), as all of its runs here are."
-        + CLOCK + WITHOUT_PYTHON
-    ), fast([group([compiled])])  # fmt: skip
+        + CLOCK
+        + WITHOUT_PYTHON
+    ), fast([group([compiled])])
     lost = [record("mbref", "own", 1e-15), failed("exudyn", "tuned", 0.25)]
     assert right([group(lost)]) == (
         "mbref agrees with the truth to less than the truth's own bound, 3e-14. "
@@ -256,9 +276,11 @@ def test_differences_beyond_noise(tmp_path):
     before, after = (load(saved(tmp_path / name, records)) for name, records in (("old", old), ("new", new)))
     found = {change.identity[2]: change.sentences for change in changes(before, after)}
     assert found == {
-        "x": ["time 1.00e-01 s → 2.50e-01 s"], "y": ["outcome completed → not finite at 0.5 s"], "z": [],
+        "x": ["time 1.00e-01 s → 2.50e-01 s"],
+        "y": ["outcome completed → not finite at 0.5 s"],
+        "z": [],
         "gone": ["only in the old set"],
-    }, found  # fmt: skip
+    }, found
     assert circumstances(before, after) == ["a: 1 → 1, 2"], circumstances(before, after)
     assert not any(change.sentences for change in changes(before, before))
 

@@ -22,7 +22,7 @@ from mbref.scene import (
     TorsionSpring,
     Translational,
     Universal,
-)  # fmt: skip
+)
 
 INERTIA = ((0.02, 0.002, -0.001), (0.002, 0.03, 0.003), (-0.001, 0.003, 0.025))
 
@@ -46,24 +46,35 @@ JOINTS: tuple[Joint, ...] = (
     Revolute(name="rev", bodies=("ground", "root"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 2.0)),
     Spherical(name="sph", bodies=("hand", "arm"), anchor=(0.35, 0.7, 0.2)),
     Distance(name="dist", bodies=("hand", "piston"), anchors=((0.3, 1.0, 0.2), (-0.4, 0.8, 0.5))),
-    Universal(name="uni", bodies=("arm", "root"), anchor=(0.3, 0.3, 0.1),
-              axes=((1.0, 0.0, 1.0), (1.0, 1.0, -1.0))),
+    Universal(
+        name="uni", bodies=("arm", "root"), anchor=(0.3, 0.3, 0.1), axes=((1.0, 0.0, 1.0), (1.0, 1.0, -1.0))
+    ),
     Cylindrical(name="cyl", bodies=("piston", "ground"), anchor=(-0.5, 0.5, 0.4), axis=(0.0, 1.0, 0.2)),
     Translational(name="tra", bodies=("sled", "ground"), anchor=(1.0, 0.5, 0.2), axis=(0.3, 1.0, 0.0)),
     Fixed(name="fix", bodies=("lump", "root"), anchor=(0.1, 0.0, 0.1)),
-    Universal(name="uni7", bodies=("arm7", "root"), anchor=(0.4, 0.2, 0.1),
-              axes=((0.0, 0.0, 1.0), (1.0, -1.0, 0.0))),
+    Universal(
+        name="uni7", bodies=("arm7", "root"), anchor=(0.4, 0.2, 0.1), axes=((0.0, 0.0, 1.0), (1.0, -1.0, 0.0))
+    ),
     Spherical(name="sph7", bodies=("sled", "arm7"), anchor=(0.8, 0.7, 0.2)),
-)  # fmt: skip
+)
 LOADS: tuple[Load, ...] = (
-    Spring(bodies=("sled", "hand"), points=((1.0, 0.9, 0.2), (0.4, 1.0, 0.1)), stiffness=40.0, damping=0.5,
-           natural_length=0.4),
-    Spring(bodies=("ground", "arm"), points=((0.0, 1.5, 0.0), (0.3, 0.6, 0.3)), stiffness=20.0,
-           natural_length=0.3),
+    Spring(
+        bodies=("sled", "hand"),
+        points=((1.0, 0.9, 0.2), (0.4, 1.0, 0.1)),
+        stiffness=40.0,
+        damping=0.5,
+        natural_length=0.4,
+    ),
+    Spring(
+        bodies=("ground", "arm"),
+        points=((0.0, 1.5, 0.0), (0.3, 0.6, 0.3)),
+        stiffness=20.0,
+        natural_length=0.3,
+    ),
     TorsionSpring(joint="cyl", stiffness=3.0, damping=0.1, natural_angle=0.2),
     Force(body="arm7", point=(0.7, 0.5, 0.5), force=(1.0, -2.0, 3.0)),
     Moment(body="hand", moment=(0.3, 0.2, -0.1)),
-)  # fmt: skip
+)
 
 
 def every_joint(**changes) -> Scene:

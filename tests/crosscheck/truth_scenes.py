@@ -15,7 +15,7 @@ from mbref.scene import (
     Spring,
     TorsionSpring,
     Translational,
-)  # fmt: skip
+)
 from mbref.scenes import SCENES
 
 Z = (0.0, 0.0, 1.0)
@@ -41,9 +41,14 @@ def block(**changes):
 def free(**changes):
     """A body with three different moments, spinning near its middle axis."""
     body = Body(
-        name="body", mass=2.0, inertia=(0.2, 0.3, 0.4), position=(1.0, 0.0, 0.0), velocity=(0.0, 2.0, 1.0),
-        angular_velocity=(0.3, 5.0, 0.2), orientation=tuple(rotations.from_vector(np.array([0.3, 0.2, 0.9]))),
-    )  # fmt: skip
+        name="body",
+        mass=2.0,
+        inertia=(0.2, 0.3, 0.4),
+        position=(1.0, 0.0, 0.0),
+        velocity=(0.0, 2.0, 1.0),
+        angular_velocity=(0.3, 5.0, 0.2),
+        orientation=tuple(rotations.from_vector(np.array([0.3, 0.2, 0.9]))),
+    )
     return Scene(**({"name": "free", "body": (body,)} | changes))
 
 
@@ -76,8 +81,7 @@ SPRUNG = {
         )
     ),
     "block_spring": block(
-        gravity=(0.0, -9.81, 0.0),
-        load=(spring("ground", (0, 0, 0), "block", (1.5, 2, 3), 60.0, 2.0),),
+        gravity=(0.0, -9.81, 0.0), load=(spring("ground", (0, 0, 0), "block", (1.5, 2, 3), 60.0, 2.0),)
     ),
     "free_spring": free(
         gravity=(0.0, 0.0, -9.81),
@@ -86,7 +90,7 @@ SPRUNG = {
             Force(body="body", point=(1.0, 0.1, 0.0), force=(0.0, 1.0, 2.0)),
         ),
     ),
-}  # fmt: skip
+}
 CLOSED = tuple(n for n in SCENES if closed_form(SCENES[n]()) is not None)  # others: test_published
 DYNAMIC = {n: SCENES[n]() for n in CLOSED if not SCENES[n]().driver} | SPRUNG
 ALL = (
@@ -119,6 +123,8 @@ def turned_scene(scene, q):
         for b in scene.body
     ]
     return scene.with_(
-        body=tuple(bodies), joint=tuple(map(retyped, scene.joint)), load=tuple(map(retyped, scene.load)),
+        body=tuple(bodies),
+        joint=tuple(map(retyped, scene.joint)),
+        load=tuple(map(retyped, scene.load)),
         gravity=turn(scene.gravity),
-    )  # fmt: skip
+    )

@@ -16,48 +16,122 @@ PAIR = {"bodies": ["leaf", "bolt"]}
 
 # a scene with every kind of joint, driver and load
 EVERYTHING = {
-    "name": "everything", "gravity": [0.0, 0.0, -9.81], "duration": 0.1,
+    "name": "everything",
+    "gravity": [0.0, 0.0, -9.81],
+    "duration": 0.1,
     "body": [
         {"name": "leaf", "mass": 2.0, "inertia": [1.0, 1.0, 1.0], "position": [0.5, 0.0, 0.0]},
-        {"name": "bolt", "mass": 1.0, "inertia": [[1.0, 0.1, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1.2]],
-         "position": [1.0, 0.0, 0.0], "velocity": [0.0, 0.0, 0.0], "angular_velocity": [0.0, 0.0, 0.0]},
+        {
+            "name": "bolt",
+            "mass": 1.0,
+            "inertia": [[1.0, 0.1, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1.2]],
+            "position": [1.0, 0.0, 0.0],
+            "velocity": [0.0, 0.0, 0.0],
+            "angular_velocity": [0.0, 0.0, 0.0],
+        },
         {"name": "ball", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "position": [1.0, 1.0, 0.0]},
         {"name": "slide", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "position": [0.0, 1.0, 0.0]},
-        {"name": "tube", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "position": [0.0, 2.0, 0.0],
-         "orientation": [0.6, 0.8, 0.0, 0.0]},
+        {
+            "name": "tube",
+            "mass": 1.0,
+            "inertia": [1.0, 1.0, 1.0],
+            "position": [0.0, 2.0, 0.0],
+            "orientation": [0.6, 0.8, 0.0, 0.0],
+        },
     ],
     "joint": [
         {"name": "r", "type": "revolute", "bodies": ["ground", "leaf"], **AXIS},
-        {"name": "u", "type": "universal", **PAIR, "anchor": [1.0, 0.0, 0.0],
-         "axes": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]},
+        {
+            "name": "u",
+            "type": "universal",
+            **PAIR,
+            "anchor": [1.0, 0.0, 0.0],
+            "axes": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+        },
         {"name": "s", "type": "spherical", "bodies": ["bolt", "ball"], "anchor": [1.0, 0.5, 0.0]},
         {"name": "t", "type": "translational", "bodies": ["ground", "slide"], **AXIS},
         {"name": "c", "type": "cylindrical", "bodies": ["slide", "tube"], **AXIS},
-        {"name": "d", "type": "distance", "bodies": ["ball", "slide"],
-         "anchors": [[1.0, 1.0, 0.0], [0.0, 1.0, 0.5]]},
+        {
+            "name": "d",
+            "type": "distance",
+            "bodies": ["ball", "slide"],
+            "anchors": [[1.0, 1.0, 0.0], [0.0, 1.0, 0.5]],
+        },
     ],
     "driver": [
-        {"joint": "r", "polynomial": [0.0, 0.5],
-         "sine": {"amplitude": 0.1, "frequency": 2.0, "phase": 0.0}},
+        {"joint": "r", "polynomial": [0.0, 0.5], "sine": {"amplitude": 0.1, "frequency": 2.0, "phase": 0.0}}
     ],
     "load": [
         {"type": "moment", "body": "leaf", "moment": [0.0, 0.0, 1.0]},
         {"type": "force", "body": "ball", "point": [1.0, 1.0, 0.2], "force": [0.0, 1.0, 0.0]},
-        {"type": "spring", **PAIR, "points": [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], "stiffness": 5.0,
-         "natural_length": 0.5},
+        {
+            "type": "spring",
+            **PAIR,
+            "points": [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]],
+            "stiffness": 5.0,
+            "natural_length": 0.5,
+        },
         {"type": "torsion_spring", "joint": "c", "stiffness": 2.0, "damping": 0.1, "natural_angle": 1.0},
     ],
-}  # fmt: skip
+}
 
 NUMBERS = (
-    0, 1, -1, 2**63, -(2**63) - 1, 10**400, 0.0, -0.0, 1e-5, 1e5, -1e5, 1e-12, 1e12, 1e-100, 1e100, -1e100,
-    1e-200, 1e200, -1e200, 5e-324, 2.2e-308, 1.7e308, -1.7e308, float("inf"), float("-inf"), float("nan"),
-)  # fmt: skip
+    0,
+    1,
+    -1,
+    2**63,
+    -(2**63) - 1,
+    10**400,
+    0.0,
+    -0.0,
+    1e-5,
+    1e5,
+    -1e5,
+    1e-12,
+    1e12,
+    1e-100,
+    1e100,
+    -1e100,
+    1e-200,
+    1e200,
+    -1e200,
+    5e-324,
+    2.2e-308,
+    1.7e308,
+    -1.7e308,
+    float("inf"),
+    float("-inf"),
+    float("nan"),
+)
 WORDS = (
-    "", " ", "ground", "the fixed frame", "leaf", "r", "fixed", "revolute", "spherical", "universal",
-    "a\nb", "[red]x[/]", "[/nothing]", "$x_1$", "../../up", "a/b", "<b>&amp;</b>", "a|b", "x" * 5000, "ü",
-    "\u202e", "\x00", "1.0", "nan", "body", "{0}", "%s",
-)  # fmt: skip
+    "",
+    " ",
+    "ground",
+    "the fixed frame",
+    "leaf",
+    "r",
+    "fixed",
+    "revolute",
+    "spherical",
+    "universal",
+    "a\nb",
+    "[red]x[/]",
+    "[/nothing]",
+    "$x_1$",
+    "../../up",
+    "a/b",
+    "<b>&amp;</b>",
+    "a|b",
+    "x" * 5000,
+    "ü",
+    "\u202e",
+    "\x00",
+    "1.0",
+    "nan",
+    "body",
+    "{0}",
+    "%s",
+)
 
 
 def strange(draw: random.Random) -> Any:
@@ -65,11 +139,27 @@ def strange(draw: random.Random) -> Any:
     deep: Any = 1.0
     for _ in range(draw.choice((3, 50, 3000))):
         deep = [deep]
-    return draw.choice([
-        draw.choice(NUMBERS), draw.choice(NUMBERS), draw.choice(WORDS), True, False, [], {}, [[]], deep,
-        {"a": 1}, [{}], [1.0, 2.0], [draw.choice(NUMBERS)] * 3, [[draw.choice(NUMBERS)] * 3] * 3,
-        date(2020, 1, 1), [1.0, "x", 2.0], [draw.uniform(-2, 2) for _ in range(3)],
-    ])  # fmt: skip
+    return draw.choice(
+        [
+            draw.choice(NUMBERS),
+            draw.choice(NUMBERS),
+            draw.choice(WORDS),
+            True,
+            False,
+            [],
+            {},
+            [[]],
+            deep,
+            {"a": 1},
+            [{}],
+            [1.0, 2.0],
+            [draw.choice(NUMBERS)] * 3,
+            [[draw.choice(NUMBERS)] * 3] * 3,
+            date(2020, 1, 1),
+            [1.0, "x", 2.0],
+            [draw.uniform(-2, 2) for _ in range(3)],
+        ]
+    )
 
 
 def base(draw: random.Random) -> dict[str, Any]:
@@ -140,25 +230,63 @@ def _smudged(draw: random.Random, text: bytes) -> bytes:
     for _ in range(draw.randint(1, 3)):
         a, b = sorted(draw.randrange(len(text) + 1) for _ in range(2))
         b = min(b, a + 40)
-        piece = draw.choice((
-            b"", b"\xef\xbb\xbf", b"\xff\xfe", b"\x00", b"=", b"[", b"]" * 3, b"[[", b'"', b"\r\n", b"#",
-            b"1e9999", b"1" * 5000, b"0x" + b"f" * 400, b"[" * 4000, b"{a=" * 2000, text[a:b],
-            bytes([draw.randrange(256)]),
-            b"\nname = 1\n", b"\n[[body]]\n", b"\n[body]\n", b"1979-05-27", b"'''", b"\\u0000", b"\\ud800",
-        ))  # fmt: skip
+        piece = draw.choice(
+            (
+                b"",
+                b"\xef\xbb\xbf",
+                b"\xff\xfe",
+                b"\x00",
+                b"=",
+                b"[",
+                b"]" * 3,
+                b"[[",
+                b'"',
+                b"\r\n",
+                b"#",
+                b"1e9999",
+                b"1" * 5000,
+                b"0x" + b"f" * 400,
+                b"[" * 4000,
+                b"{a=" * 2000,
+                text[a:b],
+                bytes([draw.randrange(256)]),
+                b"\nname = 1\n",
+                b"\n[[body]]\n",
+                b"\n[body]\n",
+                b"1979-05-27",
+                b"'''",
+                b"\\u0000",
+                b"\\ud800",
+            )
+        )
         text = text[:a] + piece + text[b if draw.random() < 0.5 else a :]
     return text if text else b" "
 
 
 METHODS = (
-    "alf-dual+projection", "alf-dual+projection", "alf+projection/adams", "lm1+baumgarte", "lm1+none/rk4",
-    "mpi-svd+partitioning", "kinematic", "taylor",
-)  # fmt: skip
+    "alf-dual+projection",
+    "alf-dual+projection",
+    "alf+projection/adams",
+    "lm1+baumgarte",
+    "lm1+none/rk4",
+    "mpi-svd+partitioning",
+    "kinematic",
+    "taylor",
+)
 OPTIONS = ("alpha", "beta", "step", "max_order", "omega", "mu", "kept", "iterations", "", "nothing")
 LIMITS = (
-    "rtol", "atol", "rank_tolerance", "violation", "first_step", "smallest_step", "forced_step",
-    "largest_step", "largest_turn", "most_steps", "code",
-)  # fmt: skip
+    "rtol",
+    "atol",
+    "rank_tolerance",
+    "violation",
+    "first_step",
+    "smallest_step",
+    "forced_step",
+    "largest_step",
+    "largest_turn",
+    "most_steps",
+    "code",
+)
 PATHS = ("body[0].mass", "gravity[1]", "joint[0].anchor[2]", "body[", "x", "")
 CODES = ("auto", "generic", "generated")
 RATHER = (1e-3, 1e-6, 1e-9, 1e-12, 0.01, 0.1, 0.5, 1, 100)  # numbers that a user may well give
@@ -202,15 +330,25 @@ def times(draw: random.Random) -> list[Any]:
 def option_words(draw: random.Random) -> list[str]:
     """Words of a command line after its command and scene."""
     pairs = {
-        "--method": method, "--rtol": number, "--duration": number, "--samples": number, "--max-step": number,
-        "--times": lambda draw: ",".join(map(str, times(draw))), "--code": lambda d: d.choice(("auto", "x")),
+        "--method": method,
+        "--rtol": number,
+        "--duration": number,
+        "--samples": number,
+        "--max-step": number,
+        "--times": lambda draw: ",".join(map(str, times(draw))),
+        "--code": lambda d: d.choice(("auto", "x")),
         "--vary": lambda d: f"{d.choice(PATHS)}={number(d)}:{number(d)}",
-        "--count": number, "--seed": number, "--workers": lambda d: d.choice(("1", "0", "-1", "x")),
+        "--count": number,
+        "--seed": number,
+        "--workers": lambda d: d.choice(("1", "0", "-1", "x")),
         "--engine": lambda d: d.choice(("mbref", "nothing", "a:b", "os:path", ":", "mbref:x", "..")),
-        "--setting": lambda d: d.choice(("kinematic", "x", "")), "--time-limit": number, "--scene": str,
+        "--setting": lambda d: d.choice(("kinematic", "x", "")),
+        "--time-limit": number,
+        "--scene": str,
         "--out": lambda d: d.choice(("scene.toml", "runs.jsonl", "", "no/such", "/", "x" * 300)),
-        "--repeats": number, "--section": lambda d: d.choice(("x", "", "../..")),
-    }  # fmt: skip
+        "--repeats": number,
+        "--section": lambda d: d.choice(("x", "", "../..")),
+    }
     words = ["--samples", "3", "--duration", "0.01"] if draw.random() < 0.7 else []
     for name in draw.sample(sorted(pairs), draw.choice((0, 1, 1, 2, 3))):
         words += [name, str(pairs[name](draw))]

@@ -32,7 +32,8 @@ def rail(point: tuple[float, float, float], stiffness: float = 20.0, inertia: fl
     """A slide on an arm, pulled by a spring at a point that may turn both out of their plane."""
     body = {"mass": 1.0, "position": (0.3, 0.0, 0.0)}
     return Scene(
-        name="rail", duration=0.5,
+        name="rail",
+        duration=0.5,
         body=(
             Body(name="arm", mass=1.0, inertia=(0.01, 0.02, 0.02), position=(0.1, 0.0, 0.0)),
             Body(name="slide", inertia=(inertia, inertia, inertia), **body),
@@ -42,11 +43,15 @@ def rail(point: tuple[float, float, float], stiffness: float = 20.0, inertia: fl
             Translational(name="guide", bodies=("arm", "slide"), anchor=(0.3, 0.0, 0.0), axis=X),
         ),
         load=(
-            Spring(bodies=("ground", "slide"), points=((0.3, 0.5, point[2]), (0.3, 0.0, 0.0)),
-                   stiffness=stiffness, natural_length=0.3),
+            Spring(
+                bodies=("ground", "slide"),
+                points=((0.3, 0.5, point[2]), (0.3, 0.0, 0.0)),
+                stiffness=stiffness,
+                natural_length=0.3,
+            ),
             Force(body="slide", point=(0.3, 0.0, 0.0), force=point),
         ),
-    )  # fmt: skip
+    )
 
 
 NUMBERS_DECIDE = {

@@ -139,9 +139,10 @@ def test_reactions_of_a_tree_are_open_nowhere():
 def straight_arch(offset: float = 0.0) -> Scene:
     """Two equal links between fixed hinges, in line where the offset (m) of the hinge between them is 0."""
     hinges = (
-        ("A", GROUND, "left", -1.0, 0.0), ("B", "left", "right", 0.0, offset),
+        ("A", GROUND, "left", -1.0, 0.0),
+        ("B", "left", "right", 0.0, offset),
         ("C", "right", GROUND, 1.0, 0.0),
-    )  # fmt: skip
+    )
     body = tuple(
         Body(name=name, mass=1.0, inertia=(0.1,) * 3, position=(x, 0.5 * offset, 0.0))
         for name, x in (("left", -0.5), ("right", 0.5))

@@ -44,8 +44,14 @@ def driven(t: float) -> tuple[float, float, float]:
 @pytest.mark.parametrize("t", [0.0, 0.3, 1.7])
 def test_body_on_a_driven_hinge(t: float):
     hinge = Revolute(name="J", bodies=("ground", "ball"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
-    model = Model(Scene(name="s", body=(BALL,), joint=(hinge,),
-                        driver=(Driver(joint="J", polynomial=POLYNOMIAL, sine=SINE),)))  # fmt: skip
+    model = Model(
+        Scene(
+            name="s",
+            body=(BALL,),
+            joint=(hinge,),
+            driver=(Driver(joint="J", polynomial=POLYNOMIAL, sine=SINE),),
+        )
+    )
     angle, rate, acceleration = driven(t)
     c, s = math.cos(angle), math.sin(angle)
     q = np.array([c, s, 0.0, math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2)])
@@ -60,8 +66,14 @@ def test_body_on_a_driven_hinge(t: float):
 @pytest.mark.parametrize("t", [0.0, 0.3, 1.7])
 def test_body_on_a_driven_slide(t: float):
     slide = Translational(name="J", bodies=("ground", "ball"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 3.0, 4.0))
-    model = Model(Scene(name="s", body=(BALL,), joint=(slide,),
-                        driver=(Driver(joint="J", polynomial=POLYNOMIAL, sine=SINE),)))  # fmt: skip
+    model = Model(
+        Scene(
+            name="s",
+            body=(BALL,),
+            joint=(slide,),
+            driver=(Driver(joint="J", polynomial=POLYNOMIAL, sine=SINE),),
+        )
+    )
     along, still = np.array([0.0, 0.6, 0.8, 0.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
     value, rate, acceleration = driven(t)
     q = still + value * np.append(along, 0.0)
@@ -71,11 +83,16 @@ def test_body_on_a_driven_slide(t: float):
     assert np.abs(terms.jacobian @ (acceleration * along) - terms.gamma).max() < 1e-14
 
 
-@pytest.mark.parametrize(("rows", "negative"), [
-    ([[2.0, 1.0], [1.0, 3.0]], False), ([[0.0, 1.0], [1.0, 0.0]], True), ([[1.0, 2.0], [2.0, 1.0]], True),
-    ([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]], False),
-    ([[-1.0, 5.0, 2.0], [0.0, 2.0, 7.0], [0.0, 0.0, 3.0]], True),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("rows", "negative"),
+    [
+        ([[2.0, 1.0], [1.0, 3.0]], False),
+        ([[0.0, 1.0], [1.0, 0.0]], True),
+        ([[1.0, 2.0], [2.0, 1.0]], True),
+        ([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]], False),
+        ([[-1.0, 5.0, 2.0], [0.0, 2.0, 7.0], [0.0, 0.0, 3.0]], True),
+    ],
+)
 def test_the_sign_of_a_determinant(rows, negative):
     sign, size = determinant(np.array(rows), len(rows))
     assert sign == negative and np.exp(size) == pytest.approx(abs(np.linalg.det(rows)))
@@ -90,8 +107,16 @@ def test_the_product_of_pivots(pivots):
 
 def test_cost_that_a_run_prints(capsys):
     cost = Cost(1.25, 2.5, steps=11, rejected=22, rhs=33, factorisations=44, newton=55)
-    none = Trajectory.failed(scene="s", engine="e", version="1", method="m", settings={}, bodies=("ball",),
-                             outcome=Outcome.TIMED_OUT, message="")  # fmt: skip
+    none = Trajectory.failed(
+        scene="s",
+        engine="e",
+        version="1",
+        method="m",
+        settings={},
+        bodies=("ball",),
+        outcome=Outcome.TIMED_OUT,
+        message="",
+    )
     show(Scene(name="s", body=(BALL,)), replace(none, cost=cost))
     assert capsys.readouterr().out.splitlines()[1:] == [
         "11 steps, 22 rejected, 33 evaluations",
@@ -126,8 +151,13 @@ def test_force_beside_the_centre_and_moment():
 
 def test_damped_spring_between_ground_and_body():
     """Stretched by 0.5 m and growing at 2 m/s, it pulls back with 10 · 0.5 + 3 · 2 N."""
-    spring = Spring(bodies=("ground", "ball"), points=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), stiffness=10.0,
-                    damping=3.0, natural_length=0.5)  # fmt: skip
+    spring = Spring(
+        bodies=("ground", "ball"),
+        points=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        stiffness=10.0,
+        damping=3.0,
+        natural_length=0.5,
+    )
     assert force_of(spring, velocity=(2.0, 0.0, 0.0, 0.0, 0.0, 0.0)) == pytest.approx([-11.0, 0, 0, 0, 0, 0])
     other = spring.model_copy(update={"bodies": ("ball", "ground"), "points": spring.points[::-1]})
     assert force_of(other, velocity=(2.0, 0.0, 0.0, 0.0, 0.0, 0.0)) == pytest.approx([-11.0, 0, 0, 0, 0, 0])

@@ -69,10 +69,17 @@ def test_what_is_written_is_read(tmp_path: Path):
     assert os.listdir(tmp_path / "new") == ["a"]
 
 
-@pytest.mark.parametrize("damage", [
-    lambda data: data[:-1], lambda data: data[:10], lambda data: b"", lambda data: data + b"x",
-    lambda data: data[:40] + bytes([data[40] ^ 1]) + data[41:], lambda data: b"something else",
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda data: data[:-1],
+        lambda data: data[:10],
+        lambda data: b"",
+        lambda data: data + b"x",
+        lambda data: data[:40] + bytes([data[40] ^ 1]) + data[41:],
+        lambda data: b"something else",
+    ],
+)
 def test_damaged_files_are_told_and_removed(damage, tmp_path: Path, capsys):
     path = tmp_path / "a"
     checked_file.write(path, b"data " * 10)

@@ -178,8 +178,13 @@ def test_a_driver_of_a_locked_loop_is_told_at_the_start():
 def askew(scene, tilt):
     """The four-bar at rest with a revolute joint B whose axis is tilted by a slope."""
     corner = scene.joint_named("B")
-    revolute = {"name": "B", "type": "revolute", "bodies": corner.bodies, "anchor": corner.anchor_pair[0],
-                "axis": (0.0, tilt, 1.0)}  # fmt: skip
+    revolute = {
+        "name": "B",
+        "type": "revolute",
+        "bodies": corner.bodies,
+        "anchor": corner.anchor_pair[0],
+        "axis": (0.0, tilt, 1.0),
+    }
     at_rest = [body.model_copy(update={"velocity": None, "angular_velocity": None}) for body in scene.body]
     return scene.with_(
         body=at_rest, joint=[revolute if joint.name == "B" else joint for joint in scene.joint]

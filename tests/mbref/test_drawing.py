@@ -87,8 +87,10 @@ def test_names_stay_apart_while_the_mechanism_moves(turning):
 @pytest.mark.parametrize("gap", [0.001, 0.02, 0.05])
 def test_names_of_joints_near_each_other_are_apart(gap):
     """Pins of which the signs touch are named one at a time; pins in one place are named together."""
-    joints = [{"name": f"pin{x:g}", "type": "spherical", "bodies": ("ground", "bar"), "anchor": (x, 0, 0)}
-              for x in (0.0, gap, 1.0)]  # fmt: skip
+    joints = [
+        {"name": f"pin{x:g}", "type": "spherical", "bodies": ("ground", "bar"), "anchor": (x, 0, 0)}
+        for x in (0.0, gap, 1.0)
+    ]
     found = labels(still(Scene(name="near", body=[{"name": "bar", "position": (0.5, 0, 0)}], joint=joints)))
     assert not covered(found) and len(found) == (3 if gap < 0.01 else 4), found
 
@@ -102,9 +104,14 @@ def test_joints_at_one_place_are_named_together():
 def test_names_of_bars_that_cross_at_their_middles_are_apart():
     corners = {"rising": (1.0, 1.0, 0.0), "falling": (1.0, -1.0, 0.0)}
     joints: list[dict[str, object]] = [
-        {"name": "pin", "type": "revolute", "bodies": ("rising", "falling"),
-         "anchor": (0, 0, 0), "axis": (0, 0, 1)}
-    ]  # fmt: skip
+        {
+            "name": "pin",
+            "type": "revolute",
+            "bodies": ("rising", "falling"),
+            "anchor": (0, 0, 0),
+            "axis": (0, 0, 1),
+        }
+    ]
     for name, (x, y, _) in corners.items():
         for sign in (-1, 1):
             end, ball = (sign * x, sign * y, 0.0), f"{name}{sign}"
@@ -116,9 +123,10 @@ def test_names_of_bars_that_cross_at_their_middles_are_apart():
 def test_bars_keep_their_length_in_a_moving_picture(turning):
     scene, motion = turning
     lines = [
-        node for node in ET.fromstring(moving(scene, motion)).find(f"{SVG}g").iter(f"{SVG}polyline")
+        node
+        for node in ET.fromstring(moving(scene, motion)).find(f"{SVG}g").iter(f"{SVG}polyline")
         if node.get("stroke-width") == "6"
-    ]  # fmt: skip
+    ]
     assert len(lines) == len(scene.body)
     for line in lines:
         values = line.find(f"{SVG}animate").attrib["values"].split(";")
@@ -165,9 +173,13 @@ def test_motions_side_by_side_share_scale_and_end(turning):
     assert {"whole", "<part>", "again"} <= set(texts(picture)) and root.find(f"{SVG}title").text == "three"
     panels = list(root.find(f"{SVG}g").findall(f"{SVG}svg"))
     frames = [
-        [line.find(f"{SVG}animate").attrib["values"].split(";") for line in panel.iter(f"{SVG}polyline")
-         if line.get("stroke-width") == "6"] for panel in panels
-    ]  # fmt: skip
+        [
+            line.find(f"{SVG}animate").attrib["values"].split(";")
+            for line in panel.iter(f"{SVG}polyline")
+            if line.get("stroke-width") == "6"
+        ]
+        for panel in panels
+    ]
     assert frames[0] == frames[2] and len(frames[0]) == len(scene.body)
     for whole, part in zip(frames[0], frames[1], strict=True):
         assert part[:33] == whole[:33] and set(part[34:]) == {part[-1]}, "it stays at its last sample"
@@ -215,8 +227,12 @@ def test_page_shows_all_points_within_its_margins():
 
 def test_every_joint_type_has_a_sign_and_is_drawn():
     assert set(SIGNS) == set(JOINT_TYPES)
-    ends = {"anchor": [1.0, 0, 0], "anchors": [[1.0, 0, 0], [2.0, 0, 0]], "axis": [0, 0, 1.0],
-            "axes": [[0, 0, 1.0], [0, 1.0, 0]]}  # fmt: skip
+    ends = {
+        "anchor": [1.0, 0, 0],
+        "anchors": [[1.0, 0, 0], [2.0, 0, 0]],
+        "axis": [0, 0, 1.0],
+        "axes": [[0, 0, 1.0], [0, 1.0, 0]],
+    }
     bodies = [{"name": n, "position": [x, 0.2, 0.1]} for n, x in (("a", 0.5), ("b", 1.5))]
     pictures = set()
     for joint in JOINT_TYPES.values():
@@ -233,13 +249,21 @@ def test_every_load_and_driver_changes_the_picture():
         {"type": "force", "body": "rod", "point": [0.5, 0, 0], "force": [0, 1, 0]},
         {"type": "moment", "body": "crank", "moment": [0, 0, -1]},
         {"type": "moment", "body": "crank", "moment": [0, 0, 1]},
-        {"type": "spring", "bodies": ["ground", "slider"], "points": [[1, 0, 0], [0.7, 0, 0]],
-         "stiffness": 1, "natural_length": 1},
+        {
+            "type": "spring",
+            "bodies": ["ground", "slider"],
+            "points": [[1, 0, 0], [0.7, 0, 0]],
+            "stiffness": 1,
+            "natural_length": 1,
+        },
         {"type": "torsion_spring", "joint": "A", "stiffness": 1},
-    ]  # fmt: skip
+    ]
     pictures = {still(scene.with_(load=(load,))) for load in loads}
-    drivers = [{"joint": "A", "polynomial": [0.0, 1.0]}, {"joint": "A", "polynomial": [0.0, -1.0]},
-               {"joint": "D", "polynomial": [0.0, 1.0]}]  # fmt: skip
+    drivers = [
+        {"joint": "A", "polynomial": [0.0, 1.0]},
+        {"joint": "A", "polynomial": [0.0, -1.0]},
+        {"joint": "D", "polynomial": [0.0, 1.0]},
+    ]
     pictures |= {still(scene.with_(driver=(driver,))) for driver in drivers} | {still(scene)}
     assert len(pictures) == 9
 

@@ -59,9 +59,11 @@ def test_accelerations_between_singular_positions_are_exact(code):
     base, rate, shift = slider_crank(0.308, 0.308, 0.3, "off_axes"), -5.8, (0.09, -0.12, 0.3)
     a, b, c, d = base.joint
     joints = (
-        a, b, Revolute(name="C", bodies=c.bodies, anchor=c.anchor, axis=Z),
+        a,
+        b,
+        Revolute(name="C", bodies=c.bodies, anchor=c.anchor, axis=Z),
         Cylindrical(name="D", bodies=d.bodies, anchor=d.anchor, axis=d.axis),
-    )  # fmt: skip
+    )
     bodies = [
         body.model_copy(update={"position": tuple(np.add(body.position, shift).tolist())})
         for body in base.body

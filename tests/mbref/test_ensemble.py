@@ -157,10 +157,20 @@ def test_command_tells_why_variants_end_early(tmp_path: Path, capsys: pytest.Cap
     driver = Driver(joint="A", polynomial=(0.0, 3.0))
     SCENES["four_bar_gravity"]().with_(driver=(driver,), duration=2.0).save(tmp_path / "driven.toml")
     x = SCENES["four_bar_gravity"]().joint_named("C").anchor_pair[0][0]
-    status = main([
-        "ensemble", str(tmp_path / "driven.toml"), "--vary", f"joint[C].anchor[0]={x + 0.04}:{x + 0.06}",
-        "--count", "2", "--workers", "1", "--method", "taylor",
-    ])  # fmt: skip
+    status = main(
+        [
+            "ensemble",
+            str(tmp_path / "driven.toml"),
+            "--vary",
+            f"joint[C].anchor[0]={x + 0.04}:{x + 0.06}",
+            "--count",
+            "2",
+            "--workers",
+            "1",
+            "--method",
+            "taylor",
+        ]
+    )
     printed = capsys.readouterr()
     assert status == 1 and "0 of 2 variants completed" in printed.out, printed
     assert printed.err.startswith("UNDECIDED: 2, the first of them variant 0: the drivers come to a dead"), (
@@ -170,10 +180,25 @@ def test_command_tells_why_variants_end_early(tmp_path: Path, capsys: pytest.Cap
 
 def test_command_and_single_runs_agree(tmp_path: Path, capsys: pytest.CaptureFixture):
     path = tmp_path / "runs.jsonl"
-    status = main([
-        "ensemble", "spatial_slider_crank_driven", "--vary", "joint[B].anchor[0]=0.1+-1e-3", "--count", "4",
-        "--times", "0.01", "--rtol", "1e-8", "--workers", "1", "--out", str(path), "--json",
-    ])  # fmt: skip
+    status = main(
+        [
+            "ensemble",
+            "spatial_slider_crank_driven",
+            "--vary",
+            "joint[B].anchor[0]=0.1+-1e-3",
+            "--count",
+            "4",
+            "--times",
+            "0.01",
+            "--rtol",
+            "1e-8",
+            "--workers",
+            "1",
+            "--out",
+            str(path),
+            "--json",
+        ]
+    )
     printed = json.loads(capsys.readouterr().out)
     assert (status, printed["completed"]) == (0, 4)
     runs = [simulate(s, METHOD, [0.01], LIMITS) for s in variants(DRIVEN, VARY[:1], 4)]
@@ -181,8 +206,24 @@ def test_command_and_single_runs_agree(tmp_path: Path, capsys: pytest.CaptureFix
     assert np.allclose(printed["mean_position"]["slider"], places.mean(axis=0), rtol=0, atol=1e-13)
     assert np.allclose(printed["deviation_position"]["slider"], places.std(axis=0), rtol=0, atol=1e-13)
     assert len(path.read_text().splitlines()) == 4
-    main(["ensemble", "spatial_slider_crank_driven", "--vary", "joint[B].anchor[0]=0.1+-1e-3", "--count", "4",
-          "--times", "0.01", "--rtol", "1e-8", "--workers", "1", "--out", str(path)])  # fmt: skip
+    main(
+        [
+            "ensemble",
+            "spatial_slider_crank_driven",
+            "--vary",
+            "joint[B].anchor[0]=0.1+-1e-3",
+            "--count",
+            "4",
+            "--times",
+            "0.01",
+            "--rtol",
+            "1e-8",
+            "--workers",
+            "1",
+            "--out",
+            str(path),
+        ]
+    )
     assert "4 of 4 variants completed" in (said := capsys.readouterr().out) and "runs a second" in said
 
 
@@ -253,9 +294,9 @@ def test_scenes_that_come_slowly_do_not_wait_for_others(monkeypatch: pytest.Monk
 
 def test_runs_before_a_faulty_scene_are_handed_out():
     scenes = list(variants(DRIVEN, VARY, 30))
-    scenes[25] = scenes[25].with_(driver=(), body=tuple(
-        body.model_copy(update={"mass": None, "inertia": None}) for body in DRIVEN.body
-    ))  # fmt: skip
+    scenes[25] = scenes[25].with_(
+        driver=(), body=tuple(body.model_copy(update={"mass": None, "inertia": None}) for body in DRIVEN.body)
+    )
     found: list[int] = []
     with ThreadPoolExecutor(1) as one, pytest.raises(SceneError):
         found.extend(k for k, _ in ensemble(scenes, TIMES, METHOD, Limits(rtol=1e-3), one))

@@ -118,8 +118,15 @@ def real_system(name):
     return model.mass, terms.jacobian, terms.force, terms.gamma
 
 
-REAL = ("four_bar", "five_bar", "spatial_slider_crank", "spatial_slider_crank_driven", "planar_slider_crank",
-        "planar_slider_crank_gravity", "four_bar_gravity")  # fmt: skip
+REAL = (
+    "four_bar",
+    "five_bar",
+    "spatial_slider_crank",
+    "spatial_slider_crank_driven",
+    "planar_slider_crank",
+    "planar_slider_crank_gravity",
+    "four_bar_gravity",
+)
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS.values(), ids=FORMULATIONS)

@@ -25,9 +25,13 @@ from mbref.trajectory import Outcome
 TAYLOR = Method.parse("taylor")
 ORDER_16 = Method.parse("taylor[order=16]")
 MECHANISMS = (
-    "planar_slider_crank", "spatial_slider_crank", "spatial_slider_crank_driven", "bricard",
-    "slider_crank_chain", "heavy_top",
-)  # fmt: skip
+    "planar_slider_crank",
+    "spatial_slider_crank",
+    "spatial_slider_crank_driven",
+    "bricard",
+    "slider_crank_chain",
+    "heavy_top",
+)
 
 
 def terms(scene, code):
@@ -88,10 +92,14 @@ def test_terms_of_random_mechanisms_are_those_of_the_kernels(seed):
 @pytest.mark.parametrize(
     ("name", "duration"),
     (
-        ("spatial_slider_crank", 0.02), ("spatial_slider_crank_gravity", 0.1), ("four_bar_gravity", 0.05),
-        ("sarrus", 0.05), ("bricard", 0.05), ("bennett", 0.05),
+        ("spatial_slider_crank", 0.02),
+        ("spatial_slider_crank_gravity", 0.1),
+        ("four_bar_gravity", 0.05),
+        ("sarrus", 0.05),
+        ("bricard", 0.05),
+        ("bennett", 0.05),
     ),
-)  # fmt: skip
+)
 def test_power_gives_the_terms_of_one_freedom(name, duration):
     """With constant moments, rows that depend on others, variables in several blocks; most start at rest, the
     duration ago, which is how far the terms can be told."""

@@ -32,26 +32,33 @@ def oblique(body):
 
 
 RAIL = Scene(
-    name="rail", body=(block("slide", 0.0),), joint=(guide("guide", ("ground", "slide"), 0.0),),
-    load=(oblique("slide"),), **GRAVITY,
-)  # fmt: skip
+    name="rail",
+    body=(block("slide", 0.0),),
+    joint=(guide("guide", ("ground", "slide"), 0.0),),
+    load=(oblique("slide"),),
+    **GRAVITY,
+)
 TWO_GUIDES = RAIL.with_(name="two_guides", joint=(*RAIL.joint, guide("other", ("ground", "slide"), 0.4)))
 SLEEVE = Scene(
-    name="sleeve", body=(block("arm", 0.1), block("sleeve", 0.3)),
+    name="sleeve",
+    body=(block("arm", 0.1), block("sleeve", 0.3)),
     joint=(
         Revolute(name="pin", bodies=("ground", "arm"), anchor=ORIGIN, axis=Z),
         guide("guide", ("arm", "sleeve"), 0.3),
     ),
-    load=(oblique("sleeve"),), **GRAVITY,
-)  # fmt: skip
+    load=(oblique("sleeve"),),
+    **GRAVITY,
+)
 WELD = Scene(
-    name="weld", body=(block("a", 0.0), block("b", 1.0)),
+    name="weld",
+    body=(block("a", 0.0), block("b", 1.0)),
     joint=(
         Fixed(name="root", bodies=("ground", "a"), anchor=ORIGIN),
         Fixed(name="tip", bodies=("a", "b"), anchor=(0.5, 0.0, 0.0)),
     ),
-    load=(oblique("b"),), **GRAVITY,
-)  # fmt: skip
+    load=(oblique("b"),),
+    **GRAVITY,
+)
 
 
 def held(scene):
@@ -176,14 +183,16 @@ def test_motion_and_reactions_are_those_of_all_equations_solved_together(scene):
 def test_a_driver_that_works_against_what_would_be_held_is_not_passed_over():
     """Its rate is zero at the start, which is therefore consistent."""
     scene = Scene(
-        name="against", body=(block("a", 0.0), block("b", 1.0)),
+        name="against",
+        body=(block("a", 0.0), block("b", 1.0)),
         joint=(
             Revolute(name="p", bodies=("ground", "a"), anchor=ORIGIN, axis=Z),
             Fixed(name="w", bodies=("ground", "a"), anchor=ORIGIN),
             Revolute(name="r", bodies=("a", "b"), anchor=(0.5, 0.0, 0.0), axis=Z),
         ),
-        driver=(Driver(joint="p", polynomial=(0.0, 0.0, 5.0)),), **GRAVITY,
-    )  # fmt: skip
+        driver=(Driver(joint="p", polynomial=(0.0, 0.0, 5.0)),),
+        **GRAVITY,
+    )
     run = simulate(scene, METHOD, [0.0, 0.2])
     assert run.outcome.name != "COMPLETED", "the driver cannot turn what is welded"
 

@@ -145,13 +145,14 @@ def crank_acceleration(q, rate):
 REDUCED = {
     "oscillator": (oscillator_error, lambda x, _: -4 * (x - 0.7), (1.0, 0.0), 20.0, displacement(20.0)),
     "pendulum": (
-        pendulum_error, lambda phi, _: -2 * 9.81 / 2.7 * np.sin(phi), (np.pi / 2, 0.0), 10.0,
+        pendulum_error,
+        lambda phi, _: -2 * 9.81 / 2.7 * np.sin(phi),
+        (np.pi / 2, 0.0),
+        10.0,
         pendulum_angle(10.0),
     ),
-    "crank": (
-        crank_error, crank_acceleration, (0.0, 30.0), 0.25, CRANK_TRUTH._reduced([0.25])[0][0],
-    ),
-}  # fmt: skip
+    "crank": (crank_error, crank_acceleration, (0.0, 30.0), 0.25, CRANK_TRUTH._reduced([0.25])[0][0]),
+}
 
 
 def scipy_run(code, acceleration, start, end, exact, rtol):

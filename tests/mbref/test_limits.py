@@ -11,9 +11,16 @@ from mbref.simulation.limits import Limits
 from mbref.simulation.simulate import simulate
 
 NUMBERS = (
-    "rtol", "atol", "rank_tolerance", "violation", "first_step", "smallest_step", "forced_step",
-    "largest_step", "largest_turn",
-)  # fmt: skip
+    "rtol",
+    "atol",
+    "rank_tolerance",
+    "violation",
+    "first_step",
+    "smallest_step",
+    "forced_step",
+    "largest_step",
+    "largest_turn",
+)
 
 
 @pytest.mark.parametrize("value", [-1.0, math.nan, math.inf, 5e-324, 10**400, "1", True, [1.0]], ids=repr)

@@ -100,8 +100,14 @@ def test_energy_is_kept_by_gravity_alone():
 def test_energy_of_a_tumbling_body_is_that_of_its_principal_axes():
     """1/2 (A p² + B q² + C r²) with the rates about its own axes, which the spin leaves as it is."""
     moments, spin, turn = np.array([1.0, 2.0, 2.5]), np.array([3.0, 0.4, -1.0]), (0.5, -0.5, 0.5, 0.5)
-    body = Body(name="top", mass=2.0, inertia=tuple(moments), position=(0.0, 0.0, 0.0), orientation=turn,
-                angular_velocity=spin)  # fmt: skip
+    body = Body(
+        name="top",
+        mass=2.0,
+        inertia=tuple(moments),
+        position=(0.0, 0.0, 0.0),
+        orientation=turn,
+        angular_velocity=spin,
+    )
     motion = simulate(Scene(name="top", body=(body,)), times=TIMES * 20, limits=Limits(rtol=1e-11))
     own = np.array([-spin[2], -spin[0], spin[1]])  # the quaternion turns x to -z, y to -x and z to y
     assert motion.kinetic_energy[0] == pytest.approx(moments @ own**2 / 2, rel=1e-14)
@@ -155,8 +161,11 @@ def test_plot_has_a_panel_for_each_quantity(crank):
     axes = crank.plot("slider.position.x", "rod.position", "A.angle").axes
     assert [a.get_ylabel() for a in axes] == ["position, m", "angle, rad"]
     assert [line.get_label() for line in axes[0].lines] == [
-        "slider.position.x", "rod.position.x", "rod.position.y", "rod.position.z",
-    ]  # fmt: skip
+        "slider.position.x",
+        "rod.position.x",
+        "rod.position.y",
+        "rod.position.z",
+    ]
     assert (axes[1].lines[0].get_ydata() == crank.joint("A").angle).all()
     with pytest.raises(ValueError, match=r"no column 'slider\.colour'"):
         crank.plot("slider.colour")
@@ -170,10 +179,19 @@ def test_panels_of_a_plot_have_the_units_of_their_quantities(crank):
     names = [f"rod.{quantity}.x" for quantity in quantities]
     names += ["rod.orientation.w", "A.angle", "A.rate", "D.displacement", "A.force.x", "A.moment.z", "energy"]
     assert [axes.get_ylabel() for axes in crank.plot(*names).axes] == [
-        "position, m", "velocity, m/s", "angular velocity, rad/s", "acceleration, m/s²",
-        "angular acceleration, rad/s²", "orientation", "angle, rad", "rate, rad/s", "displacement, m",
-        "force, N", "moment, N m", "energy, J",
-    ]  # fmt: skip
+        "position, m",
+        "velocity, m/s",
+        "angular velocity, rad/s",
+        "acceleration, m/s²",
+        "angular acceleration, rad/s²",
+        "orientation",
+        "angle, rad",
+        "rate, rad/s",
+        "displacement, m",
+        "force, N",
+        "moment, N m",
+        "energy, J",
+    ]
 
 
 def test_without_names_joints_and_energy_are_plotted(crank):

@@ -19,10 +19,12 @@ def flat_parallelogram(moment: float) -> Scene:
     hinges = tuple(
         Revolute(name=name, bodies=pair, anchor=(x, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
         for name, pair, x in (
-            ("A", (GROUND, "left"), 0.0), ("D", (GROUND, "right"), 2.0),
-            ("B", ("left", "coupler"), 1.0), ("C", ("right", "coupler"), 3.0),
+            ("A", (GROUND, "left"), 0.0),
+            ("D", (GROUND, "right"), 2.0),
+            ("B", ("left", "coupler"), 1.0),
+            ("C", ("right", "coupler"), 3.0),
         )
-    )  # fmt: skip
+    )
     push = Moment(body="left", moment=(0.0, 0.0, moment))
     return Scene(name="flat", duration=1.0, body=bodies, joint=hinges, load=(push,))
 

@@ -40,38 +40,55 @@ def line_of(text: str) -> int:
         ("mass = 2.0", "mass = -2.0", "body[rod].mass", "must be positive", "mass = 2.0"),
         ("gravity =", "gravty =", "gravty", "did you mean 'gravity'?", "gravity"),
         ("anchor = [0.2", "ancor = [0.2", "joint[B].ancor", "did you mean 'anchor'?", "anchor = [0.2"),
-        ('"rod", "slider"', '"rood", "slider"', "joint[C].bodies[0]", "did you mean 'rod'?",
-         'bodies = ["rod", "s'),
-        ('type = "translational"', 'type = "translatonal"', "joint[D].type", "did you mean 'translational'?",
-         'type = "translational"'),
+        (
+            '"rod", "slider"',
+            '"rood", "slider"',
+            "joint[C].bodies[0]",
+            "did you mean 'rod'?",
+            'bodies = ["rod", "s',
+        ),
+        (
+            'type = "translational"',
+            'type = "translatonal"',
+            "joint[D].type",
+            "did you mean 'translational'?",
+            'type = "translational"',
+        ),
         ("duration = 2.0", "duration = 0.0", "duration", "must be positive", "duration"),
         ('body = "crank"', 'body = "crnk"', "load[0].body", "did you mean 'crank'?", 'body = "crank"'),
-        ('"ground", "crank"', '"world", "crank"', "joint[A].bodies[0]", "did you mean 'ground'?", 'bodies ='),
-        ('"ground", "crank"', '"ground", "Crank"', "joint[A].bodies[1]", "did you mean 'crank'?", 'bodies ='),
+        ('"ground", "crank"', '"world", "crank"', "joint[A].bodies[0]", "did you mean 'ground'?", "bodies ="),
+        ('"ground", "crank"', '"ground", "Crank"', "joint[A].bodies[1]", "did you mean 'crank'?", "bodies ="),
         ('type = "revolute"', 'type = "hinge"', "joint[A].type", "did you mean 'revolute'?", 'type = "rev'),
-        ("position = [0.5, 0.0, 0.0]", "position = [0.5, 0.0]", "body[rod].position",
-         "must be three numbers, got [0.5, 0.0]", "position = [0.5"),
+        (
+            "position = [0.5, 0.0, 0.0]",
+            "position = [0.5, 0.0]",
+            "body[rod].position",
+            "must be three numbers, got [0.5, 0.0]",
+            "position = [0.5",
+        ),
         ("gravity = [0.0, -9.81, 0.0]", "gravity = -9.81", "gravity", "must be three numbers", "gravity"),
         ("moment = [", "speed = [", "load[0].speed", "known: type, body, moment", "moment = ["),
         ("[[load]]", "[[loads]]", "loads", "did you mean 'load'?", "[[load]]"),
     ],
-)  # fmt: skip
+)
 def test_a_fault_has_its_line_and_a_suggestion(tmp_path, old, new, path, says, line):
     told = [fault for fault in faults(tmp_path, (old, new)) if fault.startswith(f"{path}: ")]
     assert len(told) == 1 and says in told[0] and told[0].endswith(f"(line {line_of(line)})"), told
 
 
 def test_a_driver_of_a_joint_without_a_known_type_is_no_second_fault(tmp_path):
-    found = faults(tmp_path, ('type = "revolute"', 'type = "hinge"'),
-                   ("[[load]]", '[[driver]]\njoint = "A"\n\n[[load]]'))  # fmt: skip
+    found = faults(
+        tmp_path, ('type = "revolute"', 'type = "hinge"'), ("[[load]]", '[[driver]]\njoint = "A"\n\n[[load]]')
+    )
     assert len(found) == 1
 
 
 def test_axes_of_a_universal_joint_are_perpendicular(tmp_path):
     skew = 'type = "universal"\nbodies = ["crank", "rod"]\naxes = [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]'
     text = template().replace('type = "revolute"\nbodies = ["crank", "rod"]', skew)
-    (tmp_path / "my.toml").write_text(text.replace("anchor = [0.2, 0.0, 0.0]\naxis = [0.0, 0.0, 1.0]",
-                                                   "anchor = [0.2, 0.0, 0.0]"))  # fmt: skip
+    (tmp_path / "my.toml").write_text(
+        text.replace("anchor = [0.2, 0.0, 0.0]\naxis = [0.0, 0.0, 1.0]", "anchor = [0.2, 0.0, 0.0]")
+    )
     with pytest.raises(SceneError, match=r"joint\[B\].axes: must be perpendicular, but enclose 45 degrees"):
         Scene.from_file(tmp_path / "my.toml")
 
@@ -190,8 +207,11 @@ def test_the_shipped_schema_is_the_models_and_knows_every_field():
     assert set(shipped["properties"]) == set(Scene.model_fields)
     body = shipped["$defs"]["Body"]["properties"]
     assert "array" in json.dumps(body["inertia"]) and shipped["$defs"]["Revolute"]["required"] == [
-        "name", "bodies", "anchor", "axis",
-    ]  # fmt: skip
+        "name",
+        "bodies",
+        "anchor",
+        "axis",
+    ]
 
 
 def test_new_draw_assemble_and_diagnose(tmp_path, monkeypatch, capsys):
@@ -216,8 +236,16 @@ def test_new_draw_assemble_and_diagnose(tmp_path, monkeypatch, capsys):
 
 def test_diagnose_tells_a_locked_loop_and_drivers_too_many(tmp_path, capsys):
     scene = find_scene("four_bar_gravity").with_(duration=0.1)
-    pins = [{"name": j.name, "type": "revolute", "bodies": j.bodies, "anchor": j.anchor_pair[0],
-             "axis": (0.0, 0.0, 1.0)} for j in scene.joint]  # fmt: skip
+    pins = [
+        {
+            "name": j.name,
+            "type": "revolute",
+            "bodies": j.bodies,
+            "anchor": j.anchor_pair[0],
+            "axis": (0.0, 0.0, 1.0),
+        }
+        for j in scene.joint
+    ]
     scene = scene.with_(joint=pins)
     scene.with_("joint[A].axis", [0.0, 0.1, 1.0]).save(tmp_path / "locked.toml")
     assert main(["diagnose", str(tmp_path / "locked.toml")]) == 0
@@ -264,13 +292,16 @@ def test_animate_shows_branches_side_by_side(tmp_path, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        ("five_bar --duration 0.05", "nowhere up to t = 0.05 s has the motion a choice of branches: "
-         "singular position 1 at t = 0.0125865 s: one branch; singular position 2"),
+        (
+            "five_bar --duration 0.05",
+            "nowhere up to t = 0.05 s has the motion a choice of branches: "
+            "singular position 1 at t = 0.0125865 s: one branch; singular position 2",
+        ),
         ("planar_slider_crank --duration 0.1", "it passes no singular position"),
         ("four_bar --duration 0.05 --crossing 3", "passes 2 singular positions up to t = 0.05 s, got 3"),
         ("planar_slider_crank --duration 0.1 --method mpi-svd+none", "looks for no singular position"),
     ],
-)  # fmt: skip
+)
 def test_animate_says_why_there_are_no_branches(words, told, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["animate", *words.split(), "--branches"]) == 2
@@ -304,5 +335,6 @@ def test_progress_in_a_pipe_is_a_line_every_ten_seconds(capsys):
     for done in (0.1, 0.5, 0.6, 1.5):
         lines(done)
     assert capsys.readouterr().err.splitlines() == [
-        "simulating: 25 %, about 36 s left", "simulating: 75 %, about 10 s left",
-    ]  # fmt: skip
+        "simulating: 25 %, about 36 s left",
+        "simulating: 75 %, about 10 s left",
+    ]

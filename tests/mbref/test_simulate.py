@@ -41,9 +41,12 @@ def completed(scene, method="mpi-svd+projection", times=(0.0, 1.0), limits=FINE)
 
 def one_body(joint, load=(), driver=(), **body):
     return Scene(
-        name="one", body=(Body(name="b", position=(1.0, 0.0, 0.0), **{**ROD, **body}),), joint=joint,
-        load=load, driver=driver,
-    )  # fmt: skip
+        name="one",
+        body=(Body(name="b", position=(1.0, 0.0, 0.0), **{**ROD, **body}),),
+        joint=joint,
+        load=load,
+        driver=driver,
+    )
 
 
 def near(measured, expected, tolerance, what):
@@ -89,9 +92,14 @@ def test_torsion_spring_over_many_turns_and_closed_form():
 
 @pytest.mark.parametrize(
     ("stabilisation", "wound", "asked", "turn"),
-    [("projection", False, 0.0, 0.75), ("projection", True, 0.0, 1.0), ("none", False, 0.0, 1.0),
-     ("projection", True, 2.0, 2.0), ("projection", False, 0.5, 0.5)],
-)  # fmt: skip
+    [
+        ("projection", False, 0.0, 0.75),
+        ("projection", True, 0.0, 1.0),
+        ("none", False, 0.0, 1.0),
+        ("projection", True, 2.0, 2.0),
+        ("projection", False, 0.5, 0.5),
+    ],
+)
 def test_a_step_turns_no_body_farther_than_is_safe_or_asked(stabilisation, wound, asked, turn):
     hinge = Revolute(name="H", bodies=("ground", "b"), anchor=(1, 0, 0), axis=(1, 0, 0))
     spring = (TorsionSpring(joint="H", stiffness=1e-9),) if wound else ()
@@ -130,11 +138,14 @@ def test_drivers_without_masses_follow_their_function(method):
     hinge = Revolute(name="H", bodies=("ground", "arm"), anchor=(0, 0, 0), axis=(0, 0, 1))
     slide = Translational(name="S", bodies=("arm", "block"), anchor=(1, 0, 0), axis=(1, 0, 0))
     scene = Scene(
-        name="arm", body=(Body(name="arm", position=(0.5, 0, 0)), Body(name="block", position=(1, 0, 0))),
+        name="arm",
+        body=(Body(name="arm", position=(0.5, 0, 0)), Body(name="block", position=(1, 0, 0))),
         joint=(hinge, slide),
-        driver=(Driver(joint="H", polynomial=(0.0, 1.0, 0.5), sine=sine),
-                Driver(joint="S", polynomial=(0, 2.0))),
-    )  # fmt: skip
+        driver=(
+            Driver(joint="H", polynomial=(0.0, 1.0, 0.5), sine=sine),
+            Driver(joint="S", polynomial=(0, 2.0)),
+        ),
+    )
     t = np.linspace(0, 1, 5)
     angle, reach = t + 0.5 * t**2 + 0.5 * np.sin(3 * t), 1 + 2 * t
     trajectory = completed(scene, method, t)
@@ -144,12 +155,17 @@ def test_drivers_without_masses_follow_their_function(method):
 
 def test_distance_and_cylindrical_joints_keep_theirs():
     scene = Scene(
-        name="rod", gravity=(0, 0, -9.81),
-        body=(Body(name="b", position=(1.0, 0, 0), angular_velocity=(1.0, 0, 0), **ROD),
-              Body(name="c", position=(2.0, 0, 0.5), **ROD)),
-        joint=(Cylindrical(name="C", bodies=("ground", "b"), anchor=(1, 0, 0), axis=(0, 0, 1)),
-               Distance(name="D", bodies=("b", "c"), anchors=((1.5, 0, 0), (2.0, 0, 0.5)))),
-    )  # fmt: skip
+        name="rod",
+        gravity=(0, 0, -9.81),
+        body=(
+            Body(name="b", position=(1.0, 0, 0), angular_velocity=(1.0, 0, 0), **ROD),
+            Body(name="c", position=(2.0, 0, 0.5), **ROD),
+        ),
+        joint=(
+            Cylindrical(name="C", bodies=("ground", "b"), anchor=(1, 0, 0), axis=(0, 0, 1)),
+            Distance(name="D", bodies=("b", "c"), anchors=((1.5, 0, 0), (2.0, 0, 0.5))),
+        ),
+    )
     with pytest.raises(SceneError, match=r"joint\[C\]: velocities given to bodies violate it by"):
         simulate(scene, "lm1+projection", [0.1])  # turning about x is what the cylindrical joint forbids
     body = scene.body[0].model_copy(update={"angular_velocity": (0.0, 0.0, 3.0)})

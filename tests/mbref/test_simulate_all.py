@@ -149,10 +149,13 @@ def test_runs_and_their_reactions_pass_between_processes():
 def test_scenes_of_one_shape_differ_in_numbers_alone():
     assert len({shape_of(scene) for scene in variants(CRANK, [MASS, LENGTH], 5)}) == 1
     others = [
-        CRANK, DRIVEN, CRANK.with_(ground="body"), CRANK.with_(load=()),
+        CRANK,
+        DRIVEN,
+        CRANK.with_(ground="body"),
+        CRANK.with_(load=()),
         CRANK.with_("body[rod].inertia", ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))),
         DRIVEN.with_("driver[0].polynomial", (0.0, 1.0, 2.0)),
-    ]  # fmt: skip
+    ]
     assert len({shape_of(scene) for scene in others}) == len(others)
 
 

@@ -99,9 +99,12 @@ def test_what_hangs_on_a_tilted_door_swings_as_on_a_fixed_one(tilt):
     held = door(tilt, seed=1)
     at = held.body[0].position
     flap = Body(
-        name="flap", mass=0.7, inertia=(0.02, 0.01, 0.02), position=(at[0] + 0.3, at[1], at[2] + 0.1),
+        name="flap",
+        mass=0.7,
+        inertia=(0.02, 0.01, 0.02),
+        position=(at[0] + 0.3, at[1], at[2] + 0.1),
         orientation=held.body[0].orientation,
-    )  # fmt: skip
+    )
     hinge = Revolute(name="flap", bodies=("door", "flap"), anchor=at, axis=(0.0, 0.6, 0.8))
     wall = Fixed(name="wall", bodies=(GROUND, "door"), anchor=at)
     times = np.linspace(0.0, 0.5, 6)

@@ -16,8 +16,11 @@ from mbref.scenes.planar_slider_crank import slider_crank
 from mbref.simulation.start_run import start_run
 
 WATCHING = (
-    "alf-dual+projection", "mpi-svd+projection", "mpi-gs+projection/adams", "alf+projection/rk4[step=1e-3]",
-)  # fmt: skip
+    "alf-dual+projection",
+    "mpi-svd+projection",
+    "mpi-gs+projection/adams",
+    "alf+projection/rk4[step=1e-3]",
+)
 CROSSING = ("taylor", "alf-dual+none", "alf-dual+baumgarte", "alf+none")
 LOOPS = {
     "four": (four_bar_gravity(0.3, "four"), 1.0),

@@ -102,7 +102,10 @@ def spherical_loop(crank: float, coupler: float, angle: float, rates: tuple[floa
         gravity=(1.0, 2.0, -9.0),
         body=tuple(
             Body(
-                name=name, mass=1.0, inertia=(0.1, 0.1, 0.1), position=tuple(map(float, 0.4 * place)),
+                name=name,
+                mass=1.0,
+                inertia=(0.1, 0.1, 0.1),
+                position=tuple(map(float, 0.4 * place)),
                 angular_velocity=None if rate is None else tuple(map(float, rate)),
             )
             for name, (place, rate) in bodies.items()
@@ -111,7 +114,7 @@ def spherical_loop(crank: float, coupler: float, angle: float, rates: tuple[floa
             Revolute(name=n, bodies=pair, anchor=tuple(map(float, x)), axis=tuple(map(float, x)))
             for (n, x), pair in zip(hinges.items(), pairs, strict=True)
         ),
-    )  # fmt: skip
+    )
 
 
 def arc(angle: float) -> np.ndarray:

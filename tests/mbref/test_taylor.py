@@ -70,13 +70,22 @@ def assert_alike(a, b, tolerance):
 @pytest.mark.parametrize(
     ("name", "end"),
     [
-        ("four_bar_gravity", 0.15), ("five_bar_gravity", 0.15), ("four_bar", 0.01), ("five_bar", 0.01),
-        ("spatial_slider_crank", 0.02), ("spatial_slider_crank_driven", 0.1), ("planar_slider_crank", 0.1),
+        ("four_bar_gravity", 0.15),
+        ("five_bar_gravity", 0.15),
+        ("four_bar", 0.01),
+        ("five_bar", 0.01),
+        ("spatial_slider_crank", 0.02),
+        ("spatial_slider_crank_driven", 0.1),
+        ("planar_slider_crank", 0.1),
         ("andrews_squeezer", 0.03),
-        ("bricard", 1.0), ("bennett", 0.5), ("sarrus", 0.3), ("heavy_top", 0.2), ("flyball_governor", 0.2),
+        ("bricard", 1.0),
+        ("bennett", 0.5),
+        ("sarrus", 0.3),
+        ("heavy_top", 0.2),
+        ("flyball_governor", 0.2),
         ("h_frame", 0.5),
     ],
-)  # fmt: skip
+)
 def test_a_scene_as_by_the_general_kernels(name, end):
     scene, times = SCENES[name](), np.linspace(0.0, end, 7)
     general = simulate(scene, "alf-dual+projection", times, Limits(rtol=1e-11))
@@ -191,13 +200,15 @@ def test_a_pendulum_on_a_driven_cart(axis, length):
     place = (0.2 * length, 0.1 * length, -0.2 * length)
     bob = Body(name="bob", mass=2.5, inertia=tuple(np.array([0.02, 0.04, 0.04]) * length**2), position=place)
     scene = Scene(
-        name="driven_cart", gravity=(0, 0, -9.81), body=(cart, bob),
+        name="driven_cart",
+        gravity=(0, 0, -9.81),
+        body=(cart, bob),
         joint=(
             Translational(name="S", bodies=("ground", "cart"), anchor=(0, 0, 0), axis=axis),
             Revolute(name="R", bodies=("cart", "bob"), anchor=(0, 0, 0), axis=(0, 1, 0)),
         ),
         driver=(Driver(joint="S", polynomial=(0.0, 0.2 * length, 0.7 * length)),),
-    )  # fmt: skip
+    )
     times = [0.05, 0.1]
     series = simulate(scene, "taylor", times, Limits(rtol=1e-10))
     general = simulate(scene, "alf-dual+projection", times, Limits(rtol=1e-11))

@@ -55,8 +55,13 @@ def test_a_sample_beside_a_singular_position():
 def test_quaternions_go_on_over_a_full_turn(axis):
     """A body that spins about a principal axis by 4 π: its quaternion is that of the angle, sign and all."""
     spin, times = 10.0, np.linspace(0.0, 0.4 * np.pi, 41)
-    body = Body(name="b", mass=2.0, inertia=(0.1, 0.2, 0.25), position=(0.0, 0.0, 0.0),
-                angular_velocity=tuple(spin * a for a in axis))  # fmt: skip
+    body = Body(
+        name="b",
+        mass=2.0,
+        inertia=(0.1, 0.2, 0.25),
+        position=(0.0, 0.0, 0.0),
+        angular_velocity=tuple(spin * a for a in axis),
+    )
     run = simulate(Scene(name="spinning", body=(body,)), "taylor", times, FINE)
     half = 0.5 * spin * times
     exact = np.column_stack([np.cos(half), np.outer(np.sin(half), axis)])
@@ -128,14 +133,22 @@ def angle_of_bar(beside: float, duration: float) -> float:
 
 def sprung_bar(speed: float, ends: tuple, **spring: float) -> Scene:
     """A bar that turns on a hinge at a speed (rad/s), with a spring between the ground and it."""
-    bar = Body(name="bar", mass=1.0, inertia=(0.001, 0.0133, 0.0133), position=(0.2, 0.0, 0.0),
-               velocity=(0.0, 0.2 * speed, 0.0), angular_velocity=(0.0, 0.0, speed))  # fmt: skip
+    bar = Body(
+        name="bar",
+        mass=1.0,
+        inertia=(0.001, 0.0133, 0.0133),
+        position=(0.2, 0.0, 0.0),
+        velocity=(0.0, 0.2 * speed, 0.0),
+        angular_velocity=(0.0, 0.0, speed),
+    )
     bodies = ("ground", "bar")
     return Scene(
-        name="meeting", body=(bar,), duration=0.7,
+        name="meeting",
+        body=(bar,),
+        duration=0.7,
         joint=(Revolute(name="A", bodies=bodies, anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),),
         load=(Spring(bodies=bodies, points=ends, stiffness=20.0, **spring),),
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])

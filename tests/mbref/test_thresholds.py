@@ -30,9 +30,13 @@ for scene, end, crossings in (
 def interpreted(*arguments: str) -> subprocess.CompletedProcess:
     """A process of Python whose kernels are interpreted."""
     return subprocess.run(
-        [sys.executable, *arguments], check=False, capture_output=True, text=True,
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, cwd=Path(__file__).parents[2],
-    )  # fmt: skip
+        [sys.executable, *arguments],
+        check=False,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        cwd=Path(__file__).parents[2],
+    )
 
 
 def test_the_table_has_a_unit_and_a_reason_for_every_threshold():

@@ -57,9 +57,11 @@ def scissor(plane: Plane, start: float) -> tuple[Scene, list]:
         name="S", bodies=(GROUND, "slider"), anchor=plane.point(z.real + 0j), axis=plane.vector(1.0 + 0j)
     )
     joints = (
-        plane.hinge("A", (GROUND, "up"), 0j), plane.hinge("M", ("up", "down"), z / 2),
-        plane.hinge("B", ("down", "slider"), z.real + 0j), slide,
-    )  # fmt: skip
+        plane.hinge("A", (GROUND, "up"), 0j),
+        plane.hinge("M", ("up", "down"), z / 2),
+        plane.hinge("B", ("down", "slider"), z.real + 0j),
+        slide,
+    )
     return _driven(bodies, joints), [lambda z, f=f: f(0.6 * z) for f in places]
 
 

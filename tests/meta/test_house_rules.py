@@ -18,6 +18,7 @@ FILES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("
 MAY_IMPORT = {"mbref": {"mbref"}, "crosscheck": {"crosscheck", "mbref"}, "reports": set(PACKAGES)}
 ENGINE_PACKAGES = {"mujoco", "pinocchio", "exudyn", "opensim", "pyondsel", "sksundae", "casadi", "heyoka"}
 LONGEST = 330  # lines of a file
+MOST_SKIPS = 60  # marks in the repository that keep a layout from the formatter
 
 
 @functools.cache
@@ -75,6 +76,13 @@ def test_plotting_only_in_reports_and_in_the_plot_of_a_motion():
 def test_files_are_short():
     lengths = {name(path): len(path.read_text().splitlines()) for path in FILES}
     assert not {path: length for path, length in lengths.items() if length > LONGEST}
+
+
+def test_the_formatter_lays_out_nearly_all_lines():
+    folders = (*PACKAGES, "tests", "benchmarks", "examples", "docs")
+    sources = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
+    marked = {name(path): count for path in sources if (count := path.read_text().count("# fmt: " + "skip"))}
+    assert sum(marked.values()) <= MOST_SKIPS, f"{sum(marked.values())} marks, at most {MOST_SKIPS}: {marked}"
 
 
 def test_first_lines_say_what_files_are():

@@ -22,25 +22,57 @@ ADAPTER = "crosscheck.engines.mbref"  # the one module that may import all of mb
 FLOORS = {  # lowest first; an arrow within a floor or downwards
     "mbref": (
         ["rotations", "records", "trajectory", "scene_services"],
-        ["scene", "scene_fields", "scene_joints", "scene_lines", "scene_loads", "scene_paths",
-         "scene_text", "scene_validation"],
-        ["command_line", "formats", "scenes", "scene_slips", "variation"], ["drawing"],
+        [
+            "scene",
+            "scene_fields",
+            "scene_joints",
+            "scene_lines",
+            "scene_loads",
+            "scene_paths",
+            "scene_text",
+            "scene_validation",
+        ],
+        ["command_line", "formats", "scenes", "scene_slips", "variation"],
+        ["drawing"],
         ["joint_motion", "energy"],
-        ["motion"], ["kernels"], ["linear_algebra"], ["equations"], ["formulations"], ["stabilisation"],
-        ["integrators"], ["method"], ["simulation", "taylor"], ["ensembles"], ["design"], ["cli"],
+        ["motion"],
+        ["kernels"],
+        ["linear_algebra"],
+        ["equations"],
+        ["formulations"],
+        ["stabilisation"],
+        ["integrators"],
+        ["method"],
+        ["simulation", "taylor"],
+        ["ensembles"],
+        ["design"],
+        ["cli"],
         ["__main__"],
     ),
     "crosscheck": (
-        ["judge"], ["recorded"], ["engine"], ["engines"], ["processes"], ["study"], ["conformance"],
-        ["findings"], ["paper"], ["cli"],
+        ["judge"],
+        ["recorded"],
+        ["engine"],
+        ["engines"],
+        ["processes"],
+        ["study"],
+        ["conformance"],
+        ["findings"],
+        ["paper"],
+        ["cli"],
         ["__main__"],
     ),
     "reports": (
-        ["blocks"], ["runs"], ["places", "engine_looks"], ["figures"],
+        ["blocks"],
+        ["runs"],
+        ["places", "engine_looks"],
+        ["figures"],
         ["mechanisms", "speed_figure", "time_series", "benchmark_plot"],
-        ["sections"], ["render", "stored"], ["__main__"],
+        ["sections"],
+        ["render", "stored"],
+        ["__main__"],
     ),
-}  # fmt: skip
+}
 
 MAKING = {"study", "run", "run_case", "run_here", "run_isolated", "time_interleaved", "observe", "collection"}
 MAKERS = (
@@ -154,8 +186,10 @@ def test_circles_and_upward_arrows_are_found():
 def test_imports_inside_functions_are_arrows(tmp_path):
     """An import in a function or for types alone counts; one that ``__init__`` re-exports does not."""
     text = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import a\ndef f():\n    import b.c\n"
-    for name, wanted in (("module.py", {"typing", "typing.TYPE_CHECKING", "a", "b.c"}),
-                         ("__init__.py", {"typing", "typing.TYPE_CHECKING", "b.c"})):  # fmt: skip
+    for name, wanted in (
+        ("module.py", {"typing", "typing.TYPE_CHECKING", "a", "b.c"}),
+        ("__init__.py", {"typing", "typing.TYPE_CHECKING", "b.c"}),
+    ):
         path = tmp_path / name
         path.write_text(text)
         assert set(imported(path)) == wanted

@@ -79,14 +79,25 @@ class Tree:
     def _run(self, test: str, jitted: bool, limit: float) -> int | None:
         """Return the exit status of pytest on a file: 0 passed, 1 failed, 2 not even collected, 5 without
         a test, which passes; None when the time was up."""
-        environment = {**os.environ, "PYTHONPATH": str(self.place), "PYTHONDONTWRITEBYTECODE": "1",
-                       "HYPOTHESIS_PROFILE": "first"}  # fmt: skip
+        environment = {
+            **os.environ,
+            "PYTHONPATH": str(self.place),
+            "PYTHONDONTWRITEBYTECODE": "1",
+            "HYPOTHESIS_PROFILE": "first",
+        }
         if not jitted:
             environment["NUMBA_DISABLE_JIT"] = "1"
         command = [sys.executable, "-P", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", test]
         try:
-            done = subprocess.run(command, cwd=self.place, env=environment, capture_output=True, text=True,
-                                  timeout=limit, check=False)  # fmt: skip
+            done = subprocess.run(
+                command,
+                cwd=self.place,
+                env=environment,
+                capture_output=True,
+                text=True,
+                timeout=limit,
+                check=False,
+            )
         except subprocess.TimeoutExpired:
             return None
         return 0 if done.returncode == 5 else done.returncode
@@ -168,9 +179,10 @@ def score(results: Sequence[str]) -> str:
 def main() -> int:
     """Run the command line."""
     parser = argparse.ArgumentParser(
-        prog="python -m tests.mutants", description=__doc__,
+        prog="python -m tests.mutants",
+        description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
+    )
     parser.add_argument("--seed", type=int, default=1, metavar="S", help="default: 1")
     parser.add_argument("--count", type=int, default=300, metavar="N", help="default: 300")
     parser.add_argument("--only", default="", metavar="PATH", help="files whose path begins so")

@@ -8,12 +8,42 @@ from typing import NamedTuple
 
 SIGNS = {ast.Add: "-", ast.Sub: "+"}
 FACTORS = {ast.Mult: "/", ast.Div: "*"}
-COMPARISONS = {ast.Lt: "<=", ast.LtE: "<", ast.Gt: ">=", ast.GtE: ">", ast.Eq: "!=", ast.NotEq: "==",
-               ast.In: "not in", ast.NotIn: "in", ast.Is: "is not", ast.IsNot: "is"}  # fmt: skip
-EXTREMES = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum", "argmin": "argmax",
-            "argmax": "argmin", "any": "all", "all": "any", "sin": "cos", "cos": "sin"}  # fmt: skip
-KINDS = ("sign", "factor", "comparison", "constant", "index", "extreme", "argument order", "statement",
-         "condition", "bodies")  # fmt: skip
+COMPARISONS = {
+    ast.Lt: "<=",
+    ast.LtE: "<",
+    ast.Gt: ">=",
+    ast.GtE: ">",
+    ast.Eq: "!=",
+    ast.NotEq: "==",
+    ast.In: "not in",
+    ast.NotIn: "in",
+    ast.Is: "is not",
+    ast.IsNot: "is",
+}
+EXTREMES = {
+    "min": "max",
+    "max": "min",
+    "minimum": "maximum",
+    "maximum": "minimum",
+    "argmin": "argmax",
+    "argmax": "argmin",
+    "any": "all",
+    "all": "any",
+    "sin": "cos",
+    "cos": "sin",
+}
+KINDS = (
+    "sign",
+    "factor",
+    "comparison",
+    "constant",
+    "index",
+    "extreme",
+    "argument order",
+    "statement",
+    "condition",
+    "bodies",
+)
 
 
 class Mutant(NamedTuple):

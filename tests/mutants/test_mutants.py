@@ -28,8 +28,10 @@ BY_KIND = {
     "condition": ("x = a and b", {"x = (a)", "x = (b)"}),
     "condition of a loop": ("x = [a for a in b if a]", {"x = [a for a in b if True]"}),
     "bodies": ("x = a if b else c", {"x = (c if b else a)"}),
-    "condition of bodies": ("if a:\n    x = b\nelse:\n    x = c",
-                            {"if (not (a)):\n    x = b\nelse:\n    x = c"}),
+    "condition of bodies": (
+        "if a:\n    x = b\nelse:\n    x = c",
+        {"if (not (a)):\n    x = b\nelse:\n    x = c"},
+    ),
     "a product is not a text": ("x = 'a' + b", set()),
     "annotations": ("x: f[1] = a", set()),
     "documentation": ('def f():\n    """Return 3."""', set()),
@@ -37,7 +39,7 @@ BY_KIND = {
     "imports for types": ("if TYPE_CHECKING:\n    import a", set()),
     "equal arguments": ("x = f(a, a)", set()),
     "umlauts before the place": ("x = 'ä', a - b", {"x = 'ä', ((a) + (b))"}),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", BY_KIND)
@@ -60,8 +62,9 @@ def test_a_seed_draws_the_same_mutants_and_another_seed_others():
     first, again, other = (runner.drawn(seed, 20, "crosscheck/study") for seed in (1, 1, 2))
     assert first == again and len(set(first)) == 20 and set(first) != set(other)
     assert all(m.file.startswith("crosscheck/study/") for m in first)
-    assert len(runner.drawn(1, 10**6, "mbref/energy.py")) == len(set(mutants("mbref/energy.py",
-               (ROOT / "mbref/energy.py").read_text())))  # fmt: skip
+    assert len(runner.drawn(1, 10**6, "mbref/energy.py")) == len(
+        set(mutants("mbref/energy.py", (ROOT / "mbref/energy.py").read_text()))
+    )
 
 
 def test_tests_are_those_that_import_the_file_the_nearest_first():

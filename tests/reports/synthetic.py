@@ -19,9 +19,12 @@ from mbref.trajectory import Cost, Outcome, Trajectory
 from reports.runs import SceneRuns, by_scene
 
 MADE_OF = {
-    "schema": 1, "time_limit": 60.0, "seed": 0, "versions": {"python": "3.x", "numpy": "2.x", "numba": None},
+    "schema": 1,
+    "time_limit": 60.0,
+    "seed": 0,
+    "versions": {"python": "3.x", "numpy": "2.x", "numba": None},
     "machine": {"cpu": "a processor", "cores": 2, "system": "a system"},
-}  # fmt: skip
+}
 
 
 @functools.cache
@@ -36,19 +39,33 @@ def exact(a_scene: Scene, samples: int = 13, share: float = 1.0) -> Trajectory:
 
 
 def record(
-    engine: str, family: str, error: float, seconds: float, steps: int = 100, a_scene: Scene | None = None,
-    outcome: Outcome = Outcome.COMPLETED, share: float = 1.0, **settings: Any,
-) -> dict[str, Any]:  # fmt: skip
+    engine: str,
+    family: str,
+    error: float,
+    seconds: float,
+    steps: int = 100,
+    a_scene: Scene | None = None,
+    outcome: Outcome = Outcome.COMPLETED,
+    share: float = 1.0,
+    **settings: Any,
+) -> dict[str, Any]:
     """The record of a run that is shifted from the truth by ``error``, in scene lengths, at every sample."""
     a_scene = a_scene or scene()
     true = exact(a_scene, share=share)
     shift = np.array([error * scene_length(a_scene), 0.0, 0.0])
     shifted = dataclasses.replace(
-        true, engine=engine, version="1.0", method=family, settings=settings, outcome=outcome,
-        position=true.position + shift, t_end=share * a_scene.duration,
+        true,
+        engine=engine,
+        version="1.0",
+        method=family,
+        settings=settings,
+        outcome=outcome,
+        position=true.position + shift,
+        t_end=share * a_scene.duration,
         message="" if outcome is Outcome.COMPLETED else f"{outcome.sentence} | early\nindeed",
-        cost=Cost(seconds=seconds, steps=steps, rhs=4 * steps), scene=a_scene.name,
-    )  # fmt: skip
+        cost=Cost(seconds=seconds, steps=steps, rhs=4 * steps),
+        scene=a_scene.name,
+    )
     metrics = measure(a_scene, shifted, truth_for(a_scene))
     key = hashlib.sha256(f"{a_scene.name} {engine} {family} {settings} {error}".encode()).hexdigest()
     return {
@@ -70,12 +87,23 @@ def nothing(engine: str, family: str, a_scene: Scene | None = None) -> dict[str,
     """The record of a run that crashed without a state."""
     a_scene = a_scene or scene()
     lost = Trajectory.failed(
-        scene=a_scene.name, engine=engine, version="", method=family, settings={}, outcome=Outcome.CRASHED,
-        bodies=tuple(b.name for b in a_scene.body), message="the process was ended by SIGSEGV",
-    )  # fmt: skip
+        scene=a_scene.name,
+        engine=engine,
+        version="",
+        method=family,
+        settings={},
+        outcome=Outcome.CRASHED,
+        bodies=tuple(b.name for b in a_scene.body),
+        message="the process was ended by SIGSEGV",
+    )
     metrics = measure(a_scene, lost, truth_for(a_scene))
-    more = {"scene": a_scene.name, "family": family, "key": f"{engine} {family}", "metrics": metrics,
-            "asked": asked(a_scene, engine, {})}  # fmt: skip
+    more = {
+        "scene": a_scene.name,
+        "family": family,
+        "key": f"{engine} {family}",
+        "metrics": metrics,
+        "asked": asked(a_scene, engine, {}),
+    }
     return {**MADE_OF, **lost.to_record(), **more}
 
 

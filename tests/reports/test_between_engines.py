@@ -124,8 +124,13 @@ def test_branches_move_side_by_side(parted):
 def test_a_branch_whose_run_ended_early_says_so_and_stays(parted):
     first, second = sorted(parted.branches, key=lambda r: r["asked"]["options"]["branches"])
     bodies = {n: {k: v[:40] for k, v in body.items()} for n, body in second["bodies"].items()}
-    early = {**second, "outcome": "STEP_FAILED", "t_end": second["times"][39],
-             "times": second["times"][:40], "bodies": bodies}  # fmt: skip
+    early = {
+        **second,
+        "outcome": "STEP_FAILED",
+        "t_end": second["times"][39],
+        "times": second["times"][:40],
+        "bodies": bodies,
+    }
     (block,) = [
         b for b in crossings.render(replace(parted, branches=[first, early])) if isinstance(b, Moving)
     ]

@@ -55,12 +55,25 @@ def record(case: Case, outcome: Outcome, t_end: float, steps: int) -> dict[str, 
     scene = case.scene
     exact, metrics = motion(scene, np.asarray(case.times))
     made = dataclasses.replace(
-        exact, engine="mbref", version="1", method=case.setting.family, settings=dict(case.setting.options),
-        outcome=outcome, t_end=t_end, message="" if outcome is Outcome.COMPLETED else outcome.sentence,
-        cost=Cost(seconds=0.01 * t_end, steps=steps), scene=scene.name,
-    )  # fmt: skip
-    return {**MADE_OF, **made.to_record(), "scene": scene.name, "family": case.setting.family,
-            "key": "", "metrics": metrics}  # fmt: skip
+        exact,
+        engine="mbref",
+        version="1",
+        method=case.setting.family,
+        settings=dict(case.setting.options),
+        outcome=outcome,
+        t_end=t_end,
+        message="" if outcome is Outcome.COMPLETED else outcome.sentence,
+        cost=Cost(seconds=0.01 * t_end, steps=steps),
+        scene=scene.name,
+    )
+    return {
+        **MADE_OF,
+        **made.to_record(),
+        "scene": scene.name,
+        "family": case.setting.family,
+        "key": "",
+        "metrics": metrics,
+    }
 
 
 @pytest.fixture(scope="module")
@@ -137,9 +150,10 @@ def test_tables_and_figures_without_the_studies(records, blocks):
     found = paper.render(some, ILLUSTRATION)
     whole, here = ({b.text for b in shown if isinstance(b, Heading)} for shown in (blocks, found))
     assert whole - here == {
-        "Influence of the settings", "Every formulation with every stabilisation",
+        "Influence of the settings",
+        "Every formulation with every stabilisation",
         "ALF against its dual, digit by digit over α",
-    }, whole - here  # fmt: skip
+    }, whole - here
     [reasons] = tables(found, "Measured")
     assert len(reasons.rows) == 3, reasons.rows
 
@@ -208,9 +222,16 @@ def test_digits_of_an_exact_record(records):
     for name, errors in paper_methods.digit_errors(records).items():
         assert max(errors) < 1e-14, f"{name}: the exact accelerations have errors {errors}"
     missing = Label("digits", "alf", "100")
-    lost = Trajectory.failed(scene=records[missing]["scene"], engine="mbref", version="1", method="alf",
-                             settings={}, bodies=("crank", "rod", "slider"), outcome=Outcome.NOT_CONVERGED,
-                             message="")  # fmt: skip
+    lost = Trajectory.failed(
+        scene=records[missing]["scene"],
+        engine="mbref",
+        version="1",
+        method="alf",
+        settings={},
+        bodies=("crank", "rod", "slider"),
+        outcome=Outcome.NOT_CONVERGED,
+        message="",
+    )
     other = {**records, missing: {**MADE_OF, **lost.to_record(), "scene": records[missing]["scene"]}}
     assert np.isnan(paper_methods.digit_errors(other)["alf"][0]), "no accelerations, and yet an error"
 
@@ -234,9 +255,11 @@ def test_figures_and_no_simulation(blocks, monkeypatch):
         raise AssertionError("a section simulated")
 
     for module, name in (
-        (crosscheck.study.grid, "study"), (crosscheck.processes.pool, "run_isolated"),
-        (mbref.simulation.simulate, "simulate"), (crosscheck.study.grid, "run_isolated"),
-    ):  # fmt: skip
+        (crosscheck.study.grid, "study"),
+        (crosscheck.processes.pool, "run_isolated"),
+        (mbref.simulation.simulate, "simulate"),
+        (crosscheck.study.grid, "run_isolated"),
+    ):
         monkeypatch.setattr(module, name, simulated)
     drawn = [block.name for block in blocks if isinstance(block, Figure) and block.draw()]
     for number in (4, 5, 6, 8, 11, 12, 13, 14, 15, 16):

@@ -227,9 +227,14 @@ def cost(asked: Case, seconds: float, outcome: str = "COMPLETED") -> dict[str, R
 
 @pytest.mark.parametrize(
     ("seconds", "middle", "outcome", "chosen"),
-    [(0.01, 0.02, "COMPLETED", 6), (0.1, 0.8, "COMPLETED", 4), (0.5, 4.0, "COMPLETED", None),
-     (0.5, 10.0, "TIMED_OUT", None), (0.1, 0.1, "STEP_FAILED", 6)],
-)  # fmt: skip
+    [
+        (0.01, 0.02, "COMPLETED", 6),
+        (0.1, 0.8, "COMPLETED", 4),
+        (0.5, 4.0, "COMPLETED", None),
+        (0.5, 10.0, "TIMED_OUT", None),
+        (0.1, 0.1, "STEP_FAILED", 6),
+    ],
+)
 def test_the_finest_setting_that_is_affordable_by_the_growth_so_far(seconds, middle, outcome, chosen):
     family = [case("a", k) for k in range(7)]
     begun = ladder.first(family)

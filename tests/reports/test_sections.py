@@ -57,9 +57,11 @@ def test_every_section_and_a_heading(monkeypatch):
         raise AssertionError("a section simulated")
 
     for module, name in (
-        (crosscheck.study.grid, "study"), (crosscheck.processes.pool, "run_isolated"),
-        (mbref.simulation.simulate, "simulate"), (crosscheck.study.grid, "run_isolated"),
-    ):  # fmt: skip
+        (crosscheck.study.grid, "study"),
+        (crosscheck.processes.pool, "run_isolated"),
+        (mbref.simulation.simulate, "simulate"),
+        (crosscheck.study.grid, "run_isolated"),
+    ):
         monkeypatch.setattr(module, name, simulated)
     parts = blocks(groups())
     for part in parts:
@@ -67,9 +69,19 @@ def test_every_section_and_a_heading(monkeypatch):
         if isinstance(figure, Figure):
             figure.draw()
     headings = [part.text for part in parts if isinstance(part, Heading)]
-    for heading in ("Summary", "spatial_slider_crank", "The mechanism", "Speed against error",
-                    "Constraint violation over time", "Energy balance over time", "Outcomes",
-                    "Order of convergence", "The limit h → 0", "Least errors", "Provenance"):  # fmt: skip
+    for heading in (
+        "Summary",
+        "spatial_slider_crank",
+        "The mechanism",
+        "Speed against error",
+        "Constraint violation over time",
+        "Energy balance over time",
+        "Outcomes",
+        "Order of convergence",
+        "The limit h → 0",
+        "Least errors",
+        "Provenance",
+    ):
         assert heading in headings, (heading, headings)
 
 
@@ -219,8 +231,9 @@ def test_outcome_table_and_outcome_time_and_error_together():
 def test_key_of_failures_and_their_reasons():
     found = table(speed.render(groups()[0]), "Mark")
     assert [row[:5] for row in found.rows] == [
-        ("1", "exudyn", "tuned", "2", "NOT_CONVERGED"), ("2", "pinocchio", "defaults", "1", "CRASHED")
-    ], found.rows  # fmt: skip
+        ("1", "exudyn", "tuned", "2", "NOT_CONVERGED"),
+        ("2", "pinocchio", "defaults", "1", "CRASHED"),
+    ], found.rows
     assert "SIGSEGV" in found.rows[1][-1] and "did not converge" in found.rows[0][-1], found.rows
 
 

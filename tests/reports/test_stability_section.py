@@ -16,9 +16,12 @@ def record(
     ladder: str, difficulty: float, error: float, outcome="COMPLETED", engine="mbref", family="taylor"
 ):
     return {
-        "scene": stability.scene_name(ladder, difficulty), "engine": engine, "family": family,
-        "outcome": outcome, "metrics": {"error": error},
-    }  # fmt: skip
+        "scene": stability.scene_name(ladder, difficulty),
+        "engine": engine,
+        "family": family,
+        "outcome": outcome,
+        "metrics": {"error": error},
+    }
 
 
 def test_every_rung_has_an_exact_motion_and_a_place():
@@ -52,17 +55,21 @@ def test_counts_tell_right_ended_and_false():
     ]
     (table,) = [b for b in section.render(records) if isinstance(b, Table)]
     assert [tuple(row) for row in table.rows] == [
-        ("mbref", "taylor", "1", "1", "2"), ("mujoco", "projected", "1", "0", "1"),
-    ]  # fmt: skip
+        ("mbref", "taylor", "1", "1", "2"),
+        ("mujoco", "projected", "1", "0", "1"),
+    ]
 
 
 @pytest.mark.parametrize(
     ("error", "outcome", "text", "red"),
     [
-        (1e-9, "COMPLETED", "9", False), (3e-16, "COMPLETED", "15", False), (2.0, "COMPLETED", "0", True),
-        (1.0, "LEFT_MOTION", "m", False), (1.0, "SINGULAR_MATRIX", "a", False),
+        (1e-9, "COMPLETED", "9", False),
+        (3e-16, "COMPLETED", "15", False),
+        (2.0, "COMPLETED", "0", True),
+        (1.0, "LEFT_MOTION", "m", False),
+        (1.0, "SINGULAR_MATRIX", "a", False),
     ],
-)  # fmt: skip
+)
 def test_a_cell_shows_digits_or_why_the_run_ended(error, outcome, text, red):
     blocks = section.render([record("gap", 1e-1, error, outcome)])
     (heat,) = [b for b in blocks if isinstance(b, HeatMap)]
