@@ -16,7 +16,6 @@ from mbref.linear_algebra.vectors import larger
 from mbref.simulation.stepping import DONE, PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED
 from mbref.taylor.coefficients import largest_used
 from mbref.taylor.crossing.detection import (
-    contains_singular_position,
     ends_near_singular,
     time_to_singular_position,
 )
@@ -155,7 +154,7 @@ def attempt_predictor_step(h, last, memory):
     if status != OK:
         return status
     pivot = least_pivot(memory)
-    memory.step.crossed = contains_singular_position(h, pivot, memory)
+    memory.step.crossed = memory.kernels.detect(h, pivot, memory)
     if memory.step.crossed or ends_near_singular(pivot, memory):
         return SINGULAR_AHEAD
     is_accepted = memory.step.violation <= LOST_ROWS * PREDICTOR_TOLERANCE and continues_motion(h, memory)

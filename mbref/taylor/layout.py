@@ -230,11 +230,17 @@ class Progress(NamedTuple):
 
 
 class SeriesKernels(NamedTuple):
-    """The kernels that several others call, by address: a copy in each would be cold where it is called."""
+    """The kernels that several others call, by address: each is compiled once."""
 
     begin: Annotated[Kernel, BEGIN]
     expand: Annotated[Kernel, EXPAND]
     step: Annotated[Kernel, STEP]
+    partition: Annotated[Kernel, PARTITION]
+    respond: Annotated[Kernel, RESPOND]
+    terms: Annotated[Kernel, TERMS]
+    multipliers: Annotated[Kernel, TERMS]
+    detect: Annotated[Kernel, DETECT]
+    sample: Annotated[Kernel, SAMPLE]
 
 
 class SceneCode(NamedTuple):
@@ -319,5 +325,6 @@ class TaylorMemory(NamedTuple):
 
 
 SERIES = Named(TaylorMemory)
-BEGIN = STEP = INT(SERIES)
+BEGIN = STEP = PARTITION = RESPOND = TERMS = SAMPLE = INT(SERIES)
+DETECT = INT(FLOAT, FLOAT, SERIES)  # length of the step (s), least pivot at its end
 EXPAND = INT(FLOAT, SERIES)  # t

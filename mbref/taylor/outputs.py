@@ -10,21 +10,18 @@ from __future__ import annotations
 from mbref.equations.evaluation import evaluate
 from mbref.equations.primitives import constraints
 from mbref.equations.static_multipliers import add_static_multipliers
-from mbref.kernels.compilation import INT, entry, kernel
+from mbref.kernels.compilation import INT, entry, exchangeable, kernel
 from mbref.kernels.layout import OK, SINGULAR
 from mbref.linear_algebra.minimum_norm import find_least_multipliers
 from mbref.linear_algebra.sparse_cholesky import regularised_factor
 from mbref.linear_algebra.vectors import copy
 from mbref.simulation.samples import take_sample
 from mbref.stabilisation.projection import ALPHA
-from mbref.taylor.layout import SERIES
+from mbref.taylor.layout import SAMPLE, SERIES
 from mbref.taylor.loads import expand_drivers
-from mbref.taylor.partition import choose
 from mbref.taylor.samples import find_poses, put_state
 from mbref.taylor.saved_state import restore_state, save_state
-from mbref.taylor.series import expand_series
 from mbref.taylor.simd import WIDTH, load, store
-from mbref.taylor.solver import factorise_anew
 
 SAMPLE_CORRECTIONS = 2  # of the state at a sample of a loose series: the second one leaves rounding
 
@@ -58,13 +55,13 @@ def complete_until(end, memory):
     mode.order, mode.tolerance = 2, memory.options.accurate_tolerance
     while progress.completed < end and status == OK:
         loop.clock.sample, loop.clock.time = progress.completed, loop.times[progress.completed]
-        status = complete_sample(memory)
+        status = memory.kernels.sample(memory)
         progress.completed = loop.clock.sample
     mode.order, mode.tolerance = order, tolerance
     return status
 
 
-@kernel
+@exchangeable(SAMPLE)
 def complete_sample(memory):
     """Record the sample at which the clock stands: OK or the reason why it cannot be.
 
@@ -144,6 +141,5 @@ def return_to_series(memory):
         copy(here.terms[order], terms[order])
     copy(here.angles, memory.angles)
     expand_drivers(memory.run.loop.clock.time, memory)
-    choose(memory)
-    factorise_anew(memory)
-    expand_series(memory)
+    memory.kernels.partition(memory)
+    memory.kernels.terms(memory)

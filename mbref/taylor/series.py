@@ -8,12 +8,14 @@ is added to the sums of all later orders at once, so that little is left between
 
 from __future__ import annotations
 
-from mbref.kernels.compilation import inlined, kernel
+from mbref.kernels.compilation import exchangeable, inlined, kernel
+from mbref.kernels.layout import OK
 from mbref.taylor.coefficients import largest_coefficient
 from mbref.taylor.generated_calls import expand_by_code, expand_by_power
+from mbref.taylor.layout import TERMS
 from mbref.taylor.loads import add_loads, start_loads
 from mbref.taylor.simd import WIDTH, gather, load, store
-from mbref.taylor.solver import respond_in_loops, solution
+from mbref.taylor.solver import solution
 
 SLOWEST = 2.0  # steps over the time in which the speed would vanish: beyond, rounding grows with the order
 
@@ -104,7 +106,7 @@ def expand_with_springs(last, memory):
         solve_order(k, last, memory)
 
 
-@kernel
+@exchangeable(TERMS)
 def expand_series(memory):
     """Compute all orders of the variables from the first two, which are consistent."""
     code, step, order = memory.code, memory.step, memory.mode.order
@@ -120,8 +122,8 @@ def expand_series(memory):
         if length == 0.0:  # at the start, before a step: the time in which a variable moves by one
             length = 1.0 / largest_coefficient(series.terms, 1, solver.pivot_columns.shape[0])
         if not turns_back_in(length, memory):
-            return
-    expand_with_multipliers(memory)
+            return OK
+    return memory.kernels.multipliers(memory)
 
 
 @inlined
@@ -141,22 +143,23 @@ def turns_back_in(h, memory):
     return not memory.step.deceleration * h <= SLOWEST
 
 
-@kernel
+@exchangeable(TERMS)
 def expand_with_multipliers(memory):
     """Compute all orders of the variables and multipliers from the first two."""
     springs, torsions, code = memory.polynomials.springs, memory.polynomials.torsions, memory.code
     memory.step.deceleration = 0.0
     if code.expand_by_power != 0:
-        respond_in_loops(memory)
+        memory.kernels.respond(memory)
     if code.expand != 0 and code.rank == memory.partition.rank:
         series, solver = memory.series, memory.solver
         expand_by_code(
             code.expand, series.terms, solver.response, series.left, series.right, series.scale,
             series.growth, solver.rhs, memory.mode.order - 2,
         )  # fmt: skip
-        return
+        return OK
     start_sums(memory)
     if springs.damping.shape[0] + torsions.damping.shape[0] == 0:
         expand_without_springs(memory.mode.order - 2, memory)
     else:
         expand_with_springs(memory.mode.order - 2, memory)
+    return OK

@@ -10,13 +10,21 @@ from mbref.equations.branches import SMOOTH
 from mbref.kernels.memory_pool import Pooled, acquire, copied, fill, shapes_of
 from mbref.kernels.named_memory import allocate
 from mbref.simulation.run import Run
+from mbref.taylor.crossing.detection import contains_singular_position
 from mbref.taylor.layout import Polynomials, Series, SeriesKernels, TaylorMemory
+from mbref.taylor.outputs import complete_sample
 from mbref.taylor.polynomials import Geometry
+from mbref.taylor.series import expand_series, expand_with_multipliers
 from mbref.taylor.simd import padded_size
+from mbref.taylor.solver import respond_in_loops
+from mbref.taylor.step_start import choose_partition
 from mbref.taylor.stepping import begin_series, expand_from, take_step
 
 KEPT = 16  # singular positions that are passed in a call
-CALLED = (begin_series, expand_from, take_step)  # the SeriesKernels
+CALLED = (
+    begin_series, expand_from, take_step, choose_partition, respond_in_loops, expand_series,
+    expand_with_multipliers, contains_singular_position, complete_sample,
+)  # fmt: skip
 
 
 def acquire_memory(run: Run, geometry: Geometry, polynomials: Polynomials, order: int) -> Pooled:
@@ -41,6 +49,7 @@ def _allocate(
     run: Run, geometry: Geometry, polynomials: Polynomials, sizes: Mapping[str, int]
 ) -> TaylorMemory:
     """Return memory of the series, ready except for numbers."""
+    kernels = zip(SeriesKernels._fields, CALLED, strict=True)
     orders, nz, nr = sizes["orders"], sizes["nz"], sizes["nr"]
     series = allocate(Series, sizes)
     grown = np.arange(1.0, orders + 1) * np.arange(2.0, orders + 2)
@@ -55,7 +64,7 @@ def _allocate(
         polynomials=copied(polynomials),
         pose_maps=copied(geometry.pose_maps),
         series=series,
-        kernels=SeriesKernels(*(kernel.pointer for kernel in CALLED)),
+        kernels=SeriesKernels(**{name: kernel.pointer for name, kernel in kernels}),
         branch_switches=np.array(switches, np.int64),
     )
 

@@ -2,15 +2,16 @@
 
 All variables are z = N b + T u of the independent ones u.  N and T come from Gauss–Jordan elimination of the
 tableau [G 1] by rows and dependent variables (R. A. Wehage and E. J. Haug, J. Mech. Design 104, 1982), u from
-the reduced mass matrix Tᵀ M T: the mass matrix need be regular only for the motions that the
-rows allow.  Rows that depend on others have no multiplier.  The inverse is symmetric.
+the reduced mass matrix Tᵀ M T, which is regular where each motion that the rows allow has inertia.  Rows that
+depend on others have no multiplier.  The inverse is symmetric.
 """
 
 from __future__ import annotations
 
-from mbref.kernels.compilation import inlined, kernel
+from mbref.kernels.compilation import exchangeable, inlined, kernel
 from mbref.kernels.layout import OK, SINGULAR
 from mbref.taylor.generated_calls import factorise_by_code
+from mbref.taylor.layout import RESPOND
 from mbref.taylor.partition import choose, put_rows, save_replaced_pivot
 from mbref.taylor.simd import WIDTH, load, store
 
@@ -223,7 +224,7 @@ def respond(memory):
             solver.response, solver.last, solver.pivot_rows, solver.pivot_columns,
         )  # fmt: skip
     else:
-        respond_in_loops(memory)
+        memory.kernels.respond(memory)
     if memory.polynomials.given.driver.shape[0] > 0:
         add_functions(memory.polynomials.given.driver.shape[0], memory)
 
@@ -240,9 +241,9 @@ def put_inverse(solver):
             response[e, i] = particular[i, e]
 
 
-@kernel
+@exchangeable(RESPOND)
 def respond_in_loops(memory):
-    """Compute the pivots and the response by elimination of the rows, then of the reduced mass matrix."""
+    """Compute pivots and response by elimination of the rows, then of the reduced mass matrix; return OK."""
     exchange(memory)
     split(memory)
     if memory.partition.rank == memory.solver.pivot_columns.shape[0]:
@@ -252,12 +253,12 @@ def respond_in_loops(memory):
         solve_reduced(memory)
         put_dependent(memory)
         put_multipliers(memory)
+    return OK
 
 
 @kernel
 def factorise_equations(memory):
-    """Compute the response at the first coefficients; return OK, or SINGULAR where rows or inertia change
-    rank."""
+    """Compute the response at the first coefficients; return OK, or SINGULAR where a rank changes."""
     memory.run.equations.system.counts.factorisations += 1
     respond(memory)
     if not is_sharp(memory.solver):
@@ -271,10 +272,9 @@ def factorise_equations(memory):
 @kernel
 def factorise_anew(memory):
     """Compute the response by a partition that has just been chosen, whose pivots are the reference."""
-    solver = memory.solver
     respond(memory)
-    for k in range(solver.first.shape[0]):
-        solver.first[k] = abs(solver.last[k])
+    for k in range(memory.solver.first.shape[0]):
+        memory.solver.first[k] = abs(memory.solver.last[k])
 
 
 @inlined

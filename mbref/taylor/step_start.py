@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from mbref.kernels.compilation import kernel
+from mbref.kernels.compilation import exchangeable, kernel
 from mbref.linear_algebra.vectors import copy
 from mbref.taylor.correction import violation
+from mbref.taylor.layout import PARTITION
 from mbref.taylor.loads import ANGLE, TORSION_SERIES
 from mbref.taylor.partition import choose, save_start_pivots
 from mbref.taylor.simd import WIDTH, load, store
@@ -33,6 +34,13 @@ def return_to_start(memory):
         copy(past[k], terms[k])
     memory.step.start_violation = violation(memory)
     if memory.partition.partition_id != memory.step.start_partition_id:
-        choose(memory)
-        factorise_anew(memory)
+        memory.kernels.partition(memory)
         save_start_pivots(memory)
+
+
+@exchangeable(PARTITION)
+def choose_partition(memory):
+    """Choose a partition at the first coefficients, and compute its response; return its rank."""
+    memory.partition.rank = choose(memory)
+    factorise_anew(memory)
+    return memory.partition.rank

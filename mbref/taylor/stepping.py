@@ -33,12 +33,11 @@ from mbref.taylor.crossing.thresholds import (
 from mbref.taylor.layout import BEGIN, EXPAND, STEP
 from mbref.taylor.loads import expand_drivers, part_behind_no_length, time_to_no_length
 from mbref.taylor.mode import is_accurate
-from mbref.taylor.partition import choose, least_pivot
+from mbref.taylor.partition import least_pivot
 from mbref.taylor.pose_maps import read_variables
 from mbref.taylor.samples import evaluate_series, keep_sample, put_angles
-from mbref.taylor.series import expand_series, expand_with_multipliers, turns_back_in
+from mbref.taylor.series import turns_back_in
 from mbref.taylor.simd import WIDTH, load, store
-from mbref.taylor.solver import factorise_anew
 from mbref.taylor.step_start import return_to_start, save_series
 
 ROW_ROUNDING = 1e-12  # violation of a row, in units of the scene, that rounding may leave
@@ -54,7 +53,7 @@ def expand_from(t, memory):
     expand_drivers(t, memory)
     status = correct_state(memory)
     if status == OK:
-        expand_series(memory)
+        memory.kernels.terms(memory)
     return status
 
 
@@ -220,7 +219,7 @@ def take_step(memory):
     state.start_violation = 0.0
     regular, h = first_lengths(left, memory)
     if turns_back_in(h, memory):
-        expand_with_multipliers(memory)
+        memory.kernels.multipliers(memory)
         save_series_without_pole(memory)
         regular, h = first_lengths(left, memory)
     if 0.0 < state.time_to_pole < h and not is_accurate(memory):
@@ -272,8 +271,7 @@ def begin_series(memory):
         memory.angles[s] = memory.run.equations.angles[slot[s]]
     read_variables(t, memory)
     expand_drivers(t, memory)
-    memory.partition.rank, memory.step.crossed, memory.progress.leaving = choose(memory), 0, 0
-    memory.progress.rests_near = 0
-    factorise_anew(memory)
+    memory.kernels.partition(memory)
+    memory.step.crossed, memory.progress.leaving, memory.progress.rests_near = 0, 0, 0
     status = memory.kernels.expand(t, memory)
     return status if t > 0.0 else judge_start(status, memory)

@@ -18,7 +18,6 @@ from mbref.kernels.layout import OK
 from mbref.simulation.stepping import SINGULAR_AHEAD, STEP_TOO_SMALL, UNDECIDED
 from mbref.taylor.coefficients import turns_back
 from mbref.taylor.crossing.detection import (
-    contains_singular_position,
     ends_near_singular,
     is_near_singular,
 )
@@ -89,7 +88,7 @@ def judge_branch(h, last, memory):
     Regular steps return SINGULAR_AHEAD where a singular position is near.
     """
     step, pivot = memory.step, least_pivot(memory)
-    step.crossed = contains_singular_position(h, pivot, memory)
+    step.crossed = memory.kernels.detect(h, pivot, memory)
     if not is_accurate(memory):
         return SINGULAR_AHEAD if step.crossed or ends_near_singular(pivot, memory) else OK
     if not (step.crossed or is_near_singular(pivot, memory)):

@@ -9,7 +9,7 @@ that falls and rises linearly vanishes.
 
 from __future__ import annotations
 
-from mbref.kernels.compilation import kernel
+from mbref.kernels.compilation import exchangeable, kernel
 from mbref.taylor.coefficients import distance_moved, turns_back
 from mbref.taylor.crossing.determinants import (
     gradient_determinant,
@@ -37,6 +37,7 @@ from mbref.taylor.crossing.thresholds import (
     SECTIONS,
     SECTIONS_COARSE,
 )
+from mbref.taylor.layout import DETECT
 from mbref.taylor.mode import PREDICTOR, is_accurate
 from mbref.taylor.partition import freedoms, is_undriven, least_pivot, replaced_pivot, save_start_pivots
 from mbref.taylor.samples import evaluate_series
@@ -94,7 +95,7 @@ def changes_signs(memory):
 
 
 # --- the decision ---------------------------------------------------------------------------------------
-@kernel
+@exchangeable(DETECT)
 def contains_singular_position(h, pivot, memory):
     """Return whether a step of h seconds, with a least pivot at its end, contains a singular position."""
     start, moved, kept = memory.step.start_pivot, distance_moved(h, memory), keeps_signs(memory)
