@@ -194,6 +194,7 @@ class Watch(NamedTuple):
     generic_rank: int = 0
     regular: int = 0  # whether the motion begins on no singular position, where the rank is less
     accepted_time: float = 0.0  # s
+    singular_part: float = 0.0  # of the step within which the run ends, from its start to a singular position
 
 
 class Clock(NamedTuple):
@@ -226,18 +227,22 @@ class History(NamedTuple):
     """The last accepted states, a ring: step s stands in row s mod KEPT."""
 
     time: Annotated[Vector, KEPT]
-    pivots: Annotated[Matrix, KEPT, "pivots"]  # of every row of Φ_q, see Watch
     y: Annotated[Matrix, KEPT, "14*nb"]
     y_rate: Annotated[Matrix, KEPT, "14*nb"]
     nodes: Annotated[Indices, KEPT]  # rows chosen for an extrapolation
     weights: Annotated[Matrix, 2, KEPT]  # of the nodes in an extrapolation
 
 
-class Gradients(NamedTuple):
-    """Constraint gradients at both ends of a step; without room where the scene has many rows."""
+class Ends(NamedTuple):
+    """Both ends of a step of a run that watches pivots, and the product of their constraint gradients."""
 
-    start: Annotated[Vector, "compared_entries"]  # D of ``SparseFactor`` where the step began
-    product: Annotated[Matrix, "compared_rows", "compared_rows"]
+    gradient: Annotated[Vector, "watched_entries"]  # D of ``SparseFactor`` where the step began
+    squared_pivots: Annotated[Vector, "watched_rows"]  # there
+    lower: Annotated[Vector, "watched_numbers"]  # of ``sparse_lu.factorise_product``
+    upper: Annotated[Vector, "watched_numbers"]
+    pivots: Annotated[Vector, "watched_rows"]
+    rates: Annotated[Matrix, 2, "7*nb"]  # q' at both ends
+    pose: Annotated[Vector, "7*nb"]  # inside the step
 
 
 class Loop(NamedTuple):
@@ -250,7 +255,7 @@ class Loop(NamedTuple):
     y_rate: Annotated[Vector, "14*nb"]
     y_new: Annotated[Vector, "14*nb"]
     history: History
-    gradients: Gradients
+    ends: Ends
 
 
 class Kernels(NamedTuple):

@@ -39,7 +39,6 @@ from mbref.stabilisation.all_coordinates import rates as rates_of_all_rows
 from mbref.stabilisation.base import Stabilisation
 
 NEARLY = 1e-5  # least singular value below which rows are nearly dependent
-MOST_COMPARED = 60  # rows whose gradients at both ends of a step are compared
 
 
 class Stepper(Protocol):
@@ -184,9 +183,10 @@ class Run:
         pivots = factor.symbolic.row.size
         algebra = formulation.linear_algebra
         sizes = {**model.sizes, "k": self.times.size, "dense_rows": algebra.rows(model.m), "pivots": pivots}
-        compared = pivots <= MOST_COMPARED
-        sizes["compared_rows"] = pivots if compared else 0
-        sizes["compared_entries"] = factor.d.size if compared else 0
+        watched = stabilisation.projects and not method.is_series
+        sizes["watched_rows"] = pivots if watched else 0
+        sizes["watched_entries"] = factor.d.size if watched else 0
+        sizes["watched_numbers"] = factor.l.size if watched else 0
         static = no_static_rows() if data.resting.size else factor.static  # else their multipliers come last
         at_every_state = factor._replace(static=static)
         equations = model.equations(

@@ -3,20 +3,27 @@
 Where the rank of Φ_q drops, a pivot of its rows falls to zero and rises again.  The pivots are those of unit
 rows in columns of unit length (``equations.units``), so that masses have no part in them; the projection has
 them at hand after every step (``layout.Watch``).  A step comes to a singular position where it ends at one.
-It passes one where the determinant of the constraint gradients at both of its ends, det(G₁ G₀ᵀ + I/α),
-changes its sign.  Several loops that pass one together leave the sign; then several pivots vanish at once.
+Inside a step rows may lose rank where a pivot of the product of the gradients at both ends is negative
+(``linear_algebra.sparse_lu``).  The pose at the zero of that pivot decides: at a singular position fewer
+pivots are left than the rank; elsewhere a redundant row has taken the place of the one that vanishes.
 """
 
 from __future__ import annotations
 
+from numpy import sqrt
+
+from mbref.equations.coordinates import coordinate_rates, normalise
+from mbref.equations.evaluation import evaluate
 from mbref.kernels.compilation import kernel
-from mbref.linear_algebra.elimination import determinant
-from mbref.linear_algebra.vectors import copy
-from mbref.stabilisation.projection import ALPHA, keep_gradient
+from mbref.linear_algebra.sparse_cholesky import find_squared_pivots
+from mbref.linear_algebra.sparse_lu import factorise_product
+from mbref.linear_algebra.vectors import copy, sort
+from mbref.stabilisation.projection import factorise_constraints, keep_end
 
 REACHED = 1e-3  # relative pivot at which a step has come to a singular position: no motion is accurate there
-SHARP = 1.2  # falls of a pivot in the time of a step, below which it has vanished and risen inside
-SMALLEST = 1e-4  # pivot of a row below which it is as good as redundant, and is not compared
+VANISHED = 1e-2  # relative pivot at the zero of one inside a step, where the pose is off by an interpolation
+ALPHA = 1e8  # of the product: a redundant row has a pivot of 1/α, far above rounding
+SEARCH, EXACT = 30, 1e-9  # evaluations that find a zero, and parts of the step within which it is found
 
 
 @kernel
@@ -29,68 +36,106 @@ def relative_pivot(watch):
 @kernel
 def meets_singular_position(h, memory):
     """Whether a step of h seconds, whose end has just been projected, comes to a singular position or passes
-    one."""
+    one; its place in the step and the pose are in memory then."""
     watch = memory.watch
     if memory.control.closed_loops == 0.0 or watch.reference_pivot == 0.0:
         return False
     if relative_pivot(watch) <= REACHED and watch.smallest_pivot < watch.past_pivot:
+        keep_position(1.0, h, memory)
         return True
-    compared = memory.loop.gradients.product.shape[0] > 0
-    return (compared and changes_sign(memory)) or vanishing_pivots(h, memory) > compared
+    return passes_singular_position(h, memory)
 
 
 @kernel
-def vanishing_pivots(h, memory):
-    """The number of pivots that have vanished inside a step of h seconds: their values at both ends add up to
-    what they fall, as fast as in the step before."""
-    history, taken = memory.loop.history, memory.equations.system.counts.steps
-    if taken == memory.loop.clock.restart:
-        return 0
-    kept, found = history.time.shape[0], 0
-    now, before = taken % kept, (taken - 1) % kept
-    width = history.time[now] - history.time[before]
+def keep_position(part, h, memory):
+    """Keep the part of a step of h seconds and the pose there, as those at which the run ends."""
+    memory.watch.singular_part = part
+    put_pose(part, h, memory)
+
+
+@kernel
+def passes_singular_position(h, memory):
+    """Whether the rank drops inside a step of h seconds.
+
+    Rows whose pivots are small at both ends are redundant: no zero of theirs is looked at.
+    """
+    ends, factor = memory.loop.ends, memory.factor
+    factorise_product(factor, ends.gradient, ALPHA, ends)
+    least, looked_at = (REACHED * memory.watch.reference_pivot) ** 2, False
     for k in range(memory.pivots.shape[0]):
-        start, end = history.pivots[now, k], memory.pivots[k]
-        fall = (history.pivots[before, k] - start) / width * h
-        if start > SMALLEST and start + end < SHARP * fall:
-            found += 1
-    return found
+        larger = max(memory.pivots[k] ** 2, ends.squared_pivots[k])
+        if ends.pivots[k] < 0.0 and larger > least:
+            if not looked_at:
+                put_rates(memory)
+                looked_at = True
+            part = zero_of_pivot(k, h, memory)
+            if pivot_at_pose(memory) < VANISHED * memory.watch.reference_pivot:
+                keep_position(part, h, memory)
+                return True
+            expand_product_at(1.0, h, memory)
+    return False
 
 
 @kernel
-def changes_sign(memory):
-    """Whether det(G₁ G₀ᵀ + I/α) is negative, G₀ and G₁ being the gradients at both ends of the step.
-
-    It is positive where the rows' span turns by less than a right angle, and changes its sign where the rank
-    drops by one in between.
-    """
-    factor, gradients = memory.factor, memory.loop.gradients
-    put_product(factor, gradients)
-    negative, _ = determinant(gradients.product, factor.diagonal.shape[0])
-    return negative
+def put_rates(memory):
+    """q' at both ends of the step."""
+    rates, before, after = memory.loop.ends.rates, memory.previous, memory.state
+    coordinate_rates(before.coordinates, before.velocities, rates[0])
+    coordinate_rates(after.coordinates, after.velocities, rates[1])
 
 
 @kernel
-def put_product(factor, gradients):
-    """D D₀ᵀ and a part 1/α of the squares of D on its diagonal, D₀ being where the step began.
+def put_pose(part, h, memory):
+    """The pose at a part of a step of h seconds, by Hermite's cubic polynomial."""
+    ends, rest = memory.loop.ends, 1.0 - part
+    before, after = memory.previous.coordinates, memory.state.coordinates
+    of_before, of_after = (1.0 + 2.0 * part) * rest * rest, (1.0 + 2.0 * rest) * part * part
+    of_first, of_last = h * part * rest * rest, h * part * part * rest
+    for k in range(before.shape[0]):
+        value = of_before * before[k] + of_after * after[k]
+        ends.pose[k] = value + of_first * ends.rates[0, k] - of_last * ends.rates[1, k]
+    normalise(ends.pose)
 
-    It has entries where S and its factor L have theirs, and from the products of the same numbers.
-    """
-    symbolic, d, d_0, product = factor.symbolic, factor.d, gradients.start, gradients.product
-    first, row, start, left, right = (
-        symbolic.l_start, symbolic.l_row, symbolic.s_start, symbolic.s_left, symbolic.s_right,
-    )  # fmt: skip
-    product[:] = 0.0
-    for k in range(factor.diagonal.shape[0]):
-        for entry in range(first[k], first[k + 1]):
-            lower, upper, square = 0.0, 0.0, 0.0
-            for p in range(start[entry], start[entry + 1]):
-                lower += d[left[p]] * d_0[right[p]]
-                upper += d[right[p]] * d_0[left[p]]
-                square += d[left[p]] * d[right[p]]
-            product[row[entry], k], product[k, row[entry]] = lower, upper
-            if row[entry] == k:
-                product[k, k] += (square if square > 0.0 else 1.0) / ALPHA
+
+@kernel
+def expand_product_at(part, h, memory):
+    """The factor at the pose of a part of a step of h seconds, and its product with that at the start."""
+    ends, t = memory.loop.ends, memory.loop.clock.time + part * h
+    put_pose(part, h, memory)
+    evaluate(t, ends.pose, memory.state.velocities, memory.equations)
+    factorise_constraints(memory)
+    factorise_product(memory.factor, ends.gradient, ALPHA, ends)
+
+
+@kernel
+def zero_of_pivot(k, h, memory):
+    """The part of a step of h seconds at which pivot k of the product changes its sign: false position
+    (the Pegasus rule of
+    Dowell & Jarratt, BIT 12, 1972).  The factor is left at the pose there."""
+    pivots, low, high, part = memory.loop.ends.pivots, 0.0, 1.0, 1.0
+    at_low, at_high = memory.loop.ends.squared_pivots[k], pivots[k]
+    for _ in range(SEARCH):
+        part = low + (high - low) * at_low / (at_low - at_high)
+        expand_product_at(part, h, memory)
+        found = pivots[k]
+        if (found < 0.0) == (at_high < 0.0):
+            at_low *= at_high / (at_high + found)
+        else:
+            low, at_low = high, at_high
+        high, at_high = part, found
+        if abs(high - low) < EXACT or found == 0.0:
+            break
+    return part
+
+
+@kernel
+def pivot_at_pose(memory):
+    """The smallest of as many pivots as there are independent rows, where the factor was last found."""
+    factor, rank = memory.factor, memory.watch.generic_rank
+    find_squared_pivots(factor)
+    squares = factor.squared_pivots
+    sort(squares)
+    return sqrt(squares[squares.shape[0] - rank]) if rank > 0 else 1.0
 
 
 @kernel
@@ -99,15 +144,14 @@ def remember_watch(memory):
     watch = memory.watch
     watch.past_pivot = watch.smallest_pivot
     watch.nearest = min(watch.nearest, relative_pivot(watch))
-    keep_gradient(memory)
+    keep_end(memory)
 
 
 @kernel
 def remember_state(taken, y, y_rate, memory):
-    """Row taken mod KEPT of the history := t, pivots, y, y'."""
+    """Row taken mod KEPT of the history := t, y, y'."""
     history = memory.loop.history
     row, n = taken % history.time.shape[0], y.shape[0]
     history.time[row] = memory.loop.clock.time
-    copy(memory.pivots, history.pivots[row])
     copy(y, history.y[row, :n])
     copy(y_rate, history.y_rate[row, :n])

@@ -8,7 +8,12 @@ from mbref.kernels.compilation import INT, entry, kernel
 from mbref.kernels.layout import CHANGED, MEMORY, NOT_FINITE, OK, SINGULAR_AHEAD
 from mbref.linear_algebra.vectors import all_finite, copy
 from mbref.simulation.samples import take_sample
-from mbref.simulation.singular_crossing import meets_singular_position, remember_state, remember_watch
+from mbref.simulation.singular_crossing import (
+    keep_position,
+    meets_singular_position,
+    remember_state,
+    remember_watch,
+)
 
 # how a call ends; evaluation statuses (SINGULAR, …) end it too
 DONE, VIOLATED, STEP_TOO_SMALL, TOO_MANY_STEPS, PAUSED, UNDECIDED, LEFT_MOTION, CREEPING = range(10, 18)
@@ -152,7 +157,9 @@ def accept_step(now, h, suggested, ratio, memory):
     loop, counts = memory.loop, memory.equations.system.counts
     clock = loop.clock
     status = memory.kernels.accept(now, loop.y_new, memory)
-    if status == OK and meets_singular_position(now - clock.time, memory):
+    if status == SINGULAR_AHEAD:
+        keep_position(1.0, now - clock.time, memory)
+    elif status == OK and meets_singular_position(now - clock.time, memory):
         status = SINGULAR_AHEAD
     if status == SINGULAR_AHEAD:
         clock.attempt_end = now

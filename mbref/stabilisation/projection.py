@@ -65,7 +65,7 @@ def put_active(t, y, memory):
     if factorise_constraints(memory):
         watch_pivots(memory)
         memory.watch.past_pivot = memory.watch.smallest_pivot
-        keep_gradient(memory)
+        keep_end(memory)
     contract(state.coordinates, state.velocities, active, y)
     return active.coordinates.shape[0] + active.velocities.shape[0]
 
@@ -79,11 +79,12 @@ def factorise_constraints(memory):
 
 
 @kernel
-def keep_gradient(memory):
-    """Keep the gradient of the last factor, with which that at the end of a step is compared."""
-    gradients = memory.loop.gradients
-    if gradients.product.shape[0] > 0:
-        copy(memory.factor.d, gradients.start)
+def keep_end(memory):
+    """Keep the gradient and the pivots of the last factor, at which the next step begins."""
+    ends = memory.loop.ends
+    copy(memory.factor.d, ends.gradient)
+    for k in range(ends.squared_pivots.shape[0]):
+        ends.squared_pivots[k] = memory.pivots[k] ** 2
 
 
 @inlined

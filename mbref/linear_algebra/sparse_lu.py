@@ -1,0 +1,54 @@
+"""Sparse LU factors of the product of two gradients, D D̃ᵀ + diag(D Dᵀ)/α, without exchange of rows.
+
+They have entries where the Cholesky factor of D Dᵀ has its own.  The product of the first k pivots is the
+determinant of the first k rows: it changes its sign where these rows lose rank between D̃ and D.
+"""
+
+from __future__ import annotations
+
+from mbref.kernels.compilation import kernel
+
+
+@kernel
+def factorise_product(factor, other, alpha, product):
+    """The factors of D D̃ᵀ + diag(D Dᵀ)/α into ``product``; D is that of the factor, D̃ is ``other`` (nd,).
+
+    ``product.lower`` (nl,) has ones on the diagonal of L left out, ``product.upper`` the numbers of Uᵀ; its
+    pivots (r,) are over D Dᵀ's diagonal.
+    """
+    first, lower, upper, pivots = factor.symbolic.l_start, product.lower, product.upper, product.pivots
+    for k in range(pivots.shape[0]):
+        start, square = first[k], square_of_row(factor, first[k])
+        value, _ = eliminated(factor, other, product, start)
+        pivot = value + square / alpha
+        pivots[k] = pivot / square
+        inverse = 1.0 / pivot if pivot != 0.0 else alpha / square
+        for p in range(start + 1, first[k + 1]):
+            below, right = eliminated(factor, other, product, p)
+            lower[p], upper[p] = below * inverse, right
+
+
+@kernel
+def square_of_row(factor, diagonal):
+    """The square of the length of a row of D, by its place on the diagonal; 1 of a row without entries."""
+    symbolic, d, square = factor.symbolic, factor.d, 0.0
+    for p in range(symbolic.s_start[diagonal], symbolic.s_start[diagonal + 1]):
+        square += d[symbolic.s_left[p]] * d[symbolic.s_right[p]]
+    return square if square > 0.0 else 1.0
+
+
+@kernel
+def eliminated(factor, other, product, place):
+    """The numbers of D D̃ᵀ below and right of the diagonal that belong to a place of the Cholesky factor,
+    less the products of the numbers of L and U in earlier columns."""
+    symbolic, d, lower, upper = factor.symbolic, factor.d, product.lower, product.upper
+    below, right = 0.0, 0.0
+    for p in range(symbolic.s_start[place], symbolic.s_start[place + 1]):
+        i, j = symbolic.s_left[p], symbolic.s_right[p]
+        below += d[i] * other[j]
+        right += d[j] * other[i]
+    for p in range(symbolic.update_start[place], symbolic.update_start[place + 1]):
+        i, j = symbolic.update_left[p], symbolic.update_right[p]
+        below -= lower[j] * upper[i]
+        right -= lower[i] * upper[j]
+    return below, right
