@@ -19,8 +19,8 @@ check: ## the gate: the README's test command, lint and types, in a fresh clone 
 test: $(VENV)/ready ## the tests, in this checkout
 	$(BIN)/pytest -n 2
 
-lint: $(VENV)/ready ## format, lint and types, in this checkout
-	$(BIN)/ruff format . && $(BIN)/ruff check . && $(BIN)/mypy
+lint: $(VENV)/ready ## format, lint, types and the prose of README and docs, in this checkout
+	$(BIN)/ruff format . && $(BIN)/ruff check . && $(BIN)/mypy && $(BIN)/python -m tests.prose
 
 deep: $(VENV)/ready ## the slow tests too, with many more random cases
 	HYPOTHESIS_PROFILE=deep $(BIN)/pytest -n 2 -m "slow or not slow"

@@ -1,0 +1,33 @@
+"""Commands that README and docs print are accepted; `tests/test_printed_commands.py` runs them."""
+
+from __future__ import annotations
+
+import pytest
+
+import crosscheck.cli.parser
+import mbref.cli.commands
+from tests.printed_commands import FOUND, ROOT
+
+PARSERS = {"mbref": mbref.cli.commands.parser, "crosscheck": crosscheck.cli.parser.parser}
+
+
+def test_commands_are_found():
+    assert len(FOUND) > 50 and {words[0] for _, words in FOUND} >= set(PARSERS)
+
+
+@pytest.mark.parametrize(
+    ("page", "words"), FOUND, ids=[f"{page}: {' '.join(words)}" for page, words in FOUND]
+)
+def test_a_printed_command_is_accepted(page, words):
+    program, *arguments = words
+    if program in PARSERS:
+        plain = arguments[: arguments.index(">")] if ">" in arguments else arguments
+        known = PARSERS[program]().parse_args(plain)
+        assert callable(known.action) if program == "mbref" else known.command == plain[0]
+    elif program == "python":
+        assert (ROOT / arguments[0]).is_file() or (ROOT / arguments[1].replace(".", "/")).exists()
+    elif "-k" in arguments:
+        name = arguments[arguments.index("-k") + 1]
+        assert any(f"def {name}(" in path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))
+    else:
+        assert arguments[:2] == ["--pyargs", "crosscheck.conformance"]

@@ -1,0 +1,40 @@
+"""README, CHANGELOG and docs are in plain words: no fault by proselint with the rules of tests/prose.toml."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip("proselint", reason="installed by the extra `dev`")
+from tests import prose
+
+PAGES = prose.pages()
+
+
+@pytest.mark.parametrize("path", PAGES, ids=[str(path.relative_to(prose.ROOT)) for path in PAGES])
+def test_pages_have_no_fault(path):
+    found = [f"{path.name}:{line}: {message}" for line, message in prose.faults(path.read_text())]
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize("path", PAGES, ids=[str(path.relative_to(prose.ROOT)) for path in PAGES])
+def test_pages_begin_with_their_purpose_and_an_example(path):
+    lines = path.read_text().splitlines()
+    first = next(line for line in lines[1:] if line)
+    assert lines[0].startswith("# ") and first[:1] not in "#|-", first
+    assert path.name == "CHANGELOG.md" or "`" in "".join(lines[1:30]) or "![" in "".join(lines[1:30])
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        ("# A page\n\nThe rows, but for one.\n", [3]),
+        ("A run tells the error.\n", [1]),
+        ("`told` is a name.\n\n```sh\ntells\n```\n", []),
+        ("One | cell told | here\n", [1]),
+        ("Word " * 37 + ".\n", [1]),
+        (("Word " * 30 + ".\n") * 3, []),
+        ("It is very unique.\n", [1, 1]),
+    ],
+)
+def test_faults_are_found_with_their_lines(text, lines):
+    assert [line for line, _ in prose.faults(text)] == lines

@@ -1,0 +1,22 @@
+"""Commands that README and docs print, read from their shell blocks."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+
+
+def commands(page: Path) -> Iterator[list[str]]:
+    """Yield the words of each command in a page's shell blocks, without comments."""
+    for block in re.findall(r"^```(?:sh|run)?\n(.*?)^```$", page.read_text(), re.S | re.M):
+        for line in block.replace("\\\n", " ").splitlines():
+            if line and re.match(r"(mbref|crosscheck|python|pytest) ", line):
+                yield shlex.split(line, comments=True)
+
+
+FOUND = [(str(page.relative_to(ROOT)), words) for page in PAGES for words in commands(page)]

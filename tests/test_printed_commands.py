@@ -1,0 +1,59 @@
+"""Commands and Python that README and docs print run as a reader would run them."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mbref.scenes import SCENES
+from tests.printed_commands import FOUND, ROOT
+
+SHORT = ("compare", "run", "list", "certify", "reference", "tune", "report")  # commands of minutes at most
+OF_CROSSCHECK = [
+    words
+    for _, words in FOUND
+    if words[:1] == ["crosscheck"] and words[1] in SHORT and "--render" not in words
+]
+
+
+def slow(page: str) -> Any:
+    """Return a page whose commands run with `make deep` only."""
+    return pytest.param(page, marks=pytest.mark.slow)
+
+
+def run(words: list[str], folder: Path) -> None:
+    """Run a command in a folder, as a reader would."""
+    program, *arguments = words
+    ran = subprocess.run(
+        [sys.executable, "-m", program, *arguments], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert ran.returncode == 0, f"{' '.join(words)}: {ran.stdout[-1000:]}{ran.stderr[-1000:]}"
+
+
+@pytest.mark.parametrize("page", ["README.md", slow("docs/methods.md"), slow("docs/records.md")])
+def test_printed_commands_of_mbref_run(page, tmp_path):
+    for found, words in FOUND:
+        if found == page and words[0] == "mbref":
+            run(words, tmp_path)
+
+
+@pytest.mark.parametrize("page", ["README.md", slow("docs/api.md"), slow("docs/judge.md")])
+def test_printed_python_runs(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for block in re.findall(r"^```python\n(.*?)^```$", (ROOT / page).read_text(), re.S | re.M):
+        exec(block, {})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", OF_CROSSCHECK, ids=" ".join)
+def test_printed_commands_of_crosscheck_run(words, tmp_path):
+    run(["mbref", "new", "my.toml"], tmp_path)
+    for name in (word.removesuffix(".toml") for word in words if word.endswith(".toml")):
+        if name in SCENES:
+            SCENES[name]().save(tmp_path / f"{name}.toml")
+    run(words, tmp_path)
