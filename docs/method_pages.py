@@ -14,22 +14,26 @@ CHOOSE = "methods.md"  # the pages of formulations follow it in the contents
 def page(formulation: Formulation) -> str:
     """Return the page of a formulation: equations, use, limits, and measurements made by the build."""
     name, about = formulation.name, formulation.about
+    scene = "four_bar" if formulation.needs_independent_columns else "planar_slider_crank"
     return f"""# `{name}`: {about.title}
-
-$${about.formula}$$
-
-{about.text}
 
 **Use it for**: {about.use}
 
 **It fails on**: {about.fails}
 
+```sh
+mbref run {scene} --method {name}+projection
+```
+
+$${about.formula}$$
+
+{about.text}
+
 ## Measured
 
 <!-- measured: {name}+projection {name} -->
 
-Runs of 0.1 s: how each ended, and its largest error against the exact motion, relative to the size of the
-mechanism or in rad.
+Each cell gives the outcome of a run of 0.1 s and its largest error, relative to the size of the mechanism or in rad.
 
 ![The planar slider-crank](../figures/motion_planar_slider_crank.svg)
 """
