@@ -33,7 +33,8 @@ $${about.formula}$$
 
 <!-- measured: {name}+projection {name} -->
 
-Each cell gives the outcome of a run of 0.1 s and its largest error, relative to the size of the mechanism or in rad.
+Each cell gives the outcome of a run of 0.1 s and its largest error, relative to the mechanism's size or
+in rad.
 
 ![The planar slider-crank](../figures/motion_planar_slider_crank.svg)
 """
