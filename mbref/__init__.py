@@ -73,6 +73,12 @@ def __getattr__(name: str) -> Any:
 
 
 SERVICES.counts = lambda scene: import_module("mbref.equations.diagnosis").counts(scene)
+SERVICES.violations = lambda scene, motion: import_module("mbref.equations.along_trajectory").violations(
+    scene, motion
+)
+SERVICES.determined_reactions = lambda scene, motion: import_module(
+    "mbref.equations.along_trajectory"
+).determined_reactions(scene, motion)
 SERVICES.picture = lambda scene: import_module("mbref.drawing.picture").still(scene)
 
 

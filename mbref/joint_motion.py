@@ -20,8 +20,8 @@ class JointMotion:
     angle, rate : ndarray, shape (k,), or None
         Angle about the axis (rad, counted on over full turns) and its rate (rad/s), of revolute, cylindrical
         and planar joints.
-    displacement : ndarray, shape (k,), or None
-        Displacement along the axis, m, of translational and cylindrical joints.
+    displacement, displacement_rate : ndarray, shape (k,), or None
+        Displacement along the axis, m, and its rate, m/s, of translational and cylindrical joints.
     rotation : ndarray, shape (k, 3)
         Rotation vector of the second body relative to the first, rad, along the world's axes at t = 0 as they
         are fixed to the first body.
@@ -35,6 +35,7 @@ class JointMotion:
     angle: np.ndarray | None
     rate: np.ndarray | None
     displacement: np.ndarray | None
+    displacement_rate: np.ndarray | None
     rotation: np.ndarray
     force: np.ndarray | None
     moment: np.ndarray | None
@@ -52,16 +53,16 @@ def joint_motion(scene: Scene, motion: Trajectory, name: str) -> JointMotion:
     if name not in {joint.name for joint in scene.joint}:
         raise KeyError(f"no joint {name!r}; joints: {', '.join(joint.name for joint in scene.joint)}")
     joint = scene.joint_named(name)
-    turned = [_turned(scene, motion, body) for body in joint.bodies]
+    turned = [turned_since_start(scene, motion, body) for body in joint.bodies]
     relative = rotations.multiply(rotations.conjugate(turned[0]), turned[1])
     turns = joint.facts.free_rotations == 1 and bool(joint.directions)
     slides = joint.facts.free_translations == 1 and bool(joint.directions)
     angle, rate = _angle(scene, motion, joint, turned[0], relative) if turns else (None, None)
-    displacement = _displacement(scene, motion, joint, turned[0]) if slides else None
+    slid, speed = _displacement(scene, motion, joint, turned[0]) if slides else (None, None)
     wrench = (motion.reactions or {}).get(name)
     force, moment = (None, None) if wrench is None else (wrench[:, :3], wrench[:, 3:])
     marks = (motion.open_reactions or {}).get(name)
-    return JointMotion(name, angle, rate, displacement, _vector(relative), force, moment, marks)
+    return JointMotion(name, angle, rate, slid, speed, _vector(relative), force, moment, marks)
 
 
 def place_of(scene: Scene, motion: Trajectory, name: str, point: tuple[float, float, float]) -> np.ndarray:
@@ -70,11 +71,21 @@ def place_of(scene: Scene, motion: Trajectory, name: str, point: tuple[float, fl
     if b < 0:
         return np.tile(np.array(point), (len(motion.times), 1))
     arm = np.array(point) - np.array(scene.body[b].position)
-    return np.asarray(motion.position[:, b] + rotations.rotate(_turned(scene, motion, name), arm))
+    return np.asarray(motion.position[:, b] + rotations.rotate(turned_since_start(scene, motion, name), arm))
 
 
-def _turned(scene: Scene, motion: Trajectory, name: str) -> np.ndarray:
-    """Rotations (k, 4) of a body since the scene's orientation at t = 0."""
+def velocity_of(scene: Scene, motion: Trajectory, name: str, point: tuple[float, float, float]) -> np.ndarray:
+    """Return world velocities (k, 3), m/s, of a point (world, t = 0) that moves with a body, or stands on the
+    ground."""
+    b = scene.body_index(name)
+    if b < 0:
+        return np.zeros((len(motion.times), 3))
+    arm = place_of(scene, motion, name, point) - motion.position[:, b]
+    return np.asarray(motion.velocity[:, b] + rotations.cross(motion.angular_velocity[:, b], arm))
+
+
+def turned_since_start(scene: Scene, motion: Trajectory, name: str) -> np.ndarray:
+    """Return rotations (k, 4) of a body since the scene's orientation at t = 0."""
     b = scene.body_index(name)
     if b < 0:
         return np.tile(np.array([1.0, 0.0, 0.0, 0.0]), (len(motion.times), 1))
@@ -106,10 +117,18 @@ def _angular_velocity(scene: Scene, motion: Trajectory, name: str) -> np.ndarray
     return np.zeros((len(motion.times), 3)) if b < 0 else motion.angular_velocity[:, b]
 
 
-def _displacement(scene: Scene, motion: Trajectory, joint: Joint, first: np.ndarray) -> np.ndarray:
-    """(r₂ - r₁)·axis, the anchors' distance along the axis that the first body carries."""
-    ends = [place_of(scene, motion, *end) for end in zip(joint.bodies, joint.anchor_pair, strict=True)]
-    return np.einsum("ki,ki->k", ends[1] - ends[0], rotations.rotate(first, _axis(joint)[None]))
+def _displacement(
+    scene: Scene, motion: Trajectory, joint: Joint, first: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return (r₂ - r₁)·axis (k,), m, of anchors and the axis that the first body carries, and its rate."""
+    ends = list(zip(joint.bodies, joint.anchor_pair, strict=True))
+    places = [place_of(scene, motion, *end) for end in ends]
+    speeds = [velocity_of(scene, motion, *end) for end in ends]
+    axis = rotations.rotate(first, _axis(joint)[None])
+    turning = rotations.cross(_angular_velocity(scene, motion, joint.bodies[0]), axis)
+    apart = places[1] - places[0]
+    rate = np.einsum("ki,ki->k", speeds[1] - speeds[0], axis) + np.einsum("ki,ki->k", apart, turning)
+    return np.einsum("ki,ki->k", apart, axis), rate
 
 
 def _vector(p: np.ndarray) -> np.ndarray:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from html import escape
 from pathlib import Path
@@ -12,15 +11,16 @@ from typing import Any
 
 import numpy as np
 
+from mbref.actuation import DriverMotion, LoadMotion, driver_motion, load_motion
 from mbref.drawing.picture import moving, still
 from mbref.drawing.view import View
 from mbref.energy import kinetic, potential
 from mbref.joint_motion import JointMotion, joint_motion
+from mbref.outputs import chosen, columns_of
 from mbref.records import strict_json
 from mbref.scene import Scene, SceneError
-from mbref.trajectory import Trajectory
-
-VECTORS = ("position", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
+from mbref.scene_services import SERVICES
+from mbref.trajectory import Trajectory, Violation
 
 
 @dataclass(frozen=True, repr=False)
@@ -74,22 +74,87 @@ class Motion(Trajectory):
         """
         return self.kinetic_energy + self.potential_energy
 
-    def columns(self) -> dict[str, np.ndarray]:
-        """Return every number over time as a column.
+    def driver(self, joint: str) -> DriverMotion:
+        """Return force or torque, and power that the driver of a joint supplies.
+
+        Raises
+        ------
+        KeyError
+            If the joint has no driver; the message lists the driven joints.
+        """
+        return driver_motion(self.mechanism, self, joint)
+
+    def load_at(self, place: int) -> LoadMotion:
+        """Return length or angle, rate, force or torque, and power of the load at a place, from 0.
+
+        Raises
+        ------
+        IndexError
+            If the scene has no such load.
+        """
+        return load_motion(self.mechanism, self, place)
+
+    @property
+    def violation(self) -> Violation:
+        """Largest violation of a constraint row at position, velocity and acceleration level."""
+        found: Violation = SERVICES.violations(self.mechanism, self)
+        return found
+
+    @property
+    def largest_reaction(self) -> np.ndarray | None:
+        """Largest reaction force of a joint at each sample, N, shape (k,). None without masses."""
+        if self.reactions is None:
+            return None
+        forces = [np.linalg.norm(wrench[:, :3], axis=1) for wrench in self.reactions.values()]
+        return np.asarray(np.max(forces, axis=0, initial=0.0)) if forces else np.zeros(len(self.times))
+
+    @property
+    def determined_reactions(self) -> dict[str, np.ndarray]:
+        """Which components of the reactions equilibrium determines, by joint, shape (k, 6).
+
+        True for a component of force (x, y, z) or moment (x, y, z) that does not depend on how redundant
+        constraints share the load. In a plane mechanism across z these are force x, force y and moment z.
+        """
+        found: dict[str, np.ndarray] = SERVICES.determined_reactions(self.mechanism, self)
+        return found
+
+    def columns(self, *names: str) -> dict[str, np.ndarray]:
+        """Return numbers over time as columns.
+
+        Parameters
+        ----------
+        *names : str
+            Columns or their beginnings, such as ``"rod.position"`` or ``"driver(A).torque"``. Default: all.
+            ``mbref list outputs`` prints the names.
 
         Returns
         -------
         dict of str to ndarray, shape (k,)
             ``time``, ``rod.position.x``, ``A.angle``, ``energy`` and so on, in SI units.
+
+        Raises
+        ------
+        ValueError
+            If a name fits no column.
         """
         table = {"time": self.times}
         for name in self.bodies:
-            table.update(_body_columns(name, self[name]))
+            table.update(columns_of("body", name, vars(self[name])))
         for joint in self.mechanism.joint:
-            table.update(_joint_columns(self.joint(joint.name)))
-        if self.mechanism.has_mass():
-            table["energy"] = self.energy
-        return table
+            table.update(columns_of("joint", joint.name, vars(self.joint(joint.name))))
+        for driver in self.mechanism.driver:
+            table.update(columns_of("driver", driver.joint, vars(self.driver(driver.joint))))
+        for place in range(len(self.mechanism.load)):
+            table.update(columns_of("load", str(place), vars(self.load_at(place))))
+        table.update(columns_of("mechanism", "", self._totals()))
+        return {name: table[name] for name in ["time", *chosen(table, names)]} if names else table
+
+    def _totals(self) -> dict[str, np.ndarray | None]:
+        """Numbers of the whole mechanism by their names in the table of outputs."""
+        levels = {f"{level}_violation": rows for level, rows in self.violation._asdict().items()}
+        energies = ("kinetic_energy", "potential_energy", "energy") if self.mechanism.has_mass() else ()
+        found = {name: getattr(self, name) for name in energies}
+        return {**levels, "largest_reaction": self.largest_reaction, **found}
 
     def to_dataframe(self) -> Any:
         """Return the columns as a pandas DataFrame, indexed by time.
@@ -105,9 +170,9 @@ class Motion(Trajectory):
             raise ImportError("to_dataframe needs pandas: pip install pandas; columns() does not") from None
         return pandas.DataFrame(self.columns()).set_index("time")
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write the columns as CSV. The first line has their names, numbers have all digits."""
-        table = self.columns()
+    def to_csv(self, path: str | Path, *names: str) -> None:
+        """Write columns, by default all, as CSV. The first line has their names, numbers have all digits."""
+        table = self.columns(*names)
         with open(path, "w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file)
             writer.writerow(table)
@@ -180,18 +245,3 @@ class Motion(Trajectory):
     def _repr_html_(self) -> str:
         shown = self.picture() if self.times.size else still(self.mechanism)
         return f"<figure>{shown}<figcaption>{escape(repr(self)[1:-1])}</figcaption></figure>"
-
-
-def _body_columns(name: str, body: Any) -> Iterator[tuple[str, np.ndarray]]:
-    for key, axes in (("orientation", "wxyz"), *((key, "xyz") for key in VECTORS)):
-        if (array := getattr(body, key)) is not None:
-            yield from ((f"{name}.{key}.{axis}", array[:, i]) for i, axis in enumerate(axes))
-
-
-def _joint_columns(joint: JointMotion) -> Iterator[tuple[str, np.ndarray]]:
-    for key in ("angle", "rate", "displacement", "open"):
-        if (array := getattr(joint, key)) is not None:
-            yield f"{joint.name}.{key}", array
-    for key in ("force", "moment"):
-        if (array := getattr(joint, key)) is not None:
-            yield from ((f"{joint.name}.{key}.{axis}", array[:, i]) for i, axis in enumerate("xyz"))

@@ -1,6 +1,6 @@
-"""Services of a scene that higher parts of the package do: counting constraints and drawing.
+"""Services of a scene and its motion that higher parts of the package do: constraint rows and drawing.
 
-A scene is data and imports none of them.  ``mbref/__init__``, which imports everything, binds them here.
+Scenes and motions are data and import none of them.  ``mbref/__init__`` binds them here.
 """
 
 from __future__ import annotations
@@ -47,10 +47,16 @@ class Services:
         Returns the Counts of a scene.
     picture : callable
         Returns a scene at t = 0 as SVG.
+    violations : callable
+        Returns the Violation of a scene's constraint rows along a trajectory.
+    determined_reactions : callable
+        Returns by joint which components (k, 6) of its reaction equilibrium determines along a trajectory.
     """
 
     counts: Callable[[Any], Counts]
     picture: Callable[[Any], str]
+    violations: Callable[[Any, Any], Any]
+    determined_reactions: Callable[[Any, Any], Any]
 
 
 SERVICES = Services()

@@ -6,7 +6,7 @@ import enum
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -127,9 +127,11 @@ class Crossing:
         """Return the crossing as numbers, lists and text, for JSON."""
         arrays = ("position", "orientation", "velocity", "angular_velocity")
         return {
-            "time": self.time, "taken": self.taken, "sentence": self.sentence,
+            "time": self.time,
+            "taken": self.taken,
+            "sentence": self.sentence,
             **{key: getattr(self, key).tolist() for key in arrays},
-        }  # fmt: skip
+        }
 
     @staticmethod
     def from_record(record: Mapping[str, Any]) -> Crossing:
@@ -164,6 +166,24 @@ class BodyMotion:
 
     def __repr__(self) -> str:
         return f"<BodyMotion of {self.name!r}: {len(self.position)} samples>"
+
+
+class Violation(NamedTuple):
+    """Largest violation of a constraint row at k sample times, at three levels.
+
+    Attributes
+    ----------
+    position : ndarray, shape (k,)
+        m or rad.
+    velocity : ndarray, shape (k,)
+        m/s or rad/s.
+    acceleration : ndarray, shape (k,), or None
+        m/s² or rad/s². None if the engine gives no accelerations.
+    """
+
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray | None
 
 
 PER_BODY = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
@@ -254,16 +274,33 @@ class Trajectory:
 
     @staticmethod
     def failed(
-        *, scene: str, engine: str, version: str, method: str, settings: Mapping[str, Any],
-        bodies: tuple[str, ...], outcome: Outcome, message: str,
-    ) -> Trajectory:  # fmt: skip
+        *,
+        scene: str,
+        engine: str,
+        version: str,
+        method: str,
+        settings: Mapping[str, Any],
+        bodies: tuple[str, ...],
+        outcome: Outcome,
+        message: str,
+    ) -> Trajectory:
         """Return a trajectory without states, for a run that crashed, hung or did not begin."""
         nb = len(bodies)
         return Trajectory(
-            scene, engine, version, method, settings, np.zeros(0), bodies, np.zeros((0, nb, 3)),
-            np.zeros((0, nb, 4)), np.zeros((0, nb, 3)), np.zeros((0, nb, 3)),
-            outcome=outcome, message=message,
-        )  # fmt: skip
+            scene,
+            engine,
+            version,
+            method,
+            settings,
+            np.zeros(0),
+            bodies,
+            np.zeros((0, nb, 3)),
+            np.zeros((0, nb, 4)),
+            np.zeros((0, nb, 3)),
+            np.zeros((0, nb, 3)),
+            outcome=outcome,
+            message=message,
+        )
 
     def to_record(self) -> dict[str, Any]:
         """Return the record that ``run --json`` prints. crosscheck adds its ``metrics``."""

@@ -14,6 +14,7 @@ from mbref.cli.ensemble import add as add_ensemble
 from mbref.cli.exchange import add as add_exchange
 from mbref.cli.options import TEXT
 from mbref.cli.pictures import add as add_pictures
+from mbref.cli.plotting import add as add_plotting
 from mbref.cli.run import add as add_run
 from mbref.cli.scene_files import add as add_scene_files
 from mbref.cli.tables import add as add_tables
@@ -83,7 +84,16 @@ def parser() -> argparse.ArgumentParser:
         help="show the versions of mbref and of the packages that it computes with",
     )
     known = commands(whole, title="commands", required=True, metavar="COMMAND")
-    for add in (add_scene_files, add_pictures, add_diagnose, add_run, add_ensemble, add_exchange, add_tables):
+    for add in (
+        add_scene_files,
+        add_pictures,
+        add_diagnose,
+        add_run,
+        add_plotting,
+        add_ensemble,
+        add_exchange,
+        add_tables,
+    ):
         add(known)
     whole.set_defaults(grammar=parser)
     return whole

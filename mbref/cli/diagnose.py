@@ -121,9 +121,22 @@ def _start_lines(found: Diagnosis) -> list[str]:
         f"    degrees of freedom  {counts.degrees_of_freedom}",
         f"    rows in redundancy  {_listed(found.redundant_by_joint)}",
         f"    unique reactions    {', '.join(found.unique_reactions) or 'of no joint'}",
+        *_determined_lines(found),
         f"    singular values     {found.smallest_singular_value:.3g} to {found.largest_singular_value:.3g}"
         " (rows of unit length;",
         "                        the smallest is 0 in a singular position)",
+    ]
+
+
+def _determined_lines(found: Diagnosis) -> list[str]:
+    """Return a line for each set of components that equilibrium determines, with its joints."""
+    groups: dict[tuple[str, ...], list[str]] = {}
+    for name, components in (found.determined_reactions or {}).items():
+        if name not in found.unique_reactions:
+            groups.setdefault(components, []).append(name)
+    return [
+        f"    determined          {', '.join(components) or 'nothing'} of {', '.join(names)}"
+        for components, names in groups.items()
     ]
 
 

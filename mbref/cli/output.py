@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from rich.console import Console
 
+from mbref.outputs import UNITS, quantity_of
 from mbref.scene import Scene
 from mbref.scene_slips import probable_slips
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 PIPED_WIDTH = 80  # characters of a line where no terminal says otherwise
+TIME = "s"
 HOUR = 3600.0  # s
 PAUSE = 10.0  # s between two lines of progress where stderr is no terminal
 QUANTITIES = {  # of a body in a table → field of a trajectory
@@ -61,6 +63,19 @@ def body_table(
         for k, (quantity, field) in enumerate(QUANTITIES.items()):
             last = k == len(QUANTITIES) - 1
             table.add_row("" if k else name, quantity, *cells(b, field), end_section=last)
+    return table
+
+
+def column_table(columns: Mapping[str, np.ndarray]) -> Table:
+    """Return a table with a column of numbers over time for each of the named columns (k,), time first."""
+    from rich.table import Table
+
+    table = Table()
+    for name in columns:
+        unit = TIME if name == "time" else UNITS[quantity_of(name)]
+        table.add_column(f"{name}\n{unit}", justify="right", overflow="fold")
+    for row in zip(*columns.values(), strict=True):
+        table.add_row(*(f"{x:.6g}" for x in rounded(np.array(row))))
     return table
 
 

@@ -10,12 +10,14 @@ from typing import Any
 from mbref.cli.branches import along_branches, chosen, of_several_branches, told
 from mbref.cli.options import TEXT, add_method_options, add_scene, limits_of, sample_times
 from mbref.cli.output import progress_bar, warn
+from mbref.drawing.film import write_film
 from mbref.drawing.picture import moving, side_by_side, still
 from mbref.drawing.png import png
 from mbref.drawing.view import View
 from mbref.method import default_method
 from mbref.scenes import find_scene
 
+MOVING = (".svg", ".gif", ".mp4")
 VIEW = """\
 xy, xz, yz, oblique, or AZIMUTH,ELEVATION in degrees (write --view=-60,20);
 without: across the plane of a plane mechanism, else oblique"""
@@ -37,16 +39,22 @@ def add(commands: Any) -> None:
 
     animate = commands.add_parser(
         "animate",
-        help="the moving mechanism as SVG",
+        help="the moving mechanism as SVG, GIF or MP4",
         formatter_class=TEXT,
-        description="Simulate a scene and write its motion as an SVG that every browser plays.",
+        description="Simulate a scene and write its motion as an SVG that every browser plays,\n"
+        "a GIF or an MP4.",
         epilog="examples:\n  mbref animate mechanism.toml\n"
         "  mbref animate flyball_governor --duration 2 --view oblique --out governor.svg\n"
-        "  mbref animate four_bar --branches",
+        "  mbref animate four_bar --branches\n  mbref animate four_bar_gravity --out four_bar.gif",
     )
     add_scene(animate)
     animate.add_argument("--view", metavar="VIEW", help=VIEW)
-    animate.add_argument("--out", metavar="FILE", help=".svg (default: as the scene, with -moving.svg)")
+    animate.add_argument(
+        "--out",
+        metavar="FILE",
+        help=".svg, .gif or .mp4 (default: as the scene, with -moving.svg);\n"
+        ".gif and .mp4 need the extra video",
+    )
     animate.add_argument(
         "--branches",
         action="store_true",
@@ -65,7 +73,7 @@ def add(commands: Any) -> None:
 
 def _draw(options: argparse.Namespace) -> int:
     scene, view = find_scene(options.scene), _view(options)
-    path = _path(options, "", (".svg", ".png"))
+    path = path_of(options, "", (".svg", ".png"))
     warn(scene)
     picture = still(scene, view)
     if path.suffix == ".png":
@@ -82,7 +90,7 @@ def _animate(options: argparse.Namespace) -> int:
     scene, view = find_scene(options.scene), _view(options)
     parted = options.branches or options.crossing is not None
     path, times, limits = (
-        _path(options, "-branches" if parted else "-moving", (".svg",)),
+        path_of(options, *(("-branches", (".svg",)) if parted else ("-moving", MOVING))),
         sample_times(options, scene),
         limits_of(options),
     )
@@ -98,7 +106,10 @@ def _animate(options: argparse.Namespace) -> int:
             number = chosen(motion, options.crossing)
             motions = along_branches(simulate, motion, method, limits, number)
             picture = partial(side_by_side, scene, motions, f"{scene.name}: {told(motion, number)}", view)
-    path.write_text(picture(), encoding="utf-8")
+    if path.suffix == ".svg":
+        path.write_text(picture(), encoding="utf-8")
+    else:
+        write_film(path, scene, motion, view)
     print(path)
     if not parted and (several := of_several_branches(motion)):
         print(f"{told(motion, several[0])}; --branches shows them side by side")
@@ -112,7 +123,7 @@ def _view(options: argparse.Namespace) -> View | None:
     return View.parse(options.view) if options.view else None
 
 
-def _path(options: argparse.Namespace, ending: str, suffixes: tuple[str, ...]) -> Path:
+def path_of(options: argparse.Namespace, ending: str, suffixes: tuple[str, ...]) -> Path:
     """The file asked for, or one here named as the scene or its file; ValueError for another kind of file."""
     path = Path(options.out or f"{Path(options.scene).name.removesuffix('.toml')}{ending}.svg")
     if path.suffix not in suffixes:

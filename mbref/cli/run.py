@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from mbref.cli.options import TEXT, add_method_options, add_scene, limits_of, sample_times
-from mbref.cli.output import body_table, console, progress_bar, rounded, warn
+from mbref.cli.output import body_table, column_table, console, progress_bar, rounded, warn
 from mbref.method import default_method
+from mbref.motion import Motion
+from mbref.outputs import UNITS
 from mbref.records import strict_json
 from mbref.scene import Scene
 from mbref.scenes import find_scene
-from mbref.trajectory import Trajectory
 
 SHOWN = 10  # singular positions in the text; --json has all
 
@@ -29,7 +33,8 @@ def add(commands: Any) -> None:
         "  mbref run four_bar --method mpi-svd+partitioning --duration 0.02 --json\n"
         "  mbref run mechanism.toml --method 'lm1+baumgarte[alpha=10,beta=10]/rk4[step=1e-4]'\n"
         "  mbref run four_bar --duration 0.1 --branch 2=2\n"
-        "  mbref run mechanism.toml --out run.csv",
+        "  mbref run mechanism.toml --out run.csv\n"
+        '  mbref run spatial_slider_crank --samples 5 --columns slider.position "driver(A).torque"',
     )
     add_scene(run)
     add_method_options(run)
@@ -37,6 +42,14 @@ def add(commands: Any) -> None:
         "--out",
         metavar="FILE",
         help="write the whole motion: .csv is a table of columns, .json what\nmbref.Motion.load reads",
+    )
+    run.add_argument(
+        "--columns",
+        nargs="+",
+        metavar="COLUMN",
+        default=[],
+        help="print these numbers over time, and write only them to a .csv, such as rod.position energy;\n"
+        "mbref list outputs prints their names",
     )
     run.add_argument(
         "--branch",
@@ -62,13 +75,15 @@ def _run(options: argparse.Namespace) -> int:
     method = options.method or default_method(scene)
     with simulator(method) as simulate:
         with progress_bar("simulating", float(times[-1])) as progress:
+            if options.columns:  # refuses unknown names
+                simulate(scene, method, times[:1], limits, progress).columns(*options.columns)
             motion = simulate(scene, method, times, limits, progress)
         if options.out:
-            write(motion, options.out)
+            write(motion, options.out, *options.columns)
         if options.json:
             print(strict_json({"scene": scene.name, "records": [motion.to_record()]}), flush=True)
         else:
-            show(scene, motion)
+            show(scene, motion, options.columns)
     return 0 if motion.outcome.name == "COMPLETED" else 1
 
 
@@ -83,16 +98,14 @@ def _branches(words: list[str]) -> dict[int, int]:
 
 def _writer(out: str | None) -> Any:
     """Return the writer for a file of that name; ValueError for an unknown file suffix."""
-    from mbref.motion import Motion
-
-    writers = {".csv": Motion.to_csv, ".json": Motion.save}
+    writers = {".csv": Motion.to_csv, ".json": lambda motion, path, *_: motion.save(path)}
     if out is not None and Path(out).suffix not in writers:
         raise ValueError(f"--out: must end in {' or '.join(writers)}, got {out!r}")
     return writers[Path(out).suffix] if out else None
 
 
-def show(scene: Scene, trajectory: Trajectory) -> None:
-    """Print how a run ended, what it cost, and its last state."""
+def show(scene: Scene, trajectory: Motion, columns: Sequence[str] = ()) -> None:
+    """Print how a run ended, what it cost, and its last state or the columns asked for."""
     out, cost = console(), trajectory.cost
     out.print(f"{scene.name} by {trajectory.method}: {trajectory.outcome.name} at t = {trajectory.t_end:g} s")
     if trajectory.message:
@@ -107,8 +120,28 @@ def show(scene: Scene, trajectory: Trajectory) -> None:
         out.print(f"singular position {number} at t = {crossing.time:.6g} s: {crossing.sentence}, {taken}")
     if not trajectory.times.size:
         return
+    if "kernels" not in trajectory.settings:  # compiled: a first result does not wait for further kernels
+        out.print("\n".join(_largest(trajectory)))
+    if columns:
+        out.print(column_table(trajectory.columns(*columns)))
+        return
 
     def numbers(b: int, field: str) -> list[str]:
         return [f"{x:.5g}" for x in rounded(getattr(trajectory, field)[-1, b])]
 
     out.print(body_table(f"state at t = {trajectory.times[-1]:g} s", trajectory.bodies, "right", numbers))
+
+
+def _largest(motion: Motion) -> Iterator[str]:
+    """Yield the largest violations of constraint rows, and the largest reaction with its joint and time."""
+    levels = [
+        f"{float(rows.max()):.2g} {UNITS[f'{level}_violation']}"
+        for level, rows in motion.violation._asdict().items()
+        if rows is not None
+    ]
+    yield f"largest violation of a constraint row {', '.join(levels)}"
+    if motion.reactions:
+        sizes = {name: np.linalg.norm(wrench[:, :3], axis=1) for name, wrench in motion.reactions.items()}
+        name = max(sizes, key=lambda name: float(sizes[name].max()))
+        at = int(sizes[name].argmax())
+        yield f"largest reaction {sizes[name][at]:.5g} N in joint {name} at t = {motion.times[at]:.6g} s"

@@ -13,6 +13,7 @@ from mbref.cli.options import TEXT
 from mbref.cli.output import console
 from mbref.formulations import FORMULATIONS
 from mbref.integrators import INTEGRATORS
+from mbref.outputs import OUTPUTS
 from mbref.scenes import SCENES
 from mbref.stabilisation import STABILISATIONS
 
@@ -37,12 +38,13 @@ def add(commands: Any) -> None:
     """The commands' grammar."""
     listing = commands.add_parser(
         "list",
-        help="the built-in scenes and the methods",
+        help="the built-in scenes, the methods, the numbers of a motion",
         formatter_class=TEXT,
-        description="The built-in scenes, or the parts of a method with their options.",
-        epilog="examples:\n  mbref list\n  mbref list methods",
+        description="The built-in scenes, the parts of a method with their options, or the numbers\n"
+        "that a motion has over time.",
+        epilog="examples:\n  mbref list\n  mbref list methods\n  mbref list outputs",
     )
-    listing.add_argument("what", nargs="?", choices=list(TABLES), help="default: both")
+    listing.add_argument("what", nargs="?", choices=list(TABLES), help="default: scenes and methods")
     listing.set_defaults(action=_list)
 
     completion = commands.add_parser(
@@ -57,7 +59,7 @@ def add(commands: Any) -> None:
 
 
 def _list(options: argparse.Namespace) -> int:
-    for name in [options.what] if options.what else TABLES:
+    for name in [options.what] if options.what else BOTH:
         console().print(TABLES[name]())
     return 0
 
@@ -92,7 +94,16 @@ def _methods() -> Table:
     return table
 
 
-TABLES: dict[str, Callable[[], Table]] = {"scenes": _scenes, "methods": _methods}
+def _outputs() -> Table:
+    table = Table("column", "unit", "meaning", title="numbers of a motion over time")
+    for k, output in enumerate(OUTPUTS):
+        ends = OUTPUTS[min(k + 1, len(OUTPUTS) - 1)].owner != output.owner
+        table.add_row(output.column, output.unit, output.meaning, end_section=ends)
+    return table
+
+
+BOTH = ("scenes", "methods")
+TABLES: dict[str, Callable[[], Table]] = {"scenes": _scenes, "methods": _methods, "outputs": _outputs}
 
 
 def _complete(options: argparse.Namespace) -> int:

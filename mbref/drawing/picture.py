@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -14,7 +13,7 @@ from mbref.drawing.marks import Stage, driver_mark, ground_mark, joint_mark, loa
 from mbref.drawing.shapes import Shape, anchors, at_rest, attack, moved, shapes
 from mbref.drawing.svg import COLOURS, GREY, INK
 from mbref.drawing.timeline import Timeline
-from mbref.drawing.view import Page, View, view_of
+from mbref.drawing.view import Page, View, round_length, view_of
 from mbref.scene import GROUND, Scene
 from mbref.trajectory import Trajectory
 
@@ -81,6 +80,14 @@ def moving(scene: Scene, motion: Trajectory, view: View | None = None, width: fl
     _check([motion])
     panel, timeline = Panel([Layer(motion, more=(signs, names))]), Timeline.of(motion.times)
     return picture(scene, [panel], _title(scene), timeline, view, Form(width))
+
+
+def frames(scene: Scene, motion: Trajectory, view: View | None = None) -> Iterator[str]:
+    """Yield the samples that a moving picture shows, each as a still SVG of one size and part of space."""
+    _check([motion])
+    for sample in Timeline.of(motion.times).samples:
+        panel = Panel([Layer(_at(motion, [sample]), more=(signs, names))])
+        yield picture(scene, [panel], _title(scene), view=view, form=Form(), shown=[motion])
 
 
 def side_by_side(
@@ -280,7 +287,7 @@ def _axes(page: Page, grid: _Grid) -> Iterator[str]:
 def _scale(grid: _Grid) -> Iterator[str]:
     """Yield a bar of a round length."""
     scale = grid.page.scale
-    length = _round_length(110 / scale)
+    length = round_length(110 / scale)
     left, y = grid.width - 40 - length * scale, grid.bottom + FOOT - 20
     ends = f"M{left:.1f} {y - 4:.1f}v8m0 -4h{length * scale:.1f}m0 -4v8"
     yield f'<path d="{ends}" stroke="{INK}" fill="none"/>'
@@ -317,9 +324,3 @@ def _clock(grid: _Grid, timeline: Timeline, times: np.ndarray) -> Iterator[str]:
     places = np.stack([dot, np.full_like(dot, y)], axis=1)
     moves = timeline if len(times) > 1 else None
     yield svg.follow(places, f'<circle r="5" fill="{COLOURS[1]}"/>', moves)
-
-
-def _round_length(longest: float) -> float:
-    """Return the largest of 1, 2 or 5 times a power of ten that is not longer."""
-    power = 10.0 ** math.floor(math.log10(longest))
-    return float(f"{max(k for k in (1, 2, 5) if k * power <= longest * (1 + 1e-9)) * power:.6g}")

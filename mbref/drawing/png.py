@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 
-def png(svg: str) -> bytes:
-    """The picture at twice its size; a moving one at its first frame.  Raises ValueError without resvg."""
+def png(svg: str, zoom: int = 2) -> bytes:
+    """Return the picture at twice its size; a moving one at its first frame.
+
+    Raises ValueError without resvg.
+    """
     try:
         import resvg_py
     except ImportError:
         raise ValueError("PNG needs resvg: pip install 'mbref[draw]'; SVG needs nothing more") from None
-    return bytes(resvg_py.svg_to_bytes(svg_string=svg, zoom=2))
+    return bytes(resvg_py.svg_to_bytes(svg_string=svg, zoom=zoom))

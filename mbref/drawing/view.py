@@ -85,3 +85,9 @@ class Page:
         """World directions (…, 3) on the page (…, 2), y downwards, at the length they are seen with."""
         seen: np.ndarray = vectors @ self.view.axes[:2].T * np.array([1.0, -1.0])
         return seen
+
+
+def round_length(longest: float) -> float:
+    """Return the largest of 1, 2 or 5 times a power of ten that is not longer."""
+    power = 10.0 ** math.floor(math.log10(longest))
+    return float(f"{max(k for k in (1, 2, 5) if k * power <= longest * (1 + 1e-9)) * power:.6g}")

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mbref.equations.initial_state import LARGE, Start, consistent_start
+from mbref.equations.joint_reactions import determined_components
 from mbref.equations.model import Model
 from mbref.equations.units import row_lengths
 from mbref.linear_algebra.redundancy import Redundancy
@@ -19,6 +20,7 @@ from mbref.scenes import find_scene
 RANK_TOLERANCE = 1e-10  # relative to the largest singular value of the scaled Jacobian
 UNIQUE_TOLERANCE = 1e-8  # a row takes part in a redundancy when its weight in it exceeds this
 UNIQUE_SHARE = 1e-9  # the same for the squares of a large scene, where other singular values leave 1e-12
+COMPONENTS = tuple(f"{kind} {axis}" for kind in ("force", "moment") for axis in "xyz")
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,9 @@ class Diagnosis:
         Smallest nonzero singular value of Φ_q with unit rows: the distance from a singular position.
     largest_singular_value : float
         Largest singular value of Φ_q with unit rows.
+    determined_reactions : dict of str to tuple of str, or None
+        Components of the reactions that equilibrium determines, by joint, such as ``"force x"``, along world
+        axes. None for large scenes.
     """
 
     counts: Counts
@@ -44,6 +49,7 @@ class Diagnosis:
     unique_reactions: tuple[str, ...]  # joints all of whose rows have a unique multiplier
     smallest_singular_value: float  # of Φ_q with unit rows, above rank: the distance to a singular position
     largest_singular_value: float
+    determined_reactions: dict[str, tuple[str, ...]] | None = None
 
 
 def counts(scene: Scene) -> Counts:
@@ -94,10 +100,18 @@ def diagnose(scene: Scene | str | Path) -> Diagnosis:
         shared = np.linalg.norm(left[:, rank:], axis=1) > UNIQUE_TOLERANCE
         smallest = float(values[rank - 1]) if rank else 0.0
         largest = float(values[0]) if values.size else 0.0
+    determined = _determined(model, start) if model.m <= LARGE else None
     total = _counts(model, rank)
     involved = Counter(name for name, part in zip(model.row_joint, shared, strict=True) if part)
     unique = tuple(name for name in total.rows_by_joint if name not in involved)
-    return Diagnosis(total, dict(involved), unique, smallest, largest)
+    return Diagnosis(total, dict(involved), unique, smallest, largest, determined)
+
+
+def _determined(model: Model, start: Start) -> dict[str, tuple[str, ...]]:
+    """Return by joint the names of the components of its reaction that equilibrium determines at t = 0."""
+    q = start.q.reshape(1, model.nb, 7)
+    found = determined_components(model, q, model.blocks_along(np.zeros(1), q))
+    return {name: tuple(np.array(COMPONENTS)[mask[0]].tolist()) for name, mask in found.items()}
 
 
 def _counts(model: Model, rank: int) -> Counts:

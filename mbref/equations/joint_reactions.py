@@ -120,11 +120,7 @@ def open_dimensions(model: Model, blocks: np.ndarray) -> dict[str, np.ndarray]:
     combination of rows vanishes, a left null vector of Φ_q (Wojtyra, J. Theor. Appl. Mech. 43, 2005).  From
     the blocks (k, m, 12) of Φ_q.
     """
-    jacobian = model.dense(blocks)
-    left, values, _ = np.linalg.svd(jacobian / row_lengths(jacobian)[..., None])
-    rank = np.sum(values > OPEN * values.max(axis=1, initial=0.0)[:, None], axis=1)
-    least = int(rank.min(initial=model.m))
-    vanishing = (left * (np.arange(model.m) >= rank[:, None])[:, None, :])[..., least:]
+    vanishing, _ = vanishing_combinations(model, blocks)
     names = tuple(joint.name for joint in model.scene.joint)
     _, _, of, starts = _places(model.structure, names)
     ends = [*starts, of.size][1:]
@@ -132,6 +128,35 @@ def open_dimensions(model: Model, blocks: np.ndarray) -> dict[str, np.ndarray]:
         name: np.sum(_singular_values(vanishing[:, first:end]) > SHARE, axis=1)
         for name, first, end in zip(names, starts, ends, strict=True)
     }
+
+
+def determined_components(model: Model, q: np.ndarray, blocks: np.ndarray) -> dict[str, np.ndarray]:
+    """Return by joint which components (k, 6) of its reaction every solution of equilibrium shares.
+
+    Force and moment on the second body at the anchor, along world axes; from q (k, nb, 7) and the blocks
+    (k, m, 12) of Φ_q. A component is open where a vanishing combination of rows, added to the multipliers,
+    changes it.
+    """
+    found = {joint.name: np.ones((len(q), 6), dtype=bool) for joint in model.scene.joint}
+    vanishing, lengths = vanishing_combinations(model, blocks)
+    units = np.repeat([1.0, model.length], 3)
+    for k in range(vanishing.shape[-1]):
+        for name, change in reactions(model, q, blocks, vanishing[..., k] / lengths).items():
+            found[name] &= np.abs(change / units) <= SHARE
+    return found
+
+
+def vanishing_combinations(model: Model, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return left null vectors (k, m, c) of the unit rows of Φ_q, and the lengths (k, m) of its rows.
+
+    From the blocks (k, m, 12). Samples with fewer null vectors than others have zeros in their place.
+    """
+    jacobian = model.dense(blocks)
+    lengths = row_lengths(jacobian)
+    left, values, _ = np.linalg.svd(jacobian / lengths[..., None])
+    rank = np.sum(values > OPEN * values.max(axis=1, initial=0.0)[:, None], axis=1)
+    least = int(rank.min(initial=model.m))
+    return (left * (np.arange(model.m) >= rank[:, None])[:, None, :])[..., least:], lengths
 
 
 def _singular_values(matrices: np.ndarray) -> np.ndarray:

@@ -1,0 +1,128 @@
+"""Forces, torques and powers of the drivers, springs and torsion springs of a motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbref import rotations
+from mbref.joint_motion import JointMotion, joint_motion, place_of, turned_since_start, velocity_of
+from mbref.scene import Scene, Spring
+from mbref.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class DriverMotion:
+    """Force or torque, and power, that a driver supplies at k sample times (inverse dynamics).
+
+    The driver acts on the second body of its joint and with the opposite sign on the first. A positive
+    torque turns the second body about the joint's axis, a positive force pushes it along the axis. It is the
+    share of the joint's reaction about or along the axis; springs at the joint act in addition.
+
+    Attributes
+    ----------
+    joint : str
+        Name of the driven joint.
+    force : ndarray, shape (k,), or None
+        Force along the axis, N, of a translational joint.
+    torque : ndarray, shape (k,), or None
+        Torque about the axis, N m, of a revolute or cylindrical joint.
+    power : ndarray, shape (k,), or None
+        Power into the mechanism, W: torque times rate of the angle, or force times rate of the displacement.
+
+    All are None without masses.
+    """
+
+    joint: str
+    force: np.ndarray | None
+    torque: np.ndarray | None
+    power: np.ndarray | None
+
+
+@dataclass(frozen=True)
+class LoadMotion:
+    """Length or angle, rate, force or torque, and power of a load at k sample times.
+
+    Numbers that a load of this type does not have are None; forces and moments that are constant have none.
+
+    Attributes
+    ----------
+    place : int
+        Place of the load in the scene, from 0.
+    length, length_rate : ndarray, shape (k,), or None
+        Distance of the points of a spring, m, and its rate, m/s.
+    force : ndarray, shape (k,), or None
+        Force of spring and damper, N: stiffness (length - natural length) + damping rate. It is positive
+        where it pulls its points together.
+    angle, rate : ndarray, shape (k,), or None
+        Angle of a torsion spring's joint since t = 0, rad, and its rate, rad/s.
+    torque : ndarray, shape (k,), or None
+        Torque of a torsion spring and damper on the second body about the joint's axis, N m.
+    power : ndarray, shape (k,), or None
+        Power of spring and damper into the bodies, W: -force times length rate, or torque times rate.
+    """
+
+    place: int
+    length: np.ndarray | None = None
+    length_rate: np.ndarray | None = None
+    force: np.ndarray | None = None
+    angle: np.ndarray | None = None
+    rate: np.ndarray | None = None
+    torque: np.ndarray | None = None
+    power: np.ndarray | None = None
+
+
+def driver_motion(scene: Scene, motion: Trajectory, name: str) -> DriverMotion:
+    """Return force or torque, and power of the driver of a joint; raises KeyError that lists the drivers."""
+    driven = [driver.joint for driver in scene.driver]
+    if name not in driven:
+        raise KeyError(f"no driver of a joint {name!r}; driven joints: {', '.join(driven) or 'none'}")
+    joint, found = scene.joint_named(name), joint_motion(scene, motion, name)
+    if found.force is None or found.moment is None:
+        return DriverMotion(name, None, None, None)
+    axis = _world_axis(scene, motion, name)
+    if joint.facts.driven == "angle":
+        torque = np.einsum("ki,ki->k", found.moment, axis)
+        return DriverMotion(name, None, torque, torque * _rate(found))
+    force = np.einsum("ki,ki->k", found.force, axis)
+    return DriverMotion(name, force, None, force * _rate(found))
+
+
+def load_motion(scene: Scene, motion: Trajectory, place: int) -> LoadMotion:
+    """Return length or angle, rate and force or torque of a load by its place; raises IndexError."""
+    if not 0 <= place < len(scene.load):
+        raise IndexError(f"no load {place}; the scene has {len(scene.load)} loads, counted from 0")
+    load = scene.load[place]
+    if load.type == "spring":
+        return _spring(scene, motion, place, load)
+    if load.type != "torsion_spring":
+        return LoadMotion(place)
+    found = joint_motion(scene, motion, load.joint)
+    angle, rate = np.asarray(found.angle), _rate(found)
+    torque = -load.stiffness * (angle - load.natural_angle) - load.damping * rate
+    return LoadMotion(place, angle=angle, rate=rate, torque=torque, power=torque * rate)
+
+
+def _spring(scene: Scene, motion: Trajectory, place: int, load: Spring) -> LoadMotion:
+    ends = list(zip(load.bodies, load.points, strict=True))
+    start, stop = (place_of(scene, motion, *end) for end in ends)
+    start_rate, stop_rate = (velocity_of(scene, motion, *end) for end in ends)
+    length = np.linalg.norm(stop - start, axis=1)
+    direction = (stop - start) / np.where(length > 0, length, 1.0)[:, None]
+    rate = np.einsum("ki,ki->k", stop_rate - start_rate, direction)
+    force = load.stiffness * (length - load.natural_length) + load.damping * rate
+    return LoadMotion(place, length, rate, force, power=-force * rate)
+
+
+def _world_axis(scene: Scene, motion: Trajectory, name: str) -> np.ndarray:
+    """Return the axis (k, 3) of a joint, which its first body carries, as a unit vector."""
+    joint = scene.joint_named(name)
+    axis = np.array(joint.directions[0])
+    first = turned_since_start(scene, motion, joint.bodies[0])
+    return np.asarray(rotations.rotate(first, axis[None] / np.linalg.norm(axis)))
+
+
+def _rate(joint: JointMotion) -> np.ndarray:
+    """Return the rate (k,) of the angle, or where there is none of the displacement."""
+    return np.asarray(joint.displacement_rate if joint.rate is None else joint.rate)

@@ -1,0 +1,65 @@
+"""mbref plot: numbers of a motion over time as a picture."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from mbref.cli.options import TEXT, add_method_options, add_scene, limits_of, sample_times
+from mbref.cli.output import progress_bar, warn
+from mbref.cli.pictures import path_of
+from mbref.method import default_method
+from mbref.outputs import OUTPUTS
+from mbref.scenes import find_scene
+
+NAMES = "columns:\n" + "\n".join(f"  {o.column:31} {o.unit:13} {o.meaning}" for o in OUTPUTS)
+
+
+def add(commands: Any) -> None:
+    """The command's grammar."""
+    plot = commands.add_parser(
+        "plot",
+        help="numbers of a motion over time as PNG or SVG",
+        formatter_class=TEXT,
+        description="Simulate a scene and plot columns of its motion over time, one panel for each\n"
+        "quantity. Needs the extra report.",
+        epilog="examples:\n  mbref plot mechanism.toml\n"
+        "  mbref plot four_bar_gravity rocker.position A.angle --out run.png\n"
+        '  mbref plot spatial_slider_crank slider.position "driver(A).torque"\n\n' + NAMES,
+    )
+    add_scene(plot)
+    plot.add_argument(
+        "columns",
+        nargs="*",
+        metavar="COLUMN",
+        help="a column or its beginning, such as rod.position (default: joint coordinates and energy)",
+    )
+    plot.add_argument("--out", metavar="FILE", help=".svg or .png (default: as the scene, with -plot.svg)")
+    add_method_options(plot, json=False)
+    plot.set_defaults(action=_plot)
+
+
+def _plot(options: argparse.Namespace) -> int:
+    from mbref.cli.first_run import simulator
+
+    scene = find_scene(options.scene)
+    path, times, limits = (
+        path_of(options, "-plot", (".svg", ".png")),
+        sample_times(options, scene),
+        limits_of(options),
+    )
+    warn(scene)
+    method = options.method or default_method(scene)
+    with simulator(method) as simulate, progress_bar("simulating", float(times[-1])) as progress:
+        if options.columns:  # refuses unknown names
+            simulate(scene, method, times[:1], limits, progress).columns(*options.columns)
+        motion = simulate(scene, method, times, limits, progress)
+    try:
+        figure = motion.plot(*options.columns)
+    except ImportError:
+        raise ValueError("a plot needs matplotlib: pip install 'mbref[report]'") from None
+    figure.savefig(path, dpi=150)
+    print(path)
+    if motion.outcome.name != "COMPLETED":
+        print(f"{motion.outcome.name}: {motion.message}")
+    return 0 if motion.outcome.name == "COMPLETED" else 1

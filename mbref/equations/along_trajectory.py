@@ -1,0 +1,66 @@
+"""Constraint rows along a trajectory of any engine: violations, and which reactions are determined."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbref import rotations
+from mbref.equations.joint_reactions import determined_components
+from mbref.equations.model import Model
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory, Violation
+
+
+def violations(scene: Scene, motion: Trajectory) -> Violation:
+    """Return the largest |Φ|, |Φ_q q' - ν| and |Φ_q q'' - γ| over the constraint rows at each sample.
+
+    Rows are those of ``equations.primitives``: metres, or cosines of axes that stay
+    perpendicular and sines of driven angles, which are radians to first order.
+    """
+    model = Model(scene)
+    q, v, a = coordinates(model, motion)
+    terms = model.along(motion.times, q, v)
+    blocks = model.dense(terms.jacobian)
+    velocity = np.einsum("kmn,kn->km", blocks, v) - terms.nu
+    acceleration = None if a is None else np.einsum("kmn,kn->km", blocks, a) - terms.gamma
+    model.release()
+    return Violation(
+        _largest(terms.phi), _largest(velocity), None if acceleration is None else _largest(acceleration)
+    )
+
+
+def determined_reactions(scene: Scene, motion: Trajectory) -> dict[str, np.ndarray]:
+    """Return by joint which components (k, 6) of its reaction equilibrium determines, along world axes."""
+    model = Model(scene)
+    q, _, _ = coordinates(model, motion)
+    q = q.reshape(len(q), model.nb, 7)
+    found = determined_components(model, q, model.blocks_along(motion.times, q))
+    model.release()
+    return found
+
+
+def coordinates(model: Model, motion: Trajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Return q (k, 7 nb), q' and q'' (k, 6 nb) of a trajectory, in the principal frames of the model.
+
+    q'' is None without accelerations. A modelled ground stands still.
+    """
+    count, own = len(motion.times), len(motion.bodies)
+    p = rotations.multiply(motion.orientation, model.principal[:own])
+    q = np.tile(model.start(), (count, 1)).reshape(count, model.nb, 7)
+    q[:, :own] = np.concatenate([motion.position, p], axis=-1)
+    v = _in_frames(model, p, motion.velocity, motion.angular_velocity)
+    if motion.acceleration is None or motion.angular_acceleration is None:
+        return q.reshape(count, -1), v, None
+    return q.reshape(count, -1), v, _in_frames(model, p, motion.acceleration, motion.angular_acceleration)
+
+
+def _in_frames(model: Model, p: np.ndarray, linear: np.ndarray, angular: np.ndarray) -> np.ndarray:
+    """Return world velocities (k, b, 3) and angular ones, in frames p (k, b, 4), as rates (k, 6 nb)."""
+    found = np.zeros((len(p), model.nb, 6))
+    found[:, : p.shape[1], :3] = linear
+    found[:, : p.shape[1], 3:] = rotations.rotate(rotations.conjugate(p), angular)
+    return found.reshape(len(p), -1)
+
+
+def _largest(rows: np.ndarray) -> np.ndarray:
+    return np.asarray(np.abs(rows).max(axis=1, initial=0.0))

@@ -1,0 +1,173 @@
+"""Outputs: the names, units and meanings of all numbers that a motion has over time.
+
+``Motion.columns``, CSV files, tables, plots, ``mbref list outputs`` and docs/outputs.md follow this table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from mbref.scene_fields import meant
+
+Owner = Literal["body", "joint", "driver", "load", "mechanism"]
+PREFIXES: dict[Owner, str] = {  # of a column, by its owner
+    "body": "{}.",
+    "joint": "{}.",
+    "driver": "driver({}).",
+    "load": "load({}).",
+    "mechanism": "",
+}
+EXAMPLES: dict[Owner, str] = {"body": "rod", "joint": "A", "driver": "A", "load": "0", "mechanism": ""}
+MASSES = "the mass and inertia of every body"
+ACCELERATIONS = "accelerations, which the engine does not give"
+TURNING = "a joint that turns about one axis"
+SLIDING = "a joint that slides along one axis"
+
+
+class Output(NamedTuple):
+    """A number of a body, joint, driver, load or mechanism over time: name, unit, components and meaning.
+
+    ``needs`` says what a motion without this number lacks.
+    """
+
+    owner: Owner
+    name: str
+    unit: str
+    components: str
+    meaning: str
+    needs: str = ""
+
+    @property
+    def column(self) -> str:
+        """An example of the column's name, with all components."""
+        axes = f".{self.components[0]}…{self.components[-1]}" if self.components else ""
+        return f"{PREFIXES[self.owner].format(EXAMPLES[self.owner])}{self.name}{axes}"
+
+    @property
+    def shape(self) -> str:
+        """Shape of the array in Python, for k sample times."""
+        return f"(k, {len(self.components)})" if self.components else "(k,)"
+
+    def columns(self, owner: str, values: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+        """Yield names and values (k,) of the columns of values (k,) or (k, components) of an owner."""
+        name = f"{PREFIXES[self.owner].format(owner)}{self.name}"
+        if not self.components:
+            yield name, values
+        for i, component in enumerate(self.components):
+            yield f"{name}.{component}", values[:, i]
+
+
+OUTPUTS = (
+    Output("body", "orientation", "", "wxyz", "unit quaternion, body to world"),
+    Output("body", "position", "m", "xyz", "centre of mass, world"),
+    Output("body", "velocity", "m/s", "xyz", "velocity of the centre of mass, world"),
+    Output("body", "angular_velocity", "rad/s", "xyz", "angular velocity, world"),
+    Output("body", "acceleration", "m/s²", "xyz", "acceleration of the centre of mass, world", ACCELERATIONS),
+    Output("body", "angular_acceleration", "rad/s²", "xyz", "angular acceleration, world", ACCELERATIONS),
+    Output("joint", "angle", "rad", "", "angle about the axis since t = 0, full turns counted", TURNING),
+    Output("joint", "rate", "rad/s", "", "rate of the angle", TURNING),
+    Output("joint", "displacement", "m", "", "displacement along the axis since t = 0", SLIDING),
+    Output("joint", "displacement_rate", "m/s", "", "rate of the displacement", SLIDING),
+    Output("joint", "open", "", "", "number of reaction components that equilibrium leaves open", MASSES),
+    Output("joint", "force", "N", "xyz", "reaction on the second body at its anchor, world", MASSES),
+    Output("joint", "moment", "N m", "xyz", "reaction moment on the second body, world", MASSES),
+    Output(
+        "driver",
+        "force",
+        "N",
+        "",
+        "force on the second body along the axis of a sliding joint",
+        f"{MASSES}, and {SLIDING}",
+    ),
+    Output(
+        "driver",
+        "torque",
+        "N m",
+        "",
+        "torque on the second body about the axis of a turning joint",
+        f"{MASSES}, and {TURNING}",
+    ),
+    Output(
+        "driver", "power", "W", "", "power into the mechanism: torque times rate, or force times rate", MASSES
+    ),
+    Output("load", "length", "m", "", "length of a spring", "a spring"),
+    Output("load", "length_rate", "m/s", "", "rate of the length of a spring", "a spring"),
+    Output("load", "force", "N", "", "force of spring and damper, positive where it pulls", "a spring"),
+    Output("load", "angle", "rad", "", "angle of a torsion spring since t = 0", "a torsion spring"),
+    Output("load", "rate", "rad/s", "", "rate of the angle of a torsion spring", "a torsion spring"),
+    Output(
+        "load",
+        "torque",
+        "N m",
+        "",
+        "torque of a torsion spring and damper on the second body",
+        "a torsion spring",
+    ),
+    Output(
+        "load", "power", "W", "", "power of spring and damper into the bodies", "a spring or a torsion spring"
+    ),
+    Output("mechanism", "position_violation", "m or rad", "", "largest violation of a constraint row"),
+    Output("mechanism", "velocity_violation", "m/s or rad/s", "", "largest violation at velocity level"),
+    Output(
+        "mechanism",
+        "acceleration_violation",
+        "m/s² or rad/s²",
+        "",
+        "largest violation at acceleration level",
+        ACCELERATIONS,
+    ),
+    Output("mechanism", "largest_reaction", "N", "", "largest reaction force of a joint", MASSES),
+    Output("mechanism", "kinetic_energy", "J", "", "kinetic energy", MASSES),
+    Output("mechanism", "potential_energy", "J", "", "energy of gravity and springs", MASSES),
+    Output("mechanism", "energy", "J", "", "kinetic plus potential energy", MASSES),
+)
+UNITS = {output.name: output.unit for output in OUTPUTS}
+
+
+def columns_of(owner: Owner, name: str, numbers: Mapping[str, Any]) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the columns of an owner: its numbers over time that the table names and that are not None."""
+    for output in OUTPUTS:
+        if output.owner == owner and (values := numbers.get(output.name)) is not None:
+            yield from output.columns(name, values)
+
+
+def chosen(columns: Mapping[str, Any] | Sequence[str], names: Sequence[str]) -> list[str]:
+    """Return the columns with these names or beginnings, such as ``rod.position``.
+
+    Raises ValueError for a name that fits none; the message says what it needs, what was meant or what there
+    is.
+    """
+    found: list[str] = []
+    for name in names:
+        fitting = [column for column in columns if column == name or column.startswith(f"{name}.")]
+        if not fitting:
+            raise ValueError(f"no column {name!r}{_hint(list(columns), name)}")
+        found += [column for column in fitting if column not in found]
+    return found
+
+
+def quantity_of(column: str) -> str:
+    """Return the quantity of a column: ``position`` of ``rod.position.x``, ``angle`` of ``A.angle``."""
+    return next(part for part in reversed(column.split(".")) if part in UNITS)
+
+
+def _hint(columns: Sequence[str], name: str) -> str:
+    """Return what the column needs, what was meant, or which columns there are."""
+    parts = [column.split(".") for column in columns]
+    beginnings = list(dict.fromkeys(".".join(p[:n]) for p in parts for n in range(1, len(p) + 1)))
+    owner, _, quantity = name.rpartition(".")
+    needs = f" in this motion; it needs {_needs(owner, quantity)}" * bool(_needs(owner, quantity))
+    if needs and (not owner or owner in beginnings):
+        return needs
+    owners = dict.fromkeys(c[: c.index(quantity_of(c))].rstrip(".") or c for c in columns if c != "time")
+    return meant(name, beginnings) or needs or f"; there are columns of {', '.join(owners)}"
+
+
+def _needs(owner: str, quantity: str) -> str:
+    """Return what a motion lacks that has no such quantity of an owner, by the owner's kind."""
+    own = ("mechanism",) if not owner else ("body", "joint")
+    kinds = (owner.partition("(")[0],) if owner.endswith(")") else own
+    return next((o.needs for o in OUTPUTS if o.name == quantity and o.owner in kinds), "")

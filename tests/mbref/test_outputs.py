@@ -1,0 +1,311 @@
+"""Numbers of a motion by name / closed forms: drivers, springs, violations, determined reactions."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crosscheck.judge.joint_reactions import shared_wrenches
+from mbref import Motion, Scene, find_scene, simulate
+from mbref.cli.commands import main
+from mbref.outputs import OUTPUTS
+
+PAGE = Path(__file__).parents[2] / "docs" / "outputs.md"
+TIMES = np.linspace(0.0, 1.0, 21)
+MASS, INERTIA, ARM, G = 2.0, 0.3, 0.7, 9.81
+SWING = {"amplitude": 0.8, "frequency": 3.0}
+STIFFNESS, DAMPING, LENGTH, TWIST = 40.0, 1.5, 0.9, 0.25
+POST = (0.5, 1.1, 0.0)  # the spring's end on the ground
+
+
+def pendulum(bodies=("ground", "rod"), axis=(0.0, 0.0, 2.0), load=()) -> Scene:
+    """A rod at rest along x, turned about the origin by 0.8 sin 3t + 0.5 t."""
+    rod = {"name": "rod", "mass": MASS, "inertia": [INERTIA] * 3, "position": [ARM, 0.0, 0.0]}
+    hinge = {"name": "A", "type": "revolute", "bodies": bodies, "anchor": [0.0, 0.0, 0.0], "axis": axis}
+    driver = {"joint": "A", "polynomial": [0.0, 0.5], "sine": SWING}
+    return Scene(
+        name="pendulum", gravity=(0.0, -G, 0.0), body=[rod], joint=[hinge], driver=[driver], load=load
+    )
+
+
+def angle(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """θ, θ' and θ'' of the rod about z."""
+    return 0.8 * np.sin(3 * t) + 0.5 * t, 2.4 * np.cos(3 * t) + 0.5, -7.2 * np.sin(3 * t)
+
+
+SPRINGS = (
+    {
+        "type": "spring",
+        "bodies": ["ground", "rod"],
+        "points": [POST, [1.2, 0.0, 0.0]],
+        "stiffness": STIFFNESS,
+        "damping": DAMPING,
+        "natural_length": LENGTH,
+    },
+    {
+        "type": "torsion_spring",
+        "joint": "A",
+        "stiffness": STIFFNESS,
+        "damping": DAMPING,
+        "natural_angle": TWIST,
+    },
+    {"type": "force", "body": "rod", "point": [1.2, 0.0, 0.0], "force": [1.0, 0.0, 0.0]},
+)
+
+
+@pytest.fixture(scope="module")
+def sprung() -> Motion:
+    return simulate(pendulum(load=SPRINGS), times=TIMES)
+
+
+@pytest.mark.parametrize(
+    ("bodies", "z", "sense"),
+    [(("ground", "rod"), 2.0, 1), (("ground", "rod"), -1.0, -1), (("rod", "ground"), 1.0, -1)],
+)
+def test_torque_of_a_driver_is_that_of_the_driven_pendulum(bodies, z, sense):
+    """J θ'' + m g l cos θ acts on the rod about z; θ has the driver's sign or the opposite one."""
+    motion = simulate(pendulum(bodies, (0.0, 0.0, z)), times=TIMES)
+    theta, rate, acceleration = (sense * x for x in angle(TIMES))
+    torque = (INERTIA + MASS * ARM**2) * acceleration + MASS * G * ARM * np.cos(theta)
+    found = motion.driver("A")
+    assert np.allclose(found.torque, sense * torque, atol=1e-9) and found.force is None
+    assert np.allclose(found.power, torque * rate, atol=1e-9)
+
+
+def test_force_of_a_driver_pushes_a_slide_up_its_tilted_guide():
+    """m (s'' + g sin 30°) with s = 0.3 t + 0.1 t², and power force times s'."""
+    axis = (np.sqrt(3) / 2, 0.5, 0.0)
+    slide = {"name": "slide", "mass": MASS, "inertia": [INERTIA] * 3, "position": [0.0, 0.0, 0.0]}
+    guide = {
+        "name": "D",
+        "type": "translational",
+        "bodies": ["ground", "slide"],
+        "anchor": [0.0, 0.0, 0.0],
+        "axis": axis,
+    }
+    scene = Scene(
+        name="lift",
+        gravity=(0.0, -G, 0.0),
+        body=[slide],
+        joint=[guide],
+        driver=[{"joint": "D", "polynomial": [0.0, 0.3, 0.1]}],
+    )
+    motion = simulate(scene, times=TIMES)
+    found, speed = motion.driver("D"), 0.3 + 0.2 * TIMES
+    assert np.allclose(found.force, MASS * (0.2 + G / 2), atol=1e-9) and found.torque is None
+    assert np.allclose(motion.joint("D").displacement_rate, speed, atol=1e-12)
+    assert np.allclose(found.power, MASS * (0.2 + G / 2) * speed, atol=1e-9)
+
+
+def test_rate_of_a_displacement_counts_the_turn_of_the_guide():
+    """A slide on a turning arm: d/dt of the displacement along the arm, not along the world."""
+    arm = {
+        "name": "arm",
+        "mass": 1.0,
+        "inertia": [0.1] * 3,
+        "position": [0.5, 0.0, 0.0],
+        "angular_velocity": [0.0, 0.0, 2.0],
+    }
+    slide = {"name": "slide", "mass": 1.0, "inertia": [0.1] * 3, "position": [0.8, 0.1, 0.0]}
+    joints = [
+        {
+            "name": "A",
+            "type": "revolute",
+            "bodies": ["ground", "arm"],
+            "anchor": [0.0] * 3,
+            "axis": [0.0, 0.0, 1.0],
+        },
+        {
+            "name": "D",
+            "type": "translational",
+            "bodies": ["arm", "slide"],
+            "anchor": [0.8, 0.1, 0.0],
+            "axis": [1.0, 0.0, 0.0],
+        },
+    ]
+    motion = simulate(Scene(name="arm", body=[arm, slide], joint=joints), times=np.linspace(0.0, 0.5, 501))
+    joint = motion.joint("D")
+    assert np.allclose(
+        joint.displacement_rate, np.gradient(joint.displacement, motion.times, edge_order=2), atol=1e-4
+    )
+    assert joint.displacement[-1] > 0.1
+
+
+def test_length_rate_and_force_of_a_spring_follow_from_geometry(sprung):
+    """The law of cosines between the post and the tip of the rod."""
+    theta, turning, _ = angle(TIMES)
+    tip = 1.2 * np.stack([np.cos(theta), np.sin(theta)], axis=1)
+    speed = 1.2 * turning[:, None] * np.stack([-np.sin(theta), np.cos(theta)], axis=1)
+    apart = tip - np.array(POST[:2])
+    length = np.sqrt(apart[:, 0] ** 2 + apart[:, 1] ** 2)
+    rate = (apart * speed).sum(axis=1) / length
+    force = STIFFNESS * (length - LENGTH) + DAMPING * rate
+    found = sprung.load_at(0)
+    for own, right in ((found.length, length), (found.length_rate, rate), (found.force, force)):
+        assert np.allclose(own, right, atol=1e-9)
+    assert np.allclose(found.power, -force * rate, atol=1e-8) and found.torque is None
+
+
+def test_torque_of_a_torsion_spring_turns_back(sprung):
+    theta, turning, _ = angle(TIMES)
+    torque = -STIFFNESS * (theta - TWIST) - DAMPING * turning
+    found = sprung.load_at(1)
+    assert np.allclose(found.angle, theta, atol=1e-9) and np.allclose(found.rate, turning, atol=1e-9)
+    assert np.allclose(found.torque, torque, atol=1e-8) and found.length is None
+    assert np.allclose(found.power, torque * turning, atol=1e-8)
+    assert set(vars(sprung.load_at(2)).values()) == {2, None}
+    with pytest.raises(IndexError, match="no load 3; the scene has 3 loads"):
+        sprung.load_at(3)
+
+
+def test_powers_of_driver_and_springs_are_the_rate_of_energy(sprung):
+    """d/dt of kinetic energy and weight, by hand, is the power of driver, springs and the constant force."""
+    theta, turning, acceleration = angle(TIMES)
+    gained = (INERTIA + MASS * ARM**2) * turning * acceleration + MASS * G * ARM * np.cos(theta) * turning
+    pushed = -1.2 * np.sin(theta) * turning  # of the force of 1 N along x at the tip
+    powers = sprung.driver("A").power + sprung.load_at(0).power + sprung.load_at(1).power + pushed
+    assert np.allclose(powers, gained, atol=1e-8)
+
+
+@pytest.mark.parametrize("ground", ["frame", "body"])
+def test_violation_is_what_a_pose_and_its_rates_are_off_by(ground):
+    motion = simulate(find_scene("planar_slider_crank").with_(ground=ground), times=TIMES[:3] / 10)
+    assert all(level.max() < 1e-9 for level in motion.violation)
+    off = {
+        "position": (1e-3, "position"),
+        "velocity": (1e-2, "velocity"),
+        "acceleration": (0.1, "acceleration"),
+    }
+    for level, (size, field) in off.items():
+        moved = getattr(motion, field).copy()
+        moved[1, 1, 2] += size  # the rod, out of the plane, at one sample
+        found = getattr(dataclasses.replace(motion, **{field: moved}).violation, level)
+        assert found[1] == pytest.approx(size, rel=1e-6) and found[[0, 2]].max() < 1e-9, level
+    bare = dataclasses.replace(motion, acceleration=None)
+    assert bare.violation.acceleration is None and "acceleration_violation" not in bare.columns()
+
+
+@pytest.mark.parametrize(
+    "name", ["planar_slider_crank", "four_bar", "five_bar", "spatial_slider_crank", "bennett"]
+)
+def test_determined_components_are_those_that_the_judge_s_open_wrenches_leave(name):
+    scene = find_scene(name)
+    motion = simulate(scene, times=np.array([0.0, 0.003]))
+    found = motion.determined_reactions
+    for k, t in enumerate(motion.times):
+        opened = shared_wrenches(scene, t, motion.position[k], motion.orientation[k])
+        for joint, basis in opened.items():
+            assert (found[joint][k] == (np.abs(basis).max(axis=1, initial=0.0) < 1e-6)).all(), (joint, t)
+
+
+def test_forces_in_the_plane_of_a_mechanism_of_revolutes_are_determined(capsys, tmp_path):
+    hinges = [
+        j.model_dump() | {"type": "revolute", "axis": (0.0, 0.0, 1.0)} for j in find_scene("four_bar").joint
+    ]
+    fields = ("name", "type", "bodies", "anchor", "axis")
+    scene = find_scene("four_bar").with_(joint=[{key: hinge[key] for key in fields} for hinge in hinges])
+    found = simulate(scene, times=[0.0, 0.003]).determined_reactions
+    assert all((mask == [True, True, False, False, False, True]).all() for mask in found.values())
+    scene.save(tmp_path / "plane.toml")
+    assert main(["diagnose", str(tmp_path / "plane.toml"), "--start"]) == 0
+    assert "determined          force x, force y, moment z of A, B, C, D" in capsys.readouterr().out
+
+
+def test_the_largest_reaction_is_that_of_some_joint(sprung):
+    assert np.allclose(sprung.largest_reaction, np.linalg.norm(sprung.joint("A").force, axis=1), rtol=1e-14)
+    motion = simulate("planar_slider_crank", times=TIMES[:3] / 10)
+    sizes = [np.linalg.norm(motion.joint(j.name).force, axis=1) for j in motion.mechanism.joint]
+    assert (motion.largest_reaction == np.max(sizes, axis=0)).all()
+
+
+def test_unknown_columns_say_what_they_need_or_what_was_meant(sprung):
+    assert list(sprung.columns("driver(A)", "energy")) == [
+        "time",
+        "driver(A).torque",
+        "driver(A).power",
+        "energy",
+    ]
+    massless = sprung.mechanism.body[0].model_copy(update={"mass": None, "inertia": None})
+    bare = simulate(sprung.mechanism.with_(body=[massless], load=[]), times=TIMES[:2])
+    for motion, name, says in (
+        (bare, "driver(A).torque", "it needs the mass and inertia of every body"),
+        (bare, "energy", "it needs the mass and inertia of every body"),
+        (sprung, "A.displacement", "it needs a joint that slides"),
+        (sprung, "driver(B).torque", r"did you mean 'driver\(A\)\.torque'"),
+        (
+            sprung,
+            "colour",
+            r"there are columns of rod, A, driver\(A\), load\(0\), load\(1\), position_violation",
+        ),
+    ):
+        with pytest.raises(ValueError, match=says):
+            motion.columns(name)
+    with pytest.raises(KeyError, match="no driver of a joint 'B'; driven joints: A"):
+        sprung.driver("B")
+    assert bare.driver("A").power is None and bare.largest_reaction is None
+
+
+def test_the_page_lists_the_table_of_outputs():
+    rows = [f"| `{o.column}` | {o.unit} | {o.shape} | {o.meaning} |" for o in OUTPUTS]
+    assert [line for line in PAGE.read_text().splitlines() if line.startswith("| `")] == rows
+
+
+def test_commands_print_write_and_plot_columns(tmp_path, capsys):
+    path, table, picture = (str(tmp_path / name) for name in ("my.toml", "run.csv", "run.png"))
+    pendulum().save(path)
+    asked = ["A.angle", "driver(A).torque"]
+    assert main(["run", path, "--times", "0,0.5", "--out", table, "--columns", *asked]) == 0
+    shown = capsys.readouterr().out
+    assert "driver(A).torque" in shown and "13.734" in shown and "largest reaction" in shown
+    with open(table, newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == ["time", *asked] and float(rows[0]["driver(A).torque"]) == pytest.approx(
+        MASS * G * ARM
+    )
+    assert main(["plot", path, *asked, "--samples", "5", "--out", picture]) == 0
+    assert Path(picture).read_bytes().startswith(b"\x89PNG")
+    assert main(["plot", path, "--samples", "5", "--out", picture.replace("png", "svg")]) == 0
+    assert "<svg" in Path(picture.replace("png", "svg")).read_text()
+    capsys.readouterr()
+    assert main(["plot", path, "A.angel", "--samples", "5"]) == 2
+    assert "did you mean 'A.angle'?" in capsys.readouterr().err
+    assert main(["list", "outputs"]) == 0 and "driver(A).torque" in capsys.readouterr().out
+
+
+def test_a_gif_takes_the_time_of_the_round(tmp_path):
+    from PIL import Image
+
+    path = tmp_path / "my.toml"
+    pendulum().save(path)
+    assert main(["animate", str(path), "--samples", "7", "--out", str(tmp_path / "my.gif")]) == 0
+    with Image.open(tmp_path / "my.gif") as film:
+        lasts = []
+        for k in range(film.n_frames):
+            film.seek(k)
+            lasts.append(film.info["duration"])
+    assert len(lasts) == 7 and sum(lasts) == 4000
+
+
+def test_an_mp4_is_written_by_ffmpeg(tmp_path):
+    pytest.importorskip("imageio_ffmpeg", reason="the extra video writes MP4")
+    path = tmp_path / "my.toml"
+    pendulum().save(path)
+    assert main(["animate", str(path), "--samples", "7", "--out", str(tmp_path / "my.mp4")]) == 0
+    assert (tmp_path / "my.mp4").read_bytes()[4:8] == b"ftyp"
+
+
+@pytest.mark.parametrize(
+    ("missing", "ending"), [("PIL", "gif"), ("imageio_ffmpeg", "mp4"), ("matplotlib.figure", "png")]
+)
+def test_a_missing_library_is_named(missing, ending, tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, missing, None)
+    path = tmp_path / "my.toml"
+    pendulum().save(path)
+    command = "plot" if ending == "png" else "animate"
+    assert main([command, str(path), "--samples", "3", "--out", str(tmp_path / f"my.{ending}")]) == 2
+    assert "pip install 'mbref[" in capsys.readouterr().err
