@@ -19,8 +19,8 @@ from mbref.joint_motion import JointMotion, joint_motion
 from mbref.outputs import chosen, columns_of
 from mbref.records import strict_json
 from mbref.scene import Scene, SceneError
-from mbref.scene_services import SERVICES
-from mbref.trajectory import Trajectory, Violation
+from mbref.scene_services import SERVICES, Violation
+from mbref.trajectory import Trajectory
 
 
 @dataclass(frozen=True, repr=False)
@@ -97,8 +97,7 @@ class Motion(Trajectory):
     @property
     def violation(self) -> Violation:
         """Largest violation of a constraint row at position, velocity and acceleration level."""
-        found: Violation = SERVICES.violations(self.mechanism, self)
-        return found
+        return SERVICES.violations(self.mechanism, self)
 
     @property
     def largest_reaction(self) -> np.ndarray | None:
@@ -115,8 +114,7 @@ class Motion(Trajectory):
         True for a component of force (x, y, z) or moment (x, y, z) that does not depend on how redundant
         constraints share the load. In a plane mechanism across z these are force x, force y and moment z.
         """
-        found: dict[str, np.ndarray] = SERVICES.determined_reactions(self.mechanism, self)
-        return found
+        return SERVICES.determined_reactions(self.mechanism, self)
 
     def columns(self, *names: str) -> dict[str, np.ndarray]:
         """Return numbers over time as columns.

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,24 @@ class Counts:
     degrees_of_freedom: int
 
 
+class Violation(NamedTuple):
+    """Largest violation of a constraint row at k sample times, at three levels.
+
+    Attributes
+    ----------
+    position : ndarray, shape (k,)
+        m or rad.
+    velocity : ndarray, shape (k,)
+        m/s or rad/s.
+    acceleration : ndarray, shape (k,), or None
+        m/s² or rad/s². None if the engine gives no accelerations.
+    """
+
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray | None
+
+
 class Services:
     """Functions of a scene, bound when ``mbref`` is imported.
 
@@ -55,8 +75,8 @@ class Services:
 
     counts: Callable[[Any], Counts]
     picture: Callable[[Any], str]
-    violations: Callable[[Any, Any], Any]
-    determined_reactions: Callable[[Any, Any], Any]
+    violations: Callable[[Any, Any], Violation]
+    determined_reactions: Callable[[Any, Any], dict[str, np.ndarray]]
 
 
 SERVICES = Services()

@@ -6,7 +6,7 @@ import enum
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -166,24 +166,6 @@ class BodyMotion:
 
     def __repr__(self) -> str:
         return f"<BodyMotion of {self.name!r}: {len(self.position)} samples>"
-
-
-class Violation(NamedTuple):
-    """Largest violation of a constraint row at k sample times, at three levels.
-
-    Attributes
-    ----------
-    position : ndarray, shape (k,)
-        m or rad.
-    velocity : ndarray, shape (k,)
-        m/s or rad/s.
-    acceleration : ndarray, shape (k,), or None
-        m/s² or rad/s². None if the engine gives no accelerations.
-    """
-
-    position: np.ndarray
-    velocity: np.ndarray
-    acceleration: np.ndarray | None
 
 
 PER_BODY = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")

@@ -8,7 +8,8 @@ from mbref import rotations
 from mbref.equations.joint_reactions import determined_components
 from mbref.equations.model import Model
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory, Violation
+from mbref.scene_services import Violation
+from mbref.trajectory import Trajectory
 
 
 def violations(scene: Scene, motion: Trajectory) -> Violation:
