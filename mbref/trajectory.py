@@ -127,11 +127,9 @@ class Crossing:
         """Return the crossing as numbers, lists and text, for JSON."""
         arrays = ("position", "orientation", "velocity", "angular_velocity")
         return {
-            "time": self.time,
-            "taken": self.taken,
-            "sentence": self.sentence,
+            "time": self.time, "taken": self.taken, "sentence": self.sentence,
             **{key: getattr(self, key).tolist() for key in arrays},
-        }
+        }  # fmt: skip
 
     @staticmethod
     def from_record(record: Mapping[str, Any]) -> Crossing:
@@ -256,33 +254,16 @@ class Trajectory:
 
     @staticmethod
     def failed(
-        *,
-        scene: str,
-        engine: str,
-        version: str,
-        method: str,
-        settings: Mapping[str, Any],
-        bodies: tuple[str, ...],
-        outcome: Outcome,
-        message: str,
-    ) -> Trajectory:
+        *, scene: str, engine: str, version: str, method: str, settings: Mapping[str, Any],
+        bodies: tuple[str, ...], outcome: Outcome, message: str,
+    ) -> Trajectory:  # fmt: skip
         """Return a trajectory without states, for a run that crashed, hung or did not begin."""
         nb = len(bodies)
         return Trajectory(
-            scene,
-            engine,
-            version,
-            method,
-            settings,
-            np.zeros(0),
-            bodies,
-            np.zeros((0, nb, 3)),
-            np.zeros((0, nb, 4)),
-            np.zeros((0, nb, 3)),
-            np.zeros((0, nb, 3)),
-            outcome=outcome,
-            message=message,
-        )
+            scene, engine, version, method, settings, np.zeros(0), bodies, np.zeros((0, nb, 3)),
+            np.zeros((0, nb, 4)), np.zeros((0, nb, 3)), np.zeros((0, nb, 3)),
+            outcome=outcome, message=message,
+        )  # fmt: skip
 
     def to_record(self) -> dict[str, Any]:
         """Return the record that ``run --json`` prints. crosscheck adds its ``metrics``."""
