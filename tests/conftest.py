@@ -35,6 +35,6 @@ def pytest_collection_finish(session: pytest.Session) -> None:
             for name in GENERAL:
                 prepare(Method.parse(name))
         case "gw1":
-            from mbref.taylor.stepper import prepare_series
+            from mbref.taylor.preparation import prepare_series
 
             prepare_series()

@@ -21,7 +21,13 @@ from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.run import Run
 from mbref.simulation.start_run import start_run
 from mbref.simulation.stepping import DONE
-from mbref.taylor.stepper import KERNELS_OF_SERIES, prepare_series
+from mbref.taylor.preparation import (
+    KERNELS_OF_SERIES,
+    STEPPING,
+    prepare_expansion,
+    prepare_series,
+    prepare_stepping,
+)
 
 __all__ = ["Limits", "are_compiled", "checked_times", "prepare", "simulate", "why_no_code"]
 
@@ -126,8 +132,13 @@ def prepare(method: Method) -> None:
 
     Those of Taylor series are among them: runs of other methods are compared with one.
     """
-    with compiled_beside(KERNELS_OF_SERIES, prepare_series.__module__, prepare_series.__name__):
+    kernels, beside = (
+        (STEPPING, prepare_stepping) if method.is_series else (KERNELS_OF_SERIES, prepare_series)
+    )
+    with compiled_beside(kernels, beside.__module__, beside.__name__):
         preparation.prepare(method)
+        if method.is_series:
+            prepare_expansion()
     prepare_series()
 
 

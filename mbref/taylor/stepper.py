@@ -43,14 +43,11 @@ from mbref.taylor.layout import Options, Polynomials, TaylorMemory
 from mbref.taylor.mode import REGULAR
 from mbref.taylor.outputs import complete_samples
 from mbref.taylor.polynomials import Geometry
-from mbref.taylor.series_memory import CALLED, acquire_memory, put_equations, shapes_of_equations
+from mbref.taylor.preparation import prepare_series
+from mbref.taylor.series_memory import acquire_memory, put_equations, shapes_of_equations
 
 EXACT, EXACT_ORDER = 1e-13, 22  # rtol and atol of steps that pass singular positions, and their least order
 SHARE = 0.05  # of rtol + atol: the tolerance of a step that is clear of singular positions
-KERNELS_OF_SERIES = (
-    *CALLED, enter_series, advance_series, follow_drivers, complete_samples, begin_crossing, cross_position,
-    continue_crossing, end_crossing, put_state_along,
-)  # fmt: skip
 ROUNDING = 1e-16  # of a singular value
 STEPS_WORTH_CODE = 20_000  # steps ahead from which on generated code saves more time than it takes
 LEAST_ORDER, MOST_ORDER = 4, 30
@@ -322,9 +319,3 @@ class SeriesStepper:
         put_state_along(ahead, self.argument)
         state = self.run.memory.state
         return state.coordinates.copy(), state.velocities.copy()
-
-
-def prepare_series() -> None:
-    """Compile the kernels of the series, or load them from the cache of this machine."""
-    for kernel in KERNELS_OF_SERIES:
-        kernel.prepare()
