@@ -226,6 +226,10 @@ class Engine(ABC):
         """Return the parts of which families are composed; empty if there are none."""
         return {}
 
+    def own_code(self, scene: Scene, setting: Setting) -> str:
+        """Return a line of the engine's own code or XML that makes a setting; empty where it has none."""
+        return ""
+
     def prepare(self, families: Sequence[str]) -> None:  # noqa: B027 - most engines need nothing
         """Import and compile what the families need, ahead of the first run in a process."""
 

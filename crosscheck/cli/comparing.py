@@ -18,7 +18,7 @@ from crosscheck.study.ladder import families
 from crosscheck.study.progress import counted
 from crosscheck.study.record_view import public
 from crosscheck.study.timings import REPEATS, with_timings
-from crosscheck.study.tuning import tuned
+from crosscheck.study.tuning import by_closure, by_error, tuned
 
 
 def compare(arguments: argparse.Namespace) -> int:
@@ -63,18 +63,25 @@ def tune(arguments: argparse.Namespace) -> int:
     limit, ours = arguments.time_limit, engine(name).integrated_here
     planned = request.plan([scene], [name], Choice(is_quick=False), [times], limit, notice)
     cases = [case._replace(reference_time=arguments.reference_time) for case in planned]
+    wanted = by_closure(arguments.closure, scene) if arguments.closure else by_error(arguments.error)
     with counted("trying settings", len(families(cases))) as advance, ThreadPoolExecutor() as threads:
-        found = tuned(cases, arguments.error, lambda some: study(some, threads), ours, advance)
+        found = tuned(cases, wanted.level, lambda some: study(some, threads), ours, advance, wanted.measure)
     best = with_timings(found.cases, found.reached, None, notice)
     best.sort(key=lambda record: (record["family"] in ours, record["cost"]["seconds"]))
     if arguments.json:
         shown = [
-            {**public(r), "command": command(r, arguments.scene), "integrated_here": r["family"] in ours}
+            {
+                **public(r),
+                "command": command(r, arguments.scene),
+                "own_code": tables.own_code(scene, r),
+                "integrated_here": r["family"] in ours,
+            }
             for r in best
         ]
-        print_json([{"scene": scene.name, "error": arguments.error, "records": shown}])
+        goal = "closure" if arguments.closure else "error"
+        print_json([{"scene": scene.name, goal: wanted.level, "records": shown}])
     else:
-        tables.print_tuning(console(), arguments.error, best, found.records, arguments.scene)
+        tables.print_tuning(console(), wanted, best, found.records, scene, arguments.scene)
         for sentence in missing_truths(cases, found.records):
             console().print(sentence, soft_wrap=True)
     return COMPLETED if best else OTHERWISE

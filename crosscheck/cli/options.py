@@ -12,6 +12,7 @@ from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.study.command import parsed_option
 from crosscheck.study.grid import TIME_LIMIT
 from crosscheck.study.sweep import QUICK_LIMIT
+from mbref.scene_units import in_si
 
 DIGITS = f"{FEWEST_DIGITS} to {MOST_DIGITS}"  # that a command line may ask for
 
@@ -140,6 +141,15 @@ def digits(text: str) -> int:
     if not (text.isdecimal() and FEWEST_DIGITS <= int(text) <= MOST_DIGITS):
         raise argparse.ArgumentTypeError(f"must be from {DIGITS}, got {text}")
     return int(text)
+
+
+def length(text: str) -> float:
+    """A positive length of a command line, such as 1mm or 0.5 in, m; metres without a unit."""
+    try:
+        value = in_si(text if text[-1:].isalpha() else f"{text} m", "length")
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return positive(repr(value))
 
 
 def positive(text: str) -> float:

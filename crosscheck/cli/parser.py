@@ -15,6 +15,7 @@ from crosscheck.cli.options import (
     add_reference_time,
     add_selection,
     digits,
+    length,
     numbers,
     positive,
     whole,
@@ -158,12 +159,20 @@ def _add_compare(commands: Commands) -> None:
 
 
 def _add_tune(commands: Commands) -> None:
-    example = "crosscheck tune mujoco my.toml --error 1e-6"
-    about = "find the cheapest settings of an engine that reach an error on a mechanism"
+    example = "crosscheck tune mujoco my.toml --error 1e-6\n  crosscheck tune mujoco my.toml --closure 1mm"
+    about = "find the cheapest settings of an engine that reach an error or a closure gap on a mechanism"
     parser = _add(commands, "tune", about, example)
     parser.add_argument("engine", metavar="ENGINE", help="a known engine (`crosscheck list engines`)")
     parser.add_argument("scene", metavar="SCENE", help="a built-in scene or a .toml file")
-    parser.add_argument("--error", type=positive, default=1e-6, metavar="E", help="default: %(default)g")
+    goal = parser.add_mutually_exclusive_group()
+    goal.add_argument("--error", type=positive, default=1e-6, metavar="E", help="default: %(default)g")
+    goal.add_argument(
+        "--closure",
+        type=length,
+        metavar="GAP",
+        help="the widest gap of closed joints, such as 1mm, instead of an error; angles count times the "
+        "mechanism's length",
+    )
     parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
     add_limits(parser)
 

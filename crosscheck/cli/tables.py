@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from crosscheck.cli.terminal_plot import scatter
-from crosscheck.engine import Engine, engine
+from crosscheck.engine import Engine, Setting, engine
 from crosscheck.study.command import command
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import (
@@ -27,7 +27,9 @@ from crosscheck.study.record_view import (
 )
 from crosscheck.study.sentences import Verdict
 from crosscheck.study.speed_sentences import LEVEL, SAID, title
+from crosscheck.study.tuning import Criterion, known_error
 from crosscheck.study.verdict import Grade, Judged
+from mbref.scene import Scene
 
 MEASURED = ("violation_position", "energy_error")  # metrics that the table of runs shows beside the error
 SETTINGS_WIDTH, NUMBER_WIDTH = 15, 8  # least widths of columns, so that numbers stay whole
@@ -60,6 +62,7 @@ def print_comparison(console: Console, group: Judged, said: Verdict, path: str, 
     console.print(scatter(records, letters))
     _print_best(console, group)
     _print_advice(console, group, path)
+    _print_own_code(console, group)
     _print_messages(console, records)
 
 
@@ -83,14 +86,19 @@ def _ranked(group: Judged, letters: Mapping[tuple[str, str], str], with_ratio: b
 
 
 def print_tuning(
-    console: Console, level: float, reached: Sequence[Record], records: Sequence[Record], path: str
+    console: Console,
+    wanted: Criterion,
+    reached: Sequence[Record],
+    records: Sequence[Record],
+    scene: Scene,
+    path: str,
 ) -> None:
-    """Print settings that reach an error, first the engine's own, then settings that crosscheck
+    """Print settings that reach a criterion, first the engine's own, then settings that crosscheck
     integrates, either the cheapest first, with the cheapest's commands; else the nearest run."""
     if not reached:
-        nearest = min(records, key=lambda r: (not is_completed(r), error(r), -r["t_end"]))
-        console.print(_unreached(level, nearest), soft_wrap=True)
-        _print_settings(console, "the nearest run", [nearest])
+        nearest = min(records, key=lambda r: (not is_completed(r), wanted.measure(r), -r["t_end"]))
+        console.print(_unreached(wanted, nearest), soft_wrap=True)
+        _print_settings(console, "the nearest run", [nearest], wanted)
         return
     simulator = engine(records[0]["asked"]["engine"])
     name, ours = records[0]["engine"], simulator.integrated_here
@@ -98,20 +106,23 @@ def print_tuning(
     rest = [r for r in reached if r["family"] in ours]
     if not own:
         missing = all(r["family"] in ours for r in records)
-        reason = "has no integrator of its own here" if missing else f"reaches {level:g} with none of its own"
+        reason = (
+            "has no integrator of its own here" if missing else f"reaches {wanted.name} with none of its own"
+        )
         console.print(f"{title(name)} {reason}.", soft_wrap=True)
     for group, heading in ((own, f"integrated by {title(name)} itself"), (rest, "integrated by crosscheck")):
         if group:
-            _print_settings(console, heading, group)
-            console.print(
-                f"{_to_set(simulator, group[0])}\nThe cheapest: {command(group[0], path)}", soft_wrap=True
-            )
+            _print_settings(console, heading, group, wanted)
+            code = own_code(scene, group[0])
+            lines = [_to_set(simulator, group[0]), f"The cheapest: {command(group[0], path)}"]
+            console.print("\n".join([*lines, *[f"To copy: {code}"] * bool(code)]), soft_wrap=True)
 
 
-def _print_settings(console: Console, heading: str, records: Sequence[Record]) -> None:
-    table = _table(heading, ("engine, family", "settings", "error", "time (s)"), 2)
+def _print_settings(console: Console, heading: str, records: Sequence[Record], wanted: Criterion) -> None:
+    measured = "closure" if "closure" in wanted.name else "error"
+    table = _table(heading, ("engine, family", "settings", measured, "time (s)"), 2)
     for r in records:
-        table.add_row(" ".join(engine_and_family(r)), _options(r), error_text(r), _seconds(r))
+        table.add_row(" ".join(engine_and_family(r)), _options(r), wanted.text(r), _seconds(r))
     console.print(table)
 
 
@@ -126,16 +137,17 @@ def _to_set(found: Engine, record: Record) -> str:
     return "; ".join(parts) + "."
 
 
-def _unreached(level: float, nearest: Record) -> str:
+def _unreached(wanted: Criterion, nearest: Record) -> str:
     """The sentence above the nearest run: an error that is not reached, or that nothing could tell."""
     bound = error_bound(nearest)
     if not is_completed(nearest):
-        return f"No setting reaches an error of {level:g}: no run completes. The one that got furthest:"
-    if not math.isfinite(error(nearest)):
+        return f"No setting reaches {wanted.name}: no run completes. The one that got furthest:"
+    if not math.isfinite(wanted.measure(nearest)):
         return "No error is known, because the motion has no truth. One of the runs:"
-    if bound > level:
-        return f"The truth is known to {bound:.0e}, so no run can be seen to reach {level:g}. The nearest:"
-    return f"No setting reaches an error of {level:g}; the nearest run has {error_text(nearest)}:"
+    if bound > wanted.level and wanted.measure is known_error:
+        known = f"The truth is known to {bound:.0e}"
+        return f"{known}, so no run can be seen to reach {wanted.level:g}. The nearest:"
+    return f"No setting reaches {wanted.name}; the nearest run has {wanted.text(nearest)}:"
 
 
 def _print_verdict(console: Console, said: Verdict) -> None:
@@ -172,6 +184,23 @@ def _print_advice(console: Console, group: Judged, path: str) -> None:
         r = cheapest.get(name, best[name])
         if is_completed(r):
             console.print(f"  error {error_text(r)}, {_seconds(r)} s: {command(r, path)}", soft_wrap=True)
+
+
+def _print_own_code(console: Console, group: Judged) -> None:
+    """Print for each engine a line of its own code or XML: the fastest run within LEVEL, else the best, among
+    settings that the engine itself has."""
+    found = group.within(LEVEL, lambda r: bool(own_code(group.scene, r)))
+    if found:
+        console.print("\nto copy into your model: settings that an engine itself has")
+    for name, r in found.items():
+        said = f"  {title(name)}, {r['family']}, error {error_text(r)}, {_seconds(r)} s: "
+        console.print(f"{said}{own_code(group.scene, r)}", soft_wrap=True)
+
+
+def own_code(scene: Scene, record: Record) -> str:
+    """Return the line of the engine's own code or XML that makes the settings of a record, if it has one."""
+    asked = Setting(record["family"], record["asked"]["options"])
+    return engine(record["asked"]["engine"]).own_code(scene, asked)
 
 
 def _options(record: Record) -> str:

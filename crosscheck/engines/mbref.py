@@ -138,6 +138,13 @@ class Mbref(Engine):
         for family in families:
             prepare(_method(family))
 
+    def own_code(self, scene: Scene, setting: Setting) -> str:
+        """Return the call of ``mbref.simulate``; none for generated code, which needs Limits."""
+        if setting.family.endswith(GENERATED) or BRANCHES in setting.options:
+            return ""
+        tolerance = f", rtol={setting.options['rtol']!r}" if "rtol" in setting.options else ""
+        return f"mbref.simulate(scene, {setting.family!r}{tolerance})"
+
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         from mbref.simulation.simulate import Limits, simulate
 

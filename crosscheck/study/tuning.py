@@ -8,15 +8,50 @@ from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
 from crosscheck.engine import Setting
+from crosscheck.judge.constraints import scene_length
 from crosscheck.study.between import MOST_COARSER, STILL_CHEAPER, between, coarser, work
 from crosscheck.study.grid import Case, Record
 from crosscheck.study.ladder import families
-from crosscheck.study.record_view import error, error_bound, is_completed
+from crosscheck.study.record_view import error, error_bound, error_text, is_completed
+from mbref.scene import Scene
 
 NEAR = 1.12  # ratio of the work of two settings between which no other is tried
 HALVINGS = 6  # of a bracket, at most
 
 Run = Callable[[Sequence[Case]], list[Record]]
+
+
+class Criterion(NamedTuple):
+    """A number of a record that must not exceed a level: its name in a sentence, and its value as text."""
+
+    name: str
+    level: float
+    measure: Callable[[Record], float]
+    text: Callable[[Record], str]
+
+
+def by_error(level: float) -> Criterion:
+    """Return the criterion that a run is known to be within an error."""
+    return Criterion(f"an error of {level:g}", level, known_error, error_text)
+
+
+def by_closure(gap: float, scene: Scene) -> Criterion:
+    """Return the criterion that closures open by no more than a gap, m; angles count times the scene's
+    length."""
+    length = scene_length(scene)
+
+    def measure(record: Record) -> float:
+        violation = record["metrics"].get("violation_position")
+        return math.inf if violation is None else length * float(violation)
+
+    name = f"a closure gap of {gap * 1e3:g} mm"
+    return Criterion(name, gap, measure, lambda record: f"{measure(record) * 1e3:.2g} mm")
+
+
+def known_error(record: Record) -> float:
+    """Return the error of a record, no lower than it is known: an error below the truth's bound is no
+    evidence."""
+    return max(error(record), error_bound(record))
 
 
 class Tuned(NamedTuple):
@@ -34,8 +69,10 @@ def tuned(
     run: Run,
     integrated_here: Collection[str] = (),
     advance: Callable[[str], None] = lambda family: None,
+    measure: Callable[[Record], float] = known_error,
 ) -> Tuned:
-    """Find the cheapest setting of every family of one engine on one scene that reaches an error.
+    """Find the cheapest setting of every family of one engine on one scene that reaches an error, or
+    the level of another ``measure``.
 
     The cheapest families begin.  A family is given up where it ran out of time, or costs more before it
     reaches the error than another has needed; families ``integrated_here``, by crosscheck, end no search of
@@ -43,7 +80,9 @@ def tuned(
     """
     groups = families(cases)
     firsts = run([group[0] for group in groups])
-    searches = [_Search(group, first, level, run) for group, first in zip(groups, firsts, strict=True)]
+    searches = [
+        _Search(group, first, level, run, measure) for group, first in zip(groups, firsts, strict=True)
+    ]
     for search in sorted(searches, key=lambda s: (s.is_any_of(integrated_here), s.cost())):
         rivals = [
             s for s in searches if search.is_any_of(integrated_here) or not s.is_any_of(integrated_here)
@@ -61,8 +100,15 @@ Pair = tuple[Case, Record]
 class _Search:
     """The search in one family, whose coarsest setting was run."""
 
-    def __init__(self, settings: Sequence[Case], first: Record, level: float, run: Run) -> None:
-        self._settings, self._level, self._run = settings, level, run
+    def __init__(
+        self,
+        settings: Sequence[Case],
+        first: Record,
+        level: float,
+        run: Run,
+        measure: Callable[[Record], float],
+    ) -> None:
+        self._settings, self._level, self._run, self._measure = settings, level, run, measure
         self.family = settings[0].setting.family
         self.made = [(settings[0], first)]
 
@@ -136,9 +182,8 @@ class _Search:
         return case, record
 
     def _reaches(self, record: Record) -> bool:
-        """Return whether a run is known to be so near; an error below the bound of the truth is no
-        evidence."""
-        return is_completed(record) and max(error(record), error_bound(record)) <= self._level
+        """Return whether a run is known to be so near."""
+        return is_completed(record) and self._measure(record) <= self._level
 
 
 def _seconds(record: Record) -> float:

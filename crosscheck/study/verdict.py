@@ -114,6 +114,13 @@ class Judged:
         by_cost = sorted(reached, key=lambda r: r["cost"]["seconds"])
         return {r["engine"]: r for r in reversed(by_cost)}
 
+    def within(self, level: float, use: Callable[[Record], bool]) -> dict[str, Record]:
+        """Return of each engine the record to use among those that may be used: the fastest completed one
+        within an error, otherwise the most accurate."""
+        usable = [r for r in self.comparable if is_completed(r) and math.isfinite(error(r)) and use(r)]
+        order = sorted(usable, key=lambda r: (max(error(r), level), r["cost"]["seconds"]))
+        return {r["engine"]: r for r in reversed(order)}
+
     def agreement(self) -> dict[tuple[str, str], float]:
         """Largest differences between the finest completed runs of two engines, where there is no truth."""
         finest = {r["engine"]: r for r in self.comparable if is_completed(r)}

@@ -25,6 +25,7 @@ from crosscheck.study.fair_timing import timed
 from crosscheck.study.hurried import NOT_STARTED, Hurried
 from crosscheck.study.record_view import PUBLIC, is_judged
 from crosscheck.study.truth_sentences import unknown
+from crosscheck.study.tuning import by_error
 from mbref.scene import Body, Moment, Revolute, Scene, TorsionSpring
 from mbref.scenes import SCENES
 from mbref.scenes.four_bar import four_bar_gravity
@@ -432,7 +433,7 @@ def test_an_error_that_no_setting_reaches_or_nothing_tells(more, says):
         "cost": {"seconds": 1},
     }
     shown = Console(width=200, file=io.StringIO())
-    tables.print_tuning(shown, 1e-8, [], [{**run, **more}], "my.toml")
+    tables.print_tuning(shown, by_error(1e-8), [], [{**run, **more}], SCENES["four_bar"](), "my.toml")
     assert says in shown.file.getvalue(), shown.file.getvalue()
 
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from argparse import ArgumentTypeError
 from typing import Any
 
 import numpy as np
 import pytest
 
+from crosscheck.cli.options import length
 from crosscheck.engine import Setting
 from crosscheck.study.between import between, coarser, work
 from crosscheck.study.comparison import _with_coarser
 from crosscheck.study.grid import Case, key
 from crosscheck.study.ladder import beyond
-from crosscheck.study.tuning import tuned
+from crosscheck.study.tuning import by_closure, tuned
 from mbref.scene import Body, Scene
 
 BLOCK = Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
@@ -159,3 +161,36 @@ def test_a_sweep_that_begins_too_fine_is_continued_to_coarser_settings():
         family[1:], records | {key(family[1]): {**records[key(family[1])], "outcome": "STEP_FAILED"}}
     )
     assert _with_coarser([family], records, None) == ([family], records)
+
+
+def test_a_closure_gap_is_the_violation_times_the_scene_s_length():
+    """A family of order 2 whose closures open by h² of the scene's length of 2 m."""
+    scene = SCENE.with_(
+        joint=[{"name": "A", "type": "spherical", "bodies": ["ground", "b"], "anchor": [2.0, 0.0, 0.0]}]
+    )
+    engine = Modelled(rk2=(2.0, 1.0, 1e-3, 1.0))
+
+    def run(cases):
+        return [
+            {**r, "metrics": {"error": 1.0, "violation_position": r["metrics"]["error"]}}
+            for r in engine(cases)
+        ]
+
+    wanted = by_closure(1e-3, scene)
+    done = tuned(engine.cases(0.1, 0.01, 0.001), wanted.level, run, measure=wanted.measure)
+    [cheapest] = done.cases
+    best = (1e-3 / 2) ** 0.5
+    assert best / 1.15 < cheapest.setting.options["step"] <= best
+    assert wanted.name == "a closure gap of 1 mm" and wanted.text(done.reached[0]).endswith(" mm")
+    assert wanted.measure({"metrics": {}}) == float("inf")
+
+
+@pytest.mark.parametrize(("text", "metres"), [("1mm", 1e-3), ("0.5 in", 0.0127), ("2e-4", 2e-4)])
+def test_a_length_of_a_command_line_has_a_unit(text, metres):
+    assert length(text) == pytest.approx(metres, rel=1e-15)
+
+
+@pytest.mark.parametrize("text", ["0mm", "-1 mm", "3 parsec", "wide", ""])
+def test_a_length_that_is_none_is_refused(text):
+    with pytest.raises(ArgumentTypeError):
+        length(text)

@@ -8,7 +8,7 @@ import pytest
 from imports import ROOT, children, circles, graph, imported, sources, upward
 
 DOORS = (
-    r"command_line|formats|scene|scene_fields|scene_joints|scene_lines|scene_loads|scenes(\.\w+)?|scene_validation|trajectory|rotations|records"
+    r"command_line|formats|scene|scene_fields|scene_joints|scene_lines|scene_loads|scenes(\.\w+)?|scene_units|scene_validation|trajectory|rotations|records"
     r"|__version__"
 )
 ALLOWED = {  # package → the names of mbref that it may import
@@ -30,6 +30,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
             "scene_loads",
             "scene_paths",
             "scene_text",
+            "scene_units",
             "scene_validation",
         ],
         ["command_line", "formats", "scenes", "scene_slips", "variation", "outputs"],

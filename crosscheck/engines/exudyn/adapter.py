@@ -15,11 +15,12 @@ import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Owner, Setting
 from crosscheck.engines.driver_motion import fastest_rate
-from crosscheck.engines.exudyn.dynamic import Motion, integrate
+from crosscheck.engines.exudyn.dynamic import Motion, integrate, step_count
 from crosscheck.engines.exudyn.extrapolation import RICHARDSON, extrapolate
 from crosscheck.engines.exudyn.joints import SUPPORTS
 from crosscheck.engines.exudyn.reactions import reactions
 from crosscheck.engines.exudyn.static import drive
+from crosscheck.engines.written import Written
 from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
@@ -88,6 +89,18 @@ class Exudyn(Engine):
     def _coarse(self, scene: Scene, step: float) -> Trajectory:
         times = np.linspace(0, scene.duration, SCOUT_SAMPLES)
         return self.run(scene, times, Setting("alpha", {"step": step}))
+
+    def own_code(self, scene: Scene, setting: Setting) -> str:
+        """Return the statements that set up SolveDynamic, for ``settings = exu.SimulationSettings()``."""
+        if setting.family not in DYNAMIC:
+            return ""
+        statements: list[str] = []
+        exu, settings = Written("exu", statements), Written("settings", statements)
+        integration = settings.timeIntegration
+        integration.endTime = scene.duration
+        integration.numberOfSteps = step_count(scene.duration, float(setting.options["step"]))
+        kind = DYNAMIC[setting.family](exu, settings, bool(scene.counts().redundant or scene.driver))
+        return "; ".join([*statements, f"mbs.SolveDynamic(settings, solverType={kind!r})"])
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         exu = _exudyn()

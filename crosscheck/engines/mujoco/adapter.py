@@ -20,13 +20,17 @@ from crosscheck.engines.mujoco import compiled_run
 from crosscheck.engines.mujoco.families import (
     ADAPTIVE,
     COMPILED,
+    CONVERGED,
     DEFAULT_STEP,
     FAMILIES,
     HARD,
     INTEGRATED_HERE,
+    MOST_ITERATIONS,
     OPTIONS,
     RK4,
+    STIFFEST,
     STOCK,
+    own_code,
     sweep,
 )
 from crosscheck.engines.mujoco.model import SUPPORTS, compiled
@@ -38,8 +42,6 @@ from mbref import rotations
 from mbref.scene import Driver, Scene
 from mbref.trajectory import Outcome, Trajectory
 
-CONVERGED, MOST_ITERATIONS = 1e-20, 50  # scaled gain of a Newton iteration; two or three are usual
-STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance, as far as it is not clamped
 TURN_PER_STEP = 0.25  # rad a driver may move within one adaptive step: closures can fold in between
 SCOUT_SAMPLES = 41  # of the coarse run that finds how fast a scene turns
 
@@ -69,6 +71,10 @@ class MuJoCo(Engine):
     def serves(self, scene: Scene, family: str) -> bool:
         """Return what the sweep offers, which has the tuned family for every scene."""
         return family == "tuned" or super().serves(scene, family)
+
+    def own_code(self, scene: Scene, setting: Setting) -> str:
+        """Return the MJCF of a setting, and Python for what MJCF does not have."""
+        return own_code(setting)
 
     def prepare(self, families: Sequence[str]) -> None:
         """Compile the code of the compiled families."""

@@ -7,7 +7,7 @@ a run through singular positions with less left of the closure errors that they 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from crosscheck.engine import Setting
 from crosscheck.engines.initial_velocities import may_move_freely
@@ -63,6 +63,9 @@ OPTIONS = {
     "turn": "rad a driver may move within one step",
 }
 MAX_STEPS = 250_000
+STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance, as far as it is not clamped
+CONVERGED, MOST_ITERATIONS = 1e-20, 50  # scaled gain of a Newton iteration; two or three are usual
+SCALED = "model.body_invweight0[:] *= {0:g}; model.dof_invweight0[:] *= {0:g}"  # after compilation
 
 
 def sweep(scene: Scene, rate: float) -> list[Setting]:
@@ -118,3 +121,38 @@ def _steps(scene: Scene, rate: float, angles: Sequence[float]) -> list[float]:
     """Steps (s) that turn by the angles (rad) at a rate (rad/s), as far as they are not too many."""
     steps = [_rounded(angle / rate) for angle in angles]
     return [h for h in steps if scene.duration / h <= MAX_STEPS] or steps[:1]
+
+
+def own_code(setting: Setting) -> str:
+    """Return the MJCF of a setting that MuJoCo integrates itself, and Python for what MJCF does not have."""
+    family, options = setting.family, setting.options
+    if family in INTEGRATED_HERE:
+        return ""
+    step = options.get("step", DEFAULT_STEP)
+    flags, attributes = {"autoreset": "disable"}, {"timestep": f"{step!r}"}
+    if family == "defaults":
+        return _option(attributes, flags)
+    integrator = STOCK.get(family, RK4).removeprefix("mjINT_")
+    attributes |= {"integrator": NAMES.get(integrator, integrator), "jacobian": "dense"}
+    flags["island"] = "disable"
+    if family in STOCK:
+        return _option(attributes, flags) + _closures(2 * step, 1.0)
+    attributes |= {"iterations": str(MOST_ITERATIONS), "tolerance": repr(CONVERGED)}
+    flags["refsafe"] = "disable"
+    beta = options.get("beta", 0.0)
+    hardened = SCALED.format(options.get("hard", HARD))
+    return f"{_option(attributes, flags)}{_closures(-(beta**2), -2 * beta)} and in Python: {hardened}"
+
+
+NAMES = {"EULER": "Euler", "IMPLICIT": "implicit", "IMPLICITFAST": "implicitfast"}  # in MJCF
+
+
+def _option(attributes: Mapping[str, str], flags: Mapping[str, str]) -> str:
+    own, switched = (" ".join(f'{k}="{v}"' for k, v in names.items()) for names in (attributes, flags))
+    return f"<option {own}><flag {switched}/></option>"
+
+
+def _closures(first: float, second: float) -> str:
+    """The stiffness of all equalities: solref, and the hardest impedance."""
+    impedance = " ".join(map(repr, STIFFEST))
+    return f'<default><equality solref="{first!r} {second!r}" solimp="{impedance}"/></default>'

@@ -24,10 +24,12 @@ from crosscheck.engines.pinocchio import compiled_run
 from crosscheck.engines.pinocchio.families import (
     BAUMGARTE,
     COMPILED,
+    CONVERGED,
     FAMILIES,
     FIXED,
     OPTIONS,
     TUNED_COMPILED,
+    own_code,
     sweep,
 )
 from crosscheck.engines.pinocchio.model import SUPPORTS, Loads, Mechanism
@@ -40,11 +42,6 @@ from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
 Step = Callable[[np.ndarray, float, float], np.ndarray]  # (state, its time, a later time) -> state then
-CONVERGED = (
-    1e-9,
-    1e-8,
-    50,
-)  # change of the forces (N), mu, iterations: accelerations near singular positions
 WITHOUT_PYTHON = 1e-9, 1e-7, 5  # the same in compiled code: fewer iterations are as exact there
 FORCES = (
     1e-9,
@@ -88,6 +85,10 @@ class Pinocchio(Engine):
     def serves(self, scene: Scene, family: str) -> bool:
         """Return what the sweep offers, which has the tuned family for every scene."""
         return family == "tuned" or super().serves(scene, family)
+
+    def own_code(self, scene: Scene, setting: Setting) -> str:
+        """Return the settings of constraintDynamics; empty where DOP853 integrates."""
+        return own_code(setting)
 
     def prepare(self, families: Sequence[str]) -> None:
         """Compile the steppers and the library of the compiled families."""

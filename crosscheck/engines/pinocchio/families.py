@@ -28,6 +28,7 @@ FAMILIES = {
     "DOP853; needs a C++ compiler and the package cmeel-eigen",
     TUNED_COMPILED: "as tuned, without Python, with the same needs",
 }
+CONVERGED = 1e-9, 1e-8, 50  # change of the forces (N), mu, iterations: accelerations near singular positions
 OPTIONS = {
     "step": "time step, s",
     "rtol": "relative tolerance of a step",
@@ -64,3 +65,16 @@ def _steps(scene: Scene, rate: float, angles: Sequence[float]) -> list[float]:
     """Steps (s) that turn by the angles (rad) at a rate (rad/s), as far as they are not too many."""
     steps = [float(f"{angle / rate:.2g}") for angle in angles]
     return [h for h in steps if scene.duration / h <= MAX_FIXED_STEPS] or steps[:1]
+
+
+def own_code(setting: Setting) -> str:
+    """Return the settings of constraintDynamics in steps h of RK4, and the closures' Baumgarte terms."""
+    if setting.family not in FIXED:
+        return ""
+    step = float(setting.options["step"])
+    given = () if setting.family == "defaults" else CONVERGED
+    solver = f"settings = pinocchio.ProximalSettings({', '.join(map(repr, given))})"
+    root = BAUMGARTE / step
+    gains = f"pinocchio.BaumgarteCorrectorParameters({root**2!r}, {2 * root!r})"
+    feedback = f"; [c.setBaumgarteCorrectorParameters({gains}) for c in closures]"
+    return f"h = {step!r}; {solver}{feedback * (setting.family == 'baumgarte')}"

@@ -62,6 +62,12 @@ class Simbody(Engine):
         """Integrators by accuracy."""
         return [Setting(family, {"accuracy": a}) for family in INTEGRATORS for a in ACCURACIES]
 
+    def own_code(self, scene: Scene, setting: Setting) -> str:
+        """Return the statements that set up the ``manager = opensim.Manager(model)``."""
+        kind = f"opensim.Manager.IntegratorMethod_{INTEGRATORS[setting.family]}"
+        accuracy = f"manager.setIntegratorAccuracy({setting.options['accuracy']!r})"
+        return f"manager.setIntegratorMethod({kind}); {accuracy}"
+
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         """Simulate; raises ValueError for a family it does not have."""
         if setting.family not in INTEGRATORS:

@@ -1,0 +1,27 @@
+"""Python code of settings: an object that writes down the assignments that a function makes to it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class Written:
+    """A name in code; attributes are names too, and every value that is assigned to one becomes a statement.
+
+    A function that sets up an engine's settings writes its own code when it is given this object.
+    """
+
+    def __init__(self, name: str, statements: list[str]):
+        object.__setattr__(self, "_name", name)
+        object.__setattr__(self, "_statements", statements)
+
+    def __getattr__(self, name: str) -> Written:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return Written(f"{self._name}.{name}", self._statements)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        self._statements.append(f"{self._name}.{name} = {value!r}")
+
+    def __repr__(self) -> str:
+        return str(self._name)

@@ -1,0 +1,148 @@
+"""Lines of an engine's own code or XML / the settings that its adapter makes, field by field."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mbref
+from crosscheck.engine import Setting, engine
+from crosscheck.engines.written import Written
+from crosscheck.study.verdict import Judged
+from mbref import find_scene
+
+SCENE = find_scene("planar_slider_crank")
+HARDENED = {"step": 2e-4, "beta": 300.0, "hard": 1e-7}
+MODEL = (
+    "<mujoco>{}<worldbody><body name='a'><freejoint/><geom size='1' mass='2'/></body></worldbody>"
+    "<equality><connect body1='a' anchor='0 0 0'/></equality></mujoco>"
+)
+
+
+@pytest.mark.parametrize(
+    ("family", "options"),
+    [
+        ("defaults", {"step": 5e-4}),
+        *((family, {"step": 3e-4}) for family in ("stock", "euler", "implicit", "implicitfast")),
+        ("tuned", HARDENED),
+        ("stiff", {**HARDENED, "beta": 1000.0}),
+    ],
+)
+def test_mjcf_makes_the_options_of_a_run(family, options):
+    mujoco = pytest.importorskip("mujoco")
+    from crosscheck.engines.mujoco.adapter import _MujocoSimulation
+
+    xml, _, python = engine("mujoco").own_code(SCENE, Setting(family, options)).partition(" and in Python: ")
+    model = mujoco.MjModel.from_xml_string(MODEL.format(xml))
+    before = model.body_invweight0.copy(), model.dof_invweight0.copy()
+    exec(python, {"model": model})
+    own = _MujocoSimulation(SCENE, Setting(family, options)).model
+    for name in ("timestep", "integrator", "jacobian", "iterations", "tolerance", "disableflags", "solver"):
+        assert getattr(model.opt, name) == getattr(own.opt, name), name
+    assert np.allclose(model.eq_solref[0], own.eq_solref[0]) and np.allclose(
+        model.eq_solimp[0], own.eq_solimp[0]
+    )
+    factor = options.get("hard", 1.0)
+    assert np.allclose(model.body_invweight0, factor * before[0], rtol=1e-14)
+    assert np.allclose(model.dof_invweight0, factor * before[1], rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["planar_slider_crank", "spatial_slider_crank"])
+@pytest.mark.parametrize("family", ["defaults", "trapezoidal", "alpha"])
+def test_python_makes_the_settings_of_exudyn(name, family):
+    exu = pytest.importorskip("exudyn")
+    from crosscheck.engines.exudyn.adapter import DYNAMIC
+    from crosscheck.engines.exudyn.dynamic import Solver
+
+    scene = find_scene(name)
+    line = engine("exudyn").own_code(scene, Setting(family, {"step": 0.3e-3}))
+    settings, wanted, solved = exu.SimulationSettings(), exu.SimulationSettings(), []
+    exec(line, {"settings": settings, "exu": exu, "mbs": _Solving(solved)})
+    kind = DYNAMIC[family](exu, wanted, Solver(exu, scene).singular)
+    wanted.timeIntegration.endTime = scene.duration
+    wanted.timeIntegration.numberOfSteps = int(np.ceil(scene.duration / 0.3e-3))
+    assert solved == [kind] and str(settings) == str(wanted) != str(exu.SimulationSettings())
+
+
+class _Solving:
+    def __init__(self, solved: list[Any]):
+        self.solved = solved
+
+    def SolveDynamic(self, settings: Any, solverType: Any) -> None:
+        self.solved.append(solverType)
+
+
+def test_python_makes_the_settings_of_pinocchio():
+    pinocchio = pytest.importorskip("pinocchio")
+    from crosscheck.engines.pinocchio.adapter import _PinocchioSimulation
+
+    for family in ("defaults", "proximal", "baumgarte"):
+        asked = Setting(family, {"step": 2e-4})
+        own = _PinocchioSimulation(SCENE, asked)
+        closures = list(_PinocchioSimulation(SCENE, Setting("proximal", {"step": 2e-4})).mechanism.closures)
+        names: dict[str, Any] = {"pinocchio": pinocchio, "closures": closures}
+        exec(engine("pinocchio").own_code(SCENE, asked), names)
+        for field in ("absolute_accuracy", "mu", "max_iter"):
+            assert getattr(names["settings"], field) == getattr(own.solver, field), field
+        assert names["h"] == 2e-4 and len(closures) > 0
+        for closure, mine in zip(closures, own.closures, strict=True):
+            corrector, other = (
+                closure.m_baumgarte_parameters,
+                mine.m_baumgarte_parameters,
+            )
+            assert np.allclose(corrector.Kp, other.Kp) and np.allclose(corrector.Kd, other.Kd)
+
+
+def test_simbody_s_line_names_its_integrator():
+    opensim = pytest.importorskip("opensim")
+    line = engine("simbody").own_code(SCENE, Setting("merson", {"accuracy": 1e-6}))
+    assert hasattr(opensim.Manager, re.search(r"IntegratorMethod_\w+", line)[0])
+    assert line.endswith("manager.setIntegratorAccuracy(1e-06)")
+
+
+def test_mbref_s_line_runs():
+    line = engine("mbref").own_code(SCENE, Setting("taylor", {"rtol": 1e-6}))
+    motion = eval(line, {"mbref": mbref, "scene": SCENE.with_(duration=0.001)})
+    assert motion.settings["rtol"] == 1e-6 and motion.outcome.name == "COMPLETED"
+
+
+@pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
+def test_families_that_crosscheck_integrates_have_no_line_of_an_engine_s_integrator(name):
+    pytest.importorskip({"pinocchio": "pinocchio"}.get(name, name))
+    found, integrators = engine(name), {"pinocchio": ("defaults", "proximal", "baumgarte")}.get(name, ())
+    for family in found.integrated_here:
+        if family not in integrators:
+            assert not found.own_code(SCENE, Setting(family, {"step": 1e-3, "rtol": 1e-6, "min_step": 1e-5}))
+
+
+def test_code_is_written_from_assignments():
+    statements: list[str] = []
+    settings = Written("settings", statements)
+    settings.newton.relativeTolerance = 1e-6
+    settings.solver = Written("exu", statements).Kind.Dense
+    assert statements == ["settings.newton.relativeTolerance = 1e-06", "settings.solver = exu.Kind.Dense"]
+
+
+def test_the_fastest_run_within_a_level_is_used_else_the_most_accurate():
+    def record(engine: str, error: float, seconds: float, family: str = "own") -> dict[str, Any]:
+        return {
+            "engine": engine,
+            "family": family,
+            "outcome": "COMPLETED",
+            "metrics": {"error": error},
+            "cost": {"seconds": seconds},
+        }
+
+    records = [
+        record("a", 1e-9, 3.0),
+        record("a", 5e-7, 1.0),
+        record("a", 1e-7, 2.0),
+        record("a", 1e-8, 0.1, "ours"),
+        record("b", 1e-2, 0.1),
+        record("b", 1e-4, 0.2),
+    ]
+    found = Judged(SCENE, {}, records).within(1e-6, lambda r: r["family"] == "own")
+    assert {name: r["metrics"]["error"] for name, r in found.items()} == {"a": 5e-7, "b": 1e-4}
