@@ -16,7 +16,19 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, Strict, ValidationError, field_validator, model_validator
 
-from mbref.scene_fields import Entry, Name, Positive, Quaternion, Real, Reals, Vector, as_list
+from mbref.scene_fields import (
+    Angle,
+    Entry,
+    LengthOrAngle,
+    Name,
+    Point,
+    Positive,
+    Quaternion,
+    Real,
+    Reals,
+    Vector,
+    as_list,
+)
 from mbref.scene_joints import (
     JOINT_TYPES,
     Cylindrical,
@@ -88,7 +100,7 @@ class Body(Entry):
     name: Name
     mass: Positive | None = None
     inertia: Inertia = None
-    position: Vector
+    position: Point
     orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
     velocity: Vector | None = None
     angular_velocity: Vector | None = None
@@ -110,9 +122,9 @@ class Body(Entry):
 class Sine(Entry):
     """amplitude · sin(frequency · t + phase); frequency in rad/s."""
 
-    amplitude: Real = 0.0
+    amplitude: LengthOrAngle = 0.0
     frequency: Real = 1.0
-    phase: Real = 0.0
+    phase: Angle = 0.0
 
 
 class Driver(Entry):

@@ -10,6 +10,8 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, Strict
 
+from mbref.scene_units import angle, length, length_or_angle
+
 LARGEST, SMALLEST = 1e40, 1e-40  # sizes of numbers whose products and squares are still numbers
 OTHER_WORDS = {  # of other programs and books → ours
     "hinge": "revolute",
@@ -100,6 +102,14 @@ Name = Annotated[str, Field(min_length=1)]
 Pair = Annotated[tuple[Name, Name], Strict(False)]
 VectorPair = Annotated[tuple[Vector, Vector], Strict(False), BeforeValidator(as_list)]
 Reals = Annotated[tuple[Real, ...], Field(min_length=1), Strict(False), BeforeValidator(as_list)]
+
+
+Length = Annotated[Real, BeforeValidator(length, json_schema_input_type=float | str)]  # m, or "300 mm"
+Angle = Annotated[Real, BeforeValidator(angle, json_schema_input_type=float | str)]  # rad, or "30 deg"
+LengthOrAngle = Annotated[Real, BeforeValidator(length_or_angle, json_schema_input_type=float | str)]
+Extent = Annotated[NotNegative, BeforeValidator(length, json_schema_input_type=float | str)]
+Point = Annotated[tuple[Length, Length, Length], Strict(False), BeforeValidator(as_list)]
+PointPair = Annotated[tuple[Point, Point], Strict(False), BeforeValidator(as_list)]
 
 
 def direction(v: tuple[float, float, float]) -> tuple[float, float, float]:

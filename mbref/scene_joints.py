@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import Discriminator, field_validator
 
-from mbref.scene_fields import Entry, Name, Pair, Vector, VectorPair, direction
+from mbref.scene_fields import Entry, Name, Pair, Point, PointPair, Vector, VectorPair, direction
 
 X, Y, Z = 0, 1, 2
 SKEW = 0.05  # cosine between the axes of a universal joint that is no rounding of a right angle
@@ -74,7 +74,7 @@ class JointEntry(Entry):
 
 
 class _AnchorJoint(JointEntry):
-    anchor: Vector
+    anchor: Point
 
     @property
     def anchor_pair(self) -> tuple[Vector, Vector]:
@@ -160,7 +160,7 @@ class Distance(JointEntry):
 
     facts = JointFacts(condition="constant distance")
     type: Literal["distance"] = "distance"
-    anchors: VectorPair
+    anchors: PointPair
 
     @field_validator("anchors")
     @classmethod

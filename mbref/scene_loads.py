@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal, get_args
 
 from pydantic import Discriminator, ValidationInfo, field_validator
 
-from mbref.scene_fields import Entry, Name, NotNegative, Pair, Real, Vector, VectorPair
+from mbref.scene_fields import Angle, Entry, Extent, Name, NotNegative, Pair, Point, PointPair, Vector
 
 
 class LoadEntry(Entry):
@@ -36,7 +36,7 @@ class Force(LoadEntry):
     acts_on = "body"
     type: Literal["force"] = "force"
     body: Name
-    point: Vector
+    point: Point
     force: Vector
 
 
@@ -46,10 +46,10 @@ class Spring(LoadEntry):
     acts_on = "bodies"
     type: Literal["spring"] = "spring"
     bodies: Pair
-    points: VectorPair
+    points: PointPair
     stiffness: NotNegative
     damping: NotNegative = 0.0
-    natural_length: NotNegative
+    natural_length: Extent
 
     @field_validator("natural_length")
     @classmethod
@@ -68,7 +68,7 @@ class TorsionSpring(LoadEntry):
     joint: Name
     stiffness: NotNegative
     damping: NotNegative = 0.0
-    natural_angle: Real = 0.0
+    natural_angle: Angle = 0.0
 
 
 Load = Annotated[Moment | Force | Spring | TorsionSpring, Discriminator("type")]

@@ -1,4 +1,4 @@
-"""Numbers of a scene that are valid and yet probably slips: degrees for radians, millimetres for metres."""
+"""Numbers of a scene that are valid and yet probably slips: other units, a misdirected axis, no joints."""
 
 from __future__ import annotations
 
@@ -15,11 +15,15 @@ QUARTER = 90  # of which round numbers of degrees are multiples
 APART = 300.0  # times the next shorter length: one in millimetres is not always the longest
 GYRATION = 30.0  # radius of gyration over the mechanism's length
 STRONGEST = 100.0  # m/s², of gravity
+FURTHEST = 100.0  # rad, of a driver: 16 turns, and degrees of most motions
+INSTANTS = 101  # of a motion at which a driver's value is looked at
+FLAT = 1e-6  # of the mechanism's size, of a point out of a plane; also the cosine of a right angle
 
 
 def probable_slips(scene: Scene) -> list[str]:
     """One sentence for each, under the path of the field."""
-    return [*_angles(scene), *_lengths(scene), *_inertias(scene), *_gravity(scene)]
+    found = (_angles, _lengths, _inertias, _gravity, _axes, _no_joints, _far_drivers)
+    return [sentence for each in found for sentence in each(scene)]
 
 
 def link_lengths(scene: Scene) -> dict[str, dict[str, float]]:
@@ -86,12 +90,78 @@ def _inertias(scene: Scene) -> Iterator[str]:
 
 def _size(scene: Scene) -> float:
     """The extent of all anchors and centres of mass, m."""
+    return float(np.ptp(np.array(_points(scene)), axis=0).max())
+
+
+def _points(scene: Scene) -> list[tuple[float, float, float]]:
+    """All anchors and centres of mass."""
     points = [body.position for body in scene.body]
-    points += [anchor for joint in scene.joint for anchor in joint.anchor_pair]
-    return float(np.ptp(np.array(points), axis=0).max())
+    return points + [anchor for joint in scene.joint for anchor in joint.anchor_pair]
 
 
 def _gravity(scene: Scene) -> Iterator[str]:
     strength = math.hypot(*scene.gravity)
     if strength > STRONGEST:
         yield f"gravity: {strength:g} m/s² is {strength / 9.81:.3g} times the earth's; is it in mm/s²?"
+
+
+def _axes(scene: Scene) -> Iterator[str]:
+    """Hinges of loops whose axes lie in the plane of a mechanism, where most hinges have axes across it."""
+    hinges = [(joint.name, _unit(joint.directions[0])) for joint in scene.joint if joint.type == "revolute"]
+    for normal in [axis for _, axis in hinges[:2]]:
+        turned = [abs(float(axis @ normal)) for _, axis in hinges]
+        across, inside = (sum(map(test, turned)) for test in (_is_one, _is_zero))
+        if inside and across > inside and across + inside == len(hinges) and _is_flat(scene, normal):
+            for (name, _), cosine in zip(hinges, turned, strict=True):
+                if _is_zero(cosine) and _is_in_loop(scene, name):
+                    yield f"joint[{name}].axis: lies in the plane of the mechanism; other axes are across it"
+            return
+
+
+def _is_in_loop(scene: Scene, name: str) -> bool:
+    """Whether the bodies of a joint are connected without it, too."""
+    others = [joint.bodies for joint in scene.joint if joint.name != name]
+    reached, last = {scene.joint_named(name).bodies[0]}, 0
+    while len(reached) > last:
+        last = len(reached)
+        reached |= {body for pair in others if reached & set(pair) for body in pair}
+    return scene.joint_named(name).bodies[1] in reached
+
+
+def _is_one(cosine: float) -> bool:
+    return cosine > 1 - FLAT
+
+
+def _is_zero(cosine: float) -> bool:
+    return cosine < FLAT
+
+
+def _is_flat(scene: Scene, normal: np.ndarray) -> bool:
+    """Whether anchors and centres of mass lie in one plane across a direction."""
+    heights = np.array(_points(scene)) @ normal
+    return float(np.ptp(heights)) <= FLAT * _size(scene)
+
+
+def _unit(axis: tuple[float, float, float]) -> np.ndarray:
+    return np.array(axis) / math.hypot(*axis)
+
+
+def _no_joints(scene: Scene) -> Iterator[str]:
+    if not scene.joint:
+        names = ", ".join(body.name for body in scene.body)
+        yield f"joint: there is none, so nothing holds {names}"
+
+
+def _far_drivers(scene: Scene) -> Iterator[str]:
+    """Drivers that turn a joint by many turns before the end of the motion."""
+    times = np.linspace(0.0, scene.duration, INSTANTS)
+    for driver in scene.driver:
+        value = sum(c * times**k for k, c in enumerate(driver.polynomial))
+        if sine := driver.sine:
+            value = value + sine.amplitude * np.sin(sine.frequency * times + sine.phase)
+        furthest = float(np.abs(value).max())
+        if scene.joint_named(driver.joint).facts.driven == "angle" and furthest > FURTHEST:
+            yield (
+                f"driver[{driver.joint}].polynomial: turns the joint by {furthest:.4g} rad, "
+                f"{furthest / TURN:.3g} turns, within {scene.duration:g} s; is it in degrees?"
+            )

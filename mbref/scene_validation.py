@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from mbref.scene_fields import LARGEST, SMALLEST, checked_length, checked_size, meant, shown
 from mbref.scene_joints import JOINT_TYPES
 from mbref.scene_loads import LOAD_TYPES
+from mbref.scene_units import dimension_of, in_si
 
 GROUND = "ground"
 RESERVED = (GROUND, "the fixed frame")  # names that no body can have
@@ -227,9 +228,19 @@ def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Iterato
             if name in driven:
                 yield f"driver[{i}].joint", f"{name!r} already has a driver"
             driven.add(name)
+            yield from _unit_faults(f"driver[{i}].sine.amplitude", _get(driver, "sine"), types.get(name))
         if start := _initial_value(driver):
             message = f"c0 + amplitude·sin(phase) must be 0, motion is measured from t = 0; got {start:g}"
             yield f"driver[{i}].polynomial", message
+
+
+def _unit_faults(path: str, sine: Any, joint: Any) -> Iterator[tuple[str, str]]:
+    """The fault of an amplitude whose unit does not suit the coordinate that a driver prescribes."""
+    driven = JOINT_TYPES[joint].facts.driven if joint in JOINT_TYPES else None
+    needed = {"angle": "angle", "displacement": "length"}.get(str(driven))
+    amplitude = _get(sine, "amplitude")
+    if needed and dimension_of(amplitude) not in (None, needed):
+        yield path, f"prescribes the {driven} of a {joint} joint, a unit of {needed}, got {amplitude!r}"
 
 
 def _initial_value(driver: Any) -> float:
@@ -243,6 +254,8 @@ def _initial_value(driver: Any) -> float:
 
 def _number(value: Any) -> float:
     """A number of a size that a scene can have, or 0, where a field's own fault is reported."""
+    if dimension := dimension_of(value):
+        value = in_si(value, dimension)
     return float(value) if isinstance(value, int | float) and abs(value) <= LARGEST else 0.0
 
 

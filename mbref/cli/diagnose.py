@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import tomllib
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbref.cli.options import TEXT, add_scene
@@ -11,6 +13,7 @@ from mbref.cli.output import console, warn
 from mbref.records import strict_json
 from mbref.scene import Scene, SceneError
 from mbref.scene_slips import link_lengths
+from mbref.scene_units import echoed
 from mbref.scenes import find_scene
 
 if TYPE_CHECKING:
@@ -55,6 +58,7 @@ def _diagnose(options: argparse.Namespace) -> int:
             "\n".join(
                 [
                     *_scene_lines(scene),
+                    *_unit_lines(options.scene),
                     *_start_lines(found),
                     *_motion_lines(along),
                     *_swap_lines(swaps, redundant),
@@ -108,6 +112,14 @@ def _scene_lines(scene: Scene) -> list[str]:
     lines.append("  joints")
     lines += [f"    {joint.name:12} {joint.type}, {' and '.join(joint.bodies)}" for joint in scene.joint]
     return lines
+
+
+def _unit_lines(path: str) -> list[str]:
+    """Return the numbers with a unit in a scene's file, in SI."""
+    if not path.endswith(".toml"):
+        return []
+    found = list(echoed(tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))))
+    return ["  units", *(f"    {line}" for line in found)] * bool(found)
 
 
 def _start_lines(found: Diagnosis) -> list[str]:

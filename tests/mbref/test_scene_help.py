@@ -7,6 +7,7 @@ import math
 from importlib.resources import files
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mbref import __version__
@@ -168,6 +169,125 @@ def test_no_built_in_scene_has_a_probable_slip(name):
 def test_probable_slips(path, value, says):
     (slip,) = probable_slips(find_scene("planar_slider_crank").with_(path, value))
     assert slip.startswith(says), slip
+
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").rglob("*.toml"))
+SCENE_FILES = [path for path in EXAMPLES if "[[body]]" in path.read_text()]
+
+
+@pytest.mark.parametrize("path", SCENE_FILES, ids=lambda path: path.name)
+def test_no_example_has_a_probable_slip(path):
+    assert probable_slips(Scene.from_file(path)) == []
+
+
+def test_a_hinge_in_the_plane_of_a_plane_mechanism_is_probably_a_slip():
+    """Two hinges across the plane and one in it; as many in it as across are a spatial mechanism."""
+    scene = find_scene("planar_slider_crank")
+    hinge = {
+        "name": "T",
+        "type": "revolute",
+        "bodies": ["rod", "slider"],
+        "anchor": scene.joint[2].anchor_pair[0],
+    }
+
+    def with_axis(axis, height=0.0):
+        anchor = (*hinge["anchor"][:2], height)
+        return scene.with_(joint=[*scene.joint, {**hinge, "axis": axis, "anchor": anchor}])
+
+    says = ["joint[T].axis: lies in the plane of the mechanism; other axes are across it"]
+    assert probable_slips(with_axis((1.0, 2.0, 0.0))) == says
+    for spatial in (with_axis((0.0, 0.0, 1.0)), with_axis((1.0, 0.0, 1.0)), with_axis((1.0, 0.0, 0.0), 0.1)):
+        assert probable_slips(spatial) == []
+    first = with_axis((1.0, 0.0, 0.0)).with_("joint[A].axis", (1.0, 0.0, 0.0))
+    assert probable_slips(first) == [], "one axis across the plane and two in it"
+
+
+def test_a_scene_without_joints_is_probably_a_slip():
+    scene = find_scene("planar_slider_crank")
+    assert probable_slips(scene.with_(joint=[])) == [
+        "joint: there is none, so nothing holds crank, rod, slider"
+    ]
+
+
+@pytest.mark.parametrize(("rate", "told"), [(100.1, 1), (99.9, 0), (-100.1, 1)])
+def test_a_driver_of_more_than_a_hundred_radians_is_probably_a_slip(rate, told):
+    driven = find_scene("four_bar").with_(driver=({"joint": "A", "polynomial": [0.0, rate]},), duration=1.0)
+    found = probable_slips(driven)
+    assert len(found) == told and all(
+        s.startswith("driver[A].polynomial: turns the joint by 100.1 rad, 15.9 turns") for s in found
+    )
+
+
+def test_units_are_read_as_si(tmp_path):
+    """Lengths and angles with a unit give the scene of the numbers in m and rad."""
+    plain = Scene.from_file(Path(__file__).parents[2] / "examples" / "door_closer.toml").to_dict()
+    with_units = json.loads(json.dumps(plain))
+    for body in with_units["body"]:
+        body["position"] = [f"{1000 * x!r} mm" for x in body["position"]]
+    for joint in with_units["joint"]:
+        if "anchor" in joint:
+            joint["anchor"] = [f"{100 * x!r} cm" for x in joint["anchor"]]
+    for load in with_units["load"]:
+        if load["type"] == "spring":
+            load["natural_length"] = f"{load['natural_length'] / 0.0254!r}in"
+        if "natural_angle" in load:
+            load["natural_angle"] = f"{math.degrees(load['natural_angle'])!r} deg"
+    read, right = Scene(**with_units), Scene(**plain)
+    for mine, other in zip((*read.body, *read.load), (*right.body, *right.load), strict=True):
+        for key, value in mine.model_dump().items():
+            other_value = getattr(other, key)
+            if isinstance(value, float) or key in ("position", "points"):
+                assert np.allclose(value, other_value, rtol=1e-14), key
+    assert all(
+        np.allclose(a.anchor_pair, b.anchor_pair) for a, b in zip(read.joint, right.joint, strict=True)
+    )
+    read.save(tmp_path / "read.toml")
+    assert "mm" not in (tmp_path / "read.toml").read_text()
+
+
+def test_amplitudes_have_the_unit_of_the_driven_coordinate():
+    scene = find_scene("four_bar")
+    swing = {"joint": "A", "sine": {"amplitude": "30 deg", "frequency": 2.0, "phase": "0 deg"}}
+    assert scene.with_(driver=(swing,)).driver[0].sine.amplitude == pytest.approx(math.pi / 6, rel=1e-15)
+    with pytest.raises(
+        SceneError,
+        match=r"driver\[A\]\.sine\.amplitude: prescribes the angle of a revolute joint.* got '30 mm'",
+    ):
+        scene.with_(driver=({**swing, "sine": {"amplitude": "30 mm"}},))
+    late = {"amplitude": "30 deg", "phase": "90 deg"}
+    with pytest.raises(SceneError, match="must be 0, motion is measured from t = 0; got 0"):
+        scene.with_(driver=({**swing, "sine": late},))
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("wide", "must be a number, or one with a unit, such as \"300 mm\", got 'wide'"),
+        ("3 parsec", "'parsec' is no unit of length, known: m, mm"),
+        ("30 deg", "'deg' is no unit of length"),
+        ("1e999 mm", "must be a number|finite|at most"),
+        ("1 2 mm", "must be a number"),
+    ],
+)
+def test_texts_that_are_no_length_are_refused(text, says):
+    with pytest.raises(SceneError, match=says):
+        find_scene("four_bar").with_("joint[A].anchor", [text, 0.0, 0.0])
+
+
+def test_the_schema_allows_units_where_a_scene_does():
+    text = json.dumps(Scene.model_json_schema())
+    assert '"anyOf": [{"type": "number"}, {"type": "string"}]' in text
+
+
+def test_diagnose_echoes_units_in_si(tmp_path, capsys):
+    path = tmp_path / "my.toml"
+    text = (Path(__file__).parents[2] / "mbref" / "templates" / "scene.toml").read_text()
+    assert "position = [" in text
+    start = text.index("position = [") + len("position = [")
+    number = text[start : text.index(",", start)]
+    path.write_text(text[:start] + f'"{1000 * float(number):g} mm"' + text[start + len(number) :])
+    assert main(["diagnose", str(path), "--start"]) == 0
+    assert f"{1000 * float(number):g} mm = {float(number):g} m" in capsys.readouterr().out
 
 
 def test_angles_beyond_a_turn_are_probably_degrees():
