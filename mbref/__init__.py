@@ -13,6 +13,7 @@ from mbref.scene_services import SERVICES
 if TYPE_CHECKING:
     from mbref.ensembles.ensemble import ensemble
     from mbref.equations.diagnosis import Diagnosis, counts, diagnose
+    from mbref.error_estimate import ErrorEstimate
     from mbref.method import Method, MethodError
     from mbref.motion import Motion
     from mbref.scene import Scene, SceneError
@@ -26,6 +27,7 @@ __version__ = "0.2.0"
 _MODULE_OF = {
     "Cost": "mbref.trajectory",
     "Diagnosis": "mbref.equations.diagnosis",
+    "ErrorEstimate": "mbref.error_estimate",
     "Limits": "mbref.simulation.simulate",
     "Method": "mbref.method",
     "MethodError": "mbref.method",
@@ -48,6 +50,7 @@ __all__ = [
     "SCENES",
     "Cost",
     "Diagnosis",
+    "ErrorEstimate",
     "Limits",
     "Method",
     "MethodError",
@@ -79,6 +82,7 @@ SERVICES.violations = lambda scene, motion: import_module("mbref.equations.along
 SERVICES.determined_reactions = lambda scene, motion: import_module(
     "mbref.equations.along_trajectory"
 ).determined_reactions(scene, motion)
+SERVICES.error_estimate = lambda *wanted: import_module("mbref.second_run").estimate_error(*wanted)
 SERVICES.picture = lambda scene: import_module("mbref.drawing.picture").still(scene)
 
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import csv
 import json
-from dataclasses import dataclass, field, fields
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -15,6 +18,7 @@ from mbref.actuation import DriverMotion, LoadMotion, driver_motion, load_motion
 from mbref.drawing.picture import moving, still
 from mbref.drawing.view import View
 from mbref.energy import kinetic, potential
+from mbref.error_estimate import ErrorEstimate
 from mbref.joint_motion import JointMotion, joint_motion
 from mbref.outputs import chosen, columns_of
 from mbref.records import strict_json
@@ -116,6 +120,52 @@ class Motion(Trajectory):
         """
         return SERVICES.determined_reactions(self.mechanism, self)
 
+    @cached_property
+    def error_estimate(self) -> ErrorEstimate:
+        """Estimated global error of the motion at its samples, by a second run at a smaller tolerance.
+
+        The second run is made on first access; it takes about twice the time of the motion. Raises ValueError
+        if the motion is of another engine than mbref.
+        """
+        return SERVICES.error_estimate(self)
+
+    def with_error_estimate(
+        self, seconds: float = math.inf, progress: Callable[[float], None] | None = None
+    ) -> Motion:
+        """Return the motion with its error estimate, whose warning, if it has one, is part of ``message``.
+
+        Parameters
+        ----------
+        seconds : float
+            Time limit, s. No estimate is made of a motion whose steps took longer, and none by a second run
+            that takes longer; ``error_estimate.reason`` is then the reason.
+        progress : callable, optional
+            Called with the time reached (s) between steps of the second run.
+
+        Raises
+        ------
+        ValueError
+            If the motion is of another engine than mbref.
+        """
+        estimate = SERVICES.error_estimate(self, seconds, progress)
+        message = "; ".join(filter(None, (self.message, estimate.warning)))
+        return replace(self, message=message)._keeping(estimate)
+
+    def _keeping(self, estimate: ErrorEstimate) -> Motion:
+        """Return the motion, which has this error estimate from now on."""
+        self.__dict__["error_estimate"] = estimate
+        return self
+
+    @property
+    def known_estimate(self) -> ErrorEstimate | None:
+        """The error estimate, if it has been made."""
+        return self.__dict__.get("error_estimate")
+
+    def to_record(self) -> dict[str, Any]:
+        """Return the record that ``run --json`` prints; ``error_estimate`` is None if none was made."""
+        estimate = self.known_estimate
+        return {**super().to_record(), "error_estimate": estimate and estimate.to_record()}
+
     def columns(self, *names: str) -> dict[str, np.ndarray]:
         """Return numbers over time as columns.
 
@@ -128,7 +178,8 @@ class Motion(Trajectory):
         Returns
         -------
         dict of str to ndarray, shape (k,)
-            ``time``, ``rod.position.x``, ``A.angle``, ``energy`` and so on, in SI units.
+            ``time``, ``rod.position.x``, ``A.angle``, ``energy`` and so on, in SI units. ``error_estimate``
+            is among them if it has been made.
 
         Raises
         ------
@@ -152,7 +203,8 @@ class Motion(Trajectory):
         levels = {f"{level}_violation": rows for level, rows in self.violation._asdict().items()}
         energies = ("kinetic_energy", "potential_energy", "energy") if self.mechanism.has_mass() else ()
         found = {name: getattr(self, name) for name in energies}
-        return {**levels, "largest_reaction": self.largest_reaction, **found}
+        estimate = None if self.known_estimate is None else self.known_estimate.error
+        return {**levels, "largest_reaction": self.largest_reaction, **found, "error_estimate": estimate}
 
     def to_dataframe(self) -> Any:
         """Return the columns as a pandas DataFrame, indexed by time.
@@ -202,8 +254,10 @@ class Motion(Trajectory):
         """
         try:
             whole = json.loads(Path(path).read_text(encoding="utf-8"))
-            scene = Scene(**whole["scene"])
-            return Motion.of(scene, Trajectory.from_record(scene.name, whole["record"]))
+            scene, record = Scene(**whole["scene"]), whole["record"]
+            motion = Motion.of(scene, Trajectory.from_record(scene.name, record))
+            estimate = record.get("error_estimate")
+            return motion._keeping(ErrorEstimate.from_record(motion.times, estimate)) if estimate else motion
         except (ValueError, KeyError, TypeError, AttributeError, SceneError):
             raise ValueError(f"{path}: is not a file that Motion.save wrote") from None
 

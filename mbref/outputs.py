@@ -23,6 +23,7 @@ PREFIXES: dict[Owner, str] = {  # of a column, by its owner
 EXAMPLES: dict[Owner, str] = {"body": "rod", "joint": "A", "driver": "A", "load": "0", "mechanism": ""}
 MASSES = "the mass and inertia of every body"
 ACCELERATIONS = "accelerations, which the engine does not give"
+SECOND_RUN = "a second run: mbref run without --estimate no, or motion.error_estimate before"
 TURNING = "a joint that turns about one axis"
 SLIDING = "a joint that slides along one axis"
 
@@ -123,6 +124,7 @@ OUTPUTS = (
     Output("mechanism", "kinetic_energy", "J", "", "kinetic energy", MASSES),
     Output("mechanism", "potential_energy", "J", "", "energy of gravity and springs", MASSES),
     Output("mechanism", "energy", "J", "", "kinetic plus potential energy", MASSES),
+    Output("mechanism", "error_estimate", "", "", "estimated error, relative or rad", SECOND_RUN),
 )
 UNITS = {output.name: output.unit for output in OUTPUTS}
 

@@ -1,4 +1,4 @@
-"""Services of a scene and its motion that higher parts of the package do: constraint rows and drawing.
+"""Services of a scene and its motion that higher parts do: constraint rows, drawing and second runs.
 
 Scenes and motions are data and import none of them.  ``mbref/__init__`` binds them here.
 """
@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+
+from mbref.error_estimate import ErrorEstimate
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class Violation(NamedTuple):
 
 
 class Services:
-    """Functions of a scene, bound when ``mbref`` is imported.
+    """Functions of a scene or a motion, bound when ``mbref`` is imported.
 
     Attributes
     ----------
@@ -71,12 +73,16 @@ class Services:
         Returns the Violation of a scene's constraint rows along a trajectory.
     determined_reactions : callable
         Returns by joint which components (k, 6) of its reaction equilibrium determines along a trajectory.
+    error_estimate : callable
+        Returns the ErrorEstimate of a motion, by a second run with a time limit, s; see
+        ``Motion.with_error_estimate``.
     """
 
     counts: Callable[[Any], Counts]
     picture: Callable[[Any], str]
     violations: Callable[[Any, Any], Violation]
     determined_reactions: Callable[[Any, Any], dict[str, np.ndarray]]
+    error_estimate: Callable[..., ErrorEstimate]
 
 
 SERVICES = Services()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from mbref.records import strict_json
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 
+ESTIMATE_SECONDS = 5.0  # of CPU time, for a run and for its second run
 SHOWN = 10  # singular positions in the text; --json has all
 
 
@@ -59,6 +61,13 @@ def add(commands: Any) -> None:
         help="at a singular position, counted from 1, take another branch than the smooth one, which is 1;\n"
         "a run lists the branches at every crossing; e.g. --branch 2=2.  May be repeated",
     )
+    run.add_argument(
+        "--estimate",
+        choices=("auto", "yes", "no"),
+        default="auto",
+        help="estimate the global error by a second run at a smaller tolerance: auto (default), unless it\n"
+        f"takes longer than {ESTIMATE_SECONDS:g} s; yes, however long it takes; no",
+    )
     run.set_defaults(action=_run)
 
 
@@ -76,8 +85,10 @@ def _run(options: argparse.Namespace) -> int:
     with simulator(method) as simulate:
         with progress_bar("simulating", float(times[-1])) as progress:
             if options.columns:  # refuses unknown names
-                simulate(scene, method, times[:1], limits, progress).columns(*options.columns)
+                first = simulate(scene, method, times[:1], limits, progress)
+                _estimated(first, options.estimate).columns(*options.columns)
             motion = simulate(scene, method, times, limits, progress)
+        motion = _estimated(motion, options.estimate)
         if options.out:
             write(motion, options.out, *options.columns)
         if options.json:
@@ -85,6 +96,14 @@ def _run(options: argparse.Namespace) -> int:
         else:
             show(scene, motion, options.columns)
     return 0 if motion.outcome.name == "COMPLETED" else 1
+
+
+def _estimated(motion: Motion, wanted: str) -> Motion:
+    """Return the motion with its error estimate, where one is wanted."""
+    if wanted == "no":
+        return motion
+    with progress_bar("estimating the error", motion.t_end) as progress:
+        return motion.with_error_estimate(ESTIMATE_SECONDS if wanted == "auto" else math.inf, progress)
 
 
 def _branches(words: list[str]) -> dict[int, int]:
@@ -105,11 +124,13 @@ def _writer(out: str | None) -> Any:
 
 
 def show(scene: Scene, trajectory: Motion, columns: Sequence[str] = ()) -> None:
-    """Print how a run ended, what it cost, and its last state or the columns asked for."""
+    """Print how a run ended, its error estimate and cost, and its last state or the columns asked for."""
     out, cost = console(), trajectory.cost
     out.print(f"{scene.name} by {trajectory.method}: {trajectory.outcome.name} at t = {trajectory.t_end:g} s")
     if trajectory.message:
         out.print(trajectory.message)
+    if trajectory.known_estimate is not None:
+        out.print(trajectory.known_estimate.sentence)
     out.print(
         f"{cost.steps} steps, {cost.rejected} rejected, {cost.rhs} evaluations\n"
         f"{cost.factorisations} factorisations, {cost.newton} Newton iterations\n"

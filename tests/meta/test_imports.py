@@ -21,7 +21,7 @@ ADAPTER = "crosscheck.engines.mbref"  # the one module that may import all of mb
 
 FLOORS = {  # lowest first; an arrow within a floor or downwards
     "mbref": (
-        ["rotations", "records", "trajectory", "scene_services"],
+        ["rotations", "records", "trajectory", "error_estimate", "scene_services"],
         [
             "scene",
             "scene_fields",
@@ -45,6 +45,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["integrators"],
         ["method"],
         ["simulation", "taylor"],
+        ["second_run"],
         ["ensembles"],
         ["design"],
         ["cli"],

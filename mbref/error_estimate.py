@@ -1,0 +1,125 @@
+"""ErrorEstimate: the estimated global error of a motion at its samples."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+RATIO, LEAST = 1e3, 1e-6  # of an error to the relative tolerance, and of an error: above both, a warning
+
+
+@dataclass(frozen=True)
+class ErrorEstimate:
+    """Estimated global error of a motion at its k samples.
+
+    The error of a sample is the largest distance of a body's centre of mass from its true place, divided by
+    the length of the mechanism, or the angle between its orientation and the true one, rad, whichever is
+    larger. It is estimated by the difference from a second run.
+
+    Attributes
+    ----------
+    times : ndarray, shape (k,)
+        Sample times of the motion, s.
+    error : ndarray, shape (k,)
+        Estimated error; NaN at samples that the second run did not reach.
+    rtol : float or None
+        Relative tolerance of the motion. None for a method in fixed steps.
+    second_run : str
+        Method and tolerance of the second run. Empty if no estimate was made.
+    reason : str
+        The reason why some samples have no estimate. Empty if all samples have one.
+    tighter : tuple of (float, float), or None
+        A smaller relative tolerance that was tried, and its largest error. None for motions without a
+        warning.
+    """
+
+    times: np.ndarray
+    error: np.ndarray
+    rtol: float | None
+    second_run: str
+    reason: str = ""
+    tighter: tuple[float, float] | None = None
+
+    def __repr__(self) -> str:
+        return f"<ErrorEstimate: {self.sentence}>"
+
+    @staticmethod
+    def none(times: np.ndarray, rtol: float | None, reason: str) -> ErrorEstimate:
+        """Return the estimate of a motion for which none could be made."""
+        return ErrorEstimate(times, np.full(len(times), math.nan), rtol, "", reason)
+
+    @property
+    def largest(self) -> float | None:
+        """Largest estimated error. None if no sample has an estimate."""
+        known = self.error[~np.isnan(self.error)]
+        return float(known.max()) if known.size else None
+
+    def exceeds_from(self, level: float) -> float | None:
+        """Return the time, s, of the first sample whose error is above ``level``; None if there is none."""
+        above = np.flatnonzero(self.error > level)
+        return float(self.times[above[0]]) if above.size else None
+
+    @property
+    def exceeds_rtol_from(self) -> float | None:
+        """Time, s, of the first sample whose error is above ``rtol``. None if there is none."""
+        return None if self.rtol is None else self.exceeds_from(self.rtol)
+
+    def _warned_from(self) -> float | None:
+        """Time, s, of the first sample whose error the warning reports. None if there is none."""
+        return None if self.rtol is None else self.exceeds_from(max(RATIO * self.rtol, LEAST))
+
+    @property
+    def warning(self) -> str:
+        """Sentence on an error above 1000 times the relative tolerance and 1e-6. Empty if there is none.
+
+        The motion is called sensitive unless a smaller tolerance gives less than 1000 times that tolerance.
+        """
+        begin = self._warned_from()
+        if begin is None:
+            return ""
+        better = "; rtol {:.0e} gives {:.0e}".format(*self.tighter) if self.tighter else ""
+        cured = self.tighter is not None and self.tighter[1] < RATIO * self.tighter[0]
+        what = "inaccurate run" if cured else "sensitive motion"
+        return f"{what}: error about {_short(self.largest)} from t = {begin:.3g} s on{better}"
+
+    @property
+    def sentence(self) -> str:
+        """Sentence on the estimate, or on the reason why there is none."""
+        if self.largest is None:
+            return f"no error estimate: {self.reason}"
+        begin = self.exceeds_rtol_from
+        above = "" if begin is None else f", above rtol {self.rtol:g} from t = {begin:.3g} s on"
+        ends = f"; {self.reason}" if self.reason else ""
+        return f"estimated error: at most {self.largest:.1e}{above}{ends}"
+
+    def to_record(self) -> dict[str, Any]:
+        """Return numbers, lists and text, for JSON."""
+        return {
+            "largest": self.largest,
+            "exceeds_rtol_from": self.exceeds_rtol_from,
+            "error": self.error.tolist(),
+            "rtol": self.rtol,
+            "second_run": self.second_run,
+            "reason": self.reason,
+            "tighter": None if self.tighter is None else list(self.tighter),
+            "sentence": self.sentence,
+        }
+
+    @staticmethod
+    def from_record(times: np.ndarray, record: Mapping[str, Any]) -> ErrorEstimate:
+        """Return the estimate that ``to_record`` wrote."""
+        tighter = record["tighter"]
+        return ErrorEstimate(
+            times,
+            np.array(record["error"], dtype=float),
+            **{key: record[key] for key in ("rtol", "second_run", "reason")},
+            tighter=None if tighter is None else (float(tighter[0]), float(tighter[1])),
+        )
+
+
+def _short(number: float | None) -> str:
+    return f"{number:.0e}" if number is not None and number < 0.01 else f"{number:.1g}"

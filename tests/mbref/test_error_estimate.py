@@ -1,0 +1,265 @@
+"""Error estimates: closed forms, sensitive motions, rounding, ends of second runs, records and commands."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from crosscheck.judge.metrics import error_series
+from crosscheck.judge.truth import truth_for
+from mbref import ErrorEstimate, Limits, Motion, Scene, find_scene, simulate
+from mbref.cli.commands import main
+from mbref.scene import Body, Driver, Revolute, Spring, Translational
+from mbref.second_run import perturbed
+from mbref.trajectory import Cost, Outcome
+
+TIMES = np.array([0.0, 0.5, 1.0, 1.5])
+UNIT = 2.0**-52
+
+
+def estimate(*errors: float, rtol: float | None = 1e-9, **more) -> ErrorEstimate:
+    return ErrorEstimate(TIMES, np.array(errors), rtol, "taylor", **more)
+
+
+def rod(name: str, start: tuple[float, float], stop: tuple[float, float]) -> Body:
+    """A rod of 1 kg in the xy-plane, its frame parallel to the world's."""
+    way = np.subtract(stop, start)
+    x, y = ((np.array(start) + stop) / 2).tolist()
+    long = float(way @ way) / 12
+    return Body(name=name, mass=1.0, inertia=(long, long, 1.1 * long), position=(x, y, 0.0))
+
+
+def pin(name: str, first: str, second: str, x: float, y: float) -> Revolute:
+    return Revolute(name=name, bodies=(first, second), anchor=(x, y, 0.0), axis=(0.0, 0.0, 1.0))
+
+
+@pytest.fixture(scope="module")
+def pendulums() -> Scene:
+    """Three rods in a row, released from a horizontal line: chaotic."""
+    return Scene(
+        name="pendulums",
+        gravity=(0.0, -9.81, 0.0),
+        duration=8.0,
+        body=tuple(rod(f"rod{k}", (0.4 * k, 0.0), (0.4 * k + 0.4, 0.0)) for k in range(3)),
+        joint=tuple(
+            pin(f"P{k}", f"rod{k - 1}" if k else "ground", f"rod{k}", 0.4 * k, 0.0) for k in range(3)
+        ),
+    )
+
+
+@pytest.fixture(scope="module")
+def oscillator() -> Scene:
+    """A mass of 1 kg on a spring of 100 N/m, 0.2 m from its place of rest: x = 1 + 0.2 cos 10 t."""
+    return Scene(
+        name="oscillator",
+        duration=1.0,
+        body=(Body(name="mass", mass=1.0, inertia=(0.01, 0.01, 0.01), position=(1.2, 0.0, 0.0)),),
+        joint=(
+            Translational(name="D", bodies=("ground", "mass"), anchor=(0.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0)),
+        ),
+        load=(
+            Spring(
+                bodies=("ground", "mass"),
+                points=((0.0, 0.0, 0.0), (1.2, 0.0, 0.0)),
+                stiffness=100.0,
+                damping=0.0,
+                natural_length=1.0,
+            ),
+        ),
+    )
+
+
+@pytest.fixture(scope="module")
+def dead() -> Scene:
+    """A driven crank of 0.5 m that cannot turn: the other bars reach 0.5 m + 0.5 m, to a hinge at 1.2 m."""
+    return Scene(
+        name="dead",
+        gravity=(0.0, -9.81, 0.0),
+        duration=1.0,
+        body=(
+            rod("crank", (0.0, 0.0), (0.5, 0.0)),
+            rod("coupler", (0.5, 0.0), (0.8, 0.4)),
+            rod("rocker", (1.2, 0.0), (0.8, 0.4)),
+        ),
+        joint=(
+            pin("A", "ground", "crank", 0.0, 0.0),
+            pin("B", "crank", "coupler", 0.5, 0.0),
+            pin("C", "coupler", "rocker", 0.8, 0.4),
+            pin("D", "ground", "rocker", 1.2, 0.0),
+        ),
+        driver=(Driver(joint="A", polynomial=(0.0, 2.0)),),
+    )
+
+
+def test_numbers_and_sentences_of_an_estimate():
+    found = estimate(0.0, 5e-10, 3e-9, 2e-9)
+    assert found.largest == 3e-9 and found.exceeds_rtol_from == 1.0 and found.exceeds_from(1e-8) is None
+    assert found.sentence == "estimated error: at most 3.0e-09, above rtol 1e-09 from t = 1 s on"
+    assert found.warning == ""
+    quiet = estimate(0.0, 1e-10, 2e-10, np.nan, reason="the second run ended at t = 1.2 s")
+    assert quiet.sentence == "estimated error: at most 2.0e-10; the second run ended at t = 1.2 s"
+
+
+@pytest.mark.parametrize(
+    ("rtol", "error", "warns"),
+    [
+        (1e-9, 1e-6, False),
+        (1e-9, 1.1e-6, True),
+        (1e-12, 1e-8, False),
+        (1e-5, 9e-3, False),
+        (1e-5, 1.1e-2, True),
+    ],
+)
+def test_an_error_above_a_thousand_tolerances_and_a_millionth_has_a_warning(rtol, error, warns):
+    assert bool(estimate(0.0, 0.0, error, 0.0, rtol=rtol).warning) == warns
+
+
+def test_warning_has_the_error_the_time_and_a_tolerance_that_was_tried():
+    found = estimate(0.0, 1e-3, 0.5, 3.1, rtol=1e-5, tighter=(1e-12, 6e-8))
+    assert found.warning == "sensitive motion: error about 3 from t = 1 s on; rtol 1e-12 gives 6e-08"
+    assert "gives" not in replace(found, tighter=None).warning
+
+
+def test_a_motion_that_a_smaller_tolerance_cures_is_not_called_sensitive():
+    found = estimate(0.0, 1e-3, 0.5, 3.1, rtol=1e-5, tighter=(1e-12, 0.9e-9))
+    assert found.warning == "inaccurate run: error about 3 from t = 1 s on; rtol 1e-12 gives 9e-10"
+
+
+def test_a_method_in_fixed_steps_has_an_error_and_no_warning():
+    found = estimate(0.0, 0.1, 0.2, 0.3, rtol=None)
+    assert not found.warning and found.sentence == "estimated error: at most 3.0e-01"
+
+
+def test_the_estimate_is_the_true_error_of_an_oscillation(oscillator):
+    """The length of the mechanism is the distance of the mass from the joint, 1.2 m."""
+    motion = simulate(oscillator, "taylor[order=4]", limits=Limits(rtol=1e-4))
+    true = np.abs(motion["mass"].position[:, 0] - 1 - 0.2 * np.cos(10 * motion.times)) / 1.2
+    assert true.max() > 1e-10, "the run is too accurate for a test"
+    assert np.abs(motion.error_estimate.error - true).max() < 1e-3 * true.max()
+
+
+def test_a_sensitive_motion_is_reported_in_the_message(pendulums):
+    motion = simulate(pendulums, "taylor", rtol=1e-4)
+    told = motion.with_error_estimate()
+    found = told.error_estimate
+    assert motion.outcome is told.outcome is Outcome.COMPLETED and motion.message == ""
+    assert told.message == found.warning and found.warning.startswith("sensitive motion: error about ")
+    assert found.largest > 0.1 and found.tighter is not None and found.tighter[1] < 1e-2 * found.largest
+    accurate = simulate(pendulums, "taylor", rtol=1e-12).error_estimate
+    assert 0.1 < accurate.largest / found.tighter[1] < 10 and accurate.tighter is None
+
+
+def test_rounding_is_magnified_in_the_estimate_of_the_smallest_tolerance(pendulums):
+    """Two runs of different tolerance that share their start would not see its rounding."""
+    found = simulate(pendulums, "taylor", rtol=1e-15).error_estimate
+    assert found.error[-1] > 20 * found.error[1] > 0
+
+
+def test_a_driven_motion_has_rounding_errors_only():
+    found = simulate("four_bar", duration=0.1).error_estimate
+    assert found.exceeds_rtol_from is None and 0 < found.largest < 1e-11
+
+
+def test_motions_across_and_from_singular_positions_have_an_estimate():
+    for name, duration in (("planar_slider_crank_equal", 0.3), ("four_bar_straight", 0.1)):
+        found = simulate(name, duration=duration).error_estimate
+        assert not np.isnan(found.error).any() and found.largest < 1e-7, (name, found)
+
+
+def test_numbers_change_in_their_last_digits_and_zeros_do_not(pendulums):
+    def numbers(scene: Scene) -> np.ndarray:
+        fields = [body.position + body.inertia for body in scene.body] + [
+            j.anchor + j.axis for j in scene.joint
+        ]
+        return np.array([x for numbers in (scene.gravity, *fields) for x in numbers])
+
+    before, after = numbers(pendulums), numbers(perturbed(pendulums))
+    assert (np.abs(after - before) <= 2.5 * UNIT * np.abs(before)).all() and (after != before).sum() > 10
+    assert (
+        perturbed(pendulums) == perturbed(pendulums) and perturbed(pendulums).duration == pendulums.duration
+    )
+
+
+def test_samples_that_the_second_run_does_not_reach_have_none(dead):
+    motion = simulate(dead)
+    assert 2 < len(motion.times) < 101 and not np.isnan(motion.error_estimate.error).any()
+    last = np.repeat([len(motion.times) - 1], 3)
+    more = {
+        name: np.concatenate([getattr(motion, name), getattr(motion, name)[last]])
+        for name in ("position", "orientation", "velocity", "angular_velocity")
+    }
+    times = np.concatenate([motion.times, 2.0 + np.arange(3)])
+    found = replace(motion, times=times, **more).error_estimate
+    assert np.isnan(found.error).tolist() == [False] * len(motion.times) + [True] * 3
+    assert found.reason.startswith("the second run ended at t = ") and "dead position" in found.reason
+
+
+def test_runs_that_take_long_are_not_repeated(pendulums):
+    motion = replace(simulate(pendulums, duration=0.1), cost=Cost(seconds=7.0))
+    found = motion.with_error_estimate(5.0).error_estimate
+    assert found.largest is None and found.second_run == "" and np.isnan(found.error).all()
+    assert found.sentence == (
+        "no error estimate: the run took 7 s, more than 5 s; "
+        "--estimate yes and motion.error_estimate have no time limit"
+    )
+    assert motion.error_estimate.largest is not None
+
+
+def test_second_runs_end_at_their_time_limit(pendulums):
+    motion = replace(simulate(pendulums), cost=Cost(seconds=0.0))
+    found = motion.with_error_estimate(0.0).error_estimate
+    assert found.largest is None and found.reason.startswith("a second run takes longer than 0 s")
+
+
+def test_motions_of_other_engines_are_refused(pendulums):
+    motion = replace(simulate(pendulums, duration=0.1), engine="mujoco")
+    with pytest.raises(ValueError, match="a motion of mujoco"):
+        motion.error_estimate  # noqa: B018
+
+
+def test_records_columns_and_files_have_an_estimate_that_was_made(pendulums, tmp_path):
+    motion = simulate(pendulums, duration=0.5)
+    assert motion.to_record()["error_estimate"] is None and "error_estimate" not in motion.columns()
+    found = motion.error_estimate
+    motion.save(tmp_path / "motion.json")
+    read = Motion.load(tmp_path / "motion.json").error_estimate
+    assert np.array_equal(read.error, found.error) and read.to_record() == found.to_record()
+    motion.to_csv(tmp_path / "motion.csv")
+    rows = list(csv.DictReader((tmp_path / "motion.csv").read_text().splitlines()))
+    assert [float(row["error_estimate"]) for row in rows] == found.error.tolist()
+
+
+def test_an_early_estimate_is_stored_with_its_gap(tmp_path):
+    motion = simulate("four_bar", times=TIMES / 100)
+    record = estimate(0.0, 1e-10, np.nan, np.nan, reason="why", tighter=(1e-12, 1e-9)).to_record()
+    read = ErrorEstimate.from_record(motion.times, json.loads(json.dumps(record).replace("NaN", "null")))
+    assert np.isnan(read.error).tolist() == [False, False, True, True]
+    assert read.reason == "why" and read.tighter == (1e-12, 1e-9) and read.second_run == "taylor"
+
+
+def test_command_prints_the_estimate_unless_told_not_to(capsys, pendulums, tmp_path):
+    path = tmp_path / "pendulums.toml"
+    pendulums.save(path)
+    command = ["run", str(path), "--rtol", "1e-4"]
+    assert main(command) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "sensitive motion: error about" in said and "estimated error: at most" in said
+    assert main([*command, "--json"]) == 0
+    record = json.loads(capsys.readouterr().out)["records"][0]
+    assert "sensitive motion" in record["message"] and record["error_estimate"]["largest"] > 0.1
+    assert main([*command, "--json", "--estimate", "no"]) == 0
+    record = json.loads(capsys.readouterr().out)["records"][0]
+    assert record["error_estimate"] is None and record["message"] == ""
+
+
+def test_the_estimate_is_the_error_that_the_judge_measures():
+    scene = find_scene("planar_slider_crank_gravity").with_(duration=0.5)
+    motion = simulate(scene, rtol=1e-6)
+    truth = truth_for(scene, 0.0)
+    assert truth is not None, "the scene has a closed form"
+    true = error_series(scene, motion, truth.poses(motion.times))
+    assert motion.error_estimate.largest == pytest.approx(true.max(), rel=1e-2)
