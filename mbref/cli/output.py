@@ -29,6 +29,9 @@ QUANTITIES = {  # of a body in a table → field of a trajectory
 }
 
 
+SMALL = ("violation", "error_estimate")  # columns whose numbers are of the size of rounding errors
+
+
 def console() -> Console:
     """The standard output, as wide as the terminal, 80 columns in a pipe; names are never markup."""
     return Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, markup=False, highlight=False)
@@ -74,8 +77,9 @@ def column_table(columns: Mapping[str, np.ndarray]) -> Table:
     for name in columns:
         unit = TIME if name == "time" else UNITS[quantity_of(name)]
         table.add_column(f"{name}\n{unit}", justify="right", overflow="fold")
-    for row in zip(*columns.values(), strict=True):
-        table.add_row(*(f"{x:.6g}" for x in rounded(np.array(row))))
+    shown = [values if name.endswith(SMALL) else rounded(values) for name, values in columns.items()]
+    for row in zip(*shown, strict=True):
+        table.add_row(*(f"{x:.6g}" for x in row))
     return table
 
 

@@ -256,6 +256,14 @@ def test_command_prints_the_estimate_unless_told_not_to(capsys, pendulums, tmp_p
     assert record["error_estimate"] is None and record["message"] == ""
 
 
+def test_a_table_of_columns_shows_errors_below_the_rounding_of_other_numbers(capsys, oscillator, tmp_path):
+    path = tmp_path / "oscillator.toml"
+    oscillator.save(path)
+    assert main(["run", str(path), "--times", "0,0.01", "--columns", "error_estimate"]) == 0
+    rows = [line.split("│") for line in capsys.readouterr().out.splitlines() if line.startswith("│ 0.01")]
+    assert len(rows) == 1 and 0 < float(rows[0][2]) < 1e-12
+
+
 def test_the_estimate_is_the_error_that_the_judge_measures():
     scene = find_scene("planar_slider_crank_gravity").with_(duration=0.5)
     motion = simulate(scene, rtol=1e-6)
