@@ -14,6 +14,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from crosscheck.conformance.features import is_undetermined, undetermined
+from crosscheck.conformance.hint import Failure, hint
 from crosscheck.conformance.properties import PROPERTIES, Finding
 from crosscheck.conformance.runners import InProcess, Isolated, Runner
 from crosscheck.conformance.trial import Bench, Broken, NoExact, Outside, Specimen, set_up
@@ -55,6 +56,7 @@ class Conformance:
     version: str
     verdicts: Sequence[Verdict]
     family: str = ""  # of settings, where not the best
+    hint: str = ""  # one sentence on the cause of failures
 
     @property
     def conforms(self) -> bool:
@@ -101,7 +103,19 @@ def held_against(
     with ThreadPoolExecutor(1 if isinstance(runner, InProcess) else os.cpu_count()) as threads:
         groups = threads.map(examined, [Specimen(undetermined()), *specimens])
         verdicts = [verdict for group in groups for verdict in group]
-    return Conformance(runner.name, ", ".join(sorted(versions)), verdicts, family)
+    failures = _failures(specimens, verdicts)
+    return Conformance(
+        runner.name, ", ".join(sorted(versions)), verdicts, family, hint(runner, failures, family)
+    )
+
+
+def _failures(specimens: Sequence[Specimen], verdicts: Sequence[Verdict]) -> list[Failure]:
+    """The first card of a motion that each failing specimen fails."""
+    failed: dict[str, str] = {}
+    for verdict in verdicts:
+        if verdict.status == FAIL and verdict.property not in FIRST:
+            failed.setdefault(verdict.scene, verdict.property)
+    return [Failure(s, failed[s.scene.name]) for s in specimens if s.scene.name in failed]
 
 
 def asked(runner: Runner, specimen: Specimen, family: str = "") -> Bench | Verdict:
@@ -191,6 +205,8 @@ def tables(conformance: Conformance) -> Iterator[Table | Text]:
     yield from _domains(conformance)
     yield from (Text(f"{_card(name)}: {abouts()[name]}", style="dim") for name in properties)
     yield from (_sentence(verdict) for verdict in conformance.verdicts if verdict.status == FAIL)
+    if conformance.hint:
+        yield Text(conformance.hint)
     yield _summary(conformance)
 
 

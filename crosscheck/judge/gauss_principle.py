@@ -28,13 +28,24 @@ def gauss(scene: Scene) -> np.ndarray:
     turn."""
     mass, force = _unbound(scene)
     weights = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))  # of `stacked`
-    rows = jacobian(scene, 0.0, *initial_poses(scene))[0] * weights
-    mass, force = mass * weights * weights[:, None], force * weights
+    rows = jacobian(scene, 0.0, *initial_poses(scene))[0]
+    found = of_least_constraint(mass, force, rows, bias(scene), weights)
+    return np.concatenate(np.hsplit(found.reshape(-1, 6), 2))
+
+
+def of_least_constraint(
+    mass: np.ndarray, force: np.ndarray, rows: np.ndarray, coasting: np.ndarray, weights: np.ndarray
+) -> np.ndarray:
+    """Accelerations a / weights (n,) that minimise ½ aᵀ M a - aᵀ f among those with J a = -coasting.
+
+    From M (n, n), f (n,), rows J (m, n) and the residuals (m,) of bodies that coast."""
+    rows, mass, force = rows * weights, mass * weights * weights[:, None], force * weights
     _, s, vt = np.linalg.svd(rows, full_matrices=True)
     free = vt[int((s > RANK * s.max(initial=0.0)).sum()) :].T
-    held = np.linalg.lstsq(rows, -bias(scene), rcond=RANK)[0]
+    held = np.linalg.lstsq(rows, -coasting, rcond=RANK)[0]
     step = np.linalg.lstsq(free.T @ mass @ free, free.T @ (force - mass @ held), rcond=None)[0]
-    return np.concatenate(np.hsplit((held + free @ step).reshape(-1, 6), 2))
+    found: np.ndarray = held + free @ step
+    return found
 
 
 def _unbound(scene: Scene) -> tuple[np.ndarray, np.ndarray]:

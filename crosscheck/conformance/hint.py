@@ -1,0 +1,109 @@
+"""A hint where an engine fails: the term that explains its accelerations if it is left out or wrong.
+
+Accelerations are differences of the engine's own velocities at the middle of a failing scene, and the judge's
+terms are those of the engine's own state there, so that errors of the integration do not count.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from typing import NamedTuple
+
+import numpy as np
+
+from crosscheck.conformance.runners import Runner
+from crosscheck.conformance.trial import NEIGHBOURS, Bench, Broken, Specimen, set_up
+from crosscheck.judge.constraints import initial_twists, scene_length
+from crosscheck.judge.terms import PARTS, accelerations, terms_at, variants
+from crosscheck.processes.pool import ChildFailed
+from mbref.scene import Scene
+
+WRONG = 1e-3  # of the accelerations: differences of velocities are exact to 1e-5 in engines that conform
+EXPLAINED = 0.02  # of the difference that may remain with a changed term
+MOST = 8  # failing scenes that are looked at, those with fewest terms first
+WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)  # of central differences of order 8
+
+
+class Failure(NamedTuple):
+    """The first card that a scene of the suite fails."""
+
+    specimen: Specimen
+    card: str
+
+
+def hint(runner: Runner, failures: Sequence[Failure], family: str = "") -> str:
+    """Return one sentence on the cause that explains most failing scenes; empty without any to look at."""
+    ordered = sorted(failures, key=lambda failure: len(parts_of(failure.specimen.scene)))
+    asked = [failure for failure in ordered if failure.specimen.scene.has_mass()][:MOST]
+    found = [pair for failure in asked for pair in _looked_at(runner, failure, family)]
+    if not found:
+        return ""
+    wrong = [(failure, changes) for failure, changes in found if changes is not None]
+    first, _ = (wrong or found)[0]
+    needs = ", ".join(parts_of(first.specimen.scene))
+    begin = f"hint: begin with the scene {first.specimen.scene.name!r}, card {first.card} (it needs: {needs})"
+    if not wrong:
+        return f"{begin}; accelerations agree with the judge's, so look at the integration or at the output"
+    count = Counter(change for _, changes in wrong for change in changes)
+    if not count:
+        return f"{begin}; its accelerations are wrong, and no single term explains them"
+    best = max(count, key=lambda change: (count[change], -PARTS.index(change[0])))
+    scenes = f"{count[best]} of {len(wrong)} scenes with wrong accelerations"
+    return f"{begin}; look at the {best[0]}: {best[1]} explains {scenes}"
+
+
+def parts_of(scene: Scene) -> list[str]:
+    """Return the parts of an engine that a scene needs, in order of dependence."""
+    needed = {
+        "mass matrix": True,
+        "gravity": any(scene.gravity),
+        "velocity terms": any(np.any(part) for part in initial_twists(scene)),
+        "loads": bool(scene.load),
+        "constraints": bool(scene.joint),
+        "drivers": bool(scene.driver),
+    }
+    return [part for part in PARTS if needed[part]]
+
+
+Changes = set[tuple[str, str]] | None  # parts and changes that explain wrong accelerations; None where right
+
+
+def _looked_at(runner: Runner, failure: Failure, family: str) -> Iterator[tuple[Failure, Changes]]:
+    """Yield a failure with what explains it; nothing where the engine has no motion to look at."""
+    with suppress(Broken, ChildFailed):
+        yield failure, explanations(set_up(runner, failure.specimen, family))
+
+
+def explanations(bench: Bench) -> Changes:
+    """Return the changes that explain the accelerations of a bench's engine, None where these are right."""
+    scene, motion, middle = bench.scene, bench.close, NEIGHBOURS
+    own = _differences(scene, bench)
+    right = accelerations(scene, terms_at(scene, motion, middle))
+    difference = float(np.linalg.norm(own - right))
+    if not np.isfinite(difference):
+        raise Broken("the terms of its motion are not known")
+    if difference <= WRONG * max(float(np.linalg.norm(right)), _least(scene)):
+        return None
+    return {
+        (part, change)
+        for part, change, terms in variants(scene, motion, middle)
+        if np.linalg.norm(own - accelerations(scene, terms)) <= EXPLAINED * difference
+    }
+
+
+def _differences(scene: Scene, bench: Bench) -> np.ndarray:
+    """Accelerations (6 nb,) in the middle of near samples, angular ones times the scene's length."""
+    motion = bench.close
+    rates = np.concatenate([motion.velocity, scene_length(scene) * motion.angular_velocity], axis=-1)
+    step = float(motion.times[1] - motion.times[0])
+    found = sum(
+        w * (rates[NEIGHBOURS + k] - rates[NEIGHBOURS - k]) for k, w in enumerate(WEIGHTS[:NEIGHBOURS], 1)
+    )
+    return np.ravel(found / step)
+
+
+def _least(scene: Scene) -> float:
+    """The acceleration that covers the scene's length in its duration, below which none counts."""
+    return scene_length(scene) / scene.duration**2

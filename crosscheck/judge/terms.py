@@ -1,0 +1,164 @@
+"""Terms of the equations of motion at a state by the judge's own equations, each of which can be left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from crosscheck.judge.constraints import (
+    closure_accelerations,
+    inertia_matrices,
+    jacobian,
+    joint_coordinates,
+    scene_length,
+)
+from crosscheck.judge.gauss_motion import State, applied
+from crosscheck.judge.gauss_principle import of_least_constraint
+from mbref import rotations
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+
+GYRATION = "the gyroscopic moments ω × Jω"
+GRAVITY = "gravity"
+
+
+class Terms(NamedTuple):
+    """The terms of a scene's equations at a state: M a = Σ f + Jᵀ λ, J a = γ.
+
+    Mass matrix (6 nb, 6 nb), forces (6 nb,) by name, rows (m, 6 nb) with the joint of each, and the parts of
+    γ (m,) of velocities and of drivers.
+    """
+
+    mass: np.ndarray
+    forces: Mapping[str, np.ndarray]
+    rows: np.ndarray
+    joints: tuple[str, ...]
+    of_velocities: np.ndarray
+    of_drivers: np.ndarray
+
+
+class Variant(NamedTuple):
+    """Terms with one of them changed: the part of an engine where it belongs, and what was changed."""
+
+    part: str
+    change: str
+    terms: Terms
+
+
+PARTS = ("mass matrix", "gravity", "velocity terms", "loads", "constraints", "drivers")  # by dependence
+
+
+def terms_at(scene: Scene, motion: Trajectory, sample: int) -> Terms:
+    """Return the terms at a sample of a motion, whose first sample is less than half a turn from t = 0."""
+    t, state = float(motion.times[sample]), _state(scene, motion, sample)
+    position, orientation, velocity, spin, _ = state
+    rows, _ = jacobian(scene, t, position, orientation)
+    still = np.zeros_like(position)
+    driven = _residuals(scene, t, position, orientation, still, still)
+    moved = _residuals(scene, t, position, orientation, velocity, spin)
+    names = tuple(
+        name
+        for name, found in closure_accelerations(scene, t, position, orientation, *[still] * 4).items()
+        for _ in found
+    )
+    return Terms(_mass(scene, orientation), _forces(scene, state), rows, names, driven - moved, -driven)
+
+
+def accelerations(scene: Scene, terms: Terms) -> np.ndarray:
+    """Return the accelerations (6 nb,) that the terms give, by Gauss's principle; angular ones times the
+    scene's length."""
+    weights = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))
+    force = np.sum(list(terms.forces.values()), axis=0)
+    gamma = terms.of_velocities + terms.of_drivers
+    return of_least_constraint(terms.mass, force, terms.rows, -gamma, weights)
+
+
+def variants(scene: Scene, motion: Trajectory, sample: int) -> Iterator[Variant]:
+    """Yield the terms at a sample with one of them left out, of opposite sign or wrong, by dependence."""
+    terms = terms_at(scene, motion, sample)
+    yield from _other_masses(scene, motion.orientation[sample], terms)
+    for name, force in terms.forces.items():
+        part = {GRAVITY: PARTS[1], GYRATION: PARTS[2]}.get(name, PARTS[3])
+        for change, factor in CHANGES.items():
+            yield Variant(
+                part, change.format(name), terms._replace(forces={**terms.forces, name: factor * force})
+            )
+    for change, factor in CHANGES.items():
+        changed = terms._replace(of_velocities=factor * terms.of_velocities)
+        yield Variant(PARTS[2], change.format("the velocity part of γ in J a = γ"), changed)
+    for joint in dict.fromkeys(terms.joints):
+        kept = np.array([name != joint for name in terms.joints])
+        rows = {key: getattr(terms, key)[kept] for key in ("rows", "of_velocities", "of_drivers")}
+        names = tuple(name for name in terms.joints if name != joint)
+        yield Variant(PARTS[4], f"joint {joint!r} left out", terms._replace(joints=names, **rows))
+    for change, factor in CHANGES.items():
+        changed = terms._replace(of_drivers=factor * terms.of_drivers)
+        yield Variant(PARTS[5], change.format("the drivers' accelerations in γ"), changed)
+
+
+CHANGES = {"{} left out": 0.0, "{} of opposite sign": -1.0, "{} counted twice": 2.0}
+
+
+def _state(scene: Scene, motion: Trajectory, sample: int) -> State:
+    """The state at a sample, with the angles of the torsion springs."""
+    place = motion.position[sample], motion.orientation[sample]
+    whole = motion.times, motion.position, motion.orientation, motion.angular_velocity
+    coordinates = joint_coordinates(scene, *whole)
+    angles = [coordinates[load.joint][sample, 0] for load in scene.load if load.type == "torsion_spring"]
+    return *place, motion.velocity[sample], motion.angular_velocity[sample], np.array(angles)
+
+
+def _residuals(scene: Scene, t: float, *pose_and_rates: np.ndarray) -> np.ndarray:
+    """Acceleration residuals (m,) of bodies that coast."""
+    still = np.zeros_like(pose_and_rates[0])
+    found = closure_accelerations(scene, t, *pose_and_rates, still, still)
+    return np.concatenate([np.zeros(0), *found.values()])
+
+
+def _forces(scene: Scene, state: State) -> dict[str, np.ndarray]:
+    """Forces and moments (6 nb,) by name: gravity, gyroscopic moments, each load and each damper."""
+    bare = scene.with_(load=[], gravity=(0.0, 0.0, 0.0))
+    plain = (*state[:4], np.zeros(0))
+    gyroscopic = applied(bare, plain).ravel()
+    found = {GRAVITY: applied(scene.with_(load=[]), plain).ravel() - gyroscopic, GYRATION: gyroscopic}
+    springs = 0
+    for k, load in enumerate(scene.load):
+        angles = state[4][springs : springs + 1] if load.type == "torsion_spring" else np.zeros(0)
+        springs += load.type == "torsion_spring"
+        own = (*state[:4], angles)
+        name, force = f"load[{k}] ({load.type})", applied(bare.with_(load=[load]), own).ravel() - gyroscopic
+        if load.is_damped:
+            undamped = load.model_copy(update={"damping": 0.0})
+            elastic = applied(bare.with_(load=[undamped]), own).ravel() - gyroscopic
+            found[f"the damping of {name}"], force = force - elastic, elastic
+        found[name] = force
+    return found
+
+
+def _mass(scene: Scene, orientation: np.ndarray, inertia: np.ndarray | None = None) -> np.ndarray:
+    """The mass matrix (6 nb, 6 nb) with inertias (nb, 3, 3) along world axes, by default turned with the
+    bodies."""
+    if inertia is None:
+        turn = rotations.to_matrix(orientation)
+        inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
+    mass = np.zeros((6 * len(scene.body), 6 * len(scene.body)))
+    for b, body in enumerate(scene.body):
+        mass[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = (body.mass or 0.0) * np.eye(3)
+        mass[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = inertia[b]
+    return mass
+
+
+def _other_masses(scene: Scene, orientation: np.ndarray, terms: Terms) -> Iterator[Variant]:
+    """Mass matrices with inertias along other axes, and without products of inertia."""
+    own, turn = inertia_matrices(scene), rotations.to_matrix(orientation)
+    diagonal = np.array([np.diag(np.diag(matrix)) for matrix in own])
+    back = np.swapaxes(turn, 1, 2)
+    others = {
+        "inertias not turned from body to world axes": own,
+        "inertias turned the wrong way, Rᵀ J R for R J Rᵀ": back @ own @ turn,
+        "products of inertia left out": turn @ diagonal @ back,
+    }
+    for change, inertia in others.items():
+        yield Variant(PARTS[0], change, terms._replace(mass=_mass(scene, orientation, inertia)))

@@ -1,0 +1,114 @@
+"""Hints for engines that fail / engines with one known defect; terms / accelerations of motions."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crosscheck.conformance.hint import Failure, hint, parts_of
+from crosscheck.conformance.runners import InProcess
+from crosscheck.conformance.suite import held_against
+from crosscheck.conformance.trial import specimens
+from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.gauss_motion import gauss_motion
+from crosscheck.judge.terms import accelerations, terms_at, variants
+
+PATH = Path(__file__).parents[2] / "examples" / "spatial_engine" / "spatial_engine.py"
+SPEC = importlib.util.spec_from_file_location("spatial_engine_with_defects", PATH)
+example = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(example)
+KNOWN = {specimen.scene.name: specimen for specimen in specimens()}
+NAMES = ("tumbling body", "pendulum", "spinning loop", "cylindrical driver", "torsion", "oscillator")
+
+
+class Defective(example.Mechanism):
+    """The example engine's equations with one defect."""
+
+    defect = ""
+
+    def __init__(self, scene):
+        super().__init__(scene.with_(gravity=(0.0, 0.0, 0.0)) if self.defect == "gravity" else scene)
+
+    def loads(self, state):
+        force, moment = super().loads(state)
+        if self.defect == "gyroscopic":
+            for b in range(self.count):
+                inertia = state.turn[b] @ self.inertia[b] @ state.turn[b].T
+                moment[b] += 2 * np.cross(state.spin[b], inertia @ state.spin[b])
+        return force, moment
+
+    def rows(self, mate, t, state):
+        if self.defect == "gamma":
+            still = state._replace(velocity=0 * state.velocity, spin=0 * state.spin)
+            return super().rows(mate, t, state)[0], super().rows(mate, t, still)[1]
+        if self.defect == "driver" and mate.driver:
+            rows, gamma = super().rows(mate, t, state)
+            return rows, np.append(gamma[:-1], gamma[-1] - 2 * example.driven(mate.driver, t))
+        return super().rows(mate, t, state)
+
+
+def runner_with(defect, monkeypatch):
+    monkeypatch.setattr(example, "Mechanism", type("Mechanism", (Defective,), {"defect": defect}))
+    return InProcess(example.ENGINE, "spatial")
+
+
+@pytest.mark.parametrize(
+    ("defect", "names", "says"),
+    [
+        ("gravity", ("pendulum",), "look at the gravity: gravity left out explains"),
+        (
+            "gyroscopic",
+            ("tumbling body",),
+            "velocity terms: the gyroscopic moments ω × Jω of opposite",
+        ),
+        (
+            "gamma",
+            ("spinning loop",),
+            "velocity terms: the velocity part of γ in J a = γ left out",
+        ),
+        (
+            "driver",
+            ("driven", "cylindrical driver"),
+            "look at the drivers: the drivers' accelerations in γ of opposite",
+        ),
+    ],
+)
+def test_the_term_that_an_engine_lacks_is_named(defect, names, says, monkeypatch):
+    runner = runner_with(defect, monkeypatch)
+    found = hint(runner, [Failure(KNOWN[name], "truth") for name in names])
+    assert says in found, found
+
+
+def test_an_engine_without_a_defect_is_told_to_look_at_its_integration(monkeypatch):
+    found = hint(runner_with("", monkeypatch), [Failure(KNOWN["pendulum"], "truth")])
+    assert "begin with the scene 'pendulum', card truth" in found
+    assert "accelerations agree with the judge's, so look at the integration" in found
+
+
+def test_verify_ends_with_the_hint_and_conforming_engines_have_none(monkeypatch):
+    chosen = [KNOWN["free_fall"]]
+    failing = held_against(runner_with("gravity", monkeypatch), chosen)
+    assert "gravity left out explains 1 of 1 scenes" in failing.hint and not failing.conforms
+    assert failing.to_record()["hint"] == failing.hint
+    conforming = held_against(runner_with("", monkeypatch), chosen)
+    assert conforming.conforms and conforming.hint == ""
+
+
+@pytest.mark.parametrize("name", [*NAMES, "force load", "turntable"])
+def test_terms_give_the_accelerations_of_the_judge_s_motion(name):
+    scene = KNOWN[name].scene
+    motion = gauss_motion(scene, tuple(np.linspace(0.0, 0.2 * scene.duration, 5).tolist()))
+    own = np.concatenate([motion.acceleration[3], motion.angular_acceleration[3]], axis=-1)
+    found = accelerations(scene, terms_at(scene, motion, 3)).reshape(-1, 6)
+    found[:, 3:] /= scene_length(scene)
+    assert np.allclose(found, own, rtol=1e-6, atol=1e-6 * np.abs(own).max()), (found, own)
+
+
+def test_every_part_of_an_engine_has_variants_where_a_scene_needs_it():
+    scene = KNOWN["cylindrical driver"].scene
+    motion = gauss_motion(scene, (0.0, 0.1 * scene.duration))
+    found = {variant.part for variant in variants(scene, motion, 1)}
+    assert set(parts_of(scene)) <= found
