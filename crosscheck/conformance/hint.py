@@ -1,7 +1,7 @@
-"""A hint where an engine fails: the term that explains its accelerations if it is left out or wrong.
+"""Hints for engines that fail: the changed term that explains the accelerations of an engine best.
 
 Accelerations are differences of the engine's own velocities at the middle of a failing scene, and the judge's
-terms are those of the engine's own state there, so that errors of the integration do not count.
+terms are taken at the engine's own state there, so that errors of the integration do not count.
 """
 
 from __future__ import annotations
