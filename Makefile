@@ -39,7 +39,7 @@ kills: $(VENV)/ready ## processes of studies and ensembles killed at random mome
 
 SEED := 1
 
-mutants: $(VENV)/ready ## 300 defects drawn from the syntax trees (make mutants SEED=2): which do the tests see?
+mutants: $(VENV)/ready ## plant 300 random defects (make mutants SEED=2) and report which the tests detect
 	$(BIN)/python -m tests.mutants --seed $(SEED) --count 300
 
 coverage: $(VENV)/ready ## coverage of mbref, its kernels run as plain Python
@@ -70,7 +70,7 @@ reference: $(VENV)/ready ## the committed report with its records, anew, into re
 
 DRAWN := mechanisms 200 --beside mbref=taylor
 
-drawn: $(VENV)/ready ## every card on drawn mechanisms, for the committed report; resumes from build/drawn/
+drawn: $(VENV)/ready ## every card on random mechanisms, for the committed report; resumes from build/drawn/
 	mkdir -p build/drawn
 	for engine in mujoco pinocchio exudyn; do $(BIN)/crosscheck verify $$engine --$(DRAWN) --json \
 	    --records build/drawn/$$engine.jsonl > reports/reference/conformance/$${engine}_drawn.json; done

@@ -327,4 +327,4 @@ def engine(name: str) -> Engine:
 def _as_engine(name: str, found: object) -> Engine:
     if isinstance(found, Engine):
         return found
-    raise LookupError(f"{name!r} is no engine: it does not implement crosscheck.engine.Engine")
+    raise LookupError(f"{name!r} is not an engine: it does not implement crosscheck.engine.Engine")

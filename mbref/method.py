@@ -140,11 +140,11 @@ class Method:
             _part(integrator or "dop853", INTEGRATORS, "integrator", options),
         )
         if not parts[2].integrates and not parts[1].projects:
-            raise MethodError(f"integrator {parts[2].name} only extrapolates: it goes with projection")
+            raise MethodError(f"integrator {parts[2].name} only extrapolates: use it with +projection")
         if parts[2].step is None and not parts[1].projects:
-            raise MethodError(f"integrator {parts[2].name} projects every step: it goes with projection")
+            raise MethodError(f"integrator {parts[2].name} projects every step: use it with +projection")
         if parts[2].holds_constraints and parts[1].name != "none":
-            raise MethodError(f"integrator {parts[2].name} holds the constraints itself: it goes with none")
+            raise MethodError(f"integrator {parts[2].name} enforces constraints itself: use it with +none")
         return Method(*parts, options)
 
 

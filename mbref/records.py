@@ -52,7 +52,7 @@ def _parsed(path: str | Path | None) -> tuple[dict[str, dict[str, Any]], int, in
         raise RecordsError(f"{path}: holds no records; name another file, or remove it")
     if foreign:
         numbers = ", ".join(map(str, foreign))
-        print(f"{path}: no record in line {numbers}; left as it is", file=sys.stderr)
+        print(f"{path}: line {numbers} holds no record and was left unchanged", file=sys.stderr)
     return {record["key"]: record for record in lines if record is not None}, end, len(text)
 
 

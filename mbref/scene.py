@@ -229,7 +229,7 @@ class Scene(Entry):
         except tomllib.TOMLDecodeError as error:
             raise SceneError([f"{path}: is not TOML: {error}{toml_hint(text, str(error))}"]) from None
         except UnicodeDecodeError as error:
-            raise SceneError([f"{path}: is no text in UTF-8 (at byte {error.start})"]) from None
+            raise SceneError([f"{path}: is not UTF-8 text (at byte {error.start})"]) from None
         except ValueError as error:  # a number of thousands of digits
             raise SceneError([f"{path}: is not TOML: {error}"]) from None
         except RecursionError:

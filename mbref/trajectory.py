@@ -33,10 +33,10 @@ class Outcome(enum.Enum):
     SINGULAR_POSITION = (
         "SINGULAR_POSITION",
         "",
-        "the motion comes to a singular position, which the method does not cross",
+        "the motion reaches a singular position, which the method does not cross",
     )
-    UNDECIDED = ("UNDECIDED", "", "rounding hides the branch of the motion at a singular position")
-    LEFT_MOTION = ("LEFT_MOTION", "", "the run went on along another motion than the one of its start")
+    UNDECIDED = ("UNDECIDED", "", "rounding errors would decide the motion beyond a singular position")
+    LEFT_MOTION = ("LEFT_MOTION", "", "the run continued along another motion than the exact one")
     TIMED_OUT = ("TIMED_OUT", "", "the time limit was reached")
     CRASHED = ("CRASHED", "", "the process ended without a result")
 

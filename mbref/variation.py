@@ -51,7 +51,7 @@ class Variation:
         except ValueError:
             raise ValueError(f"{text!r} is not PATH=LOW:HIGH or PATH=MEAN+-DEVIATION") from None
         if not (equals and np.isfinite([low, high]).all() and (high >= 0 if normal else high >= low)):
-            raise ValueError(f"{text!r} is no interval, and no mean with a deviation")
+            raise ValueError(f"{text!r} must have LOW <= HIGH, or a DEVIATION that is not negative")
         return Variation(path.strip(), low, high, normal)
 
     def draw(self, random: np.random.Generator) -> float:
@@ -92,7 +92,7 @@ def variants(scene: Scene, variations: Sequence[Variation], count: int, seed: in
 
 def _drawn(variation: Variation, random: np.random.Generator, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise SceneError([f"{variation.path}: is not a number that the scene gives"])
+        raise SceneError([f"{variation.path}: the scene gives no number there"])
     return variation.draw(random)
 
 

@@ -44,4 +44,4 @@ def _refuse_without_flint() -> None:
 def _refuse_missing_folder(file: str | None) -> None:
     """Raise RequestError where a file cannot be written for want of its folder."""
     if file and not Path(file).parent.is_dir():
-        raise RequestError(f"--out: {Path(file).parent} is no folder")
+        raise RequestError(f"--out: {Path(file).parent} must be in an existing folder")

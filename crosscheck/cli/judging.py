@@ -52,7 +52,7 @@ def _show(found: Judgement, ignored: Sequence[str]) -> None:
     if found.reason:
         console().print(f"The reference ends at t = {found.until:.6g} s: {found.reason}", soft_wrap=True)
     if not found.is_right and not found.explanations:
-        console().print("No explanation that was tried removes half of the difference.")
+        console().print("None of the tested explanations removes half of the difference.")
     for e in found.explanations:
         console().print(f"{e.sentence}: {100 * e.remains:.2g} % of the difference remains", soft_wrap=True)
     if ignored:

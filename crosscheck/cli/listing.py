@@ -66,7 +66,7 @@ def _methods() -> Table:
 
 
 def _settings() -> Table:
-    title = "settings: a family is a way of running an engine, its options set how accurately"
+    title = "settings: a family is a way to run an engine; its options control the accuracy"
     table = Table("engine", "name", "meaning", title=title)
     for name in engine_names():
         found = engine(name)

@@ -38,7 +38,7 @@ def add_selection(parser: argparse.ArgumentParser) -> None:
         action="append",
         metavar="FAMILY",
         help="an engine's family of settings, such as defaults or tuned; may repeat; default: at quick "
-        "depth these two or the first two, else all (`crosscheck list settings`)",
+        "depth these two or the first two, otherwise all (`crosscheck list settings`)",
     )
     parser.add_argument(
         "--option",
@@ -111,7 +111,7 @@ def numbers(text: str) -> list[float]:
 def add_limits(parser: argparse.ArgumentParser, time_limit: float | None = TIME_LIMIT) -> None:
     """Times that a run and a reference may take, and the form of the output; a ``time_limit`` of None depends
     on the depth."""
-    default = f"{time_limit:g}" if time_limit else f"{QUICK_LIMIT:g} at quick depth, {TIME_LIMIT:g} else"
+    default = f"{time_limit:g}" if time_limit else f"{QUICK_LIMIT:g} at quick depth, {TIME_LIMIT:g} otherwise"
     parser.add_argument(
         "--time-limit",
         type=positive,

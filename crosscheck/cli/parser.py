@@ -96,8 +96,8 @@ def _add_certify(commands: Commands) -> None:
 def _add_judge(commands: Commands) -> None:
     example = "crosscheck judge four_bar.toml run.csv --unit mm --unit deg --column coupler.position.x=2"
     about = (
-        "compare a motion recorded by any tool with the reference: the error of each column with its bound, "
-        "when it begins, and what would explain it; 0 where all columns are right, 1 otherwise"
+        "compare a motion recorded by any tool with the reference: print the error of each column, its "
+        "bound, its begin and likely causes; exit status 0 if all columns are right, otherwise 1"
     )
     parser = _add(commands, "judge", about, example)
     parser.add_argument("scene", metavar="SCENE", help="a built-in name or a .toml file")
@@ -150,7 +150,7 @@ def _add_run(commands: Commands) -> None:
 
 def _add_compare(commands: Commands) -> None:
     example = "crosscheck compare my.toml"
-    about = "compare engines on a mechanism: who is right, how accurate, how fast, where each breaks"
+    about = "compare engines on a mechanism: which are right, how accurate and how fast, and why others fail"
     parser = _add(commands, "compare", about, example)
     add_selection(parser)
     parser.add_argument(
@@ -197,12 +197,14 @@ def _add_verify(commands: Commands) -> None:
         action="store_true",
         help="run in this process: fast, but a crash ends all, and repeated runs share the process",
     )
-    drawn = parser.add_argument_group("drawn mechanisms, in the place of scenes; runs are in this process")
+    drawn = parser.add_argument_group("random mechanisms instead of scenes; runs are in this process")
     drawn.add_argument(
-        "--mechanisms", type=whole, metavar="N", help="judge every card on N mechanisms drawn from seeds"
+        "--mechanisms", type=whole, metavar="N", help="check every card on N random mechanisms"
     )
     drawn.add_argument("--first-seed", type=int, default=0, metavar="S", help="default: 0")
-    drawn.add_argument("--records", metavar="FILE", help="keep verdicts there, and take those it has")
+    drawn.add_argument(
+        "--records", metavar="FILE", help="store verdicts in this file, and reuse the stored ones"
+    )
     drawn.add_argument(
         "--beside", action="append", metavar="E[=F]", help="an engine (and family) to agree with; may repeat"
     )
@@ -214,7 +216,7 @@ def _add_findings(commands: Commands) -> None:
     parser = _add(commands, "findings", about, "crosscheck findings --recheck")
     parser.add_argument("name", nargs="*", metavar="NAME", help="a finding; default: all")
     parser.add_argument(
-        "--recheck", action="store_true", help="run the proofs, and say which findings are present or gone"
+        "--recheck", action="store_true", help="run the proofs, and report which findings are still present"
     )
 
 
@@ -231,7 +233,7 @@ def _add_report(commands: Commands) -> None:
     add_engines(parser)
     add_depth(parser)
     parser.add_argument(
-        "--quick", dest="depth", action="store_const", const="quick", help="the same as --depth quick"
+        "--quick", dest="depth", action="store_const", const="quick", help="short for --depth quick"
     )
     parser.add_argument(
         "--section",
@@ -240,7 +242,7 @@ def _add_report(commands: Commands) -> None:
         help="render only this section, such as speed (docs/compare.md lists them); may repeat",
     )
     parser.add_argument("--out", default="report", metavar="DIR", help="folder to write (default: report)")
-    parser.add_argument("--render", metavar="DIR", help="render a report's records again, run nothing")
+    parser.add_argument("--render", metavar="DIR", help="render a report from its records, without any run")
     add_reference_time(parser)
 
 
@@ -266,4 +268,4 @@ def _add_diff(commands: Commands) -> None:
     parser = _add(commands, "diff", about, example)
     parser.add_argument("old", metavar="OLD", help="a records.jsonl, or the folder of a report")
     parser.add_argument("new", metavar="NEW", help="the same")
-    parser.add_argument("--all", action="store_true", help="list the runs too that did not change")
+    parser.add_argument("--all", action="store_true", help="also list the runs that did not change")

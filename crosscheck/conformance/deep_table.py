@@ -1,4 +1,4 @@
-"""The tables of a run on drawn mechanisms, for a terminal."""
+"""The tables of a run on random mechanisms, for a terminal."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ def tables(tally: Tally) -> Iterator[Table | Text]:
     """Cards with their counts and the largest part of an allowance that was used; then the violations."""
     plan = tally.plan
     first, last = plan.first, plan.first + tally.seeds - 1
-    title = f"{plan.engine} {tally.version} {plan.family}: mechanisms drawn from seeds {first} to {last}"
+    title = f"{plan.engine} {tally.version} {plan.family}: random mechanisms, seeds {first} to {last}"
     numbers = (Column(name, justify="right") for name in COLUMNS)
-    table = Table("card", *numbers, "most used of the allowance", "it checks", title=title, box=SIMPLE)
+    table = Table("card", *numbers, "largest value / allowance", "it checks", title=title, box=SIMPLE)
     for name, counts in tally.counts.items():
         used, scene = tally.worst.get(name, (0.0, ""))
         row = (str(counts[status]) for status in COLUMNS)
@@ -34,7 +34,7 @@ def tables(tally: Tally) -> Iterator[Table | Text]:
 
 def _summary(tally: Tally) -> str:
     """Return the number of violations, and of how many mechanisms that is known."""
-    ran, drawn = tally.decided(RUN), f"{tally.seeds} drawn mechanisms"
+    ran, drawn = tally.decided(RUN), f"{tally.seeds} random mechanisms"
     if not ran:
-        return f"{tally.plan.engine}: ran none of {drawn}, so nothing is known of it"
+        return f"{tally.plan.engine}: ran none of {drawn}, so it is not judged"
     return f"{tally.plan.engine}: {len(tally.violations)} violations; it ran {ran} of {drawn}"

@@ -16,7 +16,7 @@ from mbref.trajectory import Trajectory
 
 
 def double_precision(bench: Bench) -> Finding | Outside:
-    """Numbers are not rounded to single precision, unless the engine says that it computes in that."""
+    """Numbers are not rounded to single precision, unless the engine declares single precision."""
     if bench.rounding > ROUNDING:
         return Outside(f"the engine says that its numbers are rounded to {bench.rounding:.1e}")
     single = single_precision(bench.scene, bench.close)
@@ -24,14 +24,13 @@ def double_precision(bench: Bench) -> Finding | Outside:
 
 
 def smooth(bench: Bench) -> Finding:
-    """Check that states at neighbouring times lie on smooth curves, up to the rounding that the engine
-    claims."""
+    """States at neighbouring times lie on smooth curves, up to the rounding that the engine declares."""
     noise, where = grain(bench.scene, bench.close)
     return Finding(noise, max(SAME_MOTION, GRAINS * bench.rounding), where)
 
 
 def refined(bench: Bench) -> Finding | Outside:
-    """Without joints, finer settings come nearer to each other, down to the rounding the engine claims."""
+    """Without joints, differences of successive settings decrease to the rounding of the engine."""
     if len(bench.sweep) < SWEPT:
         return Outside("the engine offers fewer than three settings that complete")
     allowed = max(SAME_MOTION, GRAINS * bench.rounding, bench.steps_before)
@@ -39,11 +38,11 @@ def refined(bench: Bench) -> Finding | Outside:
 
 
 def settled(bench: Bench) -> Finding | Outside:
-    """Velocities, accelerations and reactions are exact within what the engine's own accuracy leaves."""
+    """Velocities, accelerations and reactions are as accurate as the engine's settings explain."""
     if len(bench.settings) < 2:
         return Outside("the engine offers one setting")
     if np.isnan(bench.exact.velocity).any():
-        return Outside("the formula of this scene gives poses alone")
+        return Outside("the closed form of this scene gives poses only")
     return max(_rates(bench), key=lambda finding: finding.measured / finding.allowed)
 
 

@@ -64,7 +64,7 @@ class Property(NamedTuple):
 
 
 def sample_times(bench: Bench) -> Finding:
-    """The samples are at the times asked for, bit for bit, and the run ends at the last."""
+    """Samples are at the requested times, bit for bit, and the run ends at the last one."""
     times = np.array([*bench.motion.times, bench.motion.t_end])
     wanted = np.array([*bench.times, bench.times[-1]])
     same = times.shape == wanted.shape
@@ -78,12 +78,12 @@ def unit_orientations(bench: Bench) -> Finding:
 
 
 def closure(bench: Bench) -> Finding:
-    """Joints and drivers hold at every sample: the judge's own joint equations."""
+    """Joints and drivers hold at every sample, by the judge's own joint equations."""
     return Finding(float(violation_series(bench.scene, bench.motion).max()), STAYS_CLOSED)
 
 
 def honest_end(bench: Bench) -> Finding:
-    """A run driven beyond the mechanism's last pose ends with a failure, and joints hold at its samples."""
+    """A run driven beyond the last pose of the mechanism ends with a failure; joints hold at its samples."""
     run = bench.finest.value
     if run.outcome in NO_ENDS:
         return Finding(np.inf, STAYS_CLOSED, f"{run.outcome.label} {run.message}".rstrip())
@@ -93,7 +93,7 @@ def honest_end(bench: Bench) -> Finding:
 
 
 def velocities(bench: Bench) -> Finding:
-    """Velocities and angular velocities (world) are the rates of the poses: central differences."""
+    """Velocities and angular velocities (world) agree with central differences of the poses."""
     run = _at(bench.close, slice(NEIGHBOURS - 1, NEIGHBOURS + 2))
     h = (run.times[2] - run.times[0]) / 2
     moved = (run.position[2] - run.position[0]) / (2 * h)
@@ -111,12 +111,12 @@ def velocities(bench: Bench) -> Finding:
 
 
 def truth(bench: Bench) -> Finding:
-    """Poses against a closed form, a truth of the judge, or Gauss's principle integrated."""
+    """Poses agree with a closed form, the judge's reference, or an integration of Gauss's principle."""
     return Finding(difference(bench.scene, bench.motion, bench.exact), LIKE_TRUTH, bench.exact.engine)
 
 
 def convergence(bench: Bench) -> Finding | Outside:
-    """The motion is the exact one within what the engine's measured order and floor leave of error."""
+    """The error is at most what the engine's measured order and accuracy limit explain."""
     if len(bench.settings) < 2:
         return Outside("the engine offers one setting")
     error, allowed = difference(bench.scene, bench.motion, bench.exact), bench.resolution
@@ -133,10 +133,10 @@ def rates_closed(bench: Bench) -> Finding:
 
 
 def true_velocities(bench: Bench) -> Finding | Outside:
-    """Velocities and angular velocities (world) against the exact ones."""
+    """Velocities and angular velocities (world) agree with the exact ones."""
     exact, length = bench.exact, scene_length(bench.scene)
     if np.isnan(exact.velocity).any():
-        return Outside("the formula of this scene gives poses alone")
+        return Outside("the closed form of this scene gives poses only")
     linear = np.linalg.norm(bench.motion.velocity - exact.velocity, axis=-1) / length
     angular = np.linalg.norm(bench.motion.angular_velocity - exact.angular_velocity, axis=-1)
     return Finding(
@@ -145,11 +145,11 @@ def true_velocities(bench: Bench) -> Finding | Outside:
 
 
 def true_accelerations(bench: Bench) -> Finding | Outside:
-    """Accelerations and angular accelerations (world), where the engine gives them, against exact ones."""
+    """Accelerations (world), if the engine gives them, agree with the exact ones, angular ones too."""
     if bench.motion.acceleration is None:
         return Outside("the engine gives no accelerations")
     if bench.exact.acceleration is None:
-        return Outside("the formula of this scene gives poses alone")
+        return Outside("the closed form of this scene gives poses only")
     found = [
         (stacked(bench.scene, bench.motion, k), stacked(bench.scene, bench.exact, k))
         for k in range(len(bench.times))
@@ -160,7 +160,7 @@ def true_accelerations(bench: Bench) -> Finding | Outside:
 
 
 def energy(bench: Bench) -> Finding | Outside:
-    """Energy less the work of loads stays what it was, where something moves, nothing damps or drives."""
+    """Energy minus the work of loads is constant, in scenes without dampers and drivers."""
     motion = bench.motion
     if any(isinstance(load, Moment) for load in bench.scene.load):  # its work is summed over the samples
         motion = bench.run(bench.scene, np.linspace(0.0, bench.scene.duration, DENSE))
@@ -173,7 +173,7 @@ def energy(bench: Bench) -> Finding | Outside:
 
 
 def momentum(bench: Bench) -> Finding | Outside:
-    """Momentum, and its moment about the common centre of mass, grow by gravity and outer loads alone."""
+    """Momentum and angular momentum change by gravity and external loads only."""
     drift = momentum_series(bench.scene, bench.motion)
     if drift is None:
         return Outside("a joint or spring is fixed to the ground, or nothing moves or has mass")
@@ -181,12 +181,12 @@ def momentum(bench: Bench) -> Finding | Outside:
 
 
 def balanced(bench: Bench) -> Finding | Outside:
-    """Reactions and loads on every body are what moves it: the judge's own loads, the exact accelerations."""
+    """Reactions and loads on every body agree with its exact acceleration, by the judge's own loads."""
     return _of_reactions(bench, balance)
 
 
 def workless(bench: Bench) -> Finding | Outside:
-    """No reaction acts along a motion that its joint leaves free: the judge's own joint equations."""
+    """No reaction acts along a motion that its joint allows, by the judge's own joint equations."""
     return _of_reactions(bench, idle)
 
 
@@ -213,8 +213,7 @@ def silence(bench: Bench) -> Finding:
 
 
 def determinism(bench: Bench) -> Finding:
-    """Check that a run repeated gives equal bits: in another process, and in one that has run another
-    scene."""
+    """A repeated run gives equal bits, in another process and after a run of another scene."""
     others = [bench.run(bench.scene, bench.times), *bench.shared_runs]
     return Finding(float(np.max([_bits_apart(bench.motion, other) for other in others])), 0.0)
 
@@ -229,7 +228,7 @@ def _bits_apart(first: Trajectory, other: Trajectory) -> float:
 
 
 def other_times(bench: Bench) -> Finding:
-    """Sampled at other times, the first of them not 0, or at one time alone, the motion stays."""
+    """The motion does not depend on the number of samples and their times."""
     between = bench.times[:-1] + np.diff(bench.times) * np.resize([0.3, 0.7], len(bench.times) - 1)
     times = np.sort([*bench.times[1:], *between])
     common = _at(bench.run(bench.scene, times), np.isin(times, bench.times))
@@ -242,7 +241,7 @@ def other_times(bench: Bench) -> Finding:
 
 
 def related(name: str, bench: Bench) -> Finding | Cannot | Outside:
-    """The scene changed as the relation says moves as it says, by accelerations and unique reactions too."""
+    """Compare motion, accelerations and unique reactions of the changed scene with the expected ones."""
     relation = RELATIONS[name]
     scene = changed(relation, bench)
     if isinstance(scene, Outside):
@@ -324,7 +323,7 @@ PROPERTIES: Mapping[str, Property] = {
     "repeated": _property(determinism, _related, version=2),
     "resampled": _property(other_times, _related, version=3),
     **{
-        name: Property(f"The scene {name}: {relation.about}.", partial(related, name), _related, 3)
+        name: Property(f"Changed scene: {relation.about}.", partial(related, name), _related, 3)
         for name, relation in RELATIONS.items()
     },
 }

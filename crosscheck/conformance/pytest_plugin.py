@@ -22,20 +22,26 @@ KEPT = "crosscheck/verdicts"  # where pytest's cache has the verdicts of runs be
 def pytest_addoption(parser: pytest.Parser) -> None:
     """The options of the suite."""
     group = parser.getgroup("crosscheck", "conformance of an engine")
-    group.addoption(
-        "--engine", metavar="NAME", help="the engine to hold the suite against, or module:attribute"
-    )
+    group.addoption("--engine", metavar="NAME", help="the engine to test, or module:attribute")
     group.addoption(
         "--depth", choices=("quick", "deep"), default="quick", help="deep: all relations on all scenes"
     )
     group.addoption("--mechanisms", type=int, default=0, metavar="N", help="random mechanisms besides")
-    group.addoption("--mechanism-seed", type=int, default=0, metavar="S", help="the first one's seed (0)")
+    group.addoption(
+        "--mechanism-seed",
+        type=int,
+        default=0,
+        metavar="S",
+        help="seed of the first random mechanism (default 0)",
+    )
     group.addoption(
         "--in-process", action="store_true", help="run in this process: fast, but a crash ends all"
     )
     group.addoption("--time-limit", type=float, default=60.0, metavar="T", help="of a run, s (60)")
     group.addoption("--findings", metavar="DIR", help="keep what fails as small scene files there")
-    group.addoption("--resume", action="store_true", help="take passes of runs before from pytest's cache")
+    group.addoption(
+        "--resume", action="store_true", help="reuse passed checks of earlier runs from pytest's cache"
+    )
 
 
 def pytest_report_header(config: pytest.Config) -> list[str]:
@@ -100,7 +106,7 @@ class Session:
 
         key = f"{self.name} {scene} {Verdict(card, scene, PASS).card()}"
         if self.config.getoption("resume") and self.known.get(key) == PASS:
-            return Verdict(card, scene, PASS, reason="in a run before")
+            return Verdict(card, scene, PASS, reason="in an earlier run")
         bench = self.bench(scene)
         if bench.cannot and card != REFUSAL:
             return Verdict(card, scene, CANNOT, reason=str(bench.cannot))

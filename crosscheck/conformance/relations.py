@@ -252,26 +252,28 @@ def unchanged(about: str, change: Callable[[Scene], Scene | Outside]) -> Relatio
 
 
 RELATIONS = {
-    "rotated": _isometry("about an axis askew, its motion rotates with it", ASKEW),
-    "turned": _isometry("about z, its motion rotates with it", IN_PLANE),
-    "translated": _isometry("its motion moves with it", np.eye(3), (0.3, -0.5, 0.0)),
-    "mirrored": _isometry("its motion is the mirror image", np.eye(3) - 2 * np.outer(NORMAL, NORMAL)),
+    "rotated": _isometry("rotated about a skew axis, the motion rotates too", ASKEW),
+    "turned": _isometry("rotated about z, the motion rotates too", IN_PLANE),
+    "translated": _isometry("translated, the motion is translated too", np.eye(3), (0.3, -0.5, 0.0)),
+    "mirrored": _isometry("mirrored, the motion is mirrored too", np.eye(3) - 2 * np.outer(NORMAL, NORMAL)),
     "scaled": Relation(
-        "masses and loads times 2.5, the motion stays", lambda s, _: scaled(s, HEAVIER), heavier
+        "with masses and loads times 2.5, the motion stays", lambda s, _: scaled(s, HEAVIER), heavier
     ),
-    "reordered": unchanged("bodies and joints listed in reverse, the motion stays", reordered),
-    "relabelled": Relation("under other names, the motion stays", lambda s, _: relabelled(s), renamed),
+    "reordered": unchanged("with bodies and joints in reverse order, the motion stays", reordered),
+    "relabelled": Relation("with other names, the motion stays", lambda s, _: relabelled(s), renamed),
     "swapped": Relation(
         "with the bodies of every joint exchanged, the motion stays", lambda s, _: swapped(s), opposite
     ),
-    "stretched": unchanged("with axes 1000 times as long, the motion stays", stretched),
-    "duplicated": unchanged("with a joint given twice, the motion stays", duplicated),
+    "stretched": unchanged("with axis vectors 1000 times as long, the motion stays", stretched),
+    "duplicated": unchanged("with a duplicate joint, the motion stays", duplicated),
     "satisfied": unchanged("with a joint that the motion satisfies anyway, the motion stays", satisfied),
     "split": Relation("with a body as two welded halves, the motion stays", lambda s, _: split(s), of_halves),
     "negated": unchanged("with the other sign of every quaternion, the motion stays", negated),
-    "enlarged": _other_units("four times as large, twice as slow under its gravity (Froude)", 4.0, 2.0),
+    "enlarged": _other_units("four times as large, the motion is twice as slow (Froude)", 4.0, 2.0),
     "in millimetres": _other_units("with its lengths in millimetres, the motion stays", 1000.0, 1.0),
-    "restarted": Relation("from its state half way, the motion goes on", *RESTARTED),
-    "reversed": Relation("from its last state with velocities reversed, the motion goes back", *REVERSED),
-    "replayed": Relation("by its driver's moment instead, the motion stays", replayed, undriven),
+    "restarted": Relation("restarted from its state half way, the motion is continued", *RESTARTED),
+    "reversed": Relation(
+        "started from the last state with reversed velocities, the motion runs backwards", *REVERSED
+    ),
+    "replayed": Relation("with the driver replaced by its moment, the motion stays", replayed, undriven),
 }

@@ -114,7 +114,7 @@ def _second_half(scene: Scene, motion: Trajectory) -> Trajectory:
 
 def _from_the_end(scene: Scene, motion: Trajectory) -> Scene | Outside:
     if scene.driver or any(getattr(load, "damping", 0.0) for load in scene.load):
-        return Outside("a driver or a damper acts, whose motion cannot be run back")
+        return Outside("a driver or a damper acts, so the motion is not reversible")
     return started(scene, motion, len(motion.times) - 1, -1.0)
 
 
@@ -158,7 +158,7 @@ REVERSED = _from_the_end, _backwards
 def replayed(scene: Scene, motion: Trajectory) -> Scene | Outside:
     """The driver of a hinge to the ground replaced by the moment that the engine says it gives."""
     if len(scene.driver) != 1 or not motion.reactions:
-        return Outside("it has not one driver, or the engine gives no reactions")
+        return Outside("the scene does not have exactly one driver, or the engine gives no reactions")
     joint = next(j for j in scene.joint if j.name == scene.driver[0].joint)
     if joint.facts.driven == "displacement" or joint.bodies[0] != GROUND:
         return Outside("its driver does not turn a body about an axis on the ground")

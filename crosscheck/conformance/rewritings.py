@@ -100,15 +100,17 @@ def split(scene: Scene) -> Scene | Outside:
     if body.mass is None:
         return Outside("bodies have no mass to split")
     if body.velocity is None or body.angular_velocity is None:
-        return Outside("the velocities of the body are left open")
+        return Outside("the velocities of the body are not given")
     if _is_corrected(scene):
-        return Outside("given velocities contradict the joints, and their correction counts bodies")
+        return Outside(
+            "given velocities contradict the joints, and their correction depends on the number of bodies"
+        )
     try:
         return _in_halves(scene, body)
     except SceneError as error:
-        return Outside(f"the halves are no bodies: {error.faults[0]}")
+        return Outside(f"the halves are not valid bodies: {error.faults[0]}")
     except ValueError:
-        return Outside("the body is too thin to have halves beside each other")
+        return Outside("the body is too thin to be split into two halves")
 
 
 def _is_corrected(scene: Scene) -> bool:

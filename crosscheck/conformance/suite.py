@@ -25,8 +25,8 @@ PASS, FAIL, CANNOT, OUTSIDE = "pass", "fail", "cannot", "outside"
 REFUSAL, RUN = "refusal", "run"
 MARKS = {PASS: ("✓", "green"), FAIL: ("✗", "bold red"), CANNOT: ("–", "yellow"), OUTSIDE: ("○", "dim")}
 FIRST = {
-    REFUSAL: "Scenes that cannot be run are refused by cannot() with a reason, and all others have settings.",
-    RUN: "The run at the finest setting of the engine's best family completes.",
+    REFUSAL: "cannot() refuses scenes that the engine cannot run, with a reason; others have settings.",
+    RUN: "A run with the finest setting of the engine's best family completes.",
 }
 
 
@@ -140,7 +140,7 @@ def refusal(bench: Bench) -> Verdict:
     if bench.cannot:
         return Verdict(REFUSAL, name, PASS if impossible else CANNOT, reason=str(bench.cannot))
     if impossible or not bench.settings:
-        reason = "cannot() is silent on a motion without masses" if impossible else "it offers no setting"
+        reason = "cannot() does not refuse a motion without masses" if impossible else "it offers no setting"
         return Verdict(REFUSAL, name, FAIL, reason=reason)
     return Verdict(REFUSAL, name, PASS)
 
@@ -196,7 +196,13 @@ def tables(conformance: Conformance) -> Iterator[Table | Text]:
     named = " ".join(filter(None, (conformance.engine, conformance.version, conformance.family)))
     title = f"{named}: cards that {', '.join(f'{mark} {status}' for status, (mark, _) in MARKS.items())}"
     counts = [Column(mark, justify="right") for mark, _ in MARKS.values()]
-    table = Table("scene", *counts, "fails, or how near a pass is to its limit", title=title, box=SIMPLE)
+    table = Table(
+        "scene",
+        *counts,
+        "value and limit of failures, and of the pass nearest to its limit",
+        title=title,
+        box=SIMPLE,
+    )
     for scene in dict.fromkeys(v.scene for v in conformance.verdicts):
         own = [v for v in conformance.verdicts if v.scene == scene]
         table.add_row(scene, *(_count(own, status) for status in MARKS), _worst(own))
@@ -256,7 +262,7 @@ def _summary(conformance: Conformance) -> Text:
     counts = [f"{sum(v.status == status for v in conformance.verdicts)} {status}" for status in MARKS]
     scenes = {v.scene for v in conformance.verdicts}
     run = {v.scene for v in conformance.verdicts if v.property == "run" and v.status in (PASS, FAIL)}
-    nothing = "" if run else "; an engine that runs none is not shown to conform"
+    nothing = "" if run else "; an engine that runs no scene is not shown to conform"
     return Text(f"{conformance.engine}: {', '.join(counts)}; {len(run)} of {len(scenes)} scenes run{nothing}")
 
 

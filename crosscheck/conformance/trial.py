@@ -183,7 +183,7 @@ class Bench:
             if len(runs) == SWEPT:
                 break
         if len(runs) == 1 < len(self.settings):
-            raise Broken("no setting but the finest completes")
+            raise Broken("only the finest setting completes")
         return runs
 
     @cached_property
@@ -252,7 +252,8 @@ class Bench:
     @property
     def floors(self) -> str:
         """The differences that `own_accuracy` was measured from, in words."""
-        return f"twin runs {self.twins_apart:.1e} apart, two finest settings {self.steps_apart:.1e}"
+        steps = f"the two finest settings by {self.steps_apart:.1e}"
+        return f"perturbed runs differ by {self.twins_apart:.1e}, {steps}"
 
     @cached_property
     def exact(self) -> Trajectory:
@@ -277,7 +278,7 @@ def completed(scene: Scene, run: Trajectory, samples: int) -> Trajectory:
     if run.outcome is not Outcome.COMPLETED:
         raise Broken(f"{run.outcome.label} after {run.t_end:.3g} s: {run.message or run.outcome.sentence}")
     if len(run.times) != samples:
-        raise Broken(f"it says it completed, with {len(run.times)} of {samples} samples")
+        raise Broken(f"the run claims to have completed, with {len(run.times)} of {samples} samples")
     if lost := not_finite(run):
         raise Broken(f"it says it completed, with numbers that are not finite: {lost[0]}")
     return in_scene_order(scene, run)

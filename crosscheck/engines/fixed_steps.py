@@ -59,7 +59,7 @@ class FixedSteps:
         self.counts.steps += n
         self.counts.rhs += n
         if not np.isfinite(self.stepper.motion().position).all():
-            message = f"the state stopped being finite between {t0:.6g} s and {t1:.6g} s"
+            message = f"the state became infinite or NaN between {t0:.6g} s and {t1:.6g} s"
             raise Failed(Outcome.NOT_FINITE, t0, message)
 
     def sample(self, t: float) -> Sample:

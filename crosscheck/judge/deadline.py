@@ -48,7 +48,7 @@ def within(seconds: float) -> Iterator[None]:
 def ask() -> None:
     """Raise TimeIsUp past the calling thread's limit, and GivenUp where no thread's result is wanted."""
     if _given_up.is_set():
-        raise GivenUp("the motion is no longer wanted")
+        raise GivenUp("the computation was cancelled")
     if time.thread_time() > _limit.end:
         raise TimeIsUp
 

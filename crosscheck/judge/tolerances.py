@@ -8,7 +8,7 @@ ROUNDING = float(np.finfo(float).eps)
 
 RANK = 1e-9
 """Singular values below this part of the largest count as zero: poses are consistent to about 1e-15, so
-true zeros are 1e-15, and a mechanism 1e-9 from singular cannot be told from a singular one in practice."""
+true zeros are 1e-15. A mechanism 1e-9 from a singular position behaves like a singular one in practice."""
 
 FREEDOM = 1e-7
 """The same for the mobility of a family's path away from singular positions: a freedom is exactly zero

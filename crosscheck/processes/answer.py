@@ -42,7 +42,7 @@ def well_formed(answer: Any, scene: Scene, times: np.ndarray) -> Trajectory:
         raise MalformedAnswer(f"outcome: is {answer.outcome!r}, not an Outcome")
     names = tuple(body.name for body in scene.body)
     if not isinstance(answer.bodies, tuple | list) or sorted(map(str, answer.bodies)) != sorted(names):
-        raise MalformedAnswer(f"bodies: are {answer.bodies!r}, not those of the scene, {names!r}")
+        raise MalformedAnswer(f"bodies: are {answer.bodies!r}, but the scene has {names!r}")
     reached = _times(answer, times)
     if answer.scene != scene.name:
         raise MalformedAnswer(f"scene: is {answer.scene!r}, not {scene.name!r}")
@@ -87,7 +87,7 @@ def _times(answer: Trajectory, times: np.ndarray) -> np.ndarray:
     """The times reached (k,): the first of those asked for, all of them where the run completed."""
     reached = _array("times", answer.times, None)
     if reached.ndim != 1 or reached.size > times.size or not np.array_equal(reached, times[: reached.size]):
-        raise MalformedAnswer("times: are not the first of those asked for")
+        raise MalformedAnswer("times: are not the first of the requested times")
     if answer.outcome is Outcome.COMPLETED and reached.size < times.size:
         raise MalformedAnswer(f"times: completed with {reached.size} of {times.size} samples")
     return reached
@@ -111,7 +111,7 @@ def _reactions(value: Any, scene: Scene, reached: int) -> dict[str, np.ndarray] 
     if value is None:
         return None
     if not isinstance(value, Mapping) or not set(value) <= {joint.name for joint in scene.joint}:
-        raise MalformedAnswer("reactions: are not those of joints of the scene")
+        raise MalformedAnswer("reactions: name joints that the scene does not have")
     return {name: _array(f"reactions[{name}]", load, (reached, 6)) for name, load in value.items()}
 
 
@@ -120,7 +120,7 @@ def _settings(value: Any) -> dict[str, Any]:
     try:
         return json.loads(json.dumps(dict(value), default=lambda number: number.item()))
     except (TypeError, ValueError, AttributeError):
-        raise MalformedAnswer("settings: are no table of plain values") from None
+        raise MalformedAnswer("settings: must be a dictionary of plain values") from None
 
 
 def _cost(answer: Trajectory) -> Cost:

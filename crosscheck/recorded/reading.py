@@ -140,7 +140,7 @@ def _factor(name: str, own: str, units: Sequence[str]) -> float:
     fitting = [u for u in units if _dimension(u) == dimension]
     unit = own or (fitting[-1] if fitting else "")
     if unit and _dimension(unit) != dimension:
-        raise SceneError([f"column {name}: {unit!r} is no unit of a quantity in {dimension}"])
+        raise SceneError([f"column {name}: {unit!r} is not a unit of a quantity in {dimension}"])
     return UNITS[unit]
 
 

@@ -101,7 +101,7 @@ def _measured(
     gates = [case for scene in scenes for case in identity_cases(scene, _engines(cases), limit)]
     path = _file(wanted, "records.jsonl")
     if path is not None and (there := len(known(cases, path))):
-        notice(f"{path} has {there} of the runs")
+        notice(f"{path} already has {there} of the runs")
     groups, by_key = (_few if wanted.is_quick else _all)(families(cases), gates, path)
     if wanted.is_quick and not wanted.is_named:
         others, more = _few(_other_families(groups, by_key), [], path)

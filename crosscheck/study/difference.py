@@ -50,7 +50,7 @@ def load(path: str | Path) -> dict[Identity, Record]:
     for record in _of_the_report(file, list(looked_at(file).values())):
         if "asked" not in record:
             raise ValueError(
-                f"{file}: its records lack the field asked, the request of the run; make them again"
+                f"{file}: its records lack the field `asked` with the request of the run; run them again"
             )
         timed = times.get(record["key"]) or record["cost"]
         cost = {**record["cost"], "seconds": timed["seconds"]}

@@ -57,5 +57,5 @@ def _asked(pair: tuple[str, Scene]) -> Offer:
     try:
         _, cannot, found = capabilities(*pair, READY_SECONDS)
     except ChildFailed as failure:
-        return Cannot(Owner.ADAPTER, f"its settings cannot be found out: {failure}")
+        return Cannot(Owner.ADAPTER, f"its settings are unknown: {failure}")
     return cannot or tuple(found)

@@ -136,7 +136,7 @@ def _no_bad_defaults(groups: Sequence[Judged]) -> str:
     unjudged = [name for name, verdict in found.items() if verdict is Grade.UNJUDGED]
     if unjudged:
         owners = listed(map(title, unjudged))
-        return f"The defaults of {owners} complete; without a truth nothing tells whether they are right."
+        return f"The defaults of {owners} complete; without a truth it is unknown whether they are right."
     return "No engine's defaults fail or are wrong."
 
 

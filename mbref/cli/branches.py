@@ -20,14 +20,18 @@ def chosen(smooth: Motion, number: int | None) -> int:
     Raises MethodError where none was looked for, ValueError where there is none.
     """
     if smooth.crossings is None:
-        raise MethodError(f"--branches: {smooth.method} looks for no singular position; taylor does")
+        raise MethodError(
+            f"--branches: {smooth.method} does not detect singular positions; use --method taylor"
+        )
     passed, until = len(smooth.crossings), f"up to t = {smooth.t_end:g} s"
     if number is not None and not 1 <= number <= passed:
-        raise ValueError(f"--crossing: the motion passes {passed} singular positions {until}, got {number}")
+        raise ValueError(
+            f"--crossing: must be at most {passed}, the singular positions {until}, got {number}"
+        )
     several = of_several_branches(smooth)
     if number is None and not several:
-        which = "; ".join(told(smooth, k) for k in range(1, passed + 1)) or "it passes no singular position"
-        raise ValueError(f"--branches: nowhere {until} has the motion a choice of branches: {which}")
+        which = "; ".join(told(smooth, k) for k in range(1, passed + 1)) or "the motion passes none"
+        raise ValueError(f"--branches: no singular position {until} has several branches: {which}")
     return number or several[0]
 
 

@@ -132,7 +132,7 @@ def _start_lines(found: Diagnosis) -> list[str]:
         f"    redundant rows      {counts.redundant}",
         f"    degrees of freedom  {counts.degrees_of_freedom}",
         f"    rows in redundancy  {_listed(found.redundant_by_joint)}",
-        f"    unique reactions    {', '.join(found.unique_reactions) or 'of no joint'}",
+        f"    unique reactions    {_unique(found)}",
         *_determined_lines(found),
         f"    singular values     {found.smallest_singular_value:.3g} to {found.largest_singular_value:.3g}"
         " (rows of unit length;",
@@ -157,7 +157,7 @@ def _motion_lines(along: AlongMotion | str | None) -> list[str]:
         return [f"  along the motion      not known: {along}"]
     if along is None:
         return []
-    still = "" if along.moves or along.stopped else ", in which nothing moves"
+    still = "" if along.moves or along.stopped else ": nothing moves"
     lines = [
         f"  along the motion of {along.end:g} s{still}",
         *[f"    it ends early       {along.stopped}"] * bool(along.stopped),
@@ -176,13 +176,13 @@ def _motion_lines(along: AlongMotion | str | None) -> list[str]:
         lines.append(f"    singular positions  {len(along.crossings)} in all")
     if along.shaky:
         lines.append(
-            "    shaky               freedoms of first order that second order takes away, at every pose:\n"
-            "                        rows are dependent that are no redundancy, and an engine may let it move"
+            "    infinitesimal       velocities satisfy the joints but belong to no motion, at every pose:\n"
+            "                        an engine may let the mechanism move along them"
         )
     if along.by_rounding:
         sizes = ", ".join(f"{s:.1g}" for s in along.by_rounding)
         lines.append(
-            f"    but for rounding    singular values {sizes} at most: redundant by the numbers' last digits"
+            f"    nearly redundant    singular values up to {sizes}, explained by rounding of the numbers"
         )
     return lines
 
@@ -191,7 +191,10 @@ def _swap_lines(swaps: list[dict[str, str]], redundant: bool) -> list[str]:
     if not swaps:
         return ["  no exchange or removal of up to four joints ends the redundancy"] * redundant
     shown = [" and ".join(f"{name} {kind}" for name, kind in swap.items()) for swap in swaps]
-    return ["  without redundancy, as mobile, with", *(f"    {words}" for words in shown)]
+    return [
+        "  exchanges that end the redundancy and keep the degrees of freedom",
+        *(f"    {words}" for words in shown),
+    ]
 
 
 def _driver_lines(scene: Scene) -> list[str]:
@@ -201,6 +204,11 @@ def _driver_lines(scene: Scene) -> list[str]:
         f"  more drivers than degrees of freedom ({len(scene.driver)} and {freedoms}): redundant rows remain"
     )
     return [told] * (len(scene.driver) > freedoms)
+
+
+def _unique(found: Diagnosis) -> str:
+    """Return the joints whose whole reaction is unique."""
+    return ", ".join(found.unique_reactions) or "none as a whole; single components may be unique"
 
 
 def _listed(numbers: dict[str, int]) -> str:

@@ -24,9 +24,9 @@ def add(commands: Any) -> None:
         "ensemble",
         help="simulate variants of a scene on every core",
         formatter_class=TEXT,
-        description="Simulate copies of a scene with numbers drawn at random; mean and standard deviation\n"
-        "of every body at the last time. Interrupted, --out keeps the runs that ended;\n"
-        "the same command goes on.",
+        description="Simulate variants of a scene with random parameters. Print the mean and the standard\n"
+        "deviation of every body at the last time. --out stores finished runs; after an\n"
+        "interrupt, the repeated command runs only the missing ones.",
         epilog="example:\n"
         "  mbref ensemble planar_slider_crank --vary 'joint[B].anchor[0]=0.304+-1e-4' \\\n"
         "      --vary 'body[slider].mass=0.9:1.1' --count 500 --duration 0.1 --out runs.jsonl",
@@ -37,11 +37,11 @@ def add(commands: Any) -> None:
         action="append",
         required=True,
         metavar="PATH=LOW:HIGH",
-        help="a number that varies, uniform; PATH=MEAN+-DEVIATION: normal; may repeat",
+        help="a parameter with a uniform distribution; PATH=MEAN+-DEVIATION: normal distribution; may repeat",
     )
     many.add_argument("--count", type=int, default=100, help="variants (default 100)")
-    many.add_argument("--seed", type=int, default=0, help="of the random numbers (default 0)")
-    many.add_argument("--workers", type=int, help="processes (default: one a core)")
+    many.add_argument("--seed", type=int, default=0, help="seed of the random numbers (default 0)")
+    many.add_argument("--workers", type=int, help="number of processes (default: one for each core)")
     many.add_argument("--out", metavar="FILE", help="append every trajectory, one JSON line each")
     add_method_options(many)
     many.set_defaults(action=_ensemble)

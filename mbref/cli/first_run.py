@@ -31,7 +31,10 @@ COMPILING = (
     "mbref: compiling kernels for this machine, once for each method, up to a minute; "
     "meanwhile they are interpreted"
 )
-WAITING = "mbref: this result is of interpreted kernels; compiling goes on for later runs (Ctrl-C ends it)"
+WAITING = (
+    "mbref: this result was computed by interpreted kernels; compilation continues for later runs "
+    "(Ctrl-C stops it)"
+)
 
 Simulate = Callable[..., Motion]  # with the arguments of ``simulate``
 

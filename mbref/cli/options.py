@@ -39,8 +39,8 @@ def add_method_options(parser: argparse.ArgumentParser, json: bool = True) -> No
         "--code",
         choices=("auto", "generic", "generated"),
         default="auto",
-        help="of the method taylor: generic, the kernels that serve every scene; generated, machine code\n"
-        "for this scene; auto (default), generated once 20 000 steps are ahead.  Both agree to rounding",
+        help="code of the method taylor: generic (one code for all scenes), generated (machine code for\n"
+        "this scene) or auto (default: generated for more than 20 000 expected steps); equal to rounding",
     )
     parser.add_argument("--max-step", type=float, default=0.0, help="largest step, s (default: the duration)")
     if json:

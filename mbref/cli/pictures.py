@@ -20,7 +20,7 @@ from mbref.scenes import find_scene
 MOVING = (".svg", ".gif", ".mp4")
 VIEW = """\
 xy, xz, yz, oblique, or AZIMUTH,ELEVATION in degrees (write --view=-60,20);
-without: across the plane of a plane mechanism, else oblique"""
+default: perpendicular to the plane of a planar mechanism, otherwise oblique"""
 
 
 def add(commands: Any) -> None:

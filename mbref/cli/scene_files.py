@@ -24,7 +24,7 @@ def add(commands: Any) -> None:
         description="Write a scene file to start from: a commented slider-crank, or a copy of a scene.",
         epilog="examples:\n  mbref new my.toml\n  mbref new my.toml --like four_bar_gravity",
     )
-    new.add_argument("out", metavar="FILE", help="the .toml file; an existing one is left alone")
+    new.add_argument("out", metavar="FILE", help="the .toml file; an existing file is not changed")
     new.add_argument("--like", metavar="SCENE", help="a built-in name, or another .toml file")
     new.set_defaults(action=_new)
 
@@ -64,7 +64,7 @@ def _new(options: argparse.Namespace) -> int:
     if path.suffix != ".toml":
         raise ValueError(f"FILE: must end in .toml, got {options.out!r}")
     if path.exists():
-        raise ValueError(f"{path}: is there already, and is left as it is")
+        raise ValueError(f"{path}: exists already and was not changed; name another file")
     if options.like:
         find_scene(options.like).save(path)
     else:

@@ -17,16 +17,16 @@ from reports.blocks import Block, Heading, Table, Text
 Verified = Mapping[str, Any]  # an engine, its version and its verdicts
 
 CAPTION = (
-    "Cards of the conformance suite against engines: the number of the suite's mechanisms on which an engine "
-    "passes (✓) and fails (✗); –: on no mechanism can the engine be asked, ○: no mechanism is in the card's "
-    "domain. Defects: the planted defects of an example engine that the card tells, each of one line."
+    "Cards of the conformance suite: the number of the suite's mechanisms on which an engine passes (✓) and "
+    "fails (✗); –: the engine runs none of the mechanisms, ○: the card applies to none of them. "
+    "Defects: the number of planted defects of an example engine that the card detects."
 )
 FAMILIES = (
     "Formulations and stabilisations of mbref on six moving mechanisms: the number of verdicts. A method "
-    "cannot be asked where it does not claim the mechanism, as one with redundant joints."
+    "is not asked about mechanisms that it does not claim to handle, such as redundant ones."
 )
 DRAWN = (
-    "Cards on drawn mechanisms: closed loops of 3 to 8 bodies with all kinds of joints, loads and drivers, "
+    "Cards on random mechanisms: closed loops of 3 to 8 bodies with all kinds of joints, loads and drivers, "
     "floating ones, rotors, and ones without masses. Shown is on how many a card holds, of how many it was "
     "decided on."
 )
@@ -112,10 +112,10 @@ def _drawn_violations(verified: Sequence[Verified]) -> list[Block]:
                 )
             )
     if not rows:
-        return [Text("No drawn mechanism violates a card.")]
+        return [Text("No random mechanism violates a card.")]
     header = ("Engine", "Card", "Times", "Worst", "Measured", "Allowed", "Cause", "Remedy")
     return [
-        Table("Violated cards on drawn mechanisms, each with its worst.", header, rows, frozenset({2, 4, 5}))
+        Table("Violated cards on random mechanisms, each with its worst.", header, rows, frozenset({2, 4, 5}))
     ]
 
 
@@ -180,7 +180,7 @@ def _number(value: float | None) -> str:
 def _defects() -> Table:
     rows = [(proof.about, proof.scene, proof.card) for proof in proofs()]
     return Table(
-        f"The {len(rows)} planted defects, each with the card that tells it.",
+        f"The {len(rows)} planted defects, each with the card that detects it.",
         ("Defect", "Mechanism", "Card"),
         rows,
         folded=True,

@@ -129,7 +129,7 @@ def test_command_and_its_records(known, capsys, tmp_path):
     counts = record["cards"]["agreement"]
     assert counts["pass"] == 1 and record["first_seed"] == 2, record["cards"]
     assert main(arguments) == 0
-    assert "mbref: 0 violations; it ran 1 of 1 drawn mechanisms" in capsys.readouterr().out
+    assert "mbref: 0 violations; it ran 1 of 1 random mechanisms" in capsys.readouterr().out
 
 
 def test_tally_and_seeds_that_decide_nothing(known):
@@ -143,7 +143,7 @@ def test_tally_and_seeds_that_decide_nothing(known):
     found = deep.examined(deep.Plan("example", 2))
     assert found.seeds == deep.MOST * 2 and set(found.open()) >= {"truth"}, found.counts
     *_, last = tables(found)
-    assert str(last) == "example: ran none of 6 drawn mechanisms, so nothing is known of it"
+    assert str(last) == "example: ran none of 6 random mechanisms, so it is not judged"
     assert all(not set(c) - {"cannot", "pass"} for c in itertools.islice(found.counts.values(), 5))
 
 

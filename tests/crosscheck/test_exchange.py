@@ -165,7 +165,7 @@ def changed(tmp_path, old: str, new: str) -> Path:
     ("old", "new", "says"),
     [
         ('anchor="0.7 0 0"/>', 'anchor="0.7 0 0" active="false"/>', "'C' is not active"),
-        ("</worldbody>", '<site name="mark"/></worldbody>', "1 sites that hold nothing"),
+        ("</worldbody>", '<site name="mark"/></worldbody>', "1 sites without a joint"),
         ("</equality>", '</equality><sensor><jointpos joint="A"/></sensor>', "1 sensors"),
     ],
 )

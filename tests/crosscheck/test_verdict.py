@@ -220,7 +220,7 @@ def test_a_motion_that_is_not_known_beside_one_that_is():
 def test_defaults_that_nothing_judges():
     unjudged = [record(name, "defaults", None, times=[0.0]) for name in ("mujoco", "exudyn")]
     assert breaks([group(unjudged, kind="", reason="two ways", bound=None)]) == (
-        "The defaults of MuJoCo and Exudyn complete; without a truth nothing tells whether they are right."
+        "The defaults of MuJoCo and Exudyn complete; without a truth it is unknown whether they are right."
     )
     assert breaks([group([record("mbref", "own", 1e-12)])]) == "No setting is a library's default."
 

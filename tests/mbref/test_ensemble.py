@@ -132,9 +132,9 @@ def test_several_numbers_of_one_entry_vary():
     [
         ("body[0].mass", "is not PATH=LOW:HIGH"),
         ("body[0].mass=1", "is not PATH=LOW:HIGH"),
-        ("body[0].mass=2:1", "is no interval"),
-        ("body[0].mass=1+--1", "is no interval"),
-        ("body[0].mass=0:inf", "is no interval"),
+        ("body[0].mass=2:1", "must have LOW"),
+        ("body[0].mass=1+--1", "must have LOW"),
+        ("body[0].mass=0:inf", "must have LOW"),
         ("bodies[0].mass=1:2", "bodies[0].mass: is not a path"),
         ("body[nobody].mass=1:2", "body[nobody].mass: the scene has no 'nobody'"),
         ("body[cranc].mass=1:2", "the scene has no 'cranc' there; did you mean 'crank'?"),

@@ -51,7 +51,7 @@ def test_foreign_lines_are_told_by_number_and_left(tmp_path: Path, capsys: pytes
     ]
     path.write_text("\n".join(lines) + "\n")
     assert set(stored(path)) == {"a", "b"}
-    assert capsys.readouterr().err == f"{path}: no record in line 2, 3, 4, 5, 7; left as it is\n"
+    assert capsys.readouterr().err == f"{path}: line 2, 3, 4, 5, 7 holds no record and was left unchanged\n"
     assert path.read_text().splitlines() == lines
 
 

@@ -164,7 +164,7 @@ def test_unreadable_files_are_faults(tmp_path):
         (b"a = " + b"[" * 4000 + b"]" * 4000, "is nested too deeply"),
         (b"a = " + b"1" * 5000, "is not TOML"),
         (b"a = 0x" + b"f" * 5000, "a: is not a known field"),
-        (b'name = "\xff"', "is no text in UTF-8"),
+        (b'name = "\xff"', "is not UTF-8 text"),
         (b"\x00", "is not TOML"),
     ],
 )

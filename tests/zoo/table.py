@@ -12,16 +12,16 @@ from crosscheck.conformance.suite import Verdict, abouts
 from tests.zoo.defects import DEFECTS
 
 FOR_REPORTS = Path(suite.__file__).with_name("proved_by.toml")
-HEAD = f"""# What the conformance suite checks, and what proves that it does
+HEAD = f"""# Conformance cards
 
-`crosscheck verify ENGINE` holds an engine against the cards below; `docs/verify-your-engine.md` tells how.
-A card passes, fails, or says why it does not apply: the engine cannot run the scene, or the scene is outside
-the card's domain. A card's number counts up when its check becomes another, so that verdicts of different
-checks are never compared.
+This page lists the checks ("cards") of the conformance suite, for readers of a verdict by
+`crosscheck verify ENGINE`. [Verify your engine](verify-your-engine.md) explains how to run it. A card passes,
+fails, or does not apply, with a reason. The number of a card increases when its check changes, so that
+verdicts of different checks are never compared.
 
-Every card is proved by defects: {len(DEFECTS)} changes of one line, planted one at a time in
-`examples/spatial_engine` (`tests/zoo/defects.toml`). Each makes the card beside it fail on the scene named,
-where the unchanged engine passes (`pytest tests/zoo`). This file is written by
+Each card has been tested with defects: {len(DEFECTS)} changes of one line, planted one at a time in
+`examples/spatial_engine` (`tests/zoo/defects.toml`). With a defect the card in its row fails on the scene in
+its row, and passes without it (`pytest tests/zoo`). This page is written by
 `python -m tests.zoo.table docs/conformance.md`.
 """
 
@@ -49,7 +49,7 @@ def _defects() -> Iterator[str]:
 
 
 def data() -> str:
-    """The defects, each with the scene and the card that tells it, as TOML."""
+    """The defects, each with the scene and the card that detects it, as TOML."""
     lines = ("[[defect]]", "about = {about!r}", "scene = {scene!r}", "card = {card!r}", "")
     head = "# Written by `python -m tests.zoo.table docs/conformance.md`.\n\n"
     told = (line.format(**defect._asdict()) for defect in DEFECTS.values() for line in lines)

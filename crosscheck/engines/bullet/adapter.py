@@ -28,8 +28,8 @@ ITERATIONS = 1000
 FINER = 1  # steps more, each a third of the one before: the method is of first order
 CLOSES = ("spherical", "revolute")
 FAMILIES = {
-    "iterated": "1000 iterations of the solver; a cut hinge held by two points, by one in a plane",
-    "defaults": "50 iterations, the library's number; a cut hinge held by two points",
+    "iterated": "1000 iterations; a cut hinge closed by two points, in a planar mechanism by one",
+    "defaults": "50 iterations, the library's number; a cut hinge closed by two points",
 }
 OPTIONS = {"step": "time step, s", "iterations": "iterations of the solver in a step"}
 

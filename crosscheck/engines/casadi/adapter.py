@@ -28,7 +28,7 @@ FAMILIES = {
 }
 OPTIONS = {
     **RTOL,
-    "min_step": "shortest step (s), taken whatever its error",
+    "min_step": "shortest step (s); the error is not tested below it",
     "beta": "double root of the closure errors (1/s)",
 }
 RTOLS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)

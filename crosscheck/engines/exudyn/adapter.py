@@ -36,8 +36,8 @@ SPECTRAL_RADIUS = 0.9
 SCOUT = (250, 2000)  # steps of the coarse run that finds how fast a scene turns
 SCOUT_SAMPLES = 26
 FAMILIES = {
-    "defaults": "SolveDynamic as it comes",
-    "tuned": "three trapezoidal runs extrapolated to h = 0, restarted behind singular positions",
+    "defaults": "SolveDynamic with its default settings",
+    "tuned": "three trapezoidal runs extrapolated to h = 0, restarted after singular positions",
     "trapezoidal": "the trapezoidal rule with index-2 constraints",
     "alpha": "generalised alpha",
     "static": "static analysis of a fully driven mechanism, pose by pose",

@@ -1,4 +1,4 @@
-"""Richardson's extrapolation of Exudyn's runs to h = 0, restarted behind singular positions.
+"""Richardson's extrapolation of Exudyn's runs to h = 0, restarted after singular positions.
 
 The trapezoidal rule with index-2 constraints has an error that is even in the step h, as long as steps end
 at regular positions; a step that ends beside a singular one fails.  Where a run fails, all runs are taken up

@@ -201,7 +201,7 @@ class _MujocoSimulation:
             raise Failed(Outcome.STEP_FAILED, t0, f"MuJoCo stopped after {t0:.6g} s: {error}") from error
         self.data.time = t1
         if not (np.isfinite(self.data.qpos).all() and np.isfinite(self.data.qvel).all()):
-            message = f"the state stopped being finite between {t0:.6g} s and {t1:.6g} s"
+            message = f"the state became infinite or NaN between {t0:.6g} s and {t1:.6g} s"
             raise Failed(Outcome.NOT_FINITE, t0, message)
 
     def _fixed(self, t0: float, t1: float) -> None:

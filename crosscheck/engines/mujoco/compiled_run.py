@@ -117,7 +117,7 @@ def compiled_run(
 
     if family == NEWTON and may_move_freely(scene):
         raise ValueError(
-            f"{NEWTON} cannot run {scene.name}: joints and drivers leave some of the motion open"
+            f"{NEWTON} cannot run {scene.name}: joints and drivers do not prescribe the whole motion"
         )
     model = built.model
     for equality, _ in built.drivers:

@@ -39,17 +39,17 @@ COMPILED_RTOLS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 LEAST_TURN = 0.03  # rad turned within the shortest adaptive step
 FAMILIES = {
     "defaults": "the library's own options",
-    "stock": "closures as stiff as its documentation allows (time constant two steps, impedance 0.9999), RK4",
-    "euler": "stock closures, its first-order integrator Euler",
-    "implicit": "stock closures, its first-order integrator implicit",
-    "implicitfast": "stock closures, its first-order integrator implicitfast; only where a load damps",
+    "stock": "the stiffest documented closures (time constant two steps, impedance 0.9999), RK4",
+    "euler": "default closures, first-order integrator Euler",
+    "implicit": "default closures, first-order integrator implicit",
+    "implicitfast": "default closures, first-order integrator implicitfast; only where a load damps",
     "tuned": "the regulariser scaled away through invweight0, critically damped closures at five times the "
     "fastest rate of the scene, RK4, Newton's method iterated to convergence",
-    "stiff": "the tuned model with closures as stiff as the step bears",
+    "stiff": "the tuned model with the stiffest closures that are stable at the step",
     "forward": "the tuned model's accelerations (mj_forward) integrated by DOP853",
-    "projected": "as forward, every accepted state projected onto the closures",
-    FORWARD_COMPILED: "as forward, without Python: mj_forward of libmujoco called by a compiled DOP853",
-    PROJECTED_COMPILED: "as projected, without Python; the closures' errors do not decay of themselves",
+    "projected": "like forward; every accepted state is projected onto the closures",
+    FORWARD_COMPILED: "like forward, without Python: mj_forward of libmujoco called by a compiled DOP853",
+    PROJECTED_COMPILED: "like projected, without Python; closure errors are removed by projection only",
     NEWTON: "Newton's method on MuJoCo's closures, without Python; where drivers prescribe the whole motion",
 }
 INTEGRATED_HERE = (*ADAPTIVE, *COMPILED)
@@ -59,7 +59,7 @@ OPTIONS = {
     "min_step": "shortest step, s",
     "beta": "double root of the closure errors, 1/s",
     "hard": "factor of the regulariser",
-    "tolerance": "closure errors that Newton's method leaves, m or rad",
+    "tolerance": "closure error at which Newton's method stops, m or rad",
     "turn": "rad a driver may move within one step",
 }
 MAX_STEPS = 250_000

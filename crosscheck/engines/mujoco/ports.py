@@ -24,7 +24,7 @@ DEFAULT_STEP = 2e-3  # s
 STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance, as far as it is not clamped
 FAMILIES = {
     "stock": "closures as stiff as documented (time constant two steps, impedance 0.9999), RK4",
-    "euler": "stock closures, its first-order integrator Euler",
+    "euler": "default closures, first-order integrator Euler",
     "defaults": "the library's own options",
 }
 OPTIONS = {"step": "time step, s"}

@@ -143,7 +143,7 @@ class _OndselSimulation:
             middle = [answer.three(name, *BRYANT)[taken, 1] for name in names]
             if np.abs(np.cos(middle)).min() > LOCKED:
                 return [_Reader(assembly, answer, frame).sample() for frame in taken]
-        raise Failed(Outcome.NOT_FINITE, t0, f"orientations after {t0:.6g} s cannot be told from the angles")
+        raise Failed(Outcome.NOT_FINITE, t0, f"angles after {t0:.6g} s do not determine the orientations")
 
     def sample(self, t: float) -> Sample:
         """The sample computed at t; at 0, of the first step."""

@@ -56,7 +56,7 @@ CLOSED_ENOUGH = 1e-8  # m and rad, beyond which it has failed
 TURN_PER_STEP = 0.25  # rad a driver may move within one adaptive step: closures can fold in between
 SCOUT_RTOL = 1e-5
 SCOUT_SAMPLES = 41  # of the coarse run that finds how fast a scene turns
-HINTS = {"defaults": ": without regularisation the default solver settings cannot bear redundant closures"}
+HINTS = {"defaults": ": the default solver settings fail on redundant closures"}
 
 
 class Pinocchio(Engine):

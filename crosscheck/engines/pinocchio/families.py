@@ -19,14 +19,14 @@ DOP853_COMPILED, TUNED_COMPILED = "dop853, compiled", "tuned, compiled"
 COMPILED = (DOP853_COMPILED, TUNED_COMPILED)
 COMPILED_RTOLS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 FAMILIES = {
-    "defaults": "the constraint solver as it comes (no regularisation, one iteration), RK4",
+    "defaults": "the constraint solver with its default settings (no regularisation, one iteration), RK4",
     "proximal": "the solver iterated to convergence, which redundant closures need, RK4",
     "baumgarte": "RK4 with the closures' own Baumgarte terms, double root 0.1/step",
     "dop853": "DOP853 without stabilisation",
     "tuned": "DOP853, every accepted state projected onto the closures",
-    DOP853_COMPILED: "as dop853, without Python: constraintDynamics of its C++ library called by a compiled "
-    "DOP853; needs a C++ compiler and the package cmeel-eigen",
-    TUNED_COMPILED: "as tuned, without Python, with the same needs",
+    DOP853_COMPILED: "like dop853, without Python: constraintDynamics of its C++ library called by a "
+    "compiled DOP853; needs a C++ compiler and the package cmeel-eigen",
+    TUNED_COMPILED: "like tuned, without Python; needs a C++ compiler and cmeel-eigen",
 }
 CONVERGED = 1e-9, 1e-8, 50  # change of the forces (N), mu, iterations: accelerations near singular positions
 OPTIONS = {

@@ -244,7 +244,7 @@ class Stepper:
                     break
                 state[:, :-4] = arithmetic.settled(state[:, :-4] + system.solve(still, -gap)[0])
         if not np.isfinite(doubles(np.stack([self._x, self._v]))).all():
-            raise Ended("a pivot of its equations cannot be told from zero in so many digits")
+            raise Ended("a pivot of its equations is zero to the digits of the arithmetic")
 
     # --- steps --------------------------------------------------------------------------------------------
     def _step(self, most: float) -> tuple[Expansion, float]:

@@ -118,7 +118,7 @@ def unclosed(
             if apart and all(np.linalg.norm(place - t) > near for t in taken):
                 yield (
                     f"frames {first!r} (on {groups.names[a]!r}) and {second!r} (on {groups.names[b]!r}) "
-                    f"coincide and nothing joins them; --close {first}={second} closes the loop"
+                    f"coincide without a joint; --close {first}={second} closes the loop"
                 )
 
 

@@ -105,7 +105,7 @@ def notes(mujoco: Any, model: Any) -> Iterator[str]:
         "motion-capture bodies": model.nmocap,
         "geoms that could touch others": touching if touching > 1 else 0,
         "sensors": model.nsensor,
-        "sites that hold nothing": model.nsite - len(_holding_sites(mujoco, model)),
+        "sites without a joint": model.nsite - len(_holding_sites(mujoco, model)),
         "limits of tendons": int(np.sum(model.tendon_limited != 0)),
         "limits of joints": int(np.sum(model.jnt_limited != 0)),
     }

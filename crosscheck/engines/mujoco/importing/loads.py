@@ -77,7 +77,7 @@ def of_tendons(mujoco: Any, model: Any, data: Any, groups: Groups) -> Iterator[L
         name = model.tendon(k).name or f"tendon {k}"
         if len(wraps) != 2 or not plain or (low != high and stiffness):
             kind = "springs" if stiffness else "damping"
-            yield Part(kind, f"tendon {name!r}, which is no spring between two sites")
+            yield Part(kind, f"tendon {name!r}, which is not a spring between two sites")
             model.tendon_stiffness[k] = model.tendon_damping[k] = 0
             continue
         sites = [int(model.wrap_objid[w]) for w in wraps]

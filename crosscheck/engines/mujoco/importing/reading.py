@@ -180,7 +180,7 @@ class _Reader:
         for e in range(model.neq):
             name, kind = model.equality(e).name or f"equality {e}", model.eq_type[e]
             if not model.eq_active0[e]:
-                self.notes.append(f"equality {name!r} is not active: it is no part of the scene")
+                self.notes.append(f"equality {name!r} is not active: it is not part of the scene")
             elif kind == kinds.mjEQ_JOINT and model.eq_obj2id[e] < 0:
                 self.rows.append(
                     JointRow(name, (int(model.eq_obj1id[e]), -1), float(model.eq_data[e, 0]), 0.0)
@@ -260,7 +260,7 @@ class _Reader:
             if joint is None or not driven:
                 name = left_out.joint_name(self.model, row.joints[0])
                 raise SceneError(
-                    [f"equality {row.name!r}: locks {name}, which is no hinge or slide of its own"]
+                    [f"equality {row.name!r}: locks {name}, which is not a single hinge or slide"]
                 )
             self.drivers.append(Driver(joint=joint.name))
 

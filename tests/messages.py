@@ -1,0 +1,50 @@
+"""All messages of the packages in a row, collected from their code: python -m tests.messages [FOLDER ...]
+
+A message is a text of at least four words that is no docstring, and no part of another text.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("mbref", "crosscheck", "reports")
+LEAST_WORDS = 4
+MARKUP = re.compile(r"[<{\\]\w+[ />}{]|^\s*(?:int|static|import|from) ")  # pictures, formulas, C, Python
+
+
+def text_of(node: ast.expr) -> str:
+    """Return the text of a string, with {…} for each value that is filled in."""
+    if isinstance(node, ast.JoinedStr):
+        return "".join(part.value if isinstance(part, ast.Constant) else "{…}" for part in node.values)
+    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ""
+
+
+def messages(source: str) -> Iterator[tuple[int, str]]:
+    """Yield line and text of each message of a file's source."""
+    tree = ast.parse(source)
+    parts = {id(part) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
+    alone = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant | ast.JoinedStr) and id(node) not in parts | alone:
+            text = text_of(node)
+            if len(re.findall(r"[A-Za-z]{2,}", text)) >= LEAST_WORDS and not MARKUP.search(text):
+                yield node.lineno, text
+
+
+def collected() -> Iterator[tuple[str, int, str]]:
+    """Yield file, line and text of every message of the packages."""
+    for package in PACKAGES:
+        for path in sorted((ROOT / package).rglob("*.py")):
+            for line, text in messages(path.read_text()):
+                yield str(path.relative_to(ROOT)), line, text
+
+
+if __name__ == "__main__":
+    for place, number, message in collected():
+        if place.startswith(tuple(sys.argv[1:]) or PACKAGES):
+            print(f"{place}:{number}: {' '.join(message.split())}")

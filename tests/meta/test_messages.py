@@ -1,0 +1,40 @@
+"""Messages are in plain words; `python -m tests.messages` prints all of them in a row."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from test_words import NOT_YET, WORDS
+
+from tests.messages import collected, messages
+
+FOUND = [found for found in collected() if not found[0].startswith(NOT_YET)]
+RIDDLES = re.compile(  # turns of which a reader has to find the noun, or the meaning
+    r"\b(of no joint|whatever its error\b(?! estimate)|as it comes|left as it is|done without|is told|"
+    r"made anew|cannot be told|out of reach|bear that)\b"
+)
+
+
+def test_messages_are_in_plain_words():
+    assert len(FOUND) > 800, len(FOUND)
+    wrong = [f"{place}:{line}: {text}" for place, line, text in FOUND if WORDS.search(text)]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_messages_are_no_riddles():
+    wrong = [f"{place}:{line}: {text}" for place, line, text in FOUND if RIDDLES.search(text)]
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize(
+    ("source", "found"),
+    [
+        ('raise ValueError(f"the step {h} is too small")', ["the step {…} is too small"]),
+        ('say("one of the " "rows is redundant")', ["one of the rows is redundant"]),
+        ('"""A docstring is not a message."""', []),
+        ('x = "short text"', []),
+    ],
+)
+def test_a_new_message_is_collected(source, found):
+    assert [text for _, text in messages(source)] == found
