@@ -174,9 +174,9 @@ class Engine(ABC):
     """
 
     name: str
-    package: str  # to install when it is missing
+    package: str  # name of the package to install
     supports: Supports = Supports()  # everything else is refused
-    rounding: float = 2.0**-52  # relative, of the numbers it computes with; 2**-23 in single precision
+    rounding: float = 2.0**-52  # relative rounding of the engine's arithmetic; 2**-23 in single precision
     families: Mapping[str, str] = {}  # family of settings → its description, for `crosscheck list settings`
     integrated_here: Collection[str] = ()  # families whose integrator, or extrapolation, is crosscheck's
     options: Mapping[str, str] = {}  # option of a setting → its description, with the unit

@@ -27,7 +27,7 @@ from mbref.stabilisation.base import Stabilisation
 if TYPE_CHECKING:
     from mbref.scene import Scene
 
-MOST_NAMES = 256  # whose methods are remembered
+MOST_NAMES = 256  # names whose parsed methods are cached
 SERIES, SPARSE = "taylor", "alf-dual+projection/dop853"  # the default methods of few and of many bodies
 MOST_BODIES = 100  # up to here the dense ``taylor`` costs at most about 5 times the sparse method
 # (``benchmarks/default_method.py``); it is worth that, because it crosses singular positions
@@ -71,7 +71,7 @@ class Method:
     formulation: Formulation
     stabilisation: Stabilisation
     integrator: Integrator
-    options: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # by name of the part
+    options: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # keyed by name of the part
 
     def __str__(self) -> str:
         parts = [_text(p.name, self.options.get(p.name, {})) for p in self.parts]

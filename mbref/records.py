@@ -75,7 +75,7 @@ def append(path: str | Path | None, record: dict[str, Any]) -> None:
     with open(path, "ab", buffering=0) as file:
         before = os.fstat(file.fileno()).st_size
         try:
-            while line:  # one write, but on a disk that is nearly full: the next one raises
+            while line:  # usually one write; on a full disk the next one raises
                 line = line[file.write(line) :]
         except BaseException:
             with contextlib.suppress(OSError):  # the first failure is the one reported

@@ -13,7 +13,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from mbref.scene_units import angle, length, length_or_angle
 
 LARGEST, SMALLEST = 1e40, 1e-40  # sizes of numbers whose products and squares are still numbers
-OTHER_WORDS = {  # of other programs and books → ours
+OTHER_WORDS = {  # words of other programs and books → our words
     "hinge": "revolute",
     "pin": "revolute",
     "rotational": "revolute",

@@ -11,8 +11,8 @@ import numpy as np
 from mbref.scene import GROUND, Scene
 
 TURN = 2 * math.pi
-QUARTER = 90  # of which round numbers of degrees are multiples
-APART = 300.0  # times the next shorter length: one in millimetres is not always the longest
+QUARTER = 90  # degrees; likely angles are multiples of it
+APART = 300.0  # multiple of the next shorter length: one in millimetres is not always the longest
 GYRATION = 30.0  # radius of gyration over the mechanism's length
 STRONGEST = 100.0  # m/s², of gravity
 FURTHEST = 100.0  # rad, of a driver: 16 turns, and degrees of most motions

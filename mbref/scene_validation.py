@@ -43,7 +43,7 @@ class SceneError(Exception):
         super().__init__("\n".join(self.faults))
 
     def __reduce__(self) -> tuple[type[SceneError], tuple[list[str]]]:
-        return type(self), (self.faults,)  # so that it comes whole out of another process
+        return type(self), (self.faults,)  # so that the error can be pickled
 
 
 def checked_inertia(value: Any) -> tuple[Any, ...]:
@@ -106,7 +106,7 @@ def field_faults(error: ValidationError, tables: Mapping[str, Sequence[str]]) ->
         default = f"{fault['msg'][0].lower()}{fault['msg'][1:]}, got {got}"
         if kind == "too_short" and fault["input"]:
             continue  # entries are there, but faulty ones were left out
-        if kind == "missing" and isinstance(fault["loc"][-1], int):  # of a list that is too short
+        if kind == "missing" and isinstance(fault["loc"][-1], int):  # the list is too short
             yield _path(fault["loc"][:-1]), _must_hold(fault["loc"][:-1], got)
             continue
         path = _path(fault["loc"]) + (".type" if kind.startswith("union_tag") else "")

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from reports import figures
 from reports.runs import short
 
-LIMIT, NARROW = "limit", 0.06  # how far the engines' marks stand apart
+LIMIT, NARROW = "limit", 0.06  # distance of the engines' marks, in data units
 
 
 def draw(data: Mapping[str, Any]) -> Figure:

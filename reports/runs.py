@@ -114,7 +114,7 @@ class SceneRuns:
     scene: Scene
     runs: Sequence[Run]
     gate: Sequence[Record] = ()  # short runs that show whether the engines simulate the same mechanism
-    truth: Record | None = None  # of `crosscheck.study.truths`
+    truth: Record | None = None  # record made by `crosscheck.study.truths`
     motion: Record | None = None  # the run of largest error at the instants shown of the truth's motion
     branches: Sequence[Record] = ()  # runs along the branches that meet at singular positions
 
@@ -229,7 +229,7 @@ def power(value: float) -> str:
     return "–" if not math.isfinite(value) else "0" if value == 0 else f"{value:.1e}"
 
 
-ROUNDING = 1e-11  # below which a difference from the judge's own solution is rounding
+ROUNDING = 1e-11  # smaller differences from the judge's solution are rounding
 
 
 def beyond_rounding(value: float) -> str:

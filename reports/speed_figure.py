@@ -14,7 +14,7 @@ from reports.runs import Run, SceneRuns, duration
 
 HEIGHT, TOP, FOOT = 380.0, 26.0, 40.0  # px: of the axes, above and below them
 LEAST_WIDE = 18  # percent of the width that the name of a grade takes
-MOST_LABELS = 7  # on an axis
+MOST_LABELS = 7  # most tick labels on an axis
 DASHES = ("", "6 4", "2 4", "9 3 2 3")
 
 

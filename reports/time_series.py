@@ -13,7 +13,7 @@ from reports.runs import Curve, Run, SceneRuns
 SMALLEST = 1e-17  # magnitudes below are drawn here: zero has no place on a logarithmic axis
 
 Panels = Sequence[np.ndarray]
-Series = Mapping[Curve, Panels]  # for every curve one (k,) array a panel
+Series = Mapping[Curve, Panels]  # for each curve one (k,) array per panel
 
 
 def series(scene_runs: SceneRuns, measure: Callable[[Run], Panels | None]) -> dict[Curve, Panels]:

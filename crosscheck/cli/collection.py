@@ -21,7 +21,7 @@ from mbref.records import looked_at
 from mbref.scene import Scene
 
 TIMINGS, ILLUSTRATION = "paper-timings.jsonl", "paper-illustration.jsonl"
-REPEATS = 3  # of the timed runs, in turns
+REPEATS = 3  # timed runs of each setting, in turns
 Notice = Callable[[str], None]  # takes one sentence for the user
 
 

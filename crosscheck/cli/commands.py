@@ -48,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         notice("interrupted")
         return INTERRUPTED
-    except BrokenPipeError:  # the reader of the output has closed it, as in `crosscheck list | head`
+    except BrokenPipeError:  # the reader closed the pipe, as in `crosscheck list | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return OTHERWISE
 

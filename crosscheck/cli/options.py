@@ -14,7 +14,7 @@ from crosscheck.study.grid import TIME_LIMIT
 from crosscheck.study.sweep import QUICK_LIMIT
 from mbref.scene_units import in_si
 
-DIGITS = f"{FEWEST_DIGITS} to {MOST_DIGITS}"  # that a command line may ask for
+DIGITS = f"{FEWEST_DIGITS} to {MOST_DIGITS}"  # allowed values of --digits
 
 
 def add_selection(parser: argparse.ArgumentParser) -> None:

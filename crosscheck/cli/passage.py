@@ -17,7 +17,7 @@ from mbref.trajectory import Trajectory
 
 SCENE, SAMPLES = "planar_slider_crank_equal", 161
 FINE = 1001  # instants at which the Jacobian is looked at
-NEAR = 0.05  # a smallest singular value below this, and least among its neighbours, is a passage
+NEAR = 0.05  # smallest singular value: a local minimum below it counts as a singular position
 
 
 class Passage(NamedTuple):

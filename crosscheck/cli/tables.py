@@ -33,7 +33,7 @@ from mbref.scene import Scene
 
 MEASURED = ("violation_position", "energy_error")  # metrics that the table of runs shows beside the error
 SETTINGS_WIDTH, NUMBER_WIDTH = 15, 8  # least widths of columns, so that numbers stay whole
-OUTCOME_WIDTH = 13  # at most, for 80 columns in all
+OUTCOME_WIDTH = 13  # characters at most, so that a table fits 80 columns
 BEST = {"violation_position": "closure", "energy_error": "energy", "reaction_error": "reactions"}
 NO_ENERGY = "energy –: a driver or damper works, or samples are too far apart to count turns"
 TEXT_COLUMNS = 3  # the columns from the left that hold words and may be folded

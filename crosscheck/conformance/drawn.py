@@ -20,7 +20,7 @@ from crosscheck.judge.gauss_principle import goes_on, rank, rank_of, singular_va
 from mbref.scene import GROUND, Body, Driver, Fixed, Force, Joint, Load, Revolute, Scene, Sine, TorsionSpring
 
 DURATION = 0.05  # s: bodies of half a metre turn by a tenth of a radian
-REGULAR = 1e-3  # least singular value of rows with a driver, of unit length: else its joint hardly turns
+REGULAR = 1e-3  # smallest singular value of unit rows with a driver: below it the driven joint hardly moves
 FRAME = "frame"  # the body in the ground's place
 NUDGE = 0.1  # m or rad: amplitude of a driver's wave
 

@@ -60,7 +60,7 @@ def keep(scene: Scene, verdict: suite.Verdict, engine: str, folder: Path, called
 
 def found(bench: Bench, verdict: suite.Verdict, folder: Path) -> Path:
     """Make a violation small and keep it; the file's path."""
-    if bench.specimen.dead_end:  # a smaller one may be none
+    if bench.specimen.dead_end:  # a smaller scene may have no dead end
         return keep(bench.scene, verdict, bench.runner.name, folder, bench.scene.name)
     small = shrunk(bench.scene, violates(bench.runner, verdict.property))
     again = verdict

@@ -46,7 +46,7 @@ from mbref.trajectory import Outcome, Trajectory
 SECOND = ("acceleration", "angular_acceleration")
 NORMS = 4.0  # roundings of the engine by which the length of a quaternion may be off
 STATE = ("position", "orientation", "velocity", "angular_velocity")
-NO_ENDS = (Outcome.COMPLETED, Outcome.CRASHED, Outcome.TIMED_OUT)  # where no motion is to the end
+NO_ENDS = (Outcome.COMPLETED, Outcome.CRASHED, Outcome.TIMED_OUT)  # not allowed at a dead end
 DENSE = 65  # samples from which the work of a moment is summed to 1e-8
 
 

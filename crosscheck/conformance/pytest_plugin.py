@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from crosscheck.conformance.suite import Verdict
     from crosscheck.conformance.trial import Bench
 
-KEPT = "crosscheck/verdicts"  # where pytest's cache has the verdicts of runs before
+KEPT = "crosscheck/verdicts"  # key of earlier verdicts in pytest's cache
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

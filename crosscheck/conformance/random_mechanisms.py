@@ -31,13 +31,13 @@ Triple = tuple[float, float, float]
 REFERENCE, PRINCIPLE = "mbref", "Gauss's principle"
 KINDS = ("revolute", "universal", "spherical", "translational", "cylindrical", "distance", "fixed", "planar")
 TREE = (0.34, 0.14, 0.14, 0.12, 0.12, 0.08, 0.03, 0.03)  # probability of each kind to join a body to the tree
-CLOSING = (0.4, 0.15, 0.2, 0.05, 0.1, 0.08, 0.0, 0.02)  # and to close a loop
-PLANAR = 0.65  # part of the mechanisms whose axes are parallel, so that their loops are redundant
-HINGED = 0.25  # part of the loops that are a second hinge on the axis of the first
+CLOSING = (0.4, 0.15, 0.2, 0.05, 0.1, 0.08, 0.0, 0.02)  # probabilities of joint types that close a loop
+PLANAR = 0.65  # fraction of the mechanisms whose axes are parallel, so that their loops are redundant
+HINGED = 0.25  # fraction of the loops that are a second hinge on the axis of the first
 TRIES = 60
-MOST_DRAWS = 1000  # of a mechanism; a few do
+MOST_DRAWS = 1000  # attempts to generate a mechanism; usually a few suffice
 DURATION = 0.01  # s
-CONTINUES = 1e-9  # relative residual of the acceleration equations where a mobility is not of the instant
+CONTINUES = 1e-9  # relative residual of the acceleration equations below which a mobility is finite
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from mbref.trajectory import Trajectory
 
 Mapped = Callable[[Any], Any]
 HEAVIER = 2.5
-FLIP = np.diag([1.0, -1.0, 1.0])  # of the body frames of a mirrored scene, which stay right-handed
+FLIP = np.diag([1.0, -1.0, 1.0])  # reflection of body frames in a mirrored scene; keeps them right-handed
 
 
 @dataclass(frozen=True)

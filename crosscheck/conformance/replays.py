@@ -16,7 +16,7 @@ from mbref import rotations
 from mbref.scene import GROUND, Driver, Joint, Load, Moment, Scene
 from mbref.trajectory import Trajectory
 
-CONSTANT = 1e-6  # relative variation of a moment given by reactions that counts as constant
+CONSTANT = 1e-6  # relative variation below which a driver's moment counts as constant
 
 
 def started(scene: Scene, motion: Trajectory, sample: int, sense: float) -> Scene:

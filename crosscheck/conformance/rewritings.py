@@ -15,7 +15,7 @@ from mbref.scene import GROUND, Body, Cylindrical, Fixed, Joint, Scene, SceneErr
 from mbref.trajectory import Trajectory
 
 HALF, LIMIT = " half", 0.2  # the halves' distance as a part of the largest that the inertia allows
-UNCHANGED = 1e-12  # of the largest velocity: changes by rounding
+UNCHANGED = 1e-12  # fraction of the largest velocity: a smaller change is rounding
 
 
 def relabelled(scene: Scene) -> Scene:

@@ -151,7 +151,7 @@ def _two_hinges(draw: st.DrawFn, bodies: Sequence[Body], joints: Sequence[Joint]
     """Another joint on the axis of a revolute one; on a new pair of hinges' where there is none."""
     hinges = [joint for joint in joints if isinstance(joint, Revolute)]
     if not hinges:
-        return [joints[-1].model_copy(update={"name": "R"})]  # a joint twice is redundant too
+        return [joints[-1].model_copy(update={"name": "R"})]  # a duplicate joint is redundant
     hinge = draw(st.sampled_from(hinges))
     axis = np.array(hinge.axis) / np.linalg.norm(hinge.axis)
     kind = draw(st.sampled_from((Revolute, Cylindrical)))

@@ -55,7 +55,7 @@ class Conformance:
     engine: str
     version: str
     verdicts: Sequence[Verdict]
-    family: str = ""  # of settings, where not the best
+    family: str = ""  # family of settings; empty: the engine's best family
     hint: str = ""  # one sentence on the cause of failures
 
     @property

@@ -39,13 +39,13 @@ from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
 
 SAMPLES = 9
-STEP = 1e-4  # of the duration, between neighbouring samples: what differs by h² of a motion differs by 1e-8
-NEIGHBOURS = 4  # on either side of the middle
+STEP = 1e-4  # spacing of neighbouring samples / duration: second differences are about 1e-8
+NEIGHBOURS = 4  # samples on each side of the middle one
 TURN = 1e-3  # rad: the most that a motion turns from one neighbouring sample to the next
 SWEPT = 3  # settings from which order and floor are measured
 FASTEST, SLOWEST = 0.1, 0.5  # contractions that are believed: adaptive steps and a floor make others
 COARSER = 1e-8  # tolerance of the second integration of Gauss's principle, 100 times the first tolerance
-SHARE = 0.1  # of what those two differ by is the most that the first is off by: 0.01 to 0.03 was measured
+SHARE = 0.1  # largest error of the finer one / difference of the two; measured: 0.01 to 0.03
 SHORT = {  # built-in scenes with a truth, and end times (s) before their first singular position
     "four_bar": 0.01,
     "four_bar_gravity": 0.12,
@@ -119,7 +119,7 @@ class Bench:
     version: str
     cannot: Cannot | None
     settings: Sequence[Setting]
-    family: str = ""  # where not the best is judged
+    family: str = ""  # family to judge; empty: the engine's best family
 
     @property
     def scene(self) -> Scene:
@@ -300,7 +300,7 @@ def exact_motion(specimen: Specimen, times: np.ndarray) -> Trajectory:
             if truth is not None:
                 return truth.poses(times)
         except NoSolution:
-            pass  # no reference within its time: accelerations at the start are still known
+            pass  # without a reference, accelerations at the start are still known
         return _of_gauss(specimen.scene, times)
     position, orientation = specimen.exact(times)
     unknown = np.full_like(position, np.nan)

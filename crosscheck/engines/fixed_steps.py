@@ -19,8 +19,8 @@ from mbref.trajectory import Outcome, Trajectory
 
 ANGLES = (0.15, 0.05, 0.015, 0.005, 0.0015)  # rad turned per step
 MOST_STEPS = 250_000
-SCOUT_SAMPLES = 41  # of the coarse run that finds how fast a scene turns
-ARM = 0.1  # of the scene's length: half the distance of two points that hold a hinge
+SCOUT_SAMPLES = 41  # samples of the coarse run that measures how fast a scene turns
+ARM = 0.1  # half the distance of the two points that close a hinge / scene's length
 
 
 class Simulation(Protocol):

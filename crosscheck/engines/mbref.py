@@ -32,9 +32,9 @@ WITH_SINGULAR_MASS = (
     "taylor",
     "lm1+projection",
     "alf+projection",
-)  # of bodies without some moment of inertia
-KINEMATIC = "kinematic"  # of driven scenes; integrates nothing, so has no tolerance
-GENERATED = ", generated"  # by machine code for the scene, made before the clock runs
+)  # families for bodies that lack a moment of inertia
+KINEMATIC = "kinematic"  # family for fully driven scenes; it has no tolerance because it integrates nothing
+GENERATED = ", generated"  # suffix: machine code for the scene, compiled before the timed run
 FAMILIES = {
     "alf-dual+projection": "augmented Lagrangian in dual form, projection, DOP853; default of many bodies",
     "lm2+projection": "Lagrange multipliers eliminated by blocks, projection, DOP853",

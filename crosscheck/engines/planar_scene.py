@@ -35,7 +35,7 @@ def planar_scene(scene: Scene) -> Scene:
     if not normals or not _starts_within(scene, normal := unit(np.array(normals[0]))):
         return scene
     found = [scene]
-    for kept in ((Spherical,), ()):  # a spherical joint that is cut is a point as it is
+    for kept in ((Spherical,), ()):  # a cut spherical joint is already a point closure
         joints = [joint if isinstance(joint, kept) else _hinged(joint, normal) for joint in scene.joint]
         if all(joint is not None for joint in joints):
             found.append(_closed_by_points(scene.with_(joint=joints)))

@@ -22,11 +22,11 @@ WIDTHS = {
     "acceleration": 3,
     "angular_acceleration": 3,
 }
-MAX_STEPS = 10**6  # of one interval; beyond it the run is not going to end
+MAX_STEPS = 10**6  # steps in one sample interval; a run with more steps is stopped
 
 UNKNOWN = np.zeros((0, 3))  # accelerations of an engine that gives none
 
-STRETCH = 1.01  # by which a step may be longer to end at a sample
+STRETCH = 1.01  # factor by which a step may be extended to end at a sample
 JUMPS = np.linspace(1.0, 4.0, 16)  # shortest steps, tried where the shortest one fails
 
 Rhs = Callable[[float, np.ndarray], np.ndarray]
@@ -168,7 +168,7 @@ class Adaptive:
 
     rhs: Rhs
     settle: Settle | None
-    rtol: float  # of every component; the absolute tolerance is a hundredth of it
+    rtol: float  # relative tolerance; the absolute tolerance is a hundredth of it
     min_step: float  # s
     max_step: float  # s
     counts: Counts
@@ -205,7 +205,7 @@ class Adaptive:
         best = min(attempts, key=lambda attempt: attempt[3] if math.isfinite(attempt[3]) else math.inf)
         if not math.isfinite(best[3]):
             if self.settle is not None:
-                self.settle(t + best[0], best[1])  # which may say why
+                self.settle(t + best[0], best[1])  # raises the specific error, if there is one
             raise Failed(Outcome.NOT_FINITE, t, f"the motion is not finite after {t:.6g} s")
         return best
 

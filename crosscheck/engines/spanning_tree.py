@@ -27,8 +27,8 @@ from mbref.scene import Body, Distance, Joint, JointFacts, Scene, Spherical
 
 GROUND_LINK = -1
 NO_AXES = np.zeros((0, 3))
-DRIVEN_WEIGHT = 10  # more than any joint has rows: a driven joint is cut last
-ROD_SHARE = 0.1  # of the smallest effective mass a body shows at the anchor of a distance joint
+DRIVEN_WEIGHT = 10  # exceeds the number of rows of any joint, so that driven joints are cut last
+ROD_SHARE = 0.1  # mass of a rod / smallest effective mass of a body at the anchors of its distance joint
 BALL: JointFacts = Spherical.facts
 ROD_END: str = Spherical.model_fields["type"].default
 FREE, SLIDE, TURN, BALL_JOINT = "free", "slide", "turn", "ball"
@@ -76,7 +76,7 @@ class Link:
     anchor: np.ndarray = field(default_factory=lambda: np.zeros(3))
     axes: np.ndarray = field(default_factory=lambda: NO_AXES)
     ghost: bool = False
-    ends: tuple[tuple[int, np.ndarray], ...] = ()  # of a rod: the bodies it ties, and where (world)
+    ends: tuple[tuple[int, np.ndarray], ...] = ()  # of a rod: bodies and anchors (world)
 
     @property
     def freedoms(self) -> int:

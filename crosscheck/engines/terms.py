@@ -40,7 +40,7 @@ TURN_PER_STEP = 0.25  # rad a driver may move within one step: closures can fold
 PROJECTIONS = 10  # Newton iterations at most; two are usual
 CLOSED = 1e-13  # m and rad, where a projection ends
 CLOSED_ENOUGH = 1e-8  # m and rad, beyond which it has failed
-REDUNDANT = 1e-7  # of the largest singular value: redundant rows of states not quite closed are below
+REDUNDANT = 1e-7  # fraction of the largest singular value: smaller ones belong to redundant rows
 
 
 class Terms(NamedTuple):

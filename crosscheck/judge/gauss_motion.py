@@ -77,7 +77,7 @@ def accelerations(scene: Scene, t: float, state: State, rank: int | None = None)
 def _least(matrix: np.ndarray, wanted: np.ndarray, rank: int | None) -> np.ndarray:
     """The least solution (n,) of a matrix (m, n) of known rank, else of singular values beyond RANK."""
     if not (np.isfinite(matrix).all() and np.isfinite(wanted).all()):
-        return np.full(matrix.shape[1], np.nan)  # a step that went astray, which the integrator refuses
+        return np.full(matrix.shape[1], np.nan)  # not finite, so that the integrator rejects the step
     u, s, vt = np.linalg.svd(matrix, full_matrices=False)
     r = int(np.sum(s > RANK * s[0])) if rank is None else rank
     return vt[:r].T @ (u[:, :r].T @ wanted / s[:r])

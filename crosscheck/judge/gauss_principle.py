@@ -18,7 +18,7 @@ from mbref import rotations
 from mbref.scene import Scene, TorsionSpring
 from mbref.trajectory import Trajectory
 
-CONTINUES = 1e-8  # of the accelerations: residual of a mobility of the instant, which stops at once
+CONTINUES = 1e-8  # fraction of the accelerations: a larger residual means an infinitesimal mobility
 NO_AXIS = np.zeros(3)  # no shared axis of turning: torsion springs are added here
 
 

@@ -20,7 +20,7 @@ from mbref.scene import GROUND, Joint, Scene
 from mbref.trajectory import Trajectory
 
 LEAST = 1e-3  # m/s²: forces that accelerate the masses by less count as none
-SAMPLES = 11  # of a trajectory, spread over it, that are compared
+SAMPLES = 11  # number of compared samples, spread over the trajectory
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ class JointFrames:
     bodies: tuple[int, ...]
     points: np.ndarray  # (2, 3) frame origins, in the body frames
     frames: np.ndarray  # (2, 4) frame orientations, frame to body
-    length: float  # of a distance joint, else 0
+    length: float  # length of a distance joint, otherwise 0
     driver: Driver | None
 
     @property

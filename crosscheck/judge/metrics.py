@@ -23,7 +23,7 @@ from mbref import rotations
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
-MANY = 50  # bodies; reactions of more are left to `crosscheck.judge.joint_reactions`
+MANY = 50  # bodies; for more bodies `crosscheck.judge.joint_reactions` compares the reactions
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from mbref.scene import Force, Load, Moment, Scene, Spring, TorsionSpring
 from mbref.trajectory import Trajectory
 
 ALONG = 6  # samples of a run at which its accelerations are compared
-DRIVEN_SAMPLES = 101  # of a driver's motion, whose largest acceleration is looked for
+DRIVEN_SAMPLES = 101  # samples of a driver's motion, to find its largest acceleration
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,12 @@ from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
 SIMPLE = 12  # bits of the significand: shorter numbers, such as halves and eighths, are no evidence
-SMALL = 2.0**-12  # of its scale: a smaller number may be a difference of larger ones, with few bits left
+SMALL = 2.0**-12  # fraction of the scale: smaller numbers may have lost bits by cancellation
 STATES = ("position", "orientation", "velocity", "angular_velocity")
 PUSHES = ("acceleration", "angular_acceleration")
 EVIDENCE = 4  # numbers of an item that are neither; a double is a float32 by chance once in 2²⁹
 LEAST = 1e-300  # N, where nothing has mass
-ORDER = 6  # of the differences that take a smooth motion away
+ORDER = 6  # order of the differences that remove a smooth motion
 WEIGHTS = np.array([(-1.0) ** k * comb(ORDER, k) for k in range(ORDER + 1)])
 Series = tuple[str, np.ndarray, np.ndarray]  # the item, its numbers (k, w), and the scales of those (w,)
 

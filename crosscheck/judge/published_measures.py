@@ -17,7 +17,7 @@ from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
 Measure = Callable[[Scene, Trajectory, Trajectory | None], float | None]
-NEAR_ZERO = 1e-3  # below which relative errors of A02 are relative to this, as the problem has it
+NEAR_ZERO = 1e-3  # smallest denominator of relative errors in A02, as the problem defines it
 
 
 def energy(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:

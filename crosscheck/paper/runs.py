@@ -17,13 +17,13 @@ from mbref.scenes import SCENES
 from mbref.trajectory import Outcome
 
 ENGINE = "mbref"  # the engine that has the paper's methods
-SHARE = 0.95  # of the end time of a failed run, where its error is taken
+SHARE = 0.95  # fraction of a failed run's end time at which its error is measured
 SAMPLES = np.linspace(0.0, END, 101)
-SHORT = np.linspace(0.0, 0.12, 61)  # every 2 ms over two revolutions
+SHORT = np.linspace(0.0, 0.12, 61)  # s; samples every 2 ms over two revolutions
 TURNS = np.linspace(0.0, END, 201)
 SECOND = np.linspace(0.0, 1.0, 6)
-FINE = np.linspace(0.0, END, 2001)  # every 10 ms, to see the peaks at singular positions
-SIZED_ROWS = ("MPI (SVD)", "ALF", "ALF + CP")  # whose end times are shown over the size of the data errors
+FINE = np.linspace(0.0, END, 2001)  # s; samples every 10 ms, to show the peaks at singular positions
+SIZED_ROWS = ("MPI (SVD)", "ALF", "ALF + CP")  # plotted: end time over the size of data errors
 FREE = ("LM2", "MPI (SVD)", "MPI (GS)")  # the rows of Table III that drift until they fail
 LASTING = ("MPI (SVD) + CP", "MPI (GS) + CP")  # the rows of Tables I and II whose runs last 20 s
 
@@ -52,7 +52,7 @@ HEAVY_SWEEP = tuple(v for v in SWEEP if v.name in ("rtol 1e-5", "smallest step 1
 [RAISED] = [v for v in SWEEP if v.name == "rank 1e-4"]
 KEPT, KEPT_RTOLS = (0.6, 0.3, 0.1, 0.03), (1e-6, 1e-7, 1e-8, 1e-9)
 ALPHAS = tuple(10.0**k for k in range(2, 13))
-DIGITS_EPSILON = 1e-14  # so that only rounding is left
+DIGITS_EPSILON = 1e-14  # data error as small as rounding
 EXACT, PENALTY, DUAL = "mpi-svd", "alf", "alf-dual"
 
 

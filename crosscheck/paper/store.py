@@ -14,7 +14,7 @@ from mbref.records import looked_at
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
-DRAWN_PARTS = ("figures", "dynamic", "peaks")  # whose motions figures draw
+DRAWN_PARTS = ("figures", "dynamic", "peaks")  # parts whose motions are plotted
 PLACES = 6  # significant digits of a motion that is drawn
 FILE = "paper.jsonl"
 INDEX = "paper-runs.json"  # label → key of the record, beside the records
@@ -38,7 +38,7 @@ def run(path: str | Path, chosen: Cases, progress: Shown) -> Records:
 def drawable(label: Label, scene: Scene, record: Record) -> Record:
     """The record with the motion that figures draw, in PLACES digits, and its ``violation`` (k,) of positions
     at the samples, taken before; without motion where no figure draws it."""
-    if label.part == "digits":  # whose accelerations are compared digit by digit
+    if label.part == "digits":  # accelerations are compared digit by digit
         return record
     drawn = label.part in DRAWN_PARTS
     shown = list(record["bodies"].items())[: 1 if label == PEAKS else None]

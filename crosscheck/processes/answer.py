@@ -23,7 +23,7 @@ WIDTHS = {"position": 3, "orientation": 4, "velocity": 3, "angular_velocity": 3}
 OPTIONAL = {"acceleration": 3, "angular_acceleration": 3}
 CLOCK = time.get_clock_info("process_time").resolution
 LEAST = CLOCK if CLOCK < 1e-6 else 0.0  # s of a run; by a coarse clock a short run takes none
-UNIT_TOLERANCE = 1e-3  # of a quaternion's length; beyond it, it is none
+UNIT_TOLERANCE = 1e-3  # largest deviation of a quaternion from unit length
 
 
 class MalformedAnswer(Exception):

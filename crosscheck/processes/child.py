@@ -28,10 +28,10 @@ from mbref.trajectory import Outcome
 
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 INTERVAL = 0.2  # s, at which the CPU time of a child is read
-LOADED = 10.0  # times its limit, in wall time, that a call may take where other processes have the cores
-ORPHAN_SECONDS = 10.0  # beyond that, a child whose parent has died ends itself
-ENDING_SECONDS = 10.0  # for a child that has hung up to end by itself, with an exit status that shows why
-TAIL = 4000  # bytes in which the last printed line is looked for
+LOADED = 10.0  # wall time / CPU limit that a call may take on a busy machine
+ORPHAN_SECONDS = 10.0  # s after which a child ends itself if its parent has died
+ENDING_SECONDS = 10.0  # s that a child without connection has to end with its own exit status
+TAIL = 4000  # last bytes of the output, searched for the last printed line
 PRINTED = 200  # characters of the last printed line that a message quotes
 
 Function = Callable[..., Any]
@@ -60,8 +60,8 @@ class Child:
     """The child process; its owner closes it."""
 
     def __init__(self) -> None:
-        self.ready: Observation | None = None  # what making an engine ready gave, where copies run it
-        self._copies = False  # whether a copy makes the present call
+        self.ready: Observation | None = None  # result of preparing the engine, for copies of the process
+        self._copies = False  # True if a copy of the process makes the present call
         self._printed = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - closed by `close`
         self._channel, theirs = Pipe()
         with theirs:
@@ -103,7 +103,7 @@ class Child:
     def kill(self) -> None:
         """End the process and what it started; a call under way fails."""
         if self.is_alive:
-            with contextlib.suppress(ProcessLookupError):  # it has just ended by itself
+            with contextlib.suppress(ProcessLookupError):  # the process has just ended
                 os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
 

@@ -25,12 +25,12 @@ from mbref.trajectory import Outcome, Trajectory
 MOST_IDLE = 8  # children that wait for a run: one of every engine, so that scouting has started them
 COPIES = sys.platform == "linux"  # elsewhere a forked process may miss what libraries of the system began
 NO_ENGINE = ""  # served by a child that computes for the judge
-READY_SECONDS = 600.0  # for imports and compiling, before the time of a run begins
+READY_SECONDS = 600.0  # s for imports and compilation, before the time of a run begins
 
-_idle: list[tuple[str, Child]] = []  # with their engines, the one used last at the end
+_idle: list[tuple[str, Child]] = []  # idle children and their engines, the last used one at the end
 _lending = Lock()
-_preparing: dict[str, Lock] = {}  # by engine
-_starting: dict[int, Child] = {}  # by thread: children that are made ready
+_preparing: dict[str, Lock] = {}  # keyed by engine
+_starting: dict[int, Child] = {}  # keyed by thread: children that are made ready
 _prepared: set[tuple[str, str]] = set()  # engines and families that a child has made ready
 
 
@@ -138,7 +138,7 @@ def end_idle() -> None:
 
 
 atexit.register(end_idle)
-os.register_at_fork(after_in_child=_idle.clear)  # they answer the process that started them
+os.register_at_fork(after_in_child=_idle.clear)  # idle children belong to the process that started them
 
 
 def _check(engine_name: str) -> None:

@@ -36,7 +36,7 @@ def get_ready(engine_name: str, families: Sequence[str]) -> str:
     simulator = engine(engine_name)
     try:
         version = simulator.version()
-    except ImportError:  # a run will say so
+    except ImportError:  # reported by the run
         return ""
     simulator.prepare(families)
     return str(version)
@@ -172,7 +172,7 @@ def _end_as(status: int) -> NoReturn:
 def _answer(function: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
     """The pickled answer; warnings and printed text of the call are not left to the next one."""
     try:
-        with warnings.catch_warnings():  # each call warns afresh
+        with warnings.catch_warnings():  # reset the filter, so that each call warns again
             return pickle.dumps((True, function(*arguments)))
     except Exception as error:  # the parent turns the sentence into an Outcome
         return pickle.dumps((False, traceback.format_exception_only(error)[-1].strip()))

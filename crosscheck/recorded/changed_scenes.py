@@ -15,7 +15,7 @@ from crosscheck.recorded.explanations import Columns, Difference, with_signs
 from mbref.scene import Scene, SceneError, TorsionSpring
 
 ITERATIONS = 5
-PROMISING = 0.7  # part of the difference that the linear fit may leave where the fit goes on
+PROMISING = 0.7  # fraction of the difference left by a linear fit: above it no further fit is tried
 RTOL = 1e-9
 KNOWN_GRAVITY = {9.80665: "9.80665", 9.81: "9.81", 9.8: "9.8", 10.0: "10"}
 

@@ -12,7 +12,7 @@ from crosscheck.recorded.columns import VECTORS, kind_of
 from mbref import rotations
 
 Columns = Mapping[str, np.ndarray]
-EXACTLY = 1e-6  # of the difference: what remains is of rounding and printed digits
+EXACTLY = 1e-6  # fraction of the difference: a smaller remainder is rounding
 ALIKE = 20.0  # fits within this factor of the best count as equal, and the simplest of them comes first
 SHOWN = 3
 FACTORS = {

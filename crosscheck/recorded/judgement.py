@@ -18,7 +18,7 @@ from crosscheck.recorded.explanations import Difference, Explanation, ranked, wi
 from crosscheck.recorded.reading import Recording, read
 from mbref.scene import Scene, SceneError
 
-BEGINS = 0.01  # of the largest error: an error begins where it first exceeds this part
+BEGINS = 0.01  # fraction of the largest error that marks the begin of an error
 DENSE = 400  # further times at which the exact motion is known, for shifts in time
 TRIED = 20.0  # CPU seconds for motions of changed scenes
 

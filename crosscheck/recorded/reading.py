@@ -21,7 +21,7 @@ SHORT = {  # last part of a header → column
     **{f"q{a}": f"orientation.{a}" for a in "wxyz"},
 }
 ORDERS = ("wxyz", "xyzw")
-LATE = 50.0  # of the scene's duration: times beyond are in another unit
+LATE = 50.0  # multiple of the scene's duration: later times are in another unit
 
 
 @dataclass(frozen=True)

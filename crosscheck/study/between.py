@@ -11,9 +11,9 @@ from crosscheck.study.grid import Record
 
 STEP = "step"  # the option of fixed steps, s; the others that vary are tolerances
 MOST_COARSER = 8  # settings coarser than a family's own that are tried
-LOOSEST = 0.5  # of a tolerance: a larger one asks for nothing
-DIGITS = 3  # of the numbers
-STILL_CHEAPER = 0.97  # of the work of the next finer setting: a coarser one with more gains nothing
+LOOSEST = 0.5  # largest tolerance that is tried
+DIGITS = 3  # significant digits of the tried options
+STILL_CHEAPER = 0.97  # fraction of the next finer setting's work: a coarser setting must cost less
 
 
 def between(coarse: Setting, fine: Setting) -> Setting | None:

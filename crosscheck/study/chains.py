@@ -26,7 +26,7 @@ class Chains(ThreadPoolExecutor):
     def __init__(self, measure: Measure) -> None:
         super().__init__(os.cpu_count())
         self._measure, self._measuring = measure, ThreadPoolExecutor(1)
-        self._calls: dict[str, deque[Call]] = {}  # by engine, as long as a thread stays with it
+        self._calls: dict[str, deque[Call]] = {}  # keyed by engine, as long as a thread stays with it
         self._changing = Lock()
 
     def submit(self, run: Callable[..., Any], case: Any, /) -> Future[Any]:  # type: ignore[override]

@@ -14,9 +14,9 @@ from crosscheck.study.wording import runs
 from mbref.records import looked_at
 from mbref.scene import Scene, SceneError
 
-ERROR_RATIO = 2.0  # of errors; rounding and another order of operations scatter them by less above NOISE
+ERROR_RATIO = 2.0  # ratio of errors: larger than the scatter by rounding, above NOISE
 NOISE = 1e-12  # errors below it are rounding
-EARLIER = 0.1  # part of its end time by which a run that fails ends at another time
+EARLIER = 0.1  # fraction of the end time: a larger change of a failed run's end is reported
 MEASURES = {
     "velocities": "velocity_error",
     "closure": "violation_position",
@@ -24,8 +24,8 @@ MEASURES = {
     "reactions": "reaction_error",
 }
 """Metrics that are compared where the error did not change."""
-MEASURE_NOISE = 1e-11  # of these
-TIME_RATIO, SINGLE_RATIO = 1.5, 2.0  # of times: of interleaved repeats on the same machine, of single runs
+MEASURE_NOISE = 1e-11  # noise of METRICS: smaller values are not compared
+TIME_RATIO, SINGLE_RATIO = 1.5, 2.0  # ratios of times: interleaved repeats, single runs
 
 Identity = tuple[str, str, str, str, str]  # scene, engine, family, options, sample times
 

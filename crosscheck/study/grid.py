@@ -37,7 +37,7 @@ from mbref.trajectory import Outcome, Trajectory
 SCHEMA = 1
 SAMPLES = 101  # sample times of a default case, both ends included
 TIME_LIMIT = 60.0  # s, of a default case
-MEASURED = 2.0  # times the limits of a case: CPU time for its metrics
+MEASURED = 2.0  # CPU time for the metrics / time limit of the case
 PACKAGES = ("numpy", "scipy", "numba")
 
 Record = dict[str, Any]
@@ -220,7 +220,7 @@ def shown_name(engine_name: str) -> str:
     ``module:attribute``."""
     try:
         return engine(engine_name).name if ":" in engine_name else engine_name
-    except Exception:  # a module that cannot be imported: each run says so as its outcome
+    except Exception:  # each run reports the failed import as its outcome
         return engine_name
 
 

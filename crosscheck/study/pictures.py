@@ -13,7 +13,7 @@ from crosscheck.study.grid import Case, Record, run_case, study
 from crosscheck.study.record_view import error, is_completed
 from mbref.trajectory import Crossing
 
-DIGITS = 6  # of a position over the mechanism's size, more than a picture has pixels
+DIGITS = 6  # digits of a position / mechanism's size: finer than the pixels of a picture
 FRAMES = 75  # instants of the motion on a branch
 MOST = 2  # singular positions of a scene whose branches are shown
 DROPPED = ("reactions", "open_reactions")  # fields of a record that no picture shows

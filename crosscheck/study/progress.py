@@ -27,7 +27,7 @@ from crosscheck.study.grid import Record
 PARTS = 10  # lines of a progress that no terminal shows
 QUIET = 20.0  # s without a line, after which one names the work under way
 LOOKED = 0.5  # s after which that is looked at again
-HUNDREDTHS = 100  # parts in which the progress of one motion is reported
+HUNDREDTHS = 100  # number of progress reports for one motion
 Show = Callable[[int, int, str], None]  # done, in all, what was done last
 
 
@@ -45,7 +45,7 @@ class UnderWay:
     are made ready, such as that kernels are compiled; several threads may work."""
 
     def __init__(self) -> None:
-        self._began: dict[int, tuple[str, float]] = {}  # by thread
+        self._began: dict[int, tuple[str, float]] = {}  # keyed by thread
 
     def named(self, run: Callable[[Any], Any], name: Callable[[Any], str]) -> Callable[[Any], Any]:
         """The function, whose calls are under way by the name of what they are given."""

@@ -22,7 +22,7 @@ TITLES = {
 LEVEL = ERROR_LEVELS[1]  # the error at which speeds are compared in words
 SAID = f"{LEVEL:.0e}".replace("e-0", "e-")
 
-COMPILED = ", compiled"  # how families end that call an engine's library without Python
+COMPILED = ", compiled"  # suffix of families that call an engine's library without Python
 CLOCK = " Times are CPU seconds of stepping"
 ADAPTERS = ", each engine as crosscheck's Python adapter calls it."
 WITHOUT_PYTHON = (

@@ -24,7 +24,7 @@ from mbref.scenes.links import CRANK_RATE
 from mbref.scenes.planar_slider_crank import slider_crank
 
 RTOL = 1e-9
-MOST_STEPS = 200_000  # of a run, for every 30 s
+MOST_STEPS = 200_000  # steps of a run for every 30 s of limit
 SAMPLES = 21
 TIME_LIMIT = 20.0  # s of a run
 METHODS = (

@@ -18,8 +18,8 @@ QUICK_SCENES = {  # name → end time (s)
     "four_bar": 0.05,
     "five_bar": 0.05,
 }
-QUICK_FAMILIES = ("defaults", "tuned", "forward, compiled", "newton, compiled")  # else an engine's first ones
-MOST_FAMILIES, MOST_SETTINGS = 2, 3  # in the quick sweep, of an engine and of a family
+QUICK_FAMILIES = ("defaults", "tuned", "forward, compiled", "newton, compiled")  # else: the first
+MOST_FAMILIES, MOST_SETTINGS = 2, 3  # quick sweep: families of an engine, settings of a family
 QUICK_SAMPLES, SAMPLES = 31, 101
 QUICK_LIMIT, LIMIT = 5.0, 120.0  # s of a run
 

@@ -16,7 +16,7 @@ from crosscheck.study.record_view import error, error_bound, error_text, is_comp
 from mbref.scene import Scene
 
 NEAR = 1.12  # ratio of the work of two settings between which no other is tried
-HALVINGS = 6  # of a bracket, at most
+HALVINGS = 6  # most halvings of an interval of settings
 
 Run = Callable[[Sequence[Case]], list[Record]]
 

@@ -47,10 +47,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("mbref: interrupted", file=sys.stderr)
         return INTERRUPTED
-    except BrokenPipeError:  # the reader of our output has gone, as `head` does
+    except BrokenPipeError:  # the reader closed the pipe, as `head` does
         sys.stdout = None
         return INCOMPLETE
-    except OSError as error:  # of a file that is written
+    except OSError as error:  # a file could not be written
         return _refuse([f"{error.filename or options.out}: {error.strerror}"])
 
 

@@ -26,7 +26,7 @@ from mbref.simulation.limits import Limits
 from mbref.simulation.simulate import are_compiled, prepare, simulate
 
 SPAWN = multiprocessing.get_context("spawn")
-INTERPRETED = "NUMBA_DISABLE_JIT"  # environment variable with which numba compiles nothing
+INTERPRETED = "NUMBA_DISABLE_JIT"  # environment variable that turns numba's compilation off
 COMPILING = (
     "mbref: compiling kernels for this machine, once for each method, up to a minute; "
     "meanwhile they are interpreted"

@@ -22,7 +22,7 @@ PIPED_WIDTH = 80  # characters of a line where no terminal says otherwise
 TIME = "s"
 HOUR = 3600.0  # s
 PAUSE = 10.0  # s between two lines of progress where stderr is no terminal
-QUANTITIES = {  # of a body in a table → field of a trajectory
+QUANTITIES = {  # columns of a body in a table → field of a trajectory
     "position, m": "position",
     "velocity, m/s": "velocity",
     "angular velocity, rad/s": "angular_velocity",

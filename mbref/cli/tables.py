@@ -19,7 +19,7 @@ from mbref.stabilisation import STABILISATIONS
 
 METHOD = "a method: formulation+stabilisation/integrator, such as lm2+baumgarte[alpha=10,beta=10]/rk4"
 SHELLS = ("bash", "zsh", "tcsh")
-MEANINGS = {  # of stabilisations and integrators
+MEANINGS = {  # meanings of stabilisations and integrators
     "none": "constraint violations grow",
     "baumgarte": "violations decay by feedback; an error in the motion remains",
     "partitioning": "integrates independent coordinates and solves for the others",

@@ -22,10 +22,10 @@ SAMPLES = 61
 ROUNDING = (
     1e-5  # singular values below it (relative) at every pose are taken for rounding of the file's numbers
 )
-MOST_ROWS = 300  # beyond it dense singular values at every pose take too long
-SAME = 1e-9  # part of a length, radian or singular value that is no difference between two poses
-POSES = 5  # at which freedoms are looked at to second order
-MOST_STEPS = 20_000  # a slow motion is diagnosed up to the time that it reaches
+MOST_ROWS = 300  # constraint rows: for more, singular values at every pose take too long
+SAME = 1e-9  # relative difference below which two poses count as equal
+POSES = 5  # poses at which degrees of freedom are tested to second order
+MOST_STEPS = 20_000  # steps of the diagnosis; a longer motion is diagnosed in part
 
 
 @dataclass(frozen=True)

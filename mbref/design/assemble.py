@@ -16,8 +16,8 @@ from mbref.equations.packing import FRAME, Packs
 from mbref.scene import GROUND, Scene, SceneError
 
 Point = tuple[float, float, float]
-SHARES = 20  # parts in which large changes are made, so that the loops stay on their branch
-CLOSED = 1e-10  # of the mechanism's length
+SHARES = 20  # parts of a large change, so that the loops stay on their branch
+CLOSED = 1e-10  # fraction of the mechanism's length: smaller gaps are closed
 MOST_ITERATIONS = 50
 
 

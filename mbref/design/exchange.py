@@ -23,7 +23,7 @@ MOST_EXCHANGES = 4  # joints exchanged at once
 MOST_TRIALS = 3000
 PART = 1e-6  # weight of a row in a redundancy above which its joint takes part
 
-REMOVED = "removed"  # in the place of a new type
+REMOVED = "removed"  # stands for a joint type
 Exchange = dict[str, str]  # joint → its new type, or REMOVED
 
 

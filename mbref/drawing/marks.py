@@ -15,7 +15,7 @@ from mbref.drawing.view import Page
 from mbref.scene import GROUND, Driver, Joint, Load, Scene
 from mbref.trajectory import Trajectory
 
-ACTION = "#b3261e"  # of loads and drivers
+ACTION = "#b3261e"  # colour of loads and drivers
 STUB = 20.0  # px, half of an axis drawn at a joint
 ARROW = 52.0  # px
 FACING = 0.7  # cosine to the line of sight above which an axis is seen as a point

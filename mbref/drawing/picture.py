@@ -63,7 +63,7 @@ class Form(NamedTuple):
     columns: int = 1
 
 
-BESIDE = Form(width=360.0, margin=44.0, letters=20, columns=2)  # of motions side by side
+BESIDE = Form(width=360.0, margin=44.0, letters=20, columns=2)  # layout of motions side by side
 
 
 def still(scene: Scene, view: View | None = None, width: float = Form().width) -> str:

@@ -11,7 +11,7 @@ from mbref import rotations
 from mbref.scene import Body, Joint, Load, Scene
 from mbref.trajectory import Trajectory
 
-FLAT = 1e-6  # a mechanism or a body this thin, relative to its size, is planar or straight
+FLAT = 1e-6  # thickness / size below which a body or mechanism is planar or straight
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ DRAWN = (
     "floating ones, rotors, and ones without masses. Shown is on how many a card holds, of how many it was "
     "decided on."
 )
-ANY_DRAWN = "drawn mechanisms"  # in the place of a scene, in explanations
+ANY_DRAWN = "drawn mechanisms"  # stands for a scene in explanations (the name in stored records)
 UNEXPLAINED = "not explained yet"
 
 

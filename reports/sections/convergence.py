@@ -11,7 +11,7 @@ from reports.blocks import Block, Heading, Table, Text
 from reports.runs import Curve, Run, SceneRuns, number, power
 
 STEP = "step"
-TELLING = 5.0  # times the discretisation error: a lesser bias may be the extrapolation's own
+TELLING = 5.0  # multiple of the discretisation error: a lesser bias may be the extrapolation's own
 LIMITS = (
     "Scene",
     "Engine",

@@ -13,7 +13,7 @@ from reports import mechanisms
 from reports.blocks import Block, Heading, Moving, Table, Text
 from reports.runs import Run, SceneRuns, plain
 
-DIGITS = 12  # of the times shown, behind the point, s
+DIGITS = 12  # decimals of displayed times, s
 SHOWN = 12  # singular positions of one motion
 CAPTION = (
     "Positions at which the rank of the constraint Jacobian drops, passed by {label}; "

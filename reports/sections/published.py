@@ -11,7 +11,7 @@ from crosscheck.study.record_view import error_bound
 from reports.blocks import Block, Heading, Table, Text
 from reports.runs import Run, SceneRuns, duration, power
 
-LEAST = 1e-14  # below which a measure of a run in double precision is rounding
+LEAST = 1e-14  # smaller values are rounding in double precision
 HEADER = ("Engine", "Family", "Settings", "Error", "Accepted", "Time")
 
 

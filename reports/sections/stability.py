@@ -16,7 +16,7 @@ from reports.runs import Curve
 
 ALLOWED = max(1e3 * RTOL, 1e-6)  # error of a method of mbref beyond which a completed run is a false success
 MOST_DIGITS = 15.0
-LETTERS = {  # of outcomes that the paper's tables do not have
+LETTERS = {  # letters of outcomes that the paper's tables do not have
     "SINGULAR_POSITION": "s",
     "UNDECIDED": "u",
     "LEFT_MOTION": "m",

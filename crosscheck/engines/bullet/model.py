@@ -45,7 +45,7 @@ class Mechanism:
 
         self.p, self.scene, self.tree = pybullet, scene, tree
         self.places: dict[int, Place] = {}
-        self.joints: dict[int, tuple[int, int]] = {}  # of slides and turns, by velocity of the tree
+        self.joints: dict[int, tuple[int, int]] = {}  # joints, keyed by joint velocity of the tree
         self.rates = initial_rates(scene, tree)
         pybullet.setGravity(*scene.gravity)
         parts = pieces(tree, NEGLIGIBLE)
@@ -59,7 +59,7 @@ class Mechanism:
         """A multibody of the pieces that hang together; the first of them has the number ``start``."""
         floats = parts[0].mobility is not None and parts[0].mobility.kind == FREE
         first, links = (parts[0], parts[1:]) if floats else (None, parts)
-        up = start if floats else start - 1  # from pieces to links of PyBullet
+        up = start if floats else start - 1  # offset from pieces to PyBullet's links
         base: dict[str, Any] = {"baseMass": 0.0}
         if first:
             centre = (first.origin + first.offset).tolist()

@@ -39,8 +39,8 @@ ENDS = {  # status: outcome and sentence
 }
 RATE = 0.1  # 1/s, of the closures where they are not projected
 LEAST_TURN = 0.03  # rad turned within the shortest step, which only singular positions need
-SCOUT = {"rtol": 1e-6}  # of the run that finds how fast a scene turns
-SCOUT_STEP, SCOUTED = 1e-5, 101  # its shortest step over the duration, and its samples
+SCOUT = {"rtol": 1e-6}  # setting of the coarse run that measures how fast a scene turns
+SCOUT_STEP, SCOUTED = 1e-5, 101  # of the coarse run: shortest step / duration, number of samples
 
 
 class CasADi(Generator):

@@ -24,7 +24,7 @@ from crosscheck.engines.symbolic.generator import equations_of, origin
 from crosscheck.engines.symbolic.symbols import Symbol, bare, symbolic
 from mbref.scene import Scene
 
-FOLDER = "casadi"  # of the cache
+FOLDER = "casadi"  # folder in the cache
 FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-shared", "-fPIC", "-w")
 INTEGRATOR = Path(__file__).with_name("dop853.c")
 WRAPPER = """

@@ -23,11 +23,11 @@ B, C, ERROR3, ERROR5 = map(np.array, (tableau.B, tableau.C, tableau.ERROR3, tabl
 
 SAFETY, SHRINK, GROW, RETRY = 0.8, 0.2, 100.0, 0.25
 ORDER = 8
-STRETCH = 1e-9  # by which a step may be longer to end at a sample
+STRETCH = 1e-9  # relative extension of a step that ends at a sample
 SMALLEST = 1e-14  # step over the last sample's time, below which a run has failed
 JUMPS, LONGEST_JUMP = 16, 4.0  # lengths tried where the shortest step fails, the longest in shortest steps
 
-REACHED, NOT_FINITE, TOO_SMALL, TOO_MANY, REFUSED = range(5)  # how the way to a sample ends
+REACHED, NOT_FINITE, TOO_SMALL, TOO_MANY, REFUSED = range(5)  # statuses of an integration to a sample
 STEPS, REJECTED, EVALUATIONS = range(3)  # places of the counts
 
 

@@ -12,8 +12,8 @@ from numba import njit
 from crosscheck.engines.compiled.calls import rates_of
 from crosscheck.engines.compiled.dop853 import EVALUATIONS, NOT_FINITE, REACHED, STEPS, is_finite
 
-NOT_MET = 10  # how the way to a sample ends, beside REACHED and NOT_FINITE
-STRETCH = 1e-9  # of a step, by which it may be longer
+NOT_MET = 10  # further status of the way to a sample: closures are not satisfied
+STRETCH = 1e-9  # relative extension of a step that ends at a sample
 
 
 class System(NamedTuple):

@@ -26,7 +26,7 @@ from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
 DEFAULT_STEP = 1e-3  # s
-DEFAULT_ERP, STRONG_ERP = 0.01, 0.5  # of a closure error, removed in a step
+DEFAULT_ERP, STRONG_ERP = 0.01, 0.5  # fraction of a closure error that a step removes
 FINER = 2  # steps more, each a third of the one before: the method is of first order
 CLOSES = ("spherical", "revolute")
 FAMILIES = {

@@ -20,7 +20,7 @@ from crosscheck.engines.terms import Terms
 from crosscheck.engines.tree_reactions import LinkMotion
 from mbref.scene import Scene
 
-NEGLIGIBLE = 1e-24  # mass of bodies in chains of joints, of their links
+NEGLIGIBLE = 1e-24  # mass of auxiliary bodies in chains of joints / mass of the links
 PAIRS = {SLIDE: "Prismatic", TURN: "Revolute", BALL_JOINT: "Ball", FREE: "Free"}
 
 
@@ -33,7 +33,7 @@ class Mechanism:
         self.dart, self.scene, self.tree = dartpy, scene, tree
         self.coordinates = joint_coordinates(tree, in_child=True)
         self.skeleton = dartpy.dynamics.Skeleton(scene.name)
-        self.joints: dict[int, Any] = {}  # by joint velocity of the tree
+        self.joints: dict[int, Any] = {}  # keyed by joint velocity of the tree
         parts = pieces(tree, NEGLIGIBLE)
         built: list[Any] = []
         for piece in parts:

@@ -42,7 +42,7 @@ class Mechanism:
         if time_step:
             self.plant.SetUseSampledOutputPorts(False)  # the update is then one of discrete states alone
         self.plant.mutable_gravity_field().set_gravity_vector(scene.gravity)
-        self.joints: dict[int, Any] = {}  # by first joint velocity of the tree
+        self.joints: dict[int, Any] = {}  # keyed by first joint velocity of the tree
         self.bodies = self._bodies()
         for closure in tree.closures if time_step else ():
             self._close(closure)

@@ -18,7 +18,7 @@ from crosscheck.engines.exudyn.model import System, build
 from mbref.scene import Scene
 from mbref.trajectory import Cost, Outcome
 
-SAME = 1e-12  # relative to the end time: sample times nearer than this are the same
+SAME = 1e-12  # fraction of the end time: nearer sample times are equal
 
 Configure = Callable[[Any, Any, bool], Any]  # (exudyn, simulation settings, singular) -> solver type
 

@@ -33,7 +33,7 @@ from mbref.trajectory import Cost
 RICHARDSON = {4: 64 / 45, 2: -20 / 45, 1: 1 / 45}  # divisor of the step: weight; cancels h² and h⁴
 BEFORE, BEHIND = 2.0, 2.0  # steps from the failure to the ends of the window that is crossed
 NODES = 12  # states that the extrapolation across the window takes
-BESIDE = 0.05  # of their spacing: a node nearer to a sample is taken there
+BESIDE = 0.05  # fraction of the node spacing: a node nearer to a sample is moved to it
 APART = 6.0  # steps between them, where the last crossing does not end nearer
 
 
@@ -106,7 +106,7 @@ class _ExtrapolatedRuns:
     def arrive(self, samples: Samples) -> None:
         """Makes the last of the samples the present state."""
         times, values, _ = samples
-        data = self.solvers[-1].state().data  # only count turns
+        data = self.solvers[-1].state().data  # the data variables only count turns
         self.state = State(float(times[-1]), values[0, -1].ravel(), values[1, -1].ravel(), data)
 
     def motion(self, ending: Ending | None) -> Motion:

@@ -66,7 +66,7 @@ def projected(
 def _least(scene: Scene, orientation: np.ndarray, rows: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """The change (nb, 6) of the bodies' twists with these values of the rows and the least kinetic energy:
     the noise of a light body is not handed on to a heavy one."""
-    root = np.zeros((len(scene.body), 6, 6))  # one root a body of the mass matrix's inverse
+    root = np.zeros((len(scene.body), 6, 6))  # square root of M⁻¹, one block for each body
     masses = np.array([body.mass for body in scene.body], dtype=float)
     for k, (mass, inertia) in enumerate(zip(masses, inertia_matrices(scene), strict=True)):
         moments, principal = np.linalg.eigh(inertia)

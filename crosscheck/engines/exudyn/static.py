@@ -19,7 +19,7 @@ from crosscheck.judge.tolerances import RANK
 from mbref.scene import Scene
 from mbref.trajectory import Cost, Outcome
 
-JUMP = 0.5  # a step that misses the trapezoidal rule by more, relative to its length, left the branch
+JUMP = 0.5  # relative deviation from the trapezoidal rule above which a step has changed branch
 
 
 class Stopped(Exception):

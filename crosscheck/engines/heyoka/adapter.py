@@ -25,7 +25,7 @@ from crosscheck.engines.symbolic.symbols import Symbol, bare, symbolic
 from mbref.scene import Scene
 from mbref.trajectory import Cost, Outcome, Trajectory
 
-FOLDER = "heyoka"  # of the cache
+FOLDER = "heyoka"  # folder in the cache
 FAMILY = "taylor"
 FAMILIES = {FAMILY: "Taylor series of the order that heyoka chooses, without stabilisation of closures"}
 RTOLS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12)

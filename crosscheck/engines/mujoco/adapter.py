@@ -43,7 +43,7 @@ from mbref.scene import Driver, Scene
 from mbref.trajectory import Outcome, Trajectory
 
 TURN_PER_STEP = 0.25  # rad a driver may move within one adaptive step: closures can fold in between
-SCOUT_SAMPLES = 41  # of the coarse run that finds how fast a scene turns
+SCOUT_SAMPLES = 41  # samples of the coarse run that measures how fast a scene turns
 
 
 class MuJoCo(Engine):
@@ -160,7 +160,7 @@ class _MujocoSimulation:
     def installed(self) -> Iterator[None]:
         """MuJoCo's process-wide hooks are this run's, until the run is over."""
         mujoco = self.mujoco
-        mujoco.set_mju_user_warning(lambda _: None)  # they would go to the terminal and MUJOCO_LOG.TXT
+        mujoco.set_mju_user_warning(lambda _: None)  # warnings would go to the terminal and to MUJOCO_LOG.TXT
         try:
             if self.compiled.drivers:
                 mujoco.set_mjcb_control(self._drive)

@@ -43,10 +43,10 @@ from crosscheck.engines.mujoco.context import (
 )
 from crosscheck.engines.mujoco.rates import SIGNATURE, put
 
-ITERATIONS = 10  # of Newton's method at most; two are usual
+ITERATIONS = 10  # iterations of Newton's method at most; usually two
 CLOSED = 1e-13  # m and rad, where it ends
 CLOSED_ENOUGH = 1e-8  # m and rad, beyond which it has failed
-REDUNDANT = 1e-7  # of the largest row: what is left of a redundant one of a state not quite closed is below
+REDUNDANT = 1e-7  # fraction of the largest row: smaller remainders of elimination are redundant rows
 MET, NOT_MET = 0, 1
 TOLERANCE, EVALUATIONS, TIME = range(3)  # numbers of a motion that is followed
 

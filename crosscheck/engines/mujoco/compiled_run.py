@@ -22,7 +22,7 @@ from mbref.trajectory import Trajectory
 if TYPE_CHECKING:
     from crosscheck.engines.mujoco.context import Context
 
-ITERATIONS = 3  # of Newton's method: one meets equalities up to rounding
+ITERATIONS = 3  # iterations of Newton's method; one satisfies equalities to rounding
 UNUSED = (
     "CONTACT",
     "LIMIT",

@@ -16,7 +16,7 @@ import numpy as np
 from crosscheck.engines.mujoco.struct_layout import offset
 from mbref.scene import Driver
 
-ARMATURE = 1e15  # of a driven coordinate, in mean inertias of the model
+ARMATURE = 1e15  # armature of a driven coordinate / mean inertia of the model
 LIBRARIES = ("libmujoco.so*", "libmujoco*.dylib", "mujoco.dll")
 FUNCTIONS = (
     "mj_forward",
@@ -59,8 +59,8 @@ FUNCTIONS = (
     WIDTH,
 ) = range(29)  # places in the context
 POSITION, VELOCITY, INERTIA, AMPLITUDE, FREQUENCY, PHASE, POLYNOMIAL = range(7)  # numbers of a drive
-ROWS = 7  # of an equality at most
-NOTHING = 1e-12  # of the model's extent: a row of closures that nothing moves is rounding
+ROWS = 7  # most rows of an equality
+NOTHING = 1e-12  # fraction of the model's extent: smaller closure rows are rounding
 
 
 class Context(NamedTuple):

@@ -113,7 +113,7 @@ class _Builder:
     def __init__(self, mujoco: Any, scene: Scene, tree: Tree, spec: Any):
         self.mujoco, self.scene, self.tree, self.spec = mujoco, scene, tree, spec
         self.body = {GROUND_LINK: spec.worldbody}
-        self.joint: dict[int, Any] = {}  # by first joint velocity
+        self.joint: dict[int, Any] = {}  # keyed by first joint velocity
         self.applied: list[tuple[str, np.ndarray]] = []
 
     def centre(self, link: int) -> np.ndarray:

@@ -13,10 +13,10 @@ from crosscheck.engines.sampling import Failed
 from mbref.scene import Driver
 from mbref.trajectory import Outcome
 
-ITERATIONS = 10  # of Newton's method at most; two are usual
+ITERATIONS = 10  # iterations of Newton's method at most; usually two
 CLOSED = 1e-13  # m and rad, where it ends
 CLOSED_ENOUGH = 1e-8  # m and rad, beyond which it has failed
-REDUNDANT = 1e-7  # of the largest singular value: redundant rows of states not quite closed are below
+REDUNDANT = 1e-7  # fraction of the largest singular value: smaller ones belong to redundant rows
 
 Rows = Callable[[], Sequence[tuple[int, Driver]]]  # the driven constraint rows of the data as they are
 

@@ -31,7 +31,7 @@ FAMILIES = {FAMILY: "kinematics and inverse dynamics of a driven mechanism, pose
 STEPS = (100, 400, 1600)  # over a scene's duration
 BRYANT = ("Bryantx", "Bryanty", "Bryantz")
 LOCKED = 1e-3  # cosine of the second angle below which the other two lose digits
-EVEN = 1e-9  # relative difference of sample intervals that are one analysis
+EVEN = 1e-9  # relative difference below which sample intervals count as equal
 
 
 class Ondsel(Engine):
@@ -99,7 +99,7 @@ class _OndselSimulation:
         self.counts = Counts()
         self.samples: dict[float, Sample] = {}
         self.pose = initial_poses(scene)
-        self.hindered = False  # an analysis has failed: from then on sample by sample, as far as it goes
+        self.hindered = False  # True after a failed analysis: then each sample is computed alone
 
     def advance(self, t0: float, t1: float) -> None:
         """Has the sample at t1, and those after it at the same spacing, computed; raises Failed."""

@@ -14,7 +14,7 @@ from crosscheck.judge.constraints import inertia_matrices
 from mbref import rotations
 from mbref.scene import GROUND, Driver, Joint, Scene
 
-End = tuple[str, np.ndarray, np.ndarray]  # of a joint: body, point, axes (columns)
+End = tuple[str, np.ndarray, np.ndarray]  # end of a joint: body, point, axes (columns)
 JOINTS = {  # joint type: OndselSolver's
     "fixed": "fixed",
     "revolute": "revolute",
@@ -31,7 +31,7 @@ MOTIONS: dict[str | None, str] = {
 SUPPORTS = Supports(
     joints=tuple(JOINTS),
     drivers=("angle", "displacement"),
-    loads=("moment", "force", "spring", "torsion_spring"),  # no load changes a motion that is prescribed
+    loads=("moment", "force", "spring", "torsion_spring"),  # loads do not change a prescribed motion
 )
 # joints whose accelerations are right only where the first body is at rest:
 ACCURATE_ON_GROUND = ("cylindrical", "planar")

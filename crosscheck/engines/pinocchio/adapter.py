@@ -42,20 +42,20 @@ from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
 Step = Callable[[np.ndarray, float, float], np.ndarray]  # (state, its time, a later time) -> state then
-WITHOUT_PYTHON = 1e-9, 1e-7, 5  # the same in compiled code: fewer iterations are as exact there
+WITHOUT_PYTHON = 1e-9, 1e-7, 5  # solver parameters in compiled code; fewer iterations suffice
 FORCES = (
     1e-9,
     1e-6,
     50,
-)  # the same where redundant closures' forces are read, in which rounding grows as 1/mu
+)  # solver parameters for forces of redundant closures, whose rounding grows as 1/mu
 PROJECTIONS = 10  # Newton iterations at most; two are usual
 CLOSED = 1e-13  # m and rad, where a projection ends
-REDUNDANT = 1e-7  # of the largest singular value: redundant rows of states not quite closed are below
-NOTHING = 1e-12  # of the scene's length: rows of closures that the tree satisfies by itself are rounding
+REDUNDANT = 1e-7  # fraction of the largest singular value: smaller ones belong to redundant rows
+NOTHING = 1e-12  # fraction of the scene's length: smaller closure rows are rounding
 CLOSED_ENOUGH = 1e-8  # m and rad, beyond which it has failed
 TURN_PER_STEP = 0.25  # rad a driver may move within one adaptive step: closures can fold in between
 SCOUT_RTOL = 1e-5
-SCOUT_SAMPLES = 41  # of the coarse run that finds how fast a scene turns
+SCOUT_SAMPLES = 41  # samples of the coarse run that measures how fast a scene turns
 HINTS = {"defaults": ": the default solver settings fail on redundant closures"}
 
 
@@ -128,7 +128,7 @@ class _PinocchioSimulation:
         self.counts = Counts()
         self.loads = Loads(mechanism)
         self.nq = self.model.nq
-        self.least = NOTHING * max(1.0, scene_length(scene))  # of a Jacobian's entry that is not rounding
+        self.least = NOTHING * max(1.0, scene_length(scene))  # smallest Jacobian entry that is not rounding
         self.flat = self.nq == self.model.nv  # no quaternions: dq/dt = v
         self.driven = [(mechanism.q_of_v[i], self.nq + i, driver) for i, driver in mechanism.driven]
         self.free = np.setdiff1d(np.arange(self.model.nv), [i for i, _ in mechanism.driven])

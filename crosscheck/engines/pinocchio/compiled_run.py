@@ -28,7 +28,7 @@ class Solver(NamedTuple):
     mu: float
     iterations: int
     beta: float  # double root of the closure errors, 1/s
-    nothing: float  # an entry of the closures' Jacobian below is rounding
+    nothing: float  # smaller entries of the closure Jacobian are rounding
 
 
 def why_not(scene: Scene) -> str:

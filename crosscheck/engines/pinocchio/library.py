@@ -13,7 +13,7 @@ from pathlib import Path
 from crosscheck.engines import kept
 from crosscheck.engines.compiler import CXX, NoLibrary
 
-FOLDER = "pinocchio"  # of the cache
+FOLDER = "pinocchio"  # folder in the cache
 SOURCE = Path(__file__).with_name("rates.cpp")
 FLAGS = (
     "-std=c++17",
@@ -28,7 +28,7 @@ FLAGS = (
     "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",
     "-DBOOST_FUSION_INVOKE_MAX_ARITY=12",
 )
-EIGEN = Path("/usr/include/eigen3")  # of the system, in addition to the one of the prefix
+EIGEN = Path("/usr/include/eigen3")  # system folder, searched after the folder of the Python environment
 
 
 def why_not() -> str:

@@ -61,7 +61,7 @@ class Mechanism:
         self.model = pin.Model()
         self.model.gravity = pin.Motion(np.array(scene.gravity), np.zeros(3))
         self.joint: list[int] = []
-        self.motions: list[Mobility] = []  # of Pinocchio's joints
+        self.motions: list[Mobility] = []  # elementary motions of Pinocchio's joints
         self.origin: dict[int, np.ndarray] = {0: np.zeros(3)}
         for k, link in enumerate(self.tree.links):
             self._add(k, link)

@@ -31,8 +31,8 @@ SUPPORTS = Supports(
     drivers=("angle", "displacement"),
     loads=("moment", "force", "spring", "torsion_spring"),
 )
-UNLIMITED = 1e9  # rad or m; coordinates have a range
-LOCKED = 1e-12  # cosine of the second angle below which the first and third are one
+UNLIMITED = 1e9  # rad or m; limit of a coordinate's range, which OpenSim requires
+LOCKED = 1e-12  # cosine of the second angle below which the first and third axis coincide
 
 
 class Mechanism:
@@ -46,7 +46,7 @@ class Mechanism:
         self.model = opensim.Model()
         self.model.setGravity(opensim.Vec3(*scene.gravity))
         self.bodies: list[Any] = []
-        self.coordinates: dict[int, Any] = {}  # by joint velocity of the tree
+        self.coordinates: dict[int, Any] = {}  # keyed by joint velocity of the tree
         for k, link in enumerate(self.tree.links):
             self._add(k, link)
         self.closures = [self._close(k, closure) for k, closure in enumerate(self.tree.closures)]

@@ -17,11 +17,11 @@ from mbref import rotations
 from mbref.scene import Scene
 from mbref.trajectory import Outcome
 
-INCREMENT = 1e-7  # of the difference quotients, relative to a component's scale
+INCREMENT = 1e-7  # increment of difference quotients / scale of the component
 WORSE = 1e-2  # replace the chosen rows if their least pivot falls below this part of the best choice's
-LOST = 1e-2  # of the length and of a radian: a row left out that is off by more was no redundant one
-LOOSE = 1e2  # of the scale of the integral of μ: of no interest, and at first order its error rules the steps
-LEAST_STEP = 1e-12  # of the duration
+LOST = 1e-2  # fraction of the length, or rad: a dropped row violated by more was not redundant
+LOOSE = 1e2  # tolerance of ∫μ / its scale; loose, because ∫μ is not used and would limit the steps
+LEAST_STEP = 1e-12  # fraction of the duration
 MAX_STEPS = 10**6
 ENDINGS = {  # IDA's return flags
     -1: Outcome.STEP_FAILED,

@@ -26,7 +26,7 @@ from crosscheck.engines.tree_reactions import LinkMotion, wrench
 from mbref.scene import Moment, Scene
 
 Entries = Sequence[Any] | np.ndarray  # numbers or symbols
-SEED = 1  # of the pose at which rows that vanish are found
+SEED = 1  # random seed of the pose at which vanishing rows are found
 
 
 class TreeEquations:
@@ -76,7 +76,7 @@ class TreeEquations:
         """The links in motion, their origins at ``position``."""
         zero = np.zeros(3, dtype=object)
         ground = Frame(np.zeros(3), zero, np.eye(3).astype(object), zero, zero, zero, zero)
-        anchored: list[Frame] = []  # with the origin at the anchor of the link's own joint
+        anchored: list[Frame] = []  # frames whose origin is the anchor of the link's joint
         for link, first in zip(self.tree.links, self.tree.starts, strict=True):
             parent = ground if link.parent == GROUND_LINK else anchored[link.parent]
             frame = parent.moved(parent.arm(link.anchor), link.anchor)

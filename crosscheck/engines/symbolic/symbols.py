@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-NOTHING = 1e-12  # an entry that is rounding
+NOTHING = 1e-12  # smaller entries are rounding
 
 
 @dataclass(frozen=True)

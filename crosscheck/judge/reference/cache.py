@@ -49,7 +49,7 @@ def save(scene: Scene, arrays: dict[str, np.ndarray]) -> None:
     body, path = io.BytesIO(), _path(scene)
     named: dict[str, Any] = {**arrays}  # of one type, they would count as the switch that savez also takes
     np.savez(body, **named)
-    with contextlib.suppress(OSError):  # a cache that cannot be written is no cache
+    with contextlib.suppress(OSError):  # without a writable cache the result is not stored
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
             file.write(hashlib.sha256(body.getvalue()).digest() + body.getvalue())

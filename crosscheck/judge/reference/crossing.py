@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.polynomial import chebyshev
 
-NEAR = 0.15  # of the median distance from singularity: points to be bridged
-MOST = 0.25  # of the points may be bridged
-DEGREE = 8  # of the polynomial that shows whether the distance changes its sign
+NEAR = 0.15  # fraction of the median distance from singularity: nearer points are interpolated
+MOST = 0.25  # largest fraction of interpolated points
+DEGREE = 8  # degree of the polynomial that tests whether the distance changes its sign
 WINDOW = 12  # points on either side that it goes through
 SIGNED = 0.1  # misfit of the signed distance, relative to the misfit of the unsigned distance
 

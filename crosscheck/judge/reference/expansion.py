@@ -18,7 +18,7 @@ from crosscheck.judge.reference.natural import NaturalCoordinates
 from crosscheck.judge.reference.natural_loads import Loads, LoadSeries, convolved
 from crosscheck.judge.reference.saddle_point import SaddlePoint
 
-LEAST_TERMS = 6  # before which no series is cut
+LEAST_TERMS = 6  # smallest number of terms of a series
 
 
 class Expansion:

@@ -23,7 +23,7 @@ WEAKER = {
 }
 """Types whose rows are among those of a type, with the same anchor and axis; the fewest rows first."""
 REMOVED = "removed"
-KEPT = 0.02  # part of the least singular value that rows keep without the redundant ones
+KEPT = 0.02  # smallest singular value without the removed rows / with them
 Pose = tuple[float, np.ndarray, np.ndarray]
 """Time, positions (nb, 3) and orientations (nb, 4)."""
 

@@ -18,19 +18,19 @@ from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
 from crosscheck.judge.reference.crossing import bridged, singular_ahead, singular_time
 
 SWEEPS = 60  # Picard iterations before a panel is shortened
-MANY = 35  # a panel that took more is not followed by a longer one
+MANY = 35  # iterations: after more of them the next panel is not longer
 SETTLED = 2000.0  # rounding units of the last change, and of the end of the series
-BRIDGED = 1e4  # times more, across a singular position
+BRIDGED = 1e4  # factor on the tolerance across a singular position
 TELLING = 1e-3  # change below which the series determines the length of a panel
 ROUGHLY = 1.2  # safety factor on the length that the series of an iterate gives
-SPARE = 0.9  # of the length that the series could resolve
+SPARE = 0.9  # panel length / longest length that the series resolves
 LONGEST, SHORTER, SHORTEST = 1.6, 0.6, 0.5  # factors on the length of the next panel
-FLOOR = 1e-3  # of the largest column, below which a column counts as small
+FLOOR = 1e-3  # fraction of the largest column: smaller columns count as small
 DIVERGES = 1e3
 LAST = 3  # coefficients of a series that must be small
 FLAT = 0.1  # ratio of its last eighth to the one before, from which on a series ends in rounding noise
-NOISE = 4.0  # times the last eighth: noise that an iteration is left with
-NOISIEST = 1e5  # times the tolerance: noise with which a panel may settle
+NOISE = 4.0  # multiple of the last eighth of the coefficients: noise level of an iteration
+NOISIEST = 1e5  # multiple of the tolerance: largest noise of a converged panel
 
 
 class Equations(Protocol):

@@ -23,12 +23,12 @@ from crosscheck.judge.reference.tree import tree_motion
 from mbref.scene import Scene
 
 SECONDS = 20.0
-TWIN_ORDER, TWIN_NODES, TWIN_SEED = 24, 1.8, 1  # of second runs: A's order, B's points a digit
+TWIN_ORDER, TWIN_NODES, TWIN_SEED = 24, 1.8, 1  # second runs: order of A, nodes per digit of B, seed
 CONSISTENT = 32 * EXTENDED.eps  # residual that is of the motion's own rounding, not of the scene's
-SHARE = 0.4  # of the time that is left for each run of A
+SHARE = 0.4  # fraction of the time that is left for each run of A
 FIELDS = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
 
-_computing: dict[str, Lock] = {}  # by what determines the motion
+_computing: dict[str, Lock] = {}  # locks, keyed by the data that determine a motion
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 from crosscheck.judge.deadline import ask
 from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
 
-ROUNDS = 40  # of refinement, at most
-FIRST = 4.0  # so that the first round, which finds the solution itself, is not the last
+ROUNDS = 40  # refinement steps at most
+FIRST = 4.0  # initial correction size, so that the first step is never the last
 TINY = 1e-300
-STALLED = 0.5  # a round that leaves more than this part of the last correction is the last one
+STALLED = 0.5  # ratio of successive corrections above which refinement ends
 
 
 class Sparse:

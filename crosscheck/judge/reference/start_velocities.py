@@ -19,8 +19,8 @@ from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
 from crosscheck.judge.tolerances import RANK
 from mbref.scene import Scene
 
-ROUNDS = 40  # of correction, at most
-STALLED = 0.5  # a round that corrects by more than this part of the last is the last one
+ROUNDS = 40  # correction steps at most
+STALLED = 0.5  # ratio of successive corrections above which the iteration ends
 
 
 @dataclass(frozen=True)

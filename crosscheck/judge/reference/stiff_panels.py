@@ -30,12 +30,12 @@ from crosscheck.judge.reference.panels import (
 )
 
 MOST = 2500  # unknowns of a panel
-STIFF = 4.0  # times that the fastest decay is shorter than a panel
+STIFF = 4.0  # panel length / fastest decay time above which a panel is stiff
 SWEEPS = 25  # corrections before a panel is shortened
 AGAIN = 1e-4  # change from which on slopes are not taken again
-GROWS = 2.0  # times the last change: the iteration diverges
-RESOLVED = 0.1  # of the tolerance: the end of the states' series
-STEP = 1e-5  # of the largest in a column, for difference quotients
+GROWS = 2.0  # ratio of successive changes above which the iteration diverges
+RESOLVED = 0.1  # fraction of the tolerance: largest last coefficients of a resolved series
+STEP = 1e-5  # increment of difference quotients / largest entry of the column
 
 
 class SlopedEquations(Equations, Protocol):

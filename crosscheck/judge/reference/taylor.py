@@ -27,22 +27,22 @@ from mbref.scene import Scene
 
 ORDER = 28
 NEW_ROW = 1e-4  # pivot from which a row that was dependent at the start has become independent
-BLUNT = 0.25  # part of the best sharpness below which the choice of rows is looked at again
-KEEN = 0.5  # part of the best sharpness that other rows have to have,
-BETTER = 1e3  # or else how many times sharper they have to be
-NEAR = 0.4  # part of the usual sharpness below which a position counts as near a singular one
-PREFERENCE = 0.2  # by how much a row's weight may be larger
+BLUNT = 0.25  # smallest singular value / its best value: below it the selection of rows is reconsidered
+KEEN = 0.5  # smallest singular value of the new rows / best value: required,
+BETTER = 1e3  # or: smallest singular value of the new rows / of the old rows
+NEAR = 0.4  # smallest singular value / usual value: below it a singular position is near
+PREFERENCE = 0.2  # largest relative change of a row's weight
 USUAL = 50  # steps over which sharpness is usual
 DATA = float(np.finfo(float).eps)  # rounding of a scene's numbers
 ENOUGH = 100.0  # multiples of the tolerance that a leap may lose without trying from nearer
 TRIED = 24  # lengths at which a singular position is looked for
-FINE = 1e-6  # relative accuracy of its place
-DEPENDENT = 0.02  # part of the present sharpness that it falls below
+FINE = 1e-6  # relative accuracy of the time of the singular position
+DEPENDENT = 0.02  # smallest singular value / present value: below it the rows are dependent
 SHORTER = 0.8  # factor on a step that ends too near to a singular position
 LEAST_STEP = 1e-6  # s, where no time is left
-SHORTEST = 1e-9  # step, relative to the time reached, at which the series is said to end
+SHORTEST = 1e-9  # step / time reached: a shorter step ends the run
 STEPS_END = "its steps end: its series cannot be continued over a singular position there"
-WITHOUT_INERTIA = 1e-13  # part of the largest inertia of a freedom that counts as none
+WITHOUT_INERTIA = 1e-13  # fraction of the largest inertia: smaller ones count as zero
 
 Sample = tuple[np.ndarray, ...]
 

@@ -22,13 +22,13 @@ from crosscheck.judge.reference.vectors import apply, product, unit
 from mbref.scene import Scene
 
 NODES_PER_DIGIT = 2.1
-FIRST = 0.1  # of the time asked for: length of the first panel
-LEAST = 1e-10  # of the time asked for: shortest panel
-SLOW = 20  # of Picard's iterations, from which on a panel may be stiff
-NEAR_END = 0.7  # part of a panel from which on a singular position is too near its end
+FIRST = 0.1  # length of the first panel / duration
+LEAST = 1e-10  # shortest panel / duration
+SLOW = 20  # Picard iterations: a panel that needs more may be stiff
+NEAR_END = 0.7  # fraction of a panel: a singular position later than this is too near its end
 BEYOND = 0.35  # half lengths from the end of a panel to a singular position that its series leaps over
 LEAST_LOST = 1e6  # rounding units that a leap may lose without trying from nearer
-MOST_LOST = 1e-7  # by a leap at most; most of it is off the closed loops, onto which the end is put again
+MOST_LOST = 1e-7  # largest error of a step across a singular position, before closures are corrected
 SEVERAL = 3  # panels across one singular position that do not settle before it is leapt over
 
 

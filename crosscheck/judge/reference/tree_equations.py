@@ -22,9 +22,9 @@ from crosscheck.judge.reference.vectors import apply, product, saddle_solve, uni
 from crosscheck.judge.tolerances import RANK
 from mbref.scene import Driver, Scene
 
-WORSE = 0.5  # part of the best conditioning below which other rows are chosen
+WORSE = 0.5  # conditioning / best conditioning: below it other rows are selected
 CORRECTIONS = 8  # Newton iterations at most that close the loops
-PREFERENCE = 0.2  # by how much a row's weight may be larger
+PREFERENCE = 0.2  # largest relative change of a row's weight
 OPEN = 1e-9  # residual, relative to the scene's length, of rows that were taken as redundant and are not
 
 

@@ -27,7 +27,7 @@ RIGIDITY = {
     "planar": 3,
     "spherical": 3,
 }
-PREFERRED = 10  # of joints with a driver or a torsion spring, whose coordinate is then at hand
+PREFERRED = 10  # weight of joints with a driver or a torsion spring, so that they stay in the tree
 
 
 @dataclass(frozen=True)

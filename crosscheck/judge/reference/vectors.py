@@ -10,8 +10,8 @@ from crosscheck.judge.reference.arithmetic import doubles
 COLUMN = np.array([[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]])
 SIGN = np.array([[1, -1, -1, -1], [1, 1, -1, 1], [1, 1, 1, -1], [1, -1, 1, 1]])
 """Entries of the matrix L(p) with p q = L(p) q for quaternions."""
-REGULAR = 1e-15  # on the diagonal of the scaled matrix that is inverted in doubles
-LIGHT = 1e-12  # least diagonal of a mass matrix, relative to the largest, that the scaling follows
+REGULAR = 1e-15  # regularisation on the diagonal of the scaled matrix
+LIGHT = 1e-12  # smallest diagonal entry of a mass matrix / largest, as used for scaling
 REFINEMENTS = 40
 
 

@@ -49,7 +49,7 @@ class Pose:
     dspin: np.ndarray
 
 
-DrivenSign = Callable[[Driver], float | None]  # the sign with which a driver moves q; None: it does not
+DrivenSign = Callable[[Driver], float | None]  # sign of a driver's motion of q; None: no motion
 
 
 @dataclass(frozen=True)

@@ -16,13 +16,13 @@ import numpy as np
 
 from crosscheck.judge.deadline import TimeIsUp, ask, within
 
-NODES = 64  # per panel, degree 63
+NODES = 64  # nodes of a panel (polynomials of degree 63)
 SWEEPS = 60  # Picard iterations before a panel is shortened
-EASY = 20  # a panel that converged within so many sweeps lets the next be longer
+EASY = 20  # iterations: after fewer of them the next panel is longer
 ROOT_STEPS = 20  # Newton iterations for the place of a value
 UP, DOWN = np.longdouble(1.2), np.longdouble(0.7)  # factors on the length of the next panel
 REAL = np.longdouble  # 64-bit mantissa on x86; double elsewhere, with the accuracy of double
-SETTLED = 64 * float(np.finfo(REAL).eps)  # relative size of the last change and of the series' tail
+SETTLED = 64 * float(np.finfo(REAL).eps)  # relative limit of the last change and of the last coefficients
 SECONDS = 20.0  # CPU time for all panels of a solution: it is known up to where they came
 SMALLEST = 1e-12  # panel length, relative to the time reached, at which the solution has a singularity
 

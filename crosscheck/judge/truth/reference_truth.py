@@ -11,7 +11,7 @@ from crosscheck.judge.truth.picard import NoSolution
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
-SAMPLES = 101  # of the scene's duration, for the accuracy of a truth that was not asked for poses
+SAMPLES = 101  # samples over the duration, to state a truth's accuracy before poses are requested
 
 
 class ReferenceTruth:

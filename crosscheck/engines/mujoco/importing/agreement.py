@@ -19,8 +19,8 @@ from crosscheck.judge.constraints import closure, inertia_matrices, jacobian
 from mbref import rotations
 from mbref.scene import Scene, SceneError, Spring
 
-AGREE = 1e-8  # of the largest entry: rounding of inertias and poses leaves less than 1e-10
-RANK = 1e-8  # of the largest singular value of rows of length one
+AGREE = 1e-8  # fraction of the largest entry: rounding of inertias and poses leaves less than 1e-10
+RANK = 1e-8  # fraction of the largest singular value of rows of length one
 RANDOM_POSES = 2
 TRIES = 12  # random poses tried for each one, because not every pose can be closed
 REACH = 0.25  # rad, and m of the extent: largest change of a coordinate of a random pose

@@ -16,7 +16,7 @@ from mbref.scene import GROUND, SceneError
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 SHORT = {"3d": "spherical", "6d": "fixed"}  # numbers of equations, as YAML files of parallel robots name them
-COINCIDENT = 1e-6  # of the model's extent
+COINCIDENT = 1e-6  # fraction of the model's extent
 GRAMMAR = "frame_a=frame_b[:type[:axis]] or a .yaml file"
 
 

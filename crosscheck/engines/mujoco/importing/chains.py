@@ -22,7 +22,7 @@ from mbref.scene import (
 )
 
 ALIGNED = 1e-9  # between unit vectors; and between points, of the model's extent
-RANK = 1e-9  # of the largest singular value of the motions: less is no further motion
+RANK = 1e-9  # fraction of the largest singular value: smaller ones are not independent motions
 Made = list[tuple[type[Any], dict[str, Any]]]
 
 

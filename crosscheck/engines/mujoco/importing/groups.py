@@ -11,7 +11,7 @@ from mbref import rotations
 from mbref.scene import GROUND, Body
 
 WORLD = 0  # MuJoCo's number of the world, and of the group that is fixed to it
-PLAIN = 1e-15  # of the largest moment: products of inertia below it are rounding
+PLAIN = 1e-15  # fraction of the largest moment: products of inertia below it are rounding
 
 
 @dataclass(frozen=True)

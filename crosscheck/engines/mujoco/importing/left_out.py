@@ -10,7 +10,7 @@ import numpy as np
 
 from mbref.scene import SceneError
 
-KINDS = {  # of parts that change the motion → what they are
+KINDS = {  # kinds of parts that change the motion → their description
     "armature": "inertia of rotors, reflected to joint coordinates or tendons",
     "couplings": "joint coordinates or tendons that follow others",
     "damping": "dampers of joints and tendons that no load of a scene describes",

@@ -13,11 +13,11 @@ from crosscheck.engines.mujoco.importing.chains import kind_of
 from crosscheck.engines.mujoco.importing.closures import Closure
 from mbref.scene import SceneError
 
-CLOSED = 1e-12  # of the model's extent, and rad: loops are closed
-ROUNDED = 1e-9  # the same where Newton's method ends above CLOSED, at a position that is nearly singular
+CLOSED = 1e-12  # fraction of the model's extent, or rad: smaller gaps are closed
+ROUNDED = 1e-9  # limit like CLOSED at nearly singular positions, where Newton's method is less accurate
 ITERATIONS = 200
 LONGEST = 0.2  # rad, and m of the extent: largest change of a coordinate in an iteration
-RANK = 1e-9  # of the largest singular value: smaller ones belong to redundant rows
+RANK = 1e-9  # fraction of the largest singular value: smaller ones belong to redundant rows
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from crosscheck.engines.mujoco.importing.posing import JointRow, Poses
 from mbref.formats import Imported, ImportOptions
 from mbref.scene import GROUND, Body, Driver, Joint, Scene, SceneError
 
-OPEN = 1e-6  # of the model's extent: a closure that was open wider at the start is reported
+OPEN = 1e-6  # fraction of the model's extent: a wider gap at the start is reported
 
 
 @dataclass(frozen=True)
