@@ -208,7 +208,7 @@ def _driver_lines(scene: Scene) -> list[str]:
 
 def _unique(found: Diagnosis) -> str:
     """Return the joints whose whole reaction is unique."""
-    return ", ".join(found.unique_reactions) or "of no joint as a whole"
+    return ", ".join(found.unique_reactions) or "none as a whole"
 
 
 def _listed(numbers: dict[str, int]) -> str:

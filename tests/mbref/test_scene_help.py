@@ -418,7 +418,10 @@ def test_animate_shows_branches_side_by_side(tmp_path, capsys, monkeypatch):
             "singular position 1 at t = 0.0125865 s: one branch; singular position 2",
         ),
         ("planar_slider_crank --duration 0.1", "the motion passes none"),
-        ("four_bar --duration 0.05 --crossing 3", "must be at most 2, the singular positions up to t = 0.05 s, got 3"),
+        (
+            "four_bar --duration 0.05 --crossing 3",
+            "must be at most 2, the singular positions up to t = 0.05 s, got 3",
+        ),
         ("planar_slider_crank --duration 0.1 --method mpi-svd+none", "does not detect singular positions"),
     ],
 )
