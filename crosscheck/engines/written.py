@@ -11,6 +11,9 @@ class Written:
     A function that sets up an engine's settings writes its own code when it is given this object.
     """
 
+    _name: str
+    _statements: list[str]
+
     def __init__(self, name: str, statements: list[str]):
         object.__setattr__(self, "_name", name)
         object.__setattr__(self, "_statements", statements)

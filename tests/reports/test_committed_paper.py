@@ -15,6 +15,7 @@ from reports import render
 from reports.sections import paper
 
 FOLDER = Path(__file__).parents[2] / "reports" / "paper"
+README = (Path(__file__).parents[2] / "README.md").read_text()
 HOOKS = Path(__file__).parents[2] / "docs" / "hooks.py"
 
 
@@ -41,7 +42,9 @@ def test_every_cell_and_figure_has_its_record(records):
 
 def test_records_are_of_one_clean_commit_and_small(records):
     commits = {record["commit"] for record in records.records.values()}
-    assert len(commits) == 1 and "+" not in commits.pop(), f"made from a clean checkout: {commits}"
+    [commit] = commits
+    assert "+" not in commit, f"made from a clean checkout: {commit}"
+    assert f"records of commit {commit[:7]}" in README, "README states the commit of the paper's records"
     assert sum(path.stat().st_size for path in FOLDER.rglob("*") if path.is_file()) < 9e6
 
 

@@ -11,6 +11,7 @@ from reports.blocks import Figure, Plot
 from reports.runs import SceneRuns
 
 FOLDER = Path(__file__).parents[2] / "reports" / "reference"
+README = (Path(__file__).parents[2] / "README.md").read_text()
 DRAWING = re.compile(r'(<div class="wide"[^>]*>).*?</div>', re.DOTALL)
 
 
@@ -57,4 +58,5 @@ def test_the_report_is_of_one_commit_and_small(groups):
     assert "+" not in commit, "made from a clean checkout"
     text = (FOLDER / "report.md").read_text()
     assert f"records of commit {commit}, " in text, "the report names the commit of its records"
+    assert f"are of commit {commit[:7]}, later changes" in README, "README states the commit of the report"
     assert sum(path.stat().st_size for path in FOLDER.rglob("*") if path.is_file()) < 15e6
