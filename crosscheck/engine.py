@@ -5,7 +5,6 @@ An engine of a third party needs to import nothing but this module.
 
 from __future__ import annotations
 
-import enum
 import os
 import sys
 from abc import ABC, abstractmethod
@@ -17,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.judge.constraints import inertia_matrices, initial_poses, initial_twists
+from crosscheck.refusals import Cannot, Owner, Supports
 from mbref import rotations
 from mbref.scene import GROUND, Scene
 from mbref.scene_fields import meant
@@ -54,73 +54,6 @@ __all__ = [
 BRANCHES = "branches"  # the option that chooses branches at singular positions, where an engine has one
 BEST = "tuned"  # the family that is an engine's best, where it has one of that name
 FamilyParts = Mapping[str, Mapping[str, Mapping[str, float]]]  # kind of part → name → options and defaults
-
-
-class Owner(enum.Enum):
-    """The part that would have to change before an engine could do what it refuses."""
-
-    ADAPTER = "missing in the adapter"
-    ENGINE = "missing in the engine"
-    MODEL = "excluded by the engine's model"
-
-
-@dataclass(frozen=True)
-class Cannot:
-    """A refusal, given before running.
-
-    Attributes
-    ----------
-    owner : Owner
-        The part that is the cause: adapter, engine, or the engine's model.
-    reason : str
-        One sentence about the scene.
-    """
-
-    owner: Owner
-    reason: str
-
-    def __str__(self) -> str:
-        return f"{self.reason} ({self.owner.value})"
-
-
-@dataclass(frozen=True)
-class Supports:
-    """Features that an adapter maps to its engine.
-
-    Attributes
-    ----------
-    joints : collection of str
-        Joint types, as in scene files.
-    drivers : collection of str
-        Driven coordinates: ``"angle"``, ``"displacement"``.
-    loads : collection of str
-        Load types, as in scene files.
-    """
-
-    joints: Collection[str] = ()
-    drivers: Collection[str] = ()
-    loads: Collection[str] = ()
-
-    def missing(self, scene: Scene) -> Cannot | None:
-        """Return the refusal of the first joint, driver or load that is not declared, or None."""
-        reasons = [
-            f"joint {joint.name!r} is of type {joint.type!r}, which the adapter does not map"
-            for joint in scene.joint
-            if joint.type not in self.joints
-        ]
-        for driver in scene.driver:
-            coordinate = scene.joint_named(driver.joint).facts.driven
-            if coordinate not in self.drivers:
-                reasons.append(
-                    f"the driver of joint {driver.joint!r} prescribes its {coordinate}, "
-                    "which the adapter does not map"
-                )
-        reasons += [
-            f"load[{k}] is of type {load.type!r}, which the adapter does not map"
-            for k, load in enumerate(scene.load)
-            if load.type not in self.loads
-        ]
-        return Cannot(Owner.ADAPTER, reasons[0]) if reasons else None
 
 
 @dataclass(frozen=True)

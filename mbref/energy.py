@@ -11,7 +11,10 @@ from mbref.trajectory import Trajectory
 
 
 def kinetic(scene: Scene, motion: Trajectory) -> np.ndarray:
-    """Σ (m v·v + ω·J ω)/2 over the bodies (k,), J; raises ValueError where a body has no mass."""
+    """Σ (m v·v + ω·J ω)/2 over the bodies and Σ I q'²/2 over armatures (k,), J.
+
+    Raises ValueError where a body has no mass.
+    """
     _need_masses(scene)
     mass = np.array([body.mass for body in scene.body])
     inertia = np.array([_matrix(body.inertia) for body in scene.body])
@@ -19,7 +22,13 @@ def kinetic(scene: Scene, motion: Trajectory) -> np.ndarray:
     own = rotations.rotate(turned_back, motion.angular_velocity)
     turning = np.einsum("kbi,bij,kbj->k", own, inertia, own)
     moving = np.einsum("b,kbi,kbi->k", mass, motion.velocity, motion.velocity)
-    return np.asarray((moving + turning) / 2)
+    total = moving + turning
+    for joint in scene.joint:
+        if joint.reflected_inertia:
+            found = joint_motion(scene, motion, joint.name)
+            rate = found.rate if joint.facts.driven == "angle" else found.displacement_rate
+            total = total + joint.reflected_inertia * np.asarray(rate) ** 2
+    return np.asarray(total / 2)
 
 
 def potential(scene: Scene, motion: Trajectory) -> np.ndarray:

@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, Strict, ValidationError, field_validator, model_validator
 
+from mbref.scene_couplings import Coupling
 from mbref.scene_fields import (
     Angle,
     Entry,
@@ -31,6 +32,7 @@ from mbref.scene_fields import (
 )
 from mbref.scene_joints import (
     JOINT_TYPES,
+    Coordinate,
     Cylindrical,
     Distance,
     Fixed,
@@ -61,6 +63,7 @@ __all__ = [
     "JOINT_TYPES",
     "LOAD_TYPES",
     "Body",
+    "Coupling",
     "Cylindrical",
     "Distance",
     "Driver",
@@ -140,7 +143,7 @@ class Driver(Entry):
 
 
 class Scene(Entry):
-    """A mechanism: ``body``, ``joint``, ``driver`` and ``load`` tuples, gravity and default end time.
+    """A mechanism: ``body``, ``joint``, ``coupling``, ``driver`` and ``load`` tuples, gravity and end time.
 
     ``ground = "body"`` adds the ground as a body held by six rows, as the paper counts it; the
     default ``"frame"`` models no ground body.  Raises SceneError with every fault found.
@@ -152,6 +155,7 @@ class Scene(Entry):
     ground: Literal["frame", "body"] = "frame"
     body: Annotated[tuple[Body, ...], Field(min_length=1), Strict(False)]
     joint: Annotated[tuple[Joint, ...], Strict(False)] = ()
+    coupling: Annotated[tuple[Coupling, ...], Strict(False)] = ()
     driver: Annotated[tuple[Driver, ...], Strict(False)] = ()
     load: Annotated[tuple[Load, ...], Strict(False)] = ()
 
@@ -182,6 +186,11 @@ class Scene(Entry):
             if joint.name == name:
                 return joint
         raise KeyError(name)
+
+    def coupled(self, coupling: Coupling) -> tuple[tuple[Joint, Coordinate], ...]:
+        """Both joints of a coupling, each with its coupled coordinate."""
+        first, second = map(self.joint_named, coupling.joints)
+        return coupling.pairs((first, second))
 
     def has_mass(self) -> bool:
         """Whether every body has mass and inertia, as a dynamic analysis needs."""
@@ -241,7 +250,8 @@ class Scene(Entry):
 
 
 TABLES = {"": tuple(Scene.model_fields)} | {
-    name: tuple(table.model_fields) for name, table in (("body", Body), ("driver", Driver), ("sine", Sine))
+    name: tuple(table.model_fields)
+    for name, table in (("body", Body), ("coupling", Coupling), ("driver", Driver), ("sine", Sine))
 }
 
 

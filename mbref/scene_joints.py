@@ -8,11 +8,13 @@ from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import Discriminator, field_validator
 
-from mbref.scene_fields import Entry, Name, Pair, Point, PointPair, Vector, VectorPair, direction
+from mbref.scene_fields import Entry, Name, NotNegative, Pair, Point, PointPair, Vector, VectorPair, direction
 
 X, Y, Z = 0, 1, 2
 SKEW = 0.05  # cosine between the axes of a universal joint that is no rounding of a right angle
 Coordinate = Literal["angle", "displacement"]
+ANGLE: Coordinate = "angle"
+DISPLACEMENT: Coordinate = "displacement"
 Condition = Literal["perpendicular axes", "constant distance"]
 
 
@@ -48,6 +50,12 @@ class JointFacts:
         """Number of relative rotations that stay free."""
         return 3 - len(self.forbidden_rotations) - (self.condition == "perpendicular axes")
 
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """The joint coordinates that can be coupled: the angle about the axis, the displacement along it."""
+        angle = (ANGLE,) if self.forbidden_rotations == (X, Y) else ()
+        return angle + ((DISPLACEMENT,) if self.forbidden_translations == (X, Y) else ())
+
 
 class JointEntry(Entry):
     """The fields and facts that all joints have."""
@@ -72,6 +80,11 @@ class JointEntry(Entry):
         """The joint's axes, world at t = 0, of any length: none, one of both bodies, or one of each body."""
         return ()
 
+    @property
+    def reflected_inertia(self) -> float:
+        """The ``armature`` of the driven coordinate, kg m² or kg; 0 of a joint that has no such field."""
+        return getattr(self, "armature", 0.0)
+
 
 class _AnchorJoint(JointEntry):
     anchor: Point
@@ -91,6 +104,10 @@ class _AxisJoint(_AnchorJoint):
         return (self.axis,)
 
 
+class _DrivenJoint(_AxisJoint):
+    armature: NotNegative = 0.0  # kg m² or kg, of the driven coordinate q: the kinetic energy ½ armature q'²
+
+
 class Fixed(_AnchorJoint):
     """No relative motion."""
 
@@ -98,8 +115,8 @@ class Fixed(_AnchorJoint):
     type: Literal["fixed"] = "fixed"
 
 
-class Revolute(_AxisJoint):
-    """Rotation about ``axis`` through ``anchor``."""
+class Revolute(_DrivenJoint):
+    """Rotation about ``axis`` through ``anchor``; ``armature`` is the reflected inertia of a rotor."""
 
     facts = JointFacts((X, Y, Z), (X, Y), driven="angle", takes_torsion_spring=True)
     type: Literal["revolute"] = "revolute"
@@ -134,15 +151,15 @@ class Spherical(_AnchorJoint):
     type: Literal["spherical"] = "spherical"
 
 
-class Translational(_AxisJoint):
-    """Displacement along ``axis``, no rotation."""
+class Translational(_DrivenJoint):
+    """Displacement along ``axis``, no rotation; ``armature`` is the reflected mass of a motor."""
 
     facts = JointFacts((X, Y), (X, Y, Z), driven="displacement")
     type: Literal["translational"] = "translational"
 
 
-class Cylindrical(_AxisJoint):
-    """Displacement along and rotation about ``axis``."""
+class Cylindrical(_DrivenJoint):
+    """Displacement along and rotation about ``axis``; ``armature`` is of the rotation."""
 
     facts = JointFacts((X, Y), (X, Y), driven="angle", takes_torsion_spring=True)
     type: Literal["cylindrical"] = "cylindrical"

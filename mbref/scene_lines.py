@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 TABLE = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]\]?")
 KEY = re.compile(r"\s*([\w-]+|\"[^\"]*\")\s*=")
 NAME = re.compile(r"\s*(?:name|joint)\s*=\s*[\"']([^\"']*)[\"']")
-SINGLE = re.compile(r"\s*\[\s*(body|joint|driver|load)\s*\]")
+SINGLE = re.compile(r"\s*\[\s*(body|joint|coupling|driver|load)\s*\]")
 LINE = re.compile(r" \(line \d+\)$")
 AT = re.compile(r"at line (\d+)")
 PATH = re.compile(r"(\w+)(?:\[([^\]]*)\])?(?:\.(\w+))?")

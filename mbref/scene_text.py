@@ -7,7 +7,7 @@ from typing import Any
 
 import tomli_w
 
-FIRST = ("name", "type", "joint", "bodies", "body")  # keys that stand first in an entry
+FIRST = ("name", "type", "joint", "joints", "bodies", "body")  # keys that stand first in an entry
 
 
 def scene_text(data: Mapping[str, Any]) -> str:

@@ -5,20 +5,24 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from pydantic import ValidationError
 
+from mbref.scene_couplings import default_coordinates
 from mbref.scene_fields import LARGEST, SMALLEST, checked_length, checked_size, meant, shown
-from mbref.scene_joints import JOINT_TYPES
+from mbref.scene_joints import JOINT_TYPES, Coordinate
 from mbref.scene_loads import LOAD_TYPES
 from mbref.scene_units import dimension_of, in_si
 
 GROUND = "ground"
+Faults = Iterator[tuple[str, str]]  # path and message
 RESERVED = (GROUND, "the fixed frame")  # names that no body can have
 DRIVABLE = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.driven)
 TORSIONAL = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.takes_torsion_spring)
+COUPLED = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.coordinates)
+COORDINATES = get_args(Coordinate)
 ACTS_ON = {name: load.acts_on for name, load in LOAD_TYPES.items()}
 NUMBERS = {  # field → what its list holds; of all others three numbers
     "orientation": "four numbers (w, x, y, z)",
@@ -31,6 +35,9 @@ NUMBERS = {  # field → what its list holds; of all others three numbers
     "joint": "entries [[joint]]",
     "driver": "entries [[driver]]",
     "load": "entries [[load]]",
+    "coupling": "entries [[coupling]]",
+    "joints": "two names of joints",
+    "coordinates": 'two of "angle" and "displacement"',
 }
 INERTIA_TOLERANCE = 1e-9  # relative; discs and thin rods meet the triangle inequality with equality
 
@@ -74,7 +81,7 @@ def checked_inertia(value: Any) -> tuple[Any, ...]:
     return tuple(array.tolist()) if array.ndim == 1 else tuple(map(tuple, array.tolist()))
 
 
-def field_faults(error: ValidationError, tables: Mapping[str, Sequence[str]]) -> Iterator[tuple[str, str]]:
+def field_faults(error: ValidationError, tables: Mapping[str, Sequence[str]]) -> Faults:
     """(path, message) of every fault pydantic found, in the words of the file.
 
     ``tables`` has the names of the fields by table; names of fields of joints and loads are known here.
@@ -131,7 +138,7 @@ def _meant_field(location: Sequence[str | int], tables: Mapping[str, Sequence[st
 def named_paths(data: Mapping[str, Any], faults: Mapping[str, str]) -> Iterator[str]:
     """``path: message`` of every fault, an entry by its name where it has one of its own: body[rod].mass."""
     for path, message in faults.items():
-        match = re.match(r"(body|joint|driver)\[(\d+)\](?=\.)", path)
+        match = re.match(r"(body|joint|coupling|driver)\[(\d+)\](?=\.)", path)
         name = _own_name(data, match[1], int(match[2])) if match else ""
         yield (
             f"{match[1]}[{name}]{path[match.end() :]}: {message}" if match and name else f"{path}: {message}"
@@ -182,7 +189,7 @@ def _names(entries: Sequence[Any]) -> list[str]:
     return [_text(entry, "name") for entry in entries]
 
 
-def reference_faults(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def reference_faults(data: Mapping[str, Any]) -> Faults:
     """Faults between entries: duplicate names, unknown bodies and joints, drivers of the wrong joint.
 
     Works on raw tables, so that these are found beside the faults of single fields.
@@ -202,6 +209,7 @@ def reference_faults(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     for i, joint in enumerate(joints):
         yield from _pair_faults(f"joint[{i}].bodies", _get(joint, "bodies"), known)
     types = {_text(joint, "name"): _text(joint, "type") for joint in joints}
+    yield from _coupling_faults(data, types)
     yield from _driver_faults(data, types)
     for i, load in enumerate(_entries(data, "load")):
         acts_on = ACTS_ON.get(_text(load, "type"))
@@ -218,7 +226,38 @@ def reference_faults(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             yield from _joint_faults(f"load[{i}].joint", name, types, TORSIONAL, "carry a torsion spring")
 
 
-def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def _coupling_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
+    """Couplings with the name of another entry, of unknown joints, or of coordinates that a joint has not."""
+    couplings = _entries(data, "coupling")
+    yield from _duplicates("coupling", _names(couplings))
+    for i, coupling in enumerate(couplings):
+        if (own := _text(coupling, "name")) and own in types:
+            yield f"coupling[{i}].name", f"{own!r} is already the name of a joint"
+        names = _get(coupling, "joints")
+        if not isinstance(names, list | tuple) or len(names) != 2:
+            continue  # reported as a field fault
+        path = f"coupling[{i}].joints"
+        for k, name in enumerate(names):
+            yield from _joint_faults(f"{path}[{k}]", name, types, COUPLED, "be coupled")
+        if all(isinstance(name, str) and types.get(name) in COUPLED for name in names):
+            yield from _coordinate_faults(path, coupling, names, types)
+
+
+def _coordinate_faults(path: str, coupling: Any, names: Sequence[str], types: Mapping[str, str]) -> Faults:
+    """Coupled coordinates that joints of these types have not, or that are one and the same."""
+    first, second = (JOINT_TYPES[types[name]].facts for name in names)
+    asked = _get(coupling, "coordinates")
+    given = isinstance(asked, list | tuple) and len(asked) == 2
+    chosen = asked if given else default_coordinates((first, second), names[0] == names[1])
+    for name, facts, coordinate in zip(names, (first, second), chosen, strict=True):
+        if coordinate in COORDINATES and coordinate not in facts.coordinates:
+            yield path, f"{name!r} is {types[name]}, which has no {coordinate} to be coupled"
+            return
+    if names[0] == names[1] and chosen[0] == chosen[1]:
+        yield path, f"must be two different coordinates, got the {chosen[0]} of {names[0]!r} twice"
+
+
+def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
     """Drivers of unknown or wrong joints, second ones of a joint, and values that do not begin at 0."""
     driven: set[str] = set()
     for i, driver in enumerate(_entries(data, "driver")):
@@ -234,7 +273,7 @@ def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Iterato
             yield f"driver[{i}].polynomial", message
 
 
-def _unit_faults(path: str, sine: Any, joint: Any) -> Iterator[tuple[str, str]]:
+def _unit_faults(path: str, sine: Any, joint: Any) -> Faults:
     """The fault of an amplitude whose unit does not suit the coordinate that a driver prescribes."""
     driven = JOINT_TYPES[joint].facts.driven if joint in JOINT_TYPES else None
     needed = {"angle": "angle", "displacement": "length"}.get(str(driven))
@@ -259,7 +298,7 @@ def _number(value: Any) -> float:
     return float(value) if isinstance(value, int | float) and abs(value) <= LARGEST else 0.0
 
 
-def _duplicates(key: str, names: Sequence[str], reserved: Sequence[str] = ()) -> Iterator[tuple[str, str]]:
+def _duplicates(key: str, names: Sequence[str], reserved: Sequence[str] = ()) -> Faults:
     for i, name in enumerate(names):
         if name in reserved:
             yield f"{key}[{i}].name", f"{name!r} is reserved for the fixed frame"
@@ -272,7 +311,7 @@ def _unknown(what: str, name: str, known: Sequence[str] | set[str]) -> str:
     return f"unknown {what} {name!r}; known: {told}{meant(name, known)}"
 
 
-def _pair_faults(path: str, pair: Any, known: set[str]) -> Iterator[tuple[str, str]]:
+def _pair_faults(path: str, pair: Any, known: set[str]) -> Faults:
     if not isinstance(pair, list | tuple) or len(pair) != 2:
         return  # reported as a field fault
     for k, name in enumerate(pair):
@@ -282,12 +321,10 @@ def _pair_faults(path: str, pair: Any, known: set[str]) -> Iterator[tuple[str, s
         yield path, f"must be two different bodies, got {pair[0]!r} twice"
 
 
-def _joint_faults(
-    path: str, name: Any, types: Mapping[str, Any], allowed: Sequence[str], what: str
-) -> Iterator[tuple[str, str]]:
+def _joint_faults(path: str, name: Any, types: Mapping[str, Any], able: Sequence[str], what: str) -> Faults:
     if not isinstance(name, str) or not name:
         return  # reported as a field fault
     if name not in types:
         yield path, _unknown("joint", name, list(types))
-    elif types[name] in JOINT_TYPES and types[name] not in allowed:
-        yield path, f"{name!r} is {types[name]}; only {', '.join(allowed)} joints can {what}"
+    elif types[name] in JOINT_TYPES and types[name] not in able:
+        yield path, f"{name!r} is {types[name]}; only {', '.join(able)} joints can {what}"

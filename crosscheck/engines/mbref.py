@@ -68,7 +68,8 @@ class Mbref(Engine):
         """mbref has equations for every joint in its table, and for every load of a scene file."""
         from mbref.equations.joints import JOINTS
 
-        return Supports(joints=tuple(JOINTS), drivers=("angle", "displacement"), loads=LOADS)
+        both = ("angle", "displacement")
+        return Supports(tuple(JOINTS), drivers=both, loads=LOADS, couplings=both, armatures=both)
 
     def version(self) -> str:
         from mbref import __version__

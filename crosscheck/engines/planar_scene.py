@@ -74,6 +74,8 @@ def _closed_by_points(scene: Scene) -> Scene:
     """The scene whose cut hinges are points."""
     acting = {driver.joint for driver in scene.driver}
     acting |= {load.joint for load in scene.load if isinstance(load, TorsionSpring)}
+    acting |= {name for coupling in scene.coupling for name in coupling.joints}
+    acting |= {joint.name for joint in scene.joint if joint.reflected_inertia}
     cut = {closure.joint for closure in spanning_tree(scene).closures if closure.kind == "weld"}
     joints = [
         Spherical(name=joint.name, bodies=joint.bodies, anchor=joint.anchor_pair[0])

@@ -1,7 +1,7 @@
 """A scene as a spanning tree with loop closures, for the engines that work in joint coordinates.
 
 Nodes are the bodies and the ground, edges the joints.  A maximum-weight spanning tree by constraint rows
-keeps the stiff joints, and every driven one; every joint that is cut closes a loop:
+keeps the stiff joints, and every driven or coupled one; every joint that is cut closes a loop:
 
 - a cut spherical joint is a point that two links share;
 - a cut joint of another type that the engine closes by itself is a closure of that type;
@@ -24,6 +24,7 @@ import numpy as np
 from crosscheck.engines.geometry import cross_matrix, joint_frame, unit
 from mbref import rotations
 from mbref.scene import Body, Distance, Joint, JointFacts, Scene, Spherical
+from mbref.scene_joints import DISPLACEMENT, Coordinate
 
 GROUND_LINK = -1
 NO_AXES = np.zeros((0, 3))
@@ -113,11 +114,11 @@ class Tree:
         """The link of a scene's body; the ground's for -1."""
         return self.own[body] if body >= 0 else GROUND_LINK
 
-    def coordinate(self, scene: Scene, joint: str) -> int:
-        """Index of the velocity that a driver or torsion spring of that joint acts on."""
+    def coordinate(self, scene: Scene, joint: str, kind: Coordinate | None = None) -> int:
+        """Index of a joint's velocity, of its angle or displacement; by default of the driven coordinate."""
         index = [j.name for j in scene.joint].index(joint)
         link = next(k for k, item in enumerate(self.links) if item.joint == index)
-        return self.starts[link] + self.links[link].freedoms - 1
+        return self.starts[link] + (0 if kind == DISPLACEMENT else self.links[link].freedoms - 1)
 
 
 @dataclass(frozen=True)
@@ -138,14 +139,15 @@ def spanning_tree(scene: Scene, closes: Collection[str] = (ROD_END,)) -> Tree:
     """
     nodes = [_body_link(b, body) for b, body in enumerate(scene.body)]
     edges = []
+    acting = {driver.joint for driver in scene.driver}
+    acting |= {name for coupling in scene.coupling for name in coupling.joints}
     for j, joint in enumerate(scene.joint):
         first, second = joint.bodies
         pair = (scene.body_index(first), scene.body_index(second))
         if isinstance(joint, Distance):
             edges += _rod(nodes, j, pair, np.array(joint.anchors))
         else:
-            driven = any(driver.joint == joint.name for driver in scene.driver)
-            weight = joint.facts.rows + DRIVEN_WEIGHT * driven
+            weight = joint.facts.rows + DRIVEN_WEIGHT * (joint.name in acting)
             anchor = np.array(joint.anchor_pair[0])
             edges.append(_Edge(joint.type, joint.facts, j, pair, anchor, _axes(joint), weight))
     kept, cut = _kruskal(len(nodes), edges)

@@ -6,20 +6,33 @@ model that produced it.  Arrays may have any leading shape (…): one pose, or t
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from crosscheck.judge import joint_residuals
+from crosscheck.judge.joint_coordinates import (
+    COORDINATES,
+    coordinate_accelerations,
+    coordinate_rates,
+    coordinates,
+    reflected,
+)
+from crosscheck.judge.joint_residuals import JointFrames, grounded, with_ground
 from crosscheck.judge.tolerances import CONTRADICTED, CONTRADICTION, RANK
 from mbref import rotations
 from mbref.scene import Scene, SceneError
+from mbref.scene_joints import DISPLACEMENT
 
 Residuals = dict[str, np.ndarray]
 
 
 def closure(scene: Scene, t: np.ndarray | float, position: np.ndarray, orientation: np.ndarray) -> Residuals:
     """Position residuals (…, rows) by joint name, m and rad, of positions (…, nb, 3) and unit
-    quaternions (…, nb, 4) at times t (…); a driver's residual stands last under its joint."""
-    pose = _pose(position, orientation)
+    quaternions (…, nb, 4) at times t (…); a driver's residual stands last under its joint.
+
+    Couplings are left out: one pose does not say how often a joint has turned (see ``coupling_gaps``)."""
+    pose = with_ground(position, orientation)
     return {
         joint.name: joint_residuals.position_rows(joint, np.asarray(t, float), *pose)
         for joint in joint_residuals.joint_frames(scene)
@@ -35,12 +48,14 @@ def closure_rates(
     angular_velocity: np.ndarray,
 ) -> Residuals:
     """Velocity residuals (…, rows), m/s and rad/s, of world velocities (…, nb, 3): the forbidden
-    components of the frames' relative twist; on closed poses the time derivative of `closure`."""
-    motion = (*_pose(position, orientation), _grounded(velocity), _grounded(angular_velocity))
-    return {
+    components of the frames' relative twist; on closed poses the time derivative of `closure`.  The couplings
+    follow the joints, by name."""
+    motion = (*with_ground(position, orientation), grounded(velocity), grounded(angular_velocity))
+    found = {
         joint.name: joint_residuals.velocity_rows(joint, np.asarray(t, float), *motion)
         for joint in joint_residuals.joint_frames(scene)
     }
+    return found | _coupled(scene, lambda joint: coordinate_rates(joint, *motion))
 
 
 def closure_accelerations(
@@ -55,16 +70,46 @@ def closure_accelerations(
 ) -> Residuals:
     """Acceleration residuals (…, rows), m/s² and rad/s²: the time derivative of `closure_rates`."""
     rates = (velocity, angular_velocity, acceleration, angular_acceleration)
-    motion = (*_pose(position, orientation), *map(_grounded, rates))
-    return {
+    motion = (*with_ground(position, orientation), *map(grounded, rates))
+    found = {
         joint.name: joint_residuals.acceleration_rows(joint, np.asarray(t, float), *motion)
         for joint in joint_residuals.joint_frames(scene)
     }
+    return found | _coupled(scene, lambda joint: coordinate_accelerations(joint, *motion))
+
+
+def coupling_gaps(
+    scene: Scene,
+    times: np.ndarray,
+    position: np.ndarray,
+    orientation: np.ndarray,
+    angular_velocity: np.ndarray,
+) -> Residuals:
+    """Position residuals (k, 1) of couplings by name, q₂ - ratio q₁ in m or rad, of trajectory arrays
+    (k, nb, ·); NaN from where the samples are too far apart to count turns."""
+    motion = (np.asarray(times, float), *with_ground(position, orientation), grounded(angular_velocity))
+    return _coupled(scene, lambda joint: coordinates(joint, *motion))
+
+
+def _coupled(scene: Scene, of_joint: Callable[[JointFrames], np.ndarray]) -> Residuals:
+    """q₂ - ratio q₁ (…, 1) of each coupling, from both coordinates of a joint (…, 2), or their rates."""
+    joints = {joint.name: joint for joint in joint_residuals.joint_frames(scene)}
+    found: Residuals = {}
+    for coupling in scene.coupling:
+        first, second = (
+            of_joint(joints[joint.name])[..., COORDINATES.index(coordinate)]
+            for joint, coordinate in scene.coupled(coupling)
+        )
+        found[coupling.name] = (second - coupling.ratio * first)[..., None]
+    return found
 
 
 def length_rows(scene: Scene) -> dict[str, np.ndarray]:
-    """Masks (rows,) of the residuals by joint name: True for lengths (m), False for angles (rad)."""
-    return {joint.name: joint_residuals.are_lengths(joint) for joint in joint_residuals.joint_frames(scene)}
+    """Masks (rows,) of the residuals by name of the joint or coupling: True for lengths (m), False for
+    angles (rad)."""
+    found = {joint.name: joint_residuals.are_lengths(joint) for joint in joint_residuals.joint_frames(scene)}
+    ends = {coupling.name: scene.coupled(coupling)[1][1] for coupling in scene.coupling}
+    return found | {name: np.array([coordinate == DISPLACEMENT]) for name, coordinate in ends.items()}
 
 
 def joint_coordinates(
@@ -74,22 +119,36 @@ def joint_coordinates(
     orientation: np.ndarray,
     angular_velocity: np.ndarray,
 ) -> dict[str, np.ndarray]:
-    """(k, 2) angle (rad) and displacement (m) since t = 0 of every joint that can be driven, by name.
+    """(k, 2) angle (rad) and displacement (m) since t = 0 of every joint with a coordinate, by name.
 
     Trajectory arrays (k, nb, ·).  The angle counts turns; it is NaN from where the samples are too far
     apart to tell them.
     """
-    motion = (np.asarray(times, float), *_pose(position, orientation), _grounded(angular_velocity))
-    with_axis = [joint for joint in joint_residuals.joint_frames(scene) if joint.facts.driven]
+    motion = (np.asarray(times, float), *with_ground(position, orientation), grounded(angular_velocity))
+    with_axis = [joint for joint in joint_residuals.joint_frames(scene) if joint.facts.coordinates]
     if not len(motion[0]):
         return {joint.name: np.zeros((0, 2)) for joint in with_axis}
-    return {joint.name: joint_residuals.coordinates(joint, *motion) for joint in with_axis}
+    return {joint.name: coordinates(joint, *motion) for joint in with_axis}
+
+
+def joint_rates(
+    scene: Scene,
+    position: np.ndarray,
+    orientation: np.ndarray,
+    velocity: np.ndarray,
+    angular_velocity: np.ndarray,
+) -> dict[str, np.ndarray]:
+    """(…, 2) rates of angle (rad/s) and displacement (m/s) of every joint with a coordinate, by name."""
+    motion = (*with_ground(position, orientation), grounded(velocity), grounded(angular_velocity))
+    joints = [joint for joint in joint_residuals.joint_frames(scene) if joint.facts.coordinates]
+    return {joint.name: coordinate_rates(joint, *motion) for joint in joints}
 
 
 def jacobian(
     scene: Scene, t: float, position: np.ndarray, orientation: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(J, b) with J x = b at velocity level: J (rows, 6 nb), b (rows,), rows in the order of the joints.
+    """(J, b) with J x = b at velocity level: J (rows, 6 nb), b (rows,), the joints' rows in their order, then
+    the couplings'.
 
     x holds (velocity of the centre of mass, angular velocity), world, body after body; `position` (nb, 3)
     and `orientation` (nb, 4) are one pose.
@@ -183,13 +242,23 @@ def _refuse(scene: Scene, why: str, residual: np.ndarray, x: np.ndarray, most: f
     scale = np.abs(x).max(initial=0.0)
     if names and np.abs(residual).max() > most * scale:
         name = names[int(np.abs(residual).argmax())]
-        index = [joint.name for joint in scene.joint].index(name)
         size = np.abs(residual).max()
-        raise SceneError([f"joint[{index}] {name!r}: {why}: off by {size:.3g} of {scale:.3g} m/s or rad/s"])
+        raise SceneError(
+            [f"{_place(scene, name)} {name!r}: {why}: off by {size:.3g} of {scale:.3g} m/s or rad/s"]
+        )
+
+
+def _place(scene: Scene, name: str) -> str:
+    """The path of a joint or a coupling."""
+    for key, entries in (("joint", scene.joint), ("coupling", scene.coupling)):
+        names = [entry.name for entry in entries]
+        if name in names:
+            return f"{key}[{names.index(name)}]"
+    raise KeyError(name)
 
 
 def _root_of_mass(scene: Scene) -> np.ndarray:
-    """W (6 nb, 6 nb) with WᵀW the mass matrix of the twists at t = 0; the identity without masses."""
+    """W (·, 6 nb) with WᵀW the mass matrix of the twists at t = 0; the identity without masses."""
     n = 6 * len(scene.body)
     root = np.eye(n)
     if scene.has_mass():
@@ -199,19 +268,7 @@ def _root_of_mass(scene: Scene) -> np.ndarray:
             half = np.sqrt(np.maximum(moments, 0.0))[:, None] * (axes[k] @ principal).T
             root[6 * k : 6 * k + 3, 6 * k : 6 * k + 3] *= np.sqrt(body.mass or 1.0)
             root[6 * k + 3 : 6 * k + 6, 6 * k + 3 : 6 * k + 6] = half
+        still = np.zeros((len(scene.body), 3))
+        armatures = reflected(scene, *initial_poses(scene), still, still)
+        root = np.vstack([root, np.sqrt(armatures.inertia)[:, None] * armatures.jacobian])
     return root
-
-
-def _pose(position: np.ndarray, orientation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and normalised quaternions with the ground appended."""
-    p = np.asarray(orientation, dtype=float)
-    ground = np.broadcast_to([1.0, 0.0, 0.0, 0.0], p[..., :1, :].shape)
-    return _grounded(position), np.concatenate(
-        [p / np.linalg.norm(p, axis=-1, keepdims=True), ground], axis=-2
-    )
-
-
-def _grounded(array: np.ndarray) -> np.ndarray:
-    """(…, nb + 1, 3): a row of zeros for the ground appended, so that index -1 is the ground."""
-    array = np.asarray(array, dtype=float)
-    return np.concatenate([array, np.zeros_like(array[..., :1, :])], axis=-2)

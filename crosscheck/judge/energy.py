@@ -13,7 +13,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from crosscheck.judge import constraints
-from crosscheck.judge.joint_residuals import counted
+from crosscheck.judge.joint_coordinates import COORDINATES, counted
 from crosscheck.judge.loads import attachment, world_inertia
 from crosscheck.judge.tolerances import AT_REST, PARALLEL
 from mbref import rotations
@@ -49,8 +49,8 @@ def _balance(scene: Scene, trajectory: Trajectory) -> tuple[np.ndarray, float] |
         return None
     if not all(np.isfinite(array).all() for array in _motion(trajectory)):
         return np.full(len(trajectory.times), np.inf), float(np.finfo(float).max)
-    kinetic = kinetic_energy(scene, *_motion(trajectory)[1:])
-    start = kinetic_energy(scene, *(a[None] for a in _initial(scene)[1:]))[0]
+    kinetic = kinetic_energy(scene, *_motion(trajectory))
+    start = kinetic_energy(scene, *(a[None] for a in _initial(scene)))[0]
     gains = np.array([kinetic - start, *_potential_gains(scene, trajectory)])
     scale = max(start, kinetic.max(), np.abs(gains).max())
     return None if np.isnan(gains).any() else (np.abs(gains.sum(axis=0)), float(scale))
@@ -67,13 +67,23 @@ def _possible(scene: Scene, trajectory: Trajectory) -> float:
 
 
 def kinetic_energy(
-    scene: Scene, orientation: np.ndarray, velocity: np.ndarray, angular_velocity: np.ndarray
+    scene: Scene,
+    position: np.ndarray,
+    orientation: np.ndarray,
+    velocity: np.ndarray,
+    angular_velocity: np.ndarray,
 ) -> np.ndarray:
-    """Kinetic energy (k,) in J of trajectory arrays (k, nb, ·)."""
+    """Kinetic energy (k,) of bodies and armatures, J, from trajectory arrays (k, nb, ·)."""
     mass = np.array([body.mass for body in scene.body])
     inertia = world_inertia(scene, rotations.to_matrix(orientation))
     turning = np.einsum("kbi,kbij,kbj->k", angular_velocity, inertia, angular_velocity)
-    return (np.sum(mass[:, None] * velocity**2, axis=(1, 2)) + turning) / 2
+    rates = constraints.joint_rates(scene, position, orientation, velocity, angular_velocity)
+    total = np.sum(mass[:, None] * velocity**2, axis=(1, 2)) + turning
+    for joint in scene.joint:
+        if joint.reflected_inertia:
+            column = COORDINATES.index(joint.facts.driven)
+            total = total + joint.reflected_inertia * rates[joint.name][:, column] ** 2
+    return np.asarray(total / 2)
 
 
 def potential_energy(scene: Scene, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:

@@ -13,9 +13,15 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from crosscheck.judge.constraints import closure_accelerations, inertia_matrices, initial_twists, jacobian
+from crosscheck.judge.constraints import (
+    closure_accelerations,
+    inertia_matrices,
+    initial_twists,
+    jacobian,
+)
 from crosscheck.judge.energy import kinetic_energy
 from crosscheck.judge.gauss_principle import rank as rank_at_start
+from crosscheck.judge.joint_coordinates import reflected
 from crosscheck.judge.loads import Motion, wrenches
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
@@ -59,6 +65,8 @@ def accelerations(scene: Scene, t: float, state: State, rank: int | None = None)
     turn = rotations.to_matrix(orientation)
     force = applied(scene, state)
     inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
+    if any(joint.reflected_inertia for joint in scene.joint):
+        return _with_armatures(scene, t, state, rank)
     roots = np.zeros((len(scene.body), 6, 6))  # W with WᵀW the mass matrix
     roots[:, :3, :3] = np.sqrt([body.mass or 0.0 for body in scene.body])[:, None, None] * np.eye(3)
     roots[:, 3:, 3:] = np.swapaxes(np.linalg.cholesky(inertia), 1, 2)
@@ -72,6 +80,27 @@ def accelerations(scene: Scene, t: float, state: State, rank: int | None = None)
     wanted = -np.concatenate([np.zeros(0), *bias.values()]) - weighted @ unbound.ravel()
     found = unbound.ravel() + (_least(weighted, wanted, rank) if len(rows) else 0.0)
     return np.einsum("bij,bj->bi", inverses, found.reshape(-1, 6))
+
+
+def _with_armatures(scene: Scene, t: float, state: State, rank: int | None) -> np.ndarray:
+    """``accelerations`` where armatures couple the bodies in the mass matrix."""
+    position, orientation, velocity, spin, _ = state
+    turn = rotations.to_matrix(orientation)
+    armatures = reflected(scene, position, orientation, velocity, spin)
+    mass = armatures.mass
+    for b, body in enumerate(scene.body):
+        at = slice(6 * b, 6 * b + 3), slice(6 * b + 3, 6 * b + 6)
+        mass[at[0], at[0]] += (body.mass or 0.0) * np.eye(3)
+        mass[at[1], at[1]] += turn[b] @ inertia_matrices(scene)[b] @ turn[b].T
+    inverse = np.linalg.inv(np.linalg.cholesky(mass).T)
+    unbound = inverse.T @ (applied(scene, state).ravel() + armatures.force)
+    rows, _ = jacobian(scene, t, position, orientation)
+    still = np.zeros_like(position)
+    bias = closure_accelerations(scene, t, position, orientation, velocity, spin, still, still)
+    weighted = rows @ inverse
+    wanted = -np.concatenate([np.zeros(0), *bias.values()]) - weighted @ unbound
+    found = unbound + (_least(weighted, wanted, rank) if len(rows) else 0.0)
+    return (inverse @ found).reshape(-1, 6)
 
 
 def _least(matrix: np.ndarray, wanted: np.ndarray, rank: int | None) -> np.ndarray:
@@ -103,7 +132,7 @@ def power(scene: Scene, state: State) -> float:
 
 def kinetic(scene: Scene, state: State) -> float:
     """Kinetic energy (J) of a state."""
-    return float(kinetic_energy(scene, state[1][None], state[2][None], state[3][None])[0])
+    return float(kinetic_energy(scene, *(part[None] for part in state[:4]))[0])
 
 
 def _springs(scene: Scene) -> list[TorsionSpring]:

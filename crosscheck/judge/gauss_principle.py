@@ -12,6 +12,7 @@ from crosscheck.judge.constraints import (
     jacobian,
     scene_length,
 )
+from crosscheck.judge.joint_coordinates import reflected
 from crosscheck.judge.loads import Motion, wrenches
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
@@ -63,7 +64,8 @@ def _unbound(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     for b, body in enumerate(scene.body):
         mass[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = (body.mass or 0.0) * np.eye(3)
         mass[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = inertia[b]
-    return mass, np.hstack([force, moment]).ravel()
+    armatures = reflected(scene, position, orientation, velocity, angular_velocity)
+    return mass + armatures.mass, np.hstack([force, moment]).ravel() + armatures.force
 
 
 def _torsion(scene: Scene, angular_velocity: np.ndarray) -> np.ndarray:

@@ -7,16 +7,22 @@ components in it need not.  The resultant of all joints on a body is always uniq
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.judge.constraints import jacobian, length_rows, scene_length
+from crosscheck.judge.constraints import (
+    jacobian,
+    length_rows,
+    scene_length,
+)
+from crosscheck.judge.joint_coordinates import COORDINATES, coordinate_jacobian
 from crosscheck.judge.loads import attachment
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
 from mbref.scene import GROUND, Joint, Scene
+from mbref.scene_joints import Coordinate
 from mbref.trajectory import Trajectory
 
 LEAST = 1e-3  # m/s²: forces that accelerate the masses by less count as none
@@ -52,17 +58,43 @@ def shared_wrenches(
     so well that singular values below ``rank`` times the largest are zeros.
     """
     rows, _ = jacobian(scene, t, position, orientation)
-    units, found, start = np.repeat([1.0, scene_length(scene)], 3), {}, 0
+    units, found = np.repeat([1.0, scene_length(scene)], 3), {}
     lengths = np.linalg.norm(rows, axis=1)
     u, s, _ = np.linalg.svd(rows / lengths[:, None])
     open_ = u[:, int(np.sum(s > rank * s[0])) :]
-    for joint in scene.joint:
-        count = len(length_rows(scene)[joint.name])
-        own = slice(start, start + count)
-        wrenches = on_second(scene, joint, rows[own], position, orientation) / units[:, None] / lengths[own]
-        found[joint.name] = _span(wrenches @ open_[own], rank * np.abs(wrenches).max(initial=0.0))
-        start += count
+    for joint, wrenches in of_multipliers(scene, rows, position, orientation):
+        scaled = wrenches / units[:, None] / lengths
+        found[joint.name] = _span(scaled @ open_, rank * np.abs(scaled).max(initial=0.0))
     return found
+
+
+def of_multipliers(
+    scene: Scene, rows: np.ndarray, position: np.ndarray, orientation: np.ndarray
+) -> Iterator[tuple[Joint, np.ndarray]]:
+    """Every joint with the wrenches (6, rows) on its second body, at its anchor, of unit multipliers of all
+    rows of `jacobian`; a coupling acts along the coordinates of both its joints."""
+    start = 0
+    for joint in scene.joint:
+        stop = start + len(length_rows(scene)[joint.name])
+        found = np.zeros((6, len(rows)))
+        found[:, start:stop] = on_second(scene, joint, rows[start:stop], position, orientation)
+        start = stop
+        first = len(rows) - len(scene.coupling)
+        for k, coupling in enumerate(scene.coupling, first):
+            for factor, (other, coordinate) in zip(
+                (-coupling.ratio, 1.0), scene.coupled(coupling), strict=True
+            ):
+                if other.name == joint.name:
+                    found[:, k] += factor * along_coordinate(scene, joint, coordinate, position, orientation)
+        yield joint, found
+
+
+def along_coordinate(
+    scene: Scene, joint: Joint, coordinate: Coordinate, position: np.ndarray, orientation: np.ndarray
+) -> np.ndarray:
+    """The wrench (6,) on a joint's second body of a unit force or moment along its coordinate."""
+    row = coordinate_jacobian(scene, joint.name, position, orientation)[COORDINATES.index(coordinate)]
+    return on_second(scene, joint, row[None], position, orientation)[:, 0]
 
 
 def compare(scene: Scene, first: Trajectory, second: Trajectory) -> Comparison:

@@ -112,11 +112,11 @@ def position_rows(
     joint: JointFrames, t: np.ndarray, position: np.ndarray, orientation: np.ndarray
 ) -> np.ndarray:
     """Residuals (…, rows), m and rad, of positions (…, nb + 1, 3) and quaternions (…, nb + 1, 4)."""
-    _, offset, frames = _in_world(joint, position, orientation)
+    _, offset, frames = in_world(joint, position, orientation)
     if joint.keeps_distance:
         return np.linalg.norm(offset, axis=-1, keepdims=True) - joint.length
     relative = rotations.multiply(rotations.conjugate(frames[0]), frames[1])
-    local = _resolve(frames[0], offset)
+    local = resolve(frames[0], offset)
     rows = [local[..., list(joint.facts.forbidden_translations)]]
     if joint.keeps_axes_perpendicular:
         rows.append(np.arcsin(np.clip(rotations.to_matrix(relative)[..., 2, 2:], -1, 1)))
@@ -124,7 +124,7 @@ def position_rows(
         rows.append(_tilt(relative) if joint.facts.free_rotations else _rotation_vector(relative))
     if joint.driver:
         value = driver_value(joint.driver, t)
-        rows.append((local[..., 2] - value if joint.slides else wrapped(_twist(relative) - value))[..., None])
+        rows.append((local[..., 2] - value if joint.slides else wrapped(twist(relative) - value))[..., None])
     return np.concatenate(rows, axis=-1)
 
 
@@ -137,15 +137,20 @@ def velocity_rows(
     angular_velocity: np.ndarray,
 ) -> np.ndarray:
     """Forbidden components (…, rows) of the frames' relative twist, of world velocities (…, nb + 1, 3)."""
-    arms, offset, frames = _in_world(joint, position, orientation)
+    arms, offset, frames = in_world(joint, position, orientation)
     w = [angular_velocity[..., b, :] for b in joint.bodies]
-    dv = _difference(velocity[..., b, :] + cross(w[k], arms[k]) for k, b in enumerate(joint.bodies))
+    dv = difference(velocity[..., b, :] + cross(w[k], arms[k]) for k, b in enumerate(joint.bodies))
     if joint.keeps_distance:
         return _dot(offset, dv) / np.linalg.norm(offset, axis=-1, keepdims=True)
-    linear = _resolve(frames[0], dv - cross(w[0], offset))
-    angular = _resolve(frames[0], w[1] - w[0])
     crossing = [_dot(w[1] - w[0], _crossing(frames)[0])] if joint.keeps_axes_perpendicular else []
-    return _rows(joint, linear, angular, crossing, t, 1)
+    return _rows(joint, *relative_twist(frames, offset, dv, w), crossing, t, 1)
+
+
+def relative_twist(
+    frames: list[np.ndarray], offset: np.ndarray, dv: np.ndarray, w: list[np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity and angular velocity (…, 3) of the second frame as the first one sees them."""
+    return resolve(frames[0], dv - cross(w[0], offset)), resolve(frames[0], w[1] - w[0])
 
 
 def acceleration_rows(
@@ -159,11 +164,11 @@ def acceleration_rows(
     angular_acceleration: np.ndarray,
 ) -> np.ndarray:
     """Time derivative (…, rows) of `velocity_rows`, of world accelerations (…, nb + 1, 3)."""
-    arms, offset, frames = _in_world(joint, position, orientation)
+    arms, offset, frames = in_world(joint, position, orientation)
     w = [angular_velocity[..., b, :] for b in joint.bodies]
     dw = [angular_acceleration[..., b, :] for b in joint.bodies]
-    dv = _difference(velocity[..., b, :] + cross(w[k], arms[k]) for k, b in enumerate(joint.bodies))
-    da = _difference(
+    dv = difference(velocity[..., b, :] + cross(w[k], arms[k]) for k, b in enumerate(joint.bodies))
+    da = difference(
         acceleration[..., b, :] + cross(dw[k], arms[k]) + cross(w[k], cross(w[k], arms[k]))
         for k, b in enumerate(joint.bodies)
     )
@@ -171,40 +176,21 @@ def acceleration_rows(
         length = np.linalg.norm(offset, axis=-1, keepdims=True)
         along = _dot(offset, dv) / length
         return (_dot(offset, da) + _dot(dv, dv) - along**2) / length
-    seen = da - cross(dw[0], offset) - 2 * cross(w[0], dv) + cross(w[0], cross(w[0], offset))
-    angular = _resolve(frames[0], dw[1] - dw[0] - cross(w[0], w[1]))
     crossing = [_crossing_acceleration(frames, w, dw)] if joint.keeps_axes_perpendicular else []
-    return _rows(joint, _resolve(frames[0], seen), angular, crossing, t, 2)
+    return _rows(joint, *relative_acceleration(frames, offset, (dv, da), w, dw), crossing, t, 2)
 
 
-def coordinates(
-    joint: JointFrames,
-    times: np.ndarray,
-    position: np.ndarray,
-    orientation: np.ndarray,
-    angular_velocity: np.ndarray,
-) -> np.ndarray:
-    """(k, 2) unwrapped angle about the axis and displacement along it since t = 0, over k samples."""
-    _, offset, frames = _in_world(joint, position, orientation)
-    twist = _twist(rotations.multiply(rotations.conjugate(frames[0]), frames[1]))
-    w = [angular_velocity[..., b, :] for b in joint.bodies]
-    rate = _resolve(frames[0], w[1] - w[0])[..., 2]
-    return np.stack([counted(times, twist, rate), _resolve(frames[0], offset)[..., 2]], axis=-1)
-
-
-def counted(times: np.ndarray, angle: np.ndarray, rate: np.ndarray) -> np.ndarray:
-    """Angles (k,), known up to turns and zero at t = 0, with their turns counted by the rates (k,).
-
-    Between samples the change nearest to the trapezoid of the rates is taken; NaN from where the rates
-    near a sample differ so much that this does not tell the turn.
-    """
-    before, step = np.concatenate([rate[:1], rate[:-1]]), np.diff(times, prepend=0.0)
-    expected = step * (rate + before) / 2
-    change = expected + wrapped(np.diff(angle, prepend=0.0) - expected)
-    near = np.lib.stride_tricks.sliding_window_view(np.pad(rate, 2, mode="edge"), 5, axis=0)
-    doubt = step * (near.max(axis=-1) - near.min(axis=-1))
-    doubt[:1] = np.abs(step[:1] * rate[:1])
-    return np.where(np.cumsum(doubt >= np.pi) > 0, np.nan, np.cumsum(change))
+def relative_acceleration(
+    frames: list[np.ndarray],
+    offset: np.ndarray,
+    parting: tuple[np.ndarray, np.ndarray],
+    w: list[np.ndarray],
+    dw: list[np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Time derivatives (…, 3) of ``relative_twist``, of the rates at which the origins part."""
+    dv, da = parting
+    seen = da - cross(dw[0], offset) - 2 * cross(w[0], dv) + cross(w[0], cross(w[0], offset))
+    return resolve(frames[0], seen), resolve(frames[0], dw[1] - dw[0] - cross(w[0], w[1]))
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:
@@ -212,13 +198,13 @@ def wrapped(angle: np.ndarray) -> np.ndarray:
     return angle - 2 * np.pi * np.round(angle / (2 * np.pi))
 
 
-def _in_world(
+def in_world(
     joint: JointFrames, position: np.ndarray, orientation: np.ndarray
 ) -> tuple[list[np.ndarray], np.ndarray, list[np.ndarray]]:
     """Arms from the centres to the origins (…, 3), offset between the origins, frame quaternions."""
     p = [orientation[..., b, :] for b in joint.bodies]
     arms = [rotations.rotate(p[k], joint.points[k]) for k in (0, 1)]
-    offset = _difference(position[..., b, :] + arms[k] for k, b in enumerate(joint.bodies))
+    offset = difference(position[..., b, :] + arms[k] for k, b in enumerate(joint.bodies))
     return arms, offset, [rotations.multiply(p[k], joint.frames[k]) for k in (0, 1)]
 
 
@@ -255,7 +241,8 @@ def _crossing_acceleration(frames: list[np.ndarray], w: list[np.ndarray], dw: li
     return _dot(dw[1] - dw[0], normal) + _dot(w[1] - w[0], turning)
 
 
-def _resolve(frame: np.ndarray, vector: np.ndarray) -> np.ndarray:
+def resolve(frame: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """World vectors (…, 3) in the axes of frames (…, 4)."""
     return rotations.rotate(rotations.conjugate(frame), vector)
 
 
@@ -263,7 +250,8 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.sum(a * b, axis=-1, keepdims=True)
 
 
-def _difference(pair: Iterable[np.ndarray]) -> np.ndarray:
+def difference(pair: Iterable[np.ndarray]) -> np.ndarray:
+    """Return the second of two arrays minus the first."""
     first, second = pair
     return second - first
 
@@ -284,6 +272,21 @@ def _tilt(q: np.ndarray) -> np.ndarray:
     return unit * np.arctan2(sine, z)[..., None]
 
 
-def _twist(q: np.ndarray) -> np.ndarray:
+def twist(q: np.ndarray) -> np.ndarray:
     """Angle about the third axis, up to turns."""
     return 2 * np.arctan2(q[..., 3], q[..., 0])
+
+
+def with_ground(position: np.ndarray, orientation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and normalised quaternions with the ground appended."""
+    p = np.asarray(orientation, dtype=float)
+    ground = np.broadcast_to([1.0, 0.0, 0.0, 0.0], p[..., :1, :].shape)
+    return grounded(position), np.concatenate(
+        [p / np.linalg.norm(p, axis=-1, keepdims=True), ground], axis=-2
+    )
+
+
+def grounded(array: np.ndarray) -> np.ndarray:
+    """(…, nb + 1, 3): a row of zeros for the ground appended, so that index -1 is the ground."""
+    array = np.asarray(array, dtype=float)
+    return np.concatenate([array, np.zeros_like(array[..., :1, :])], axis=-2)

@@ -126,11 +126,15 @@ def violation_series(scene: Scene, trajectory: Trajectory, level: int) -> np.nda
 
 def violation_series(scene: Scene, trajectory: Trajectory, level: int = 0) -> np.ndarray | None:
     """Largest joint residual (k,) at position (0), velocity (1) or acceleration (2) level; lengths are
-    divided by the scene's, so that the unit is rad, rad/s, rad/s². None when accelerations are missing."""
+    divided by the scene's, so that the unit is rad, rad/s, rad/s². None when accelerations are missing.
+
+    At position level couplings count as long as the samples say how often their joints have turned."""
     pose = (trajectory.times, trajectory.position, trajectory.orientation)
     rates = (trajectory.velocity, trajectory.angular_velocity)
     if level == 0:
         residuals = constraints.closure(scene, *pose)
+        gaps = constraints.coupling_gaps(scene, *pose, trajectory.angular_velocity)
+        residuals |= {name: np.nan_to_num(gap, nan=0.0) for name, gap in gaps.items()}
     elif level == 1:
         residuals = constraints.closure_rates(scene, *pose, *rates)
     elif trajectory.acceleration is None or trajectory.angular_acceleration is None:

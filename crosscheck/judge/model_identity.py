@@ -210,7 +210,7 @@ def _centre_of_mass(scene: Scene, trajectory: Trajectory) -> np.ndarray:
 def _energy(scene: Scene, trajectory: Trajectory) -> float:
     at = (trajectory.position[:1], trajectory.orientation[:1])
     rates = (trajectory.velocity[:1], trajectory.angular_velocity[:1])
-    return float(kinetic_energy(scene, at[1], *rates)[0] + potential_energy(scene, *at)[0])
+    return float(kinetic_energy(scene, *at, *rates)[0] + potential_energy(scene, *at)[0])
 
 
 def _energy_unit(scene: Scene) -> float:

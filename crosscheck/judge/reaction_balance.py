@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from crosscheck.judge.constraints import jacobian, joint_coordinates, length_rows, scene_length
+from crosscheck.judge.constraints import jacobian, joint_coordinates, scene_length
 from crosscheck.judge.gauss_motion import applied
-from crosscheck.judge.joint_reactions import LEAST, on_second, resultants
+from crosscheck.judge.joint_coordinates import reflected
+from crosscheck.judge.joint_reactions import (
+    LEAST,
+    along_coordinate,
+    of_multipliers,
+    on_second,
+    resultants,
+)
 from crosscheck.judge.loads import world_inertia
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
-from mbref.scene import Joint, Scene, TorsionSpring
+from mbref.scene import Scene, TorsionSpring
 from mbref.trajectory import Trajectory
 
 ABSURD = 10.0  # multiples of the largest exact force beyond which a reaction is no answer
@@ -30,10 +36,23 @@ def with_exact_reactions(scene: Scene, exact: Trajectory) -> Trajectory:
     for k in range(len(exact.times)):
         position, orientation = exact.position[k], exact.orientation[k]
         rows, _ = jacobian(scene, exact.times[k], position, orientation)
-        pushes = np.linalg.lstsq(rows.T, wanted[k].ravel(), rcond=RANK)[0]
-        for joint, own in _own_rows(scene):
-            found[joint.name][k] = on_second(scene, joint, rows[own], position, orientation) @ pushes[own]
+        turned, strengths = _of_armatures(scene, exact, k)
+        pushes = np.linalg.lstsq(rows.T, wanted[k].ravel() - turned.T @ strengths, rcond=RANK)[0]
+        for joint, wrenches in of_multipliers(scene, rows, position, orientation):
+            found[joint.name][k] = wrenches @ pushes
+        geared = [joint for joint in scene.joint if joint.reflected_inertia]
+        for joint, row, strength in zip(geared, turned, strengths, strict=True):
+            found[joint.name][k] += strength * on_second(scene, joint, row[None], position, orientation)[:, 0]
     return replace(exact, reactions=found)
+
+
+def _of_armatures(scene: Scene, exact: Trajectory, k: int) -> tuple[np.ndarray, np.ndarray]:
+    """The rows (c, 6 nb) of coordinates q with an armature I at a sample, and their forces -I q'' (c,)."""
+    assert exact.acceleration is not None and exact.angular_acceleration is not None
+    state = exact.position[k], exact.orientation[k], exact.velocity[k], exact.angular_velocity[k]
+    found = reflected(scene, *state)
+    twist_rates = np.hstack([exact.acceleration[k], exact.angular_acceleration[k]]).ravel()
+    return found.jacobian, -found.inertia * (found.jacobian @ twist_rates + found.drift)
 
 
 def absurd(scene: Scene, run: Trajectory, exact: Trajectory) -> list[str]:
@@ -53,15 +72,6 @@ def absurd(scene: Scene, run: Trajectory, exact: Trajectory) -> list[str]:
         for name, size in sizes.items()
         if size > ABSURD * max(largest, LEAST * sum(body.mass or 0.0 for body in scene.body))
     ]
-
-
-def _own_rows(scene: Scene) -> Iterator[tuple[Joint, slice]]:
-    """Every joint with its rows of the Jacobian."""
-    start = 0
-    for joint in scene.joint:
-        stop = start + len(length_rows(scene)[joint.name])
-        yield joint, slice(start, stop)
-        start = stop
 
 
 def balance(scene: Scene, run: Trajectory, exact: Trajectory) -> float:
@@ -107,8 +117,11 @@ def _idle_at(scene: Scene, run: Trajectory, k: int, units: np.ndarray) -> float:
     position, orientation = run.position[k], run.orientation[k]
     rows, _ = jacobian(scene, run.times[k], position, orientation)
     left = [np.zeros(6)]
-    for joint, own in _own_rows(scene):
-        held = on_second(scene, joint, rows[own], position, orientation) / units[:, None]
+    for joint, wrenches in of_multipliers(scene, rows, position, orientation):
+        held = wrenches / units[:, None]
+        if joint.reflected_inertia and joint.facts.driven:
+            along = along_coordinate(scene, joint, joint.facts.driven, position, orientation)
+            held = np.column_stack([held, along / units])
         wrench = (run.reactions or {})[joint.name][k] / units
         left.append(wrench - held @ np.linalg.lstsq(held, wrench, rcond=RANK)[0])
     return float(np.abs(left).max())

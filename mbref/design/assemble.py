@@ -12,7 +12,8 @@ from mbref import rotations
 from mbref.design.placed import placed
 from mbref.equations.initial_state import solve_positions
 from mbref.equations.model import Model
-from mbref.equations.packing import FRAME, Packs
+from mbref.equations.packing import Packs
+from mbref.equations.parts import FRAME
 from mbref.scene import GROUND, Scene, SceneError
 
 Point = tuple[float, float, float]

@@ -12,7 +12,7 @@ from mbref.drawing.shapes import attached, attack
 from mbref.drawing.svg import GREY, INK, PAPER
 from mbref.drawing.timeline import Timeline
 from mbref.drawing.view import Page
-from mbref.scene import GROUND, Driver, Joint, Load, Scene
+from mbref.scene import GROUND, Coupling, Driver, Joint, Load, Scene
 from mbref.trajectory import Trajectory
 
 ACTION = "#b3261e"  # colour of loads and drivers
@@ -135,6 +135,17 @@ SIGNS: dict[str, Callable[[], str]] = {
 }
 
 
+def coupling_mark(stage: Stage, coupling: Coupling) -> str:
+    """A dotted line between both joints, which moves with them; a spiral at a joint that is coupled with
+    itself."""
+    joints = [stage.scene.joint_named(name) for name in coupling.joints]
+    ends = [stage.place(joint.bodies[1], joint.anchor_pair[1]) for joint in joints]
+    if coupling.joints[0] == coupling.joints[1]:
+        return svg.follow(ends[0], _spiral(INK), stage.timeline)
+    look = f'stroke="{INK}" stroke-width="1.6" stroke-dasharray="1 5" stroke-linecap="round" fill="none"'
+    return svg.line(np.stack(ends, axis=1), look, stage.timeline)
+
+
 def driver_mark(stage: Stage, driver: Driver) -> str:
     """A turn about, or an arrow along, the axis of a driven joint, in the sense in which it begins."""
     joint = stage.scene.joint_named(driver.joint)
@@ -197,10 +208,10 @@ def _zigzag(first: np.ndarray, second: np.ndarray, turns: int = 12) -> np.ndarra
     return np.concatenate([first[:, None], inner, second[:, None]], axis=1)
 
 
-def _spiral() -> str:
+def _spiral(colour: str = ACTION) -> str:
     angle = np.linspace(0, 4.5 * np.pi, 60)
     radius = np.linspace(8, 17, 60)
     points = " ".join(
         f"{x:.1f},{y:.1f}" for x, y in zip(radius * np.cos(angle), radius * np.sin(angle), strict=True)
     )
-    return f'<polyline points="{points}" stroke="{ACTION}" stroke-width="1.5" fill="none"/>'
+    return f'<polyline points="{points}" stroke="{colour}" stroke-width="1.5" fill="none"/>'

@@ -9,7 +9,7 @@ import numpy as np
 
 from mbref.drawing import svg
 from mbref.drawing.labels import names
-from mbref.drawing.marks import Stage, driver_mark, ground_mark, joint_mark, load_mark
+from mbref.drawing.marks import Stage, coupling_mark, driver_mark, ground_mark, joint_mark, load_mark
 from mbref.drawing.shapes import Shape, anchors, at_rest, attack, moved, shapes
 from mbref.drawing.svg import COLOURS, GREY, INK
 from mbref.drawing.timeline import Timeline
@@ -22,7 +22,8 @@ LEADING = 1.5  # height of a line of a title, relative to its letters
 
 
 def signs(stage: Stage) -> Iterator[str]:
-    """Yield the signs of loads, joints and drivers."""
+    """Yield the signs of couplings, loads, joints and drivers."""
+    yield from (coupling_mark(stage, coupling) for coupling in stage.scene.coupling)
     yield from (load_mark(stage, load) for load in stage.scene.load)
     for joint in stage.scene.joint:
         yield from joint_mark(stage, joint)

@@ -25,13 +25,14 @@ class Evaluations:
         At times (c, k), coordinates (c, k, 7 nb) and velocities (c, k, 6 nb).
         """
         m, n, memory, shape = self._model.m, self._model.n, self._model.memory, times.shape
-        blocks, rows, forces = (np.empty((*shape, width)) for width in (12 * m, 3 * m, n))
+        columns = self._model.entry_columns
+        blocks, rows, forces = (np.empty((*shape, size)) for size in (columns.size, 3 * m, n))
         for k, place in enumerate(places.tolist()):
             self._parameters.write(place)
             evaluate_along(times[k], q[k], v[k], blocks[k], rows[k], forces[k], memory.packed.argument)
         self._model.put_numbers(memory.values, self._model.data)
         phi, nu, gamma = (rows[..., i * m : (i + 1) * m] for i in range(3))
-        return Terms(self._packs.mass[places], blocks.reshape(*shape, m, 12), phi, nu, gamma, forces)
+        return Terms(self._packs.mass[places], blocks.reshape(*shape, *columns.shape), phi, nu, gamma, forces)
 
     def starts(self) -> list[Start | SceneError]:
         """The consistent start of each scene, or the error of a scene without one."""

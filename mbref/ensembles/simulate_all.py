@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mbref.ensembles.batch import BatchResult, may_lead, run_batch
-from mbref.equations.packing import shape_of
+from mbref.equations.parts import shape_of
 from mbref.method import Method
 from mbref.motion import Motion
 from mbref.scene import Scene

@@ -118,4 +118,5 @@ def _mixed(reached: set[int], axes: Sequence[int]) -> set[int]:
 
 def primitives_of(model: Model, rows: np.ndarray) -> np.ndarray:
     """The primitives, by number, that have one of these rows."""
-    return np.unique(np.searchsorted(model.structure.row, rows, side="right") - 1)
+    last = np.searchsorted(model.structure.row, rows, side="right") - 1
+    return np.flatnonzero(np.isin(model.structure.row, model.structure.row[last]))

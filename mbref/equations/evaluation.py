@@ -46,7 +46,7 @@ def violation_rate(v, equations):
     bodies, blocks, rows = equations.scene.row_bodies, equations.system.blocks, equations.rows
     for row in range(bodies.shape[0]):
         value = -rows.nu[row]
-        for side in range(2):
+        for side in range(bodies.shape[1]):
             start = 6 * bodies[row, side]
             if start < v.shape[0]:
                 for k in range(6):
@@ -60,7 +60,7 @@ def assemble_jacobian(equations, dense):
     bodies, blocks = equations.scene.row_bodies, equations.system.blocks
     dense[:] = 0.0
     for row in range(dense.shape[0]):
-        for side in range(2):
+        for side in range(bodies.shape[1]):
             start = 6 * bodies[row, side]
             if start < dense.shape[1]:
                 for k in range(6):
@@ -78,9 +78,9 @@ def evaluate(t, q, v, equations):
 
 @entry(INT(VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, EQUATIONS))
 def evaluate_along(times, q, v, blocks, rows, forces, equations):
-    """``evaluate`` at k states, for Python: Φ_q as blocks (k, 12 m), (Φ, ν, γ) (k, 3 m), g (k, n); returns k.
+    """``evaluate`` at k states, for Python: Φ_q as blocks (k, width m), (Φ, ν, γ) (k, 3 m), g (k, n).
 
-    From times (k,), coordinates q (k, 7 nb) and velocities v (k, n).
+    Returns k.  From times (k,), coordinates q (k, 7 nb) and velocities v (k, n).
     """
     count, m = times.shape[0], equations.rows.phi.shape[0]
     for k in range(count):

@@ -102,11 +102,11 @@ class Evidence:
         shape = terms.phi.shape[:2]
         found = np.concatenate([one.reshape(*shape, -1) for one in nonzero(model, terms)], axis=2)
         found = found[:, :1] | _of_rounds(found[:, 1 : self._split], self._rounds[0])
-        entries, acting = found[..., : 12 * model.m], found[..., 12 * model.m :]
+        entries, acting = found[..., : model.entry_columns.size], found[..., model.entry_columns.size :]
         redundant = are_redundant(model, terms.jacobian[:, 0], self._shared)
         decisive = [v != 0, q != 0, mass > 0, entries, *self._of_held(terms), redundant]
         joined = np.concatenate([answer.reshape(len(q), -1) for answer in decisive], axis=1)
-        return Answers(joined, entries.reshape(*found.shape[:2], model.m, 12), acting)
+        return Answers(joined, entries.reshape(*found.shape[:2], *model.entry_columns.shape), acting)
 
     def _of_held(self, terms: Terms) -> list[np.ndarray]:
         """Which active entries and rows are other than zero in each round, and which rows could hold."""

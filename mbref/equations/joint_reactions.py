@@ -1,12 +1,15 @@
 """Joint reactions from Lagrange multipliers: -Φ_qᵀ λ of a joint's rows, moved to its anchor.
 
+The part of a coupling's or an armature's row that acts along a joint's coordinate belongs to its reaction, as
+a driver's row does.
+
 They are found when the first of them is asked for: to find them all takes longer than a short run.
 """
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +18,7 @@ from mbref import rotations
 from mbref.equations.model import Model
 from mbref.equations.structure import MOST_KEPT, Structure
 from mbref.equations.units import row_lengths
+from mbref.kernels.scene_layout import ANGLE
 from mbref.scene import Scene
 
 MOST_ROWS = 120  # singular values of more rows at every sample take longer than the run
@@ -104,13 +108,35 @@ def reactions(
         return {}
     body, side, of, starts = _places(model.structure, names)
     rows, sign = np.arange(of.size), np.where(side == 1, -1.0, 1.0)[of]
-    pulls = blocks.reshape(len(q), model.m, 2, 6)[:, rows, side[of]]
+    pulls = blocks.reshape(len(q), model.m, model.structure.sides, 6)[:, rows, side[of]]
     wrench = np.add.reduceat((sign * multipliers[:, rows])[..., None] * pulls, starts, axis=1)
     pose, force = q[:, body], wrench[..., :3]  # about the centre of mass, moments in body axes
     arm = model.anchors(q) - pose[..., :3]
     moment = rotations.rotate(pose[..., 3:], wrench[..., 3:]) - rotations.cross(arm, force)
     found = np.concatenate([force, moment], axis=-1)
+    _add_coupled(model, q, multipliers, names, found)
     return {name: found[:, j] for j, name in enumerate(names)}
+
+
+def _add_coupled(
+    model: Model, q: np.ndarray, multipliers: np.ndarray, names: Sequence[str], wrench: np.ndarray
+) -> None:
+    """Add what couplings and armatures do along the coordinates of joints to their wrenches (k, j, 6).
+
+    It is a force along, or a moment about, the axis that the first body carries.
+    """
+    primitives = model.data.primitives
+    for p, place in enumerate(model.structure.places.primitives):
+        if not place.part or place.of not in names:
+            continue
+        x, y = primitives.direction_first[p], primitives.turning_first[p]
+        turns = place.kind == ANGLE
+        axis = rotations.cross(x, y) if turns else x
+        if place.first < model.nb:
+            axis = rotations.rotate(q[:, place.first, 3:], axis[None])
+        strength = -multipliers[:, primitives.row[p]] * primitives.length[p]
+        components = slice(3, 6) if turns else slice(0, 3)
+        wrench[:, names.index(place.of), components] += strength[:, None] * axis
 
 
 def open_dimensions(model: Model, blocks: np.ndarray) -> dict[str, np.ndarray]:

@@ -10,6 +10,7 @@ from math import pi
 
 from numpy import arctan2, floor, sqrt
 
+from mbref.equations.primitives import joint_angle
 from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.scene_layout import FORCE, MOMENT, SPRING
 from mbref.linear_algebra.vectors import (
@@ -109,19 +110,14 @@ def torsion_spring(k, loads, frames, angles, g):
 
 
 @kernel
-def has_angles(loads):
-    """Whether there is a torsion spring, whose angle unwraps."""
-    for slot in loads.angle:  # noqa: SIM110 - numba compiles no generator expression
-        if slot >= 0:
-            return True
-    return False
-
-
-@kernel
 def remember_angles(equations):
-    """Keep the torsion springs' angles of the accepted state, so that they unwrap over many turns."""
-    loads, angles = equations.scene.loads, equations.angles
+    """Keep the angles of torsion springs and couplings at the accepted state, from which they unwrap."""
+    loads, angles, primitives = equations.scene.loads, equations.angles, equations.scene.primitives
     for k in range(loads.angle.shape[0]):
         slot = loads.angle[k]
         if slot >= 0:
             angles[slot] = relative_angle(k, angles[slot], loads, equations.frames.rotation)
+    for p in range(primitives.angle.shape[0]):
+        slot = primitives.angle[p]
+        if slot >= 0:
+            angles[slot] = joint_angle(p, angles[slot], primitives, equations.frames.rotation)

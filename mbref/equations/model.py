@@ -112,7 +112,7 @@ class Model:
 
     @property
     def has_angles(self) -> bool:
-        """Whether a torsion spring unwraps its angle."""
+        """Whether a torsion spring or a coupling unwraps its angle."""
         return self.structure.has_angles
 
     def start(self) -> np.ndarray:
@@ -127,7 +127,7 @@ class Model:
     def dense(self, blocks: np.ndarray) -> np.ndarray:
         """Φ_q (…, m, n) from its blocks (…, m, 12)."""
         matrix, rows = np.zeros((*blocks.shape[:-1], self.nb + 1, 6)), self.structure.rows
-        for side in range(2):
+        for side in range(self.structure.sides):
             matrix[..., rows, self.structure.row_bodies[:, side], :] = blocks[..., 6 * side : 6 * side + 6]
         return matrix[..., : self.nb, :].reshape(*blocks.shape[:-1], self.n)
 
@@ -137,11 +137,11 @@ class Model:
         From times (k,) in s, q (k, 7 nb) and v (k, n).
         """
         count = len(times)
-        blocks, rows = np.empty((count, 12 * self.m)), np.empty((count, 3 * self.m))
+        blocks, rows = np.empty((count, self.entry_columns.size)), np.empty((count, 3 * self.m))
         forces = np.empty((count, self.n))
         evaluate_along(times, q, v, blocks, rows, forces, self.memory.packed.argument)
         phi, nu, gamma = (rows[:, k * self.m : (k + 1) * self.m] for k in range(3))
-        return Terms(self.mass, blocks.reshape(count, self.m, 12), phi, nu, gamma, forces)
+        return Terms(self.mass, blocks.reshape(count, *self.entry_columns.shape), phi, nu, gamma, forces)
 
     def sparse(self, blocks: np.ndarray) -> csr_array:
         """Φ_q (m, n) from its blocks (m, 12), without zeros."""

@@ -1,20 +1,22 @@
 """Scenes of one structure as the arrays that kernels read, packed at once: a single scene, or many variants.
 
-Scenes are of one structure where they differ in numbers alone (``shape_of``).  The first axis of every array
-counts the scenes.  An entry that scenes share, as variants share most, is read once.
+Scenes are of one structure where they differ in numbers alone (``parts.shape_of``).  The first axis of every
+array counts the scenes.  An entry that scenes share, as variants share most, is read once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from mbref import rotations
+from mbref.equations.couplings import coordinate_primitives, couplings_of
 from mbref.equations.joints import driver_primitive, primitives_of
 from mbref.equations.joints.base import Primitive, frame
+from mbref.equations.parts import FRAME, NONE, all_parts
 from mbref.equations.structure import LoadPlace, Places, PrimitivePlace, structure_of
 from mbref.equations.units import body_lengths, inverse_root, metric
 from mbref.kernels.scene_layout import (
@@ -32,7 +34,6 @@ from mbref.scene import (
     GROUND,
     Body,
     Driver,
-    Fixed,
     Force,
     Joint,
     Load,
@@ -44,27 +45,10 @@ from mbref.scene import (
     TorsionSpring,
 )
 
-FRAME = "the fixed frame"  # holds a modelled ground
+Numbers = tuple[float, ...]
 AT_REST = Sine(amplitude=0.0, frequency=0.0, phase=0.0)
-NONE = (0.0, 0.0, 0.0)
 AT_ORIGIN = (*NONE, 1.0, *NONE, 1.0, 1.0, 1.0, 1.0)  # the fixed frame, as ``_of_body``
 OF_MASS = np.array([7, 7, 7, 8, 9, 10])  # of the numbers of a body: the diagonal of its part of M
-
-
-def shape_of(scene: Scene) -> Hashable:
-    """All of a scene but its numbers: scenes of equal shape are packed together."""
-    return (
-        scene.ground,
-        tuple((body.name, _shape_of_inertia(body)) for body in scene.body),
-        tuple((joint.name, joint.type, joint.bodies) for joint in scene.joint),
-        tuple((driver.joint, len(driver.polynomial)) for driver in scene.driver),
-        tuple((load.type, getattr(load, load.acts_on)) for load in scene.load),
-    )
-
-
-def _shape_of_inertia(body: Body) -> bool | None:
-    """Whether it has products of inertia; None without mass."""
-    return None if body.inertia is None else isinstance(body.inertia[0], tuple)
 
 
 class Packs:
@@ -78,8 +62,11 @@ class Packs:
 
     def __init__(self, scenes: Sequence[Scene]):
         self.scenes, self.kinematic = scenes, not scenes[0].has_mass()
-        listed = [with_ground(scene) for scene in scenes]
-        self.listed, self.joints = [bodies for bodies, _ in listed], [joints for _, joints in listed]
+        listed = [all_parts(scene) for scene in scenes]
+        self.listed, self.joints = [found.bodies for found in listed], [found.joints for found in listed]
+        self._coupled = [
+            couplings_of(scene) + found.couplings for scene, found in zip(scenes, listed, strict=True)
+        ]
         self.bodies = self.listed[0]
         self.nb = len(self.bodies)
         self.index = {body.name: b for b, body in enumerate(self.bodies)}
@@ -88,10 +75,15 @@ class Packs:
         joints = [joint for joints in self.joints for joint in joints]
         driven = {driver.joint: k for k, driver in enumerate(scenes[0].driver)}
         of_joints = _once(partial(_of_joint, driven=driven), joints)
-        self.structure = structure_of(self._places([found for found, _ in of_joints], driven))
+        of_couplings = [[*map(coordinate_primitives, found)] for found in self._coupled]
+        self.structure = structure_of(
+            self._places([found for found, _ in of_joints], of_couplings[0], driven)
+        )
         bodies = self._bodies()
         lengths = self._lengths(joints)
-        primitives, loads = self._fixed_in_bodies([number for _, rows in of_joints for number in rows])
+        primitives, loads = self._fixed_in_bodies(
+            self._in_order([rows for _, rows in of_joints], of_couplings)
+        )
         self.data = SceneData(
             gravity=self._gravity(),
             lengths=lengths,
@@ -105,8 +97,27 @@ class Packs:
             loads=loads,
         )
 
-    def _places(self, primitives: Sequence[Sequence[Primitive]], driven: Mapping[str, int]) -> Places:
-        """All of a scene but its numbers, from the primitives of each joint, the first scene's first."""
+    def _in_order(
+        self, of_joints: Sequence[list[Numbers]], of_couplings: Sequence[Sequence[tuple[Primitive, ...]]]
+    ) -> list[Numbers]:
+        """The numbers of all primitives, scene by scene: those of its joints, then those of its couplings."""
+        if not any(of_couplings):
+            return [numbers for rows in of_joints for numbers in rows]
+        found: list[Numbers] = []
+        count = len(self.joints[0])
+        for k, pairs in enumerate(of_couplings):
+            found += [numbers for rows in of_joints[k * count : (k + 1) * count] for numbers in rows]
+            found += [_numbers(primitive) for pair in pairs for primitive in pair]
+        return found
+
+    def _places(
+        self,
+        primitives: Sequence[Sequence[Primitive]],
+        coupled: Sequence[tuple[Primitive, ...]],
+        driven: Mapping[str, int],
+    ) -> Places:
+        """All of a scene but its numbers, from the primitives of each joint, the first scene's first, and of
+        the first scene's couplings."""
         scene, joints = self.scenes[0], self.joints[0]
         ends = [(self.index[joint.bodies[0]], self.index[joint.bodies[1]]) for joint in joints]
         loads = () if self.kinematic else scene.load
@@ -116,12 +127,20 @@ class Packs:
                 PrimitivePlace(p.kind, joint.name, first, second, driven[joint.name] if p.driven else -1)
                 for joint, (first, second), found in zip(joints, ends, primitives, strict=False)
                 for p in found
-            ),
+            )
+            + tuple(self._of_couplings(coupled)),
             loads=tuple(self._load_place(k, load) for k, load in enumerate(loads)),
             anchored=tuple(body for bodies in ends for body in bodies),
             drivers=len(scene.driver),
             terms=max((len(driver.polynomial) for driver in scene.driver), default=1),
         )
+
+    def _of_couplings(self, primitives: Sequence[tuple[Primitive, ...]]) -> Iterator[PrimitivePlace]:
+        """The joint coordinates of the first scene's couplings, two a row."""
+        for coupling, pair in zip(self._coupled[0], primitives, strict=True):
+            for k, (joint, p) in enumerate(zip(coupling.joints, pair, strict=True)):
+                first, second = map(self.index.__getitem__, joint.bodies)
+                yield PrimitivePlace(p.kind, coupling.name, first, second, -1, k + 1, joint.name)
 
     def _load_place(self, place: int, load: Load) -> LoadPlace:
         """Kind and bodies of load[place]; SceneError for a type without equations."""
@@ -175,22 +194,23 @@ class Packs:
         self.length = np.where(self.length > 0.0, self.length, 1.0)
         return body_lengths(anchors - self._centres[:, self.structure.anchored], self.structure.anchor_shares)
 
-    def _fixed_in_bodies(self, of_joints: Sequence[tuple[float, ...]]) -> tuple[Primitives, Loads]:
-        """Primitives and loads, from the numbers of the primitives of all joints and drivers, scene by scene.
+    def _fixed_in_bodies(self, of_primitives: Sequence[Numbers]) -> tuple[Primitives, Loads]:
+        """Primitives and loads, from the numbers of the primitives of all joints, drivers and couplings.
 
         Their vectors are turned to the principal frames of the bodies all at once.
         """
         structure, scenes = self.structure, () if self.kinematic else self.scenes
-        numbers = self._rows(of_joints, 16)
+        numbers = self._rows(of_primitives, 16)
         of_loads = self._rows((_numbers_of(load, scene) for scene in scenes for load in scene.load), 24)
         (s, p), l = numbers.shape[:2], of_loads.shape[1]
         world = np.concatenate(
             [numbers[..., :15].reshape(s, 5 * p, 3), of_loads[..., 3:21].reshape(s, 6 * l, 3)], axis=1
         )
         own = self.in_bodies(world)
-        of_primitives, vectors = own[:, : 5 * p].reshape(s, p, 5, 3), own[:, 5 * p :].reshape(s, l, 6, 3)
+        vectors_of, vectors = own[:, : 5 * p].reshape(s, p, 5, 3), own[:, 5 * p :].reshape(s, l, 6, 3)
         places = (structure.kind, structure.first, structure.second, structure.driver, structure.row)
-        directions = [of_primitives[:, :, k] for k in range(5)]
+        places += (*structure.places_in_row,)
+        directions = [vectors_of[:, :, k] for k in range(5)]
         primitives = Primitives._make([*map(self._all, places), *directions, numbers[..., 15]])
         ends = [*map(self._all, structure.load), self._all(structure.angle), of_loads[..., :3]]
         constants = [of_loads[..., k] for k in range(21, 24)]
@@ -228,16 +248,6 @@ class Packs:
 def row_of(values: Any, place: Any) -> Any:
     """The arrays of one scene, or of those at some places, of a schema of arrays of several."""
     return type(values)(*(row_of(v, place) if isinstance(v, tuple) else v[place] for v in values))
-
-
-def with_ground(scene: Scene) -> tuple[tuple[Body, ...], tuple[Joint, ...]]:
-    """Bodies and joints, the ground a body held by six rows where the scene asks for it."""
-    if scene.ground == "frame":
-        return scene.body, scene.joint
-    inertia = (1.0, 1.0, 1.0) if scene.has_mass() else None
-    body = Body(name=GROUND, position=NONE, mass=1.0 if inertia else None, inertia=inertia)
-    hold = Fixed.model_construct(name=GROUND, bodies=(FRAME, GROUND), anchor=NONE, type="fixed")
-    return (*scene.body, body), (*scene.joint, hold)
 
 
 def _once(function: Callable[[Any], Any], entries: Sequence[Any]) -> list[Any]:
@@ -282,13 +292,16 @@ def _anchors(joint: Joint) -> tuple[float, ...]:
     return *first, *second
 
 
-def _of_joint(joint: Joint, driven: Mapping[str, int]) -> tuple[list[Primitive], list[tuple[float, ...]]]:
+def _of_joint(joint: Joint, driven: Mapping[str, int]) -> tuple[list[Primitive], list[Numbers]]:
     """The primitives of a joint and its driver, and the 16 numbers of each: two points, three directions
     (``direction_first``, ``turning_first``, ``direction_second``) and a length."""
     found = [*primitives_of(joint), *([driver_primitive(joint)] if joint.name in driven else [])]
-    return found, [
-        (*p.point_first, *p.point_second, *p.first, *p.turning, *p.second, p.length) for p in found
-    ]
+    return found, [_numbers(p) for p in found]
+
+
+def _numbers(p: Primitive) -> Numbers:
+    """Two points, three directions and a length, or the factor of a joint coordinate."""
+    return *p.point_first, *p.point_second, *p.first, *p.turning, *p.second, p.length
 
 
 def _driver(driver: Driver, terms: int) -> tuple[float, ...]:

@@ -10,17 +10,23 @@ matrix of a body, the equations are
     distance   (d·d - l²) / (2 l) = 0
 
 A driver is a dot-1 whose a turns in body i by the prescribed angle, or a dot-2 less the prescribed
-displacement.  Jacobian columns multiply (δr, δπ') with δπ' the rotation in body axes; ν = -∂Φ/∂t and
+displacement.  A coupling is one row, the sum of two joint coordinates times factors:
+
+    angle      arctan2(s, c),  s = (A_j u)·(A_i y),  c = (A_j u)·(A_i x)
+    slide      (A_i a)·d
+
+Jacobian columns multiply (δr, δπ') with δπ' the rotation in body axes; ν = -∂Φ/∂t and
 γ is what Φ_q q̈ must equal (Eqs. 2 and 3 of the paper).
 """
 
 from __future__ import annotations
 
-from numpy import cos, sin
+from numpy import arctan2, cos, floor, pi, sin
 
 from mbref.kernels.compilation import inlined, kernel
-from mbref.kernels.scene_layout import DOT1, DOT2, POINT
+from mbref.kernels.scene_layout import ANGLE, DISTANCE, DOT1, DOT2, POINT
 from mbref.linear_algebra.vectors import (
+    accumulate,
     add,
     cross,
     dot,
@@ -197,6 +203,79 @@ def distance(p, equations):
     put(blocks, row, 9, cross(s_j, to_body(rotation, j, along)))
 
 
+@kernel
+def joint_coordinate(p, equations):
+    """Add a joint coordinate times its factor to the row of a coupling, which the first of two begins."""
+    primitives, rows, blocks = equations.scene.primitives, equations.rows, equations.system.blocks
+    row = primitives.row[p]
+    if primitives.begins[p]:
+        rows.phi[row], rows.nu[row], rows.gamma[row] = 0.0, 0.0, 0.0
+        for k in range(blocks.shape[1]):
+            blocks[row, k] = 0.0
+    if primitives.kind[p] == ANGLE:
+        add_angle(p, equations)
+    else:
+        add_displacement(p, equations)
+
+
+@kernel
+def joint_angle(p, reference, primitives, rotation):
+    """Angle of the second body against the first about the joint's axis (rad), nearest to ``reference``."""
+    i, j = primitives.first[p], primitives.second[p]
+    x = to_world(rotation, i, vector(primitives.direction_first, p))
+    y = to_world(rotation, i, vector(primitives.turning_first, p))
+    u = to_world(rotation, j, vector(primitives.direction_second, p))
+    angle = arctan2(dot(u, y), dot(u, x))
+    return angle + 2.0 * pi * floor((reference - angle) / (2.0 * pi) + 0.5)
+
+
+@kernel
+def add_angle(p, equations):
+    """Add an angle to its row: its rate is (ω_j - ω_i)·h with h = u × (c y - s x) / (c² + s²)."""
+    primitives, frames, rotation = equations.scene.primitives, equations.frames, equations.frames.rotation
+    rows, blocks = equations.rows, equations.system.blocks
+    i, j, row, factor = primitives.first[p], primitives.second[p], primitives.row[p], primitives.length[p]
+    x = to_world(rotation, i, vector(primitives.direction_first, p))
+    y = to_world(rotation, i, vector(primitives.turning_first, p))
+    u = to_world(rotation, j, vector(primitives.direction_second, p))
+    w_i = to_world(rotation, i, vector(frames.angular_velocity, i))
+    w_j = to_world(rotation, j, vector(frames.angular_velocity, j))
+    x_rate, y_rate, u_rate = cross(w_i, x), cross(w_i, y), cross(w_j, u)
+    c, s = dot(u, x), dot(u, y)
+    c_rate, s_rate = dot(u_rate, x) + dot(u, x_rate), dot(u_rate, y) + dot(u, y_rate)
+    square, square_rate = c * c + s * s, 2.0 * (c * c_rate + s * s_rate)
+    across = subtract(scale(c, y), scale(s, x))
+    across_rate = subtract(add(scale(c_rate, y), scale(c, y_rate)), add(scale(s_rate, x), scale(s, x_rate)))
+    normal, normal_rate = cross(u, across), add(cross(u_rate, across), cross(u, across_rate))
+    h = scale(1.0 / square, normal)
+    h_rate = scale(1.0 / square, subtract(normal_rate, scale(square_rate, h)))
+    reference = equations.angles[primitives.angle[p]]
+    rows.phi[row] += factor * joint_angle(p, reference, primitives, rotation)
+    rows.gamma[row] -= factor * dot(subtract(w_j, w_i), h_rate)
+    accumulate(blocks[row], primitives.column_first[p] + 3, scale(-factor, to_body(rotation, i, h)))
+    accumulate(blocks[row], primitives.column_second[p] + 3, scale(factor, to_body(rotation, j, h)))
+
+
+@kernel
+def add_displacement(p, equations):
+    """Add a displacement to its row, as ``dot2`` has it."""
+    primitives, frames, rotation = equations.scene.primitives, equations.frames, equations.frames.rotation
+    rows, blocks = equations.rows, equations.system.blocks
+    i, j, row, factor = primitives.first[p], primitives.second[p], primitives.row[p], primitives.length[p]
+    a, w_i = vector(primitives.direction_first, p), vector(frames.angular_velocity, i)
+    s_i, s_j = vector(primitives.point_first, p), vector(primitives.point_second, p)
+    d, d_rate, d_second = between(p, primitives, frames)
+    a_world, a_rate = to_world(rotation, i, a), to_world(rotation, i, cross(w_i, a))
+    a_second = to_world(rotation, i, cross(w_i, cross(w_i, a)))
+    first, second = primitives.column_first[p], primitives.column_second[p]
+    rows.phi[row] += factor * dot(a_world, d)
+    rows.gamma[row] -= factor * (dot(a_second, d) + 2.0 * dot(a_rate, d_rate) + dot(a_world, d_second))
+    accumulate(blocks[row], first, scale(-factor, a_world))
+    accumulate(blocks[row], first + 3, scale(factor, cross(a, add(to_body(rotation, i, d), s_i))))
+    accumulate(blocks[row], second, scale(factor, a_world))
+    accumulate(blocks[row], second + 3, scale(factor, cross(s_j, to_body(rotation, j, a_world))))
+
+
 @inlined
 def constraints(t, primitives, equations):
     """Φ, Φ_q, ν and γ of the rows of these primitives, by number, at the state in ``equations.frames``."""
@@ -209,5 +288,7 @@ def constraints(t, primitives, equations):
             dot1(p, t, equations)
         elif kinds[p] == DOT2:
             dot2(p, t, equations)
-        else:
+        elif kinds[p] == DISTANCE:
             distance(p, equations)
+        else:
+            joint_coordinate(p, equations)

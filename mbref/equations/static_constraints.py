@@ -70,25 +70,26 @@ def reduced_pattern(
     static = _static_rows(entries, columns, held)
     active = moving & ~are_held(held, moving.size)
     row, entry = np.nonzero(entries & lies_in(columns, active))
-    return symbolic_factorisation(row, columns[row, entry], 12 * row + entry, active), static
+    return symbolic_factorisation(row, columns[row, entry], columns.shape[1] * row + entry, active), static
 
 
 def _static_rows(entries: np.ndarray, columns: np.ndarray, held: Sequence[Held]) -> StaticRows:
     """The rows that hold; a column's other entries are of rows whose multipliers are known by then."""
     row, entry = np.nonzero(entries)
+    width = columns.shape[1]
     in_column: dict[int, list[int]] = {}
     for r, e in zip(row.tolist(), entry.tolist(), strict=True):
-        in_column.setdefault(int(columns[r, e]), []).append(12 * r + e)
+        in_column.setdefault(int(columns[r, e]), []).append(width * r + e)
     rows: list[int] = []
     starts, own, own_columns, firsts = [0], list[int](), list[int](), [0]
     others: list[int] = []
     for each in reversed(held):
         for r in each.rows:
             for column in each.columns:
-                (place,) = (place for place in in_column[column] if place // 12 == r)
+                (place,) = (place for place in in_column[column] if place // width == r)
                 own.append(place)
                 own_columns.append(column)
-                others += [place for place in in_column[column] if place // 12 not in each.rows]
+                others += [place for place in in_column[column] if place // width not in each.rows]
                 firsts.append(len(others))
             rows.append(r)
             starts.append(len(own))

@@ -9,6 +9,7 @@ from mbref.kernels.compilation import inlined
 def add_static_multipliers(static, system):
     """Multipliers of the statically determined rows: they balance the forces on columns without q̈."""
     blocks, multipliers, force = system.blocks.reshape(-1), system.multipliers, system.force
+    width = system.blocks.shape[1]
     start, entry, column, first, other = (
         static.start, static.entry, static.column, static.other_start, static.other,
     )  # fmt: skip
@@ -17,7 +18,7 @@ def add_static_multipliers(static, system):
         for p in range(start[k], start[k + 1]):
             balance, own = force[column[p]], blocks[entry[p]]
             for o in range(first[p], first[p + 1]):
-                balance -= blocks[other[o]] * multipliers[other[o] // 12]
+                balance -= blocks[other[o]] * multipliers[other[o] // width]
             value += own * balance
             square += own * own
         multipliers[static.row[k]] = value / square

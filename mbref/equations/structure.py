@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mbref.equations.joints.base import ROWS_OF
-from mbref.kernels.scene_layout import FORCE, SPRING, TORSION_SPRING
+from mbref.kernels.scene_layout import ANGLE, FORCE, SPRING, TORSION_SPRING
 
 MOST_KEPT = 256  # structures
 
@@ -25,6 +25,8 @@ class PrimitivePlace(NamedTuple):
     first: int  # body
     second: int
     driver: int  # -1 without
+    part: int = 0  # 1 or 2 of the two joint coordinates in the row of a coupling
+    of: str = ""  # the joint whose coordinate it is
 
 
 class LoadPlace(NamedTuple):
@@ -64,8 +66,10 @@ class Structure:
     second: np.ndarray  # (p,)
     driver: np.ndarray  # (p,), -1 without
     row: np.ndarray  # (p,) the first row of each
-    row_bodies: np.ndarray  # (m, 2)
-    entry_columns: np.ndarray  # (m, 12)
+    places_in_row: np.ndarray  # (4, p) begins, column_first, column_second, angle of ``Primitives``
+    sides: int  # bodies of a row: 2, or 4 where joint coordinates are coupled
+    row_bodies: np.ndarray  # (m, sides), filled up with the fixed frame
+    entry_columns: np.ndarray  # (m, width)
     row_joint: tuple[str, ...]  # (m,) names
     load: np.ndarray  # (3, l): kind, first and second body
     angle: np.ndarray  # (l,) index of the unwrapped angle of a torsion spring, else -1
@@ -77,13 +81,22 @@ class Structure:
     @functools.cached_property
     def sizes(self) -> dict[str, int]:
         """Sizes of the memory of evaluations (see ``kernels.layout``)."""
-        angles, m = max(1, int(np.count_nonzero(self.angle >= 0))), len(self.row_joint)
-        return {"nb": self.nb, "n": 6 * self.nb, "m": m, "angles": angles, "dense_rows": 0, "width": 12}
+        sides, m = self.sides, len(self.row_joint)
+        angles = max(1, int(np.count_nonzero(self.angle >= 0) + np.count_nonzero(self.places_in_row[3] >= 0)))
+        return {
+            "nb": self.nb,
+            "n": 6 * self.nb,
+            "m": m,
+            "angles": angles,
+            "dense_rows": 0,
+            "sides": sides,
+            "width": 6 * sides,
+        }
 
     @functools.cached_property
     def has_angles(self) -> bool:
-        """Whether a torsion spring unwraps its angle."""
-        return bool((self.angle >= 0).any())
+        """Whether a torsion spring or a coupling unwraps its angle."""
+        return bool((self.angle >= 0).any() or (self.places_in_row[3] >= 0).any())
 
     @functools.cached_property
     def of_bodies(self) -> np.ndarray:
@@ -107,7 +120,9 @@ class Structure:
     def closed_loops(self) -> int:
         """Independent loops of bodies and joints; without one, no position is singular."""
         part, loops = list(range(self.nb + 1)), 0
-        for _, one, other in dict.fromkeys((p.joint, p.first, p.second) for p in self.places.primitives):
+        for _, one, other in dict.fromkeys(
+            (p.joint, p.first, p.second) for p in self.places.primitives if not p.part
+        ):
             first, second = part[one], part[other]
             loops += first == second
             part = [first if p == second else p for p in part]
@@ -130,8 +145,16 @@ def structure_of(places: Places) -> Structure:
     )
     load = np.array(places.loads, dtype=np.int64).reshape(-1, 3).T.copy()
     is_angle = load[0] == TORSION_SPRING
-    rows = np.array([ROWS_OF[place.kind] for place in primitives], dtype=np.int64)
-    row_bodies = np.repeat(np.stack([first, second], axis=1), rows, axis=0)
+    rows = np.array([ROWS_OF[place.kind] * (place.part != 1) for place in primitives], dtype=np.int64)
+    coupled, columns = _coupled_bodies(places)
+    sides = 4 if coupled else 2
+    row_bodies = np.full((rows.sum(), sides), nb, dtype=np.int64)
+    row_bodies[:, :2] = np.repeat(np.stack([first, second], axis=1), rows, axis=0)
+    for bodies, row in zip(coupled, np.cumsum(rows)[[p.part == 2 for p in primitives]] - 1, strict=True):
+        row_bodies[row] = bodies
+    unwraps = np.array([place.kind == ANGLE for place in primitives], dtype=bool)
+    slots = np.where(unwraps, np.count_nonzero(is_angle) + np.cumsum(unwraps) - 1, -1)
+    begins = np.array([place.part != 2 for place in primitives], dtype=np.int64)
     return Structure(
         nb=nb,
         kind=kind,
@@ -139,8 +162,10 @@ def structure_of(places: Places) -> Structure:
         second=second,
         driver=driver,
         row=np.cumsum([0, *rows], dtype=np.int64)[:-1],
+        places_in_row=np.array([begins, *columns, slots], dtype=np.int64).reshape(4, -1),
+        sides=sides,
         row_bodies=row_bodies,
-        entry_columns=(6 * row_bodies[:, :, None] + np.arange(6)).reshape(len(row_bodies), 12),
+        entry_columns=(6 * row_bodies[:, :, None] + np.arange(6)).reshape(len(row_bodies), 6 * sides),
         row_joint=tuple(
             place.joint for place, count in zip(primitives, rows, strict=True) for _ in range(count)
         ),
@@ -153,6 +178,24 @@ def structure_of(places: Places) -> Structure:
                                   + [_origins(l, nb) for l in places.loads]),
         places=places,
     )  # fmt: skip
+
+
+def _coupled_bodies(places: Places) -> tuple[list[list[int]], tuple[list[int], list[int]]]:
+    """The four bodies of each coupling, filled up with the fixed frame; and for each primitive where in a row
+    the columns of its first and of its second body stand."""
+    coupled: list[list[int]] = []
+    columns: tuple[list[int], list[int]] = [], []
+    ahead = [*places.primitives[1:], None]
+    bodies: list[int] = []
+    for place, other in zip(places.primitives, ahead, strict=True):
+        if place.part == 1 and other is not None:
+            bodies = list(dict.fromkeys((place.first, place.second, other.first, other.second)))
+            coupled.append(bodies + [places.nb] * (4 - len(bodies)))
+        ends = (place.first, place.second)
+        found = [6 * bodies.index(body) for body in ends] if place.part else [0, 6]
+        for each, column in zip(columns, found, strict=True):
+            each.append(column)
+    return coupled, columns
 
 
 def _of_vectors(bodies: list[tuple[int, ...]]) -> np.ndarray:

@@ -75,15 +75,15 @@ class Counts(NamedTuple):
 class System(NamedTuple):
     """M q̈ + Φ_qᵀ λ = g, Φ_q q̈ = rhs: all that a formulation sees.  It writes acceleration and multipliers.
 
-    The constraint Jacobian stands as the blocks of both bodies' columns, or as a dense matrix, or both: a
-    formulation says which one it reads (``LinearAlgebra``).
+    The constraint Jacobian stands as the blocks of the columns of each row's bodies, or as a dense matrix, or
+    both: a formulation says which one it reads (``LinearAlgebra``).
     """
 
     mass: Annotated[Vector, "n"]  # diagonal of M
     inverse_root: Annotated[Vector, "n"]  # M^(-1/2); 1 where the mass is zero
     force: Annotated[Vector, "n"]  # g
     acceleration: Annotated[Vector, "n"]  # q̈
-    blocks: Annotated[Matrix, "m", "width"]  # width = 12, or n where a dense matrix takes their place
+    blocks: Annotated[Matrix, "m", "width"]  # width = 6 sides, or n where a dense matrix takes their place
     jacobian: Annotated[Matrix, "dense_rows", "n"]
     rhs: Annotated[Vector, "m"]
     multipliers: Annotated[Vector, "m"]  # λ
@@ -100,7 +100,7 @@ class Equations(NamedTuple):
     frames: Frames
     rows: Rows
     system: System
-    angles: Annotated[Vector, "angles"]  # rad, of torsion springs at the last accepted step, unwrapped
+    angles: Annotated[Vector, "angles"]  # rad, at the last accepted step, unwrapped
 
 
 class State(NamedTuple):

@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple
 
 from mbref.kernels.named_memory import IndexTable, Indices, Matrix, Vector
 
-POINT, DOT1, DOT2, DISTANCE = range(4)  # kinds of primitives
+POINT, DOT1, DOT2, DISTANCE, ANGLE, SLIDE = range(6)  # kinds of primitives
 MOMENT, FORCE, SPRING, TORSION_SPRING = range(4)  # kinds of loads
 
 
@@ -21,19 +21,27 @@ class Bodies(NamedTuple):
 
 
 class Primitives(NamedTuple):
-    """Primitive constraints: bodies, first row, and vectors fixed in the first and the second body."""
+    """Primitive constraints: bodies, first row, and vectors fixed in the first and the second body.
+
+    Two joint coordinates, ANGLE or SLIDE, share the row of a coupling, to which each adds its value times the
+    factor in ``length``.
+    """
 
     kind: Annotated[Indices, "p"]
     first: Annotated[Indices, "p"]
     second: Annotated[Indices, "p"]
     driver: Annotated[Indices, "p"]  # -1 without
     row: Annotated[Indices, "p"]
+    begins: Annotated[Indices, "p"]  # 0 of the second coordinate in the row of a coupling, else 1
+    column_first: Annotated[Indices, "p"]  # in the blocks, where the columns of the first body stand
+    column_second: Annotated[Indices, "p"]
+    angle: Annotated[Indices, "p"]  # index of the unwrapped angle of a joint coordinate, else -1
     point_first: Annotated[Matrix, "p", 3]
     point_second: Annotated[Matrix, "p", 3]
     direction_first: Annotated[Matrix, "p", 3]
     turning_first: Annotated[Matrix, "p", 3]  # a quarter turn from direction_first, where a driver turns it
     direction_second: Annotated[Matrix, "p", 3]
-    length: Annotated[Vector, "p"]
+    length: Annotated[Vector, "p"]  # of a distance (m), or the factor of a joint coordinate
 
 
 class Drivers(NamedTuple):
@@ -78,7 +86,7 @@ class SceneData(NamedTuple):
     primitives: Primitives
     moving: Annotated[Indices, "moving"]  # primitives that are evaluated at every state
     resting: Annotated[Indices, "resting"]  # those that only give multipliers
-    row_bodies: Annotated[IndexTable, "m", 2]  # the two bodies of each row
+    row_bodies: Annotated[IndexTable, "m", "sides"]  # the bodies of each row, filled up with the fixed frame
     drivers: Drivers
     loads: Loads
 

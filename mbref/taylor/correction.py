@@ -5,6 +5,7 @@ from __future__ import annotations
 from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.layout import NOT_CONVERGED, OK
 from mbref.linear_algebra.vectors import larger
+from mbref.taylor.angles import add_angle_rates, add_angles
 from mbref.taylor.generated_calls import close_by_code, violation_by_code
 from mbref.taylor.partition import least_pivot
 from mbref.taylor.simd import WIDTH, gather, load, store
@@ -40,6 +41,8 @@ def violation_in_loops(memory):
         store(total, phi, block * WIDTH)
     for e in range(rows.linear_row.shape[0]):
         phi[nz + rows.linear_row[e]] += rows.linear_weight[e] * terms[0, rows.linear_lane[e]]
+    if memory.polynomials.torsions.row.shape[0] > 0:
+        add_angles(memory)
 
 
 @inlined
@@ -59,6 +62,8 @@ def violation_rate_in_loops(memory):
         store(total, phi, block * WIDTH)
     for e in range(rows.linear_row.shape[0]):
         phi[nz + rows.linear_row[e]] += rows.linear_weight[e] * terms[1, rows.linear_lane[e]]
+    if memory.polynomials.torsions.row.shape[0] > 0:
+        add_angle_rates(memory)
 
 
 @inlined

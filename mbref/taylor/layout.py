@@ -42,8 +42,7 @@ class Rows(NamedTuple):
 class Products(NamedTuple):
     """Products of two series in the equations: of the force on a lane's variable, or of a lane's row.
 
-    Each block of lanes has as many blocks of slots as its lane with the most products needs.
-    """
+    A block of lanes has room for its lane with the most products."""
 
     left: Annotated[Indices, "slots"]  # lanes
     right: Annotated[Indices, "slots"]
@@ -91,7 +90,7 @@ class Springs(NamedTuple):
 
 
 class Torsions(NamedTuple):
-    """Torsion springs: two directions across the axis on the first body, one on the second."""
+    """Angles of joints: two directions across the axis on the first body, one on the second."""
 
     constant: Annotated[Matrix, "torsions", 9]
     form: Annotated[Matrix, "9*torsions", "nz"]
@@ -99,6 +98,8 @@ class Torsions(NamedTuple):
     damping: Annotated[Vector, "torsions"]
     natural: Annotated[Vector, "torsions"]
     slot: Annotated[Indices, "torsions"]  # of the unwrapped angle among the model's
+    row: Annotated[Indices, "torsions"]  # of the coupling to which the angle belongs; -1 of a torsion spring
+    factor: Annotated[Vector, "torsions"]  # of the angle in that row
 
 
 class Polynomials(NamedTuple):
@@ -131,11 +132,7 @@ class Series(NamedTuple):
 
 
 class Solver(NamedTuple):
-    """The linear system of each order, its partition and the response.
-
-    A row of ``response`` has the lanes that follow from one number on the right-hand side: of an equation
-    (none from a row that depends on others) or of a function prescribed.
-    """
+    """The linear system of each order, its partition and the response."""
 
     pivot_rows: Annotated[Indices, "nr"]  # the independent rows first
     pivot_columns: Annotated[Indices, "nz"]  # their dependent variables first
@@ -156,7 +153,9 @@ class Solver(NamedTuple):
     momentum: Annotated[Matrix, "nz", "lanes"]  # Tᵀ M
     reduced: Annotated[Matrix, "nz", "nz"]  # Tᵀ M T
     forces: Annotated[Matrix, "nz", "lanes"]  # left at a variable by the motion due to one right-hand side
-    response: Annotated[Matrix, "lanes", "lanes"]
+    response: Annotated[
+        Matrix, "lanes", "lanes"
+    ]  # row: the lanes that one number of the right-hand side moves
     rhs: Annotated[Vector, "lanes"]
     phi: Annotated[Vector, "lanes"]  # in the lanes of the multipliers
     change: Annotated[Vector, "lanes"]  # the last correction

@@ -174,6 +174,9 @@ def add_torsions(k, memory):
         of = memory.series.torsions[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
         angle = of[ANGLE, k] - torsions.natural[s] if k == 0 else of[ANGLE, k]
         of[MOMENT, k] = torsions.stiffness[s] * angle + torsions.damping[s] * (k + 1) * of[ANGLE, k + 1]
+        if torsions.row[s] >= 0:
+            of[MOMENT, k] = 0.0
+            add_coupled_angle(s, k, of, memory)
         of[MOMENT_COS, k] = product_order(of[MOMENT], of[COS], k)
         of[MOMENT_SIN, k] = product_order(of[MOMENT], of[SIN], k)
         for c in range(3):
@@ -186,6 +189,30 @@ def add_torsions(k, memory):
             f = torsions.form[9 * s + F + c]
             for i in range(nz):
                 sums[k, i] += on_e2 * e2[i] - on_e1 * e1[i] + on_f * f[i]
+
+
+@kernel
+def add_coupled_angle(s, k, of, memory):
+    """Add to the row of a coupling what order k + 2 of an angle is without that order of the variables; take
+    order k - 1 of the multiplier, which is known, into the moment.
+
+    The multiplier of order k, which is not, acts by the gradient at the time of expansion.
+    """
+    torsions, terms, sums = memory.polynomials.torsions, memory.series.terms, memory.series.sums
+    lane, factor = memory.solver.pivot_columns.shape[0] + torsions.row[s], torsions.factor[s]
+    if k > 0:
+        of[MOMENT, k - 1] = factor * terms[k + 1, lane]
+        of[MOMENT_COS, k - 1] = product_order(of[MOMENT], of[COS], k - 1)
+        of[MOMENT_SIN, k - 1] = product_order(of[MOMENT], of[SIN], k - 1)
+    order, cosine, sine = k + 2, 0.0, 0.0
+    for c in range(3):
+        for i in range(1, order):
+            cosine += of[E1 + c, i] * of[F + c, order - i]
+            sine += of[E2 + c, i] * of[F + c, order - i]
+    value = order * (of[COS, 0] * sine - of[SIN, 0] * cosine)
+    for i in range(1, order):
+        value += i * (of[COS, order - i] * of[SIN, i] - of[SIN, order - i] * of[COS, i])
+    sums[k, lane] += factor * value / order
 
 
 @kernel

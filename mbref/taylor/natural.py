@@ -17,7 +17,7 @@ import numpy as np
 from mbref import rotations
 from mbref.equations.initial_state import Start
 from mbref.equations.model import Model
-from mbref.kernels.scene_layout import DISTANCE, DOT1, DOT2, POINT
+from mbref.kernels.scene_layout import ANGLE, DISTANCE, DOT1, DOT2, POINT, SLIDE
 from mbref.taylor.direction_vectors import DirectionVectors, direction_forms
 from mbref.taylor.expressions import (
     ONE,
@@ -44,8 +44,9 @@ class NaturalCoordinates:
     """The variables of a model from a start, lengths in the unit ``length`` (m), and the rows between them.
 
     ``moving`` (n,) says which velocities can be other than zero.  ``kept`` are the variables left, ``given``
-    those that drivers prescribe: (driver, VALUE, COSINE or SINE) each.  Where drivers prescribe the whole
-    motion (``driven``), no forces are needed: equations eliminate more, and driven cranks have linear rows.
+    those that drivers prescribe: (driver, VALUE, COSINE or SINE) each.  ``angles`` belong to rows of
+    couplings, beside their products.  Where drivers prescribe the whole motion (``driven``), no forces are
+    needed: equations eliminate more, and driven cranks have linear rows.
     """
 
     def __init__(self, model: Model, start: Start, moving: np.ndarray, driven: bool = False):
@@ -61,6 +62,9 @@ class NaturalCoordinates:
         self._positions = range(3 * self.nb)
         self.eliminate = Elimination(self._may_go)
         self.orientations = Orientations(model, axes, self._moving[:, 3:], self.direction_vectors)
+        self.angles: dict[
+            int, tuple[int, float]
+        ] = {}  # primitive of an angle → its row, and its factor there
         self.rows = self._rows()
         gone = self.eliminate.expressed
         kept = (v for v in range(len(self.direction_vectors)) if v not in gone and v not in self.given)
@@ -98,14 +102,18 @@ class NaturalCoordinates:
         for equation in self._linear_equations():
             self.eliminate.add(equation)
         self.eliminate.settle()
-        rows, turned, primitives = [], set(), self.model.data.primitives
-        for p in np.flatnonzero(primitives.kind != POINT):
+        kinds = self.model.data.primitives.kind
+        rows, turned = [], set()
+        for p in np.flatnonzero((kinds != POINT) & (kinds != ANGLE) & (kinds != SLIDE)):
             number = self._turned(p)
             if number is not None and number not in turned:
                 turned.add(number)
                 rows += self._turning(p)
             else:
-                rows += self._driven(p) if primitives.driver[p] >= 0 else [self._undriven(p)]
+                is_driven = self.model.data.primitives.driver[p] >= 0
+                rows += self._driven(p) if is_driven else [self._undriven(p)]
+        couplings = self._couplings()
+        rows += [row for row, angles in couplings if not angles]
         free = (o for number, o in self.orientations.numbered.items() if number not in turned)
         rows = [row for orientation in free for row in orientation.rows()] + rows
         before = -1
@@ -116,7 +124,38 @@ class NaturalCoordinates:
                     self.eliminate.add(as_expression(row))
             self.eliminate.settle()
         linear = ({(ONE, v): c for v, c in equation.items()} for equation in self.eliminate.left)
-        return independent([row for row in (*rows, *linear) if degree(row) > 0])
+        found = independent([row for row in (*rows, *linear) if degree(row) > 0])
+        for row, angles in couplings:
+            if angles:
+                self.angles |= {p: (len(found), factor) for p, factor in angles}
+                found.append(self._reduced(row))
+        return found
+
+    def _couplings(self) -> list[tuple[Polynomial, list[tuple[int, float]]]]:
+        """Return of each coupling the polynomial of its displacements, and its angles: the primitive and its
+        factor; of both the larger factor is 1, in the unit of length."""
+        primitives, found = self.model.data.primitives, []
+        for second in np.flatnonzero(primitives.begins == 0).tolist():
+            pair, polynomial = (second - 1, second), Polynomial()
+            factors = [float(primitives.length[p]) * self._unit(p) for p in pair]
+            largest = max(map(abs, factors))
+            angles = []
+            for p, factor in zip(pair, factors, strict=True):
+                if primitives.kind[p] == ANGLE:
+                    angles.append((p, factor / largest))
+                else:
+                    axis = self.direction(int(primitives.first[p]), primitives.direction_first[p])
+                    apart = _difference(*self._ends(p)[::-1])
+                    moved = product_sum(zip(axis, apart, strict=True), factor / largest)
+                    polynomial = {
+                        k: polynomial.get(k, 0.0) + moved.get(k, 0.0) for k in {**polynomial, **moved}
+                    }
+            found.append((polynomial, angles))
+        return found
+
+    def _unit(self, p: int) -> float:
+        """Return the unit of a joint coordinate: the unit of length (m), or one radian."""
+        return self.length if self.model.data.primitives.kind[p] == SLIDE else 1.0
 
     def _is_prescribed(self, row: Polynomial) -> bool:
         """Return whether a row has a driver; it eliminates nothing, because M would depend on time."""

@@ -6,6 +6,7 @@ from numpy import inf
 
 from mbref.kernels.compilation import inlined, kernel
 from mbref.linear_algebra.vectors import copy
+from mbref.taylor.angles import add_angle_gradients
 from mbref.taylor.simd import WIDTH, load, max_abs, store
 
 
@@ -32,6 +33,7 @@ def evaluate_gradient(y, memory):
     for e in range(rows.row.shape[0]):
         if rows.lane[e] < work.shape[1]:
             work[rows.row[e], rows.lane[e]] += rows.weight[e] * y[0, rows.other[e]]
+    add_angle_gradients(y, work, memory)
 
 
 @kernel
@@ -54,6 +56,8 @@ def put_rows(memory):
         store(load(linear, j), tableau, j)
     for e in range(place.shape[0]):
         tableau[place[e]] += weight[e] * terms[0, other[e]]
+    if memory.polynomials.torsions.row.shape[0] > 0:
+        add_angle_gradients(terms, solver.tableau, memory)
 
 
 @kernel

@@ -34,7 +34,8 @@ class Geometry:
         self._rows, self._products = _rows(of, lane, self._lanes), _products(of, lane, self._lanes)
         self._poses, self._given = _poses(of, self._forms), _given(of)
         self.tableau = _tableau(self._rows, len(of.kept), len(of.rows), self._lanes)
-        self._without = Springs(*_stacked([], 3, len(of.kept))), _torsions_of([], len(of.kept))
+        self._angles = _coupled_angles(self._forms)
+        self._without = Springs(*_stacked([], 3, len(of.kept))), _torsions_of(self._angles, len(of.kept))
 
     def polynomials(self, model: Model) -> Polynomials:
         """Return the polynomials of a scene of this geometry."""
@@ -42,7 +43,7 @@ class Geometry:
         if (loads.kind == SPRING).any():
             springs = _springs(loads, self._forms)
         if (loads.kind == TORSION_SPRING).any():
-            torsions = _torsions(loads, self._forms)
+            torsions = _torsions_of([*_torsions(loads, self._forms), *self._angles], self._forms.d)
         return Polynomials(
             rows=self._rows,
             products=self._products,
@@ -250,7 +251,21 @@ def _springs(loads: Loads, forms: Forms) -> Springs:
     return Springs(*_stacked(rows, 3, forms.d))
 
 
-def _torsions(loads: Loads, forms: Forms) -> Torsions:
+def _coupled_angles(forms: Forms) -> list[tuple]:
+    """Return the angles in the rows of couplings, as rows of ``Torsions`` without stiffness."""
+    of, rows = forms.of, []
+    table = of.model.data.primitives
+    for p, (row, factor) in of.angles.items():
+        first, second = int(table.first[p]), int(table.second[p])
+        across = (of.direction(first, w[p]) for w in (table.direction_first, table.turning_first))
+        directions = *across, of.direction(second, table.direction_second[p])
+        constant, form = forms([e for direction in directions for e in direction])
+        rows.append((constant, form, 0.0, 0.0, 0.0, table.angle[p], row, factor))
+    return rows
+
+
+def _torsions(loads: Loads, forms: Forms) -> list[tuple]:
+    """Return the torsion springs, as rows of ``Torsions``."""
     of, rows = forms.of, []
     for k in np.flatnonzero(loads.kind == TORSION_SPRING):
         first, second = int(loads.first[k]), int(loads.second[k])
@@ -258,13 +273,14 @@ def _torsions(loads: Loads, forms: Forms) -> Torsions:
                   of.direction(second, loads.x_second[k]))  # fmt: skip
         constant, form = forms([e for direction_vector in direction_vectors for e in direction_vector])
         stiffness, damping = (c[k] / of.length**2 for c in (loads.stiffness, loads.damping))
-        rows.append((constant, form, stiffness, damping, loads.natural[k], loads.angle[k]))
-    return _torsions_of(rows, forms.d)
+        rows.append((constant, form, stiffness, damping, loads.natural[k], loads.angle[k], -1, 0.0))
+    return rows
 
 
 def _torsions_of(rows: Sequence[tuple], d: int) -> Torsions:
-    constant, form, stiffness, damping, natural, slot = _stacked(rows, 9, d, 4)
-    return Torsions(constant, form, stiffness, damping, natural, slot.astype(np.int64))
+    constant, form, stiffness, damping, natural, slot, row, factor = _stacked(rows, 9, d, 6)
+    indices = slot.astype(np.int64), row.astype(np.int64)
+    return Torsions(constant, form, stiffness, damping, natural, *indices, factor)
 
 
 def _stacked(rows: Sequence[tuple], width: int, d: int, numbers: int = 3) -> list[np.ndarray]:

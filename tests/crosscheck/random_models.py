@@ -163,10 +163,9 @@ def mjcf(seed: int) -> File:
             pose = numbers(np.concatenate([local(data, a, data.xpos[b]), relative]))
             scale = ' torquescale="0"' if kind == "ball weld" else ""
             equalities += f'<weld name="c{k}" body1="{first}" body2="{second}" relpose="{pose}"{scale}/>'
-    without = ["armature"]
+    without: list[str] = []
     if len(hinges) > 1 and random.uniform() < 0.3:
         equalities += f'<joint name="gear" joint1="{hinges[0]}" joint2="{hinges[1]}" polycoef="0 2 0 0 0"/>'
-        without.append("couplings")
     for name, text in sites.items():
         if name == "world":
             tree += text

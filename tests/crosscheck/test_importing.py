@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
+import mbref
 from crosscheck.engines.mujoco.importing.agreement import Agreement
 from crosscheck.engines.mujoco.importing.reading import Source, _Reader, source
 from crosscheck.judge.gauss_principle import gauss, rank
@@ -247,21 +248,92 @@ def test_coincident_frames_are_named_and_closed_on_request(tmp_path):
             read(tmp_path, text, "wish.urdf", close=[wish])
 
 
-def test_mimic_joints_are_refused_unless_left_out(tmp_path):
-    text = middle("0 1 0", "0 0 1").replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><mimic joint="j1"/>')
-    with pytest.raises(SceneError, match=r"joint 'j2' mimics 'j1'.*--without couplings"):
-        read(tmp_path, text, "mimic.urdf")
-    assert read(tmp_path, text, "mimic.urdf", without=["couplings"]).imported.left_out
+def follower(mimic: str) -> str:
+    """A URDF whose second hinge follows the first."""
+    text = middle("0 1 0", "0 0 1", "0.2 0 0")
+    moments = 'ixx="1e-3" ixy="0" ixz="0" iyy="2e-3" iyz="0" izz="2e-3"'
+    mass = f'<inertial><mass value="0.4"/><inertia {moments}/></inertial>'
+    text = text.replace('<link name="mid"/>', f'<link name="mid">{mass}</link>')
+    return text.replace('<axis xyz="0 0 1"/>', f'<axis xyz="0 0 1"/>{mimic}')
+
+
+def test_mimic_joints_are_couplings(tmp_path):
+    found = read(tmp_path, follower('<mimic joint="j1" multiplier="-1.5" offset="0.3"/>'), "mimic.urdf")
+    scene = found.imported.scene
+    (coupling,) = scene.coupling
+    assert (coupling.joints, coupling.ratio) == (("j1", "j2"), -1.5)
+    first, second = found.qpos
+    assert second == pytest.approx(0.3 - 1.5 * first, abs=1e-12), "the pose is assembled"
+    plain = read(tmp_path, follower('<mimic joint="j1"/>'), "plain.urdf", without=["couplings"])
+    assert not plain.imported.scene.coupling
+
+
+def test_a_mimic_of_no_joint_is_refused(tmp_path):
+    with pytest.raises(SceneError, match="joint 'j2' mimics 'j9': the file has no such joint"):
+        read(tmp_path, follower('<mimic joint="j9"/>'), "mimic.urdf")
+
+
+GEARS = """<mujoco><option gravity="0 0 -9.81"/><worldbody>
+<body name="w1" pos="0 0 1"><joint name="g1" axis="0 1 0" armature="0.02"/>
+<inertial pos="0.05 0 0" mass="1" diaginertia=".01 .01 .01"/></body>
+<body name="w2" pos="0.3 0 1"><joint name="g2" axis="0 1 0"/>
+<inertial pos="0 0.02 0.1" mass="1" diaginertia=".02 .02 .02"/></body>
+</worldbody><equality><joint name="gears" joint1="g2" joint2="g1" polycoef="POLY"/></equality></mujoco>"""
+
+
+def test_equalities_of_joints_are_couplings(tmp_path):
+    found = read(tmp_path, GEARS.replace("POLY", "0 -2 0 0 0"))
+    same(found)
+    (coupling,) = found.imported.scene.coupling
+    assert (coupling.name, coupling.joints, coupling.ratio) == ("gears", ("g1", "g2"), -2.0)
+    assert found.imported.scene.joint[0].armature == 0.02 and not found.imported.left_out[1:]
+    fallen = mbref.simulate(found.imported.scene, times=[0.0, 0.2], method="alf-dual+projection/dop853")
+    turned = [fallen.joint(name).angle[-1] for name in ("g1", "g2")]
+    assert turned[1] == pytest.approx(-2 * turned[0], rel=1e-9) and turned[0] > 0.01
+
+
+def test_agreement_sees_ratios_and_armatures(tmp_path):
+    scene = read(tmp_path, GEARS.replace("POLY", "0 -2 0 0 0")).imported.scene
+    agreement, tree = reread(tmp_path / "model.xml")
+    agreement.check(scene, tree)
+    for changed, says in (
+        (scene.with_("coupling[gears].ratio", -2.01), "loops: the scene's rows have rank 1, the file's 1"),
+        (scene.with_(coupling=()), "loops: the scene's rows have rank 0, the file's 1"),
+        (scene.with_("joint[g1].armature", 0.021), "joint 'g1': the scene's mass matrix"),
+    ):
+        with pytest.raises(SceneError, match=says):
+            agreement.check(changed, tree)
+
+
+def test_an_offset_of_a_coupling_moves_the_pose(tmp_path):
+    found = read(tmp_path, GEARS.replace("POLY", "0.4 -2 0 0 0"))
+    same(found)
+    assert found.qpos[1] == pytest.approx(0.4 - 2 * found.qpos[0], abs=1e-12)
+    assert any("'gears' was open by 0.4" in note for note in found.imported.notes)
+
+
+def test_a_polynomial_coupling_is_refused_by_name(tmp_path):
+    text = GEARS.replace("POLY", "0 -2 0.1 0 0")
+    with pytest.raises(SceneError, match=r"equality 'gears' of type joint, whose polynomial is not linear.*"):
+        read(tmp_path, text)
+    assert not read(tmp_path, text, without=["couplings"]).imported.scene.coupling
+
+
+def test_armature_and_couplings_can_be_left_out(tmp_path):
+    found = read(tmp_path, GEARS.replace("POLY", "0 -2 0 0 0"), without=["armature", "couplings"])
+    assert not found.imported.scene.coupling and not found.imported.scene.joint[0].armature
+    assert len(found.imported.left_out) >= 2
+    same(found)
 
 
 def reread(path: Path) -> tuple[Agreement, list[str]]:
     """The comparison with a file's model, and the names of the joints of its tree."""
-    reader = _Reader(mujoco, mujoco.MjModel.from_xml_path(str(path)), None, ImportOptions())
+    reader = _Reader(mujoco, mujoco.MjModel.from_xml_path(str(path)), None, ImportOptions(), frozenset())
     reader.read()
     return Agreement(mujoco, reader.model, reader.groups, reader.poses), reader.tree
 
 
-def test_armature_of_a_hinge_on_the_ground_is_a_part_of_its_body(tmp_path):
+def test_armature_of_a_hinge_is_of_its_joint(tmp_path):
     """(I + armature) θ'' = m g l; the file's matrices have the armature too."""
     rotor = 'armature="0.005"'
     inertial = '<inertial pos="0.05 0 0" mass="0.01" diaginertia="2e-6 2e-6 2e-6"/>'
@@ -271,7 +343,7 @@ def test_armature_of_a_hinge_on_the_ground_is_a_part_of_its_body(tmp_path):
     same(found)
     turning = np.linalg.norm(gauss(found.imported.scene)[0]) / 0.05
     assert turning == pytest.approx(0.01 * 9.81 * 0.05 / (2e-6 + 0.01 * 0.05**2 + 0.005), rel=1e-12)
-    assert "armature of 'j', 0.005 kg m², is a part of the inertia of 'f'" in found.imported.notes[0]
+    assert found.imported.scene.joint[0].armature == 0.005
 
 
 def test_velocities_of_a_keyframe_are_the_scene_s(tmp_path):

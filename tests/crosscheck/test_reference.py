@@ -342,7 +342,7 @@ def test_saddle_points_are_solved_to_the_last_digit():
     root, rows = rng.normal(size=(8, 8)), rng.normal(size=(5, 3, 8))
     mass = EXTENDED.array(root @ root.T)
     force, rate = EXTENDED.array(rng.normal(size=(3, 8))), EXTENDED.array(rng.normal(size=5))
-    x, y = SaddlePoint(mass, EXTENDED.array(rows), EXTENDED).solve(force, rate)
+    x, y = SaddlePoint(mass, EXTENDED.array(rows), EXTENDED.zeros(len(rows)), EXTENDED).solve(force, rate)
     left = x @ mass + np.einsum("m,min->in", y, EXTENDED.array(rows)) - force
     assert np.abs(left).max() < 200 * EXTENDED.eps * np.abs(x).max() * np.abs(mass).max()
     assert np.abs(np.einsum("min,in->m", rows, x) - rate).max() < 200 * EXTENDED.eps * np.abs(x).max()

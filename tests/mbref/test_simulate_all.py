@@ -10,7 +10,7 @@ import pytest
 
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from mbref.ensembles.simulate_all import run_all, simulate_all
-from mbref.equations.packing import shape_of
+from mbref.equations.parts import shape_of
 from mbref.scene import Scene, SceneError, Spring
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate

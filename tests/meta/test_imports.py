@@ -24,6 +24,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["rotations", "records", "trajectory", "error_estimate", "scene_services"],
         [
             "scene",
+            "scene_couplings",
             "scene_fields",
             "scene_joints",
             "scene_lines",
@@ -54,6 +55,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
     "crosscheck": (
         ["judge"],
         ["recorded"],
+        ["refusals"],
         ["engine"],
         ["engines"],
         ["processes"],
@@ -154,7 +156,7 @@ def test_the_formulations_of_the_reference_share_no_equations():
     natural, tree = (reached(arrows, f"crosscheck.judge.reference.{name}") for name in ("taylor", "tree"))
     shared = {name.removeprefix("crosscheck.judge.") for name in natural & tree}
     numbers = {"reference.arithmetic", "reference.motion", "reference.start_velocities"}
-    without_equations = {"constraints", "deadline", "joint_residuals", "tolerances"}
+    without_equations = {"constraints", "deadline", "joint_coordinates", "joint_residuals", "tolerances"}
     assert shared == numbers | without_equations, sorted(shared)
 
 

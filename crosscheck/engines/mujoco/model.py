@@ -25,7 +25,7 @@ from crosscheck.engines.spanning_tree import (
     spanning_tree,
 )
 from mbref import rotations
-from mbref.scene import Driver, Force, Moment, Scene, Spring, TorsionSpring
+from mbref.scene import Coupling, Driver, Force, Moment, Scene, Spring, TorsionSpring
 
 SUPPORTS = Supports(
     joints=(
@@ -40,7 +40,10 @@ SUPPORTS = Supports(
     ),
     drivers=("angle", "displacement"),
     loads=("moment", "force", "spring", "torsion_spring"),
+    couplings=("angle", "displacement"),
+    armatures=("angle", "displacement"),
 )
+COUPLING = "coupling "  # begins the names of equalities of couplings
 UNIT = (1.0, 0.0, 0.0, 0.0)
 GENERAL = ((1.0, 1.1, 1.2), (0.1, 0.2, 0.3), (0.5, 0.5, 0.1, 0.7))  # moments, centre, axes until compiled
 
@@ -96,6 +99,11 @@ def _built(mujoco: Any, scene: Scene, tree: Tree) -> _Builder:
         built.add_link(k, link)
     for k, closure in enumerate(tree.closures):
         built.add_closure(k, closure)
+    for coupling in scene.coupling:
+        built.add_coupling(coupling)
+    for joint in scene.joint:
+        if joint.reflected_inertia:
+            built.joint[tree.coordinate(scene, joint.name)].armature = joint.reflected_inertia
     for driver in scene.driver:
         built.add_driver(driver)
     for k, load in enumerate(scene.load):
@@ -155,6 +163,16 @@ class _Builder:
             kind, self.mujoco.mjtObj.mjOBJ_JOINT, f"driver {driver.joint}", joint.name, ""
         )
         equality.data[:5] = 0.0
+
+    def add_coupling(self, coupling: Coupling) -> None:
+        """q₂ = ratio · q₁, as MuJoCo's polynomial of degree 1."""
+        first, second = (
+            self.joint[self.tree.coordinate(self.scene, joint.name, kind)].name
+            for joint, kind in self.scene.coupled(coupling)
+        )
+        kind, objects = self.mujoco.mjtEq.mjEQ_JOINT, self.mujoco.mjtObj.mjOBJ_JOINT
+        equality = self._equality(kind, objects, COUPLING + coupling.name, second, first)
+        equality.data[:5] = 0.0, coupling.ratio, 0.0, 0.0, 0.0
 
     def _equality(self, kind: Any, objects: Any, name: str, first: str, second: str) -> Any:
         return self.spec.add_equality(type=kind, objtype=objects, name=name, name1=first, name2=second)

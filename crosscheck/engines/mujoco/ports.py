@@ -7,6 +7,7 @@ joint coordinates by MuJoCo in C, which adds rounding alone.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,11 +16,13 @@ from crosscheck.engine import Cannot, Owner, Setting
 from crosscheck.engines.driver_motion import stated_rate
 from crosscheck.engines.fixed_steps import steps
 from crosscheck.engines.initial_velocities import lacks_mass
-from crosscheck.engines.mujoco.model import SUPPORTS, compiled
+from crosscheck.engines.mujoco.model import SUPPORTS as OF_MUJOCO
+from crosscheck.engines.mujoco.model import compiled
 from crosscheck.engines.sampling import UNKNOWN
 from crosscheck.engines.tree_reactions import LinkMotion
 from mbref.scene import Scene
 
+SUPPORTS = replace(OF_MUJOCO, couplings=(), armatures=())
 DEFAULT_STEP = 2e-3  # s
 STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance, as far as it is not clamped
 FAMILIES = {

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.mujoco.model import description
+from crosscheck.engines.mujoco.model import COUPLING, description
 from crosscheck.engines.spanning_tree import Link, Tree, spanning_tree
 from mbref import rotations
 from mbref.formats import Exported
@@ -35,11 +35,11 @@ def write(scene: Scene) -> Exported:
         body = spec.body(f"link {k}")
         _true_inertia(body, link)
         body.name = names[k]
-    _name_joints(spec, scene, tree)
-    return Exported(_text(spec), tuple(_left_out(scene)))
+    new = _name_joints(spec, scene, tree)
+    return Exported(_text(spec, new), tuple(_left_out(scene)))
 
 
-def _text(spec: Any) -> str:
+def _text(spec: Any, new: dict[str, str]) -> str:
     """The MJCF text with every digit: MuJoCo's own writer keeps six."""
     root = ET.Element("mujoco", model=spec.modelname)
     ET.SubElement(root, "compiler", angle="radian")
@@ -48,6 +48,11 @@ def _text(spec: Any) -> str:
     equalities = ET.SubElement(root, "equality")
     for closure in spec.equalities:
         kind = closure.type.name.removeprefix("mjEQ_").lower()
+        if kind == "joint":
+            ends = {"joint1": new[closure.name1], "joint2": new[closure.name2]}
+            own = {"name": closure.name.removeprefix(COUPLING), "polycoef": _digits(closure.data[:5])}
+            ET.SubElement(equalities, kind, own | ends)
+            continue
         ET.SubElement(equalities, kind, name=closure.name, site1=closure.name1, site2=closure.name2)
     tendons = ET.SubElement(root, "tendon")
     for spring in spec.tendons:
@@ -86,6 +91,7 @@ def _add_body(element: ET.Element, body: Any) -> None:
             "stiffness": joint.stiffness[:1],
             "damping": joint.damping[:1],
             "springref": [joint.springref],
+            "armature": [joint.armature],
         }
         spring = {key: _digits(value) for key, value in numbers.items() if np.any(value)}
         place = {} if kind == "free" else {"pos": _digits(joint.pos)}
@@ -110,14 +116,19 @@ def _names(scene: Scene, tree: Tree) -> list[str]:
     return names
 
 
-def _name_joints(spec: Any, scene: Scene, tree: Tree) -> None:
-    """Joints by the scene's names, with a number where the scene's has several elementary motions."""
+def _name_joints(spec: Any, scene: Scene, tree: Tree) -> dict[str, str]:
+    """Name joints as the scene does, with a number where the scene's has several elementary motions; return
+    new names by old ones."""
+    new: dict[str, str] = {}
     for k, link in enumerate(tree.links):
         if link.joint >= 0:
             count = len(link.mobilities)
             for i in range(count):
                 name = scene.joint[link.joint].name
-                spec.joint(f"joint {k}.{i}").name = name if count == 1 else f"{name} {i + 1}"
+                new[f"joint {k}.{i}"] = name if count == 1 else f"{name} {i + 1}"
+    for old, name in new.items():
+        spec.joint(old).name = name
+    return new
 
 
 def _true_inertia(body: Any, link: Link) -> None:

@@ -60,6 +60,11 @@ def doubles(values: np.ndarray) -> np.ndarray:
     return np.asarray(values).astype(float)
 
 
+def largest(values: np.ndarray) -> float:
+    """The largest size in an array of any arithmetic, as a double; 0 of an empty one."""
+    return float(np.abs(doubles(values)).max(initial=0.0))
+
+
 def _objects(values: list[Any], shape: tuple[int, ...]) -> np.ndarray:
     out = np.empty(len(values), dtype=object)
     out[:] = values

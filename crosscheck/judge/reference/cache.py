@@ -26,6 +26,7 @@ SOURCES = (
     ),
     JUDGE / "constraints.py",
     JUDGE / "joint_residuals.py",
+    JUDGE / "joint_coordinates.py",
 )
 DIGEST = hashlib.sha256().digest_size
 

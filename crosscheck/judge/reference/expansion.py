@@ -15,14 +15,16 @@ import numpy as np
 from crosscheck.judge.deadline import ask
 from crosscheck.judge.reference.held_rows import HeldRows
 from crosscheck.judge.reference.natural import NaturalCoordinates
-from crosscheck.judge.reference.natural_loads import Loads, LoadSeries, convolved
+from crosscheck.judge.reference.natural_joints import GearSeries, convolved
+from crosscheck.judge.reference.natural_loads import Loads, LoadSeries
 from crosscheck.judge.reference.saddle_point import SaddlePoint
 
 LEAST_TERMS = 6  # smallest number of terms of a series
 
 
 class Expansion:
-    """The series about a time t: coordinates ``x`` (order + 3, 3, n), and torsion angles."""
+    """The series about a time t: coordinates ``x`` (order + 3, 3, n), angles of torsion springs, and joint
+    coordinates of couplings and armatures."""
 
     def __init__(
         self,
@@ -33,12 +35,15 @@ class Expansion:
         t: Any,
         start: tuple[np.ndarray, np.ndarray],
         angles: Sequence[Any],
+        turned: Sequence[Any],
     ):
         terms, zeros = order + 3, of.arithmetic.zeros
         m, p = len(held.numbers), len(held.products)
         self._held, self._drives = held, held.drives(t, terms)
         self._loads: LoadSeries = loads.series(angles, terms)
-        self._system = SaddlePoint(of.mass, held.gradient(start[0], self._drives)[:, :, :-4], of.arithmetic)
+        self._gears = GearSeries(of.joints, held.gears, turned, terms, zeros)
+        rows = held.all_gradients(start[0], self._drives)
+        self._system = SaddlePoint(of.mass, rows, held.compliance(zeros), of.arithmetic)
         self.x = zeros(terms, 3, start[0].shape[1])
         self._u, self._w = zeros(2, terms, 3, p)
         self._products, self._multipliers, self._factors = zeros(terms, p), zeros(terms, m), zeros(terms, p)
@@ -54,20 +59,32 @@ class Expansion:
         """The series of the torsion springs' angles."""
         return [torsion.angle for torsion in self._loads.torsions]
 
+    @property
+    def turned(self) -> list[np.ndarray]:
+        """The series of the joint coordinates."""
+        return [coordinate.value for coordinate in self._gears.coordinates]
+
     def _grow(self, k: int) -> None:
         """Order k of all that follows from order k of the coordinates."""
         self._u[k], self._w[k] = self._held.u(self.x[k]), self._held.w(self.x[k])
         self._products[k] = convolved(self._u, self._w, k).sum(axis=0)
         self._loads.grow(k, self.x)
+        self._gears.grow(k, self.x)
 
     def _solve(self, k: int) -> None:
         """Order k of the equations of motion and order k + 2 of the rows."""
         j = k + 2
         self._products[j] = convolved(self._u, self._w, j).sum(axis=0)  # all but X_j
-        gap = self._drives.combined(self._products, j) - self._drives.c[j]
+        self._gears.grow(j, self.x)
+        gap = np.concatenate(
+            [self._drives.combined(self._products, j) - self._drives.c[j], self._gears.gaps(j)]
+        )
         self._factors[k] = self._drives.spread(self._multipliers, k)  # all but λ_k
-        force = self._loads.order(k, self.x) - self._reaction(k)
-        x, self._multipliers[k] = self._system.solve(force[:, :-4], -gap * (j * (j - 1)))
+        force = self._loads.order(k, self.x) - self._reaction(k) - self._gears.pull(k)
+        x, found = self._system.solve(force[:, :-4], -gap * (j * (j - 1)))
+        count = self._multipliers.shape[1]
+        self._multipliers[k] = found[:count]
+        self._gears.put(found[count:], k)
         self.x[j, :, :-4] = x / (j * (j - 1))
         self._factors[k] = self._drives.spread(self._multipliers, k)
         self._grow(j)

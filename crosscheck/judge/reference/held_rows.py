@@ -14,17 +14,24 @@ from scipy.linalg import qr
 
 from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
 from crosscheck.judge.reference.natural import NaturalCoordinates
-from crosscheck.judge.reference.natural_loads import convolved
+from crosscheck.judge.reference.natural_joints import convolved
 from crosscheck.judge.reference.saddle_point import Sparse
 from crosscheck.judge.tolerances import RANK
 from mbref.scene import Driver
 
 
 class HeldRows:
-    """Some m of a scene's rows (``numbers``), and the p products they are made of."""
+    """Some of a scene's rows: m rows of joints (``numbers``) and ``couplings``, ``count`` in all.
+
+    The rows of joints are made of p products; ``gears`` are the rows of couplings and of all armatures.
+    """
 
     def __init__(self, of: NaturalCoordinates, rows: Iterable[int]):
-        self.numbers = tuple(map(int, rows))
+        chosen = tuple(map(int, rows))
+        self.count, self._joints = len(chosen), of.joints
+        self.numbers = tuple(k for k in chosen if k < len(of.c))
+        self.couplings = [of.joints.couplings[k - len(of.c)] for k in chosen if k >= len(of.c)]
+        self.gears = [*self.couplings, *of.joints.armatures]
         self._arithmetic, self._length = of.arithmetic, of.length
         driven = [(self.numbers.index(k), k, row) for k, row in of.driven if k in self.numbers]
         second = [of.second[k] for _, k, _ in driven if k in of.second]
@@ -52,9 +59,25 @@ class HeldRows:
         products = self.w(x).T[:, :, None] * u[:, None, :] + self.u(x).T[:, :, None] * w[:, None, :]
         return drives.combined(products[None], 0)
 
+    def all_gradients(self, x: np.ndarray, drives: Drives) -> np.ndarray:
+        """G (m + g, 3, n - 4) of the rows and of the gears."""
+        own = self.gradient(x, drives)[:, :, :-4]
+        return np.concatenate([own, self._joints.gradients(self.gears, x)]) if self.gears else own
+
+    def compliance(self, zeros: Any) -> np.ndarray:
+        """Reciprocal inertias (m + g,) of armatures, zeros for other rows."""
+        found = zeros(len(self.numbers) + len(self.gears))
+        for k, gear in enumerate(self.gears, len(self.numbers)):
+            if gear.inertia is not None:
+                found[k] = 1 / gear.inertia
+        return np.asarray(found)
+
     def unit_gradient(self, x: np.ndarray, t: Any) -> np.ndarray:
-        """G (m, 3 (n - 4)) in double precision, every row of length one, without the ground's columns."""
+        """G (count, 3 (n - 4)) in double precision, every row of length one, without the ground's columns."""
         rows = doubles(self.gradient(x, self.drives(t, 1)))[:, :, :-4].reshape(len(self.numbers), -1)
+        if self.couplings:
+            coupled = doubles(self._joints.gradients(self.couplings, x))
+            rows = np.concatenate([rows, coupled.reshape(len(coupled), -1)])
         return rows / np.linalg.norm(rows, axis=1, keepdims=True)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.judge.deadline import ask
+from crosscheck.judge.reference.tree_joints import used_coordinates
 from crosscheck.judge.tolerances import RANK
 from mbref.scene import JOINT_TYPES, Joint, Scene, Universal
 
@@ -30,12 +31,12 @@ Pose = tuple[float, np.ndarray, np.ndarray]
 
 def isostatic(scene: Scene, along: Sequence[Pose] = ()) -> Scene:
     """The scene with redundant joints removed or replaced by weaker ones, the last joints first; its rank at
-    t = 0, and at the poses along its motion, stays the same.  Joints with a driver or a torsion spring are
+    t = 0, and at the poses along its motion, stays the same.  Joints whose coordinate is used are
     kept; where they leave redundant rows, the scene stays as it is."""
     poses = [(0.0, *initial_poses(scene)), *along]
     rank = _rank(scene)
     least = [_singular_value(scene, rank, pose) for pose in poses]
-    needed = {d.joint for d in scene.driver} | {l.joint for l in scene.load if l.type == "torsion_spring"}
+    needed = {name for _, name in used_coordinates(scene)}
 
     def serves(trial: Scene) -> bool:
         ask()

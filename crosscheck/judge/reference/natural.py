@@ -17,6 +17,7 @@ import numpy as np
 
 from crosscheck.judge import constraints
 from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
+from crosscheck.judge.reference.natural_joints import JointCoordinates
 from crosscheck.judge.reference.start_velocities import given
 from mbref.scene import Body, Driver, Scene
 
@@ -65,6 +66,8 @@ class NaturalCoordinates:
         self.w = np.array([row.w for row in rows] + [rows[k].w for k, _ in second])
         self.c = arithmetic.array([row.c for row in rows])
         self.mass = self._mass()
+        self.joints = JointCoordinates(self)
+        self.count = len(self.c) + len(self.joints.couplings)  # number of rows, the last ones of couplings
 
     def lengths(self, values: Any) -> np.ndarray:
         """Lengths, or what is proportional to them, in the unit of the coordinates."""

@@ -12,12 +12,8 @@ from typing import Any
 import numpy as np
 
 from crosscheck.judge.reference.natural import NaturalCoordinates, skew
+from crosscheck.judge.reference.natural_joints import AngleForm, convolved
 from mbref.scene import Force, Moment, Spring, TorsionSpring
-
-
-def convolved(a: np.ndarray, b: np.ndarray, k: int) -> Any:
-    """Order k of the product of two series: Σ a_i b_{k-i}, i = 0 … k."""
-    return (a[: k + 1] * b[k::-1]).sum(axis=0)
 
 
 class Loads:
@@ -122,49 +118,34 @@ class SpringSeries:
         return -convolved(self._pull[:, None], self._d, k)[:, None] * form.vector
 
 
-class TorsionForm:
-    """A torsion spring: the joint's cross axes e₁, e₂ on its first body and f₁ on its second."""
+class TorsionForm(AngleForm):
+    """A torsion spring: its joint's angle, stiffness, damping, natural angle."""
 
     def __init__(self, of: NaturalCoordinates, load: TorsionSpring):
-        joint: Any = next(j for j in of.scene.joint if j.name == load.joint)
-        first, second = of.indices(joint.bodies)
-        frame = of.frame(joint.axis)
-        self.e1, self.e2 = of.direction(first, frame[0]), of.direction(first, frame[1])
-        self.f, self.zeros = of.direction(second, frame[0]), of.arithmetic.zeros
+        super().__init__(of, of.scene.joint_named(load.joint))
         self.stiffness, self.damping = of.arithmetic.array([load.stiffness, load.damping]) / of.length**2
         self.rest = of.arithmetic.number(load.natural_angle)
 
 
 class TorsionSeries:
-    """Its angle, unwrapped, from θ' = C S' - S C' with C = e₁ · f₁ and S = e₂ · f₁."""
+    """Its moment by the angle, which unwraps."""
 
     def __init__(self, form: TorsionForm, angle: Any, terms: int):
-        self._form = form
-        self._e1, self._e2, self._f = form.zeros(3, terms, 3)
-        self._cos, self._sin, self._moment, self._mcos, self._msin = form.zeros(5, terms)
-        self.angle = form.zeros(terms)
-        self.angle[0] = angle
+        self._form, self._moment = form, form.zeros(terms)
+        self._turned = form.series(angle, terms)
+
+    @property
+    def angle(self) -> np.ndarray:
+        """The angle (terms,)."""
+        return self._turned.value
 
     def grow(self, k: int, x: np.ndarray) -> None:
-        """Order k of the axes, of cosine and sine, and of the angle."""
-        self._e1[k], self._e2[k], self._f[k] = x[k] @ self._form.e1, x[k] @ self._form.e2, x[k] @ self._form.f
-        self._cos[k] = convolved(self._e1, self._f, k).sum()
-        self._sin[k] = convolved(self._e2, self._f, k).sum()
-        if k:
-            i = np.arange(1, k + 1)
-            turn = (
-                self._cos[k - 1 :: -1] * self._sin[1 : k + 1] - self._sin[k - 1 :: -1] * self._cos[1 : k + 1]
-            )
-            self.angle[k] = (i * turn).sum() / k
+        """Order k of the angle."""
+        self._turned.grow(k, x)
 
     def order(self, k: int) -> np.ndarray:
         """Order k (3, n) of the force: -moment × (C δS - S δC)."""
         form = self._form
         elastic = self.angle[k] - form.rest if k == 0 else self.angle[k]
         self._moment[k] = form.stiffness * elastic + form.damping * (k + 1) * self.angle[k + 1]
-        self._mcos[k] = convolved(self._moment, self._cos, k)
-        self._msin[k] = convolved(self._moment, self._sin, k)
-        cosine, sine = self._mcos[:, None], self._msin[:, None]
-        on_e2, on_e1 = convolved(cosine, self._f, k), convolved(sine, self._f, k)
-        on_f = convolved(cosine, self._e2, k) - convolved(sine, self._e1, k)
-        return -(on_e2[:, None] * form.e2 - on_e1[:, None] * form.e1 + on_f[:, None] * form.f)
+        return -self._turned.pull(self._moment, k)

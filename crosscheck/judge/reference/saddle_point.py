@@ -37,9 +37,10 @@ class Sparse:
 
 
 class SaddlePoint:
-    """M x + Gᵀ y = f, G x = g with x, f (3, n): ``mass`` M (n, n) acts on each row, ``rows`` G (m, 3, n)."""
+    """M x + Gᵀ y = f, G x - C y = g with x, f (3, n): ``mass`` M (n, n) acts on each row, ``rows`` are G
+    (m, 3, n), ``compliance`` (m,) is the diagonal of C."""
 
-    def __init__(self, mass: np.ndarray, rows: np.ndarray, arithmetic: Arithmetic):
+    def __init__(self, mass: np.ndarray, rows: np.ndarray, compliance: np.ndarray, arithmetic: Arithmetic):
         self._eps, self._arithmetic = arithmetic.eps, arithmetic
         self._size = 3 * len(mass)
         matrix = arithmetic.zeros(self._size + len(rows), self._size + len(rows))
@@ -48,6 +49,8 @@ class SaddlePoint:
             matrix[at, at] = mass
         flat = rows.reshape(len(rows), self._size)
         matrix[self._size :, : self._size], matrix[: self._size, self._size :] = flat, flat.T
+        ends = np.arange(self._size, len(matrix))
+        matrix[ends, ends] = -compliance
         self._product, near = Sparse(matrix), doubles(matrix)
         self._scale = 1 / np.sqrt(np.maximum(np.abs(near).max(axis=1), 1e-300))
         self._factors = dgetrf(near * self._scale[:, None] * self._scale)[:2]

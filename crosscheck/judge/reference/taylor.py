@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from crosscheck.judge.deadline import TimeIsUp, ask, within
-from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
+from crosscheck.judge.reference.arithmetic import Arithmetic, doubles, largest
 from crosscheck.judge.reference.expansion import Expansion, Series, value
 from crosscheck.judge.reference.held_rows import HeldRows, independent
 from crosscheck.judge.reference.motion import Motion, Times, Told, untold
@@ -106,18 +106,19 @@ class Stepper:
         self._order, self._tolerance = order, tolerance
         self._x, self._v = self.of.start()
         self._angles = [arithmetic.number(0.0) for _ in self._loads.torsions]
+        self._turned = self.of.joints.start()
         self._weights = self._varied(*way)
-        self._every, self._lost = HeldRows(self.of, range(len(self.of.c))), np.inf
+        self._every, self._lost = HeldRows(self.of, range(self.of.count)), np.inf
         self._held, self._sharpness = self._every, [0.0]
 
     def _varied(self, seed: int, displaced: float) -> np.ndarray:
         """Weights (m,) of the rows, near one, that prefer other rows by the seed; joints are displaced."""
         if not seed:
-            return np.ones(len(self.of.c))
+            return np.ones(self.of.count)
         rng, joints = np.random.default_rng(seed), slice(6 * self.of.nb, None)
         moved = displaced * self._size() * rng.uniform(-1, 1, len(self.of.c[joints]))
         self.of.c[joints] = self.of.c[joints] + self.of.arithmetic.array(moved)
-        return 1 + PREFERENCE * rng.random(len(self.of.c))
+        return 1 + PREFERENCE * rng.random(self.of.count)
 
     def samples(self, times: Times, told: Told) -> Iterator[Sample]:
         """X, X', X'' (3, n) at ascending times; raises Ended where the motion cannot be followed."""
@@ -141,35 +142,34 @@ class Stepper:
     def _start(self) -> None:
         """Put the coordinates onto the rows, and take the velocities that the rule asks for."""
         self._project()
-        still = self._held.gradient(self._x, self._held.drives(self.t, 1))[:, :, :-4]
-        rows, v = still.reshape(len(still), self._x[:, :-4].size), self._v[:, :-4].ravel()
-        rates = rows @ v - self._gaps(self._held)[1]
-        mass = np.kron(np.eye(3, dtype=int), self.of.mass)
+        held, v = self._held, self._v[:, :-4].ravel()
+        rows = held.all_gradients(self._x, held.drives(self.t, 1))[: held.count].reshape(held.count, v.size)
+        rates = rows @ v - self._gaps(held)[1]
+        mass = np.kron(np.eye(3, dtype=int), self.of.mass) + self.of.joints.mass(self._x)
         v = start_velocities(self.of.arithmetic, rows, rates, *self.of.given_velocities(self._x), mass)
         self._v[:, :-4] = v.reshape(3, -1)
         self._project()
 
     def _expansion(self, order: int) -> Expansion:
         state = self._x, self._v
-        return Expansion(self.of, self._held, self._loads, order, self.t, state, self._angles)
+        return Expansion(self.of, self._held, self._loads, order, self.t, state, self._angles, self._turned)
 
     def _advance(self, expansion: Expansion, series: np.ndarray, h: float) -> None:
         d, settled = self.of.arithmetic.number(h), self.of.arithmetic.settled
         self._x, self._v = settled(value(series, d)), settled(value(series, d, 1))
         self._angles = [settled(value(angle[: len(series)], d))[()] for angle in expansion.angles]
+        self._turned = [settled(value(one[: len(series)], d))[()] for one in expansion.turned]
         self.t = settled(self.t + d)[()]
         self.steps += 1
         self._sharpness.append(self._sharp(self._x, self.t))
         self._choose_again()
         self._project()
-        gap = _largest(self._gaps(self._every)[0]) / self._size()
-        self.contradiction = max(self.contradiction, gap)
+        self.contradiction = max(self.contradiction, largest(self._gaps(self._every)[0]) / self._size())
 
     def _size(self) -> float:
         """The largest coordinate, and no less than one."""
-        return max(1.0, _largest(self._x))
+        return max(1.0, largest(self._x))
 
-    # --- rows ---------------------------------------------------------------------------------------------
     def _choice(self, x: np.ndarray, t: Any) -> tuple[HeldRows, int]:
         """Rows that are independent at the coordinates x, and how many are well so."""
         rows, pivots = independent(self._every.unit_gradient(x, t), self._weights)
@@ -193,7 +193,7 @@ class Stepper:
         before, now = self._held, self._sharpness[-1]
         self._held = self._choice(x, t)[0]
         here, there = self._sharp(self._x, self.t), self._sharp(x, t)
-        if len(self._held.numbers) == len(before.numbers) and there > least and here > now:
+        if self._held.count == before.count and there > least and here > now:
             self._sharpness = [here]
             return True
         self._held = before
@@ -201,7 +201,7 @@ class Stepper:
 
     def _refuse_singular_start(self, series: np.ndarray, d: Any) -> None:
         """Raise Ended where more rows are independent a little later than at the start."""
-        if self._choice(value(series, d), self.t + d)[1] > len(self._held.numbers):
+        if self._choice(value(series, d), self.t + d)[1] > self._held.count:
             raise Ended(
                 "it starts in a singular position, from which more than one motion goes on: "
                 "give poses and velocities a little later on the branch meant"
@@ -214,18 +214,21 @@ class Stepper:
         if not self.of.scene.has_mass() and len(free):
             raise Ended("bodies without mass have to be driven in every freedom")
         inertia = np.einsum("ick,kl,jcl->ij", free, doubles(self.of.mass), free)
+        flat = free.reshape(len(free), self._x[:, :-4].size)
+        inertia = inertia + flat @ doubles(self.of.joints.mass(self._x)) @ flat.T
         sizes, ways = np.linalg.eigh(inertia)
         if len(sizes) and sizes[0] <= WITHOUT_INERTIA * doubles(self.of.mass).max():
             way = np.abs(np.einsum("i,icn->cn", ways[:, 0], free)).max(axis=0)
             raise Ended(f"body {self.of.scene.body[way.argmax() // 4].name!r} can turn without inertia")
 
-    # --- consistency --------------------------------------------------------------------------------------
     def _gaps(self, held: HeldRows) -> tuple[np.ndarray, np.ndarray]:
         """Residuals (m,) of rows and of their time derivatives."""
         drives = held.drives(self.t, 2)
         u, w = (np.stack([form(self._x), form(self._v)]) for form in (held.u, held.w))
         products = np.stack([(u[0] * w[0]).sum(axis=0), (u[0] * w[1] + u[1] * w[0]).sum(axis=0)])
-        return drives.combined(products, 0) - drives.c[0], drives.combined(products, 1) - drives.c[1]
+        own = drives.combined(products, 0) - drives.c[0], drives.combined(products, 1) - drives.c[1]
+        coupled = self.of.joints.gaps(held.couplings, self._x, self._v, self._turned)
+        return np.concatenate([own[0], coupled[0]]), np.concatenate([own[1], coupled[1]])
 
     def _project(self) -> None:
         """Put coordinates and velocities onto the rows, with the least change in the sense of the masses.
@@ -233,20 +236,22 @@ class Stepper:
         Raises Ended where the rows are dependent in the digits of the arithmetic.
         """
         arithmetic, held = self.of.arithmetic, self._held
-        if not held.numbers:
+        if not held.count:
             return
-        rows = held.gradient(self._x, held.drives(self.t, 1))[:, :, :-4]
-        system, still = SaddlePoint(self.of.mass, rows, arithmetic), 0 * self._x[:, :-4]
+        rows, still = held.all_gradients(self._x, held.drives(self.t, 1)), 0 * self._x[:, :-4]
+        system = SaddlePoint(self.of.mass, rows, held.compliance(arithmetic.zeros), arithmetic)
+        free = arithmetic.zeros(len(rows) - held.count)
         for level, rounds in ((0, 4), (1, 2)):
             for _ in range(rounds):
                 gap, state = self._gaps(held)[level], (self._x, self._v)[level]
-                if _largest(gap) <= 4 * arithmetic.eps * max(_largest(state), 1.0):
+                if largest(gap) <= 4 * arithmetic.eps * max(largest(state), 1.0):
                     break
-                state[:, :-4] = arithmetic.settled(state[:, :-4] + system.solve(still, -gap)[0])
+                step = system.solve(still, np.concatenate([-gap, free]))[0]
+                state[:, :-4] = arithmetic.settled(state[:, :-4] + step)
+        self._turned = self.of.joints.values(self._x, self._turned)
         if not np.isfinite(doubles(np.stack([self._x, self._v]))).all():
             raise Ended("a pivot of its equations is zero to the digits of the arithmetic")
 
-    # --- steps --------------------------------------------------------------------------------------------
     def _step(self, most: float) -> tuple[Expansion, float]:
         """A series and the length (s) of its step, at most ``most``, which does not end much nearer to a
         singular position."""
@@ -323,8 +328,3 @@ class Stepper:
         around = lengths[lowest - 1], lengths[lowest + 1]
         found = minimize_scalar(sharp, bounds=around, method="bounded", options={"xatol": FINE * around[0]})
         return float(found.x) if found.fun < DEPENDENT * self._sharpness[-1] else 0.0
-
-
-def _largest(values: np.ndarray) -> float:
-    """The largest of an array, as a double; 0 of an empty one."""
-    return float(np.abs(doubles(values)).max(initial=0.0))

@@ -86,12 +86,7 @@ class Closures:
         return Rows(rows.value - displaced, rows.drift, rows.jacobian)
 
     def _shifts(self, placed: Placed) -> Rows:
-        p, q, a = self.shifts.carried(placed)
-        d = self.shifts.offset(placed, p, q)
-        drift = dot(a[2], d[0]) + 2 * dot(a[1], d[1]) + dot(a[0], d[2])
-        first = np.concatenate([-1 * a[0], cross(a[0], d[0] + p[0])], axis=-1)
-        second = np.concatenate([a[0], cross(q[0], a[0])], axis=-1)
-        return Rows(dot(a[0], d[0]), drift, self.shifts.jacobian(placed, first, second))
+        return shift_rows(self.shifts, placed)
 
     def _lengths(self, placed: Placed) -> Rows:
         p, q = self.lengths.carried(placed)
@@ -109,24 +104,51 @@ class Closures:
         return Rows(dot(a[0], b[0]) - self.cosine, drift, self.angles.jacobian(placed, -1 * second, second))
 
 
-class Twists:
-    """Angles about the axes of joints that are not in the tree: rows whose values are integrated."""
+class Measured:
+    """Coordinates of joints that are not in the tree, angles first: rows whose values are integrated."""
 
-    def __init__(self, tree: Tree, joints: list[Any]):
-        pairs = [tuple(tree.scene.body_index(name) for name in joint.bodies) for joint in joints]
-        axes = [(joint_frame(tree.arithmetic, joint)[2],) for joint in joints]
-        self.packed = _Packed(tree.arithmetic, list(zip(pairs, axes, strict=True)), 1)
+    def __init__(self, tree: Tree, turning: list[Any], sliding: list[Any]):
+        def pair(joint: Any) -> tuple[int, ...]:
+            return tuple(tree.scene.body_index(name) for name in joint.bodies)
+
+        axes = [(pair(joint), (joint_frame(tree.arithmetic, joint)[2],)) for joint in turning]
+        places = [
+            (
+                pair(joint),
+                (*_arms(tree, pair(joint), (joint.anchor,) * 2), joint_frame(tree.arithmetic, joint)[2]),
+            )
+            for joint in sliding
+        ]
+        self.packed = _Packed(tree.arithmetic, axes, 1)
+        self._slides = _Packed(tree.arithmetic, places, 3)
+        self.sizes = np.repeat([False, True], [len(turning), len(sliding)])  # whether it is a length
 
     def rows(self, placed: Placed, value: np.ndarray) -> Rows:
-        """The rows of placed bodies with the angles (K, m)."""
-        if not len(self.packed.bodies):
-            return none(placed)
+        """The rows of placed bodies with the angles and displacements (K, m)."""
+        count = len(self.packed.bodies)
+        found = self._angles(placed, value[:, :count]) if count else none(placed)
+        if not len(self._slides.bodies):
+            return found
+        shifts = shift_rows(self._slides, placed)
+        return found.joined(Rows(value[:, count:], shifts.drift, shifts.jacobian))
+
+    def _angles(self, placed: Placed, value: np.ndarray) -> Rows:
         first, second = self.packed.bodies.T
         ((axis, axis_rate, _),) = self.packed.carried(placed)
         drift = dot(axis_rate, placed.spin[:, second] - placed.spin[:, first])
         drift = drift + dot(axis, placed.spin_drift[:, second] - placed.spin_drift[:, first])
         moment = np.concatenate([0 * axis, axis], axis=-1)
         return Rows(value, drift, self.packed.jacobian(placed, -1 * moment, moment))
+
+
+def shift_rows(shifts: _Packed, placed: Placed) -> Rows:
+    """The rows a · d of arms on both bodies and directions of the first."""
+    p, q, a = shifts.carried(placed)
+    d = shifts.offset(placed, p, q)
+    drift = dot(a[2], d[0]) + 2 * dot(a[1], d[1]) + dot(a[0], d[2])
+    first = np.concatenate([-1 * a[0], cross(a[0], d[0] + p[0])], axis=-1)
+    second = np.concatenate([a[0], cross(q[0], a[0])], axis=-1)
+    return Rows(dot(a[0], d[0]), drift, shifts.jacobian(placed, first, second))
 
 
 def none(placed: Placed) -> Rows:

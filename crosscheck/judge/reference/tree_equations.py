@@ -1,7 +1,7 @@
 """The equations of motion of a scene on its spanning tree: rates of states, and states that obey the joints.
 
-A state holds, in this order, the scalar joint coordinates, the quaternions of the balls, the angles of joints
-outside the tree that a driver or a torsion spring asks for, and the joint rates.
+A state holds, in this order, the scalar joint coordinates, the quaternions of the balls, the coordinates of
+joints outside the tree that a driver, a torsion spring, a coupling or an armature uses, and the joint rates.
 """
 
 from __future__ import annotations
@@ -15,13 +15,15 @@ from scipy.linalg import qr
 from crosscheck.judge import constraints
 from crosscheck.judge.reference.arithmetic import DOUBLE, Arithmetic, doubles
 from crosscheck.judge.reference.start_velocities import given, start_velocities
-from crosscheck.judge.reference.tree_closures import Closures, Rows, Twists
-from crosscheck.judge.reference.tree_joints import Placed, Tree
+from crosscheck.judge.reference.tree_closures import Closures, Measured, Rows
+from crosscheck.judge.reference.tree_joints import Placed, Tree, used_coordinates
 from crosscheck.judge.reference.tree_loads import Loads
 from crosscheck.judge.reference.vectors import apply, product, saddle_solve, unit
 from crosscheck.judge.tolerances import RANK
 from mbref.scene import Driver, Scene
+from mbref.scene_joints import ANGLE, DISPLACEMENT
 
+COORDINATES = (ANGLE, DISPLACEMENT)
 WORSE = 0.5  # conditioning / best conditioning: below it other rows are selected
 CORRECTIONS = 8  # Newton iterations at most that close the loops
 PREFERENCE = 0.2  # largest relative change of a row's weight
@@ -50,13 +52,20 @@ class TreeEquations:
     def __init__(self, scene: Scene, arithmetic: Arithmetic, way: tuple[int, float] = (0, 0.0)):
         self.scene, self.arithmetic, self.tree = scene, arithmetic, Tree(scene, arithmetic)
         self.closures = Closures(self.tree)
-        asked = {d.joint for d in scene.driver} | {l.joint for l in scene.load if l.type == "torsion_spring"}
-        away = [joint for joint in self.tree.cut if joint.name in asked]
-        self.twists = Twists(self.tree, away)
-        measured = {name: places[-1] for name, places in self.tree.coordinate.items() if places}
-        measured |= {joint.name: self.tree.scalars + k for k, joint in enumerate(away)}
-        self.driven = np.array([measured[driver.joint] for driver in scene.driver], dtype=int)
-        self.loads = Loads(self.tree, measured)
+        away = [key for key in sorted(used_coordinates(scene)) if key[1] not in self.tree.coordinate]
+        self.measured = Measured(
+            self.tree, *([scene.joint_named(name) for kind, name in away if kind == k] for k in COORDINATES)
+        )
+        places = self.tree.coordinate.items()
+        at = {(ANGLE, name): found[-1] for name, found in places if found}
+        at |= {(DISPLACEMENT, name): found[0] for name, found in places if found}
+        at |= {key: self.tree.scalars + k for k, key in enumerate(away)}
+        driven = [(str(scene.joint_named(d.joint).facts.driven), d.joint) for d in scene.driver]
+        self.driven = np.array([at[key] for key in driven], dtype=int)
+        pairs = [[at[kind, joint.name] for joint, kind in scene.coupled(c)] for c in scene.coupling]
+        self.coupled = np.array(pairs, dtype=int).reshape(-1, 2).T
+        self.ratio = arithmetic.array([coupling.ratio for coupling in scene.coupling])
+        self.loads = Loads(self.tree, at)
         self.nv = len(self.tree.axis)
         self.ends = np.cumsum([self.tree.scalars, 4 * len(self.tree.balls), len(away), self.nv])
         self.light, self.length = int(self.ends[1]), constraints.scene_length(scene)
@@ -69,15 +78,17 @@ class TreeEquations:
         and by how much closures are displaced."""
         rng, closing = np.random.default_rng(seed), self.closures.sizes(self.length)
         self._rate_sizes = np.where(self.tree.turning, 1.0, self.length)
-        self._row_sizes = np.concatenate([closing, self._coordinate_sizes()[self.driven]])
+        sizes = self._coordinate_sizes()
+        first, second = sizes[self.coupled]
+        coupled = np.maximum(second, np.abs(doubles(self.ratio)) * first)
+        self._row_sizes = np.concatenate([closing, sizes[self.driven], coupled])
         self._weights = 1 + (PREFERENCE * rng.random(len(self._row_sizes)) if seed else 0.0)
         self._displaced = self.arithmetic.array(displaced * closing * rng.uniform(-1, 1, len(closing)))
 
     def _coordinate_sizes(self) -> np.ndarray:
         """The scene's length for displacements, one for angles, of the joint coordinates and twists."""
-        return np.concatenate(
-            [self._rate_sizes[: self.tree.scalars], np.ones(len(self.twists.packed.bodies))]
-        )
+        away = np.where(self.measured.sizes, self.length, 1.0)
+        return np.concatenate([self._rate_sizes[: self.tree.scalars], away])
 
     def light_rates(self, y: np.ndarray) -> np.ndarray:
         """Rates (K, light) of scalars and quaternions, the latter half spin times quaternion."""
@@ -107,13 +118,26 @@ class TreeEquations:
         scalar, ball, angle, rate = self._split(y)
         placed = self.tree.placed(scalar, unit(ball), rate)
         own = scalar[..., None] * 0 + np.eye(self.tree.scalars, self.nv, dtype=int)
-        coordinates = Rows(scalar, 0 * scalar, own).joined(self.twists.rows(placed, angle))
+        coordinates = Rows(scalar, 0 * scalar, own).joined(self.measured.rows(placed, angle))
         closing = self.closures.rows(placed, self._displaced)
         wanted = self._wanted(t)
         driven = coordinates.among(self.driven)
         driven = Rows(driven.value - wanted[0], driven.drift - wanted[2], driven.jacobian)
+        coupled = self._coupled(coordinates)
         speed = [apply(closing.jacobian, rate), apply(driven.jacobian, rate) - wanted[1]]
-        return Instant(placed, coordinates, closing.joined(driven), np.concatenate(speed, axis=1), rate)
+        speed.append(apply(coupled.jacobian, rate))
+        rows = closing.joined(driven).joined(coupled)
+        return Instant(placed, coordinates, rows, np.concatenate(speed, axis=1), rate)
+
+    def _coupled(self, coordinates: Rows) -> Rows:
+        """q₂ - ratio q₁ of the couplings."""
+        first, second = map(coordinates.among, self.coupled)
+        by_rate = self.ratio[:, None] * first.jacobian
+        return Rows(
+            second.value - self.ratio * first.value,
+            second.drift - self.ratio * first.drift,
+            second.jacobian - by_rate,
+        )
 
     def start(self) -> np.ndarray:
         """The state (n,) at t = 0 with the velocities of the documented rule; raises SceneError where the
@@ -125,7 +149,10 @@ class TreeEquations:
         y = self.closed(now, y)
         at = self.at(self.arithmetic.zeros(1), y[None])
         rows = at.rows.jacobian[0, self.kept]
-        rates, mass = rows @ at.rate[0] - at.speed[0, self.kept], self.loads.mass_matrix(at.placed)[0]
+        rates, mass = (
+            rows @ at.rate[0] - at.speed[0, self.kept],
+            self.loads.mass_matrix(at.placed, at.coordinates)[0],
+        )
         y[self.ends[2] :] = start_velocities(self.arithmetic, rows, rates, *self._given(at.placed), mass)
         return self.closed(now, y)
 
@@ -188,7 +215,7 @@ class TreeEquations:
         return y
 
     def _solve(self, at: Instant, force: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        mass = self.loads.mass_matrix(at.placed)
+        mass = self.loads.mass_matrix(at.placed, at.coordinates)
         return saddle_solve(mass, at.rows.jacobian[:, self.kept], force, right[:, self.kept])
 
     def _choose(self, at: Instant) -> None:

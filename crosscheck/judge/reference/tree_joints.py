@@ -16,6 +16,7 @@ import numpy as np
 from crosscheck.judge.reference.arithmetic import Arithmetic
 from crosscheck.judge.reference.vectors import apply, cross, matrices, product, unit
 from mbref.scene import Scene
+from mbref.scene_joints import ANGLE
 
 AXES = np.eye(3)
 RIGIDITY = {
@@ -27,7 +28,7 @@ RIGIDITY = {
     "planar": 3,
     "spherical": 3,
 }
-PREFERRED = 10  # weight of joints with a driver or a torsion spring, so that they stay in the tree
+PREFERRED = 10  # weight of joints whose coordinate is used, so that they stay in the tree
 
 
 @dataclass(frozen=True)
@@ -166,9 +167,18 @@ class Tree:
         return turn
 
 
+def used_coordinates(scene: Scene) -> set[tuple[str, str]]:
+    """Kind and joint of the coordinates that drivers, torsion springs, couplings and armatures use."""
+    acting = [driver.joint for driver in scene.driver]
+    acting += [joint.name for joint in scene.joint if joint.reflected_inertia]
+    found = {(str(scene.joint_named(name).facts.driven), name) for name in acting}
+    found |= {(ANGLE, load.joint) for load in scene.load if load.type == "torsion_spring"}
+    return found | {(kind, joint.name) for c in scene.coupling for joint, kind in scene.coupled(c)}
+
+
 def spanning_tree(scene: Scene) -> list[Link]:
     """The links from the ground outwards; joints that hold more are taken first (Kruskal)."""
-    favoured = {d.joint for d in scene.driver} | {l.joint for l in scene.load if l.type == "torsion_spring"}
+    favoured = {name for _, name in used_coordinates(scene)}
 
     def weight(joint: Any) -> int:
         return RIGIDITY[joint.type] + PREFERRED * (joint.name in favoured)

@@ -16,16 +16,18 @@ from crosscheck.judge.reference.tree_closures import Rows
 from crosscheck.judge.reference.tree_joints import Placed, Tree
 from crosscheck.judge.reference.vectors import apply, cross, dot, matrices, unit
 from mbref.scene import Force, Moment, Spring, TorsionSpring
+from mbref.scene_joints import ANGLE
 
 
 class Loads:
-    """Masses, inertias, gravity and loads, packed; ``measured`` has the row of a torsion spring's joint.
+    """Masses, inertias, armatures, gravity and loads, packed; ``measured`` has the rows of joint coordinates
+    by kind and joint.
 
     A scene without all its masses has no loads, and mass 1 and inertia 1 stand for the missing ones: its
     drivers determine the motion, whatever they are.
     """
 
-    def __init__(self, tree: Tree, measured: dict[str, int]):
+    def __init__(self, tree: Tree, measured: dict[tuple[str, str], int]):
         scene, numbers = tree.scene, tree.arithmetic
         massive = scene.has_mass()
         self.tree, self.gravity = tree, numbers.array(scene.gravity)
@@ -35,15 +37,18 @@ class Loads:
             kind: [l for l in scene.load if massive and isinstance(l, kind)] for kind in LOADS
         }
         self.moments, self.forces, self.springs = of[Moment], of[Force], of[Spring]
-        self.torsion = np.array([measured[load.joint] for load in of[TorsionSpring]], dtype=int)
+        self.torsion = np.array([measured[ANGLE, load.joint] for load in of[TorsionSpring]], dtype=int)
         values = [(l.stiffness, l.damping, l.natural_angle) for l in of[TorsionSpring]]
         self.stiffness, self.damping, self.natural = numbers.array(values).reshape(-1, 3).T
+        geared = [joint for joint in scene.joint if massive and joint.reflected_inertia]
+        self.geared = np.array([measured[str(j.facts.driven), j.name] for j in geared], dtype=int)
+        self.armature = numbers.array([joint.reflected_inertia for joint in geared])
 
-    def mass_matrix(self, placed: Placed) -> np.ndarray:
+    def mass_matrix(self, placed: Placed, coordinates: Rows) -> np.ndarray:
         """(K, nv, nv)."""
-        return self._mass_matrix(placed, self._world_inertia(placed))
+        return self._mass_matrix(placed, coordinates, self._world_inertia(placed))
 
-    def terms(self, placed: Placed, angles: Rows, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def terms(self, placed: Placed, coordinates: Rows, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the mass matrix, and forces (K, nv) of loads minus inertia forces without joint
         accelerations."""
         spin, inertia = placed.spin[:, :-1], self._world_inertia(placed)
@@ -53,11 +58,14 @@ class Loads:
         self._act(placed, wrench)
         total = self._project(placed, wrench)
         if len(self.torsion):
-            jacobian = angles.jacobian[:, self.torsion]
-            resisting = self.stiffness * (angles.value[:, self.torsion] - self.natural)
+            jacobian = coordinates.jacobian[:, self.torsion]
+            resisting = self.stiffness * (coordinates.value[:, self.torsion] - self.natural)
             resisting = resisting + self.damping * apply(jacobian, rate)
             total = total - apply(np.swapaxes(jacobian, 1, 2), resisting)
-        return self._mass_matrix(placed, inertia), total
+        if len(self.geared):
+            turned = coordinates.among(self.geared)
+            total = total - apply(np.swapaxes(turned.jacobian, 1, 2), self.armature * turned.drift)
+        return self._mass_matrix(placed, coordinates, inertia), total
 
     @staticmethod
     def _with_ground(wrench: np.ndarray) -> np.ndarray:
@@ -69,11 +77,15 @@ class Loads:
         """(K, nv) generalised force of wrenches (K, nb + 1, 6)."""
         return apply(_over_bodies(placed.columns), wrench.reshape(len(wrench), -1))
 
-    def _mass_matrix(self, placed: Placed, inertia: np.ndarray) -> np.ndarray:
+    def _mass_matrix(self, placed: Placed, coordinates: Rows, inertia: np.ndarray) -> np.ndarray:
         columns = placed.columns[:, :-1]
         turning = columns[..., 3:] @ inertia
         momenta = np.concatenate([self.mass[..., None] * columns[..., :3], turning], axis=-1)
-        return _over_bodies(momenta) @ np.swapaxes(_over_bodies(columns), 1, 2)
+        found = _over_bodies(momenta) @ np.swapaxes(_over_bodies(columns), 1, 2)
+        if not len(self.geared):
+            return found
+        rows = coordinates.jacobian[:, self.geared]
+        return found + np.swapaxes(rows, 1, 2) @ (self.armature[:, None] * rows)
 
     def _act(self, placed: Placed, wrench: np.ndarray) -> None:
         """Adds the loads, each of them a force at a point of a body or a moment."""

@@ -80,7 +80,12 @@ def truth_for(scene: Scene, reference_time: float = SECONDS) -> Truth | None:
 
 @functools.lru_cache(maxsize=64)
 def closed_form(scene: Scene) -> Truth | None:
-    """The truth of a scene of a known family, or None; kept, with the part of the motion that is solved."""
+    """The truth of a scene of a known family, or None; kept, with the part of the motion that is solved.
+
+    No family has couplings or armatures.
+    """
+    if scene.coupling or any(joint.reflected_inertia for joint in scene.joint):
+        return None
     for family in PATHS:
         if truth := one_dof(scene, family(scene)):
             return truth

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from math import sqrt
 from typing import NamedTuple
 
-from mbref.kernels.scene_layout import DISTANCE, DOT1, DOT2, POINT
+from mbref.kernels.scene_layout import ANGLE, DISTANCE, DOT1, DOT2, POINT, SLIDE
 
 Vector = tuple[float, float, float]
 
 ZERO = (0.0, 0.0, 0.0)
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-ROWS_OF = {POINT: 3, DOT1: 1, DOT2: 1, DISTANCE: 1}
+ROWS_OF = {POINT: 3, DOT1: 1, DOT2: 1, DISTANCE: 1, ANGLE: 1, SLIDE: 1}
 
 
 class Primitive(NamedTuple):
@@ -24,7 +24,7 @@ class Primitive(NamedTuple):
     first: Vector = ZERO
     second: Vector = ZERO
     turning: Vector = ZERO  # with a driver: fixed in the first body, a quarter turn from first
-    length: float = 0.0
+    length: float = 0.0  # of a distance; the factor of a joint coordinate
     driven: bool = False
 
 
@@ -73,3 +73,14 @@ def driven_angle(axis: Vector) -> Primitive:
 def driven_displacement(anchor: Vector, axis: Vector) -> Primitive:
     """The second body's anchor advances along the axis by the driver's displacement."""
     return Primitive(DOT2, point_first=anchor, point_second=anchor, first=unit(axis), driven=True)
+
+
+def coordinate_angle(axis: Sequence[float], factor: float) -> Primitive:
+    """The angle of the second body about the axis, times a factor, as a part of a row."""
+    x, y, _ = frame(axis)
+    return Primitive(ANGLE, first=x, turning=y, second=x, length=factor)
+
+
+def coordinate_displacement(anchor: Vector, axis: Sequence[float], factor: float) -> Primitive:
+    """The displacement of the second body's anchor along the axis, times a factor, as a part of a row."""
+    return Primitive(SLIDE, point_first=anchor, point_second=anchor, first=unit(axis), length=factor)

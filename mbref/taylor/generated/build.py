@@ -39,6 +39,8 @@ def put_code(taylor: TaylorMemory) -> Code:
 
 def code_of(taylor: TaylorMemory, names: Sequence[str]) -> Code:
     """Return the code of functions of a scene, made or loaded; raises NoGeneratedCode."""
+    if (taylor.polynomials.torsions.row >= 0).any():
+        raise NoGeneratedCode("the rows of couplings of angles are no products of series")
     if PLAIN:
         raise NoGeneratedCode("without the JIT there is no machine code")
     lanes = taylor.series.terms.shape[1]

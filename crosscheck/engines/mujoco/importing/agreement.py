@@ -16,6 +16,7 @@ from crosscheck.engines.mujoco.importing.groups import Groups
 from crosscheck.engines.mujoco.importing.left_out import joint_name
 from crosscheck.engines.mujoco.importing.posing import Poses
 from crosscheck.judge.constraints import closure, inertia_matrices, jacobian
+from crosscheck.judge.joint_coordinates import reflected
 from mbref import rotations
 from mbref.scene import Scene, SceneError, Spring
 
@@ -70,20 +71,24 @@ class Agreement:
         placed = [self.groups.placed(data, g) for g in self.groups.massive]
         pose = np.array([p.position for p in placed]), np.array([p.orientation for p in placed])
         twists = np.vstack([p.jacobian for p in placed])
-        self._masses(scene, pose[1], twists)
+        self._masses(scene, pose, twists)
         self._forces(scene, pose, twists)
         self._tree(scene, tree, pose, twists)
         self._loops(scene, tree, pose, twists)
 
-    def _masses(self, scene: Scene, orientation: np.ndarray, twists: np.ndarray) -> None:
-        ours = twists.T @ _masses(scene, orientation) @ twists
+    def _masses(self, scene: Scene, pose: tuple[np.ndarray, np.ndarray], twists: np.ndarray) -> None:
+        still = np.zeros_like(pose[0])
+        mass = _masses(scene, pose[1]) + reflected(scene, *pose, still, still).mass
+        ours = twists.T @ mass @ twists
         self._same(ours, self.poses.mass(), "mass matrix")
 
     def _forces(self, scene: Scene, pose: tuple[np.ndarray, np.ndarray], twists: np.ndarray) -> None:
         """Bias forces with weight and springs."""
         data = self.poses.data
         motion = (twists @ data.qvel).reshape(-1, 6)
-        ours = twists.T @ (_inertial(scene, pose[1], motion, self._drift()) - _pushes(scene, pose, motion))
+        drift, armatures = self._drift(), reflected(scene, *pose, motion[:, :3], motion[:, 3:])
+        inertial = _inertial(scene, pose[1], motion, drift) + armatures.mass @ drift - armatures.force
+        ours = twists.T @ (inertial - _pushes(scene, pose, motion))
         self._same(ours, data.qfrc_bias - data.qfrc_passive, "bias forces")
 
     def _drift(self) -> np.ndarray:
@@ -112,7 +117,7 @@ class Agreement:
         self, scene: Scene, tree: Sequence[str], pose: tuple[np.ndarray, np.ndarray], twists: np.ndarray
     ) -> None:
         """The joints of the tree hold at every pose, and allow the motion of the joint coordinates only."""
-        bare = scene.with_(joint=[j for j in scene.joint if j.name in tree], driver=())
+        bare = scene.with_(joint=[j for j in scene.joint if j.name in tree], coupling=(), driver=())
         for name, residual in closure(bare, 0.0, *pose).items():
             if (gap := np.abs(residual).max(initial=0.0)) > AGREE * max(1.0, self.poses.extent):
                 raise SceneError(

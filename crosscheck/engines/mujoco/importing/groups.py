@@ -35,9 +35,6 @@ class Groups:
         self.mass = {g: float(model.body_mass[m].sum()) for g, m in self.members.items()}
         self.mass[WORLD] = np.inf
         self.names = {g: self._name(g) for g in self.members}
-        self.rotors: dict[
-            int, tuple[int, float]
-        ] = {}  # joint and armature (kg m²) that a group's inertia has
 
     @property
     def massive(self) -> list[int]:
@@ -98,17 +95,9 @@ class Groups:
             angular_velocity=None if twist is None else twist[3:].tolist(),
         )
 
-    def _rotor(self, data: Any, group: int) -> np.ndarray:
-        """Inertia (3, 3), world, of a thin disc about the fixed axis of a group: its armature."""
-        if group not in self.rotors:
-            return np.zeros((3, 3))
-        joint, armature = self.rotors[group]
-        axis = data.xaxis[joint]
-        return np.asarray(armature / 2 * (np.eye(3) + np.outer(axis, axis)))
-
     def _inertia(self, data: Any, group: int, centre: np.ndarray) -> np.ndarray:
         """World inertia (3, 3) about the group's centre of mass, by Steiner's theorem."""
-        total = self._rotor(data, group)
+        total = np.zeros((3, 3))
         for b in self.members[group]:
             axes, arm = data.ximat[b].reshape(3, 3), data.xipos[b] - centre
             total += axes @ np.diag(self.model.body_inertia[b]) @ axes.T

@@ -16,13 +16,14 @@ import numpy as np
 from crosscheck.engines.mujoco.importing import left_out, loads, urdf
 from crosscheck.engines.mujoco.importing.agreement import Agreement
 from crosscheck.engines.mujoco.importing.asked_closures import Frames, asked, unclosed
-from crosscheck.engines.mujoco.importing.chains import Chain, chains, joints_of, without_effect
+from crosscheck.engines.mujoco.importing.chains import Chain, chains, joints_of, kind_of, without_effect
 from crosscheck.engines.mujoco.importing.closures import Closure, of_equalities
-from crosscheck.engines.mujoco.importing.groups import WORLD, Groups
+from crosscheck.engines.mujoco.importing.groups import Groups
 from crosscheck.engines.mujoco.importing.left_out import Part
 from crosscheck.engines.mujoco.importing.posing import JointRow, Poses
 from mbref.formats import Imported, ImportOptions
-from mbref.scene import GROUND, Body, Driver, Joint, Scene, SceneError
+from mbref.scene import GROUND, Body, Coupling, Driver, Joint, Scene, SceneError
+from mbref.scene_joints import ANGLE, DISPLACEMENT, Coordinate
 
 OPEN = 1e-6  # fraction of the model's extent: a wider gap at the start is reported
 
@@ -57,7 +58,7 @@ def source(path: Path, options: ImportOptions) -> Source:
     model, text = _compiled(mujoco, path)
     if model.nbody < 2:  # the first is the world
         raise SceneError([f"{path}: has no body"])
-    reader = _Reader(mujoco, model, text, options)
+    reader = _Reader(mujoco, model, text, options, without)
     if not reader.groups.massive:
         raise SceneError([f"{path}: has no body that moves"])
     reader.read()
@@ -104,10 +105,12 @@ class _Reader:
     model: Any
     text: urdf.Text | None
     options: ImportOptions
+    without: frozenset[str]
     parts: list[Part] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     rows: list[JointRow] = field(default_factory=list)
     joints: list[Joint] = field(default_factory=list)
+    couplings: list[Coupling] = field(default_factory=list)
     drivers: list[Driver] = field(default_factory=list)
     loads: list[Any] = field(default_factory=list)
     tree: list[str] = field(default_factory=list)
@@ -139,6 +142,7 @@ class _Reader:
             gravity=(0.0, 0.0, 0.0) if gravity_off else self.model.opt.gravity.tolist(),
             body=tuple(self._bodies()),
             joint=tuple(self.joints),
+            coupling=tuple(self.couplings),
             driver=tuple(self.drivers),
             load=tuple(self.loads),
         )
@@ -158,10 +162,15 @@ class _Reader:
         found = [] if self._disabled("EQUALITY") else list(of_equalities(self.mujoco, self.model))
         if self.text is not None:
             found += urdf.loops(self.text.root, lambda name: self.frames.find(name).body, reference)
+            if "couplings" not in self.without:
+                self.rows += urdf.mimics(self.text.root, self._joint_number)
         found += asked(self.options.close, self.frames)
         if not self._disabled("EQUALITY"):
             self._read_equalities()
         return [c for c in found if self._between_groups(c)]
+
+    def _joint_number(self, name: str) -> int:
+        return int(self.mujoco.mj_name2id(self.model, self.mujoco.mjtObj.mjOBJ_JOINT, name))
 
     def _disabled(self, what: str) -> bool:
         bits = self.mujoco.mjtDisableBit
@@ -181,14 +190,22 @@ class _Reader:
             name, kind = model.equality(e).name or f"equality {e}", model.eq_type[e]
             if not model.eq_active0[e]:
                 self.notes.append(f"equality {name!r} is not active: it is not part of the scene")
-            elif kind == kinds.mjEQ_JOINT and model.eq_obj2id[e] < 0:
-                self.rows.append(
-                    JointRow(name, (int(model.eq_obj1id[e]), -1), float(model.eq_data[e, 0]), 0.0)
-                )
+            elif kind == kinds.mjEQ_JOINT and self._reads_row(e):
+                first, second = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
+                offset, ratio = map(float, model.eq_data[e, :2])
+                ends = (first, second if ratio else -1)
+                self.rows.append(JointRow(name, ends, offset, ratio if ends[1] >= 0 else 0.0))
             elif kind != kinds.mjEQ_CONNECT and kind != kinds.mjEQ_WELD:
                 what = kinds(kind).name.removeprefix("mjEQ_").lower()
+                if kind == kinds.mjEQ_JOINT and np.any(model.eq_data[e, 2:5]):
+                    what += ", whose polynomial is not linear"
                 self.parts.append(Part("couplings", f"equality {name!r} of type {what}"))
                 model.eq_active0[e] = 0
+
+    def _reads_row(self, e: int) -> bool:
+        """Whether an equality of joints locks one, or is linear and not to be left out."""
+        is_linear = not np.any(self.model.eq_data[e, 2:5])
+        return self.model.eq_obj2id[e] < 0 or (is_linear and "couplings" not in self.without)
 
     def _close(self) -> None:
         """Close the loops and report how wide they were open."""
@@ -219,30 +236,28 @@ class _Reader:
         whole: dict[int, int] = {}
         for chain in chains(self.mujoco, self.groups, data):
             joints = joints_of(chain, self.groups, extent)
-            self._add_rotor(chain)
             whole.update({j: len(found) for j in chain.joints if len(joints) == 1})
-            found += joints
+            found += self._with_armature(chain, joints)
         count = len(found)
         found += [c.joint(data, self.groups) for c in closures]
         self.joints = list(_renamed(found))
         self.tree = [joint.name for joint in self.joints[:count]]
         self.joint_of = {j: self.joints[k] for j, k in whole.items()}
         self._read_merged()
-        self._lock()
+        self._couple()
 
-    def _add_rotor(self, chain: Chain) -> None:
-        """Make the armature of a hinge on the ground a part of its body, which turns about a fixed axis."""
-        if chain.kinds != ("hinge",) or chain.groups[0] != WORLD:
-            return
-        dof = int(self.model.jnt_dofadr[chain.joints[0]])
-        if armature := float(self.model.dof_armature[dof]):
-            self.groups.rotors[chain.groups[1]] = (chain.joints[0], armature)
-            self.kept.append(dof)
-            joint = left_out.joint_name(self.model, chain.joints[0])
-            self.notes.append(
-                f"armature of {joint}, {armature:g} kg m², is a part of the inertia of "
-                f"{self.groups.names[chain.groups[1]]!r}, which turns about a fixed axis"
-            )
+    def _with_armature(self, chain: Chain, joints: list[Joint]) -> list[Joint]:
+        """The joints of a chain, a single one with the armature of its hinge or slide."""
+        driven = joints[0].facts.driven if len(joints) == 1 else None
+        kind = {ANGLE: "hinge", DISPLACEMENT: "slide"}.get(str(driven))
+        own = [j for j, name in zip(chain.joints, chain.kinds, strict=True) if name == kind]
+        if len(own) != 1 or "armature" in self.without:
+            return joints
+        dof = int(self.model.jnt_dofadr[own[0]])
+        if not (armature := float(self.model.dof_armature[dof])):
+            return joints
+        self.kept.append(dof)
+        return [joints[0].model_copy(update={"armature": armature})]
 
     def _read_merged(self) -> None:
         for members in self.groups.members.values():
@@ -252,17 +267,34 @@ class _Reader:
                 names = ", ".join(repr(self.model.body(b).name) for b in heavy)
                 self.notes.append(f"fixed to {self.groups.name_of(main)!r} and part of it: {names}")
 
-    def _lock(self) -> None:
-        """A locked coordinate is a driver that stands still; raises SceneError where a scene has none."""
+    def _couple(self) -> None:
+        """A coordinate that follows another is a coupling, a locked one a driver that stands still; raises
+        SceneError where a scene has none."""
+        taken = {joint.name for joint in self.joints}
         for row in self.rows:
-            joint = self.joint_of.get(row.joints[0])
-            driven = joint is not None and joint.facts.driven and joint.type != "cylindrical"
-            if joint is None or not driven:
-                name = left_out.joint_name(self.model, row.joints[0])
-                raise SceneError(
-                    [f"equality {row.name!r}: locks {name}, which is not a single hinge or slide"]
-                )
-            self.drivers.append(Driver(joint=joint.name))
+            ends = [self._coordinate(row, j) for j in row.joints if j >= 0]
+            if len(ends) == 1:
+                self.drivers.append(Driver(joint=ends[0][0].name))
+                continue
+            name = row.name
+            while name in taken:
+                name = f"coupling {name}"
+            taken.add(name)
+            (second, of_second), (first, of_first) = ends
+            is_plain = (of_first, of_second) == (first.facts.driven, second.facts.driven)
+            kinds = None if is_plain and first.name != second.name else (of_first, of_second)
+            pair = first.name, second.name
+            self.couplings.append(Coupling(name=name, joints=pair, ratio=row.ratio, coordinates=kinds))
+
+    def _coordinate(self, row: JointRow, j: int) -> tuple[Joint, Coordinate]:
+        """The joint of the scene that has a hinge or slide of the file, and its coordinate; SceneError where
+        none has."""
+        joint, couples = self.joint_of.get(j), row.joints[1] >= 0
+        if joint is not None and joint.facts.driven and (couples or joint.type != "cylindrical"):
+            is_hinge = kind_of(self.mujoco, self.model, j) == "hinge"
+            return joint, ANGLE if is_hinge else DISPLACEMENT
+        name, what = left_out.joint_name(self.model, j), "couples" if couples else "locks"
+        raise SceneError([f"equality {row.name!r}: {what} {name}, which is not a single hinge or slide"])
 
     def _read_loads(self) -> None:
         mujoco, model, data = self.mujoco, self.model, self.poses.data

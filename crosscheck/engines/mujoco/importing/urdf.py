@@ -12,6 +12,7 @@ import numpy as np
 
 from crosscheck.engines.mujoco.importing.closures import TYPES, Closure, Frame
 from crosscheck.engines.mujoco.importing.left_out import Part
+from crosscheck.engines.mujoco.importing.posing import JointRow
 from mbref.scene import SceneError
 
 PARTS = (
@@ -90,13 +91,20 @@ def _part(element: ET.Element, tag: str, default: dict[str, str]) -> ET.Element:
     return ET.SubElement(element, tag, default) if found is None else found
 
 
-def couplings(root: ET.Element) -> Iterator[Part]:
-    """Joints that follow others: ``<mimic>``, and ``<coupling>`` of URDF+."""
+def mimics(root: ET.Element, number_of: Callable[[str], int]) -> Iterator[JointRow]:
+    """Joints that follow others by ``<mimic>``; raises SceneError for an unknown joint."""
     for joint in root.iter("joint"):
         if (mimic := joint.find("mimic")) is not None:
-            ratio, offset = mimic.get("multiplier", "1"), mimic.get("offset", "0")
-            says = f"joint {joint.get('name')!r} mimics {mimic.get('joint')!r} ({ratio} q + {offset})"
-            yield Part("couplings", says)
+            name, other = str(joint.get("name")), str(mimic.get("joint"))
+            pair = number_of(name), number_of(other)
+            if min(pair) < 0:
+                raise SceneError([f"joint {name!r} mimics {other!r}: the file has no such joint that moves"])
+            offset, ratio = (float(mimic.get(key, n)) for key, n in (("offset", 0.0), ("multiplier", 1.0)))
+            yield JointRow(f"{name} mimics {other}", pair, offset, ratio)
+
+
+def couplings(root: ET.Element) -> Iterator[Part]:
+    """Joints that follow others by ``<coupling>`` of URDF+."""
     for coupling in root.iter("coupling"):
         yield Part("couplings", f"coupling {coupling.get('name', '')!r}")
 

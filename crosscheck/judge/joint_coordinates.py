@@ -1,0 +1,151 @@
+"""Joint coordinates from poses: the angle about and the displacement along a joint's axis; their armatures.
+
+Coordinates are of the second body relative to the first, zero at t = 0.  Arrays have any leading shape (…),
+and the ground as their last body.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.judge.joint_residuals import (
+    JointFrames,
+    difference,
+    grounded,
+    in_world,
+    joint_frames,
+    relative_acceleration,
+    relative_twist,
+    resolve,
+    twist,
+    with_ground,
+    wrapped,
+)
+from mbref import rotations
+from mbref.rotations import cross
+from mbref.scene import Scene
+from mbref.scene_joints import ANGLE, DISPLACEMENT
+
+COORDINATES = (ANGLE, DISPLACEMENT)  # the columns of joint coordinates
+
+
+def coordinate_rates(
+    joint: JointFrames,
+    position: np.ndarray,
+    orientation: np.ndarray,
+    velocity: np.ndarray,
+    angular_velocity: np.ndarray,
+) -> np.ndarray:
+    """(…, 2) rates of angle and displacement along the axis, as the first body sees them."""
+    arms, offset, frames = in_world(joint, position, orientation)
+    w = [angular_velocity[..., b, :] for b in joint.bodies]
+    dv = difference(velocity[..., b, :] + cross(w[k], arms[k]) for k, b in enumerate(joint.bodies))
+    linear, angular = relative_twist(frames, offset, dv, w)
+    return np.stack([angular[..., 2], linear[..., 2]], axis=-1)
+
+
+def coordinate_accelerations(
+    joint: JointFrames,
+    position: np.ndarray,
+    orientation: np.ndarray,
+    velocity: np.ndarray,
+    angular_velocity: np.ndarray,
+    acceleration: np.ndarray,
+    angular_acceleration: np.ndarray,
+) -> np.ndarray:
+    """(…, 2) time derivatives of ``coordinate_rates``."""
+    arms, offset, frames = in_world(joint, position, orientation)
+    w = [angular_velocity[..., b, :] for b in joint.bodies]
+    dw = [angular_acceleration[..., b, :] for b in joint.bodies]
+    dv = difference(velocity[..., b, :] + cross(w[k], arms[k]) for k, b in enumerate(joint.bodies))
+    da = difference(
+        acceleration[..., b, :] + cross(dw[k], arms[k]) + cross(w[k], cross(w[k], arms[k]))
+        for k, b in enumerate(joint.bodies)
+    )
+    linear, angular = relative_acceleration(frames, offset, (dv, da), w, dw)
+    return np.stack([angular[..., 2], linear[..., 2]], axis=-1)
+
+
+def coordinates(
+    joint: JointFrames,
+    times: np.ndarray,
+    position: np.ndarray,
+    orientation: np.ndarray,
+    angular_velocity: np.ndarray,
+) -> np.ndarray:
+    """(k, 2) unwrapped angle about the axis and displacement along it since t = 0, over k samples."""
+    _, offset, frames = in_world(joint, position, orientation)
+    turned = twist(rotations.multiply(rotations.conjugate(frames[0]), frames[1]))
+    w = [angular_velocity[..., b, :] for b in joint.bodies]
+    rate = resolve(frames[0], w[1] - w[0])[..., 2]
+    return np.stack([counted(times, turned, rate), resolve(frames[0], offset)[..., 2]], axis=-1)
+
+
+def counted(times: np.ndarray, angle: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    """Angles (k,), known up to turns and zero at t = 0, with their turns counted by the rates (k,).
+
+    Between samples the change nearest to the trapezoid of the rates is taken; NaN from where the rates
+    near a sample differ so much that this does not tell the turn.
+    """
+    before, step = np.concatenate([rate[:1], rate[:-1]]), np.diff(times, prepend=0.0)
+    expected = step * (rate + before) / 2
+    change = expected + wrapped(np.diff(angle, prepend=0.0) - expected)
+    near = np.lib.stride_tricks.sliding_window_view(np.pad(rate, 2, mode="edge"), 5, axis=0)
+    doubt = step * (near.max(axis=-1) - near.min(axis=-1))
+    doubt[:1] = np.abs(step[:1] * rate[:1])
+    return np.where(np.cumsum(doubt >= np.pi) > 0, np.nan, np.cumsum(change))
+
+
+def coordinate_jacobian(scene: Scene, name: str, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+    """(2, 6 nb): the rates of a joint's angle and displacement per twist of the bodies (see ``jacobian``)."""
+    n = 6 * len(scene.body)
+    joint = next(joint for joint in joint_frames(scene) if joint.name == name)
+    poses = (np.broadcast_to(a, (n, *a.shape)) for a in with_ground(position, orientation))
+    unit = np.eye(n).reshape(n, -1, 6)
+    twists = grounded(unit[..., :3]), grounded(unit[..., 3:])
+    return coordinate_rates(joint, *poses, *twists).T
+
+
+@dataclass(frozen=True)
+class Reflected:
+    """The coordinates of a pose that have an armature: its sizes (c,), kg m² or kg; J (c, 6 nb), with J times
+    the twists (velocity and angular velocity, world, body after body) the coordinates' rates; the part
+    ``drift`` (c,) of their second rates that accelerations of the bodies do not cause."""
+
+    joints: tuple[str, ...]
+    inertia: np.ndarray
+    jacobian: np.ndarray
+    drift: np.ndarray
+
+    @property
+    def mass(self) -> np.ndarray:
+        """The armatures' part (6 nb, 6 nb) of the mass matrix of the twists."""
+        return np.asarray(self.jacobian.T @ (self.inertia[:, None] * self.jacobian))
+
+    @property
+    def force(self) -> np.ndarray:
+        """The armatures' force (6 nb,) on bodies without accelerations."""
+        return np.asarray(-self.jacobian.T @ (self.inertia * self.drift))
+
+
+def reflected(
+    scene: Scene,
+    position: np.ndarray,
+    orientation: np.ndarray,
+    velocity: np.ndarray,
+    angular_velocity: np.ndarray,
+) -> Reflected:
+    """The armatures of a scene at one pose and its twists, arrays (nb, ·)."""
+    geared = [joint for joint in scene.joint if joint.reflected_inertia]
+    names = tuple(joint.name for joint in geared)
+    frames = {joint.name: joint for joint in joint_frames(scene)}
+    motion = *with_ground(position, orientation), grounded(velocity), grounded(angular_velocity)
+    still = np.zeros((len(scene.body) + 1, 3))
+    jacobian, drift = np.zeros((len(geared), 6 * len(scene.body))), np.zeros(len(geared))
+    for k, joint in enumerate(geared):
+        column = COORDINATES.index(joint.facts.driven)
+        jacobian[k] = coordinate_jacobian(scene, joint.name, position, orientation)[column]
+        drift[k] = coordinate_accelerations(frames[joint.name], *motion, still, still)[column]
+    return Reflected(names, np.array([joint.reflected_inertia for joint in geared]), jacobian, drift)

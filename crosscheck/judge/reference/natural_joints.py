@@ -1,0 +1,272 @@
+"""Joint coordinates in natural coordinates as Taylor series; the rows of couplings and armatures.
+
+An angle follows from θ' = C S' - S C' with C = e₁ · f₁ and S = e₂ · f₁ of the cross axes e of the first body
+and f of the second, a displacement is a · d.  Order j of both is linear in X_j, with the gradient at the time
+of expansion, so that a coupling is a row with a multiplier like the others.  An armature I is one, too: its
+multiplier is μ = I q'', which stands on the diagonal as -1 / I.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mbref.scene import Joint
+from mbref.scene_joints import ANGLE
+
+SETTLING = 3  # corrections of an angle, each of which leaves the cube of the last
+
+
+def convolved(a: np.ndarray, b: np.ndarray, k: int) -> Any:
+    """Order k of the product of two series: Σ a_i b_{k-i}, i = 0 … k."""
+    return (a[: k + 1] * b[k::-1]).sum(axis=0)
+
+
+class AngleForm:
+    """A joint's cross axes e₁, e₂ on its first body and f₁ on its second."""
+
+    turns = True
+
+    def __init__(self, of: Any, joint: Joint):
+        first, second = of.indices(joint.bodies)
+        frame = of.frame(joint.directions[0])
+        self.e1, self.e2 = of.direction(first, frame[0]), of.direction(first, frame[1])
+        self.f, self.zeros = of.direction(second, frame[0]), of.arithmetic.zeros
+
+    def series(self, start: Any, terms: int) -> AngleSeries:
+        """The angle as a series of so many terms, from its value at the time of expansion."""
+        return AngleSeries(self, start, terms)
+
+    def value(self, x: np.ndarray, near: Any) -> Any:
+        """The angle at coordinates x (3, n), which is within rounding of another."""
+        f = x @ self.f
+        cosine, sine = (x @ self.e1 * f).sum(), (x @ self.e2 * f).sum()
+        for _ in range(SETTLING):
+            near = near + sine * np.cos(near) - cosine * np.sin(near)
+        return near
+
+    def rate(self, x: np.ndarray, v: np.ndarray) -> Any:
+        """The rate of the angle at coordinates and rates (3, n)."""
+        f, f_rate = x @ self.f, v @ self.f
+        (c, c_rate), (s, s_rate) = (
+            ((x @ e * f).sum(), (v @ e * f).sum() + (x @ e * f_rate).sum()) for e in (self.e1, self.e2)
+        )
+        return c * s_rate - s * c_rate
+
+    def gradient(self, x: np.ndarray) -> np.ndarray:
+        """Derivatives (3, n) of the angle by coordinates x (3, n)."""
+        e1, e2, f = x @ self.e1, x @ self.e2, x @ self.f
+        c, s = (e1 * f).sum(), (e2 * f).sum()
+        on_f = c * e2 - s * e1
+        return (c * f)[:, None] * self.e2 - (s * f)[:, None] * self.e1 + on_f[:, None] * self.f
+
+
+class AngleSeries:
+    """An angle and its pull, about one time."""
+
+    def __init__(self, form: AngleForm, start: Any, terms: int):
+        self._form = form
+        self._e1, self._e2, self._f = form.zeros(3, terms, 3)
+        self._cos, self._sin, self._mcos, self._msin = form.zeros(4, terms)
+        self.value = form.zeros(terms)
+        self.value[0] = start
+
+    def grow(self, k: int, x: np.ndarray) -> None:
+        """Order k of the axes, of cosine and sine, and of the angle."""
+        self._e1[k], self._e2[k], self._f[k] = x[k] @ self._form.e1, x[k] @ self._form.e2, x[k] @ self._form.f
+        self._cos[k] = convolved(self._e1, self._f, k).sum()
+        self._sin[k] = convolved(self._e2, self._f, k).sum()
+        if k:
+            i = np.arange(1, k + 1)
+            turn = (
+                self._cos[k - 1 :: -1] * self._sin[1 : k + 1] - self._sin[k - 1 :: -1] * self._cos[1 : k + 1]
+            )
+            self.value[k] = (i * turn).sum() / k
+
+    def pull(self, moment: np.ndarray, k: int) -> np.ndarray:
+        """Order k (3, n) of a moment (terms,) times the gradient, C δS - S δC."""
+        form = self._form
+        self._mcos[k], self._msin[k] = convolved(moment, self._cos, k), convolved(moment, self._sin, k)
+        cosine, sine = self._mcos[:, None], self._msin[:, None]
+        on_e2, on_e1 = convolved(cosine, self._f, k), convolved(sine, self._f, k)
+        on_f = convolved(cosine, self._e2, k) - convolved(sine, self._e1, k)
+        return np.asarray(on_e2[:, None] * form.e2 - on_e1[:, None] * form.e1 + on_f[:, None] * form.f)
+
+
+class SlideForm:
+    """The axis of a joint on its first body, and the vector between its anchors, in the unit of length."""
+
+    turns = False
+
+    def __init__(self, of: Any, joint: Joint):
+        first, second = of.indices(joint.bodies)
+        anchors = joint.anchor_pair
+        self.axis = of.direction(first, of.frame(joint.directions[0])[2])
+        self.apart, self.zeros = (
+            of.point(second, anchors[1]) - of.point(first, anchors[0]),
+            of.arithmetic.zeros,
+        )
+
+    def series(self, start: Any, terms: int) -> SlideSeries:
+        """The displacement as a series of so many terms."""
+        return SlideSeries(self, terms)
+
+    def value(self, x: np.ndarray, near: Any) -> Any:
+        """The displacement at coordinates x (3, n)."""
+        return (x @ self.axis * (x @ self.apart)).sum()
+
+    def rate(self, x: np.ndarray, v: np.ndarray) -> Any:
+        """The rate of the displacement at coordinates and rates (3, n)."""
+        return (v @ self.axis * (x @ self.apart)).sum() + (x @ self.axis * (v @ self.apart)).sum()
+
+    def gradient(self, x: np.ndarray) -> np.ndarray:
+        """Derivatives (3, n) of the displacement by coordinates x (3, n)."""
+        return (x @ self.apart)[:, None] * self.axis + (x @ self.axis)[:, None] * self.apart
+
+
+class SlideSeries:
+    """A displacement and its pull, about one time."""
+
+    def __init__(self, form: SlideForm, terms: int):
+        self._form, self.value = form, form.zeros(terms)
+        self._axis, self._apart = form.zeros(2, terms, 3)
+
+    def grow(self, k: int, x: np.ndarray) -> None:
+        """Order k of axis, vector and displacement."""
+        self._axis[k], self._apart[k] = x[k] @ self._form.axis, x[k] @ self._form.apart
+        self.value[k] = convolved(self._axis, self._apart, k).sum()
+
+    def pull(self, force: np.ndarray, k: int) -> np.ndarray:
+        """Order k (3, n) of a force (terms,) times the gradient."""
+        on_axis, on_apart = (convolved(force[:, None], v, k) for v in (self._apart, self._axis))
+        return np.asarray(on_axis[:, None] * self._form.axis + on_apart[:, None] * self._form.apart)
+
+
+Form = AngleForm | SlideForm
+
+
+@dataclass(frozen=True)
+class Gear:
+    """The row Σ weight × coordinate, by numbers of coordinates; 0 of a coupling, the multiplier over the
+    ``inertia`` in its second derivative of an armature."""
+
+    terms: tuple[tuple[int, Any], ...]
+    inertia: Any = None
+
+    def total(self, values: Sequence[Any]) -> Any:
+        """Σ weight × value, of one value for each coordinate."""
+        return sum(
+            (weight * values[i] for i, weight in self.terms[1:]), self.terms[0][1] * values[self.terms[0][0]]
+        )
+
+
+class JointCoordinates:
+    """The joint coordinates on which couplings and armatures act, and a row for each coupling and armature.
+
+    ``of`` are the natural coordinates of the scene.
+    """
+
+    def __init__(self, of: Any):
+        self._of, self._numbers, self.forms = of, dict[tuple[str, str], int](), list[Form]()
+        self.couplings = [self._coupling(coupling) for coupling in of.scene.coupling]
+        geared = [j for j in of.scene.joint if j.reflected_inertia and of.scene.has_mass()]
+        self.armatures = [self._armature(joint) for joint in geared]
+
+    def _coupling(self, coupling: Any) -> Gear:
+        (first, one), (second, other) = self._of.scene.coupled(coupling)
+        pairs = [(self._number(first, one), -coupling.ratio), (self._number(second, other), 1.0)]
+        units = [1.0 if self.forms[i].turns else self._of.length for i, _ in pairs]
+        largest = max(abs(ratio) * unit for (_, ratio), unit in zip(pairs, units, strict=True))
+        number = self._of.arithmetic.number
+        terms = [(i, number(ratio) * unit / largest) for (i, ratio), unit in zip(pairs, units, strict=True)]
+        return Gear(tuple(terms))
+
+    def _armature(self, joint: Joint) -> Gear:
+        i = self._number(joint, str(joint.facts.driven))
+        inertia = self._of.arithmetic.number(joint.reflected_inertia)
+        if self.forms[i].turns:
+            inertia = inertia / self._of.length**2
+        return Gear(((i, self._of.arithmetic.number(1.0)),), inertia)
+
+    def _number(self, joint: Joint, coordinate: str) -> int:
+        """The number of a coordinate, which is taken in where it is new."""
+        key = joint.name, coordinate
+        if key not in self._numbers:
+            self._numbers[key] = len(self.forms)
+            self.forms.append((AngleForm if coordinate == ANGLE else SlideForm)(self._of, joint))
+        return self._numbers[key]
+
+    def start(self) -> list[Any]:
+        """The coordinates at t = 0."""
+        return [self._of.arithmetic.number(0.0) for _ in self.forms]
+
+    def values(self, x: np.ndarray, near: Sequence[Any]) -> list[Any]:
+        """The coordinates at X (3, n), angles within rounding of others."""
+        return [form.value(x, old) for form, old in zip(self.forms, near, strict=True)]
+
+    def rates(self, x: np.ndarray, v: np.ndarray) -> list[Any]:
+        """The rates of the coordinates at X and X' (3, n)."""
+        return [form.rate(x, v) for form in self.forms]
+
+    def gaps(
+        self, couplings: Sequence[Gear], x: np.ndarray, v: np.ndarray, near: Sequence[Any]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Residuals (g,) of couplings and of their time derivatives; angles are within rounding of others."""
+        if not couplings:
+            return (self._of.arithmetic.zeros(0),) * 2
+        levels = self.values(x, near), self.rates(x, v)
+        first, second = (np.array([gear.total(level) for gear in couplings]) for level in levels)
+        return first, second
+
+    def mass(self, x: np.ndarray) -> np.ndarray:
+        """The armatures' part (3 (n - 4), 3 (n - 4)) of the mass matrix at coordinates x (3, n)."""
+        size = 3 * (x.shape[1] - 4)
+        total = self._of.arithmetic.zeros(size, size)
+        for gear, gradient in zip(self.armatures, self.gradients(self.armatures, x), strict=True):
+            total = total + gear.inertia * (gradient.ravel()[:, None] * gradient.ravel())
+        return np.asarray(total)
+
+    def gradients(self, gears: Sequence[Gear], x: np.ndarray) -> np.ndarray:
+        """Derivatives (g, 3, n - 4) of the rows of gears by coordinates x (3, n)."""
+        if not gears:
+            return self._of.arithmetic.zeros(0, 3, x.shape[1] - 4)
+        found = [form.gradient(x)[:, :-4] for form in self.forms]
+        return np.array([gear.total(found) for gear in gears])
+
+
+class GearSeries:
+    """The joint coordinates, and the multipliers of gears, about one time."""
+
+    def __init__(
+        self, of: JointCoordinates, gears: Sequence[Gear], start: Sequence[Any], terms: int, zeros: Any
+    ):
+        self.gears = gears
+        self.coordinates = [form.series(value, terms) for form, value in zip(of.forms, start, strict=True)]
+        self._moments, self._nothing = zeros(len(of.forms), terms), zeros(len(gears))
+
+    def grow(self, k: int, x: np.ndarray) -> None:
+        """Take order k of the coordinates X (terms, 3, n) in."""
+        for coordinate in self.coordinates:
+            coordinate.grow(k, x)
+
+    def gaps(self, k: int) -> np.ndarray:
+        """Order k (g,) of the rows."""
+        found = self._nothing.copy()
+        for g, gear in enumerate(self.gears):
+            found[g] = gear.total([coordinate.value[k] for coordinate in self.coordinates])
+        return np.asarray(found)
+
+    def pull(self, k: int) -> Any:
+        """Order k (3, n) of the gradients times the multipliers, 0 without gears."""
+        pairs = zip(self.coordinates, self._moments, strict=True)
+        return sum((coordinate.pull(moment, k) for coordinate, moment in pairs), 0)
+
+    def put(self, multipliers: np.ndarray, k: int) -> None:
+        """Take order k of the multipliers (g,) in."""
+        for value, gear in zip(multipliers, self.gears, strict=True):
+            for i, weight in gear.terms:
+                self._moments[i, k] = self._moments[i, k] + weight * value
+        self.pull(k)

@@ -1,0 +1,80 @@
+"""Refusals of engines: what an adapter declares, and the first part of a scene that it does not."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+
+from mbref.scene import Scene
+
+
+class Owner(enum.Enum):
+    """The part that would have to change before an engine could do what it refuses."""
+
+    ADAPTER = "missing in the adapter"
+    ENGINE = "missing in the engine"
+    MODEL = "excluded by the engine's model"
+
+
+@dataclass(frozen=True)
+class Cannot:
+    """A refusal, given before running.
+
+    Attributes
+    ----------
+    owner : Owner
+        The part that is the cause: adapter, engine, or the engine's model.
+    reason : str
+        One sentence about the scene.
+    """
+
+    owner: Owner
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.reason} ({self.owner.value})"
+
+
+@dataclass(frozen=True)
+class Supports:
+    """Features that an adapter maps to its engine.
+
+    Attributes
+    ----------
+    joints : collection of str
+        Joint types, as in scene files.
+    drivers, couplings, armatures : collection of str
+        Joint coordinates that can be driven, coupled or have an armature: ``"angle"``, ``"displacement"``.
+    loads : collection of str
+        Load types, as in scene files.
+    """
+
+    joints: Collection[str] = ()
+    drivers: Collection[str] = ()
+    loads: Collection[str] = ()
+    couplings: Collection[str] = ()
+    armatures: Collection[str] = ()
+
+    def missing(self, scene: Scene) -> Cannot | None:
+        """Return the refusal of the first joint, coupling, driver or load that is not declared, or None."""
+        missing = next(self._missing(scene), "")
+        return Cannot(Owner.ADAPTER, f"{missing}, which the adapter does not map") if missing else None
+
+    def _missing(self, scene: Scene) -> Iterator[str]:
+        for joint in scene.joint:
+            if joint.type not in self.joints:
+                yield f"joint {joint.name!r} is of type {joint.type!r}"
+            if joint.reflected_inertia and joint.facts.driven not in self.armatures:
+                yield f"joint {joint.name!r} has an armature"
+        for coupling in scene.coupling:
+            for joint, kind in scene.coupled(coupling):
+                if kind not in self.couplings:
+                    yield f"coupling {coupling.name!r} couples the {kind} of joint {joint.name!r}"
+        for driver in scene.driver:
+            coordinate = scene.joint_named(driver.joint).facts.driven
+            if coordinate not in self.drivers:
+                yield f"the driver of joint {driver.joint!r} prescribes its {coordinate}"
+        for k, load in enumerate(scene.load):
+            if load.type not in self.loads:
+                yield f"load[{k}] is of type {load.type!r}"

@@ -1,0 +1,92 @@
+"""Couplings as primitive equations between joint coordinates; rotors that stand for armatures.
+
+The armature I of a joint coordinate q has the kinetic energy ½ I q'².  A rotor of its own has it: a body
+without gravity's lever, held by the fixed frame, with one coordinate that is coupled with q, ratio 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from mbref.equations.joints.base import AXES, Primitive, coordinate_angle, coordinate_displacement
+from mbref.scene import Body, Joint, Revolute, Scene, Translational
+from mbref.scene_joints import ANGLE, Coordinate
+
+ORIGIN = (0.0, 0.0, 0.0)
+
+
+class Coupled(NamedTuple):
+    """One row: the sum of two joint coordinates times factors is zero."""
+
+    name: str
+    joints: tuple[Joint, Joint]
+    coordinates: tuple[Coordinate, Coordinate]
+    factors: tuple[float, float]
+
+
+class Rotors(NamedTuple):
+    """The bodies that stand for armatures, the joints that hold them, and their couplings."""
+
+    bodies: tuple[Body, ...] = ()
+    joints: tuple[Joint, ...] = ()
+    couplings: tuple[Coupled, ...] = ()
+
+
+def rotors_of(scene: Scene, frame: str, length: float) -> Rotors:
+    """The rotors of a scene of this length (m), held by the fixed frame of that name; none without masses."""
+    geared = [joint for joint in scene.joint if joint.reflected_inertia] if scene.has_mass() else []
+    if not geared:
+        return Rotors()
+    names = _free_names(scene, geared)
+    found = [_rotor(*pair, frame, length) for pair in zip(geared, names, strict=True)]
+    bodies, joints, couplings = zip(*found, strict=True)
+    return Rotors(bodies, joints, couplings)
+
+
+def _free_names(scene: Scene, joints: list[Joint]) -> Iterator[str]:
+    """A name for the rotor of each joint that nothing else has."""
+    taken = {entry.name for entries in (scene.body, scene.joint, scene.coupling) for entry in entries}
+    for joint in joints:
+        name = f"armature of {joint.name}"
+        while name in taken:
+            name += "'"
+        yield name
+
+
+def _rotor(joint: Joint, name: str, frame: str, length: float) -> tuple[Body, Joint, Coupled]:
+    """The rotor of a joint, the joint that holds it, and the row that couples both."""
+    inertia, axis = joint.reflected_inertia, AXES[0]
+    places = {"bodies": (frame, name), "anchor": ORIGIN, "axis": axis}
+    turns = joint.facts.driven == ANGLE
+    mass = inertia / length**2 if turns else inertia
+    moment = inertia if turns else inertia * length**2
+    body = Body.model_construct(name=name, position=ORIGIN, mass=mass, inertia=(moment, moment, moment))
+    kind = Revolute if turns else Translational
+    held = kind.model_construct(name=name, type=kind.model_fields["type"].default, **places)
+    coordinate = joint.facts.driven or ANGLE
+    return body, held, Coupled(name, (joint, held), (coordinate, coordinate), (-1.0, 1.0))
+
+
+def couplings_of(scene: Scene) -> tuple[Coupled, ...]:
+    """The couplings of a scene, q₂ - ratio · q₁ = 0, of which no factor is above one."""
+    found = []
+    for coupling in scene.coupling:
+        (first, one), (second, other) = scene.coupled(coupling)
+        largest = max(1.0, abs(coupling.ratio))
+        factors = -coupling.ratio / largest, 1.0 / largest
+        found.append(Coupled(coupling.name, (first, second), (one, other), factors))
+    return tuple(found)
+
+
+def coordinate_primitives(coupled: Coupled) -> tuple[Primitive, Primitive]:
+    """The two primitives of a coupling, which share one row."""
+    first, second = map(_primitive, coupled.joints, coupled.coordinates, coupled.factors)
+    return first, second
+
+
+def _primitive(joint: Joint, coordinate: Coordinate, factor: float) -> Primitive:
+    axis, anchor = joint.directions[0], joint.anchor_pair[0]
+    if coordinate == ANGLE:
+        return coordinate_angle(axis, factor)
+    return coordinate_displacement(anchor, axis, factor)

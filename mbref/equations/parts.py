@@ -1,0 +1,57 @@
+"""Bodies, joints and couplings of a scene's equations: the scene's own, rotors, and a modelled ground."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from typing import NamedTuple
+
+from mbref.equations.couplings import Coupled, rotors_of
+from mbref.scene import GROUND, Body, Fixed, Joint, Scene
+
+FRAME = "the fixed frame"  # holds a modelled ground and the rotors of armatures
+NONE = (0.0, 0.0, 0.0)
+
+
+def shape_of(scene: Scene) -> Hashable:
+    """All of a scene but its numbers: scenes of equal shape are packed together."""
+    return (
+        scene.ground,
+        tuple((body.name, _shape_of_inertia(body)) for body in scene.body),
+        tuple((j.name, j.type, j.bodies, j.reflected_inertia > 0.0) for j in scene.joint),
+        tuple((coupling.name, coupling.joints, coupling.coordinates) for coupling in scene.coupling),
+        tuple((driver.joint, len(driver.polynomial)) for driver in scene.driver),
+        tuple((load.type, getattr(load, load.acts_on)) for load in scene.load),
+    )
+
+
+def _shape_of_inertia(body: Body) -> bool | None:
+    """Whether it has products of inertia; None without mass."""
+    return None if body.inertia is None else isinstance(body.inertia[0], tuple)
+
+
+class Parts(NamedTuple):
+    """Bodies, joints and couplings of a scene's equations, those of the scene first."""
+
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]
+    couplings: tuple[Coupled, ...]  # that are not the scene's
+
+
+def all_parts(scene: Scene) -> Parts:
+    """Bodies and joints of a scene; a rotor for each armature, and the ground a body held by six rows where
+    the scene asks for it."""
+    rotors = rotors_of(scene, FRAME, _extent(scene))
+    bodies, joints = (*scene.body, *rotors.bodies), (*scene.joint, *rotors.joints)
+    if scene.ground == "frame":
+        return Parts(bodies, joints, rotors.couplings)
+    inertia = (1.0, 1.0, 1.0) if scene.has_mass() else None
+    body = Body(name=GROUND, position=NONE, mass=1.0 if inertia else None, inertia=inertia)
+    hold = Fixed.model_construct(name=GROUND, bodies=(FRAME, GROUND), anchor=NONE, type="fixed")
+    return Parts((*bodies, body), (*joints, hold), rotors.couplings)
+
+
+def _extent(scene: Scene) -> float:
+    """The largest side of a box around all centres of mass and anchors (m), or 1."""
+    points = [body.position for body in scene.body]
+    points += [anchor for joint in scene.joint for anchor in joint.anchor_pair]
+    return max(max(side) - min(side) for side in zip(*points, strict=True)) or 1.0
