@@ -27,6 +27,8 @@ OTHER_WORDS = {  # words of other programs and books → our words
     "rigid": "fixed",
     "rod": "distance",
     "link": "distance",
+    "point_on_line": "inline",
+    "in_line": "inline",
     "torque": "moment",
     "motor": "driver",
     "spring_damper": "spring",

@@ -172,6 +172,13 @@ class Planar(_AxisJoint):
     type: Literal["planar"] = "planar"
 
 
+class Inline(_AxisJoint):
+    """A point of the second body, ``anchor``, stays on the line along ``axis`` of the first body."""
+
+    facts = JointFacts(forbidden_translations=(X, Y))
+    type: Literal["inline"] = "inline"
+
+
 class Distance(JointEntry):
     """Constant distance between two ``anchors`` (first on the first body, second on the second)."""
 
@@ -192,7 +199,7 @@ class Distance(JointEntry):
 
 
 Joint = Annotated[
-    Fixed | Revolute | Universal | Spherical | Translational | Cylindrical | Planar | Distance,
+    Fixed | Revolute | Universal | Spherical | Translational | Cylindrical | Planar | Inline | Distance,
     Discriminator("type"),
 ]
 JOINT_TYPES: dict[str, type[Joint]] = {

@@ -14,7 +14,7 @@ from crosscheck.engines.spanning_tree import GROUND_LINK, Mobility, Tree
 from mbref.scene import JOINT_TYPES
 
 EVERYTHING = Supports(
-    joints=tuple(JOINT_TYPES),
+    joints=tuple(kind for kind in JOINT_TYPES if kind != "inline"),
     drivers=("angle", "displacement"),
     loads=("moment", "force", "spring", "torsion_spring"),
 )

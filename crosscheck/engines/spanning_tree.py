@@ -46,7 +46,10 @@ class Mobility:
 
 
 def mobilities(facts: JointFacts, axes: np.ndarray) -> tuple[Mobility, ...]:
-    """The chain of elementary motions that a joint leaves free, slides first; ``axes`` (n, 3) are its own."""
+    """The chain of elementary motions that a joint leaves free, slides first; ``axes`` (n, 3) are its own.
+
+    A link that carries the line of an inline joint has the ball first, about the point of its parent.
+    """
     free = [n for n in range(3) if n not in facts.forbidden_translations]
     slides = [Mobility(SLIDE, joint_frame(axes[0])[:, n] if n < 2 else axes[0]) for n in free]
     if facts.free_rotations == 3:
@@ -118,7 +121,11 @@ class Tree:
         """Index of a joint's velocity, of its angle or displacement; by default of the driven coordinate."""
         index = [j.name for j in scene.joint].index(joint)
         link = next(k for k, item in enumerate(self.links) if item.joint == index)
-        return self.starts[link] + (0 if kind == DISPLACEMENT else self.links[link].freedoms - 1)
+        found = self.links[link]
+        if kind != DISPLACEMENT:
+            return self.starts[link] + found.freedoms - 1
+        kinds = [mobility.kind for mobility in found.mobilities]
+        return self.starts[link] + sum(COORDINATES[k] for k in kinds[: kinds.index(SLIDE)])
 
 
 @dataclass(frozen=True)
@@ -258,12 +265,13 @@ def _depth_first(nodes: list[Link], edges: list[_Edge], closures: list[Closure],
             forward = edge.nodes[0] == node
             child = edge.nodes[1] if forward else edge.nodes[0]
             axes = edge.axes if forward else -edge.axes[::-1]
+            chain = mobilities(edge.facts, axes)
             add(
                 child,
                 replace(
                     nodes[child],
                     kind=edge.kind,
-                    mobilities=mobilities(edge.facts, axes),
+                    mobilities=chain if forward or chain[-1].kind != BALL_JOINT else chain[::-1],
                     joint=edge.joint,
                     parent=number[node],
                     anchor=edge.anchor,

@@ -14,8 +14,9 @@ from mbref.equations.model import Model
 from mbref.scene import JOINT_TYPES, Joint, Scene
 
 WEAKER = {  # types that allow the motion of the first and more, those that keep most rows first
-    "revolute": ("cylindrical", "universal", "spherical"),
-    "translational": ("cylindrical", "planar"),
+    "revolute": ("cylindrical", "universal", "spherical", "inline"),
+    "translational": ("cylindrical", "planar", "inline"),
+    "cylindrical": ("inline",),
     "universal": ("spherical",),
     "fixed": ("universal", "spherical"),
 }

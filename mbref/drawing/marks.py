@@ -83,12 +83,14 @@ def joint_mark(stage: Stage, joint: Joint) -> Iterator[str]:
         yield svg.line(
             ends, f'stroke="{INK}" stroke-width="2" stroke-dasharray="9 3 2 3" fill="none"', stage.timeline
         )
-    sliding = joint.facts.free_translations == 1 and bool(joint.directions)
+    if joint.type == "inline":
+        yield from _line(stage, names[0], first, _unit(joint.directions[0]))
+    sliding = joint.facts.free_translations == 1 and joint.type != "inline" and bool(joint.directions)
     for k, axis in enumerate(map(_unit, joint.directions)):
         body, point = (names[k], joint.anchor_pair[k]) if len(joint.directions) > 1 else (names[1], second)
         if sliding:
             yield from _sleeve(stage, body, point, axis)
-        elif abs(axis @ stage.page.view.axes[2]) < 1 - 1e-9 and joint.type != "planar":
+        elif abs(axis @ stage.page.view.axes[2]) < 1 - 1e-9 and joint.type not in ("planar", "inline"):
             ends = _along(stage, body, point, axis, STUB)
             yield svg.line(
                 ends,
@@ -106,6 +108,13 @@ def _sleeve(stage: Stage, body: str, point: tuple[float, float, float], axis: np
     yield svg.line(ends, f'{butt} stroke="{INK}" stroke-width="15"', stage.timeline)
     inner = ends + (ends.mean(axis=1, keepdims=True) - ends) * 0.11
     yield svg.line(inner, f'{butt} stroke="{PAPER}" stroke-width="11.6"', stage.timeline)
+
+
+def _line(stage: Stage, body: str, point: tuple[float, float, float], axis: np.ndarray) -> Iterator[str]:
+    ends = _along(stage, body, point, axis, 34.0)
+    yield svg.line(
+        ends, f'stroke="{GREY}" stroke-width="2" stroke-dasharray="6 5" fill="none"', stage.timeline
+    )
 
 
 def _plane(stage: Stage, body: str, point: tuple[float, float, float], normal: np.ndarray) -> Iterator[str]:
@@ -131,6 +140,7 @@ SIGNS: dict[str, Callable[[], str]] = {
     "translational": lambda: "",
     "cylindrical": lambda: _ball(PAPER, 4),
     "planar": lambda: _ball(GREY, 4),
+    "inline": lambda: _ball(INK, 3.5),
     "distance": lambda: _ball(PAPER, 3.5),
 }
 

@@ -23,6 +23,7 @@ ROWS = {
     "translational": 5,
     "cylindrical": 4,
     "planar": 3,
+    "inline": 2,
     "distance": 1,
 }
 

@@ -103,7 +103,9 @@ def test_energy_error_is_the_kinetic_energy_put_in():
     push = np.array([0.0, 0.0, 2.0])
     faster = replace(EXACT, velocity=bumped(EXACT.velocity, 8, 0, push))
     added = SCENE.body[0].mass * 2.0**2 / 2
-    kinetic = kinetic_energy(SCENE, faster.orientation, faster.velocity, faster.angular_velocity)
+    kinetic = kinetic_energy(
+        SCENE, faster.position, faster.orientation, faster.velocity, faster.angular_velocity
+    )
     got = energy_series(SCENE, faster)
     assert got[8] == pytest.approx(added / kinetic.max(), rel=1e-9), f"{got[8]} of {added} J"
     assert np.delete(got, 8).max() < 1e-14, got

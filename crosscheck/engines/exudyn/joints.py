@@ -42,6 +42,7 @@ JOINTS = {
     "translational": Item("ObjectJointPrismaticX", along=X, torques=ALL),
     "cylindrical": Item("ObjectJointGeneric", (1, 1, 0, 1, 1, 0), torques=ACROSS),
     "planar": Item("ObjectJointGeneric", (0, 0, 1, 1, 1, 0), torques=ACROSS),
+    "inline": Item("ObjectJointGeneric", (1, 1, 0, 0, 0, 0), torques=(None, None, None)),
     "distance": Item("ObjectConnectorDistance", outputs={"Force": 1}),
 }
 SUPPORTS = Supports(

@@ -36,6 +36,7 @@ SUPPORTS = Supports(
         "translational",
         "cylindrical",
         "planar",
+        "inline",
         "distance",
     ),
     drivers=("angle", "displacement"),

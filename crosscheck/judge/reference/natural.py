@@ -29,7 +29,7 @@ PERPENDICULAR = {
     "planar": ((1, 2), (0, 2)),
 }
 """Axes of the joint's frame on the first and on the second body that stay perpendicular, by type."""
-SLIDING = {"translational": (0, 1), "cylindrical": (0, 1), "planar": (2,)}
+SLIDING = {"translational": (0, 1), "cylindrical": (0, 1), "planar": (2,), "inline": (0, 1)}
 """Axes of the first body's frame along which the anchors do not part; all three of the world's elsewhere."""
 EYE = np.eye(3)
 Sampled = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]

@@ -17,7 +17,7 @@ from crosscheck.judge.reference.tree_joints import Placed, Tree, joint_frame
 from crosscheck.judge.reference.vectors import apply, cross, dot, unit
 
 Carried = tuple[np.ndarray, np.ndarray, np.ndarray]  # value, rate and drift (K, m, 3)
-SLIDING = {"translational": (0, 1), "cylindrical": (0, 1), "planar": (2,)}
+SLIDING = {"translational": (0, 1), "cylindrical": (0, 1), "planar": (2,), "inline": (0, 1)}
 """Numbers of the directions (two normal to the axis, the axis) that nothing may slide along; else all."""
 ALL, TILTS = ((1, 2), (0, 2), (0, 1)), ((2, 0), (2, 1))
 LOCKED = {"fixed": ALL, "translational": ALL, "revolute": TILTS, "cylindrical": TILTS, "planar": TILTS}

@@ -185,7 +185,7 @@ def spanning_tree(scene: Scene) -> list[Link]:
 
     group = [*range(len(scene.body)), -1]
     kept = []
-    for joint in sorted((j for j in scene.joint if j.type != "distance"), key=weight, reverse=True):
+    for joint in sorted((j for j in scene.joint if j.type in RIGIDITY), key=weight, reverse=True):
         a, b = (group[scene.body_index(name)] for name in joint.bodies)
         if a != b:
             kept.append(joint)

@@ -7,6 +7,7 @@ from mbref.equations.joints import (
     cylindrical,
     distance,
     fixed,
+    inline,
     planar,
     revolute,
     spherical,
@@ -24,6 +25,7 @@ JOINTS: dict[str, Callable[[Any], list[Primitive]]] = {
     "translational": translational.primitives,
     "cylindrical": cylindrical.primitives,
     "planar": planar.primitives,
+    "inline": inline.primitives,
     "distance": distance.primitives,
 }
 

@@ -1,0 +1,105 @@
+"""Inline joints, a point on a line: closed form, judge, reference, engines, and the cure of two hinges."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mbref
+from crosscheck.engine import engine
+from crosscheck.judge.metrics import measure
+from crosscheck.judge.reference.arithmetic import EXTENDED, doubles
+from crosscheck.judge.reference.taylor import natural_motion
+from crosscheck.judge.reference.tree import tree_motion
+from crosscheck.judge.truth import truth_for
+from mbref.scene import Scene
+
+TIMES = np.array([0.0, 0.2, 0.5])
+BEAD = {"name": "bead", "mass": 1.3, "inertia": [0.02, 0.03, 0.04], "position": [0.1, 0.0, 0.2]}
+WIRE = (0.6, 0.0, -0.8)
+
+
+def bead(bodies: tuple[str, str], **more) -> Scene:
+    """A body whose point slides down a wire; the wire on the ground, or the point on it."""
+    joint = {"name": "J", "type": "inline", "bodies": bodies, "anchor": [0.3, 0.1, 0.0], "axis": WIRE}
+    return Scene(name="bead", gravity=(0.0, 0.0, -9.81), body=[{**BEAD, **more}], joint=[joint])
+
+
+def two_hinges(second: str) -> Scene:
+    """A shaft in two bearings."""
+    shaft = {"name": "shaft", "mass": 2.0, "inertia": [0.1, 0.12, 0.02], "position": [0.05, 0.0, 0.4],
+             "angular_velocity": [0.0, 0.0, 5.0]}  # fmt: skip
+    bearings = [
+        {"name": name, "type": kind, "bodies": ["ground", "shaft"], "anchor": [0.0, 0.0, z],
+         "axis": [0.0, 0.0, 1.0]}
+        for name, kind, z in (("A", "revolute", 0.0), ("B", second, 1.0))
+    ]  # fmt: skip
+    return Scene(name="shaft", gravity=(-9.81, 0.0, 0.0), body=[shaft], joint=bearings)
+
+
+SCENES = {
+    "wire on the ground": bead(("ground", "bead")),
+    "wire on the body": bead(("bead", "ground"), angular_velocity=[0.5, 1.0, -2.0]),
+    "beside a spherical joint": two_hinges("inline").with_(
+        joint=[
+            {"name": "A", "type": "spherical", "bodies": ["ground", "shaft"], "anchor": [0.0, 0.0, 0.0]},
+            *two_hinges("inline").joint[1:],
+        ]
+    ),
+}
+each = pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+
+
+def test_a_point_mass_slides_as_on_an_incline():
+    """The anchor at the centre of mass: the point falls with g sin of the slope."""
+    scene = bead(("ground", "bead"), position=[0.3, 0.1, 0.0])
+    motion = mbref.simulate(scene, times=TIMES)
+    way = 9.81 * 0.8 * TIMES**2 / 2
+    assert np.abs(motion.position[:, 0] - [0.3, 0.1, 0.0] - way[:, None] * np.array(WIRE)).max() < 1e-13
+    assert motion.joint("J").displacement == pytest.approx(way, abs=1e-13)
+
+
+@each
+def test_both_formulations_of_the_reference_agree(scene):
+    a, b = (motion(scene, TIMES, EXTENDED, seconds=60.0) for motion in (natural_motion, tree_motion))
+    assert not a.reason and not b.reason
+    for field in ("position", "acceleration", "angular_acceleration"):
+        assert np.abs(doubles(getattr(a, field) - getattr(b, field))).max() < 1e-13, field
+
+
+@each
+@pytest.mark.parametrize("method", ["taylor", "alf-dual+projection/dop853"])
+def test_mbref_moves_as_the_reference(scene, method):
+    motion = mbref.simulate(scene, method=method, times=TIMES, rtol=1e-12)
+    found = measure(scene, motion, truth_for(scene))
+    assert max(found[k] for k in ("error", "reaction_error", "violation_acceleration")) < 1e-10, found
+
+
+@each
+def test_mujoco_moves_as_the_reference(scene):
+    found = engine("mujoco")
+    run = found.run(scene, TIMES, found.settings_of(scene, "projected")[-1])
+    errors = measure(scene, run, truth_for(scene))
+    assert errors["error"] < 1e-8 and errors["violation_position"] < 1e-10, errors
+
+
+@each
+def test_exudyn_moves_as_the_reference(scene):
+    found = engine("exudyn")
+    assert found.cannot(scene) is None
+    errors = measure(scene, found.run(scene, TIMES, found.best_settings(scene)[-1]), truth_for(scene))
+    assert errors["error"] < 1e-6, errors
+
+
+@pytest.mark.parametrize("name", ["pinocchio", "simbody", "ondsel", "sundials"])
+def test_other_engines_refuse(name):
+    refusal = engine(name).cannot(SCENES["wire on the ground"])
+    assert refusal is not None and "inline" in refusal.reason
+
+
+def test_an_inline_joint_cures_two_hinges():
+    assert mbref.diagnose(two_hinges("revolute")).counts.redundant == 5
+    cured = mbref.diagnose(two_hinges("inline")).counts
+    assert (cured.redundant, cured.degrees_of_freedom) == (2, 1)
+    ball = mbref.diagnose(SCENES["beside a spherical joint"]).counts
+    assert (ball.redundant, ball.degrees_of_freedom) == (0, 1)
