@@ -64,7 +64,7 @@ def conjugate(p: np.ndarray) -> np.ndarray:
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Vector products (…, 3); for few vectors several times faster than NumPy's."""
-    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    product = np.empty(np.broadcast_shapes(a.shape, b.shape), np.result_type(a, b, float))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         product[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]

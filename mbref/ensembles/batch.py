@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -98,8 +97,9 @@ class Batch:
         self._rank = self._begin()
         count, memory = len(candidates.q), run.memory
         self._crossings: dict[int, Sequence[Crossing]] = {}
-        parameters = candidates.parameters(run, memory), run.stepper.parameters(candidates.packs.length)
-        self._parameters = Parameters([*parameters[0], *parameters[1]], SavedNumbers(run.stepper.memory))
+        of_stepper, self._fit = run.stepper.parameters(candidates.packs, candidates.q, candidates.fit)
+        parameters = [*candidates.parameters(run, memory), *of_stepper]
+        self._parameters = Parameters(parameters, SavedNumbers(run.stepper.memory))
         self._samples = [np.empty((count, *each.shape)) for each in memory.loop.samples]
         self._counts = np.empty((count, len(Counts._fields)), dtype=np.int64)
         self._seconds = np.zeros(count)
@@ -125,11 +125,10 @@ class Batch:
     def run(self) -> list[int]:
         """Run the scenes that fit; the places of those that completed in one call."""
         run, stepper, completed = self._run, self._run.stepper, []
-        for k in self._candidates.fit:
+        for k in self._fit:
             self._parameters.write(k)
             run.crossings = []
-            if not stepper.takes(partial(self._candidates.model, k), self._candidates.starts[k]):
-                continue
+            stepper.enter()
             if run.memory.watch.generic_rank != self._rank:
                 continue
             status, self._seconds[k] = stepper.advance_once()

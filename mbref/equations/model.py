@@ -175,6 +175,11 @@ class Model:
         """Index of a body, ``nb`` for the fixed frame."""
         return self._packs.index[name]
 
+    @property
+    def to_local(self) -> np.ndarray:
+        """Rotations (nb + 1, 3, 3) from the world at t = 0 to the principal frames of the bodies."""
+        return self._packs.to_local[self._place]
+
     def direction(self, name: str, vector: Sequence[float]) -> np.ndarray:
         """A world vector (3,) at t = 0 in the principal frame of a body."""
         at = np.array([self.index(name)]), np.array([vector], dtype=float)

@@ -57,7 +57,8 @@ class Packs:
     For s scenes of nb bodies: ``mass`` (s, 6 nb), the diagonal of M, and ``inverse_root``, M^(-1/2), 1 where
     the mass is zero; ``principal`` and ``orientation`` (s, nb, 4) of principal frames, from the body's own
     and from the world; ``length`` (s,), the largest distance between two centres of mass and joint anchors at
-    t = 0 (m).  ``listed`` has the bodies of each scene, ``joints`` its joints.
+    t = 0 (m).  ``to_local`` (s, nb + 1, 3, 3) turns world vectors at t = 0 to the principal frames.
+    ``listed`` has the bodies of each scene, ``joints`` its joints.
     """
 
     def __init__(self, scenes: Sequence[Scene]):
@@ -177,7 +178,7 @@ class Packs:
         self.principal = _quaternions(axes).reshape(len(self.scenes), self.nb, 4)
         if self.turns_frames:
             frames[:, :-1] = rotations.multiply(frames[:, :-1], self.principal)
-        self._to_local = np.ascontiguousarray(rotations.to_matrix(frames).swapaxes(-1, -2))
+        self.to_local = np.ascontiguousarray(rotations.to_matrix(frames).swapaxes(-1, -2))
         self._centres, self.orientation = numbers[..., :3], frames[:, :-1]
         self.mass = numbers[:, :-1].take(OF_MASS, axis=-1).reshape(len(self.scenes), 6 * self.nb)
         self.inverse_root = inverse_root(self.mass)
@@ -233,7 +234,7 @@ class Packs:
 
     def directions(self, bodies: np.ndarray, vectors: np.ndarray) -> np.ndarray:
         """World vectors (…, k, 3) at t = 0, each in the principal frame (s, k, 3) of a body of index (k,)."""
-        return (self._to_local[:, bodies] @ vectors[..., None])[..., 0]
+        return (self.to_local[:, bodies] @ vectors[..., None])[..., 0]
 
     def points(self, bodies: np.ndarray, points: np.ndarray) -> np.ndarray:
         """World points (…, k, 3) at t = 0, each in the principal frame (s, k, 3) of a body of index (k,)."""

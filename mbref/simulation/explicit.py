@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from mbref.equations.initial_state import Start
-from mbref.equations.model import Model
+from mbref.equations.packing import Packs
 from mbref.kernels.layout import SINGULAR_AHEAD, Memory
 from mbref.simulation.control import STEPS_PER_CALL
 from mbref.simulation.pace import Pace
@@ -62,14 +61,11 @@ class ExplicitStepper:
     def begin_again(self) -> None:
         """Do nothing: the stepper has no memory of its own."""
 
-    def parameters(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
-        """Return no numbers: the stepper has no memory of its own."""
-        return []
-
-    def takes(self, model: Callable[[], Model], start: Start) -> bool:
-        """Enter the state in memory: there is room for every scene whose numbers it holds."""
-        self.enter()
-        return True
+    def parameters(
+        self, packs: Packs, q: np.ndarray, places: Sequence[int]
+    ) -> tuple[list[tuple[Any, ...]], list[int]]:
+        """Return no numbers, because the stepper has no memory of its own, and all places."""
+        return [], [*places]
 
     def advance_once(self) -> tuple[int, float]:
         """Advance by one call of kernels: the status, and the process CPU time of the stepping alone (s)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
@@ -13,6 +13,7 @@ from mbref.equations.branches import Passed
 from mbref.equations.degrees_of_freedom import freedoms_left
 from mbref.equations.initial_state import Start, consistent_start
 from mbref.equations.model import Model
+from mbref.equations.packing import Packs
 from mbref.equations.reduction import Reduction, reduction_of
 from mbref.equations.static_constraints import at_rest
 from mbref.kernels.layout import (
@@ -67,12 +68,12 @@ class Stepper(Protocol):
     def begin_again(self) -> None:
         """Reset memory of the stepper to the start of the run."""
 
-    def parameters(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
-        """Return (target array, values per scene) for numbers of the stepper that differ between scenes of
-        ``lengths`` (s,)."""
-
-    def takes(self, model: Callable[[], Model], start: Start) -> bool:
-        """Whether memory has room for a scene whose numbers it holds: then it is ready to be advanced."""
+    def parameters(
+        self, packs: Packs, q: np.ndarray, places: Sequence[int]
+    ) -> tuple[list[tuple[Any, ...]], list[int]]:
+        """Return (target array, values per scene) for numbers of the stepper that differ between the scenes
+        of ``packs``, with coordinates q (s, 7 nb) at the start; and those of the places whose scenes have
+        room in memory."""
 
     def advance_once(self) -> tuple[int, float]:
         """Advance by one call of kernels: the status, and the process CPU time of the stepping alone (s)."""

@@ -44,7 +44,7 @@ class DirectionVectors:
         """Return the forms of some variables, by which kernels evaluate them from states."""
         chosen = list(wanted)
         body, driver = (np.array(each, np.int64)[chosen] for each in (self._bodies, self._turned_by))
-        forms = (np.array(each, float).reshape(-1, 12)[chosen] for each in (self._along, self._across))
+        forms = (np.array(each).reshape(-1, 12)[chosen] for each in (self._along, self._across))
         unit = np.repeat([1.0 / self.length, 1.0], [3, 9])
         return PoseMaps(body, driver, *(each * unit for each in forms))
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import TypeVar
 
+from mbref.taylor.numbers import largest, of_first
+
 Key = TypeVar("Key", bound=Hashable)
 Expression = dict[int, float]
 Polynomial = dict[tuple[int, int], float]
@@ -30,7 +32,7 @@ def combination(*terms: tuple[float, Expression]) -> Expression:
 
 def cleaned(expression: dict) -> dict:
     """Return an expression without coefficients of round-off size."""
-    small = ROUNDING * max(map(abs, expression.values()), default=0.0)
+    small = ROUNDING * largest(expression.values())
     return {key: value for key, value in expression.items() if abs(value) > small}
 
 
@@ -57,8 +59,8 @@ def plus(polynomial: Polynomial, factor: float, expression: Expression) -> Polyn
 def significant(equation: dict[Key, float], constant: Key) -> dict[Key, float]:
     """Return a polynomial without coefficients of round-off size; its constant alone where all others
     vanish."""
-    largest = max((abs(c) for key, c in equation.items() if key != constant), default=0.0)
-    small = ROUNDING if largest > VANISHING else VANISHING
+    size = largest(c for key, c in equation.items() if key != constant)
+    small = ROUNDING if size > VANISHING else VANISHING
     return {key: c for key, c in equation.items() if abs(c) > small or key == constant}
 
 
@@ -127,13 +129,13 @@ def independent(polynomials: Sequence[Polynomial]) -> list[Polynomial]:
     reduced: dict[tuple[int, int], Polynomial] = {}  # by the monomial that none of the others has
     kept = []
     for polynomial in sorted(polynomials, key=len):
-        size = max(map(abs, polynomial.values()), default=0.0)
+        size = largest(polynomial.values())
         rest = dict(polynomial)
         for monomial, other in reduced.items():
             if monomial in rest:
                 _subtract(rest, rest[monomial], other)
         rest = {k: v for k, v in rest.items() if abs(v) > DEPENDENT * size}
-        lead = max((k for k in rest if k != (ONE, ONE)), key=lambda k: abs(rest[k]), default=None)
+        lead = max((k for k in rest if k != (ONE, ONE)), key=lambda k: abs(of_first(rest[k])), default=None)
         if lead is None:
             continue
         rest = {k: v / rest[lead] for k, v in rest.items()}

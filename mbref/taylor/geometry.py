@@ -11,7 +11,8 @@ import numpy as np
 
 from mbref.equations.initial_state import Start
 from mbref.equations.model import Model
-from mbref.taylor.natural import NaturalCoordinates
+from mbref.taylor.natural import NaturalCoordinates, pose_of
+from mbref.taylor.numbers import OneScene
 from mbref.taylor.polynomials import Geometry
 
 MOST_KEPT = 64  # geometries
@@ -29,7 +30,8 @@ def geometry_of(model: Model, start: Start, moving: np.ndarray, driven: bool) ->
     if found is None:
         if len(_known) >= MOST_KEPT:
             _known.pop(next(iter(_known)), None)
-        found = _known[key] = Geometry(NaturalCoordinates(model, start, moving, driven))
+        pose = pose_of(start.q)
+        found = _known[key] = Geometry(NaturalCoordinates(model, pose, moving, driven, OneScene()))
     return found
 
 

@@ -11,11 +11,11 @@ variables.  Linear equations eliminate variables (see ``expressions``).
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from mbref import rotations
-from mbref.equations.initial_state import Start
 from mbref.equations.model import Model
 from mbref.kernels.scene_layout import ANGLE, DISTANCE, DOT1, DOT2, POINT, SLIDE
 from mbref.taylor.direction_vectors import DirectionVectors, direction_forms
@@ -33,6 +33,7 @@ from mbref.taylor.expressions import (
     significant,
 )
 from mbref.taylor.loads import COSINE, SINE, VALUE
+from mbref.taylor.numbers import Batch, OneScene, largest, scalar
 from mbref.taylor.orientations import Orientations, Triple
 
 MOST_TERMS = 40  # of an equation that eliminates a position
@@ -40,8 +41,26 @@ MOST_FACTORS = 1  # further variables of an equation that eliminates a direction
 MOST_KINEMATIC = 4  # the same, where the equations serve kinematics alone
 
 
+class Pose(NamedTuple):
+    """Centres of mass (nb, 3) in m and principal frames (nb, 3, 3) of the bodies at the start."""
+
+    centres: np.ndarray
+    axes: np.ndarray
+
+
+def pose_of(q: np.ndarray) -> Pose:
+    """Return the pose of coordinates (…, 7 nb)."""
+    poses = q.reshape(*q.shape[:-1], -1, 7)
+    return Pose(poses[..., :3], rotations.to_matrix(poses[..., 3:]))
+
+
+def unit_of_length(length: float) -> float:
+    """Return the power of two next to a length (m)."""
+    return float(2.0 ** round(np.log2(length)))
+
+
 class NaturalCoordinates:
-    """The variables of a model from a start, lengths in the unit ``length`` (m), and the rows between them.
+    """The variables of a model from its pose at the start, lengths in the unit ``length`` (m), and rows.
 
     ``moving`` (n,) says which velocities can be other than zero.  ``kept`` are the variables left, ``given``
     those that drivers prescribe: (driver, VALUE, COSINE or SINE) each.  ``angles`` belong to rows of
@@ -49,12 +68,10 @@ class NaturalCoordinates:
     needed: equations eliminate more, and driven cranks have linear rows.
     """
 
-    def __init__(self, model: Model, start: Start, moving: np.ndarray, driven: bool = False):
-        self.model, self.nb, self.driven = model, model.nb, driven
-        self.length = 2.0 ** round(np.log2(model.length))
-        poses = start.q.reshape(-1, 7)
-        self.place = poses[:, :3] / self.length
-        axes = rotations.to_matrix(poses[:, 3:])
+    def __init__(self, model: Model, pose: Pose, moving: np.ndarray, driven: bool, numbers: OneScene | Batch):
+        self.model, self.nb, self.driven, self.numbers = model, model.nb, driven, numbers
+        self.length = unit_of_length(model.length)
+        self.place, axes = pose.centres / self.length, pose.axes
         self._moving = moving.reshape(-1, 6)
         self.direction_vectors = DirectionVectors(self.length)
         self.given: dict[int, tuple[int, int]] = {}
@@ -137,16 +154,16 @@ class NaturalCoordinates:
         primitives, found = self.model.data.primitives, []
         for second in np.flatnonzero(primitives.begins == 0).tolist():
             pair, polynomial = (second - 1, second), Polynomial()
-            factors = [float(primitives.length[p]) * self._unit(p) for p in pair]
-            largest = max(map(abs, factors))
+            factors = [scalar(primitives.length[p]) * self._unit(p) for p in pair]
+            size = largest(factors)
             angles = []
             for p, factor in zip(pair, factors, strict=True):
                 if primitives.kind[p] == ANGLE:
-                    angles.append((p, factor / largest))
+                    angles.append((p, factor / size))
                 else:
                     axis = self.direction(int(primitives.first[p]), primitives.direction_first[p])
                     apart = _difference(*self._ends(p)[::-1])
-                    moved = product_sum(zip(axis, apart, strict=True), factor / largest)
+                    moved = product_sum(zip(axis, apart, strict=True), factor / size)
                     polynomial = {
                         k: polynomial.get(k, 0.0) + moved.get(k, 0.0) for k in {**polynomial, **moved}
                     }
@@ -164,7 +181,7 @@ class NaturalCoordinates:
     def _linear_equations(self) -> Iterator[Expression]:
         """Yield expressions that are zero: static positions, axes that joints share, coincident points."""
         for b, c in zip(*np.nonzero(~self._moving[:, :3]), strict=True):
-            yield {self.centres[b][c]: 1.0, ONE: -float(self.place[b, c])}
+            yield {self.centres[b][c]: 1.0, ONE: -scalar(self.place[b, c])}
         numbered = self.orientations.numbered
         pairs = [(numbered[one].direction_vector(a), numbered[other].direction_vector(b))
                  for (one, a), (other, b) in self.orientations.shared_axes()]  # fmt: skip
@@ -182,7 +199,7 @@ class NaturalCoordinates:
     def _undriven(self, p: int) -> Polynomial:
         table = self.model.data.primitives
         if table.kind[p] == DISTANCE:
-            apart, length = _difference(*self._ends(p)), float(table.length[p]) / self.length
+            apart, length = _difference(*self._ends(p)), scalar(table.length[p]) / self.length
             pairs = [*zip(apart, apart, strict=True), ({ONE: length}, {ONE: -length})]
             return product_sum(pairs, 0.5 / length)
         first = self.direction(int(table.first[p]), table.direction_first[p])

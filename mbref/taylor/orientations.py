@@ -13,6 +13,7 @@ from mbref import rotations
 from mbref.equations.model import Model
 from mbref.taylor.direction_vectors import DirectionVectors, direction_forms
 from mbref.taylor.expressions import ONE, ROUNDING, Expression, Polynomial, cleaned, product_sum
+from mbref.taylor.numbers import dot, norm, scalar
 
 PARALLEL = 1e-9  # sine of an angle between the direction_vectors of one axis
 APART = 0.2  # sine of the least angle between two directions of a basis
@@ -35,15 +36,17 @@ class Orientation:
     frame: np.ndarray | None = None
 
     @functools.cached_property
-    def _inverse(self) -> np.ndarray:
-        """Return the inverse of the basis (3, 3)."""
-        return np.asarray(np.linalg.inv(self.basis))
+    def _dual(self) -> np.ndarray:
+        """Return the dual basis (3, 3): the components of a direction are its products with these rows."""
+        assert self.basis is not None
+        across = [rotations.cross(self.basis[k - 2], self.basis[k - 1]) for k in range(3)]
+        return np.array(across) / dot(self.basis[0], across[0])
 
     def direction_vector(self, w: np.ndarray) -> Triple:
         """Return R w of a direction w (3,) that is fixed in the bodies."""
         if self.basis is None:
             return tuple({ONE: c} if c else {} for c in w.tolist())
-        a, b, c = (w @ self._inverse).tolist()
+        a, b, c = dot(self._dual, w).tolist()
         if self.frame is None:
             x, y, z = self.variables[:3], self.variables[3:6], self.variables[6:]
             direction_vectors = ({i: a, j: b, k: c} for i, j, k in zip(x, y, z, strict=True))
@@ -63,7 +66,7 @@ class Orientation:
         elif self.basis is not None:
             direction_vectors = [self.direction_vector(b) for b in self.basis]
             for i, j in itertools.combinations_with_replacement(range(3), 2):
-                square = {ONE: -float(self.basis[i] @ self.basis[j])}
+                square = {ONE: -scalar(dot(self.basis[i], self.basis[j]))}
                 pairs = [*zip(direction_vectors[i], direction_vectors[j], strict=True), (square, {ONE: 1.0})]
                 yield product_sum(pairs, 0.5 if i == j else 1.0)
 
@@ -96,7 +99,7 @@ class Orientations:
 
     def world(self, body: int, local: np.ndarray) -> np.ndarray:
         """Return a direction (3,) in the principal frame of a body in world axes at the start."""
-        return self._axes[body] @ local if body < self.nb else np.asarray(local)
+        return dot(self._axes[body], local) if body < self.nb else np.asarray(local)
 
     def _groups(self) -> list[int]:
         """Return the number of the orientation of each body; -1 for those oriented with the fixed frame."""
@@ -150,14 +153,19 @@ class Orientations:
         return self.group[body] if body < self.nb else -1
 
     def _axis(self, name: str, axis: Sequence[float]) -> np.ndarray:
-        world = self.world(self.model.index(name), self.model.direction(name, axis))
-        return np.asarray(world / np.linalg.norm(world))
+        world = self._world_of(name, np.asarray(axis))
+        return np.asarray(world / norm(world))
+
+    def _world_of(self, name: str, vector: np.ndarray) -> np.ndarray:
+        """Return a direction that moves with a body, given in the scene's world axes, at the start."""
+        body = self.model.index(name)
+        return self.world(body, dot(self.model.to_local[body], vector))
 
     def _turning(self, group: int, axis: np.ndarray) -> Orientation:
         frame = self._frame(axis)
-        across = (d - axis * (axis @ d) for d in self._directions(group))
-        arm = next(d for d in across if np.linalg.norm(d) > APART)
-        arm = arm / np.linalg.norm(arm)
+        across = (d - axis * dot(axis, d) for d in self._directions(group))
+        arm = next(d for d in across if norm(d) > APART)
+        arm = arm / norm(arm)
         return Orientation(
             self._variables(group, frame[:2], [arm]), np.array([arm, rotations.cross(axis, arm), axis]), frame
         )
@@ -167,9 +175,9 @@ class Orientations:
         along."""
         slides = [j for j in self.model.joints if len(j.facts.forbidden_translations) == 2]
         along = [self._axis(j.bodies[0], j.directions[0]) for j in slides]
-        first = next((x for x in along if abs(x @ axis) < PARALLEL), np.eye(3)[np.argmin(np.abs(axis))])
-        first = first - axis * (axis @ first)
-        first = first / np.linalg.norm(first)
+        first = next((x for x in along if abs(dot(x, axis)) < PARALLEL), np.eye(3)[np.argmin(np.abs(axis))])
+        first = first - axis * dot(axis, first)
+        first = first / norm(first)
         return np.array([first, rotations.cross(axis, first), axis])
 
     def _free(self, group: int) -> Orientation:
@@ -179,7 +187,7 @@ class Orientations:
     def _variables(self, group: int, axes: np.ndarray, directions: Sequence[np.ndarray]) -> tuple[int, ...]:
         """Add components along axes at rest (k, 3) of directions that move with an orientation."""
         body = self.group.index(group)
-        forms = [direction_forms(axes, self._axes[body].T @ w) for w in directions]
+        forms = [direction_forms(axes, dot(self._axes[body].T, w)) for w in directions]
         return self._direction_vectors.add(body, np.concatenate(forms))
 
     def _directions(self, group: int) -> Iterator[np.ndarray]:
@@ -199,14 +207,14 @@ class Orientations:
                 if n == name
             ]
             for one, other in itertools.combinations(anchors, 2):
-                arm = self.world(b, self.model.direction(name, np.subtract(other, one)))
-                if (length := np.linalg.norm(arm)) > ROUNDING:
+                arm = self._world_of(name, np.subtract(other, one))
+                if (length := norm(arm)) > ROUNDING:
                     yield arm / length
             yield from self._axes[b].T
 
 
 def _are_parallel(one: np.ndarray, other: np.ndarray) -> bool:
-    return bool(np.linalg.norm(rotations.cross(one, other)) < PARALLEL)
+    return bool(norm(rotations.cross(one, other)) < PARALLEL)
 
 
 def _keep(known: dict[int, list[np.ndarray]], group: int, axis: np.ndarray) -> bool:
@@ -222,9 +230,9 @@ def _basis(directions: Iterable[np.ndarray]) -> np.ndarray:
     """Return the first two directions that are well apart and the one across both, unit vectors, in rows."""
     chosen: list[np.ndarray] = []
     for unit in directions:
-        if not chosen or np.linalg.norm(rotations.cross(chosen[0], unit)) > APART:
+        if not chosen or norm(rotations.cross(chosen[0], unit)) > APART:
             chosen.append(unit)
         if len(chosen) == 2:
             break
     across = rotations.cross(*chosen)
-    return np.array([*chosen, across / np.linalg.norm(across)])
+    return np.array([*chosen, across / norm(across)])

@@ -10,11 +10,12 @@ import numpy as np
 
 from mbref import rotations
 from mbref.equations.model import Model
-from mbref.kernels.scene_layout import FORCE, MOMENT, SPRING, TORSION_SPRING, Bodies, Loads
+from mbref.kernels.scene_layout import FORCE, MOMENT, SPRING, TORSION_SPRING, Bodies, Loads, SceneData
 from mbref.taylor.expressions import ONE, Expression, cleaned
 from mbref.taylor.layout import Given, Inertia, Polynomials, Poses, Products, Rows, Springs, Torsions
 from mbref.taylor.loads import VALUE
 from mbref.taylor.natural import NaturalCoordinates
+from mbref.taylor.numbers import array_of
 from mbref.taylor.orientations import Triple
 from mbref.taylor.simd import WIDTH, padded_size
 
@@ -66,7 +67,9 @@ class Forms:
 
     def __call__(self, expressions: Sequence[Expression]) -> tuple[np.ndarray, np.ndarray]:
         """Return constants (k,) and coefficients (k, d)."""
-        constant, matrix = np.zeros(len(expressions)), np.zeros((len(expressions), self.d))
+        number_type = self.of.numbers.number_type
+        constant = np.full(len(expressions), 0.0, number_type)
+        matrix = np.full((len(expressions), self.d), 0.0, number_type)
         for row, expression in enumerate(expressions):
             for variable, coefficient in self.of.eliminate(expression).items():
                 if variable == ONE:
@@ -85,18 +88,23 @@ class Forms:
             self._axes[body] = [self.of.direction(body, axis) for axis in np.eye(3)]
         return self._axes[body]
 
+    def spread(self, array: np.ndarray) -> np.ndarray:
+        """Return the values of numbers, behind an axis that counts the scenes of a batch."""
+        return self.of.numbers.spread(array)
+
     @cached_property
     def centres(self) -> np.ndarray:
-        """Return coefficients (nb, 3, d) of the bodies' centres of mass."""
+        """Return coefficients (…, nb, 3, d) of the bodies' centres of mass."""
         found = [self.variables(centre)[1] for centre in self.of.centres]
-        return np.array(found).reshape(self.of.nb, 3, self.d)
+        return self.spread(np.array(found).reshape(self.of.nb, 3, self.d))
 
     @cached_property
     def _of_inertia(self) -> np.ndarray:
-        """Return the parts (4 nb, d, d) of M that a body's mass, and ∫ x² dm of its principal axes, have."""
-        direction_vectors = [self.of_axes(b)[1].reshape(3, 3, self.d) for b in range(self.of.nb)]
-        forms = [form for b, axes in enumerate(direction_vectors) for form in (self.centres[b], *axes)]
-        return np.array([form.T @ form for form in forms]).reshape(4 * self.of.nb, self.d, self.d)
+        """Return the parts (…, 4 nb, d, d) of M of each body: of its mass, and of ∫ x² dm of its axes."""
+        nb, d = self.of.nb, self.d
+        axes = self.spread(np.array([self.of_axes(b)[1] for b in range(nb)]).reshape(nb, 3, 3, d))
+        forms = np.concatenate([self.centres[..., None, :, :], axes], axis=-3)
+        return _sum_of_products(forms.reshape(*forms.shape[:-4], 4 * nb, 3, d))
 
     def of_axes(self, body: int) -> tuple[np.ndarray, np.ndarray]:
         """Return constants (9,) and coefficients (9, d) of the directions of a body's principal axes."""
@@ -107,15 +115,23 @@ class Forms:
         return self._of_axes[body]
 
     def mass(self, bodies: Bodies) -> np.ndarray:
-        """Return M (d, d), with ½ ż M ż the kinetic energy in the unit of length squared."""
+        """Return M (…, d, d), with ½ ż M ż the kinetic energy in the unit of length squared."""
         principal = bodies.inertia / self.of.length**2
-        along = principal.sum(axis=1, keepdims=True) / 2 - principal
-        weights = np.concatenate([bodies.mass[:, None], along], axis=1).reshape(-1, 1, 1)
-        return np.asarray((weights * self._of_inertia).sum(axis=0))
+        along = principal.sum(axis=-1, keepdims=True) / 2 - principal
+        weights = np.concatenate([bodies.mass[..., None], along], axis=-1)
+        weights = weights.reshape(*bodies.mass.shape[:-1], -1, 1, 1)
+        return np.asarray((weights * self._of_inertia).sum(axis=-3))
+
+
+def _sum_of_products(one: np.ndarray, other: np.ndarray | None = None) -> np.ndarray:
+    """Return Σ_k one[k, i] other[k, j] (…, d, e) of arrays (…, 3, d) and (…, 3, e)."""
+    other = one if other is None else other
+    first, second, third = (one[..., k, :, None] * other[..., k, None, :] for k in range(3))
+    return np.asarray(first + second + third)
 
 
 def _rows(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Rows:
-    constant, linear, twofold = np.zeros(lanes), [], []
+    constant, linear, twofold = np.full(lanes, 0.0, of.numbers.number_type), [], []
     for r, row in enumerate(of.rows):
         for (i, j), coefficient in row.items():
             if j == ONE:
@@ -130,7 +146,8 @@ def _rows(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Rows:
 def _tableau(rows: Rows, nz: int, nr: int, lanes: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the constant part of the tableau (nr + 1, lanes) of the rows, and the places of products in
     it."""
-    linear, of_variables = np.zeros((nr + 1, lanes)), rows.linear_lane < nz
+    linear = np.full((nr + 1, lanes), 0.0, rows.constant.dtype)
+    of_variables = rows.linear_lane < nz
     places = rows.linear_row[of_variables], rows.linear_lane[of_variables]
     np.add.at(linear, places, rows.linear_weight[of_variables])
     linear[np.arange(nr), nz + np.arange(nr)] = 1.0
@@ -139,9 +156,8 @@ def _tableau(rows: Rows, nz: int, nr: int, lanes: int) -> tuple[np.ndarray, np.n
 
 def _columns(entries: Sequence[tuple[float, ...]], indices: int) -> list[np.ndarray]:
     """Return columns of a table, the first ones of indices and the last of numbers."""
-    table = np.array(entries, dtype=float).reshape(len(entries), indices + 1)
-    columns = [np.ascontiguousarray(column) for column in table.T]
-    return [column.astype(np.int64) for column in columns[:-1]] + columns[-1:]
+    columns = list(zip(*entries, strict=True)) if entries else [()] * (indices + 1)
+    return [*(np.array(column, np.int64) for column in columns[:-1]), array_of(columns[-1])]
 
 
 def _products(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Products:
@@ -179,39 +195,53 @@ def _slots(terms: Sequence[Sequence[tuple]], nothing: tuple) -> tuple[list[tuple
 
 def _inertia(model: Model, forms: Forms, lanes: int) -> Inertia:
     """Return the mass matrix; gravity, forces and moments that are constant."""
-    of, loads = forms.of, model.data.loads
-    weight = model.data.bodies.mass[:, None] * (model.data.gravity / of.length)
-    force, linear = (weight[:, :, None] * forms.centres).sum(axis=(0, 1)), np.zeros((forms.d, forms.d))
-    places = [*enumerate(zip(loads.kind.tolist(), loads.first.tolist(), strict=True))]
-    for k, (kind, body) in places:
+    data, d = model.data, forms.d
+    scenes, pattern = data.bodies.mass.shape[:-1], forms.of.numbers.pattern
+    force, linear = _constant_forces(data, forms)
+    terms: list[list[tuple]] = [[] for _ in range(lanes)]
+    for i, j in zip(*(place.tolist() for place in np.nonzero(pattern(linear))), strict=True):
+        terms[i].append((j, i * d + j))
+    slots, start = _slots(terms, (0, d * d))
+    source, place = (np.array([slot[k] for slot in slots], np.int64) for k in range(2))
+    weights = np.concatenate([linear.reshape(*scenes, d * d), np.zeros((*scenes, 1))], axis=-1)
+    mass = np.zeros((*scenes, d, lanes))
+    mass[..., :d] = forms.mass(data.bodies)
+    coupling, coupled = map(np.ascontiguousarray, np.nonzero(pattern(mass)))
+    first = np.searchsorted(coupling, np.arange(d + 1))
+    force = np.concatenate([force, np.zeros((*scenes, lanes - d))], axis=-1)
+    return Inertia(mass, coupled, first, force, source, weights[..., place], start)
+
+
+def _constant_forces(data: SceneData, forms: Forms) -> tuple[np.ndarray, np.ndarray]:
+    """Return forces on the variables: constant ones (…, d), and the matrix (…, d, d) of linear ones."""
+    of, loads, d = forms.of, data.loads, forms.d
+    weight = data.bodies.mass[..., None] * (data.gravity / of.length)[..., None, :]
+    by_weight = weight[..., None] * forms.centres
+    force = by_weight.reshape(*by_weight.shape[:-3], 3 * of.nb, d).sum(axis=-2)
+    linear = np.zeros((*force.shape, d))
+    for k, (kind, body) in enumerate(zip(loads.kind.tolist(), loads.first.tolist(), strict=True)):
         if kind == FORCE and body < of.nb:
-            _, point = forms(of.point(body, loads.point_first[k]))
-            force += (loads.force[k] / of.length) @ point
-    for k, (kind, body) in places:
-        if kind == MOMENT:
-            constant, matrix = _moment(forms, body, loads.force[k] / of.length**2)
+            point = forms.spread(forms(of.point(body, loads.point_first[k]))[1])
+            force = (
+                force + _sum_of_products((loads.force[..., k, :] / of.length)[..., None], point)[..., 0, :]
+            )
+        elif kind == MOMENT:
+            constant, matrix = _moment(forms, body, loads.force[..., k, :] / of.length**2)
             force, linear = force + constant, linear + matrix
-    terms: list[list[tuple]] = [[] for _ in range(forms.d)]
-    for i, j in zip(*(place.tolist() for place in np.nonzero(linear)), strict=True):
-        terms[i].append((j, linear[i, j]))
-    slots, start = _slots([*terms, *[[]] * (lanes - len(terms))], (0, 0.0))
-    force = np.concatenate([force, np.zeros(lanes - forms.d)])
-    mass = np.zeros((forms.d, lanes))
-    mass[:, : forms.d] = forms.mass(model.data.bodies)
-    coupling, coupled = map(np.ascontiguousarray, np.nonzero(mass))
-    first = np.searchsorted(coupling, np.arange(forms.d + 1))
-    return Inertia(mass, coupled, first, force, *_columns(slots, 1), start)
+    return force, linear
 
 
 def _moment(forms: Forms, body: int, moment: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return constant (d,) and linear (d, d) force of a moment: ½ Σ (moment × R e) · δ(R e) over three
-    axes."""
-    constant, matrix = np.zeros(forms.d), np.zeros((forms.d, forms.d))
-    at_rest, all_moving = (each.reshape(3, 3, -1) for each in forms.of_axes(body))
-    vectors = np.concatenate([at_rest, all_moving], axis=2).swapaxes(1, 2)
-    for moving, turned in zip(all_moving, rotations.cross(moment, vectors), strict=True):
-        constant += 0.5 * turned[0] @ moving
-        matrix += 0.5 * moving.T @ turned[1:].T
+    """Return constant (…, d) and linear (…, d, d) force of a moment (…, 3): ½ Σ (moment × R e) · δ(R e) over
+    three axes."""
+    at_rest, moving = map(forms.spread, forms.of_axes(body))
+    constant, matrix = np.zeros(()), np.zeros(())
+    for k in range(0, 9, 3):
+        form = moving[..., k : k + 3, :]
+        turned = rotations.cross(moment, at_rest[..., k : k + 3])
+        turning = rotations.cross(moment[..., None, :], form.swapaxes(-1, -2)).swapaxes(-1, -2)
+        constant = constant + 0.5 * _sum_of_products(turned[..., None], form)[..., 0, :]
+        matrix = matrix + 0.5 * _sum_of_products(form, turning)
     return constant, matrix
 
 
@@ -286,9 +316,8 @@ def _torsions_of(rows: Sequence[tuple], d: int) -> Torsions:
 def _stacked(rows: Sequence[tuple], width: int, d: int, numbers: int = 3) -> list[np.ndarray]:
     """Return constants (k, width), forms (k width, d) and columns of numbers (k,)."""
     columns = [[row[i] for row in rows] for i in range(2 + numbers)]
-    constant, form = np.array(columns[0], dtype=float), np.array(columns[1], dtype=float)
     return [
-        constant.reshape(-1, width),
-        form.reshape(width * len(rows), d),
-        *(np.array(c, dtype=float) for c in columns[2:]),
+        np.array(columns[0]).reshape(-1, width),
+        np.array(columns[1]).reshape(width * len(rows), d),
+        *map(array_of, columns[2:]),
     ]

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import repeat
 from typing import Any
 
 import numpy as np
 
 from mbref.equations.branches import SMOOTH, Passed
-from mbref.equations.initial_state import Start
-from mbref.equations.model import Model
+from mbref.equations.packing import Packs
 from mbref.kernels.layout import OK, SINGULAR_AHEAD
 from mbref.kernels.machine_code import NoGeneratedCode
 from mbref.kernels.memory_pool import release
@@ -22,6 +21,7 @@ from mbref.simulation.run import Run
 from mbref.simulation.singular_start import fits_no_branch, leaving
 from mbref.simulation.stepping import DONE, PAUSED, UNDECIDED
 from mbref.taylor.advance import advance_series, enter_series
+from mbref.taylor.batch_equations import equations_of_all
 from mbref.taylor.crossing.departure import Departure
 from mbref.taylor.crossing.long_crossing import (
     begin_crossing,
@@ -39,12 +39,11 @@ from mbref.taylor.driven import (
     follow_drivers,
 )
 from mbref.taylor.geometry import geometry_of
-from mbref.taylor.layout import Options, Polynomials, TaylorMemory
+from mbref.taylor.layout import Options, TaylorMemory
 from mbref.taylor.mode import REGULAR
 from mbref.taylor.outputs import complete_samples
-from mbref.taylor.polynomials import Geometry
 from mbref.taylor.preparation import prepare_series
-from mbref.taylor.series_memory import acquire_memory, put_equations, shapes_of_equations
+from mbref.taylor.series_memory import acquire_memory, put_equations
 
 EXACT, EXACT_ORDER = 1e-13, 22  # rtol and atol of steps that pass singular positions, and their least order
 SHARE = 0.05  # of rtol + atol: the tolerance of a step that is clear of singular positions
@@ -79,7 +78,8 @@ class SeriesStepper:
         columns = run.memory.active.velocities.size
         self.is_driven = run.ranks.rank == columns and not run.model.has_angles
         self.follows_drivers, tolerance, order = self._kind_of_steps()
-        self.geometry, self.polynomials = self.equations_of(run.model, run.start)
+        self.geometry = geometry_of(run.model, run.start, self._moving, self.follows_drivers)
+        self.polynomials = self.geometry.polynomials(run.model)
         exact_order = max(order, EXACT_ORDER) if run.model.closed_loops else order
         self._pooled = acquire_memory(run, self.geometry, self.polynomials, exact_order)
         self.taylor, self.argument = self._pooled.values, self._pooled.packed.argument
@@ -121,12 +121,12 @@ class SeriesStepper:
         if settings.nearly_dependent:
             settings.rank_tolerance = (least * max(rounding, ROUNDING)) ** 0.5
 
-    def equations_of(self, model: Model, start: Start) -> tuple[Geometry, Polynomials]:
-        """Return natural coordinates and equations of a scene that differs in numbers, from its start."""
-        moving = np.zeros(model.n, dtype=bool)
+    @property
+    def _moving(self) -> np.ndarray:
+        """Return which velocities (n,) can be other than zero."""
+        moving = np.zeros(self.run.model.n, dtype=bool)
         moving[self.run.memory.active.velocities] = True
-        geometry = geometry_of(model, start, moving, self.follows_drivers)
-        return geometry, geometry.polynomials(model)
+        return moving
 
     def release(self) -> None:
         """Release the memory to the next run; this one cannot be read any more."""
@@ -161,17 +161,14 @@ class SeriesStepper:
         self._put_options()
         self._decide_rank()
 
-    def parameters(self, lengths: np.ndarray) -> list[tuple[Any, ...]]:
-        """Return where memory has numbers that differ between scenes, and values for ``lengths`` (s,)."""
-        return [(self.taylor.options, START_ERROR * np.maximum(1.0, lengths), "start_distance")]
-
-    def takes(self, model: Callable[[], Model], start: Start) -> bool:
-        """Put the equations of a scene; False where they have no room."""
-        equations = self.equations_of(model(), start)
-        if shapes_of_equations(*equations) != shapes_of_equations(self.geometry, self.polynomials):
-            return False
-        put_equations(self.taylor, *equations)
-        return True
+    def parameters(
+        self, packs: Packs, q: np.ndarray, places: Sequence[int]
+    ) -> tuple[list[tuple[Any, ...]], list[int]]:
+        """Return where memory has numbers that differ between scenes, their values, and the places of scenes
+        whose equations have the structure of those in memory."""
+        varied, alike = equations_of_all(packs, q, places, self._moving, self.follows_drivers, self.taylor)
+        distances = START_ERROR * np.maximum(1.0, packs.length)
+        return [(self.taylor.options, distances, "start_distance"), *varied], alike
 
     def advance_once(self) -> tuple[int, float]:
         """Advance by one call of kernels: the status, and the process CPU time of the stepping alone (s)."""
@@ -179,7 +176,7 @@ class SeriesStepper:
         status = self.take_steps()
         seconds = time.process_time() - began
         self.run.crossings += self.recorded()
-        return self._complete_samples(status, go_on=False), seconds
+        return self._status_with_samples(status, go_on=False), seconds
 
     def _generate_where_it_pays(self) -> None:
         """Go on with generated code where many steps are ahead."""
@@ -246,8 +243,13 @@ class SeriesStepper:
     def _complete_samples(self, status: int, go_on: bool) -> int:
         """Complete the samples of steps; return the status of the steps, or of a failed completion."""
         began = time.process_time()
-        completed = int(complete_samples(int(go_on), self.argument))
+        status = self._status_with_samples(status, go_on)
         self._sampling += time.process_time() - began
+        return status
+
+    def _status_with_samples(self, status: int, go_on: bool) -> int:
+        """Complete the samples of steps, without taking the time."""
+        completed = int(complete_samples(int(go_on), self.argument))
         return status if completed == OK or status == UNDECIDED else completed
 
     def recorded(self) -> list[Passed]:

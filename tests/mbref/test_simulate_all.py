@@ -11,11 +11,13 @@ import pytest
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from mbref.ensembles.simulate_all import run_all, simulate_all
 from mbref.equations.parts import shape_of
-from mbref.scene import Scene, SceneError, Spring
+from mbref.scene import Force, Scene, SceneError, Spring
+from mbref.scene_paths import replaced_at
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
 from mbref.trajectory import Crossing
 from mbref.variation import Variation, variants
+from tests.coupled_scenes import gear_pair
 from tests.mbref.scenes_of_one_structure import CRANK, NUMBERS_DECIDE, results
 
 METHOD, TIMES = "alf-dual+projection", np.linspace(0.0, 0.05, 4)
@@ -38,6 +40,14 @@ def in_batches(scenes: list[Scene], times=TIMES, limits=LIMITS, method=METHOD) -
     """The number of runs that were completed in a batch."""
     ended = run_all(scenes, method, times, limits)
     return sum(len(followed.places) for _, followed in ended.batches)
+
+
+def number_at(scene: Scene, path: str) -> float:
+    """The number of a scene at a path."""
+    found: list[float] = []
+    fields = {name: getattr(scene, name) for name in Scene.model_fields}
+    replaced_at(fields, path, lambda value: found.append(value) or value)
+    return found[0]
 
 
 def bytes_of(crossing: Crossing) -> list:
@@ -63,6 +73,39 @@ def test_varied_lengths_and_a_driver_together_and_alone_agree():
     scenes = list(variants(DRIVEN, [Variation("joint[B].anchor[0]", 0.1, 1e-3, normal=True)], 12))
     agree(scenes)
     assert in_batches(scenes) == 11, "roundings of zero in Φ and γ decide nothing"
+
+
+@pytest.mark.parametrize(
+    ("name", "path"),
+    [
+        ("planar_slider_crank", "joint[B].anchor[0]"),  # a moment
+        ("spatial_slider_crank_driven", "joint[B].anchor[0]"),
+        ("four_bar_gravity", "body[coupler].position[0]"),
+        ("planar_slider_crank_gravity", "joint[C].anchor[0]"),
+    ],
+)
+def test_varied_places_by_series_together_and_alone_agree(name, path):
+    """Natural coordinates of all scenes are found at once."""
+    scene = SCENES[name]()
+    mean = number_at(scene, path)
+    scenes = list(variants(scene, [Variation(path, mean, 1e-5 * abs(mean), normal=True)], 8))
+    agree(scenes, np.linspace(0.0, 0.01, 3), method="taylor")
+    assert in_batches(scenes, np.linspace(0.0, 0.01, 3), method="taylor") == 7
+
+
+def test_a_force_on_a_varied_place_by_series_together_and_alone_agree():
+    force = Force(body="rod", point=(0.4, 0.1, 0.0), force=(1.0, 2.0, 0.0))
+    scene = SCENES["planar_slider_crank_gravity"]().with_(load=(force,))
+    scenes = list(variants(scene, [Variation("load[0].point[0]", 0.3, 0.5)], 8))
+    agree(scenes, method="taylor")
+    assert in_batches(scenes, method="taylor") == 7
+
+
+def test_varied_couplings_by_series_together_and_alone_agree():
+    varied = [Variation("coupling[0].ratio", -0.6, -0.4), Variation("joint[B].anchor[0]", 0.39, 0.41)]
+    scenes = list(variants(gear_pair(), varied, 8))
+    agree(scenes, method="taylor")
+    assert in_batches(scenes, method="taylor") == 7
 
 
 def test_runs_that_pass_singular_positions_and_others_agree():
@@ -112,15 +155,16 @@ def test_numbers_that_decide_what_takes_part_are_asked(scenes):
         agree([scenes[k] for k in order * 2])
 
 
-def test_springs_and_products_of_inertia_together_and_alone_agree():
+@pytest.mark.parametrize("method", [METHOD, "taylor"])
+def test_springs_and_products_of_inertia_together_and_alone_agree(method):
     points = ((0.3, 0.2, 0.0), CRANK.body[1].position)
     spring = Spring(bodies=("ground", "rod"), points=points, stiffness=50.0, natural_length=0.1)
     sprung = CRANK.with_(load=(*CRANK.load, spring))
     turned = sprung.with_("body[rod].inertia", ((1e-3, 0.0, 2e-4), (0.0, 5e-3, 0.0), (2e-4, 0.0, 5e-3)))
     varied = [Variation("load[1].stiffness", 10.0, 90.0), LENGTH]
     scenes = list(variants(sprung, varied, 6))
-    agree([*scenes, *variants(turned, varied, 6)])
-    assert in_batches(scenes) == 5
+    agree([*scenes, *variants(turned, varied, 6)], method=method)
+    assert in_batches(scenes, method=method) == 5
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,111 @@
+"""The equations of many scenes of one structure, found at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mbref.equations.model import Model
+from mbref.equations.packing import Packs, row_of
+from mbref.kernels.scene_layout import Loads, Primitives, SceneData
+from mbref.taylor.layout import TaylorMemory
+from mbref.taylor.natural import NaturalCoordinates, pose_of, unit_of_length
+from mbref.taylor.numbers import Batch
+from mbref.taylor.polynomials import Geometry
+
+
+class JointNumbers(NamedTuple):
+    """A joint of many scenes: the facts of its type, its bodies, and the numbers of its geometry."""
+
+    facts: Any
+    bodies: tuple[str, str]
+    directions: tuple[np.ndarray, ...]
+    anchor_pair: tuple[np.ndarray, np.ndarray]
+
+
+class Models:
+    """The models of many scenes as one, whose numbers are those of all (``taylor.numbers``).
+
+    Masses, gravity and forces of ``data`` are arrays whose first axis counts the scenes.
+    """
+
+    def __init__(self, packs: Packs, places: Sequence[int], batch: Batch):
+        first = Model(packs.scenes[places[0]], packs, places[0])
+        self.nb, self.index, self.length = first.nb, first.index, first.length
+        self.bodies = first.bodies
+        self.joints = [
+            _joint(joints, batch) for joints in zip(*(packs.joints[k] for k in places), strict=True)
+        ]
+        self.to_local = batch.together(packs.to_local[places])
+        self.data = _numbers(row_of(packs.data, places), batch)
+
+
+def _joint(joints: Sequence[Any], batch: Batch) -> JointNumbers:
+    """Return a joint from those of all scenes."""
+    first = joints[0]
+    directions, anchors = (
+        batch.together(np.array([getattr(joint, name) for joint in joints], dtype=float))
+        for name in ("directions", "anchor_pair")
+    )
+    return JointNumbers(first.facts, first.bodies, tuple(directions), tuple(anchors))
+
+
+def _numbers(data: SceneData, batch: Batch) -> SceneData:
+    """Return data with the numbers of all scenes."""
+    loads = Loads(*map(batch.together, data.loads))._replace(force=data.loads.force)
+    return data._replace(primitives=Primitives(*map(batch.together, data.primitives)), loads=loads)
+
+
+def equations_of_all(
+    packs: Packs, q: np.ndarray, places: Sequence[int], moving: np.ndarray, driven: bool, memory: TaylorMemory
+) -> tuple[list[tuple[np.ndarray, np.ndarray]], list[int]]:
+    """Return the arrays of memory in which the scenes at these places differ, each with its values, one row
+    for every scene of ``packs``; and the places whose equations have the structure of those in memory.
+
+    From coordinates (s, 7 nb) of all scenes at the start.
+    """
+    if not places:
+        return [], []
+    batch, of_places = Batch(len(places)), [*places]
+    unit = unit_of_length(packs.length[places[0]])
+    batch.agree &= np.array([unit_of_length(length) == unit for length in packs.length[of_places]])
+    models: Any = Models(packs, places, batch)
+    pose = pose_of(q[of_places])
+    numbers = pose._replace(centres=batch.together(pose.centres), axes=batch.together(pose.axes))
+    geometry = Geometry(NaturalCoordinates(models, numbers, moving, driven, batch))
+    found = geometry.polynomials(models), geometry.pose_maps, geometry.tableau
+    targets = memory.polynomials, memory.pose_maps, (memory.solver.linear, memory.solver.place)
+    varied = []
+    for target, source in zip(_arrays(targets), _arrays(found), strict=True):
+        values = _values_of_all(target, source, batch)
+        if values is None:
+            return [], []
+        if not (values == target).all():
+            rows = np.zeros((len(packs.scenes), *target.shape), target.dtype)
+            rows[of_places] = values
+            varied.append((target, rows))
+    return varied, [place for place, agrees in zip(places, batch.agree, strict=True) if agrees]
+
+
+def _values_of_all(target: np.ndarray, source: np.ndarray, batch: Batch) -> np.ndarray | None:
+    """Return the values (s, …) of an array of the equations; None where it has another structure."""
+    if source.dtype == object:
+        source = batch.spread(source)
+    elif source.ndim == target.ndim:
+        source = source[None]
+    if source.shape[1:] != target.shape:
+        return None
+    if target.dtype != float and not np.array_equal(source[0], target):
+        return None
+    return source
+
+
+def _arrays(values: Any) -> Iterator[np.ndarray]:
+    """Yield all arrays of nested tuples."""
+    for value in values:
+        if isinstance(value, tuple):
+            yield from _arrays(value)
+        else:
+            yield value
