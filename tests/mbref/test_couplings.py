@@ -16,7 +16,7 @@ from tests.coupled_scenes import EVERY, G, gear_pair, pendulum, rack, screw, sli
 
 METHODS = ("taylor", "alf-dual+projection/dop853")
 NO_SLIDE = "is revolute, which has no displacement to be coupled"
-CLOSED_FORM = 1e-12  # relative to the largest value; issue: closed forms ≤ 1e-12
+CLOSED_FORM = 1e-12  # relative to the largest value
 
 
 def coordinates(scene: Scene, method: str, name: str, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -49,6 +49,7 @@ SUPPORTS = Supports(
     joints=tuple(JOINTS),
     drivers=("angle", "displacement"),
     loads=("moment", "force", "spring", "torsion_spring"),
+    couplings=("angle", "displacement"),
 )
 
 

@@ -18,7 +18,7 @@ from crosscheck.engines.exudyn.joints import JOINTS, marker_frame
 from crosscheck.engines.geometry import unit
 from crosscheck.judge.constraints import initial_twists
 from mbref import rotations
-from mbref.scene import GROUND, Driver, Joint, Load, Scene
+from mbref.scene import GROUND, Coupling, Driver, Joint, Load, Scene
 
 SENSED = ("Coordinates", "Coordinates_t", "Coordinates_tt")
 
@@ -31,7 +31,7 @@ class System:
     nodes: list[int]
     sensors: list[list[int]]  # per node: coordinates (7), their rates and second rates
     drivers: list[int]  # objects of the driver constraints
-    joint_sensors: list[int]  # joint by joint: the outputs of JOINTS; then the drivers' forces
+    joint_sensors: list[int]  # joint by joint: the outputs of JOINTS; then forces of drivers and couplings
     redundant: int  # redundant constraints in the assembled configuration
 
     def samples(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -58,7 +58,8 @@ def build(exu: Any, scene: Scene, forces: bool) -> System:
         for joint, number in zip(scene.joint, joints, strict=True)
         for output in JOINTS[joint.type].outputs
     ]
-    of_joints += [parts.sensor(number, "Force") for number in drivers]
+    couplings = [parts.coupling(coupling) for coupling in scene.coupling]
+    of_joints += [parts.sensor(number, "Force") for number in (*drivers, *couplings)]
     if forces:
         for load in scene.load:
             parts.load(load)
@@ -135,6 +136,17 @@ class _Parts:
             markerNumbers=markers,
             offsetUserFunction=lambda mbs, t, item, offset: at(t)[0],
             offsetUserFunction_t=lambda mbs, t, item, offset: at(t)[1],
+        )
+        return self.mbs.AddObject(constraint)
+
+    def coupling(self, coupling: Coupling) -> int:
+        """A coordinate constraint, ratio · q₁ - q₂ = 0, of relative coordinates of the joints' bodies."""
+        first, second = (
+            self._rotation(joint) if kind == "angle" else self._translation(joint)
+            for joint, kind in self.scene.coupled(coupling)
+        )
+        constraint = self.items.ObjectConnectorCoordinate(
+            markerNumbers=[second, first], factor1=coupling.ratio
         )
         return self.mbs.AddObject(constraint)
 

@@ -21,7 +21,7 @@ def reactions(
     """Force and moment (k, 6), world, on each joint's second body at the anchor on that body.
 
     ``moved`` (k, nb, 3) and ``turned`` (k, nb, 4) are the bodies' displacements and rotations since
-    t = 0; ``forces`` (k, ·) the outputs of each joint in JOINTS, then the force of each driver.
+    t = 0; ``forces`` (k, ·) the outputs of each joint in JOINTS, then the force of each driver and coupling.
     """
     turn = rotations.to_matrix(turned)
     found, at = {}, 0
@@ -37,6 +37,11 @@ def reactions(
         axis = _turn(scene, joint.bodies[0], turn) @ unit(joint.directions[0])
         part = slice(0, 3) if joint.facts.driven == "displacement" else slice(3, 6)
         found[joint.name][:, part] -= forces[:, at + n, None] * axis
+    for n, coupling in enumerate(scene.coupling, at + len(scene.driver)):
+        for factor, (joint, kind) in zip((-coupling.ratio, 1.0), scene.coupled(coupling), strict=True):
+            axis = _turn(scene, joint.bodies[0], turn) @ unit(joint.directions[0])
+            part = slice(0, 3) if kind == "displacement" else slice(3, 6)
+            found[joint.name][:, part] += factor * forces[:, n, None] * axis
     return found
 
 

@@ -50,7 +50,8 @@ def projected(
         residual = np.concatenate(list(closure(scene, t, *pose).values()))
         if np.abs(residual).max(initial=0.0) < CLOSED:
             break
-        moved = _least(scene, pose[1], jacobian(scene, t, *pose)[0], -residual)
+        rows = jacobian(scene, t, *pose)[0][: len(residual)]  # without couplings, which stand last
+        moved = _least(scene, pose[1], rows, -residual)
         position = position + moved[:, :3]
         turn = rotations.multiply(rotations.from_vector(moved[:, 3:]), turn)
     spin = 2 * rotations.multiply(rates[:, 3:], rotations.conjugate(turn))[:, 1:]
