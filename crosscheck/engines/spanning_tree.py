@@ -271,7 +271,7 @@ def _depth_first(nodes: list[Link], edges: list[_Edge], closures: list[Closure],
                 replace(
                     nodes[child],
                     kind=edge.kind,
-                    mobilities=chain if forward or chain[-1].kind != BALL_JOINT else chain[::-1],
+                    mobilities=chain if forward or edge.facts.free_rotations < 3 else chain[::-1],
                     joint=edge.joint,
                     parent=number[node],
                     anchor=edge.anchor,
