@@ -1,4 +1,4 @@
-"""Random mechanisms with armatures and a coupling: those of ``random_mechanisms``, with rotors and gears."""
+"""Random mechanisms with armatures and a coupling: ``random_mechanisms`` with rotors and gears."""
 
 from __future__ import annotations
 
