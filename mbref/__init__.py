@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from mbref.scene_services import SERVICES
 
 if TYPE_CHECKING:
+    from mbref.design.equilibrium import Equilibrium, equilibria, motion_of_mode
     from mbref.ensembles.ensemble import ensemble
     from mbref.equations.diagnosis import Diagnosis, counts, diagnose
     from mbref.error_estimate import ErrorEstimate
@@ -27,6 +28,7 @@ __version__ = "0.2.0"
 _MODULE_OF = {
     "Cost": "mbref.trajectory",
     "Diagnosis": "mbref.equations.diagnosis",
+    "Equilibrium": "mbref.design.equilibrium",
     "ErrorEstimate": "mbref.error_estimate",
     "Limits": "mbref.simulation.simulate",
     "Method": "mbref.method",
@@ -41,7 +43,9 @@ _MODULE_OF = {
     "counts": "mbref.equations.diagnosis",
     "diagnose": "mbref.equations.diagnosis",
     "ensemble": "mbref.ensembles.ensemble",
+    "equilibria": "mbref.design.equilibrium",
     "find_scene": "mbref.scenes",
+    "motion_of_mode": "mbref.design.equilibrium",
     "simulate": "mbref.simulation.simulate",
     "variants": "mbref.variation",
 }
@@ -50,6 +54,7 @@ __all__ = [
     "SCENES",
     "Cost",
     "Diagnosis",
+    "Equilibrium",
     "ErrorEstimate",
     "Limits",
     "Method",
@@ -63,7 +68,9 @@ __all__ = [
     "counts",
     "diagnose",
     "ensemble",
+    "equilibria",
     "find_scene",
+    "motion_of_mode",
     "simulate",
     "variants",
 ]

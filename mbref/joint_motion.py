@@ -62,7 +62,7 @@ def joint_motion(scene: Scene, motion: Trajectory, name: str) -> JointMotion:
     wrench = (motion.reactions or {}).get(name)
     force, moment = (None, None) if wrench is None else (wrench[:, :3], wrench[:, 3:])
     marks = (motion.open_reactions or {}).get(name)
-    return JointMotion(name, angle, rate, slid, speed, _vector(relative), force, moment, marks)
+    return JointMotion(name, angle, rate, slid, speed, rotations.to_vector(relative), force, moment, marks)
 
 
 def place_of(scene: Scene, motion: Trajectory, name: str, point: tuple[float, float, float]) -> np.ndarray:
@@ -129,11 +129,3 @@ def _displacement(
     apart = places[1] - places[0]
     rate = np.einsum("ki,ki->k", speeds[1] - speeds[0], axis) + np.einsum("ki,ki->k", apart, turning)
     return np.einsum("ki,ki->k", apart, axis), rate
-
-
-def _vector(p: np.ndarray) -> np.ndarray:
-    """Rotation vectors (k, 3), at most half a turn long, of unit quaternions (k, 4)."""
-    p = np.where(p[:, :1] < 0, -p, p)
-    sine = np.linalg.norm(p[:, 1:], axis=1, keepdims=True)
-    angle = 2 * np.arctan2(sine, p[:, :1])
-    return np.where(sine > 0, angle / np.where(sine > 0, sine, 1.0), 2.0) * p[:, 1:]

@@ -87,3 +87,11 @@ def angle_between(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Geodesic angle (…,) between orientations: 2 atan2(|vector|, |w|) of the relative quaternion."""
     relative = multiply(conjugate(p), q)
     return 2 * np.arctan2(np.linalg.norm(relative[..., 1:], axis=-1), np.abs(relative[..., 0]))
+
+
+def to_vector(p: np.ndarray) -> np.ndarray:
+    """Return rotation vectors (k, 3), rad, at most half a turn long, of unit quaternions (k, 4)."""
+    p = np.where(p[:, :1] < 0, -p, p)
+    sine = np.linalg.norm(p[:, 1:], axis=1, keepdims=True)
+    angle = 2 * np.arctan2(sine, p[:, :1])
+    return np.where(sine > 0, angle / np.where(sine > 0, sine, 1.0), 2.0) * p[:, 1:]

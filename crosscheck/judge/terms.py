@@ -110,10 +110,17 @@ def _state(scene: Scene, motion: Trajectory, sample: int) -> State:
     return *place, motion.velocity[sample], motion.angular_velocity[sample], np.array(angles)
 
 
-def _residuals(scene: Scene, t: float, *pose_and_rates: np.ndarray) -> np.ndarray:
+def _residuals(
+    scene: Scene,
+    t: float,
+    position: np.ndarray,
+    orientation: np.ndarray,
+    velocity: np.ndarray,
+    spin: np.ndarray,
+) -> np.ndarray:
     """Acceleration residuals (m,) of bodies that coast."""
-    still = np.zeros_like(pose_and_rates[0])
-    found = closure_accelerations(scene, t, *pose_and_rates, still, still)
+    still = np.zeros_like(position)
+    found = closure_accelerations(scene, t, position, orientation, velocity, spin, still, still)
     return np.concatenate([np.zeros(0), *found.values()])
 
 

@@ -17,6 +17,7 @@ from mbref.cli.pictures import add as add_pictures
 from mbref.cli.plotting import add as add_plotting
 from mbref.cli.run import add as add_run
 from mbref.cli.scene_files import add as add_scene_files
+from mbref.cli.statics import add as add_statics
 from mbref.cli.tables import add as add_tables
 from mbref.command_line import Parser, commands
 from mbref.method import MethodError
@@ -90,6 +91,7 @@ def parser() -> argparse.ArgumentParser:
         add_diagnose,
         add_run,
         add_plotting,
+        add_statics,
         add_ensemble,
         add_exchange,
         add_tables,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mbref import rotations
+from mbref.equations.along_trajectory import poses
 from mbref.equations.branches import MOST_ROWS as MOST_BRANCHED
 from mbref.equations.branches import second_order
 from mbref.equations.diagnosis import RANK_TOLERANCE, scaled_jacobian
@@ -78,19 +78,10 @@ def _singular_values(
 ) -> np.ndarray:
     """Relative singular values (k, min(m, n)), largest first, at poses of the scene's bodies."""
     found = []
-    for t, q in zip(times, coordinates(model, position, orientation), strict=True):
+    for t, q in zip(times, poses(model, position, orientation), strict=True):
         s = np.linalg.svd(scaled_jacobian(model, float(t), q), compute_uv=False)
         found.append(s / s[0] if s.size else s)
     return np.array(found)
-
-
-def coordinates(model: Model, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
-    """Coordinates (k, 7 nb) of poses (k, …) of the scene's bodies."""
-    own = position.shape[1]
-    q = np.tile(model.start().reshape(model.nb, 7), (len(position), 1, 1))
-    q[:, :own, :3] = position
-    q[:, :own, 3:] = rotations.multiply(orientation, model.principal[:own])
-    return q.reshape(len(position), -1)
 
 
 def _is_shaky(model: Model, motion: Motion) -> bool:
@@ -98,10 +89,10 @@ def _is_shaky(model: Model, motion: Motion) -> bool:
     if model.m > MOST_BRANCHED or model.closed_loops == 0:
         return False
     chosen = np.linspace(0, len(motion.times) - 1, POSES).round().astype(int)
-    poses = coordinates(model, motion.position[chosen], motion.orientation[chosen])
+    places = poses(model, motion.position[chosen], motion.orientation[chosen])
     at_rest = np.zeros(model.n)
     orders = (
-        second_order(model, float(t), q, at_rest) for t, q in zip(motion.times[chosen], poses, strict=True)
+        second_order(model, float(t), q, at_rest) for t, q in zip(motion.times[chosen], places, strict=True)
     )
     return all(len(order.forms) for order in orders)
 

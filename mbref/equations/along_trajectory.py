@@ -45,14 +45,21 @@ def coordinates(model: Model, motion: Trajectory) -> tuple[np.ndarray, np.ndarra
 
     q'' is None without accelerations. A modelled ground stands still.
     """
-    count, own = len(motion.times), len(motion.bodies)
-    p = rotations.multiply(motion.orientation, model.principal[:own])
-    q = np.tile(model.start(), (count, 1)).reshape(count, model.nb, 7)
-    q[:, :own] = np.concatenate([motion.position, p], axis=-1)
+    q = poses(model, motion.position, motion.orientation)
+    p = q.reshape(-1, model.nb, 7)[:, : len(motion.bodies), 3:]
     v = _in_frames(model, p, motion.velocity, motion.angular_velocity)
     if motion.acceleration is None or motion.angular_acceleration is None:
-        return q.reshape(count, -1), v, None
-    return q.reshape(count, -1), v, _in_frames(model, p, motion.acceleration, motion.angular_acceleration)
+        return q, v, None
+    return q, v, _in_frames(model, p, motion.acceleration, motion.angular_acceleration)
+
+
+def poses(model: Model, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+    """Return coordinates (k, 7 nb) of positions (k, b, 3) and orientations (k, b, 4) of the bodies."""
+    count, own = position.shape[:2]
+    q = np.tile(model.start(), (count, 1)).reshape(count, model.nb, 7)
+    q[:, :own, :3] = position
+    q[:, :own, 3:] = rotations.multiply(orientation, model.principal[:own])
+    return q.reshape(count, -1)
 
 
 def _in_frames(model: Model, p: np.ndarray, linear: np.ndarray, angular: np.ndarray) -> np.ndarray:

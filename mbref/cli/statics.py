@@ -1,0 +1,153 @@
+"""mbref equilibrium and mbref modes: poses of rest, their stability, and vibrations about them."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbref.cli.options import TEXT, add_scene
+from mbref.cli.output import console, warn
+from mbref.cli.pictures import VIEW, path_of
+from mbref.drawing.film import write_film
+from mbref.drawing.picture import moving
+from mbref.drawing.view import View
+from mbref.records import strict_json
+from mbref.rotations import to_vector
+from mbref.scenes import find_scene
+
+if TYPE_CHECKING:
+    from mbref.design.equilibrium import Equilibrium
+
+LIMITS = "Other equilibria may exist: the search begins at the scene's pose and follows the constraints."
+
+
+def add(commands: Any) -> None:
+    """The commands' grammar."""
+    rest = commands.add_parser(
+        "equilibrium",
+        help="poses at which a mechanism rests, their forces and stability",
+        formatter_class=TEXT,
+        description="Static equilibria under gravity, springs and constant loads, from several starts:\n"
+        "pose, reactions and stability of each. " + LIMITS,
+        epilog="examples:\n  mbref equilibrium four_bar_gravity\n"
+        "  mbref equilibrium mechanism.toml --number 2 --out rest.toml",
+    )
+    _add_search(rest)
+    rest.add_argument("--out", metavar="FILE.toml", help="write the scene at an equilibrium, at rest")
+    rest.set_defaults(action=_equilibrium)
+
+    shake = commands.add_parser(
+        "modes",
+        help="eigenvalues and vibrations about an equilibrium",
+        formatter_class=TEXT,
+        description="Eigenvalues, frequencies and damping ratios of small motions about an equilibrium, by\n"
+        "default the first stable one. --out writes one vibration as a moving picture.",
+        epilog="examples:\n  mbref modes four_bar_gravity\n"
+        "  mbref modes mechanism.toml --mode 2 --out second.svg",
+    )
+    _add_search(shake)
+    shake.add_argument("--mode", type=int, default=1, help="vibration of --out, from the slowest (default 1)")
+    shake.add_argument("--view", metavar="VIEW", help=VIEW)
+    shake.add_argument("--out", metavar="FILE", help=".svg, .gif or .mp4 of one vibration")
+    shake.set_defaults(action=_modes)
+
+
+def _add_search(parser: argparse.ArgumentParser) -> None:
+    add_scene(parser)
+    parser.add_argument("--starts", type=int, default=24, help="number of poses to search from (default 24)")
+    parser.add_argument("--number", type=int, metavar="K", help="number of the equilibrium, as listed")
+    parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+
+
+def _found(options: argparse.Namespace) -> list[Equilibrium]:
+    """Return the equilibria; raises ValueError where none is found, or none has the number asked for."""
+    from mbref.design.equilibrium import equilibria
+
+    if options.starts < 1:
+        raise ValueError(f"--starts: must be at least 1, got {options.starts}")
+    scene = find_scene(options.scene)
+    warn(scene)
+    found = equilibria(scene, options.starts)
+    if not found:
+        raise ValueError(
+            f"{scene.name}: no equilibrium is found from {options.starts} starts; --starts tries more"
+        )
+    if options.number is not None and not 1 <= options.number <= len(found):
+        raise ValueError(f"--number: must be from 1 to {len(found)}, got {options.number}")
+    return found
+
+
+def _equilibrium(options: argparse.Namespace) -> int:
+    if options.out and not options.out.endswith(".toml"):
+        raise ValueError(f"--out: must end in .toml, got {options.out!r}")
+    found = _found(options)
+    if options.out:
+        found[(options.number or 1) - 1].scene.save(options.out)
+    if options.json:
+        print(strict_json({"equilibria": [_record(each) for each in found]}))
+        return 0
+    for number, each in enumerate(found, 1):
+        if options.number in (None, number):
+            console().print("\n".join(_lines(number, each)), soft_wrap=True)
+    console().print(f"{LIMITS}\n" * (options.number is None) + f"{options.out}\n" * bool(options.out), end="")
+    return 0
+
+
+def _lines(number: int, each: Equilibrium) -> list[str]:
+    lines = [f"equilibrium {number}: {each.stability}"]
+    for body in each.scene.body:
+        turned = np.round(to_vector(np.array([body.orientation]))[0], 12) + 0.0
+        lines.append(
+            f"  {body.name:12} position {_three(body.position)} m, rotation vector {_three(turned)} rad"
+        )
+    for name, wrench in each.reactions.items():
+        lines.append(f"  joint {name:6} force {_three(wrench[:3])} N, moment {_three(wrench[3:])} N m")
+    return lines
+
+
+def _three(vector: Any) -> str:
+    return "(" + ", ".join(f"{x:.6g}" for x in np.round(vector, 9) + 0.0) + ")"
+
+
+def _record(each: Equilibrium) -> dict[str, Any]:
+    return {
+        "stability": each.stability,
+        "scene": each.scene.to_dict(),
+        "eigenvalues": [[float(s.real), float(s.imag)] for s in each.eigenvalues],
+        "frequencies": each.frequencies.tolist(),
+        "damping_ratios": each.damping_ratios.tolist(),
+        "reactions": {name: wrench.tolist() for name, wrench in each.reactions.items()},
+    }
+
+
+def _modes(options: argparse.Namespace) -> int:
+    from mbref.design.equilibrium import motion_of_mode
+
+    path = path_of(options, "-mode", (".svg", ".gif", ".mp4")) if options.out else None
+    found = _found(options)
+    stable = [k for k, each in enumerate(found, 1) if each.stability == "stable"]
+    number = options.number or (stable or [1])[0]
+    each = found[number - 1]
+    if path is not None:
+        motion, view = motion_of_mode(each, options.mode), View.parse(options.view) if options.view else None
+        if path.suffix == ".svg":
+            Path(path).write_text(moving(each.scene, motion, view), encoding="utf-8")
+        else:
+            write_film(path, each.scene, motion, view)
+    if options.json:
+        print(strict_json({"number": number, **_record(each)}))
+        return 0
+    console().print("\n".join(_mode_lines(number, each)), soft_wrap=True)
+    console().print(f"{path}\n" * bool(path), end="")
+    return 0
+
+
+def _mode_lines(number: int, each: Equilibrium) -> list[str]:
+    lines = [f"equilibrium {number}: {each.stability}", "  eigenvalues, 1/s"]
+    lines += [f"    {s.real:+.12g} {s.imag:+.12g} i" for s in np.round(each.eigenvalues, 12) + 0.0]
+    pairs = enumerate(zip(each.frequencies, each.damping_ratios, strict=True), 1)
+    lines += [f"  vibration {k}: {hertz:.9g} Hz, damping ratio {ratio:.6g}" for k, (hertz, ratio) in pairs]
+    return lines

@@ -1,0 +1,289 @@
+"""Static equilibria of a mechanism, their stability, and small vibrations about them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mbref import rotations
+from mbref.design.linearisation import OffConstraints, Tangent, multipliers
+from mbref.design.placed import placed
+from mbref.equations.initial_state import consistent_start, solve_positions
+from mbref.equations.joint_reactions import reactions
+from mbref.equations.model import Model, displaced, displacement
+from mbref.joint_motion import joint_motion
+from mbref.motion import Motion
+from mbref.scene import Scene, SceneError
+from mbref.scenes import find_scene
+from mbref.trajectory import Trajectory
+
+STARTS = 24  # poses from which an equilibrium is looked for
+STRIDE = 0.35  # lengths of the mechanism between neighbouring starts
+LONGEST = 0.3  # lengths of the mechanism, of a step towards an equilibrium
+MOST_STEPS = 60
+BALANCED = 1e-11  # of the scale of accelerations, which an equilibrium may leave
+SAME = 1e-6  # lengths of the mechanism or rad, between poses that count as one
+STILL = 1e-6  # of the largest |s|, below which a real part or an eigenvalue counts as zero
+NOTHING = 1e-9  # lengths of the mechanism in its duration squared: acceleration of a mechanism without forces
+SEED = 1
+AMPLITUDE, FRAMES = 0.1, 49  # of a vibration that is shown, in lengths of the mechanism; its samples
+
+
+@dataclass(frozen=True, repr=False)
+class Equilibrium:
+    """A pose at which a mechanism stays at rest.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene with its bodies at this pose, at rest; springs, joints and loads are carried along.
+    eigenvalues : ndarray, shape (2f,), complex
+        Exponents s of small motions exp(s t), 1/s, of the f degrees of freedom.
+    shapes : ndarray, shape (2f, nb, 6), complex
+        Motion of each body for each eigenvalue: displacement of the centre of mass (m) and rotation vector
+        (rad), world frame. The largest is one length of the mechanism, or one radian.
+    reactions : dict of str to ndarray, shape (6,)
+        Force (N) and moment (N m) on the second body of each joint at its anchor, world frame.
+    """
+
+    scene: Scene
+    eigenvalues: np.ndarray
+    shapes: np.ndarray
+    reactions: dict[str, np.ndarray]
+
+    @property
+    def stability(self) -> str:
+        """``stable``, ``unstable`` or ``indifferent``, by the largest real part of the eigenvalues."""
+        size = float(np.abs(self.eigenvalues).max(initial=0.0))
+        if size == 0.0 or np.abs(self.eigenvalues).min() < STILL * size:
+            return "indifferent"
+        return "unstable" if self.eigenvalues.real.max() > STILL * size else "stable"
+
+    @property
+    def frequencies(self) -> np.ndarray:
+        """Undamped natural frequencies |s| / 2π, Hz, of the eigenvalues with positive imaginary part."""
+        return np.asarray(np.abs(self.eigenvalues[self.oscillating]) / (2 * np.pi))
+
+    @property
+    def damping_ratios(self) -> np.ndarray:
+        """Damping ratios -Re s / |s| of the same eigenvalues."""
+        found = self.eigenvalues[self.oscillating]
+        return np.asarray(-found.real / np.abs(found) + 0.0)
+
+    @property
+    def oscillating(self) -> np.ndarray:
+        """Numbers of the eigenvalues with positive imaginary part, slowest first."""
+        size = float(np.abs(self.eigenvalues).max(initial=0.0))
+        return np.flatnonzero(self.eigenvalues.imag > STILL * size)
+
+    def __repr__(self) -> str:
+        listed = ", ".join(f"{f:.6g} Hz" for f in self.frequencies)
+        return f"<Equilibrium of {self.scene.name!r}: {self.stability}{'; ' * bool(listed)}{listed}>"
+
+
+def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibrium]:
+    """Return the static equilibria that are found from several starts.
+
+    The starts are the scene's pose and poses that are reached from it along the constraints. There is no
+    guarantee that all equilibria are found. Drivers must stand still.
+
+    Parameters
+    ----------
+    scene : Scene, str or path
+        The mechanism, the name of a built-in one, or a .toml file.
+    starts : int
+        Number of starts.
+
+    Raises
+    ------
+    SceneError
+        If a body has no mass, a driver moves, or the mechanism has no degree of freedom.
+    """
+    scene = scene if isinstance(scene, Scene) else find_scene(str(scene))
+    _refuse(scene)
+    model = Model(scene)
+    poses = list(_starts(Tangent(model, consistent_start(model).q), starts))
+    scale = _scale(poses)
+    if scale <= NOTHING * model.length / scene.duration**2:
+        return [_equilibrium(poses[0])]
+    found: list[Tangent] = []
+    for tangent in poses:
+        settled = _balanced(tangent, scale)
+        if settled is not None and not any(_is_same(settled, other) for other in found):
+            found.append(settled)
+    return [_equilibrium(tangent) for tangent in found]
+
+
+def motion_of_mode(equilibrium: Equilibrium, number: int, amplitude: float = AMPLITUDE) -> Motion:
+    """Return one period of a vibration about an equilibrium, without damping, on the constraints.
+
+    Parameters
+    ----------
+    equilibrium : Equilibrium
+        An equilibrium with vibrations.
+    number : int
+        Number of the vibration in ``frequencies``, from 1.
+    amplitude : float
+        Largest displacement, in lengths of the mechanism.
+
+    Raises
+    ------
+    ValueError
+        If there is no such vibration.
+    """
+    if not 1 <= number <= len(equilibrium.oscillating):
+        raise ValueError(
+            f"mode: there are {len(equilibrium.oscillating)} vibrations, there is no number {number}"
+        )
+    which = equilibrium.oscillating[number - 1]
+    model, shape = Model(equilibrium.scene), equilibrium.shapes[which]
+    q = model.start()
+    turned = rotations.conjugate(q.reshape(model.nb, 7)[: len(shape), 3:])
+    poses, phases = [], np.linspace(0.0, 2 * np.pi, FRAMES)
+    for phase in phases:
+        x = np.zeros((model.nb, 6))
+        x[: len(shape)] = amplitude * (shape * np.exp(1j * phase)).real
+        x[: len(shape), 3:] = rotations.rotate(turned, x[: len(shape), 3:])
+        poses.append(solve_positions(model, 0.0, displaced(q, x.ravel()))[0])
+    times = phases / abs(equilibrium.eigenvalues[which])
+    places = np.array(poses).reshape(FRAMES, model.nb, 7)
+    still = np.zeros((FRAMES, model.nb, 6))
+    found = model.motion(places, still, still)
+    names = tuple(body.name for body in equilibrium.scene.body)
+    return Motion(
+        equilibrium.scene.name, "mbref", "", "mode", {}, times, names, **found, mechanism=equilibrium.scene
+    )
+
+
+def _refuse(scene: Scene) -> None:
+    if not scene.has_mass():
+        without = next(body.name for body in scene.body if body.mass is None)
+        raise SceneError([f"body[{without}].mass: is missing; an equilibrium needs the mass of every body"])
+    for driver in scene.driver:
+        if any(driver.polynomial[1:]) or (driver.sine and driver.sine.amplitude):
+            raise SceneError(
+                [f"driver[{driver.joint}]: moves; an equilibrium needs drivers that stand still"]
+            )
+    if scene.counts().degrees_of_freedom == 0:
+        raise SceneError(["the mechanism has no degree of freedom, so it rests at any load"])
+
+
+def _scale(poses: list[Tangent]) -> float:
+    """Return an acceleration, m/s²: the largest at some poses, or by a displacement of the first's length."""
+    by_place = float(np.linalg.norm(poses[0].slope())) * poses[0].model.length
+    return max(by_place, *(float(np.linalg.norm(each.accelerations(*_rest(each)))) for each in poses))
+
+
+def _rest(tangent: Tangent) -> tuple[np.ndarray, np.ndarray]:
+    return np.zeros(tangent.freedoms), np.zeros(tangent.freedoms)
+
+
+def _starts(first: Tangent, count: int) -> Iterator[Tangent]:
+    """Yield the first pose, and further ones along the constraints in seeded directions, there and back."""
+    rng, freedoms = np.random.default_rng(SEED), first.freedoms
+    yield first
+    there = back = first
+    direction = _unit(rng.standard_normal(freedoms))
+    for k in range(1, count):
+        forth = k % 2 == 1
+        tangent = there if forth else back
+        ahead = tangent.basis.T @ first.basis @ direction if tangent.freedoms == freedoms else direction
+        sign = 1.0 if forth else -1.0
+        try:
+            q = tangent.pose(sign * STRIDE * first.model.length * _unit(ahead))
+        except OffConstraints:
+            direction = _unit(rng.standard_normal(freedoms))
+            continue
+        moved = Tangent(first.model, q)
+        there, back = (moved, back) if forth else (there, moved)
+        direction = _unit(direction + 0.3 * rng.standard_normal(freedoms)) if freedoms > 1 else direction
+        yield moved
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return np.asarray(vector / (np.linalg.norm(vector) or 1.0))
+
+
+def _balanced(tangent: Tangent, scale: float) -> Tangent | None:
+    """Return the pose near a start at which nothing accelerates, by Levenberg's method; None without one."""
+    freedoms, damping = tangent.freedoms, 0.0
+    off = tangent.accelerations(*_rest(tangent))
+    for _ in range(MOST_STEPS):
+        if np.linalg.norm(off) <= BALANCED * scale:
+            return tangent
+        try:
+            slope = tangent.slope()
+        except OffConstraints:
+            return None
+        weight = damping * float(np.linalg.norm(slope)) ** 2 + 1e-300
+        step = -np.linalg.solve(slope.T @ slope + weight * np.eye(freedoms), slope.T @ off)
+        size = float(np.linalg.norm(step)) / (LONGEST * tangent.model.length)
+        moved = _moved(tangent, step / max(1.0, size))
+        after = moved and moved.accelerations(*_rest(moved))
+        if moved is None or moved.freedoms != freedoms or np.linalg.norm(after) >= np.linalg.norm(off):
+            damping = max(10 * damping, 1e-3)
+            if damping > 1e6:
+                return None
+            continue
+        tangent, off, damping = moved, after, damping / 10
+    return None
+
+
+def _moved(tangent: Tangent, y: np.ndarray) -> Tangent | None:
+    try:
+        return Tangent(tangent.model, tangent.pose(y))
+    except OffConstraints:
+        return None
+
+
+def _is_same(first: Tangent, second: Tangent) -> bool:
+    apart = displacement(first.q, second.q) / first.units
+    return bool(np.abs(apart).max(initial=0.0) < SAME * first.model.length)
+
+
+def _equilibrium(tangent: Tangent) -> Equilibrium:
+    model, freedoms = tangent.model, tangent.freedoms
+    by_place, by_rate = tangent.linear_part()
+    first_order = np.block([[np.zeros((freedoms, freedoms)), np.eye(freedoms)], [by_place, by_rate]])
+    values, vectors = np.linalg.eig(first_order)
+    order = np.lexsort((-values.imag, np.abs(values).round(12)))
+    shapes = (tangent.units[:, None] * (tangent.basis @ vectors[:freedoms, order])).T
+    shapes = shapes.astype(complex).reshape(len(order), model.nb, 6)[:, : len(model.scene.body)]
+    turned = tangent.q.reshape(model.nb, 7)[: len(model.scene.body), 3:]
+    for part in (shapes.real, shapes.imag):
+        part[..., 3:] = rotations.rotate(turned, part[..., 3:])
+    sizes = np.abs(shapes / np.repeat([model.length, 1.0], 3)).max(axis=(1, 2), keepdims=True)
+    q = tangent.q.reshape(1, model.nb, 7)
+    forces = reactions(model, q, model.blocks_along(np.zeros(1), q), multipliers(model, tangent.q)[None])
+    scene = _with_angles(placed(model, tangent.q), model, tangent.q)
+    still = [body.model_copy(update={"velocity": None, "angular_velocity": None}) for body in scene.body]
+    return Equilibrium(
+        scene.with_(body=still),
+        values[order],
+        shapes / np.where(sizes > 0, sizes, 1.0),
+        {name: wrench[0] for name, wrench in forces.items()},
+    )
+
+
+def _with_angles(scene: Scene, model: Model, q: np.ndarray) -> Scene:
+    """Return the scene with torsion springs whose natural angles are measured from the pose q."""
+    zeros = np.zeros((1, model.nb, 6))
+    names = tuple(body.name for body in model.scene.body)
+    own = model.motion(q.reshape(1, model.nb, 7), zeros, zeros)
+    motion = Trajectory(scene.name, "mbref", "", "", {}, np.zeros(1), names, **own)
+    loads = [
+        load
+        if load.type != "torsion_spring"
+        else load.model_copy(
+            update={"natural_angle": load.natural_angle - _angle(model.scene, motion, load.joint)}
+        )
+        for load in scene.load
+    ]
+    return scene.with_(load=loads)
+
+
+def _angle(scene: Scene, motion: Trajectory, joint: str) -> float:
+    return float(np.asarray(joint_motion(scene, motion, joint).angle)[0])

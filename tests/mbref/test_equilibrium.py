@@ -1,0 +1,164 @@
+"""Equilibria and vibrations / closed forms of pendulums, springs and a four-bar with a diagonal spring."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from scipy.linalg import eigvalsh
+from scipy.optimize import brentq
+
+from mbref import Scene, SceneError, equilibria, find_scene, motion_of_mode
+from mbref.cli.commands import main
+
+MASS, INERTIA, ARM, G = 2.0, 0.3, 0.7, 9.81
+GRAVITY = (0.0, -G, 0.0)
+
+
+def pendulum(gravity=GRAVITY, load=()) -> Scene:
+    rod = {"name": "rod", "mass": MASS, "inertia": [INERTIA] * 3, "position": [ARM, 0.0, 0.0]}
+    hinge = {
+        "name": "A",
+        "type": "revolute",
+        "bodies": ["ground", "rod"],
+        "anchor": [0.0] * 3,
+        "axis": [0.0, 0.0, 1.0],
+    }
+    return Scene(name="pendulum", gravity=gravity, body=[rod], joint=[hinge], load=load)
+
+
+def by_sign(eigenvalues):
+    return sorted(eigenvalues, key=lambda s: -s.imag)
+
+
+def test_a_pendulum_rests_below_and_above_its_hinge():
+    found = {each.stability: each for each in equilibria(pendulum(), starts=8)}
+    assert set(found) == {"stable", "unstable"} and len(equilibria(pendulum(), starts=8)) == 2
+    rate = np.sqrt(MASS * G * ARM / (INERTIA + MASS * ARM**2))
+    assert np.allclose(found["stable"].eigenvalues, [1j * rate, -1j * rate], rtol=1e-12, atol=1e-12 * rate)
+    assert np.allclose(np.sort(found["unstable"].eigenvalues.real), [-rate, rate], rtol=1e-12)
+    for each, height in ((found["stable"], -ARM), (found["unstable"], ARM)):
+        assert np.allclose(each.scene.body[0].position, (0.0, height, 0.0), atol=1e-11)
+        assert np.allclose(each.reactions["A"], [0.0, MASS * G, 0.0, 0.0, 0.0, 0.0], atol=1e-10)
+
+
+def test_a_damped_torsion_spring_has_the_roots_of_its_equation():
+    """J s² + c s + k about the natural angle; the scene written at rest is itself at its equilibrium."""
+    spring = {"type": "torsion_spring", "joint": "A", "stiffness": 40.0, "damping": 3.0, "natural_angle": 0.4}
+    [each] = equilibria(pendulum((0.0, 0.0, 0.0), [spring]), starts=1)
+    roots = np.roots([INERTIA + MASS * ARM**2, 3.0, 40.0])
+    assert np.allclose(by_sign(each.eigenvalues), by_sign(roots), rtol=1e-11)
+    assert np.allclose(
+        each.scene.body[0].position, ARM * np.array([np.cos(0.4), np.sin(0.4), 0.0]), atol=1e-11
+    )
+    assert each.damping_ratios[0] == pytest.approx(-roots[0].real / abs(roots[0]), rel=1e-10)
+    assert each.scene.load[0].natural_angle == pytest.approx(0.0, abs=1e-10)
+    [again] = equilibria(each.scene, starts=1)
+    assert np.allclose(again.scene.body[0].position, each.scene.body[0].position, atol=1e-10)
+
+
+def test_two_rods_hang_with_the_frequencies_of_their_matrices():
+    """M = m l² [[4/3, 1/2], [1/2, 1/3]] and K = m g l diag(3/2, 1/2) of two equal slender rods."""
+    rod = {"mass": 1.0, "inertia": [1e-5, 1 / 12, 1 / 12]}
+    bodies = [
+        {**rod, "name": "upper", "position": [0.5, 0.0, 0.0]},
+        {**rod, "name": "lower", "position": [1.5, 0.0, 0.0]},
+    ]
+    hinge = {"type": "revolute", "axis": [0.0, 0.0, 1.0]}
+    joints = [
+        {**hinge, "name": "A", "bodies": ["ground", "upper"], "anchor": [0.0] * 3},
+        {**hinge, "name": "B", "bodies": ["upper", "lower"], "anchor": [1.0, 0.0, 0.0]},
+    ]
+    scene = Scene(name="double", gravity=GRAVITY, body=bodies, joint=joints)
+    found = equilibria(scene, starts=8)
+    [hanging] = [each for each in found if each.stability == "stable"]
+    squares = eigvalsh(G * np.diag([1.5, 0.5]), np.array([[4 / 3, 1 / 2], [1 / 2, 1 / 3]]))
+    assert np.allclose(hanging.frequencies, np.sqrt(squares) / (2 * np.pi), rtol=1e-11)
+    assert np.allclose([b.position[1] for b in hanging.scene.body], [-0.5, -1.5], atol=1e-10)
+    assert all(np.abs(np.array(each.scene.body[0].position)[[0, 2]]).max() < 1e-9 for each in found)
+
+
+def test_a_four_bar_with_a_diagonal_spring_has_the_frequency_of_its_energy():
+    """A parallelogram: V' = 0 and s² = -V''/I of one angle, by hand, to 12 digits."""
+    scene = find_scene("four_bar_gravity")
+    links, length = [body.mass for body in scene.body], 0.5
+    stiffness, natural = 60.0, 0.4
+    ends = [[0.0, 0.0, 0.0], list(scene.joint_named("C").anchor_pair[0])]
+    spring = {
+        "type": "spring",
+        "bodies": ["ground", "coupler"],
+        "points": ends,
+        "stiffness": stiffness,
+        "natural_length": natural,
+    }
+    weight = G * length * (links[0] / 2 + links[1] + links[2] / 2)
+    moment = (
+        sum(b.inertia[2] + b.mass * length**2 / 4 for b in (scene.body[0], scene.body[2]))
+        + links[1] * length**2
+    )
+
+    def stretched(angle):
+        d = np.sqrt(2 * length**2 * (1 + np.cos(angle)))
+        first = -(length**2) * np.sin(angle) / d
+        return d, first, (-(length**2) * np.cos(angle) - first**2) / d
+
+    def slope(angle):
+        d, first, _ = stretched(angle)
+        return weight * np.cos(angle) + stiffness * (d - natural) * first
+
+    found = equilibria(scene.with_(load=[spring]))
+    angles = [np.arctan2(*np.array(each.scene.body[0].position)[[1, 0]]) for each in found]
+    assert {"stable", "unstable"} <= {each.stability for each in found}
+    for each, angle in zip(found, angles, strict=True):
+        exact = brentq(slope, angle - 1e-3, angle + 1e-3, xtol=1e-15)
+        assert angle == pytest.approx(exact, abs=1e-10)
+        d, first, second = stretched(exact)
+        curvature = -weight * np.sin(exact) + stiffness * (first**2 + (d - natural) * second)
+        assert np.allclose(each.eigenvalues**2, -curvature / moment, rtol=1e-11)
+
+
+def test_a_hinge_without_forces_is_indifferent():
+    [each] = equilibria(pendulum((0.0, 0.0, 0.0)), starts=4)
+    assert each.stability == "indifferent" and len(each.frequencies) == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"driver": [{"joint": "A", "polynomial": [0.0, 1.0]}]}, r"driver\[A\]: moves"),
+        ({"driver": [{"joint": "A"}]}, "no degree of freedom"),
+        ({"body": [{"name": "rod", "position": [ARM, 0.0, 0.0]}]}, r"body\[rod\].mass: is missing"),
+    ],
+)
+def test_scenes_without_an_equilibrium_to_find_are_refused(change, says):
+    with pytest.raises(SceneError, match=says):
+        equilibria(pendulum().with_(**change))
+
+
+def test_a_vibration_moves_on_the_constraints_by_its_amplitude():
+    [each] = [e for e in equilibria(find_scene("four_bar_gravity"), starts=6) if e.stability == "stable"]
+    motion = motion_of_mode(each, 1, amplitude=0.05)
+    assert motion.violation.position.max() < 1e-12
+    assert motion.times[-1] == pytest.approx(1 / each.frequencies[0], rel=1e-14)
+    moved = motion.position - np.array([b.position for b in each.scene.body])
+    assert 0.2 * 0.05 < np.abs(moved).max() < 0.06
+    assert np.allclose(motion.position[0], motion.position[-1], atol=1e-12)
+    with pytest.raises(ValueError, match="there is no number 2"):
+        motion_of_mode(each, 2)
+
+
+def test_commands_print_poses_modes_and_a_picture(tmp_path, capsys):
+    path, rest, picture = (str(tmp_path / name) for name in ("my.toml", "rest.toml", "mode.svg"))
+    pendulum().save(path)
+    assert main(["equilibrium", path, "--starts", "6", "--out", rest]) == 0
+    shown = capsys.readouterr().out
+    assert "stable" in shown and "unstable" in shown and "Other equilibria may exist" in shown
+    assert "force (0, 19.62, 0) N" in shown and Scene.from_file(rest).body[0].name == "rod"
+    assert main(["modes", path, "--starts", "6", "--out", picture]) == 0
+    shown = capsys.readouterr().out
+    assert "vibration 1: 0.521331" in shown and "<animate" in (tmp_path / "mode.svg").read_text()
+    assert main(["modes", path, "--starts", "6", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["stability"] == "stable"
+    assert main(["equilibrium", path, "--starts", "2", "--number", "9"]) == 2
+    assert "--number: must be from 1 to" in capsys.readouterr().err
