@@ -11,6 +11,7 @@ import numpy as np
 from mbref import rotations
 from mbref.design.linearisation import OffConstraints, Tangent, multipliers
 from mbref.design.placed import placed
+from mbref.equations.along_trajectory import without_armatures
 from mbref.equations.initial_state import consistent_start, solve_positions
 from mbref.equations.joint_reactions import reactions
 from mbref.equations.model import Model, displaced, displacement
@@ -139,7 +140,7 @@ def motion_of_mode(equilibrium: Equilibrium, number: int, amplitude: float = AMP
             f"mode: there are {len(equilibrium.oscillating)} vibrations, there is no number {number}"
         )
     which = equilibrium.oscillating[number - 1]
-    model, shape = Model(equilibrium.scene), equilibrium.shapes[which]
+    model, shape = Model(without_armatures(equilibrium.scene)), equilibrium.shapes[which]
     q = model.start()
     turned = rotations.conjugate(q.reshape(model.nb, 7)[: len(shape), 3:])
     poses, phases = [], np.linspace(0.0, 2 * np.pi, FRAMES)

@@ -18,7 +18,7 @@ def violations(scene: Scene, motion: Trajectory) -> Violation:
     Rows are those of ``equations.primitives``: metres, or cosines of axes that stay
     perpendicular and sines of driven angles, which are radians to first order.
     """
-    model = Model(scene)
+    model = Model(without_armatures(scene))
     q, v, a = coordinates(model, motion)
     terms = model.along(motion.times, q, v)
     blocks = model.dense(terms.jacobian)
@@ -32,12 +32,19 @@ def violations(scene: Scene, motion: Trajectory) -> Violation:
 
 def determined_reactions(scene: Scene, motion: Trajectory) -> dict[str, np.ndarray]:
     """Return by joint which components (k, 6) of its reaction equilibrium determines, along world axes."""
-    model = Model(scene)
+    model = Model(without_armatures(scene))
     q, _, _ = coordinates(model, motion)
     q = q.reshape(len(q), model.nb, 7)
     found = determined_components(model, q, model.blocks_along(motion.times, q))
     model.release()
     return found
+
+
+def without_armatures(scene: Scene) -> Scene:
+    """Return the scene without armatures: a model has a rotor for each, whose pose no trajectory has."""
+    bare = {"armature": 0.0}
+    joints = [joint.model_copy(update=bare) if joint.reflected_inertia else joint for joint in scene.joint]
+    return scene.with_(joint=joints)
 
 
 def coordinates(model: Model, motion: Trajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:

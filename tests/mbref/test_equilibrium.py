@@ -43,6 +43,17 @@ def test_a_pendulum_rests_below_and_above_its_hinge():
         assert np.allclose(each.reactions["A"], [0.0, MASS * G, 0.0, 0.0, 0.0, 0.0], atol=1e-10)
 
 
+def test_an_armature_slows_a_pendulum():
+    """s² = -m g l / (J + m l² + I) with an armature I, and the picture of the vibration stays a vibration."""
+    scene = pendulum()
+    hinge = scene.joint[0].model_copy(update={"armature": 0.5})
+    [below] = [e for e in equilibria(scene.with_(joint=[hinge]), starts=6) if e.stability == "stable"]
+    square = MASS * G * ARM / (INERTIA + MASS * ARM**2 + 0.5)
+    assert np.allclose(below.eigenvalues**2, -square, rtol=1e-11)
+    moved = motion_of_mode(below, 1, amplitude=0.1).position - np.array(below.scene.body[0].position)
+    assert 0.05 < np.abs(moved).max() < 0.11
+
+
 def test_a_damped_torsion_spring_has_the_roots_of_its_equation():
     """J s² + c s + k about the natural angle; the scene written at rest is itself at its equilibrium."""
     spring = {"type": "torsion_spring", "joint": "A", "stiffness": 40.0, "damping": 3.0, "natural_angle": 0.4}

@@ -172,6 +172,16 @@ def test_powers_of_driver_and_springs_are_the_rate_of_energy(sprung):
     assert np.allclose(powers, gained, atol=1e-8)
 
 
+def test_violations_of_a_motion_with_an_armature_are_of_its_own_rows():
+    scene = find_scene("four_bar_gravity")
+    joints = [j.model_copy(update={"armature": 0.5}) if j.name == "A" else j for j in scene.joint]
+    motion = simulate(scene.with_(joint=joints), times=TIMES[:3] / 10)
+    assert all(level.max() < 1e-9 for level in motion.violation)
+    still = simulate(scene, times=TIMES[:3] / 10).determined_reactions
+    found = motion.determined_reactions
+    assert set(found) == set(still) and all((found[name] == still[name]).all() for name in still)
+
+
 @pytest.mark.parametrize("ground", ["frame", "body"])
 def test_violation_is_what_a_pose_and_its_rates_are_off_by(ground):
     motion = simulate(find_scene("planar_slider_crank").with_(ground=ground), times=TIMES[:3] / 10)
