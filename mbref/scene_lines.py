@@ -21,7 +21,7 @@ def with_lines(text: str, faults: Sequence[str]) -> list[str]:
     lines = list(_lines(text))
     names = _names(text, lines)
     return [
-        fault if LINE.search(fault) else f"{fault}{_told(_line_of(lines, names, fault))}" for fault in faults
+        fault if LINE.search(fault) else f"{fault}{_said(_line_of(lines, names, fault))}" for fault in faults
     ]
 
 
@@ -36,7 +36,7 @@ def toml_hint(text: str, error: str) -> str:
     return ""
 
 
-def _told(line: int | None) -> str:
+def _said(line: int | None) -> str:
     return "" if line is None else f" (line {line})"
 
 

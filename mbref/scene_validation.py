@@ -307,8 +307,8 @@ def _duplicates(key: str, names: Sequence[str], reserved: Sequence[str] = ()) ->
 
 
 def _unknown(what: str, name: str, known: Sequence[str] | set[str]) -> str:
-    told = ", ".join(sorted(filter(None, known))) or "none"
-    return f"unknown {what} {name!r}; known: {told}{meant(name, known)}"
+    sentence = ", ".join(sorted(filter(None, known))) or "none"
+    return f"unknown {what} {name!r}; known: {sentence}{meant(name, known)}"
 
 
 def _pair_faults(path: str, pair: Any, known: set[str]) -> Faults:

@@ -22,7 +22,7 @@ from mbref.scene import Scene, SceneError
 from mbref.simulation.limits import AUTO, FINEST, GENERATED, Limits
 from mbref.simulation.simulate import checked_run, finish_run
 
-ORDER = 24  # of the second run's series; a run chooses at most 22 at tolerances down to 1e-13
+ORDER = 24  # order of the second run; other runs use at most 22 at tolerances down to 1e-13
 RTOL_SERIES, RTOL_EXPLICIT = 1e-13, 1e-12  # of the second run
 TIGHTER = 0.1  # of the motion's own tolerance, if that gives a smaller one
 TRIED = 1e-12  # relative tolerance that is tried for a motion with a warning

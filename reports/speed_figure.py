@@ -105,8 +105,8 @@ def _curves(scene_runs: SceneRuns, axes: _Axes) -> Iterator[str]:
         drawn = [run for run in runs if run.completed and math.isfinite(run.error)]
         spots = [(axes.x(r.drawn[0]), axes.y(r.drawn[1])) for r in drawn]
         look = "hollow" if is_hollow(family) else ""
-        told = f'data-engine="{escape(engine)}" data-family="{escape(family)}"'
-        yield f'<g class="tone{tone(engine)} {look}" {told}>'
+        attributes = f'data-engine="{escape(engine)}" data-family="{escape(family)}"'
+        yield f'<g class="tone{tone(engine)} {look}" {attributes}>'
         dash = DASHES[order[engine] % len(DASHES)]
         for (x1, y1), (x2, y2) in itertools.pairwise(spots):
             yield (
@@ -129,9 +129,9 @@ def _mark(scene_runs: SceneRuns, run: Run, x: float, y: float) -> str:
         "steps": str(cost["steps"]),
         "outcome": run.outcome.label,
     }
-    told = " ".join(f'data-{name}="{escape(value)}"' for name, value in data.items())
+    attributes = " ".join(f'data-{name}="{escape(value)}"' for name, value in data.items())
     return (
-        f'<a class="run" href="#{of_run(run)}" aria-label="{said}" {told}><title>{said}</title>'
+        f'<a class="run" href="#{of_run(run)}" aria-label="{said}" {attributes}><title>{said}</title>'
         f'<svg x="{x:.2f}%" y="{y:.1f}" overflow="visible"><circle class="hit" r="12"/>'
         f'<path d="{mark(run.curve[0])}"/></svg></a>'
     )

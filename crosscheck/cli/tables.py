@@ -236,14 +236,14 @@ def _seconds(record: Record) -> str:
 
 def _print_messages(console: Console, records: Sequence[Record]) -> None:
     """Print the causes of failed runs; settings of a family with equal causes share a line."""
-    told: dict[tuple[str, str], list[str]] = {}
+    reported: dict[tuple[str, str], list[str]] = {}
     for r in records:
         if not is_completed(r):
             name, settings = _identity(r, records)
-            told.setdefault((name, f"{r['outcome']}: {r['message']}"), []).append(settings)
-    if told:
+            reported.setdefault((name, f"{r['outcome']}: {r['message']}"), []).append(settings)
+    if reported:
         console.print()
-    for (name, reason), alike in told.items():
+    for (name, reason), alike in reported.items():
         console.print(Text(f"{name} {'; '.join(alike)}: {reason}"))
 
 

@@ -1,7 +1,7 @@
 """Every card on many drawn mechanisms, each until it has its number; records are kept, so that a run resumes.
 
-All cards that ask something of a mechanism share its runs: the one judged, its twin, coarser ones and the
-exact motion are made once.
+All cards that ask something of a mechanism share its runs: the judged run, its perturbed run, coarser ones
+and the exact motion are made once.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.precision import grain, motion_rate, single_precision
 from crosscheck.judge.push_difference import accelerations_apart
 from crosscheck.judge.reaction_balance import balance, idle
-from crosscheck.judge.tolerances import GRAINS, OWN_ACCURACY, ROUNDING, SAME_MOTION, TWINS
+from crosscheck.judge.tolerances import GRAINS, OWN_ACCURACY, PERTURBED, ROUNDING, SAME_MOTION
 from mbref.trajectory import Trajectory
 
 
@@ -49,8 +49,10 @@ def settled(bench: Bench) -> Finding | Outside:
 def _rates(bench: Bench) -> Iterator[Finding]:
     """Against the exact ones: velocities; accelerations and reactions, where the engine gives them."""
     scene, motion, exact = bench.scene, bench.motion, bench.exact
-    steps, twins = (_speeds_apart(bench, motion, run) for run in (*bench.sweep[1:2], bench.twin))
-    allowed = max(SAME_MOTION, OWN_ACCURACY * steps, TWINS * twins)
+    steps, perturbed_difference = (
+        _speeds_apart(bench, motion, run) for run in (*bench.sweep[1:2], bench.perturbed)
+    )
+    allowed = max(SAME_MOTION, OWN_ACCURACY * steps, PERTURBED * perturbed_difference)
     yield Finding(_speeds_apart(bench, motion, exact), allowed, "velocities")
     if exact.acceleration is None:
         return

@@ -223,8 +223,8 @@ def _bits_apart(first: Trajectory, other: Trajectory) -> float:
     pairs = [(getattr(first, name), getattr(other, name)) for name in (*STATE, *SECOND)]
     found = other.reactions or {}
     pairs += [(wrench, found.get(joint)) for joint, wrench in (first.reactions or {}).items()]
-    told = [(a, b) for a, b in pairs if a is not None]
-    return float(np.max([np.inf if b is None else np.abs(a - b).max() for a, b in told]))
+    given = [(a, b) for a, b in pairs if a is not None]
+    return float(np.max([np.inf if b is None else np.abs(a - b).max() for a, b in given]))
 
 
 def other_times(bench: Bench) -> Finding:

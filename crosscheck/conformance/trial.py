@@ -26,11 +26,11 @@ from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.tolerances import (
     GRAINS,
     OWN_ACCURACY,
+    PERTURBED,
     RANK,
     SAME_MOTION,
     SAME_PUSHES,
     TRUTH_DRIVEN,
-    TWINS,
 )
 from crosscheck.judge.truth import NoSolution, closed_form, truth_for
 from crosscheck.processes.pool import Observation
@@ -213,7 +213,7 @@ class Bench:
     @cached_property
     def resolution(self) -> float:
         """Largest error of the finest run by the engine's measured order and floor."""
-        return max(SAME_MOTION, OWN_ACCURACY * self.left, TWINS * self.twins_apart)
+        return max(SAME_MOTION, OWN_ACCURACY * self.left, PERTURBED * self.perturbed_apart)
 
     @cached_property
     def rank(self) -> float:
@@ -226,28 +226,28 @@ class Bench:
         return difference(self.scene, self.sweep[k], self.sweep[k + 1])
 
     @cached_property
-    def twins_apart(self) -> float:
+    def perturbed_apart(self) -> float:
         """Difference of two runs whose scenes differ by two units in the last place of every number."""
-        return difference(self.scene, self.motion, self.twin)
+        return difference(self.scene, self.motion, self.perturbed)
 
     @cached_property
-    def twin(self) -> Trajectory:
+    def perturbed(self) -> Trajectory:
         """The run of a scene that differs by two units in the last place of every number."""
         return self.run(nudged(self.scene, self.rounding), self.times)
 
     @cached_property
     def own_pushes(self) -> float:
         """Return `own_accuracy` of accelerations and unique reactions."""
-        twins = pushes_apart(self.scene, self.motion, self.twin, self.rank)[0]
+        perturbed_difference = pushes_apart(self.scene, self.motion, self.perturbed, self.rank)[0]
         coarser = self.sweep[1] if len(self.sweep) > 1 else self.motion
         steps = pushes_apart(self.scene, self.motion, coarser, self.rank)[0]
-        return max(SAME_PUSHES, OWN_ACCURACY * steps, TWINS * twins)
+        return max(SAME_PUSHES, OWN_ACCURACY * steps, PERTURBED * perturbed_difference)
 
     @cached_property
     def own_accuracy(self) -> float:
-        """Largest difference of runs which should agree: multiples of what the two finest settings and twin
-        runs differ by, and no less than SAME_MOTION."""
-        return max(SAME_MOTION, OWN_ACCURACY * self.steps_apart, TWINS * self.twins_apart)
+        """Largest difference of runs which should agree: multiples of the differences of the two finest
+        settings and of perturbed runs, at least SAME_MOTION."""
+        return max(SAME_MOTION, OWN_ACCURACY * self.steps_apart, PERTURBED * self.perturbed_apart)
 
     @property
     def floors(self) -> str:

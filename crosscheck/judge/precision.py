@@ -50,8 +50,8 @@ def _of_bodies(scene: Scene, run: Trajectory) -> Iterator[Series]:
     for name, scale in scales.items():
         if (array := getattr(run, name)) is not None:
             unit = np.full(array.shape[-1], scale)
-            told = name.replace("_", " ")
-            yield from ((f"{told} of {body}", array[:, b], unit) for b, body in enumerate(run.bodies))
+            reported = name.replace("_", " ")
+            yield from ((f"{reported} of {body}", array[:, b], unit) for b, body in enumerate(run.bodies))
 
 
 def _of_joints(scene: Scene, run: Trajectory) -> Iterator[Series]:

@@ -120,9 +120,9 @@ OWN_ACCURACY = 4.0
 """Multiples of an engine's own accuracy by which such runs may differ: each is off by about one, and what
 the coarser setting adds is not all of it."""
 
-TWINS = 100.0
-"""Multiples of the difference of twin runs, whose data differ by two units in the last place, by which runs
-that should agree may differ: a rotated or reordered scene rounds in every operation, not only in its data."""
+PERTURBED = 100.0
+"""Multiples of the difference of perturbed runs, whose data differ by two units in the last place, by which
+runs that should agree may differ: a rotated or reordered scene rounds in every operation."""
 
 REACTIONS = 1e-3
 """Part of the largest force by which reactions of a conforming engine may miss what moves the bodies: they

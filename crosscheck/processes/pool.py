@@ -45,7 +45,7 @@ def run_isolated(
     engine.
     """
     _check(engine_name)
-    with _lent(engine_name) as child:
+    with _in_use(engine_name) as child:
         run = _observed(child, engine_name, scene, times, setting, time_limit).value
         if run.outcome is not Outcome.COMPLETED:
             child.kill()
@@ -58,13 +58,13 @@ def run_in_turn(
     """`run_isolated` in a child that serves on after a run that ended early: for many short runs of an engine
     that ends by itself and leaves nothing behind."""
     _check(engine_name)
-    with _lent(engine_name) as child:
+    with _in_use(engine_name) as child:
         return _observed(child, engine_name, scene, times, setting, time_limit).value
 
 
 def apart(function: Callable[..., Any], arguments: tuple[Any, ...], time_limit: float) -> Any:
     """``function(*arguments)`` in a child process, within CPU time (s); raises ChildFailed."""
-    with _lent(NO_ENGINE) as child:
+    with _in_use(NO_ENGINE) as child:
         return child.call(function, arguments, time_limit).value
 
 
@@ -86,7 +86,7 @@ def observe(
 def _observed_in_copy(
     engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, time_limit: float
 ) -> Observation:
-    with _lent(f"{engine_name} {setting.family} ready") as child:
+    with _in_use(f"{engine_name} {setting.family} ready") as child:
         seen = _observed(child, engine_name, scene, times, setting, time_limit, in_copy=True)
         if seen.value.outcome is not Outcome.COMPLETED:
             child.kill()
@@ -109,7 +109,7 @@ def ask(engine_name: str, question: Callable[..., Any], about: tuple[Any, ...], 
     Raises ChildFailed when that fails, LookupError for an unknown engine.
     """
     _check(engine_name)
-    with _lent(engine_name) as child, _starts(child):
+    with _in_use(engine_name) as child, _starts(child):
         return child.call(question, (engine_name, *about), time_limit).value
 
 
@@ -195,7 +195,7 @@ def starting() -> dict[int, str]:
 
 
 @contextmanager
-def _lent(engine_name: str) -> Iterator[Child]:
+def _in_use(engine_name: str) -> Iterator[Child]:
     """A child that waits for a run of the engine, or a new one."""
     with _lending:
         known = [entry for entry in _idle if entry[0] == engine_name and entry[1].is_alive]

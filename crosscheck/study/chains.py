@@ -47,7 +47,7 @@ class Chains(ThreadPoolExecutor):
     def _serve(self, engine: str) -> None:
         while call := self._next(engine):
             future, run, case = call
-            if future.set_running_or_notify_cancel() and (made := _told(future, run, case)):
+            if future.set_running_or_notify_cancel() and (made := _reported(future, run, case)):
                 self._measuring.submit(self._finish, future, case, made)
 
     def _next(self, engine: str) -> Call | None:
@@ -58,11 +58,11 @@ class Chains(ThreadPoolExecutor):
             return None
 
     def _finish(self, future: Future[Record], case: Case, trajectory: Trajectory) -> None:
-        if record := _told(future, self._measure, case, trajectory):
+        if record := _reported(future, self._measure, case, trajectory):
             future.set_result(record)
 
 
-def _told(future: Future[Record], function: Callable[..., Any], *arguments: Any) -> Any:
+def _reported(future: Future[Record], function: Callable[..., Any], *arguments: Any) -> Any:
     """Return the function's value; None if it raises, which the future then raises for its owner."""
     try:
         return function(*arguments)

@@ -107,10 +107,10 @@ def _measured(
         others, more = _few(_other_families(groups, by_key), [], path)
         groups, by_key = [*groups, *others], by_key | more
     run = [case for group in groups for case in group if key(case) in by_key]
-    told, found = [by_key[key(case)] for case in run], truths.result()
-    moving = _pictures(list(zip(run, told, strict=True)), found, wanted.out)
+    reported, found = [by_key[key(case)] for case in run], truths.result()
+    moving = _pictures(list(zip(run, reported, strict=True)), found, wanted.out)
     long = sweep.QUICK_LONG if wanted.is_quick else sweep.LONG
-    timed = with_timings(run, told, _file(wanted, "timings.jsonl"), notice, long, wanted.repeats)
+    timed = with_timings(run, reported, _file(wanted, "timings.jsonl"), notice, long, wanted.repeats)
     return Collection(scenes, timed, [by_key[key(gate)] for gate in gates], found, *moving)
 
 

@@ -122,13 +122,13 @@ def circumstances(old: Mapping[Identity, Record], new: Mapping[Identity, Record]
 def _circumstances(records: Mapping[Identity, Record]) -> dict[str, str]:
     found: dict[str, dict[str, None]] = {}
     for record in records.values():
-        told = {
+        reported = {
             record["engine"]: record["version"],
             **record["versions"],
             **record["machine"],
             "commit": record.get("commit"),
         }
-        for name, value in told.items():
+        for name, value in reported.items():
             if value not in ("", None):
                 found.setdefault(name, {})[str(value)] = None
     return {name: ", ".join(sorted(values)) for name, values in found.items()}

@@ -245,8 +245,8 @@ def commit() -> str | None:
     root = Path(__file__).parents[2]
     if not (root / ".git").exists():
         return None
-    told = [_git(root, "rev-parse", "--short=12", "HEAD"), _git(root, "status", "--porcelain", "-uno")]
-    return None if told[0] is None else told[0] + ("+" if told[1] else "")
+    reported = [_git(root, "rev-parse", "--short=12", "HEAD"), _git(root, "status", "--porcelain", "-uno")]
+    return None if reported[0] is None else reported[0] + ("+" if reported[1] else "")
 
 
 def _git(root: Path, *arguments: str) -> str | None:

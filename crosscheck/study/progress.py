@@ -158,7 +158,7 @@ class _Lines:
 
     def __init__(self, what: str, total: int, console: Console, under_way: UnderWay):
         self._what, self._total, self._console, self._under_way = what, total, console, under_way
-        self._start, self._told, self._done = time.monotonic(), 0, 0
+        self._start, self._reported, self._done = time.monotonic(), 0, 0
         self._printed, self._over = self._start, threading.Event()
         self._watch = threading.Thread(target=self._name_work, daemon=True)
 
@@ -172,9 +172,9 @@ class _Lines:
 
     def __call__(self, done: int, total: int, last: str) -> None:
         self._done, self._total = done, total
-        if PARTS * done // total == PARTS * self._told // total:
+        if PARTS * done // total == PARTS * self._reported // total:
             return
-        self._told = done
+        self._reported = done
         taken = time.monotonic() - self._start
         left = f", about {taken / done * (total - done):.0f} s left" if done < total else ""
         self._print(f"{left}; {last}")

@@ -49,14 +49,14 @@ def verdict(groups: Sequence[Judged], difference: str | None = None) -> Verdict:
 
 def headline(groups: Sequence[Judged]) -> str:
     """Who is right at best and at the defaults, in one line, and of how much of the motions that is known."""
-    told = [group for group in groups if group.is_judged]
+    reported = [group for group in groups if group.is_judged]
     others = not_judged(groups)
-    if not told and others:
+    if not reported and others:
         return f"{others}."
-    if not told:
+    if not reported:
         these = "this motion" if len(groups) == 1 else "these motions"
         return f"There is no reference for {these}: the engines are compared with each other."
-    at_best = _worst(told, Judged.best)
+    at_best = _worst(reported, Judged.best)
     good = [name for name, found in at_best.items() if found is Grade.RIGHT]
     first = (
         f"{'Both' if len(good) == 2 else f'All {len(good)}'} engines are right at their best settings"
@@ -65,11 +65,11 @@ def headline(groups: Sequence[Judged]) -> str:
         if good
         else f"No engine is right{_everywhere(groups)} at any setting that was run"
     )
-    far = up_to(told)
+    far = up_to(reported)
     if far:
         first = f"{far}, as far as the motion is known, {uncapitalised(first)}"
     end = f"; {others}" if others else ""
-    return f"{first}{_where_known(groups, told, good)}; {_defaults_in_short(told)}{end}."
+    return f"{first}{_where_known(groups, reported, good)}; {_defaults_in_short(reported)}{end}."
 
 
 def not_judged(groups: Sequence[Judged]) -> str:
@@ -95,26 +95,26 @@ def _reasons(groups: Sequence[Judged]) -> list[str]:
 
 def right(groups: Sequence[Judged]) -> str:
     """Errors of the engines at their best settings; without a truth, how far they agree."""
-    told = [group for group in groups if group.is_judged]
-    if not told:
+    reported = [group for group in groups if group.is_judged]
+    if not reported:
         alike = [group for group in groups if not group.differences]
         return " ".join([*map(_agreement, alike), *_reasons(groups)])
     errors: dict[str, list[float]] = {}
-    for group in told:
+    for group in reported:
         for name, record in group.best().items():
             errors.setdefault(name, []).append(
                 error(record) if grade(record) is not Grade.FAILED else math.inf
             )
     worst = {name: max(found) for name, found in errors.items()}
-    sure = max(group.truth["bound"] or 0.0 for group in told)
-    good = [name for name, e in worst.items() if math.isfinite(e) and _of(told, name) is Grade.RIGHT]
+    sure = max(group.truth["bound"] or 0.0 for group in reported)
+    good = [name for name, e in worst.items() if math.isfinite(e) and _of(reported, name) is Grade.RIGHT]
     sentences = []
     if good:
         most = at_most(max(worst[name] for name in good), sure)
-        where = _on(told, good) if len(told) == len(groups) else f" on {names(told)}"
-        far = " as far as it is known" if any(group.truth["reason"] for group in told) else ""
+        where = _on(reported, good) if len(reported) == len(groups) else f" on {names(reported)}"
+        far = " as far as it is known" if any(group.truth["reason"] for group in reported) else ""
         sentences = [f"{listed(map(title, good))} {agree(good)} with the truth to {most}{where}{far}."]
-    sentences += [_less_than_right(told, name) for name in worst if name not in good]
+    sentences += [_less_than_right(reported, name) for name in worst if name not in good]
     return " ".join([*sentences, *_reasons(groups)])
 
 
@@ -221,8 +221,8 @@ def _other_failures(groups: Sequence[Judged]) -> str:
     runs = [r for group in groups for r in group.comparable if r["family"] != "defaults"]
     bad = {verdict: [r for r in runs if grade(r) is verdict] for verdict in (Grade.FAILED, Grade.WRONG)}
     verbs = {Grade.FAILED: "", Grade.WRONG: f"{is_or_are(bad[Grade.WRONG])} "}
-    told = [f"{len(found)} {verbs[verdict]}{verdict}" for verdict, found in bad.items() if found]
-    return f" Of {len(runs)} runs at other settings, {listed(told)}." if told else ""
+    reported = [f"{len(found)} {verbs[verdict]}{verdict}" for verdict, found in bad.items() if found]
+    return f" Of {len(runs)} runs at other settings, {listed(reported)}." if reported else ""
 
 
 def _defaults_in_short(groups: Sequence[Judged]) -> str:
@@ -281,10 +281,10 @@ def _on(groups: Sequence[Judged], engines: Sequence[str] = ()) -> str:
     return "" if count == 1 else " on both scenes" if count == 2 else f" on all {count} scenes"
 
 
-def _where_known(groups: Sequence[Judged], told: Sequence[Judged], good: Sequence[str]) -> str:
+def _where_known(groups: Sequence[Judged], reported: Sequence[Judged], good: Sequence[str]) -> str:
     """The scenes that a headline is of."""
-    if len(told) < len(groups):
-        return f" on {names(told)}, whose {'motion is' if len(told) == 1 else 'motions are'} known"
+    if len(reported) < len(groups):
+        return f" on {names(reported)}, whose {'motion is' if len(reported) == 1 else 'motions are'} known"
     return _on(groups, good) if good else ""
 
 

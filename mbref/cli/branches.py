@@ -30,7 +30,7 @@ def chosen(smooth: Motion, number: int | None) -> int:
         )
     several = of_several_branches(smooth)
     if number is None and not several:
-        which = "; ".join(told(smooth, k) for k in range(1, passed + 1)) or "the motion passes none"
+        which = "; ".join(sentence(smooth, k) for k in range(1, passed + 1)) or "the motion passes none"
         raise ValueError(f"--branches: no singular position {until} has several branches: {which}")
     return number or several[0]
 
@@ -54,7 +54,7 @@ def along_branches(
     return {_title(branch, motion): motion for branch, motion in enumerate(motions, SMOOTH)}
 
 
-def told(motion: Motion, number: int) -> str:
+def sentence(motion: Motion, number: int) -> str:
     """One sentence on a singular position."""
     assert motion.crossings is not None
     crossing = motion.crossings[number - 1]

@@ -200,10 +200,10 @@ def _swap_lines(swaps: list[dict[str, str]], redundant: bool) -> list[str]:
 def _driver_lines(scene: Scene) -> list[str]:
     """A line where more drivers than freedoms make rows redundant, whatever the joints are."""
     freedoms = scene.with_(driver=(), load=()).counts().degrees_of_freedom
-    told = (
+    sentence = (
         f"  more drivers than degrees of freedom ({len(scene.driver)} and {freedoms}): redundant rows remain"
     )
-    return [told] * (len(scene.driver) > freedoms)
+    return [sentence] * (len(scene.driver) > freedoms)
 
 
 def _unique(found: Diagnosis) -> str:

@@ -105,10 +105,10 @@ class Lines:
         self._began = self._said = clock()
 
     def __call__(self, done: float) -> None:
-        """Told how far it is; writes a line where ten seconds have passed since the last."""
+        """Write a line with the progress if ten seconds have passed since the last one."""
         now = self._clock()
         if now - self._said >= PAUSE and done > 0:
             self._said = now
             left = (now - self._began) * (self._end / done - 1)
-            told = f"about {left:.0f} s left" if left < HOUR else "more than an hour left"
-            print(f"{self._what}: {100 * done / self._end:.0f} %, {told}", file=sys.stderr)
+            sentence = f"about {left:.0f} s left" if left < HOUR else "more than an hour left"
+            print(f"{self._what}: {100 * done / self._end:.0f} %, {sentence}", file=sys.stderr)

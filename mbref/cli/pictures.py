@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mbref.cli.branches import along_branches, chosen, of_several_branches, told
+from mbref.cli.branches import along_branches, chosen, of_several_branches, sentence
 from mbref.cli.options import TEXT, add_method_options, add_scene, limits_of, sample_times
 from mbref.cli.output import progress_bar, warn
 from mbref.drawing.film import write_film
@@ -105,14 +105,14 @@ def _animate(options: argparse.Namespace) -> int:
         if parted:
             number = chosen(motion, options.crossing)
             motions = along_branches(simulate, motion, method, limits, number)
-            picture = partial(side_by_side, scene, motions, f"{scene.name}: {told(motion, number)}", view)
+            picture = partial(side_by_side, scene, motions, f"{scene.name}: {sentence(motion, number)}", view)
     if path.suffix == ".svg":
         path.write_text(picture(), encoding="utf-8")
     else:
         write_film(path, scene, motion, view)
     print(path)
     if not parted and (several := of_several_branches(motion)):
-        print(f"{told(motion, several[0])}; --branches shows them side by side")
+        print(f"{sentence(motion, several[0])}; --branches shows them side by side")
     ended = [m for m in motions.values() if m.outcome.name != "COMPLETED"]
     for motion in ended:
         print(f"{motion.outcome.name}: {motion.message}")

@@ -102,7 +102,7 @@ class Work:
         self._done: SimpleQueue[Future[Ended]] = SimpleQueue()
         self._waiting: list[Job] = []
         self._since = 0.0  # s, when the first of them began to wait
-        self._at_once = 0  # runs that are given at a time; 0 before the first has told how long it takes
+        self._at_once = 0  # runs given to a worker at a time; 0 until the first run was timed
         self._cores = os.cpu_count() or 1
         self.error: Exception | None = None
 

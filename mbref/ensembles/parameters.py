@@ -17,7 +17,7 @@ class Parameters:
     """Arrays of memory, each with the values (s, …) of s scenes.
 
     ``values`` are (array, values), or (record, values, name of a number in it).  ``saved`` numbers are
-    restored before those of a scene are written.
+    restored before the values of a scene are written.
     """
 
     def __init__(self, values: Sequence[tuple[Any, ...]], saved: SavedNumbers | None = None):

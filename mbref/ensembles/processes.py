@@ -72,7 +72,7 @@ class Worker:
         return found
 
     def end(self, wait: bool = True) -> None:
-        """Have the process end after its call."""
+        """Request that the process ends after its call."""
         self._pipe.close()
         if wait:
             self._process.join()

@@ -1,4 +1,4 @@
-"""Active coordinates: those of a scene that can ever move; the others need no equation.
+"""Active coordinates: the coordinates of a scene that can move; the others need no equation.
 
 Rows and columns of Φ_q that hang together by non-zero entries form a block.  A block on which no force, no γ,
 Φ or ν and no initial velocity acts stays at rest with multipliers of zero; the bending of a planar mechanism
@@ -16,7 +16,7 @@ from mbref.equations.model import Model, Terms
 from mbref.equations.random_states import RandomStates, random_states
 
 STATES = 2  # random states, so that an accidental zero at one does no harm
-STILL = 1e-12  # of the scene's length, of 1, or of the largest velocity: the rounding of corrections
+STILL = 1e-12  # fraction of the length, of 1 rad, or of the largest velocity: rounding
 
 
 def active_entries(
@@ -24,7 +24,7 @@ def active_entries(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Which velocities (n,) can move, and which Jacobian entries (m, 12) of theirs can be other than zero.
 
-    q (7 nb,) and v (6 nb,) are the start.  Columns of entries are those of ``layout.System.blocks``.
+    q (7 nb,) and v (6 nb,) are the start.  Entries have the columns of ``layout.System.blocks``.
     The states at which equations are read are added to ``read``.
     """
     states = random_states(1, STATES, model.n)
@@ -80,8 +80,8 @@ def reached(
 def without_rounding(
     q: np.ndarray, v: np.ndarray, given: np.ndarray, length: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates (s, 7 nb) and velocities (s, 6 nb) of starts with zero for the roundings of zero, but for
-    velocities that are ``given`` (s, 6 nb).  Of s scenes of lengths (s,) in m."""
+    """Coordinates (s, 7 nb) and velocities (s, 6 nb) of starts, with entries of round-off size set to zero,
+    except velocities that are ``given`` (s, 6 nb).  Of s scenes of lengths (s,) in m."""
     small = np.full((len(q), q.shape[1] // 7, 7), STILL)
     small[..., :3] *= length[:, None, None]
     largest = np.abs(v).max(axis=1, keepdims=True, initial=0.0)

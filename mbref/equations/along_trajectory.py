@@ -15,7 +15,7 @@ from mbref.trajectory import Trajectory
 def violations(scene: Scene, motion: Trajectory) -> Violation:
     """Return the largest |Φ|, |Φ_q q' - ν| and |Φ_q q'' - γ| over the constraint rows at each sample.
 
-    Rows are those of ``equations.primitives``: metres, or cosines of axes that stay
+    Rows are defined in ``equations.primitives``: metres, or cosines of axes that stay
     perpendicular and sines of driven angles, which are radians to first order.
     """
     model = Model(without_armatures(scene))

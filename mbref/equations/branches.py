@@ -17,18 +17,18 @@ from mbref.equations.model import Model
 from mbref.equations.units import row_lengths
 
 SMOOTH = 1  # the branch that is taken unless another is asked for
-MOST_ROWS = 120  # beyond it the singular values of a crossing take longer than the run
-RANK = 1e-6  # relative singular value that is zero at a singular position
-FLAT = 1e-7  # relative size of a quadratic form that is zero
+MOST_ROWS = 120  # constraint rows: for more, the analysis takes longer than the run
+RANK = 1e-6  # relative singular value that counts as zero at a singular position
+FLAT = 1e-7  # relative size of a quadratic form that counts as zero
 SAME = 1e-4  # rad between directions that are one
-BROAD = 0.05  # the same of multiple roots, to which Newton's method converges slowly
-ZERO, CONVERGED = 1e-12, 1e-10  # of the forms, and of the last iteration's change, at a root
-STARTS, ITERATIONS = 200, 40  # of Newton's method where more than two freedoms meet
+BROAD = 0.05  # distance of multiple roots, to which Newton's method converges slowly
+ZERO, CONVERGED = 1e-12, 1e-10  # at a root: size of the forms, last change of the iteration
+STARTS, ITERATIONS = 200, 40  # of Newton's method for more than two degrees of freedom
 
 NO_OTHER = "the smooth branch only"
 ALONE = "one branch"
 OPEN = "all directions agree with the constraints to second order"
-TANGENT = "branches with a common tangent, which second order does not tell apart"
+TANGENT = "branches with a common tangent, which second order does not separate"
 NOT_LOOKED_FOR = f"branches of scenes with more than {MOST_ROWS} rows are not looked for"
 MULTIPLE = " and others that second order does not determine"
 CONE = "a cone of directions, of which the smooth one is listed"
@@ -76,7 +76,7 @@ class SecondOrder(NamedTuple):
 
     kernel: np.ndarray
     forms: np.ndarray
-    scale: np.ndarray  # of velocities and time: columns of unit length
+    scale: np.ndarray  # scaling of velocities and time: columns of unit length
 
 
 def branches(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Branches:

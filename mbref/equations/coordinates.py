@@ -25,7 +25,7 @@ def coordinate_rates(q, v, rates):
 
 @inlined
 def normalise(q):
-    """Euler parameters of every body back to unit length."""
+    """Normalise the Euler parameters of every body to unit length."""
     for b in range(q.shape[0] // 7):
         square = 0.0
         for k in range(3, 7):

@@ -10,11 +10,11 @@ from mbref.equations.model import Model, displaced
 from mbref.scene import Scene
 
 PERTURBATION = 1e-2  # rad, by which the fastest body turns away from a singular start
-RANK_TOLERANCE = 1e-10  # relative, of least-squares solutions: redundant rows are consistent
+RANK_TOLERANCE = 1e-10  # relative residual of least squares below which rows are consistent
 
 
 def undriven_freedoms(scene: Scene) -> int:
-    """Degrees of freedom that no driver prescribes; counted beside the start where that is singular."""
+    """Return the degrees of freedom that no driver prescribes, counted near the start if that is singular."""
     model = Model(scene)
     return freedoms_left(model, consistent_start(model))
 

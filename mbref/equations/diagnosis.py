@@ -18,8 +18,8 @@ from mbref.scene_services import Counts
 from mbref.scenes import find_scene
 
 RANK_TOLERANCE = 1e-10  # relative to the largest singular value of the scaled Jacobian
-UNIQUE_TOLERANCE = 1e-8  # a row takes part in a redundancy when its weight in it exceeds this
-UNIQUE_SHARE = 1e-9  # the same for the squares of a large scene, where other singular values leave 1e-12
+UNIQUE_TOLERANCE = 1e-8  # weight above which a row takes part in a redundancy
+UNIQUE_SHARE = 1e-9  # limit of squared weights in large scenes, whose rounding is 1e-12
 COMPONENTS = tuple(f"{kind} {axis}" for kind in ("force", "moment") for axis in "xyz")
 
 
@@ -47,7 +47,7 @@ class Diagnosis:
     counts: Counts
     redundant_by_joint: dict[str, int]  # rows that take part in a redundancy; their reactions are not unique
     unique_reactions: tuple[str, ...]  # joints all of whose rows have a unique multiplier
-    smallest_singular_value: float  # of Φ_q with unit rows, above rank: the distance to a singular position
+    smallest_singular_value: float  # of Φ_q with unit rows: distance to a singular position
     largest_singular_value: float
     determined_reactions: dict[str, tuple[str, ...]] | None = None
 

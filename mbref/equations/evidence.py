@@ -30,7 +30,7 @@ class Answers(NamedTuple):
 
 
 class Evidence:
-    """The questions about a scene's numbers that decide its reduction, and their answers.
+    """Structural decisions about a scene's parameters on which its reduction depends.
 
     The choice of active ``entries`` (m, 12) evaluates the terms at each of ``read``; the choice of statically
     determined rows asks the remaining questions.

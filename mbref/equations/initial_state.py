@@ -19,17 +19,17 @@ from mbref.scene import Body, SceneError
 
 RANK_TOLERANCE = 1e-5  # singular values below it (relative) are left alone: rank may drop at the start
 LARGE = 40  # rows; above, dense singular values take longer than sparse factors
-GROSS = 0.05  # of the scene's length, or of given velocities: a larger inconsistency is a fault
-CONTRADICTED = 1e-3  # of the speed by which drivers may miss the joints: rounded rates leave less
+GROSS = 0.05  # violation / scene's length, or / given velocities: a larger one is a fault
+CONTRADICTED = 1e-3  # violation by drivers / speed: rounding of rates leaves less
 MOST_ITERATIONS = 30
 OPEN_WEIGHT, REPEATS = 1e-4, 5  # weight of open velocities beside given ones, and how often it is compensated
-MET = 1e-13  # of the largest velocity: those of another branch miss Φ_q v = ν by more
-BESIDE_RANK = 1e-9  # singular values below which they are not corrected
+MET = 1e-13  # residual of Φ_q v = ν / largest velocity: on another branch it is larger
+NEAR_SINGULAR_RANK = 1e-9  # singular values below which they are not corrected
 BRANCH = (
-    "initial velocities that the scene leaves open at a singular position are those of the branch with the "
+    "initial velocities that the scene does not give belong, at a singular position, to the branch with the "
     "least kinetic energy"
 )
-LEAST_WEIGHT = 1e-6  # of a turn that no inertia resists, relative to the largest mass or inertia
+LEAST_WEIGHT = 1e-6  # weight of a rotation without inertia / largest mass or inertia
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Start:
     position_violation: float  # largest |Φ| before correction (m or rad)
     velocity_violation: float  # largest |Φ_q v - ν| of fully given velocities before correction
     given: np.ndarray  # (6 nb,) the velocities that the scene gives, zero elsewhere
-    follows_branch: bool = False  # whether velocities that the scene leaves open are those of a branch
+    follows_branch: bool = False  # True if undetermined velocities were taken from a branch
 
     def report(self) -> str:
         """One sentence for the user; empty where nothing but rounding was corrected."""
@@ -153,7 +153,7 @@ def _best_met(model: Model, q: np.ndarray, along: list[np.ndarray]) -> np.ndarra
     best = along[int(np.argmin(off)) if max(off) > MET else 0]
     terms = model.terms(0.0, q, best)
     jacobian, nu = _unit_rows(terms.jacobian, terms.nu)
-    return best + np.linalg.lstsq(jacobian, nu - jacobian @ best, rcond=BESIDE_RANK)[0]
+    return best + np.linalg.lstsq(jacobian, nu - jacobian @ best, rcond=NEAR_SINGULAR_RANK)[0]
 
 
 def _fault(model: Model, row: int, what: str) -> SceneError:

@@ -193,12 +193,12 @@ def _singular_values(matrices: np.ndarray) -> np.ndarray:
 
 
 class Places(NamedTuple):
-    """Of every joint the body in whose coordinates its wrench is read, its place, 0 or 1, and its rows."""
+    """For every joint: the body in whose coordinates its wrench is computed, its place (0 or 1), its rows."""
 
     body: np.ndarray
     side: np.ndarray
     of: np.ndarray  # the joint of each row
-    starts: np.ndarray  # the first row of each joint: those of a joint stand together, in its order
+    starts: np.ndarray  # first row of each joint; the rows of a joint are adjacent
 
 
 @functools.lru_cache(maxsize=MOST_KEPT)

@@ -41,9 +41,9 @@ class Terms:
 
 
 class Model:
-    """A scene packed once; ``bodies`` are those of the scene, then the ground if it is modelled.
+    """A scene packed once; ``bodies`` lists the bodies of the scene, then the ground if it is modelled.
 
-    ``entry_columns`` (m, 12) says the column of every entry of the blocks; those of the fixed frame are ≥ n.
+    ``entry_columns`` (m, 12) has the columns of the blocks' entries; columns of the fixed frame are ≥ n.
     A scene without all masses is ``kinematic``: M is the identity and there are no forces.
     """
 
@@ -132,7 +132,7 @@ class Model:
         return matrix[..., : self.nb, :].reshape(*blocks.shape[:-1], self.n)
 
     def along(self, times: np.ndarray, q: np.ndarray, v: np.ndarray) -> Terms:
-        """The terms at k states, with the blocks (k, m, 12) in place of Jacobians; mass (n,) is that of all.
+        """The terms at k states, with the blocks (k, m, 12) instead of Jacobians; mass (n,) is constant.
 
         From times (k,) in s, q (k, 7 nb) and v (k, n).
         """

@@ -48,7 +48,7 @@ from mbref.scene import (
 Numbers = tuple[float, ...]
 AT_REST = Sine(amplitude=0.0, frequency=0.0, phase=0.0)
 AT_ORIGIN = (*NONE, 1.0, *NONE, 1.0, 1.0, 1.0, 1.0)  # the fixed frame, as ``_of_body``
-OF_MASS = np.array([7, 7, 7, 8, 9, 10])  # of the numbers of a body: the diagonal of its part of M
+OF_MASS = np.array([7, 7, 7, 8, 9, 10])  # indices of a body's parameters on the diagonal of M
 
 
 class Packs:
@@ -101,7 +101,7 @@ class Packs:
     def _in_order(
         self, of_joints: Sequence[list[Numbers]], of_couplings: Sequence[Sequence[tuple[Primitive, ...]]]
     ) -> list[Numbers]:
-        """The numbers of all primitives, scene by scene: those of its joints, then those of its couplings."""
+        """Return the parameters of all primitives, scene by scene: joints first, then couplings."""
         if not any(of_couplings):
             return [numbers for rows in of_joints for numbers in rows]
         found: list[Numbers] = []

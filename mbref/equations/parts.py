@@ -30,7 +30,7 @@ def _shape_of_inertia(body: Body) -> bool | None:
 
 
 class Parts(NamedTuple):
-    """Bodies, joints and couplings of a scene's equations, those of the scene first."""
+    """Bodies, joints and couplings of a scene's equations, in the order of the scene."""
 
     bodies: tuple[Body, ...]
     joints: tuple[Joint, ...]

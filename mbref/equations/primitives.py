@@ -117,7 +117,7 @@ def turned_direction(p, t, scene):
 
 @kernel
 def dot1(p, t, equations):
-    """A vector on each body stay perpendicular; with a driver, the first turns by its angle."""
+    """Dot-1 constraint: a vector on each body, kept perpendicular; a driver rotates the first one."""
     primitives, frames = equations.scene.primitives, equations.frames
     rows, blocks, rotation = equations.rows, equations.system.blocks, frames.rotation
     i, j, row = primitives.first[p], primitives.second[p], primitives.row[p]
@@ -143,7 +143,7 @@ def dot1(p, t, equations):
 
 @kernel
 def between(p, primitives, frames):
-    """d from the point of the first body to that of the second, its rate, and d'' without q̈ (world)."""
+    """Return the vector d between the points of both bodies, its rate, and d'' without q̈ (world)."""
     i, j, a = primitives.first[p], primitives.second[p], frames.rotation
     s_i, s_j = vector(primitives.point_first, p), vector(primitives.point_second, p)
     w_i, w_j = vector(frames.angular_velocity, i), vector(frames.angular_velocity, j)

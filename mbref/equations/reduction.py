@@ -24,7 +24,7 @@ from mbref.kernels.layout import Active, SparseFactor, StaticRows, Symbolic
 from mbref.kernels.scene_layout import Primitives, SceneData
 from mbref.linear_algebra.symbolic_factorisation import sparse_factor, unsigned
 
-MOST_STRUCTURES, MOST_OF_ONE = 64, 8  # whose reductions are kept
+MOST_STRUCTURES, MOST_OF_ONE = 64, 8  # cache sizes: structures, and reductions of one structure
 
 _known: dict[Structure, list[Reduction]] = {}
 

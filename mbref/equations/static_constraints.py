@@ -6,7 +6,7 @@ v = 0, from the start on.  Such rows and columns are eliminated before the facto
 rows may bear on as few columns; their multipliers balance the forces on the columns.  Rows are examined at
 random states of all other coordinates; the columns held need not be moved, because they rest.
 
-Columns on which a redundant row bears stay in the system, because the sharing of reactions depends on all of
+Columns that a redundant row contains stay in the system, because the sharing of reactions depends on all of
 them; so do columns without mass, which formulations refuse.  Where a driver works against a group, no row is
 eliminated.
 """
@@ -29,9 +29,9 @@ from mbref.linear_algebra.redundancy import dense_null_shares, null_shares
 from mbref.linear_algebra.symbolic_factorisation import symbolic_factorisation, unsigned
 
 STATES = 3  # random states at which rows are examined
-MOST = 3  # columns that a group of rows holds
-SMALL = 1e-9  # length of a row (1 or m) that may be rounding
-ROUNDING = 1e-12  # relative, of lengths that are constant and of rows that are perpendicular
+MOST = 3  # most columns that a group of rows determines
+SMALL = 1e-9  # length of a row (1 or m) below which it may be rounding
+ROUNDING = 1e-12  # relative rounding of constant lengths and perpendicular rows
 REDUNDANT = 1e-10  # share of a row in the left null space; with singular values over 1e-2 others have 1e-12
 
 
@@ -109,7 +109,7 @@ class Asked:
     """The questions about a scene's numbers by which rows that hold columns were found."""
 
     def __init__(self) -> None:
-        self.read: list[RandomStates] = []  # at which the Jacobian was read
+        self.read: list[RandomStates] = []  # states at which the Jacobian was evaluated
         self.tried: list[Tried] = []
         self.shared = np.zeros(0, dtype=int)  # rows that may be redundant
 

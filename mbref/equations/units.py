@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-SPREAD = 0.5  # of a body's length; a slender rod's transverse moment is that of 0.58
-SMALLEST = 1e-9  # of the largest length; a shorter one is rounding
+SPREAD = 0.5  # radius of gyration / body length; 0.58 for a slender rod about its end
+SMALLEST = 1e-9  # length / largest length: shorter ones are rounding
 
 
 def metric(mass: np.ndarray, lengths: np.ndarray) -> np.ndarray:

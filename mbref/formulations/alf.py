@@ -5,7 +5,7 @@
 Eq. 19 is misprinted: its load has Φ_q q̈_i where the velocity violation Φ' = Φ_q q' - ν belongs, and Φ_q
 where Φ does.  Its β is used nowhere.  Eq. 20 stops when the change is ≤ epsilon; here relative to the
 larger of 1 and the acceleration.  α weights rows of unit length in the metric of M, so that it does not
-depend on units.  The number α multiplies loses digits: rounding is α times that of the accelerations
+depend on units.  The product with α loses digits: its rounding is α times the rounding of the accelerations
 (see ``alf-dual``).
 """
 
@@ -34,10 +34,9 @@ ABOUT = About(
     text=(
         "Eqs. 17 to 20, with the load of Eq. 19 as it must be: the violation of velocities and of positions."
     ),
-    use="Redundant rows and singular mass matrices at once; as the method of the paper.",
+    use="Mechanisms with redundant rows and a singular mass matrix; comparison with the paper.",
     fails=(
-        "The penalty α multiplies rounding errors: α times those of the accelerations. For accuracy take"
-        " `alf-dual`."
+        "The penalty α multiplies the rounding errors of the accelerations. For accuracy take `alf-dual`."
     ),
 )
 

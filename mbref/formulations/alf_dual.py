@@ -1,16 +1,15 @@
-"""ALF-dual: the same iteration as ALF, on the m x m matrix of its multipliers.
+"""ALF-dual: the iteration of ALF on the m x m matrix of its multipliers.
 
     (S + I/α) Δλ = Φ_q q̈_i - γ,   q̈_{i+1} = q̈_i - M⁻¹ Φ_qᵀ Δλ,   S = Φ_q M⁻¹ Φ_qᵀ,   q̈_0 = M⁻¹ g
 
-By the Woodbury identity its iterates are those of Eqs. 17 to 19.  But α enters as 1/α beside S instead of
-multiplying Φ_qᵀ Φ_q beside M, so that a large α costs no digits and few iterations are needed; no rank
-is decided.  Regularised rows are those of unit length in the metric of M.  The iteration is
+By the Woodbury identity its iterates satisfy Eqs. 17 to 19.  α enters as 1/α added to S, and not as a
+factor of Φ_qᵀ Φ_q added to M, so that a large α costs no digits and few iterations are needed; no rank
+is decided.  Regularisation acts on rows of unit length in the metric of M.  The iteration is
 ``linear_algebra.minimum_norm`` with b = γ - Φ_q q̈_0, on a sparse factor of S + I/α; it stops when the next
-change would be ≤ epsilon, relative to the larger of 1 and the acceleration.  Rows that are known to be
-independent, and are clearly so, need no 1/α: then the first iteration is exact, and is LM2's solution.  Small
-inertias make small singular values, for which it begins again with a larger α where rows are independent:
-those of redundant rows, off the constraints, are no rows' own.  Rows that are nearly dependent at the start,
-as those of two hinges that are tilted a little, make smaller ones yet, which conjugate directions find.
+change would be ≤ epsilon, relative to the larger of 1 and the acceleration.  Clearly independent rows need no
+1/α: then the first iteration is exact, and is LM2's solution.  Small inertias cause small singular values; if
+rows are independent, the iteration is repeated with a larger α.  Rows that are nearly dependent at the start,
+as with two slightly tilted hinges, cause even smaller singular values, which conjugate directions resolve.
 """
 
 from __future__ import annotations
@@ -35,13 +34,13 @@ from mbref.linear_algebra.sparse_cholesky import (
 
 ABOUT = About(
     title="Augmented Lagrangian on the multipliers",
-    meaning="augmented Lagrangian on the multipliers; redundant rows; with the default of many bodies",
+    meaning="augmented Lagrangian on the multipliers; redundant rows; default for many bodies",
     formula=(
         r"(S + I/\alpha)\, \Delta\lambda = \Phi_q \ddot q_i - \gamma, \qquad \ddot q_{i+1} = \ddot q_i - "
         r"M^{-1} \Phi_q^T \Delta\lambda, \qquad S = \Phi_q M^{-1} \Phi_q^T"
     ),
     text=(
-        "The iterates are those of `alf` by the Woodbury identity. A large α costs no digits here, no "
+        "By the Woodbury identity the iterates are equal to `alf`. A large α costs no digits here, no "
         "rank is decided, and the matrix is factored sparsely."
     ),
     use="Any mechanism with all masses, redundant or not; the default for more than 100 bodies.",
@@ -62,7 +61,7 @@ class Options(NamedTuple):
 STRONGER, LARGEST_ALPHA = 1e3, 1e16  # factor of the next α; from there on 1/α is rounding beside S
 INFINITE = 1e300  # α without 1/α
 CLEAR, WIDE = 1e-4, 0.08  # squares of pivots: of clearly independent rows, and where one iteration is enough
-ROUNDING = 1e-14  # relative change of accelerations that is left out
+ROUNDING = 1e-14  # relative change of accelerations that ends the iteration
 REDUNDANT_ALPHA = 1e15  # the largest with which a matrix of redundant rows stays positive
 options_of, factor_of = opener(Options), opener(SparseFactor)
 
@@ -142,7 +141,7 @@ def iterate(system):
     while status == NOT_CONVERGED and system.settings.independent and alpha < LARGEST_ALPHA:
         alpha *= STRONGER
         status = iterate_with(alpha, system)
-    if status == SINGULAR and alpha > options.alpha:  # of redundant rows, by rounding
+    if status == SINGULAR and alpha > options.alpha:  # rounding of redundant rows
         status = iterate_with(REDUNDANT_ALPHA, system)
     return status
 

@@ -25,7 +25,7 @@ class About(NamedTuple):
     """Texts on a formulation, from which `mbref list` and the pages of the documentation are made."""
 
     title: str
-    meaning: str  # one line, for `mbref list methods`
+    meaning: str  # one line for `mbref list methods`
     formula: str  # LaTeX
     text: str  # equations of the source, in a sentence
     use: str  # situations that it suits
@@ -97,7 +97,7 @@ class Formulation:
 
     name: str
     about: About
-    equations: str  # of the paper
+    equations: str  # equation numbers of the paper
     accelerate: Exchangeable
     linear_algebra: LinearAlgebra
     handles_redundancy: bool

@@ -34,13 +34,13 @@ ABOUT_STEP_ROWS = About(
         " dropped rows}"
     ),
     text=(
-        "As `lm2-first-rows`, but the rows are chosen anew at the first evaluation after every accepted step."
+        "Like `lm2-first-rows`, but rows are selected again at the first evaluation after each accepted step."
     ),
     use="Mechanisms whose dependent rows change with the pose.",
     fails=(
         "Singular positions without projection: a row that is dropped there leaves the motion free to "
-        "change its branch. The multipliers of redundant rows jump from one row to another with the "
-        "choice."
+        "change its branch. The multipliers of redundant rows jump when other rows are "
+        "selected."
     ),
 )
 
@@ -53,13 +53,13 @@ ABOUT_FIRST_ROWS = About(
     ),
     text=(
         "A pivoted QR of the constraint Jacobian at the first evaluation finds as many independent rows "
-        "as its rank; the other rows are dropped for the whole run, as many codes of industry do."
+        "as its rank; the other rows are dropped for the whole run, as many industrial codes do."
     ),
-    use=("Comparisons with such codes; mechanisms whose redundant rows stay the same all along the motion."),
+    use=("Comparisons with such codes; mechanisms whose redundant rows do not change along the motion."),
     fails=(
-        "Mechanisms whose dependent rows change: `SINGULAR_MATRIX` where the rows kept become dependent."
-        " At a singular start it drops a row that is needed later. Reactions of redundant rows are those"
-        " of the choice, not unique ones."
+        "Mechanisms whose dependent rows change: `SINGULAR_MATRIX` if the kept rows become dependent."
+        " At a singular start it drops a row that is needed later. Reactions of redundant rows depend on"
+        " the choice."
     ),
 )
 

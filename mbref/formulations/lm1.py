@@ -28,13 +28,13 @@ ABOUT = About(
     ),
     text="Eq. 5. The matrix is scaled symmetrically and solved by LU with partial pivoting.",
     use=(
-        "Bodies without mass or inertia, held by the constraints; mechanisms without redundant rows; as "
-        "the textbook method to compare with."
+        "Bodies without mass or inertia; mechanisms without redundant rows; comparison as "
+        "the textbook method."
     ),
     fails="Redundant rows make the matrix singular: `SINGULAR_MATRIX` at t = 0.",
 )
 
-SINGULAR_PIVOT = 1e-12  # of the scaled matrix, whose rows and columns have unit size
+SINGULAR_PIVOT = 1e-12  # pivot of the scaled matrix with rows and columns of unit size
 
 
 class Scratch(NamedTuple):

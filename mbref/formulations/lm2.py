@@ -23,13 +23,11 @@ ABOUT = About(
         r"\Phi_q^T \lambda)"
     ),
     text="Eqs. 6 to 8, by Cholesky.",
-    use="Mechanisms without redundant rows and with all masses: the fewest operations.",
-    fails=(
-        "Redundant rows, and bodies without inertia. A row within 3e-6 rad of dependent counts as redundant."
-    ),
+    use="Mechanisms without redundant rows and with all masses; it needs the fewest operations.",
+    fails=("Redundant rows (also rows within 3e-6 rad of a dependent one), and bodies without inertia."),
 )
 
-SINGULAR_PIVOT = 1e-11  # of its diagonal entry: the square of the sine between a row and those before
+SINGULAR_PIVOT = 1e-11  # pivot / diagonal entry: sine² of the angle between a row and earlier rows
 
 
 class Scratch(NamedTuple):

@@ -24,7 +24,7 @@ ABOUT = About(
         "Eqs. 29 and 30, completed for any rank: columns in order of their size, dependent ones left "
         "out, then the rows of R orthogonalised."
     ),
-    use="As `mpi-svd`, at less cost.",
+    use="Redundant rows of any kind, at less cost than `mpi-svd`.",
     fails="Bodies without mass; the rank is decided by the size of a column's remainder.",
 )
 

@@ -25,7 +25,7 @@ ABOUT = About(
         "Fully driven mechanisms, where all columns of D are independent; to see what the printed "
         "equations need."
     ),
-    fails="Every mechanism with a freedom left: `SINGULAR_MATRIX` at t = 0.",
+    fails="Mechanisms with a degree of freedom that no driver prescribes: `SINGULAR_MATRIX` at t = 0.",
 )
 
 

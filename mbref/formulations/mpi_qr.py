@@ -20,11 +20,9 @@ ABOUT = About(
     title="Moore–Penrose inverse by pivoted QR",
     meaning="Moore-Penrose inverse by pivoted QR; any rank; the cheapest of them",
     formula=r"D^T P = Q R, \qquad x = Q_1 R_1^{-T} b_1",
-    text="Householder QR of the transpose; rows behind the rank are left out (Kim & Vanderploeg, 1986).",
+    text="Householder QR of the transpose; rows beyond the rank are dropped (Kim & Vanderploeg, 1986).",
     use="The cheapest dense method that accepts redundant rows.",
-    fails=(
-        "Bodies without mass. Redundant rows get no multiplier, so that reactions lean on the rows chosen."
-    ),
+    fails=("Bodies without mass. Redundant rows get no multiplier: reactions depend on the selected rows."),
 )
 
 

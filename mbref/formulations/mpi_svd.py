@@ -1,7 +1,7 @@
 """MPI-SVD: accelerations by the Moore–Penrose inverse from the singular value decomposition.
 
 D = U S Vᵀ and D⁺ = V S⁺ Uᵀ (Eqs. 27 and 28) in Eq. 26.  Exists for any rank; singular values up to the
-rank tolerance times the largest count as zero.  The multipliers are those of least norm in scaled rows.
+rank tolerance times the largest count as zero.  The multipliers have least norm in scaled rows.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ ABOUT = About(
     ),
     text=(
         r"Eqs. 26 to 28, with $\ddot q_u = M^{-1} g$. Singular values up to the rank tolerance count as "
-        "zero; the multipliers are those of least norm."
+        "zero; the multipliers have least norm."
     ),
     use="Redundant rows of any kind, with multipliers that are well defined; small mechanisms.",
     fails=(

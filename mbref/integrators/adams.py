@@ -30,13 +30,13 @@ class Progress(NamedTuple):
 
     restart: int = -1  # ``clock.restart`` of the past that is kept
     order: int = 0
-    next_order: int = 0  # as the attempt has it
+    next_order: int = 0  # order of the next attempt
     error_below: float = 0.0  # estimated at the order below
     error: float = 0.0
     last_order: int = 0
     last_step: float = 0.0  # s
     equal_steps: float = 0.0  # steps in a row of that length
-    settled: int = 0  # whether the start is over
+    settled: int = 0  # 1 after the start phase
     failed: int = 0  # attempts in a row
 
 

@@ -13,7 +13,7 @@ three solutions are iterations of ``formulations.alf``; α is α_unit 4 / h² in
 units nor h decide.  Redundant rows are borne, and a fixed step goes over a singular position without seeing
 it.
 
-Of order 2.  The method's own accelerations serve the next step; samples record those of the formulation.
+Of order 2.  Its own accelerations serve the next step; samples record accelerations of the formulation.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from mbref.linear_algebra.vectors import copy, largest
 
 ALPHA = 1e5  # α_unit: an iteration leaves about 1 / ALPHA of a violation; rounding grows by ALPHA
 MOST_ITERATIONS = 50
-CONVERGED = 1e-6  # largest entry of a correction, to that of Δ; the next one is 1 / ALPHA of it
+CONVERGED = 1e-6  # largest entry of a correction / of Δ; the next correction is smaller by 1 / ALPHA
 ROUNDING = 10.0  # tolerances of a violation (m or rad): a smaller correction is rounding
 PROJECTIONS = 3  # iterations of a projection: ALPHA to that power is beyond rounding
 

@@ -7,9 +7,7 @@ from mbref.kernels.layout import PROPOSE
 from mbref.linear_algebra.vectors import larger
 
 SAFETY, SHRINK, GROW, RETRY = 0.8, 0.2, 100.0, 0.25  # 0.8 takes 5 to 10 % fewer evaluations than 0.9
-ROUNDED = (
-    0.02  # part of the tolerance that a step may lose below which its error may be rounding, without trend
-)
+ROUNDED = 0.02  # error / tolerance below which the error may be rounding and shows no trend
 
 
 @kernel
@@ -56,7 +54,7 @@ def trend(h, ratio, memory):
 
 @exchangeable(PROPOSE)
 def propose_by_trend(h, suggested, ratio, y, y_rate, memory):
-    """As ``propose``, but for the trend: half as many steps are refused."""
+    """Propose a step by ``propose`` with the trend of errors, which halves the number of refused steps."""
     control = memory.control
     if h == 0.0:
         return first_step(y, y_rate, control)

@@ -19,10 +19,10 @@ from mbref.linear_algebra.hermite import extrapolate
 from mbref.linear_algebra.vectors import larger
 
 NODES = 3
-NEARNESS = 2e-2  # of the step: how far both polynomials may differ; the prediction is much nearer
-ROUNDING = 1e-9  # m or rad; a coordinate that moves less is at rest but for rounding
-LARGEST_TURN = 0.4  # rad: inside longer steps pivots are looked at, which costs more than shorter ones
-ORDER = 3  # of the estimate as a part of the step
+NEARNESS = 2e-2  # difference of both polynomials / step; the prediction is much more accurate
+ROUNDING = 1e-9  # m or rad: a coordinate that moves less is at rest
+LARGEST_TURN = 0.4  # rad: longest step without an evaluation of pivots inside
+ORDER = 3  # order of the error estimate
 
 
 class Scratch(NamedTuple):

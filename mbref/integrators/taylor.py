@@ -1,6 +1,6 @@
 """Taylor: series of the motion in natural coordinates, of orders 4 to 30, in steps of their own.
 
-Steps and samples are those of ``mbref.taylor``: accelerations and multipliers follow from the series too, so
+``mbref.taylor`` computes steps and samples: accelerations and multipliers follow from the series too, so
 that the formulation has no part in them.  A series continues over singular positions.  Order 0 stands for the
 order that costs least at the tolerance.
 """

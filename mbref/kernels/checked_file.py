@@ -19,19 +19,19 @@ DIGEST = hashlib.sha256().digest_size  # bytes, before the data
 def read(path: Path) -> bytes | None:
     """The data written to this path; None where there are none, or the file is damaged.
 
-    A damaged file is told in one line on stderr and removed, where it can be.
+    A damaged file is reported in one line on stderr and removed if possible.
     """
     try:
         found = path.read_bytes()
     except FileNotFoundError:
         return None
     except OSError as error:
-        _tell(f"{path} cannot be read ({error.strerror}) and is done without")
+        _report(f"{path} cannot be read ({error.strerror}) and is not used")
         return None
     digest, data = found[:DIGEST], found[DIGEST:]
     if hashlib.sha256(data).digest() == digest:
         return data
-    _tell(f"{path} is damaged and is made anew")
+    _report(f"{path} is damaged and will be written again")
     with contextlib.suppress(OSError):
         path.unlink()
     return None
@@ -47,16 +47,16 @@ def write(path: Path, data: bytes) -> None:
             file.write(hashlib.sha256(data).digest() + data)
         os.replace(temporary, path)
     except OSError as error:
-        _tell_once(f"nothing can be kept in {path.parent} ({error.strerror}); it is made anew each time")
+        _report_once(f"cannot write to {path.parent} ({error.strerror}); it is computed each time")
         if temporary:
             with contextlib.suppress(OSError):
                 os.unlink(temporary)
 
 
 @functools.cache
-def _tell_once(sentence: str) -> None:
-    _tell(sentence)
+def _report_once(sentence: str) -> None:
+    _report(sentence)
 
 
-def _tell(sentence: str) -> None:
+def _report(sentence: str) -> None:
     print(f"mbref: {sentence}", file=sys.stderr, flush=True)

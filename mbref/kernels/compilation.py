@@ -1,4 +1,4 @@
-"""How kernels are compiled: once per machine and source version, cached on disk, replaceable.
+"""Compilation of kernels: once per machine and source version, cached on disk, replaceable.
 
 ``kernel`` marks a helper that other kernels call, ``inlined`` one that becomes part of them,
 ``allocating`` one that makes arrays: no other can.
@@ -145,9 +145,9 @@ class Exchangeable:
 
     @functools.cached_property
     def callable(self) -> Entry:
-        """The same kernel as a function for Python to call with arrays.
+        """Return the kernel as a function that Python calls with arrays.
 
-        Compiled from a renamed copy: numba's cache tells functions apart by name and signature only.
+        Compiled from a renamed copy: numba's cache distinguishes functions by name and signature only.
         """
         f = self.function
         copy = types_of_python.FunctionType(f.__code__, f.__globals__, f"{f.__name__}_entry")

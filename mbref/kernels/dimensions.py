@@ -12,7 +12,7 @@ from types import CodeType
 
 MOST_CHECKED = 256  # schemas and sizes whose check is remembered
 
-Shapes = tuple[str, tuple[str, ...], tuple[int, ...]]  # of an array: its name, its shape declared and found
+Shapes = tuple[str, tuple[str, ...], tuple[int, ...]]  # name of an array, its declared and its actual shape
 
 
 def size_of(expression: str, sizes: Mapping[str, int]) -> int:

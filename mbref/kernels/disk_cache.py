@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numba
 
-CHECKSUMS = "checksums.txt"  # a line a file: SHA-256, blank, path in the folder
+CHECKSUMS = "checksums.txt"  # one line per file: SHA-256, blank, path in the folder
 LEAST_FREE = 1 << 27  # bytes of the disk: kernels of all methods take 40 MB, and numba fails on a full disk
 LINE = hashlib.sha256().digest_size * 2 + 1  # characters before the path
 
@@ -44,7 +44,7 @@ def is_writable(folder: Path) -> bool:
         if shutil.disk_usage(folder).free < LEAST_FREE:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     except OSError as error:
-        _report(f"nothing can be kept in {folder} ({error.strerror}); kernels are compiled each time")
+        _report(f"cannot write to {folder} ({error.strerror}); kernels are compiled each time")
         return False
     return True
 
@@ -73,7 +73,7 @@ def remove_damaged(folder: Path, function: Callable) -> None:
         known, found = _known(folder, path), _checksum(path)
         is_whole = is_whole and found in known
         if known and found not in known:
-            _report(f"{path} is damaged and is made anew")
+            _report(f"{path} is damaged and will be written again")
     for path in paths if not is_whole else ():
         with contextlib.suppress(OSError):
             path.unlink()

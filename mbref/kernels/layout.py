@@ -57,12 +57,12 @@ class Settings(NamedTuple):
     rank_tolerance: float = 1e-10
     newton_tolerance: float = 1e-13
     rounding: float = 1e-15  # violation of positions that is not corrected
-    independent: int = 0  # whether rows of small singular values are known to be independent
-    nearly_dependent: int = 0  # whether rows are so at the start, as those of two hinges that are tilted
+    independent: int = 0  # 1 if rows with small singular values are known to be independent
+    nearly_dependent: int = 0  # 1 if rows are nearly dependent at the start, as with two tilted hinges
 
 
 class Counts(NamedTuple):
-    """How often each operation was done."""
+    """Counts of operations."""
 
     steps: int = 0
     rejected: int = 0
@@ -125,26 +125,26 @@ class Symbolic(NamedTuple):
     row: Annotated[Unsigned, "r"]  # the system's row of each row here, in the order of elimination
     column: Annotated[Unsigned, "c"]  # the system's column of each column here
     d_start: Annotated[Unsigned, "r + 1"]  # where each row of D begins
-    d_entry: Annotated[Unsigned, "nd"]  # place of each number of D among those of the constraint Jacobian
+    d_entry: Annotated[Unsigned, "nd"]  # index of each entry of D in the constraint Jacobian
     d_column: Annotated[Unsigned, "nd"]
-    s_start: Annotated[Unsigned, "nl + 1"]  # where the products in S of each number of L begin
+    s_start: Annotated[Unsigned, "nl + 1"]  # first product in S of each entry of L
     s_left: Annotated[Unsigned, "products"]  # the products: two numbers of D
     s_right: Annotated[Unsigned, "products"]
     l_start: Annotated[Unsigned, "r + 1"]  # where each column of L begins, its diagonal first
     l_row: Annotated[Unsigned, "nl"]
-    update_start: Annotated[Unsigned, "nl + 1"]  # where the products that each number of L loses begin
-    update_left: Annotated[Unsigned, "updates"]  # those products: a number of L and one of L Δ in one column
+    update_start: Annotated[Unsigned, "nl + 1"]  # first update of each entry of L
+    update_left: Annotated[Unsigned, "updates"]  # factors of an update: entries of L and L Δ
     update_right: Annotated[Unsigned, "updates"]
 
 
 class StaticRows(NamedTuple):
-    """Statically determined rows: each holds columns at rest; its multiplier balances the force there."""
+    """Statically determined rows: each determines columns at rest; its multiplier balances their force."""
 
     row: Annotated[Unsigned, "h"]
     start: Annotated[Unsigned, "h + 1"]  # where the entries of each row begin
-    entry: Annotated[Unsigned, "e"]  # their places in the blocks
+    entry: Annotated[Unsigned, "e"]  # index of each entry in the blocks
     column: Annotated[Unsigned, "e"]
-    other_start: Annotated[Unsigned, "e + 1"]  # where the entries of other rows in that column begin
+    other_start: Annotated[Unsigned, "e + 1"]  # first entry of other rows in the column
     other: Annotated[Unsigned, "o"]
 
 
@@ -181,7 +181,7 @@ class Control(NamedTuple):
     first_step: float  # s; 0 where the integrator chooses it
     rtol: float
     atol: float
-    closed_loops: float  # of bodies and joints; without one, no position is singular
+    closed_loops: float  # number of closed loops; without loops no position is singular
 
 
 class Watch(NamedTuple):
@@ -192,9 +192,9 @@ class Watch(NamedTuple):
     nearest: float = 1.0  # the least that smallest_pivot has been, over the reference at that time
     reference_pivot: float = 0.0  # the largest that smallest_pivot has been; 0 where nothing is watched
     generic_rank: int = 0
-    regular: int = 0  # whether the motion begins on no singular position, where the rank is less
+    regular: int = 0  # 1 if the motion does not begin at a singular position
     accepted_time: float = 0.0  # s
-    singular_part: float = 0.0  # of the step within which the run ends, from its start to a singular position
+    singular_part: float = 0.0  # fraction of the last step from its start to the singular position
 
 
 class Clock(NamedTuple):
@@ -205,8 +205,8 @@ class Clock(NamedTuple):
     suggested: float = 0.0  # s, that length before sample times cut it
     ratio: float = 0.0  # error of the last step over its tolerance
     past_length: float = 0.0  # s, of the step before the last
-    past_ratio: float = 0.0  # its error over its tolerance
-    share: float = 1.0  # of rtol and atol: the tolerance of a step (``simulation.stepping.share``)
+    past_ratio: float = 0.0  # error / tolerance of the past step
+    share: float = 1.0  # tolerance of a step / rtol and atol (``simulation.stepping.share``)
     y_size: int = 0  # length of y
     sample: int = 0  # the next one to take
     restart: int = 0  # the step since which the states are one smooth piece
@@ -279,11 +279,11 @@ class Memory(NamedTuple):
     factor: SparseFactor
     control: Control
     watch: Watch
-    pivots: Annotated[Vector, "pivots"]  # of every row, last watched
+    pivots: Annotated[Vector, "pivots"]  # pivot of every row at the last test
     loop: Loop
     kernels: Kernels
     chart: Address  # the stabilisation's own memory
-    chart_options: Address  # and its numbers
+    chart_options: Address  # parameters of the chart
     integrator: Address  # the integrator's own memory
 
 

@@ -97,7 +97,7 @@ def release(memory: Pooled) -> None:
 
 
 def fill(target: Any, source: Any) -> None:
-    """Copy the arrays of one instance of a schema into those of another."""
+    """Copy the arrays of one instance of a schema into another instance."""
     for mine, theirs in zip(target, source, strict=True):
         if isinstance(theirs, tuple):
             fill(mine, theirs)

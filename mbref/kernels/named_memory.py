@@ -72,7 +72,7 @@ class Field(typing.NamedTuple):
     """One field of a schema: its numba type, its shape in names of dimensions, its first row in the table."""
 
     name: str
-    title: str  # with its schema's name
+    title: str  # name of the field with its schema
     kind: types.Type
     shape: tuple[str, ...]
     row: int
@@ -224,7 +224,7 @@ def _address_of_other(field: Field, value: Any) -> int:
 
 
 def _address(values: np.ndarray | Numbers) -> int:
-    """Where an array or record begins; the buffer tells it faster, of arrays that may be written to."""
+    """Return the address of an array or record; for writable arrays the buffer gives it faster."""
     if isinstance(values, np.ndarray) and values.size and values.flags.writeable:
         return addressof(first_byte(values))
     return int(values.__array_interface__["data"][0])

@@ -72,7 +72,7 @@ class Loads(NamedTuple):
     natural: Annotated[Vector, "l"]  # length (m) or angle (rad)
 
 
-FIRST_NUMBERS = Primitives._fields.index("point_first")  # the fields before are those of a structure
+FIRST_NUMBERS = Primitives._fields.index("point_first")  # earlier fields belong to the structure
 FIRST_OF_LOADS = Loads._fields.index("force")
 
 
@@ -85,7 +85,7 @@ class SceneData(NamedTuple):
     bodies: Bodies
     primitives: Primitives
     moving: Annotated[Indices, "moving"]  # primitives that are evaluated at every state
-    resting: Annotated[Indices, "resting"]  # those that only give multipliers
+    resting: Annotated[Indices, "resting"]  # rows that only give multipliers
     row_bodies: Annotated[IndexTable, "m", "sides"]  # the bodies of each row, filled up with the fixed frame
     drivers: Drivers
     loads: Loads

@@ -16,8 +16,8 @@ from mbref.kernels.memory_pool import acquire, release
 from mbref.kernels.named_memory import Indices, Matrix, Named, Vector, allocate
 from mbref.linear_algebra.orthogonal_factorisations import apply_reflectors, minimum_norm, qr_pivoted
 
-CLEAR, ROUNDING = 1e-3, 1e-11  # of the longest row: a pivot that counts, and one that does not
-MET = 1e-13  # of the largest entry of a solution: residual of a row that agrees with the others
+CLEAR, ROUNDING = 1e-3, 1e-11  # pivot / longest row: nonzero above the first, zero below the second
+MET = 1e-13  # residual of a consistent row / largest entry of the solution
 UNCLEAR = -1
 
 

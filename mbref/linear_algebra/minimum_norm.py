@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 TINY, NEVER = 1e-300, 1e300
 LEAST = 2  # iterations of ``solve_to_tolerance``: enough but near singular positions, so that they are fixed
-ALPHA = 1e10  # of systems solved once: singular values below 1e-5 of unit rows are left alone
+ALPHA = 1e10  # penalty of systems solved once: ignores singular values below 1e-5
 ITERATIONS, ROUNDING = 20, 1e-15
 DEPENDENT = 1e-11  # singular value of unit rows below which the rest counts as dependent
 FACTOR = Named(SparseFactor)
@@ -74,7 +74,7 @@ def go_on_by_conjugate_directions(factor, alpha, target, multipliers):
     """Go on from where ``solve_to_tolerance`` ended, by Craig's method with S + I/α as its preconditioner.
 
     A singular value that is small beside α^(-1/2) takes about one direction (J. E. Craig, J. Math. and
-    Physics 34, 1955).  Returns OK where rounding, or rows dependent but for DEPENDENT, are left; else
+    Physics 34, 1955).  Returns OK where rounding, or rows dependent to DEPENDENT, are left; otherwise
     NOT_CONVERGED.
     """
     residual, step, change, direction = factor.residual, factor.step, factor.change, factor.direction
@@ -206,7 +206,7 @@ def factorise_once(numbers, inverse_root, factor):
 
 @entry(FLOAT(VECTOR, FACTOR))
 def iterate_once(target, factor):
-    """For Python: one iteration on ``target`` and the residual after it; the size of the change."""
+    """Run one iteration on ``target`` for Python; return the size of its change. The residual is updated."""
     size = iterate(factor, target)
     subtract_product(factor, factor.change, factor.residual)
     return size

@@ -1,6 +1,6 @@
 """Dense factorisations by orthogonalisation, which decide rank: QR, Gram–Schmidt, singular values.
 
-By hand but for the singular value decomposition, which is LAPACK's.  All in place on C-contiguous arrays
+Only the singular value decomposition calls LAPACK.  All in place on C-contiguous arrays
 given by the caller.
 """
 

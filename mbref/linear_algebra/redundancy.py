@@ -1,7 +1,7 @@
 """Rank and redundancy of large Jacobians, by the regularised inverse instead of singular values.
 
 With the rows of Φ_q at unit length, S = Φ_q Φ_qᵀ and B = (I/α) (S + I/α)⁻¹, B² has the left null vectors' sum
-of squares on its diagonal, but for (1/(α σ²))² of every other singular value σ.
+of squares on its diagonal, plus (1/(α σ²))² for every other singular value σ.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from mbref.kernels.compilation import kernel
 
 @kernel
 def factorise_product(factor, other, alpha, product):
-    """The factors of D D̃ᵀ + diag(D Dᵀ)/α into ``product``; D is that of the factor, D̃ is ``other`` (nd,).
+    """The factors of D D̃ᵀ + diag(D Dᵀ)/α into ``product``; D belongs to the factor, D̃ is ``other`` (nd,).
 
     ``product.lower`` (nl,) has ones on the diagonal of L left out, ``product.upper`` the numbers of Uᵀ; its
     pivots (r,) are over D Dᵀ's diagonal.

@@ -28,7 +28,7 @@ def symbolic_factorisation(
 ) -> Symbolic:
     """The symbolic factorisation of a pattern: row, column and place (k,) of each number of D.
 
-    Places are those of the flat constraint Jacobian that the numbers are read from; ``active`` (n,) says
+    Places are indices into the flat constraint Jacobian; ``active`` (n,) says
     which columns take part.  Scenes of one structure share the arrays of their pattern, which nobody changes.
     Raises OverflowError for a pattern too large for 32-bit indices.
     """
@@ -55,7 +55,7 @@ def _of_pattern(*pattern: bytes) -> Symbolic:
 def _made(*pattern: bytes) -> Symbolic:
     row, column, entry = (np.frombuffer(indices, dtype=np.int64) for indices in pattern[:3])
     active = np.frombuffer(pattern[3], dtype=bool)
-    from scipy.sparse import csr_array  # a quarter of the start, which kept patterns save
+    from scipy.sparse import csr_array  # slow import, avoided by cached patterns
 
     kept, row = np.unique(row, return_inverse=True)
     d = csr_array((np.ones(row.size), (row, column)), shape=(kept.size, active.size))
@@ -133,7 +133,7 @@ def _factor_pattern(d: csr_array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         s, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True, "Equil": False}
     )
     if not np.array_equal(factored.perm_c, factored.perm_r):
-        raise AssertionError("the order of elimination is not symmetric")
+        raise AssertionError("the elimination order is not symmetric")
     lower = csc_array(factored.L)
     lower.sort_indices()
     return np.argsort(factored.perm_c), lower.indptr.astype(np.int64), lower.indices.astype(np.int64)

@@ -11,7 +11,7 @@ from mbref.kernels.layout import Control
 from mbref.method import Method
 from mbref.simulation.limits import Limits
 
-STEPS_PER_CALL = 5_000  # between returns to Python, where an interrupt is heard and progress is told
+STEPS_PER_CALL = 5_000  # steps between returns to Python, for interrupts and progress
 UNWRAPPED = 1.0  # rad that a body may turn in a step where torsion springs unwrap: two turn less than π apart
 
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from mbref.simulation.run import Run
 
-TRANSMISSION = 1e2  # of velocities over rates, at the place where steps or iterations fail
+TRANSMISSION = 1e2  # largest velocity / driver rate: above it the position is dead
 ROUNDING = 1e-13  # relative singular value of redundant rows
-MOST_ROWS = 400  # least squares of more take seconds
+MOST_ROWS = 400  # constraint rows: larger least-squares problems take seconds
 
 
 def is_at_dead_position(run: Run) -> bool:

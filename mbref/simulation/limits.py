@@ -12,8 +12,8 @@ from mbref.scene_fields import LARGEST, SMALLEST, shown
 
 AUTO, GENERIC, GENERATED = "auto", "generic", "generated"
 CODES = (AUTO, GENERIC, GENERATED)
-FINEST = 1e-16  # relative tolerance; a number has no more digits
-MOST = 2**62  # of what is counted
+FINEST = 1e-16  # smallest relative tolerance: doubles have no more digits
+MOST = 2**62  # largest count
 
 # field → least and largest value, and whether 0 is taken too
 INTERVALS = {
@@ -30,7 +30,7 @@ INTERVALS = {
 COUNTS = {"most_steps": (1, MOST)}
 
 
-Branches = Mapping[int, int] | tuple[tuple[int, int], ...]  # by crossing, or pairs, as Limits keep them
+Branches = Mapping[int, int] | tuple[tuple[int, int], ...]  # keyed by crossing, or stored as pairs
 
 
 @dataclass(frozen=True)
@@ -42,17 +42,17 @@ class Limits:
 
     rtol: float = 1e-9  # local error per step, less in runs of more than 1000 steps, relative …
     atol: float | None = None  # … and absolute (SI units); None means as rtol
-    rank_tolerance: float = 1e-10  # relative; a singular value or pivot below it counts as zero
+    rank_tolerance: float = 1e-10  # relative singular value or pivot below which it counts as zero
     violation: float = 3e-3  # largest |Φ| tolerated (m or rad), times the scene's length where over 1 m
-    first_step: float = 0.0  # s, that is tried first; 0: the integrator's own guess
+    first_step: float = 0.0  # first step, s; 0: chosen by the integrator
     smallest_step: float = 0.0  # s; 0 means a million-millionth of the duration
     forced_step: float = 0.0  # s; a step this short is taken whatever its error estimate; 0: none
     largest_step: float = 0.0  # s, of fixed steps too; 0 means the duration
     largest_turn: float = 0.0  # rad that the fastest body may turn in an adaptive step; 0: a safe angle
     most_steps: int = 5_000_000
-    compared: bool = True  # whether a run that projection does not hold is compared with one that it holds
-    branches: Branches = ()  # to take at crossings, both counted from 1; else the smooth one
-    code: str = AUTO  # of `taylor`: GENERIC kernels, GENERATED for the scene, or AUTO: where it pays
+    compared: bool = True  # compare a run without projection with a projected run
+    branches: Branches = ()  # branches to take at crossings, both counted from 1; default: smooth branch
+    code: str = AUTO  # code of `taylor`: GENERIC, GENERATED for the scene, or AUTO
 
     def __post_init__(self) -> None:
         for field in fields(self):

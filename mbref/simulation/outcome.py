@@ -44,37 +44,37 @@ OUTCOMES = {
 }
 
 DEAD_POSITION = (
-    "the drivers come to a dead position at t = {:.6g} s, beyond which the mechanism cannot follow: "
-    "velocities grow without bound; end the motion before, or drive another joint"
+    "the drivers come to a dead position at t = {:.6g} s, beyond which the mechanism cannot move: "
+    "end the motion before this time, or drive another joint"
 )
 
 REST_POSITION = (
     "the motion begins at rest on a singular position, and the branch along which it is pushed cannot be "
-    "followed; velocities of the bodies along a branch tell it"
+    "computed; give the bodies velocities along the branch"
 )
 
 NO_BRANCH = (
     "the motion begins on a singular position, and its velocities agree with none of the branches that meet "
-    "there; leave out the velocities of some bodies, and they are made to agree"
+    "there; omit the velocities of some bodies, which are then computed"
 )
 
 NEARLY_DEPENDENT = (
-    "constraint rows depend on each other there but for {:.1e} (singular value of unit rows), and whether "
-    "they take a freedom cannot be told: give the axes and points of the joints with 12 digits"
+    "constraint rows are nearly dependent there (singular value {:.1e} of unit rows), so that their rank is "
+    "uncertain: give the axes and points of the joints with 12 digits"
 )
-BESIDE = (
-    "; if the mechanism begins beside a singular position, rounding turns its motion: begin on that "
-    "position, or where the singular value is above {:g}"
+NEAR_SINGULAR = (
+    "; if the mechanism begins near a singular position, rounding changes its motion: begin at that "
+    "position, or at a pose with a singular value above {:g}"
 )
-REDUNDANT = "rows that depend on others at the start but for {:.1e} count as redundant"
-ROUNDING = 1e-13  # a singular value that needs no mention
+REDUNDANT = "rows with a singular value of {:.1e} at the start count as redundant"
+ROUNDING = 1e-13  # smaller singular values are not reported
 NONE_TAKEN = 0  # the branch taken at a singular position at which the run ended
 
 
 SINGULAR_POSITION = (
-    "the motion comes to a singular position at t = {:.6g} s{}, which {} does not cross; taylor does"
+    "the motion reaches a singular position at t = {:.6g} s{}; {} does not cross it, taylor does"
 )
-LOSE_RANK = ", where the constraint rows of {} lose rank"
+LOSE_RANK = " (the constraint rows of {} lose rank)"
 FAILED = (STEP_TOO_SMALL, NOT_CONVERGED, SINGULAR, CREEPING)  # near a singular position, because of it
 
 
@@ -165,7 +165,7 @@ def _message(run: Run, status: int) -> str:
 
 
 def report_of(start: Start, ranks: Ranks, crossings: int) -> str:
-    """The correction of the start, rows that depend on others but for rounding, and how many singular
+    """Report the correction of the start, rows that are redundant to rounding, and the number of singular
     positions were passed."""
     passed = f"singular positions passed: {crossings}" if crossings else ""
     return "; ".join(filter(None, (start.report(), _rounded(ranks), passed)))
@@ -180,7 +180,7 @@ def _remedy(run: Run, status: int) -> str:
     if not run.memory.equations.system.settings.nearly_dependent or run.memory.loop.clock.time > 0.0:
         return remedy(run, status)
     turned = run.model.closed_loops > 0 and not run.scene.driver
-    return NEARLY_DEPENDENT.format(run.ranks.least) + (BESIDE.format(NEARLY) if turned else "")
+    return NEARLY_DEPENDENT.format(run.ranks.least) + (NEAR_SINGULAR.format(NEARLY) if turned else "")
 
 
 def _cause(run: Run, status: int) -> str:
@@ -197,10 +197,10 @@ def _cause(run: Run, status: int) -> str:
     if status == TOO_MANY_STEPS:
         return f"{run.limits.most_steps} steps were taken without reaching the end, at t = {t:.6g} s"
     if status == CREEPING:
-        return f"steps are so short at t = {t:.6g} s that the end is out of reach"
+        return f"steps at t = {t:.6g} s are too short to reach the end"
     if status == STEP_TOO_SMALL:
         h = memory.control.smallest_step
-        return f"the error estimate asks for a step below {h:.3g} s at t = {t:.6g} s"
+        return f"the error estimate requires a step below {h:.3g} s at t = {t:.6g} s"
     if status == LEFT_MOTION:
         return f"{OUTCOMES[status].sentence}, as a run by another method shows, by t = {t:.6g} s"
     part = run.method.integrator if run.method.is_series else run.method.formulation

@@ -30,9 +30,9 @@ NO_RANKS = Ranks(0, 1.0, 0.0)
 def ranks_at(
     model: Model, q: np.ndarray, factor: SparseFactor, tolerance: float, blocks: np.ndarray | None = None
 ) -> Ranks:
-    """Those of the rows of a factor, at q (7 nb,); of too many only whether pivots say that none depends.
+    """Return the ranks of the rows of a factor at q (7 nb,); for many rows, only a test by pivots.
 
-    ``blocks`` (m, 12) are those of Φ_q there, where they are known.
+    ``blocks`` are the blocks of Φ_q there, if they are known.
     """
     size = factor.symbolic.row.size
     if blocks is None:

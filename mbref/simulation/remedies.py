@@ -18,13 +18,13 @@ from mbref.simulation.stepping import (
 FOLLOWS = "taylor crosses singular positions"
 BY_STATUS = {
     VIOLATED: "+projection corrects violations after every step",
-    UNDECIDED: "a smaller rtol may tell the branch; --branch asks for one",
+    UNDECIDED: "a smaller rtol may determine the branch; --branch selects one",
     LEFT_MOTION: FOLLOWS,
 }
 
 
 def remedy(run: Run, status: int) -> str:
-    """One clause that names what bears the cause of a failure; empty where none is known."""
+    """Return a clause that names a method or change that avoids the failure; empty if none is known."""
     if status == SINGULAR:
         return _of_singular_matrix(run)
     if status == NOT_CONVERGED:
@@ -42,16 +42,15 @@ def _of_singular_matrix(run: Run) -> str:
     found = counts(scene)
     if massless and not formulation.handles_singular_mass:
         able = _bearing(mass=True, redundancy=found.redundant > 0)
-        return f"body {massless[0]!r} lacks mass or a moment of inertia: taylor, {able}"
+        return f"body {massless[0]!r} lacks mass or a moment of inertia; use taylor, {able}"
     if found.redundant and not formulation.handles_redundancy:
-        return (
-            f"constraint rows are redundant ({found.redundant} of {found.rows}): {_bearing(redundancy=True)}"
-        )
+        able = _bearing(redundancy=True)
+        return f"constraint rows are redundant ({found.redundant} of {found.rows}); use {able}"
     return FOLLOWS if run.model.closed_loops else ""
 
 
 def _bearing(mass: bool = False, redundancy: bool = False) -> str:
-    """The formulations that claim to bear a singular mass matrix, or redundant rows."""
+    """Return the formulations that claim to handle a singular mass matrix, or redundant rows."""
     able = [
         f.name
         for f in FORMULATIONS.values()
@@ -59,7 +58,7 @@ def _bearing(mass: bool = False, redundancy: bool = False) -> str:
         and (f.handles_redundancy or not redundancy)
         and not f.needs_independent_columns
     ]
-    return f"{', '.join(able)} bear that"
+    return " or ".join(filter(None, (", ".join(able[:-1]), able[-1])))
 
 
 def _of_iteration(run: Run) -> str:
@@ -74,5 +73,5 @@ def _of_iteration(run: Run) -> str:
 
 def _of_steps(run: Run) -> str:
     if run.method.is_series or not run.model.closed_loops:
-        return "mbref diagnose tells how near the motion comes to a singular position"
+        return "mbref diagnose prints the distance of the motion from singular positions"
     return FOLLOWS

@@ -39,7 +39,7 @@ from mbref.simulation.ranks import NO_RANKS, Ranks, ranks_at
 from mbref.stabilisation.all_coordinates import rates as rates_of_all_rows
 from mbref.stabilisation.base import Stabilisation
 
-NEARLY = 1e-5  # least singular value below which rows are nearly dependent
+NEARLY = 1e-5  # smallest singular value below which rows are nearly dependent
 
 
 class Stepper(Protocol):
@@ -129,9 +129,7 @@ class Run:
         integrates = self.method.integrator.integrates
         freedoms = freedoms_left(model, start) if model.kinematic or not integrates else 0
         if freedoms > 0 and not integrates:
-            fault = (
-                f"driver: {freedoms} degrees of freedom are left; a kinematic analysis prescribes them all"
-            )
+            fault = f"driver: {freedoms} degrees of freedom lack a driver; a kinematic analysis drives all"
             raise SceneError([fault])
         if freedoms > 0:
             raise SceneError(missing_masses(self.scene))
@@ -246,7 +244,7 @@ class Run:
         if self.method.stabilisation.projects:
             self.ranks = ranks
             memory.watch.generic_rank = ranks.rank
-            freedoms = memory.active.velocities.size - ranks.rank  # more may be a singular position's
+            freedoms = memory.active.velocities.size - ranks.rank  # at a singular position there may be more
             memory.watch.regular = freedoms <= (0 if self.scene.driver else 1)
             settings.nearly_dependent = self.ranks.least < NEARLY
             settings.rounding *= min(1.0, self.model.length)

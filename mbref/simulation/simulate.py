@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mbref.kernels.beside import compiled_beside
+from mbref.kernels.background import compiled_in_background
 from mbref.kernels.machine_code import NoGeneratedCode
 from mbref.method import Method, MethodError, default_method
 from mbref.motion import Motion
@@ -31,7 +31,7 @@ from mbref.taylor.preparation import (
 
 __all__ = ["Limits", "are_compiled", "checked_times", "prepare", "simulate", "why_no_code"]
 
-SAMPLES = 101  # where no times are asked for
+SAMPLES = 101  # default number of samples
 
 
 def simulate(
@@ -51,7 +51,7 @@ def simulate(
     scene
         A Scene, the name of a built-in one, or a .toml file.
     method
-        A Method or its name; by default that of ``method.default_method``: ``taylor``, or for many bodies
+        A Method or its name; by default ``method.default_method``: ``taylor``, or for many bodies
         ``alf-dual+projection/dop853``.  ``kinematic`` integrates nothing (``integrators.predictor``).
     times
         Sample times (k,), s, increasing; by default 101 from 0 to the scene's duration.
@@ -62,7 +62,7 @@ def simulate(
     duration
         End time, s, of the default sample times; by default the scene's.
     rtol
-        Relative tolerance, in the place of that of ``limits``.
+        Relative tolerance; replaces the tolerance of ``limits``.
 
     Returns
     -------
@@ -99,9 +99,9 @@ def simulate(
 def checked_run(scene: Scene, method: Method, times: np.ndarray, limits: Limits) -> Run:
     """Return the run of a scene; raises MethodError for limits that the method cannot meet."""
     if limits.branches and method.crosses != "by series":
-        raise MethodError(f"branches: {method} crosses no singular position; taylor does")
+        raise MethodError(f"branches: {method} does not cross singular positions; use taylor")
     if limits.code == GENERATED and not method.is_series:
-        raise MethodError(f"code: {method} has no generated code; taylor has")
+        raise MethodError(f"code: {method} has no generated code; use taylor")
     try:
         return start_run(scene, method, times, limits)
     except NoGeneratedCode as reason:
@@ -123,7 +123,7 @@ def _check_branches(run: Run) -> None:
     if last > passed:
         raise ValueError(
             f"branches: the motion passes {passed} singular positions up to t = {run.times[-1]:g} s, "
-            f"there is no number {last}"
+            f"and not {last}"
         )
 
 
@@ -135,7 +135,7 @@ def prepare(method: Method) -> None:
     kernels, beside = (
         (STEPPING, prepare_stepping) if method.is_series else (KERNELS_OF_SERIES, prepare_series)
     )
-    with compiled_beside(kernels, beside.__module__, beside.__name__):
+    with compiled_in_background(kernels, beside.__module__, beside.__name__):
         preparation.prepare(method)
         if method.is_series:
             prepare_expansion()

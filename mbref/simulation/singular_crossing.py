@@ -1,6 +1,6 @@
 """Detection of singular positions by a run that watches the rank of Φ_q: such a run ends there.
 
-Where the rank of Φ_q drops, a pivot of its rows falls to zero and rises again.  The pivots are those of unit
+Where the rank of Φ_q drops, a pivot of its rows falls to zero and rises again.  The pivots belong to unit
 rows in columns of unit length (``equations.units``), so that masses have no part in them; the projection has
 them at hand after every step (``layout.Watch``).  A step comes to a singular position where it ends at one.
 Inside a step rows may lose rank where a pivot of the product of the gradients at both ends is negative
@@ -20,9 +20,9 @@ from mbref.linear_algebra.sparse_lu import factorise_product
 from mbref.linear_algebra.vectors import copy, sort
 from mbref.stabilisation.projection import factorise_constraints, keep_end
 
-REACHED = 1e-3  # relative pivot at which a step has come to a singular position: no motion is accurate there
-VANISHED = 1e-2  # relative pivot at the zero of one inside a step, where the pose is off by an interpolation
-ALPHA = 1e8  # of the product: a redundant row has a pivot of 1/α, far above rounding
+REACHED = 1e-3  # relative pivot below which a step has reached a singular position
+VANISHED = 1e-2  # relative pivot inside a step that counts as zero, because the pose is interpolated
+ALPHA = 1e8  # penalty: redundant rows get the pivot 1/α, far above rounding
 SEARCH, EXACT = 30, 1e-9  # evaluations that find a zero, and parts of the step within which it is found
 
 

@@ -13,7 +13,7 @@ from mbref.equations.branches import MOST_ROWS
 from mbref.equations.units import row_lengths
 from mbref.simulation.run import Run
 
-TAKES_PART = 0.05  # of the largest part of a row in a dependence: less is of rows beside it
+TAKES_PART = 0.05  # part of a row / largest part in a dependence: smaller parts are ignored
 NEAR = 0.03  # relative pivot below which steps that fail are near a singular position
 
 

@@ -2,8 +2,8 @@
 
 Φ_q leaves more freedoms there than any branch has, and accelerations that it allows leave the constraints.
 A motion goes on along the branch of its velocities, which is the only one where the rates of the second-order
-forms along these velocities are independent.  From rest, Gauss's principle of least constraint takes, of the
-accelerations along the branches, the one nearest to that of free bodies, in the metric of M.
+forms along these velocities are independent.  From rest, Gauss's principle of least constraint selects, among
+accelerations along the branches, the acceleration nearest to free bodies, in the metric of M.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from mbref.equations.branches import MOST_ROWS, fit_to_branches, tangents
 from mbref.equations.initial_state import MET, rate_violation
 from mbref.simulation.run import Run
 
-BESIDE = 1e-6  # least singular value of unit rows
-STILL = 1e-12  # of a force along a branch over the largest: a body that nothing moves stays at rest
+NEAR_SINGULAR = 1e-6  # smallest singular value of unit rows below which a start is near-singular
+STILL = 1e-12  # force along a branch / largest force: below it the body stays at rest
 
 
 class Leaving(NamedTuple):
-    """How a motion leaves a singular position at t = 0: velocities (n,), or acceleration (n,) from rest."""
+    """Departure from a singular position at t = 0: velocities (n,), or accelerations (n,) from rest."""
 
     coordinates: np.ndarray
     velocities: np.ndarray
@@ -34,7 +34,7 @@ def leaving(run: Run) -> Leaving | None:
     if begins_at_rest(run):
         acceleration = leaving_acceleration(run)
         return None if acceleration is None else Leaving(run.start.q, run.start.v, acceleration)
-    if not (begins_in_motion(run) or begins_beside(run)):
+    if not (begins_in_motion(run) or begins_near_singular(run)):
         return None
     fit = fit_to_branches(run.model, 0.0, run.start.q, run.start.v)
     if fit is None or not (fit.fits and fit.is_simple):
@@ -52,7 +52,7 @@ def begins_on_singular_position(run: Run) -> bool:
     """Whether a run that projects begins on a singular position at which several branches meet."""
     if begins_at_rest(run):
         return len(tangents(run.model, run.start.q)) > 1
-    if not (begins_in_motion(run) or begins_beside(run)):
+    if not (begins_in_motion(run) or begins_near_singular(run)):
         return False
     return fit_to_branches(run.model, 0.0, run.start.q, run.start.v) is not None
 
@@ -79,10 +79,10 @@ def begins_in_motion(run: Run) -> bool:
     return freedoms_of_first_order(run) > (0 if run.scene.driver else 1) and run.model.closed_loops > 0
 
 
-def begins_beside(run: Run) -> bool:
+def begins_near_singular(run: Run) -> bool:
     """Whether a run begins so near to a singular position that rounding of the start turns its velocities,
-    with velocities that meet Φ_q v = ν to rounding: those of no branch beside a gap do not."""
-    if not run.ranks.least < BESIDE or not np.any(run.start.v):
+    with velocities that meet Φ_q v = ν to rounding. Velocities of no branch near a gap do not."""
+    if not run.ranks.least < NEAR_SINGULAR or not np.any(run.start.v):
         return False
     return rate_violation(run.model, run.start.q, run.start.v) <= MET
 

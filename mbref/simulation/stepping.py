@@ -15,11 +15,11 @@ from mbref.simulation.singular_crossing import (
     remember_watch,
 )
 
-# how a call ends; evaluation statuses (SINGULAR, …) end it too
+# statuses of a call, in addition to evaluation statuses (SINGULAR, …)
 DONE, VIOLATED, STEP_TOO_SMALL, TOO_MANY_STEPS, PAUSED, UNDECIDED, LEFT_MOTION, CREEPING = range(10, 18)
 
 MANY, PACE = 1000.0, 50  # steps of a run whose errors add up to little, and from which on its pace is known
-LEAST_TOLERANCE, EARLY = 1e-13, 1e-2  # of a step, unless rtol is less; part of rtol of the first ones
+LEAST_TOLERANCE, EARLY = 1e-13, 1e-2  # least tolerance of a step; tolerance of first steps / rtol
 
 
 @kernel

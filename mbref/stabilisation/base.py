@@ -35,8 +35,8 @@ class Stabilisation:
     memory: type | None = None
     numbers: type = NoOptions  # the method's own numbers, a record with their defaults
     feedback: Callable[[Mapping[str, float]], tuple[float, float]] | None = None  # gains of Φ' and Φ in γ
-    projects: bool = False  # every accepted state meets the constraints
-    watches_rank: bool = False  # a run ends at a singular position, where the rank of Φ_q drops
+    projects: bool = False  # True if every accepted state satisfies the constraints
+    watches_rank: bool = False  # True if a run ends at a singular position
     largest_turn: float = 1.0  # rad that a body may turn in an adaptive step unless the user says
 
     @cached_property

@@ -6,9 +6,9 @@ coordinates u follow from Φ(u, v, t) = 0 by Newton–Raphson (Eq. 15), started 
 last accepted step (Eq. 16), and their rates from Φ_u u' = ν - Φ_v v' (Eq. 14).  Φ_p = 2 Φ_π' L.
 
 The partition is kept while the smallest pivot of Φ_u relative to its largest stays above ``kept`` times its
-value when the partition was chosen; then it is chosen anew, and the integrator starts again.  With 0.1
-partitions last near turning points of a coordinate: errors 10 to 1000 times those of 0.6.  A partition with
-fewer dependent coordinates than the one before ends the run: it is at a singular position.
+value when the partition was chosen; then another one is chosen, and the integrator restarts.  With ``kept`` =
+0.1 partitions last near turning points of a coordinate, and errors are 10 to 1000 times larger than with 0.6.
+A new partition with fewer dependent coordinates ends the run: it is at a singular position.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Scratch(NamedTuple):
     residual: Annotated[Vector, "7*nb"]
     row_order: Annotated[Indices, "m + nb"]  # active rows first
     column_order: Annotated[Indices, "7*nb"]  # dependent coordinates first
-    exchanges: Annotated[Indices, "7*nb"]  # of the factor
+    exchanges: Annotated[Indices, "7*nb"]  # column exchanges of the factorisation
     partition: Partition
 
 

@@ -25,19 +25,19 @@ from mbref.linear_algebra.vectors import copy, flush_denormals, largest, sort
 from mbref.stabilisation.all_coordinates import accelerate, write_rates
 from mbref.stabilisation.base import Stabilisation
 
-ALPHA = 1e10  # of the iteration
+ALPHA = 1e10  # penalty of the iteration
 REPEATED, ALONE = 1, 2  # iterations of a correction that Newton's method repeats, and of one made once
 INDEPENDENT = (5.0 * ALPHA**-0.25) ** 2  # the squared pivot from which on a row counts as independent
 DEPENDENT = 3e-3  # the pivot up to which a row clearly depends on others
 CLEAR = 0.05  # the pivot from which on it clearly does not
-LEAST_REFERENCE = 0.05  # that the smallest pivot is compared with, also at a start near a singular position
+LEAST_REFERENCE = 0.05  # least value with which the smallest pivot is compared
 MOST_ITERATIONS = 10
 ROUNDING = 1e3  # tolerances: the violation below which iterations may fail to reduce it further
-SMALL, GOOD_REDUCTION = 1e-8, 1e-2  # a factor is kept while violations are so small and shrink so fast
-BENT = 1e-6  # and while the last correction, over its distance from a singular position, is so small
+SMALL, GOOD_REDUCTION = 1e-8, 1e-2  # violation and its reduction by a step: below both the factor is kept
+BENT = 1e-6  # last correction / distance from a singular position: below it the factor is kept
 MOVED = 30.0  # roundings of a last correction behind which rows and factor are found anew
 LARGEST_TURN = 0.75  # rad: two bodies turn by less than a right angle, with which gradients would oppose
-FACTOR_FAILED = -1.0  # a Newton step's answer in place of the violation
+FACTOR_FAILED = -1.0  # returned by a Newton step instead of the violation
 
 
 class Scratch(NamedTuple):
@@ -252,7 +252,7 @@ def depend_on_others(memory):
 
 @kernel
 def leave_out_dependent_rows(memory):
-    """Have the rows that depended on others be zero, with the blocks of each kept."""
+    """Set rows that depend on others to zero, and save their blocks."""
     pivots, row, system = memory.pivots, memory.factor.symbolic.row, memory.equations.system
     kept = scratch_of(memory.chart).blocks
     for k in range(pivots.shape[0]):
@@ -266,7 +266,7 @@ def leave_out_dependent_rows(memory):
 
 @kernel
 def put_back_dependent_rows(memory):
-    """Have the blocks of rows that were left out be as they were: an evaluation writes those that change."""
+    """Restore the blocks of dropped rows; an evaluation writes the blocks that change."""
     pivots, row, system = memory.pivots, memory.factor.symbolic.row, memory.equations.system
     kept = scratch_of(memory.chart).blocks
     for k in range(pivots.shape[0]):

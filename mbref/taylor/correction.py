@@ -11,7 +11,7 @@ from mbref.taylor.partition import least_pivot
 from mbref.taylor.simd import WIDTH, gather, load, store
 from mbref.taylor.solver import factorise_equations, solution
 
-MAX_VIOLATION = 1e-6  # a violation whose correction leaves its square
+MAX_VIOLATION = 1e-6  # violation: below it one correction leaves rounding
 MAX_CORRECTIONS = 8
 
 

@@ -37,9 +37,9 @@ from mbref.taylor.stepping import (
     save_start,
 )
 
-PREDICTOR_TOLERANCE = 3e-7  # of the last terms of the series, away from singular positions
-ACCURATE_TOLERANCE = 1e-13  # of high-accuracy steps
-MIN_PREDICTOR_RATIO = 0.25  # of a crossing step: a shorter predictor step before it does not pay
+PREDICTOR_TOLERANCE = 3e-7  # tolerance of the last terms, away from singular positions
+ACCURATE_TOLERANCE = 1e-13  # tolerance of high-accuracy steps
+MIN_PREDICTOR_RATIO = 0.25  # predictor step / crossing step: a shorter one is not taken
 PREDICTOR_ORDER, LEAST_PREDICTOR_ORDER = (
     16,
     12,

@@ -16,9 +16,9 @@ Expression = dict[int, float]
 Polynomial = dict[tuple[int, int], float]
 
 ONE = -1
-ROUNDING = 1e-12  # relative; coefficients below it are roundings of zero
+ROUNDING = 1e-12  # relative size below which coefficients count as zero
 VANISHING = 1e-9  # an equation with smaller coefficients follows from others, within rounding
-DEPENDENT = 1e-9  # of a polynomial, left by the elimination of others
+DEPENDENT = 1e-9  # largest coefficient / original one: a smaller polynomial is dependent
 
 
 def combination(*terms: tuple[float, Expression]) -> Expression:
@@ -126,7 +126,7 @@ class Elimination:
 
 def independent(polynomials: Sequence[Polynomial]) -> list[Polynomial]:
     """Return the linearly independent polynomials; those with fewer terms come first."""
-    reduced: dict[tuple[int, int], Polynomial] = {}  # by the monomial that none of the others has
+    reduced: dict[tuple[int, int], Polynomial] = {}  # keyed by the monomial that no other polynomial has
     kept = []
     for polynomial in sorted(polynomials, key=len):
         size = largest(polynomial.values())

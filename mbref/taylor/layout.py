@@ -125,7 +125,7 @@ class Series(NamedTuple):
     torsions: Annotated[Matrix, "15*torsions", "orders"]  # directions (9), cosine, sine, angle, three moments
     left: Annotated[Matrix, "orders", "slots"]  # factors of the products, one order later
     right: Annotated[Matrix, "orders", "slots"]
-    sums: Annotated[Matrix, "orders", "lanes"]  # of products of known orders, and minus the forces
+    sums: Annotated[Matrix, "orders", "lanes"]  # sums of products of known orders, minus the forces
     scale: Annotated[Matrix, "orders", "lanes"]  # of the sums on the right-hand side
     growth: Annotated[Matrix, "orders", "lanes"]  # of the solution
     variable: Annotated[Vector, "lanes"]  # 1 for a variable, else 0
@@ -135,7 +135,7 @@ class Solver(NamedTuple):
     """The linear system of each order, its partition and the response."""
 
     pivot_rows: Annotated[Indices, "nr"]  # the independent rows first
-    pivot_columns: Annotated[Indices, "nz"]  # their dependent variables first
+    pivot_columns: Annotated[Indices, "nz"]  # dependent variables first
     work: Annotated[Matrix, "nr", "nz"]
     left: Annotated[Vector, "lanes"]  # 1 for a variable without a pivot, where pivots are chosen
     row_max: Annotated[Vector, "nr"]  # the largest entry of each row there
@@ -170,7 +170,7 @@ class Options(NamedTuple):
     accurate_order: int = 0
     velocity_change: float = 0.0  # relative, of a perturbed run
     start_distance: float = 0.0  # m or rad by which the series may miss the coordinates of the start
-    start_freedoms: int = 0  # by singular values of the constraint rows
+    start_freedoms: int = 0  # degrees of freedom at the start, from singular values
     follows_drivers: int = 0  # whether steps are predictor steps away from singular positions
 
 
@@ -187,7 +187,7 @@ class Partition(NamedTuple):
 
     rank: int = 0  # of the constraint rows
     partition_id: int = 0  # number of choices of rows and variables so far
-    parity: int = 0  # whether their order is an odd permutation
+    parity: int = 0  # 1 if the order of pivots is an odd permutation
     replaced_pivot: float = 0.0  # least pivot before the last choice; minus infinity if a sign had changed
 
 
@@ -201,7 +201,7 @@ class Step(NamedTuple):
     start_logarithm: float = 0.0  # of the size of det G
     start_violation: float = 0.0  # of the rows; known after an attempt failed
     approaching: int = 1  # whether the pivot falls since the step before, which did not cross
-    last_order: int = 0  # of the series that is not rounding
+    last_order: int = 0  # last order that rounding does not dominate
     used_order: int = 0  # the last order that an attempt evaluates
     time_to_pole: float = 0.0  # s to the rounding pole that is subtracted; 0 without one
     time_to_crossing: float = 0.0  # s to a singular position, from the pivots of an attempt; 0 without one
@@ -291,7 +291,7 @@ class Waiting(NamedTuple):
 
     state: Annotated[Matrix, "k", "3*lanes"]  # variables and their two derivatives
     angles: Annotated[Matrix, "k", "torsions"]  # rad, unwrapped
-    exact: Annotated[Indices, "k"]  # whether the step was an exact one, near a singular position
+    exact: Annotated[Indices, "k"]  # 1 for a high-accuracy step near a singular position
 
 
 class TaylorMemory(NamedTuple):
@@ -309,8 +309,8 @@ class TaylorMemory(NamedTuple):
     progress: Progress
     kernels: SeriesKernels
     code: SceneCode
-    crossing_start: SavedState  # from where the last long crossing is smooth
-    crossing_result: SavedState  # where it has ended
+    crossing_start: SavedState  # state from which the last long crossing started
+    crossing_result: SavedState  # state at which the last long crossing ended
     step_start: StepStart
     series_start: StepStart  # of the present series, saved while samples are completed
     crossings: Crossings

@@ -241,7 +241,7 @@ def expand_angle(driven, functions, g):
     while last > 1 and driven[last] == 0.0:
         last -= 1
     for k in range(1, driven.shape[0]):
-        cosine, sine, inverse = 0.0, 0.0, 1.0 / k  # no order waits for a division
+        cosine, sine, inverse = 0.0, 0.0, 1.0 / k  # divide once, outside the recursion
         for i in range(1, min(k, last) + 1):
             cosine -= i * driven[i] * functions[k - i, g + 1]
             sine += i * driven[i] * functions[k - i, g]

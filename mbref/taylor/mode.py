@@ -5,7 +5,7 @@ from __future__ import annotations
 from mbref.kernels.compilation import inlined, kernel
 
 REGULAR, HIGH_ACCURACY, PREDICTOR = range(3)
-NEWTON_TOLERANCE = 1e-4  # of a predictor step: below it the correction keeps the factorised Jacobian
+NEWTON_TOLERANCE = 1e-4  # violation below which a predictor step keeps the factorised Jacobian
 
 
 @kernel

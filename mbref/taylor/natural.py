@@ -36,9 +36,9 @@ from mbref.taylor.loads import COSINE, SINE, VALUE
 from mbref.taylor.numbers import Batch, OneScene, largest, scalar
 from mbref.taylor.orientations import Orientations, Triple
 
-MOST_TERMS = 40  # of an equation that eliminates a position
+MOST_TERMS = 40  # most terms of an equation that eliminates a position
 MOST_FACTORS = 1  # further variables of an equation that eliminates a direction
-MOST_KINEMATIC = 4  # the same, where the equations serve kinematics alone
+MOST_KINEMATIC = 4  # most terms, if the equations serve kinematics only
 
 
 class Pose(NamedTuple):

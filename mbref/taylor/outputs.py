@@ -23,7 +23,7 @@ from mbref.taylor.samples import find_poses, put_state
 from mbref.taylor.saved_state import restore_state, save_state
 from mbref.taylor.simd import WIDTH, load, store
 
-SAMPLE_CORRECTIONS = 2  # of the state at a sample of a loose series: the second one leaves rounding
+SAMPLE_CORRECTIONS = 2  # corrections of a sample of a low-accuracy series; two reach rounding
 
 
 @entry(INT(INT, SERIES))

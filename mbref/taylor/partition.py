@@ -136,7 +136,7 @@ def save_replaced_pivot(memory):
 def replaced_pivot(memory):
     """Return the least pivot of the partition at the start of the step, just before its only replacement.
 
-    Minus infinity if a sign had changed, or the partition was replaced more than once or never.
+    Return minus infinity if a sign has changed, or if the partition was not replaced exactly once.
     """
     partition = memory.partition
     is_single = partition.partition_id == memory.step.start_partition_id + 1

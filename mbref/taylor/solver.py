@@ -15,8 +15,8 @@ from mbref.taylor.layout import RESPOND
 from mbref.taylor.partition import choose, put_rows, save_replaced_pivot
 from mbref.taylor.simd import WIDTH, load, store
 
-MIN_PIVOT_KEPT = 0.5  # a pivot over its first below which rows and variables are chosen again
-WITHOUT_INERTIA = 1e-13  # of the largest inertia of a variable
+MIN_PIVOT_KEPT = 0.5  # pivot / first pivot below which rows and variables are selected again
+WITHOUT_INERTIA = 1e-13  # inertia / largest inertia: smaller ones count as zero
 
 
 @inlined

@@ -45,9 +45,9 @@ from mbref.taylor.outputs import complete_samples
 from mbref.taylor.preparation import prepare_series
 from mbref.taylor.series_memory import acquire_memory, put_equations
 
-EXACT, EXACT_ORDER = 1e-13, 22  # rtol and atol of steps that pass singular positions, and their least order
-SHARE = 0.05  # of rtol + atol: the tolerance of a step that is clear of singular positions
-ROUNDING = 1e-16  # of a singular value
+EXACT, EXACT_ORDER = 1e-13, 22  # tolerance and least order of high-accuracy steps
+SHARE = 0.05  # tolerance of the last terms / (rtol + atol), far from singular positions
+ROUNDING = 1e-16  # relative rounding of a singular value
 STEPS_WORTH_CODE = 20_000  # steps ahead from which on generated code saves more time than it takes
 LEAST_ORDER, MOST_ORDER = 4, 30
 CHEAPEST = {GENERIC: (6.0, 1.2), GENERATED: (7.0, 1.6)}  # order: at a tolerance of 1, and more per digit
@@ -139,7 +139,7 @@ class SeriesStepper:
         self.taylor.progress.end = self.run.times[-1]
         mode, options = self.taylor.mode, self._options
         mode.kind, mode.tolerance, mode.order = REGULAR, options.regular_tolerance, options.regular_order
-        self.run.memory.previous.coordinates[:] = self.run.start.q  # whose quaternions give the side
+        self.run.memory.previous.coordinates[:] = self.run.start.q  # its quaternions select the sign
 
     @property
     def was_short(self) -> bool:
@@ -182,7 +182,7 @@ class SeriesStepper:
         """Go on with generated code where many steps are ahead."""
         if self._wants_code and self._steps_ahead() >= STEPS_WORTH_CODE:
             self._wants_code = False
-            with contextlib.suppress(NoGeneratedCode):  # then the generic kernels go on
+            with contextlib.suppress(NoGeneratedCode):  # continue with the generic kernels
                 self._put_code()
 
     def _steps_ahead(self) -> float:

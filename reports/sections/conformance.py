@@ -70,8 +70,8 @@ def _families(verified: Sequence[Verified]) -> Table:
 def _cause(family: str, failed: Sequence[Mapping[str, Any]]) -> str:
     """The sentences on a family's violations."""
     causes = [explanations().get((f"mbref {family}", v["property"], v["scene"])) for v in failed]
-    told = dict.fromkeys(f"{known.cause} {known.remedy}" for known in causes if known)
-    return " ".join([*told, *([UNEXPLAINED] if None in causes else [])]) or "–"
+    sentences = dict.fromkeys(f"{known.cause} {known.remedy}" for known in causes if known)
+    return " ".join([*sentences, *([UNEXPLAINED] if None in causes else [])]) or "–"
 
 
 def _drawn(verified: Sequence[Verified]) -> Table:
@@ -121,15 +121,15 @@ def _drawn_violations(verified: Sequence[Verified]) -> list[Block]:
 
 def _engines(verified: Sequence[Verified]) -> str:
     """The engines with their versions and the counts of their verdicts."""
-    told = []
+    sentences = []
     for found in verified:
         counts = {status: sum(v["status"] == status for v in found["verdicts"]) for status in MARKS}
         violated = f"{counts[FAIL]} violated" if counts[FAIL] else "none violated"
-        told.append(
+        sentences.append(
             f"{title(found['engine'])} {found['version']}: {counts[PASS]} verdicts hold, {violated}, "
             f"{counts[CANNOT]} cannot be asked, {counts[OUTSIDE]} are outside their card's domain."
         )
-    return f"crosscheck verify holds every engine against the same cards. {' '.join(told)}"
+    return f"crosscheck verify holds every engine against the same cards. {' '.join(sentences)}"
 
 
 def _cards(verified: Sequence[Verified]) -> Table:

@@ -65,15 +65,15 @@ def _limits(groups: Sequence[SceneRuns]) -> list[Block]:
 def _limit_rows(group: SceneRuns) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     for curve, runs in group.curves().items():
-        told = [run for run in runs if run.completed and math.isfinite(run.error)]
-        if swept_option(told) != STEP:
+        judged = [run for run in runs if run.completed and math.isfinite(run.error)]
+        if swept_option(judged) != STEP:
             continue
-        steps = [run.record["settings"][STEP] for run in told]
-        found = limit(group.scene, steps, [run.trajectory for run in told])
+        steps = [run.record["settings"][STEP] for run in judged]
+        found = limit(group.scene, steps, [run.trajectory for run in judged])
         exact = None if found is None else group.exact(found.motion.times)
         if found is not None and exact is not None:
             bias = float(error_series(group.scene, found.motion, exact).max())
-            finest = min(told, key=lambda run: run.record["settings"][STEP])
+            finest = min(judged, key=lambda run: run.record["settings"][STEP])
             more = _heavier(bias, found.discretisation)
             rows.append(
                 (
@@ -115,11 +115,11 @@ def slope(group: SceneRuns, curve: Curve) -> float:
     """The order of a family in a scene over its swept option; NaN without three runs on a line."""
     runs = group.curves().get(curve, ())
     option = swept_option(runs)
-    told = [run for run in runs if run.completed and math.isfinite(run.error) and run.error > 0]
-    if option is None or not told:
+    judged = [run for run in runs if run.completed and math.isfinite(run.error) and run.error > 0]
+    if option is None or not judged:
         return math.nan
     order = order_of_convergence(
-        [run.record["settings"][option] for run in told], [run.error for run in told]
+        [run.record["settings"][option] for run in judged], [run.error for run in judged]
     )
     return math.nan if order is None else order
 

@@ -62,11 +62,11 @@ def _card(group: SceneRuns, run: Run) -> Card:
 def _made(run: Run) -> str:
     """The record's id, the version, commit, date and machine."""
     record = run.record
-    told = {
+    facts = {
         "record": record["key"][:12],
         record["engine"]: record["version"],
         "commit": record.get("commit"),
         "made": record.get("date"),
         "on": record["machine"].get("cpu"),
     }
-    return ", ".join(f"{name} {value}" for name, value in told.items() if value)
+    return ", ".join(f"{name} {value}" for name, value in facts.items() if value)

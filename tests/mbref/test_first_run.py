@@ -67,7 +67,7 @@ def test_compiled_kernels_take_over_where_they_are_ready_before(monkeypatch, wor
 
 
 def test_faults_of_a_scene_are_told_by_the_interpreted_run():
-    with pytest.raises(SceneError, match="degrees of freedom are left"):
+    with pytest.raises(SceneError, match="degrees of freedom lack a driver"):
         motion(method="kinematic")
 
 

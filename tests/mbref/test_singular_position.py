@@ -142,7 +142,7 @@ def test_a_motion_that_turns_back_before_the_flat_position_is_completed(distance
 
 
 @pytest.mark.parametrize("gap", [1e-2, 1e-3, 1e-5, 1e-7])
-def test_beside_a_gap_a_run_is_right_or_ends(gap):
+def test_background_a_gap_a_run_is_right_or_ends(gap):
     scene = slider_crank(0.308, 0.308 + gap, 0.3, "gap", rate=30.0)
     for rtol in (1e-5, 1e-9):
         run = simulate(scene, "alf-dual+projection", np.linspace(0.0, 0.25, 21), Limits(rtol=rtol))

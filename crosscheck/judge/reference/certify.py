@@ -22,7 +22,7 @@ from crosscheck.judge.reference.arithmetic import EXTENDED, doubles, many_digits
 from crosscheck.judge.reference.bound import SAFETY, differences
 from crosscheck.judge.reference.cache import canonical
 from crosscheck.judge.reference.isostatic import Pose, isostatic, replaced
-from crosscheck.judge.reference.motion import Motion, Told, untold
+from crosscheck.judge.reference.motion import Motion, Progress, no_progress
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from mbref.scene import Scene
@@ -39,16 +39,16 @@ ACROSS = {"A": METHODS["A"], "A again": "of more digits and another order, where
 FEWEST_DIGITS = 4  # series of fewer have too few terms
 MOST_DIGITS = 100  # tolerances of many more are below the smallest double
 
-Shown = Callable[[str], AbstractContextManager[Told]]
+Shown = Callable[[str], AbstractContextManager[Progress]]
 """Shows the progress of the formulation named while the context lasts."""
 
 FOLDER = Path(__file__).with_name("certified")
 RATES = ("velocity", "angular_velocity")
 
 
-def unshown(_: str) -> AbstractContextManager[Told]:
+def unshown(_: str) -> AbstractContextManager[Progress]:
     """Show nothing."""
-    return nullcontext(untold)
+    return nullcontext(no_progress)
 
 
 class NotCertified(ArithmeticError):
@@ -92,8 +92,8 @@ def _motions(
     B keeps too few digits, by A with other digits and another order."""
 
     def by_a(of: Scene, order: int, places: int) -> Motion:
-        with shown("formulation A") as told:
-            return _by_a(of, times, order, places, told)
+        with shown("formulation A") as progress:
+            return _by_a(of, times, order, places, progress)
 
     moved, a = scene, by_a(scene, digits, digits + spare)
     if a.contradiction > 10.0**-digits:
@@ -104,8 +104,8 @@ def _motions(
         a, b = (by_a(moved, order, 4 * order // 3) for order in orders)
     else:
         _refuse_ended(scene, a, "A")
-        with shown("formulation B") as told:
-            b = tree_motion(moved, times, many_digits(digits + spare), seconds=np.inf, told=told)
+        with shown("formulation B") as progress:
+            b = tree_motion(moved, times, many_digits(digits + spare), seconds=np.inf, progress=progress)
     _refuse_ended(scene, a, "A")
     _refuse_ended(scene, b, "B")
     return moved, a, b
@@ -131,10 +131,10 @@ def _refuse_ended(scene: Scene, motion: Motion, name: str) -> None:
         raise NotCertified(f"{scene.name}: {name} ends at t = {motion.reached:.6g} s: {motion.reason}")
 
 
-def _by_a(scene: Scene, times: np.ndarray, order: int, places: int, told: Told) -> Motion:
+def _by_a(scene: Scene, times: np.ndarray, order: int, places: int, progress: Progress) -> Motion:
     """By formulation A to so many places a step, in arithmetic of twice the order."""
     exact = many_digits(2 * order)
-    return natural_motion(scene, times, exact, order=2 * order, tolerance=10.0**-places, told=told)
+    return natural_motion(scene, times, exact, order=2 * order, tolerance=10.0**-places, progress=progress)
 
 
 def _table(

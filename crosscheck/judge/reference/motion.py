@@ -15,13 +15,13 @@ from crosscheck.judge.deadline import TimeIsUp
 
 Times = Sequence[float] | np.ndarray
 
-Told = Callable[[float], None]
+Progress = Callable[[float], None]
 """Takes the time (s) that a motion has reached, step by step."""
 
 OVER = str(TimeIsUp())
 
 
-def untold(_: float) -> None:
+def no_progress(_: float) -> None:
     """Tell nobody the time that a motion has reached."""
 
 

@@ -113,8 +113,8 @@ class Panels:
                 return Panel(start, length, guess, rates, False, SHORTEST, foreseen=crossing)
             y, last = self.arithmetic.settled(better), min(last, change)
             panel = Panel(start, length, y, rates, False, SHORTER, crossing, sweeps=sweep)
-            if (told := self._told(panel, size, change, distance)) is not None:
-                return told
+            if (progress := self._progress(panel, size, change, distance)) is not None:
+                return progress
         return Panel(start, length, guess, rates, False, SHORTER, foreseen=crossing)
 
     def _integrated(
@@ -128,7 +128,7 @@ class Panels:
         better[:, :light] = y[0, :light] + half * self.times(self.integral, moves)
         return better, self._size(better, np.concatenate([moves, rates], axis=1) * length, light)
 
-    def _told(self, panel: Panel, size: np.ndarray, change: float, distance: np.ndarray) -> Panel | None:
+    def _progress(self, panel: Panel, size: np.ndarray, change: float, distance: np.ndarray) -> Panel | None:
         """Return the panel once an iterate has converged, or the factor by which it must be shorter."""
         tolerance = self.tolerance * (1 if panel.crossing is None else BRIDGED)
         if change > (TELLING if panel.crossing is None else tolerance):  # bridged iterates tell nothing

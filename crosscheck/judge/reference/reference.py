@@ -23,7 +23,11 @@ from crosscheck.judge.reference.tree import tree_motion
 from mbref.scene import Scene
 
 SECONDS = 20.0
-TWIN_ORDER, TWIN_NODES, TWIN_SEED = 24, 1.8, 1  # second runs: order of A, nodes per digit of B, seed
+SECOND_RUN_ORDER, SECOND_RUN_NODES, SECOND_RUN_SEED = (
+    24,
+    1.8,
+    1,
+)  # second runs: order of A, nodes per digit of B, seed
 CONSISTENT = 32 * EXTENDED.eps  # residual that is of the motion's own rounding, not of the scene's
 SHARE = 0.4  # fraction of the time that is left for each run of A
 FIELDS = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
@@ -100,14 +104,20 @@ def runs(scene: Scene, times: np.ndarray, seconds: float) -> tuple[Motion, Motio
         return a, _other_a(scene, a.times, moved, left - b.seconds), b
     if not len(a.times):
         return a, a, a
-    twin = _other_a(scene, a.times, moved, SHARE * left)
-    return a, twin, tree_motion(scene, a.times, EXTENDED, seconds=left - twin.seconds)
+    second_run = _other_a(scene, a.times, moved, SHARE * left)
+    return a, second_run, tree_motion(scene, a.times, EXTENDED, seconds=left - second_run.seconds)
 
 
 def _other_a(scene: Scene, times: np.ndarray, displaced: float, seconds: float) -> Motion:
     """By A, of another order and with other rows, the joints displaced."""
     return natural_motion(
-        scene, times, EXTENDED, seconds=seconds, order=TWIN_ORDER, seed=TWIN_SEED, displaced=displaced
+        scene,
+        times,
+        EXTENDED,
+        seconds=seconds,
+        order=SECOND_RUN_ORDER,
+        seed=SECOND_RUN_SEED,
+        displaced=displaced,
     )
 
 
@@ -118,18 +128,18 @@ def _other_b(scene: Scene, times: np.ndarray, displaced: float, seconds: float) 
         times,
         EXTENDED,
         seconds=seconds,
-        nodes_per_digit=TWIN_NODES,
-        seed=TWIN_SEED,
+        nodes_per_digit=SECOND_RUN_NODES,
+        seed=SECOND_RUN_SEED,
         displaced=displaced,
     )
 
 
 def judged(
-    scene: Scene, times: np.ndarray, one: Motion, twin: Motion, other: Motion
+    scene: Scene, times: np.ndarray, one: Motion, second_run: Motion, other: Motion
 ) -> tuple[Reference, str]:
-    """Samples of one motion with the bound that its twin and another leave, as far as that is of use."""
-    apart = np.zeros(max(len(twin.times), len(other.times)))
-    for second in (twin, other):
+    """Return samples of a motion with the bound from its second run and formulation B, while it is useful."""
+    apart = np.zeros(max(len(second_run.times), len(other.times)))
+    for second in (second_run, other):
         k = len(second.times)
         apart[:k] = np.maximum(apart[:k], differences(scene, one, second))
     bound = np.maximum(bounds(apart), rounding(scene, one)[: len(apart)])
@@ -140,14 +150,14 @@ def judged(
         **arrays,
         bound=bound[:good],
         both=np.arange(good) < len(other.times),
-        seconds=one.seconds + twin.seconds + other.seconds,
+        seconds=one.seconds + second_run.seconds + other.seconds,
     )
     if good < len(apart):
         return (
             samples,
             f"independent motions of it differ by {apart[good]:.0e} at t = {one.times[good]:.6g} s",
         )
-    ended = one if len(one.times) < len(times) else twin
+    ended = one if len(one.times) < len(times) else second_run
     return samples, f"{ended.reason}, at t = {ended.reached:.6g} s" if good < len(times) else ""
 
 

@@ -2,7 +2,7 @@
 
 Steps are as long as the series' smallest term allows (À. Jorba and M. Zou, Experimental Mathematics 14,
 2005); after each the coordinates are projected onto the rows.  A singular position, near which the series is
-lost in rounding noise, is never stepped on but leapt over, along the branch that the series continues.
+lost in rounding noise, is crossed by one step, along the branch that the series continues.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from crosscheck.judge.deadline import TimeIsUp, ask, within
 from crosscheck.judge.reference.arithmetic import Arithmetic, doubles, largest
 from crosscheck.judge.reference.expansion import Expansion, Series, value
 from crosscheck.judge.reference.held_rows import HeldRows, independent
-from crosscheck.judge.reference.motion import Motion, Times, Told, untold
+from crosscheck.judge.reference.motion import Motion, Progress, Times, no_progress
 from crosscheck.judge.reference.natural import NaturalCoordinates
 from crosscheck.judge.reference.natural_loads import Loads
 from crosscheck.judge.reference.saddle_point import SaddlePoint
@@ -27,14 +27,14 @@ from mbref.scene import Scene
 
 ORDER = 28
 NEW_ROW = 1e-4  # pivot from which a row that was dependent at the start has become independent
-BLUNT = 0.25  # smallest singular value / its best value: below it the selection of rows is reconsidered
-KEEN = 0.5  # smallest singular value of the new rows / best value: required,
+ILL_CONDITIONED = 0.25  # smallest singular value / best value: below it rows are selected again
+WELL_CONDITIONED = 0.5  # smallest singular value of the new rows / best value: required,
 BETTER = 1e3  # or: smallest singular value of the new rows / of the old rows
 NEAR = 0.4  # smallest singular value / usual value: below it a singular position is near
 PREFERENCE = 0.2  # largest relative change of a row's weight
-USUAL = 50  # steps over which sharpness is usual
+USUAL = 50  # steps whose median conditioning is the usual one
 DATA = float(np.finfo(float).eps)  # rounding of a scene's numbers
-ENOUGH = 100.0  # multiples of the tolerance that a leap may lose without trying from nearer
+ENOUGH = 100.0  # multiples of the tolerance that a step across may lose without a second attempt
 TRIED = 24  # lengths at which a singular position is looked for
 FINE = 1e-6  # relative accuracy of the time of the singular position
 DEPENDENT = 0.02  # smallest singular value / present value: below it the rows are dependent
@@ -61,19 +61,19 @@ def natural_motion(
     tolerance: float | None = None,
     seed: int = 0,
     displaced: float = 0.0,
-    told: Told = untold,
+    progress: Progress = no_progress,
 ) -> Motion:
     """The motion at ascending times (k,) ≥ 0 in natural coordinates (see Motion), by series of an order.
 
     ``tolerance`` is of a step, relative (default: the arithmetic's rounding unit).  Another ``seed`` prefers
     other rows where some are redundant, and displaces joints by up to ``displaced``, relative to the largest
-    coordinate.  ``seconds`` limits the CPU time of the calling thread; ``told`` hears the time of every step.
+    coordinate.  ``seconds`` limits the CPU time of the thread; ``progress`` receives the time of every step.
     """
     began, reason, samples = time.thread_time(), "", []
     stepper = Stepper(scene, arithmetic, order, tolerance or arithmetic.eps, (seed, displaced))
     try:
         with within(seconds):
-            for sample in stepper.samples(times, told):
+            for sample in stepper.samples(times, progress):
                 samples.append(sample)
     except (Ended, TimeIsUp) as end:
         reason = str(end)
@@ -109,7 +109,7 @@ class Stepper:
         self._turned = self.of.joints.start()
         self._weights = self._varied(*way)
         self._every, self._lost = HeldRows(self.of, range(self.of.count)), np.inf
-        self._held, self._sharpness = self._every, [0.0]
+        self._held, self._conditioning = self._every, [0.0]
 
     def _varied(self, seed: int, displaced: float) -> np.ndarray:
         """Weights (m,) of the rows, near one, that prefer other rows by the seed; joints are displaced."""
@@ -120,10 +120,10 @@ class Stepper:
         self.of.c[joints] = self.of.c[joints] + self.of.arithmetic.array(moved)
         return 1 + PREFERENCE * rng.random(self.of.count)
 
-    def samples(self, times: Times, told: Told) -> Iterator[Sample]:
+    def samples(self, times: Times, progress: Progress) -> Iterator[Sample]:
         """X, X', X'' (3, n) at ascending times; raises Ended where the motion cannot be followed."""
         self._held = self._choice(self._x, self.t)[0]
-        self._sharpness = [self._sharp(self._x, self.t)]
+        self._conditioning = [self._sharp(self._x, self.t)]
         self._refuse_undetermined()
         self._start()
         pending = list(times)
@@ -137,7 +137,7 @@ class Stepper:
                 d = self.of.arithmetic.number(pending.pop(0)) - self.t
                 yield tuple(self.of.arithmetic.settled(value(series, d, n)) for n in range(3))
             self._advance(expansion, series, h)
-            told(float(self.t))
+            progress(float(self.t))
 
     def _start(self) -> None:
         """Put the coordinates onto the rows, and take the velocities that the rule asks for."""
@@ -161,7 +161,7 @@ class Stepper:
         self._turned = [settled(value(one[: len(series)], d))[()] for one in expansion.turned]
         self.t = settled(self.t + d)[()]
         self.steps += 1
-        self._sharpness.append(self._sharp(self._x, self.t))
+        self._conditioning.append(self._sharp(self._x, self.t))
         self._choose_again()
         self._project()
         self.contradiction = max(self.contradiction, largest(self._gaps(self._every)[0]) / self._size())
@@ -183,18 +183,18 @@ class Stepper:
     def _choose_again(self) -> None:
         """Hold other rows where these have become blunt and the position is not singular: blunt rows magnify
         what redundant ones contradict each other by."""
-        now, best = self._sharpness[-1], max(self._sharpness)
-        if now <= BLUNT * best:
-            self._hold_others(self._x, self.t, min(KEEN * best, BETTER * now))
+        now, best = self._conditioning[-1], max(self._conditioning)
+        if now <= ILL_CONDITIONED * best:
+            self._hold_others(self._x, self.t, min(WELL_CONDITIONED * best, BETTER * now))
 
     def _hold_others(self, x: np.ndarray, t: Any, least: float) -> bool:
         """Hold the rows that are independent at coordinates x, if they are sharper than ``least`` there, and
         sharper than the held ones here; whether they are."""
-        before, now = self._held, self._sharpness[-1]
+        before, now = self._held, self._conditioning[-1]
         self._held = self._choice(x, t)[0]
         here, there = self._sharp(self._x, self.t), self._sharp(x, t)
         if self._held.count == before.count and there > least and here > now:
-            self._sharpness = [here]
+            self._conditioning = [here]
             return True
         self._held = before
         return False
@@ -260,25 +260,25 @@ class Stepper:
         h = series.reach(self._tolerance)
         if h <= SHORTEST * max(1e-3, float(self.t)):
             raise Ended(STEPS_END)
-        h, now = min(h, max(most, LEAST_STEP)), self._sharpness[-1]
+        h, now = min(h, max(most, LEAST_STEP)), self._conditioning[-1]
         ahead = self._ahead(expansion.x, series, h)
-        if ahead < now < NEAR * max(self._sharpness[-USUAL:]):
+        if ahead < now < NEAR * max(self._conditioning[-USUAL:]):
             middle = self._crossing(expansion.x, series, h)
             if middle and self._others_serve(expansion.x[: series.terms(h)], middle):
                 return self._step(most)
             longer = self._expansion(2 * self._order) if middle else expansion
-            if middle and self._may_leap(Series(longer.x).left_out(2 * middle)):
+            if middle and self._may_step_across(Series(longer.x).left_out(2 * middle)):
                 self.crossings.append(float(self.t) + middle)
                 return longer, 2 * middle
         return expansion, self._shortened(expansion.x, series, h, ahead)
 
     def _shortened(self, x: np.ndarray, series: Series, h: float, ahead: float) -> float:
         """The length (s) of a step that does not end much nearer to a singular position; ``ahead`` is the
-        sharpness at the end of one of length h.  Raises Ended where no length is short enough.
+        conditioning at the end of a step of length h.  Raises Ended where no length is short enough.
 
-        The sharpness where the step begins is taken anew: correcting the coordinates has changed it since.
+        The conditioning at the start is computed again, because the correction of the coordinates changed it.
         """
-        if ahead >= NEAR * self._sharpness[-1]:
+        if ahead >= NEAR * self._conditioning[-1]:
             return h
         least, now = SHORTEST * max(1e-3, float(self.t)), self._sharp(self._x, self.t)
         while ahead < NEAR * now:
@@ -292,7 +292,7 @@ class Stepper:
         """Whether only the held rows are dependent so far ahead (s), and others are not, which are then held:
         the position there is not singular."""
         d = self.of.arithmetic.number(middle)
-        if not self._hold_others(value(series, d), self.t + d, self._sharpness[-1]):
+        if not self._hold_others(value(series, d), self.t + d, self._conditioning[-1]):
             return False
         self._project()
         return True
@@ -302,11 +302,11 @@ class Stepper:
         d = self.of.arithmetic.number(h)
         return self._sharp(value(x[: series.terms(h)], d), self.t + d)
 
-    def _may_leap(self, lost: float) -> bool:
-        """Whether a leap that loses so much does so no more than rounded data, or than one from nearer."""
+    def _may_step_across(self, lost: float) -> bool:
+        """Return whether a step across loses no more than rounding of the data, or than a second attempt."""
         before, self._lost = self._lost, lost
-        blunt = max(self._sharpness[-USUAL:]) / self._sharpness[-1]
-        data = 0.0 if self.of.arithmetic.digits else DATA * blunt**2
+        ill_conditioned = max(self._conditioning[-USUAL:]) / self._conditioning[-1]
+        data = 0.0 if self.of.arithmetic.digits else DATA * ill_conditioned**2
         enough = max(ENOUGH * self._tolerance, data)
         if lost > np.sqrt(self._tolerance) or enough < lost < before:
             return False
@@ -327,4 +327,4 @@ class Stepper:
             return 0.0
         around = lengths[lowest - 1], lengths[lowest + 1]
         found = minimize_scalar(sharp, bounds=around, method="bounded", options={"xatol": FINE * around[0]})
-        return float(found.x) if found.fun < DEPENDENT * self._sharpness[-1] else 0.0
+        return float(found.x) if found.fun < DEPENDENT * self._conditioning[-1] else 0.0

@@ -14,7 +14,7 @@ import numpy as np
 
 from crosscheck.judge.deadline import TimeIsUp, ask, within
 from crosscheck.judge.reference.arithmetic import Arithmetic
-from crosscheck.judge.reference.motion import Motion, Told, untold
+from crosscheck.judge.reference.motion import Motion, Progress, no_progress
 from crosscheck.judge.reference.panels import Panel, Panels
 from crosscheck.judge.reference.stiff_panels import StiffPanels
 from crosscheck.judge.reference.tree_equations import OPEN, TreeEquations
@@ -26,10 +26,12 @@ FIRST = 0.1  # length of the first panel / duration
 LEAST = 1e-10  # shortest panel / duration
 SLOW = 20  # Picard iterations: a panel that needs more may be stiff
 NEAR_END = 0.7  # fraction of a panel: a singular position later than this is too near its end
-BEYOND = 0.35  # half lengths from the end of a panel to a singular position that its series leaps over
-LEAST_LOST = 1e6  # rounding units that a leap may lose without trying from nearer
+BEYOND = (
+    0.35  # half lengths: largest distance of a singular position from the end of a panel that steps across it
+)
+LEAST_LOST = 1e6  # rounding units that a step across may lose without a second attempt
 MOST_LOST = 1e-7  # largest error of a step across a singular position, before closures are corrected
-SEVERAL = 3  # panels across one singular position that do not settle before it is leapt over
+SEVERAL = 3  # panels across a singular position that may fail to converge before a step across it
 
 
 def tree_motion(
@@ -41,21 +43,21 @@ def tree_motion(
     nodes_per_digit: float = NODES_PER_DIGIT,
     seed: int = 0,
     displaced: float = 0.0,
-    told: Told = untold,
+    progress: Progress = no_progress,
 ) -> Motion:
     """The motion of a scene at ascending times (k,) ≥ 0 in an arithmetic; see Motion.
 
     Another ``seed`` prefers other rows where some are redundant, and displaces the joints that close loops by
     up to ``displaced``, relative to the scene's length.  The motion ends early, with the reason, after so
-    many CPU seconds, where the loops do not stay closed, and where no panel of time is short enough; ``told``
-    hears the time of every panel.  Raises SceneError when the given velocities contradict the joints.
+    many CPU seconds, where the loops do not stay closed, and where no panel of time is short enough.
+    ``progress`` receives the time of every panel.  Raises SceneError if start velocities violate the joints.
     """
     clock = time.thread_time()
     equations = TreeEquations(scene, arithmetic, (seed, displaced))
     run = _Run(equations, np.asarray(times, dtype=float), nodes_per_digit)
     try:
         with within(seconds):
-            reason = run.through(told)
+            reason = run.through(progress)
     except TimeIsUp as end:
         reason = str(end)
     return run.motion(reason, time.thread_time() - clock)
@@ -72,11 +74,14 @@ class _Run:
         self.samples: list[tuple[np.ndarray, np.ndarray]] = []
         self.crossings: list[float] = []
         self.foreseen = 0.0  # time of the next singular position, or a past one
-        self.unsettled, self.lost = 0, np.inf  # panels across the next one, and digits of a leap over it
+        self.unsettled, self.lost = (
+            0,
+            np.inf,
+        )  # failed panels across the next position; digits lost by a step across it
         self.taken = self.steps = 0
         self.stiff, self.is_stiff = StiffPanels(self.panels), False
 
-    def through(self, told: Told) -> str:
+    def through(self, progress: Progress) -> str:
         """Run to the last time; return the reason where the motion ends before."""
         ask()
         self.state = self.equations.start()
@@ -95,14 +100,14 @@ class _Run:
                 return "no panel of time is short enough"
             if panel.settled and not self._accepts(panel):
                 return "rows that were redundant at the start are not later: it is a singular position"
-            told(float(self.t))
+            progress(float(self.t))
         return ""
 
     def _tried(self, last: Panel | None, length: Any) -> Panel:
-        """A panel of a length, or one that leaps over a singular position, where several did not settle."""
+        """Solve a panel of the given length; after several failures, one across a singular position."""
         panel = self._panel(length, self._guess(last, length))
-        leap = None if panel.settled else self._leap(panel.time(panel.foreseen))
-        return leap or panel
+        step_across = None if panel.settled else self._step_across(panel.time(panel.foreseen))
+        return step_across or panel
 
     def _accepts(self, panel: Panel) -> bool:
         """Takes samples, and the state at the end, of a settled panel; false where a loop is open then."""
@@ -129,7 +134,7 @@ class _Run:
         near = NEAR_END * float(length) < gap < (1 + NEAR_END) * float(length)
         return self.arithmetic.number(gap) - length / 2 if near else length
 
-    def _leap(self, singular: float | None) -> Panel | None:
+    def _step_across(self, singular: float | None) -> Panel | None:
         """A panel over a singular position (s) that has no panel of its own, as the iteration there gains no
         digits: a panel that ends before it, continued by its series; None where nearer ones lose less."""
         if singular is None or singular <= self.t:

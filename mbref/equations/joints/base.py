@@ -23,7 +23,7 @@ class Primitive(NamedTuple):
     point_second: Vector = ZERO
     first: Vector = ZERO
     second: Vector = ZERO
-    turning: Vector = ZERO  # with a driver: fixed in the first body, a quarter turn from first
+    turning: Vector = ZERO  # for drivers: direction in the first body, perpendicular to `first`
     length: float = 0.0  # of a distance; the factor of a joint coordinate
     driven: bool = False
 

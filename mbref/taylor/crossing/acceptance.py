@@ -69,7 +69,7 @@ def crossing_tolerance(memory):
 def violation_by_rounding(memory):
     """Return the violation of the rows that rounding explains at the end of a step near a singular position.
 
-    Drivers have the rounding of the time.  Of rows that depend on others, corrections leave what they had.
+    Drivers have the rounding of the time.  Corrections do not reduce the violation of dependent rows.
     """
     step, terms, rounding, speed = memory.step, memory.series.terms, VIOLATION_FLOOR, 0.0
     if memory.polynomials.given.driver.shape[0] > 0:

@@ -99,14 +99,14 @@ def changes_signs(memory):
 def contains_singular_position(h, pivot, memory):
     """Return whether a step of h seconds, with a least pivot at its end, contains a singular position."""
     start, moved, kept = memory.step.start_pivot, distance_moved(h, memory), keeps_signs(memory)
-    is_brief = start + pivot > PIVOT_SLOPE * moved
-    if (is_brief and kept) or start + replaced_pivot(memory) > PIVOT_SLOPE * moved:
+    is_short = start + pivot > PIVOT_SLOPE * moved
+    if (is_short and kept) or start + replaced_pivot(memory) > PIVOT_SLOPE * moved:
         return False
     if determinant_changes_sign(h, min(int(moved / PART_LENGTH) + 1, MAX_PARTS), memory):
         return True
     if changes_signs(memory) and vanishes_inside(h, memory):
         return True
-    if is_brief or (kept and not is_near_singular(pivot, memory)):
+    if is_short or (kept and not is_near_singular(pivot, memory)):
         return False
     if memory.mode.kind != PREDICTOR and turns_back(memory.series.terms, memory):
         return False

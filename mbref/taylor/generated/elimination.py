@@ -198,7 +198,7 @@ class Elimination:
         return self._write.added_up(self._write.total(parts))
 
     def _without_rows(self, momentum: Row, motion: Row, particular: list[Row]) -> Row:
-        """Return a motion in the lanes of variables, and minus its momentum times N in those of
+        """Return a motion in the lanes of variables, and minus its momentum times N in the lanes of
         multipliers."""
         vectors = [momentum[vector] for vector in self._of_variables]
         parts = [

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from mbref.kernels.beside import PROGRAM, compiled_beside
+from mbref.kernels.background import PROGRAM, compiled_in_background
 
 KEPT, MISSING = SimpleNamespace(is_kept=True), SimpleNamespace(is_kept=False)
 SOURCE = """\
@@ -31,32 +31,32 @@ def mark(tmp_path, monkeypatch):
 
 
 def test_missing_kernels_are_compiled_by_the_end_of_the_block(mark):
-    with compiled_beside([KEPT, MISSING], "second", "mark"):
+    with compiled_in_background([KEPT, MISSING], "second", "mark"):
         pass
     assert mark.exists()
 
 
 def test_kept_kernels_start_no_process(mark):
-    with compiled_beside([KEPT, KEPT], "second", "mark"):
+    with compiled_in_background([KEPT, KEPT], "second", "mark"):
         pass
     assert not mark.exists()
 
 
 def test_one_core_has_no_second_process(mark, monkeypatch):
     monkeypatch.setattr(os, "cpu_count", lambda: 1)
-    with compiled_beside([MISSING], "second", "mark"):
+    with compiled_in_background([MISSING], "second", "mark"):
         pass
     assert not mark.exists()
 
 
 def test_a_second_process_that_fails_is_no_error(mark):
-    with compiled_beside([MISSING], "second", "absent"):
+    with compiled_in_background([MISSING], "second", "absent"):
         pass
     assert not mark.exists()
 
 
 def test_an_interrupted_block_ends_the_second_process(mark):
-    with pytest.raises(KeyboardInterrupt), compiled_beside([MISSING], "second", "wait"):
+    with pytest.raises(KeyboardInterrupt), compiled_in_background([MISSING], "second", "wait"):
         raise KeyboardInterrupt
 
 

@@ -17,7 +17,7 @@ from mbref.kernels.compilation import Exchangeable
 
 # The second process ends with its parent, whose death closes its standard input.
 PROGRAM = """\
-from mbref.kernels.beside import end_with_parent
+from mbref.kernels.background import end_with_parent
 end_with_parent()
 from {module} import {function}
 {function}()
@@ -25,7 +25,7 @@ from {module} import {function}
 
 
 @contextmanager
-def compiled_beside(kernels: Sequence[Exchangeable], module: str, function: str) -> Iterator[None]:
+def compiled_in_background(kernels: Sequence[Exchangeable], module: str, function: str) -> Iterator[None]:
     """While the block runs, ``module.function()`` compiles the kernels in a second process, whose end is
     waited for; without such a process where the cache has them all, or with one core.
 
