@@ -72,7 +72,7 @@ class Stepper(Protocol):
         self, packs: Packs, q: np.ndarray, places: Sequence[int]
     ) -> tuple[list[tuple[Any, ...]], list[int]]:
         """Return (target array, values per scene) for numbers of the stepper that differ between the scenes
-        of ``packs``, with coordinates q (s, 7 nb) at the start; and those of the places whose scenes have
+        of ``packs``, with coordinates q (s, 7 nb) at the start; and the places whose scenes have
         room in memory."""
 
     def advance_once(self) -> tuple[int, float]:

@@ -26,7 +26,7 @@ class JointNumbers(NamedTuple):
 
 
 class Models:
-    """The models of many scenes as one, whose numbers are those of all (``taylor.numbers``).
+    """One model of many scenes, whose numbers hold the values of all scenes (``taylor.numbers``).
 
     Masses, gravity and forces of ``data`` are arrays whose first axis counts the scenes.
     """
@@ -43,7 +43,7 @@ class Models:
 
 
 def _joint(joints: Sequence[Any], batch: Batch) -> JointNumbers:
-    """Return a joint from those of all scenes."""
+    """Return one joint with the numbers of all scenes."""
     first = joints[0]
     directions, anchors = (
         batch.together(np.array([getattr(joint, name) for joint in joints], dtype=float))

@@ -1,8 +1,8 @@
 """Numbers of many scenes at once: one operation finds the equations of all scenes of a batch.
 
-Where coefficients of a scene are floats, those of a batch are floats too if all scenes agree, and ``Numbers``
-if not.  Every operation is one of IEEE arithmetic, so that a scene has the same bits in a batch and alone.
-A decision is that of the first scene; the batch remembers which scenes decide otherwise.
+Coefficients of a batch are floats if each scene has the same float, otherwise ``Numbers``.
+Every operation is one of IEEE arithmetic, so that a scene has the same bits in a batch and alone.
+The first scene decides; the batch remembers which scenes decide otherwise.
 """
 
 from __future__ import annotations
