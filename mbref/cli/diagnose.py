@@ -189,7 +189,7 @@ def _motion_lines(along: AlongMotion | str | None) -> list[str]:
 
 def _swap_lines(swaps: list[dict[str, str]], redundant: bool) -> list[str]:
     if not swaps:
-        return ["  no exchange or removal of up to four joints ends the redundancy"] * redundant
+        return ["  no exchange or removal of joints that was tried ends the redundancy"] * redundant
     shown = [" and ".join(f"{name} {kind}" for name, kind in swap.items()) for swap in swaps]
     return [
         "  exchanges that end the redundancy and keep the degrees of freedom",

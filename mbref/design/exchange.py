@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,8 +21,8 @@ WEAKER = {  # types that allow the motion of the first and more, those that keep
     "universal": ("spherical",),
     "fixed": ("universal", "spherical"),
 }
-MOST_EXCHANGES = 4  # joints exchanged at once
-MOST_TRIALS = 3000
+MOST_EXCHANGES = 4  # joints of a smallest set; a search of larger sets takes too long
+MOST_TRIALS = 5_000  # exchanges tried in the search of smallest sets, about 1 s
 PART = 1e-6  # weight of a row in a redundancy above which its joint takes part
 
 REMOVED = "removed"  # stands for a joint type
@@ -29,41 +30,122 @@ Exchange = dict[str, str]  # joint → its new type, or REMOVED
 
 
 def exchanges(scene: Scene, most: int = 6) -> list[Exchange]:
-    """The smallest sets of joints whose exchange or removal ends all redundancy, with the same freedoms.
+    """Return sets of joints whose exchange or removal ends all redundancy, with the same freedoms.
 
-    At most ``most`` of them, of up to four joints; empty where nothing is redundant or nothing is found.
-    Asked at a general pose, without drivers.  A joint on which a driver or a torsion spring acts becomes only
-    a type that can bear it, and is not removed.
+    The smallest sets, at most ``most`` of them, where up to four joints are enough; otherwise one set, found
+    joint by joint. Empty where nothing is redundant or nothing is found. Judged at a general pose, without
+    drivers, and each by the rank. A joint on which a driver or a torsion spring acts becomes only a type that
+    can bear it, and is not removed.
     """
     model = Model(scene.with_(driver=(), load=()))
     if not model.m:
         return []
     at_pose = Model(placed(model, general_pose(model)))
     rows = _rows(at_pose)
-    rank, involved = _rank(rows.values()), _involved(at_pose, rows)
-    choices = {name: _weaker(at_pose.scene, name, _bearing(scene, name)) for name in involved}
+    redundant = Combinations.of(rows)
+    if not redundant.number:
+        return []
+    involved = [joint.name for joint in at_pose.scene.joint if redundant.involves(joint.name)]
+    choices = {
+        name: {kind: w for kind, w in kinds.items() if redundant.with_exchange(name, w) is not None}
+        for name, kinds in _choices(scene, at_pose, rows, involved).items()
+    }
     for size in range(1, MOST_EXCHANGES + 1):
-        found = _sets(rows, choices, rank, size)
+        found = (e for e in _smallest(redundant, choices, size) if _is_cure(rows, choices, e))
         if chosen := list(itertools.islice(found, most)):
             return chosen
-    return []
+    together = _joint_by_joint(redundant, choices)
+    return [together] if together and _is_cure(rows, choices, together) else []
 
 
-def _sets(
-    rows: Mapping[str, np.ndarray], choices: Mapping[str, Mapping[str, np.ndarray]], rank: int, size: int
-) -> Iterator[Exchange]:
-    """Exchanges of ``size`` joints that leave as many rows as the rank, all of them independent."""
-    total, tried = sum(map(len, rows.values())), 0
-    for names in itertools.combinations(choices, size):
-        for types in itertools.product(*(choices[name] for name in names)):
-            new = {name: choices[name][kind] for name, kind in zip(names, types, strict=True)}
-            left = total + sum(len(r) - len(rows[name]) for name, r in new.items())
-            if left != rank:
-                continue
-            if (tried := tried + 1) > MOST_TRIALS:
+class Weaker(NamedTuple):
+    """A weaker type in the place of a joint: its rows, and how they follow from the joint's own."""
+
+    rows: np.ndarray  # (k, n), of unit length
+    kept: np.ndarray  # (k, d): its rows as combinations of the d rows of the joint
+    lost: np.ndarray  # (d - k, d): an orthonormal basis of what these combinations leave out
+
+
+Choices = Mapping[str, Mapping[str, Weaker]]  # joint → type → what it leaves
+
+
+class Combinations:
+    """The vanishing combinations of the rows of Φ_q, a basis, by joint: left null vectors of Φ_q.
+
+    A weaker joint leaves the combinations that do without its lost rows.  The rank stays where each lost row
+    ends a combination.
+    """
+
+    def __init__(self, parts: Mapping[str, np.ndarray], number: int):
+        self.parts, self.number = parts, number  # joint → (rows of the joint, number)
+
+    @classmethod
+    def of(cls, rows: Mapping[str, np.ndarray]) -> Combinations:
+        """Return the vanishing combinations of rows (d, n) by joint."""
+        left, values, _ = np.linalg.svd(np.concatenate(list(rows.values())))
+        null = left[:, int(np.sum(values > ROUNDING * values[0])) :]
+        ends = np.cumsum([len(r) for r in rows.values()])[:-1]
+        return cls(dict(zip(rows, np.split(null, ends), strict=True)), null.shape[1])
+
+    def involves(self, joint: str) -> bool:
+        """Return whether the joint has a row in a combination."""
+        return bool(np.linalg.norm(self.parts[joint], axis=1).max() > PART)
+
+    def with_exchange(self, name: str, weaker: Weaker) -> Combinations | None:
+        """Return what an exchange leaves, None where it lowers the rank."""
+        _, values, vt = np.linalg.svd(weaker.lost @ self.parts[name])
+        if len(weaker.lost) > self.number or np.sum(values > PART) < len(weaker.lost):
+            return None
+        left = vt[len(weaker.lost) :].T
+        parts = {joint: part @ left for joint, part in self.parts.items()}
+        parts[name] = np.linalg.pinv(weaker.kept.T) @ parts[name]
+        return Combinations(parts, left.shape[1])
+
+
+def _smallest(redundant: Combinations, choices: Choices, size: int) -> Iterator[Exchange]:
+    """Yield the exchanges of ``size`` joints that end the redundancy, up to a number of trials."""
+    names, trials = list(choices), itertools.count(1)
+    most = [max((len(weaker.lost) for weaker in choices[name].values()), default=0) for name in names]
+    reach = [sorted(most[k:], reverse=True) for k in range(len(names) + 1)]  # rows lost from joint k on
+
+    def extended(chosen: Exchange, left: Combinations, first: int) -> Iterator[Exchange]:
+        missing = size - len(chosen)
+        if missing == 0:
+            if left.number == 0:
+                yield chosen
+            return
+        for k in range(first, len(names)):
+            if sum(reach[k][:missing]) < left.number:
                 return
-            if _rank({**rows, **new}.values()) == rank:
-                yield dict(zip(names, types, strict=True))
+            for kind, weaker in choices[names[k]].items():
+                if next(trials) > MOST_TRIALS:
+                    return
+                if (rest := left.with_exchange(names[k], weaker)) is not None:
+                    yield from extended({**chosen, names[k]: kind}, rest, k + 1)
+
+    return extended({}, redundant, 0)
+
+
+def _joint_by_joint(redundant: Combinations, choices: Choices) -> Exchange | None:
+    """Return exchanges that end the redundancy, each of the next joint that loses most rows; None if none.
+
+    A joint is removed where no other exchange is left.
+    """
+    chosen: Exchange = {}
+    offers = [(name, kind) for name, kinds in choices.items() for kind in kinds]
+    offers.sort(key=lambda offer: (offer[1] == REMOVED, -len(choices[offer[0]][offer[1]].lost)))
+    for name, kind in offers:
+        if name not in chosen and redundant.number:
+            left = redundant.with_exchange(name, choices[name][kind])
+            if left is not None:
+                redundant, chosen[name] = left, kind
+    return None if redundant.number else {name: chosen[name] for name in choices if name in chosen}
+
+
+def _is_cure(rows: Mapping[str, np.ndarray], choices: Choices, exchange: Exchange) -> bool:
+    """Return whether the rows that an exchange leaves are independent, and as many as the rank."""
+    left = {**rows, **{name: choices[name][kind].rows for name, kind in exchange.items()}}
+    return _rank(left.values()) == _rank(rows.values()) == sum(map(len, left.values()))
 
 
 def _rows(model: Model) -> dict[str, np.ndarray]:
@@ -77,15 +159,6 @@ def _rank(rows: Iterable[np.ndarray]) -> int:
     return int(np.sum(values > ROUNDING * values[0]))
 
 
-def _involved(model: Model, rows: Mapping[str, np.ndarray]) -> list[str]:
-    """The joints of the scene that have a row in a redundancy."""
-    left, values, _ = np.linalg.svd(np.concatenate(list(rows.values())))
-    null = left[:, int(np.sum(values > ROUNDING * values[0])) :]
-    owner = np.repeat(list(rows), [len(r) for r in rows.values()])
-    shared = set(owner[np.linalg.norm(null, axis=1) > PART])
-    return [joint.name for joint in model.scene.joint if joint.name in shared]
-
-
 def _bearing(scene: Scene, name: str) -> list[str]:
     """The types that can bear the driver and the torsion springs of the joint of that name."""
     driven = scene.joint_named(name).facts.driven if name in {d.joint for d in scene.driver} else None
@@ -94,16 +167,31 @@ def _bearing(scene: Scene, name: str) -> list[str]:
     return [k for k, f in facts.items() if driven in (None, f.driven) and f.takes_torsion_spring >= is_sprung]
 
 
-def _weaker(scene: Scene, name: str, kinds: Collection[str]) -> dict[str, np.ndarray]:
-    """Rows of the joint of that name as each weaker type, of these ``kinds``."""
-    joint = scene.joint_named(name)
-    found = {}
-    for kind in (k for k in WEAKER.get(joint.type, ()) if k in kinds):
-        others = tuple(_as(j, kind) if j.name == name else j for j in scene.joint)
-        found[kind] = _rows(Model(scene.with_(joint=others)))[name]
-    if len(kinds) == len(JOINT_TYPES):
-        found[REMOVED] = _rows(Model(scene))[name][:0]
+def _choices(scene: Scene, model: Model, rows: Mapping[str, np.ndarray], names: Sequence[str]) -> Choices:
+    """Return the weaker types of the joints of these names, and their removal, at the model's poses."""
+    bearing = {name: _bearing(scene, name) for name in names}
+    found: dict[str, dict[str, Weaker]] = {name: {} for name in names}
+    for kind in dict.fromkeys(itertools.chain(*WEAKER.values())):
+        changed = [
+            n for n in names if kind in WEAKER.get(scene.joint_named(n).type, ()) and kind in bearing[n]
+        ]
+        joints = tuple(_as(j, kind) if j.name in changed else j for j in model.scene.joint)
+        weaker_rows = _rows(Model(model.scene.with_(joint=joints))) if changed else {}
+        for name in changed:
+            found[name][kind] = _weaker(weaker_rows[name], rows[name])
+    for name in names:
+        order = WEAKER.get(scene.joint_named(name).type, ())
+        found[name] = {kind: found[name][kind] for kind in order if kind in found[name]}
+        if len(bearing[name]) == len(JOINT_TYPES):
+            found[name][REMOVED] = _weaker(rows[name][:0], rows[name])
     return found
+
+
+def _weaker(rows: np.ndarray, own: np.ndarray) -> Weaker:
+    """Return rows (k, n) as combinations of a joint's own rows (d, n), and what they leave out."""
+    kept = rows @ np.linalg.pinv(own)
+    _, _, vt = np.linalg.svd(kept.reshape(-1, len(own)))
+    return Weaker(rows, kept, vt[len(rows) :])
 
 
 def _as(joint: Joint, kind: str) -> Joint:

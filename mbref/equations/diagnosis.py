@@ -20,6 +20,7 @@ from mbref.scenes import find_scene
 RANK_TOLERANCE = 1e-10  # relative to the largest singular value of the scaled Jacobian
 UNIQUE_TOLERANCE = 1e-8  # weight above which a row takes part in a redundancy
 UNIQUE_SHARE = 1e-9  # limit of squared weights in large scenes, whose rounding is 1e-12
+MOST_ROWS = 300  # beyond it a dense singular value decomposition takes more than about 0.1 s
 COMPONENTS = tuple(f"{kind} {axis}" for kind in ("force", "moment") for axis in "xyz")
 
 
@@ -41,7 +42,7 @@ class Diagnosis:
         Largest singular value of Φ_q with unit rows.
     determined_reactions : dict of str to tuple of str, or None
         Components of the reactions that equilibrium determines, by joint, such as ``"force x"``, along world
-        axes. None for large scenes.
+        axes. None for scenes of more than 300 rows.
     """
 
     counts: Counts
@@ -100,7 +101,7 @@ def diagnose(scene: Scene | str | Path) -> Diagnosis:
         shared = np.linalg.norm(left[:, rank:], axis=1) > UNIQUE_TOLERANCE
         smallest = float(values[rank - 1]) if rank else 0.0
         largest = float(values[0]) if values.size else 0.0
-    determined = _determined(model, start) if model.m <= LARGE else None
+    determined = _determined(model, start) if model.m <= MOST_ROWS else None
     total = _counts(model, rank)
     involved = Counter(name for name, part in zip(model.row_joint, shared, strict=True) if part)
     unique = tuple(name for name in total.rows_by_joint if name not in involved)

@@ -146,6 +146,18 @@ def test_one_of_two_hinges_is_removed_unless_something_acts_on_it():
         assert exchanges(driven) == [{"lower": "removed"}]
 
 
+@pytest.mark.parametrize("loops", [4, 20])
+def test_exchanges_of_many_joints_end_the_redundancy_of_all_loops(loops: int):
+    """The chain is planar and made of universal joints; its loops have one redundant row each."""
+    scene = find_scene(f"four_bar_chain[{loops}]").with_(driver=())
+    swap = exchanges(scene)[0]
+    model = Model(scene)
+    at = placed(model, general_pose(model))
+    after = counts(at.with_(joint=[_as(j, swap[j.name]) if j.name in swap else j for j in at.joint]))
+    assert counts(at).redundant == loops and after.redundant == 0
+    assert after.degrees_of_freedom == counts(at).degrees_of_freedom
+
+
 def test_redundancy_within_the_plane_is_not_removed_by_exchanges():
     """Two rockers of equal length beside the crank: their lengths, not their joints, are redundant."""
     assert exchanges(find_scene("five_bar")) == [] and counts(find_scene("five_bar")).redundant > 0
