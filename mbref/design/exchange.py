@@ -18,7 +18,8 @@ WEAKER = {  # types that allow the motion of the first and more, those that keep
     "revolute": ("cylindrical", "universal", "spherical", "inline"),
     "translational": ("cylindrical", "planar", "inline"),
     "cylindrical": ("inline",),
-    "universal": ("spherical",),
+    "universal": ("spherical", "inline"),
+    "spherical": ("inline",),
     "fixed": ("universal", "spherical"),
 }
 MOST_EXCHANGES = 4  # joints of a smallest set; a search of larger sets takes too long
@@ -32,10 +33,10 @@ Exchange = dict[str, str]  # joint → its new type, or REMOVED
 def exchanges(scene: Scene, most: int = 6) -> list[Exchange]:
     """Return sets of joints whose exchange or removal ends all redundancy, with the same freedoms.
 
-    The smallest sets, at most ``most`` of them, where up to four joints are enough; otherwise one set, found
-    joint by joint. Empty where nothing is redundant or nothing is found. Judged at a general pose, without
-    drivers, and each by the rank. A joint on which a driver or a torsion spring acts becomes only a type that
-    can bear it, and is not removed.
+    The sets of the fewest joints where four are enough, at most ``most`` without and ``most`` with removed
+    joints; otherwise one set, found joint by joint. Empty where nothing is redundant or nothing is found.
+    Judged at a general pose, without drivers, and each by the rank. A joint on which a driver or a torsion
+    spring acts becomes only a type that can bear it, and is not removed.
     """
     model = Model(scene.with_(driver=(), load=()))
     if not model.m:
@@ -50,12 +51,11 @@ def exchanges(scene: Scene, most: int = 6) -> list[Exchange]:
         name: {kind: w for kind, w in kinds.items() if redundant.with_exchange(name, w) is not None}
         for name, kinds in _choices(scene, at_pose, rows, involved).items()
     }
-    for size in range(1, MOST_EXCHANGES + 1):
-        found = (e for e in _smallest(redundant, choices, size) if _is_cure(rows, choices, e))
-        if chosen := list(itertools.islice(found, most)):
-            return chosen
-    together = _joint_by_joint(redundant, choices)
-    return [together] if together and _is_cure(rows, choices, together) else []
+    kept = {name: {k: w for k, w in kinds.items() if k != REMOVED} for name, kinds in choices.items()}
+    found = _smallest(redundant, kept, most)
+    found += [e for e in _smallest(redundant, choices, most) if REMOVED in e.values()]
+    found = found or [e for e in [_joint_by_joint(redundant, choices)] if e]
+    return [exchange for exchange in found if _is_cure(rows, choices, exchange)]
 
 
 class Weaker(NamedTuple):
@@ -102,7 +102,15 @@ class Combinations:
         return Combinations(parts, left.shape[1])
 
 
-def _smallest(redundant: Combinations, choices: Choices, size: int) -> Iterator[Exchange]:
+def _smallest(redundant: Combinations, choices: Choices, most: int) -> list[Exchange]:
+    """Return the sets of the fewest joints that end the redundancy, at most ``most``; none beyond four."""
+    for size in range(1, MOST_EXCHANGES + 1):
+        if found := list(itertools.islice(_of_size(redundant, choices, size), most)):
+            return found
+    return []
+
+
+def _of_size(redundant: Combinations, choices: Choices, size: int) -> Iterator[Exchange]:
     """Yield the exchanges of ``size`` joints that end the redundancy, up to a number of trials."""
     names, trials = list(choices), itertools.count(1)
     most = [max((len(weaker.lost) for weaker in choices[name].values()), default=0) for name in names]

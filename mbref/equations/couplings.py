@@ -7,7 +7,7 @@ without gravity's lever, held by the fixed frame, with one coordinate that is co
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from mbref.equations.joints.base import AXES, Primitive, coordinate_angle, coordinate_displacement
 from mbref.scene import Body, Joint, Revolute, Scene, Translational
@@ -57,7 +57,7 @@ def _free_names(scene: Scene, joints: list[Joint]) -> Iterator[str]:
 def _rotor(joint: Joint, name: str, frame: str, length: float) -> tuple[Body, Joint, Coupled]:
     """The rotor of a joint, the joint that holds it, and the row that couples both."""
     inertia, axis = joint.reflected_inertia, AXES[0]
-    places = {"bodies": (frame, name), "anchor": ORIGIN, "axis": axis}
+    places: dict[str, Any] = {"bodies": (frame, name), "anchor": ORIGIN, "axis": axis}
     turns = joint.facts.driven == ANGLE
     mass = inertia / length**2 if turns else inertia
     moment = inertia if turns else inertia * length**2

@@ -351,7 +351,7 @@ def test_new_draw_assemble_and_diagnose(tmp_path, monkeypatch, capsys):
     assert main(["diagnose", "closed.toml", "--start", "--json"]) == 0
     found = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert found["redundant"] == 3 and found["links"]["crank"] == {"A–B": pytest.approx(0.25)}
-    assert {"A": "cylindrical", "B": "spherical"} in found["exchanges"] and found["along_motion"] is None
+    assert {"B": "inline"} in found["exchanges"] and found["along_motion"] is None
 
 
 def test_diagnose_tells_a_locked_loop_and_drivers_too_many(tmp_path, capsys):
