@@ -17,8 +17,8 @@ from crosscheck.judge.tolerances import RANK
 from mbref.scene import JOINT_TYPES, Joint, Scene, Universal
 
 WEAKER = {
-    "revolute": ("inline", "spherical", "planar", "cylindrical"),
-    "translational": ("inline", "cylindrical"),
+    "revolute": ("spherical", "planar", "cylindrical"),
+    "translational": ("cylindrical",),
     "universal": ("spherical",),
     "fixed": ("spherical",),
 }
