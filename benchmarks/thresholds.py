@@ -24,8 +24,7 @@ from crosscheck.judge.truth import truth_for
 from mbref import Limits, simulate
 from mbref.scene import Body, Revolute, Scene
 from mbref.scenes.five_bar import five_bar, five_bar_gravity
-from mbref.scenes.four_bar import LENGTH, Z, four_bar, four_bar_gravity, parallelogram
-from mbref.scenes.links import about_z, link
+from mbref.scenes.four_bar import four_bar, four_bar_gravity, two_rhombi
 from mbref.scenes.planar_slider_crank import planar_slider_crank_heavy, slider_crank
 from mbref.taylor.crossing import thresholds
 
@@ -40,26 +39,6 @@ def with_pendulum(scene: Scene) -> Scene:
     bob = Body(name="bob", mass=1.0, inertia=(1e-2,) * 3, position=(2.0, -0.5, 0.0))
     joint = Revolute(name="P", bodies=("ground", "bob"), anchor=(2.1, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
     return scene.with_(body=(*scene.body, bob), joint=(*scene.joint, joint))
-
-
-def two_rhombi(apart: float, angle: float = 0.3) -> Scene:
-    """A rhombus whose rocker is the crank of another one: two crossings in one step."""
-    first = parallelogram(angle, "two_rhombi")
-    along = np.array([math.cos(apart), math.sin(apart), 0.0]) * LENGTH
-    pin = next(joint.anchor for joint in first.joint if joint.name == "C")
-    end, foot = tuple(np.array(pin) + along), tuple(np.array([LENGTH, 0.0, 0.0]) + along)
-    bars = (
-        link("coupler2", pin, end, about_z(apart), LENGTH),
-        link("rocker2", foot, end, about_z(angle), LENGTH),
-    )
-    hinges = (
-        Revolute(name="E", bodies=("rocker", "coupler2"), anchor=pin, axis=Z),
-        Revolute(name="F", bodies=("coupler2", "rocker2"), anchor=end, axis=Z),
-        Revolute(name="G", bodies=("ground", "rocker2"), anchor=foot, axis=Z),
-    )
-    return first.with_(
-        gravity=(0.0, -9.81, 0.0), body=(*first.body, *bars), joint=(*first.joint, *hinges), duration=1.0
-    )
 
 
 def sweep() -> Iterator[tuple[str, Scene, float]]:

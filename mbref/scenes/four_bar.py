@@ -57,3 +57,24 @@ def parallelogram(theta0: float, name: str) -> Scene:
             Revolute(name="D", bodies=("ground", "rocker"), anchor=d, axis=Z),
         ),
     )
+
+
+def two_rhombi(apart: float, angle: float = 0.3) -> Scene:
+    """Under gravity, a rhombus whose rocker is the crank of another one, on a frame turned by an angle (rad):
+    both are flat within one step."""
+    first = parallelogram(angle, "two_rhombi")
+    x, y = LENGTH * math.cos(apart), LENGTH * math.sin(apart)
+    pin = next(joint.anchor_pair[0] for joint in first.joint if joint.name == "C")
+    end, foot = (pin[0] + x, pin[1] + y, 0.0), (LENGTH + x, y, 0.0)
+    bars = (
+        link("coupler2", pin, end, about_z(apart), LENGTH),
+        link("rocker2", foot, end, about_z(angle), LENGTH),
+    )
+    hinges = (
+        Revolute(name="E", bodies=("rocker", "coupler2"), anchor=pin, axis=Z),
+        Revolute(name="F", bodies=("coupler2", "rocker2"), anchor=end, axis=Z),
+        Revolute(name="G", bodies=("ground", "rocker2"), anchor=foot, axis=Z),
+    )
+    return first.with_(
+        gravity=(0.0, -9.81, 0.0), body=(*first.body, *bars), joint=(*first.joint, *hinges), duration=1.0
+    )

@@ -5,33 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from mbref.scene import Revolute, Scene
-from mbref.scenes.four_bar import LENGTH, Z, parallelogram
-from mbref.scenes.links import about_z, link
+from mbref.scenes.four_bar import LENGTH, two_rhombi
 from mbref.simulation.simulate import Limits, simulate
 
 METHODS = ("taylor", "taylor[order=28]")
 APART = (2e-2, -5e-3, 3e-4)  # rad, of the crank, between the flat positions of both loops
-
-
-def two_rhombi(apart: float, angle: float = 0.3) -> Scene:
-    """A rhombus whose rocker is the crank of another one, on a frame that is turned by a small angle."""
-    first = parallelogram(angle, "two_rhombi")
-    along = np.array([math.cos(apart), math.sin(apart), 0.0]) * LENGTH
-    pin = next(joint.anchor for joint in first.joint if joint.name == "C")
-    end, foot = tuple(np.array(pin) + along), tuple(np.array([LENGTH, 0.0, 0.0]) + along)
-    bars = (
-        link("coupler2", pin, end, about_z(apart), LENGTH),
-        link("rocker2", foot, end, about_z(angle), LENGTH),
-    )
-    hinges = (
-        Revolute(name="E", bodies=("rocker", "coupler2"), anchor=pin, axis=Z),
-        Revolute(name="F", bodies=("coupler2", "rocker2"), anchor=end, axis=Z),
-        Revolute(name="G", bodies=("ground", "rocker2"), anchor=foot, axis=Z),
-    )
-    return first.with_(
-        gravity=(0.0, -9.81, 0.0), body=(*first.body, *bars), joint=(*first.joint, *hinges), duration=1.0
-    )
 
 
 def angles(run) -> np.ndarray:
