@@ -127,7 +127,7 @@ def _print_settings(console: Console, heading: str, records: Sequence[Record], w
 
 
 def _to_set(found: Engine, record: Record) -> str:
-    """The description of a record's family, and its options with their descriptions."""
+    """Return the description of a run's family of settings, and its options with their descriptions."""
     family = found.families.get(record["family"], "")
     options = [
         f"{n} = {v:g} ({found.options[n]})" if n in found.options else f"{n} = {v}"

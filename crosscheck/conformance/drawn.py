@@ -1,6 +1,6 @@
 """Mechanisms drawn from seeds for every card: closed loops with all loads and drivers, floating ones, rotors.
 
-A card that says something of some mechanisms alone has a kind of its own: momentum of floating mechanisms,
+A check (card) for special mechanisms has its own kind of mechanism: momentum of floating mechanisms,
 a driver's constant moment of rotors, refusal of mechanisms without masses.
 """
 

@@ -27,7 +27,7 @@ WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)  # of central differences of order 
 
 
 class Failure(NamedTuple):
-    """The first card that a scene of the suite fails."""
+    """First check (card) of the suite that fails on a scene."""
 
     specimen: Specimen
     card: str

@@ -59,7 +59,7 @@ EXACT, PENALTY, DUAL = "mpi-svd", "alf", "alf-dual"
 ERRORS = tuple(10.0**-k for k in range(4, 10))  # tolerances at which the growth of the violation is shown
 GAINS = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # α = β of Baumgarte, 1/s
 GROWTH, GAIN = "growth", "gain"
-TEACHING = np.linspace(0.0, 2.0, 101)  # s, of the runs for teaching
+TEACHING = np.linspace(0.0, 2.0, 101)  # s, sample times of the runs in the part for teaching
 
 
 class Label(NamedTuple):

@@ -82,7 +82,7 @@ class MuJoCo(Engine):
             compiled_run.prepare()
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """Simulate; raises ValueError for a family it does not have."""
+        """Simulate a scene; raises ValueError for an unknown family of settings."""
         if setting.family in COMPILED and (planar := planar_scene(scene)) is not scene:
             return replace(self.run(planar, times, setting), reactions=None)
         start = time.process_time()

@@ -83,7 +83,7 @@ class Pinocchio(Engine):
         return sweep(scene, rate)
 
     def serves(self, scene: Scene, family: str) -> bool:
-        """Return what the sweep offers, which has the tuned family for every scene."""
+        """Return whether `settings` offers the family for the scene; `tuned` is offered for every scene."""
         return family == "tuned" or super().serves(scene, family)
 
     def own_code(self, scene: Scene, setting: Setting) -> str:

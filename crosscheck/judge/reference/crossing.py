@@ -55,7 +55,7 @@ def singular_ahead(nodes: np.ndarray, distance: np.ndarray) -> float | None:
 
 
 def _fit(x: np.ndarray, d: np.ndarray) -> tuple[float, np.ndarray]:
-    """Largest misfit of a polynomial through distances, and its Chebyshev coefficients."""
+    """Fit a polynomial to the distances from singularity; return largest residual and coefficients."""
     coefficients = chebyshev.chebfit(x, d, DEGREE)
     return float(np.abs(chebyshev.chebval(x, coefficients) - d).max()), coefficients
 

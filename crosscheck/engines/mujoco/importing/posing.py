@@ -16,7 +16,7 @@ from mbref.scene import SceneError
 CLOSED = 1e-12  # fraction of the model's extent, or rad: smaller gaps are closed
 ROUNDED = 1e-9  # limit like CLOSED at nearly singular positions, where Newton's method is less accurate
 ITERATIONS = 200
-LONGEST = 0.2  # rad, and m of the extent: largest change of a coordinate in an iteration
+LONGEST = 0.2  # rad, or fraction of the model's extent: largest change of a coordinate in an iteration
 RANK = 1e-9  # fraction of the largest singular value: smaller ones belong to redundant rows
 
 
