@@ -123,7 +123,7 @@ def _of_rounds(found: np.ndarray, rounds: int) -> np.ndarray:
 
 
 class Trials:
-    """Rows that were tried whether they hold columns, and the pairs of them that were compared."""
+    """Results of tests on rows: which columns each row determines, and which pairs of rows were compared."""
 
     def __init__(self, model: Model, asked: Asked):
         tried = [(t, row) for t in asked.tried for row in t.rows]

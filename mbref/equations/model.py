@@ -162,7 +162,7 @@ class Model:
         return self.along(times, q.reshape(len(q), 7 * self.nb), np.zeros((len(q), self.n))).jacobian
 
     def at(self, q: np.ndarray, states: RandomStates) -> Terms:
-        """``along`` at states about coordinates q (7 nb,), of times that are parts of the duration."""
+        """Return ``along`` at states displaced from q (7 nb,); their times are fractions of the duration."""
         moved = all_displaced(q, states.displacement)
         return self.along(states.part * self.scene.duration, moved, states.velocity)
 

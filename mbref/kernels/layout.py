@@ -83,7 +83,7 @@ class System(NamedTuple):
     inverse_root: Annotated[Vector, "n"]  # M^(-1/2); 1 where the mass is zero
     force: Annotated[Vector, "n"]  # g
     acceleration: Annotated[Vector, "n"]  # q̈
-    blocks: Annotated[Matrix, "m", "width"]  # width = 6 sides, or n where a dense matrix takes their place
+    blocks: Annotated[Matrix, "m", "width"]  # width: 6 per body of a row, or n for a dense matrix
     jacobian: Annotated[Matrix, "dense_rows", "n"]
     rhs: Annotated[Vector, "m"]
     multipliers: Annotated[Vector, "m"]  # λ

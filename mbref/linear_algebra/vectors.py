@@ -1,6 +1,6 @@
 """Three-vectors as tuples, for the kernels: compiled they cost nothing and allocate nothing.
 
-Also operations on whole vectors: copies (NumPy's slices would allocate), order, and ``larger``.
+Also operations on whole vectors: copies (NumPy's slices would allocate), sorting, maximum (``larger``).
 """
 
 from __future__ import annotations

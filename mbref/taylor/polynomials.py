@@ -79,7 +79,7 @@ class Forms:
         return constant, matrix
 
     def variables(self, variables: Iterable[int]) -> tuple[np.ndarray, np.ndarray]:
-        """Return constants and coefficients of variables, kept or eliminated."""
+        """Return constants and coefficients of variables as functions of the kept variables."""
         return self([{v: 1.0} for v in variables])
 
     def axes(self, body: int) -> Sequence[Triple]:

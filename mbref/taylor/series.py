@@ -17,7 +17,7 @@ from mbref.taylor.loads import add_loads, start_loads
 from mbref.taylor.simd import WIDTH, gather, load, store
 from mbref.taylor.solver import solution
 
-SLOWEST = 2.0  # steps over the time in which the speed would vanish: beyond, rounding grows with the order
+SLOWEST = 2.0  # step / time in which the speed would vanish: in longer steps rounding grows with order
 
 
 @inlined

@@ -71,7 +71,7 @@ MIN_ORDER_LEFT = 4  # least order of a step
 MIN_GAIN = 0.5  # step without the pole / with it: otherwise too many orders are lost
 # --- start ----------------------------------------------------------------------------------------------
 START_ERROR = 2e-7  # scene lengths, rad, or / fastest velocity: largest error of the start
-START_ERROR_DRIVEN = 0.05  # error of the start / fastest velocity, if drivers prescribe the motion
+START_ERROR_DRIVEN = 0.05  # velocity error of the start / fastest velocity, if drivers prescribe the motion
 REST_PIVOT = 5e-6  # pivot of unit rows: below it, rounding turns a motion from rest by 1e-5
 REST_TURN = 3e-8  # change of direction of a motion from rest by rounding / √pivot
 # --- departure along a branch ---------------------------------------------------------------------------
