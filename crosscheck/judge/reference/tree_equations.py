@@ -57,7 +57,7 @@ class TreeEquations:
             self.tree, *([scene.joint_named(name) for kind, name in away if kind == k] for k in COORDINATES)
         )
         places = self.tree.coordinate.items()
-        at = {(ANGLE, name): found[-1] for name, found in places if found}
+        at: dict[tuple[str, str], int] = {(ANGLE, name): found[-1] for name, found in places if found}
         at |= {(DISPLACEMENT, name): found[0] for name, found in places if found}
         at |= {key: self.tree.scalars + k for k, key in enumerate(away)}
         driven = [(str(scene.joint_named(d.joint).facts.driven), d.joint) for d in scene.driver]

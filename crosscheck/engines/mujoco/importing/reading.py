@@ -249,8 +249,9 @@ class _Reader:
     def _with_armature(self, chain: Chain, joints: list[Joint]) -> list[Joint]:
         """The joints of a chain, a single one with the armature of its hinge or slide."""
         driven = joints[0].facts.driven if len(joints) == 1 else None
-        kind = {ANGLE: "hinge", DISPLACEMENT: "slide"}.get(str(driven))
-        own = [j for j, name in zip(chain.joints, chain.kinds, strict=True) if name == kind]
+        wanted = {"hinge": ANGLE, "slide": DISPLACEMENT}
+        kinds = [wanted.get(kind) for kind in chain.kinds]
+        own = [j for j, kind in zip(chain.joints, kinds, strict=True) if driven and kind == driven]
         if len(own) != 1 or "armature" in self.without:
             return joints
         dof = int(self.model.jnt_dofadr[own[0]])
