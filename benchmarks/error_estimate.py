@@ -28,6 +28,7 @@ from mbref.scenes import SCENES, find_scene
 from mbref.trajectory import Trajectory
 
 METHODS = ("taylor", "mpi-svd+projection", "mpi-svd+none")
+SHOWN = (1e-3, 1e-6, 1e-9, 1e-12)  # tolerances in the table of sensitive motions
 TOLERANCES = tuple(10.0**-digits for digits in range(3, 14))
 SECONDS = 10.0  # of CPU time for a reference
 DURATION, SAMPLES = 0.25, 11
@@ -78,7 +79,8 @@ def main(count: int) -> None:
         "motion", "rtol", "true error", "estimate", "the run says", title="sensitive motions, taylor"
     )
     for case in cases:
-        if case.group == "sensitive" and case.method == "taylor":
+        shown = any(math.isclose(case.rtol, rtol) for rtol in SHOWN)
+        if case.group == "sensitive" and case.method == "taylor" and shown:
             sensitive.add_row(
                 case.scene, f"{case.rtol:.0e}", f"{case.true:.0e}", f"{case.estimate:.0e}", case.says
             )
@@ -136,7 +138,15 @@ def run(group: str, scene: Scene, chosen: list[tuple[str, float]]) -> Iterator[C
         bound = float(np.max(exact.settings.get("bound", truth.accuracy)))
         found = float(np.max(estimate.error[:known]))
         yield Case(
-            group, scene.name, method, rtol, motion.outcome.name, true, bound, found, estimate.sentence
+            group,
+            scene.name,
+            method,
+            rtol,
+            motion.outcome.name,
+            true,
+            bound,
+            found,
+            estimate.warning or estimate.sentence,
         )
 
 

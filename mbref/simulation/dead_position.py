@@ -2,7 +2,8 @@
 
 Near such a position the velocities that the drivers ask for, over the rates of the drivers, grow with the
 inverse root of the time that is left: Φ_q v = ν is not consistent there.  Where branches of a motion cross,
-Φ_q loses rank too, but ν stays in its range, and the velocities stay bounded.
+Φ_q loses rank too, but ν stays in its range, and the velocities stay bounded.  A state that violates the
+constraints has large velocities there, too: then `taylor` follows the motion further.
 """
 
 from __future__ import annotations
@@ -10,9 +11,11 @@ from __future__ import annotations
 import numpy as np
 
 from mbref.simulation.run import Run
+from mbref.simulation.trial import trial_of
 
 TRANSMISSION = 1e2  # largest velocity / driver rate: above it the position is dead
 ROUNDING = 1e-13  # relative singular value of redundant rows
+BEYOND = 1.01  # times the time of a failure: a run that gets further has met no dead position
 MOST_ROWS = 400  # constraint rows: larger least-squares problems take seconds
 
 
@@ -21,9 +24,12 @@ def is_at_dead_position(run: Run) -> bool:
     state, model = run.memory.state, run.model
     if not run.scene.driver or model.m > MOST_ROWS or not np.isfinite(state.coordinates).all():
         return False
-    length = model.length
-    terms = model.terms(float(run.memory.loop.clock.time), state.coordinates, np.zeros(model.n))
+    now, length = float(run.memory.loop.clock.time), model.length
+    terms = model.terms(now, state.coordinates, np.zeros(model.n))
     jacobian = terms.jacobian * np.tile(np.repeat([length, 1.0], 3), model.nb)
     velocities = np.linalg.lstsq(jacobian, terms.nu, rcond=ROUNDING)[0]
     rate = np.abs(terms.nu).max() * max(1.0, 1.0 / length)
-    return bool(np.abs(velocities).max() > TRANSMISSION * rate > 0.0)
+    if not np.abs(velocities).max() > TRANSMISSION * rate > 0.0:
+        return False
+    trial = trial_of(run)
+    return trial is None or not (trial.completed or trial.reached > BEYOND * now)

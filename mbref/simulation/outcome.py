@@ -27,6 +27,7 @@ from mbref.simulation.stepping import (
     UNDECIDED,
     VIOLATED,
 )
+from mbref.simulation.trial import trial_of
 from mbref.trajectory import Cost, Crossing, Outcome
 
 OUTCOMES = {
@@ -71,9 +72,7 @@ ROUNDING = 1e-13  # smaller singular values are not reported
 NONE_TAKEN = 0  # the branch taken at a singular position at which the run ended
 
 
-SINGULAR_POSITION = (
-    "the motion reaches a singular position at t = {:.6g} s{}; {} does not cross it, taylor does"
-)
+SINGULAR_POSITION = "the motion reaches a singular position at t = {:.6g} s{}; {} does not cross it{}"
 LOSE_RANK = " (the constraint rows of {} lose rank)"
 FAILED = (STEP_TOO_SMALL, NOT_CONVERGED, SINGULAR, CREEPING)  # near a singular position, because of it
 
@@ -138,7 +137,9 @@ def _singular_position(run: Run, status: int) -> Met | None:
 def _met(run: Run, met: Met) -> str:
     """One sentence on the singular position at which a run ended."""
     where = LOSE_RANK.format(", ".join(map(repr, met.joints))) if met.joints else ""
-    return SINGULAR_POSITION.format(met.time, where, run.method.stabilisation.name)
+    trial = trial_of(run)
+    able = trial is None or trial.completed or trial.reached > met.time
+    return SINGULAR_POSITION.format(met.time, where, run.method.stabilisation.name, ", taylor does" * able)
 
 
 def _crossings(run: Run, met: Met | None) -> Sequence[Crossing] | None:

@@ -1,4 +1,7 @@
-"""Remedies: the change of method or limits that a failed run suggests, from the facts of method and scene."""
+"""Remedies: the change of method or limits that a failed run suggests.
+
+`taylor` is named only if it completes the motion. Where it is not tried, facts of method and scene decide.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +17,12 @@ from mbref.simulation.stepping import (
     UNDECIDED,
     VIOLATED,
 )
+from mbref.simulation.trial import trial_of
 
-FOLLOWS = "taylor crosses singular positions"
+FOLLOWS, COMPLETES = "taylor crosses singular positions", "taylor completes this motion"
 BY_STATUS = {
     VIOLATED: "+projection corrects violations after every step",
     UNDECIDED: "a smaller rtol may determine the branch; --branch selects one",
-    LEFT_MOTION: FOLLOWS,
 }
 
 
@@ -31,7 +34,14 @@ def remedy(run: Run, status: int) -> str:
         return _of_iteration(run)
     if status in (STEP_TOO_SMALL, TOO_MANY_STEPS, CREEPING):
         return _of_steps(run)
-    return BY_STATUS.get(status, "")
+    return _follows(run) if status == LEFT_MOTION else BY_STATUS.get(status, "")
+
+
+def _follows(run: Run) -> str:
+    """Return the advice to use `taylor`; empty if it does not complete the motion."""
+    if trial_of(run) is None:
+        return "" if run.method.is_series else FOLLOWS
+    return _completes(run)
 
 
 def _of_singular_matrix(run: Run) -> str:
@@ -41,16 +51,22 @@ def _of_singular_matrix(run: Run) -> str:
     ]
     found = counts(scene)
     if massless and not formulation.handles_singular_mass:
-        able = _bearing(mass=True, redundancy=found.redundant > 0)
-        return f"body {massless[0]!r} lacks mass or a moment of inertia; use taylor, {able}"
+        able = _completes(run) or _bearing(mass=True, redundancy=found.redundant > 0)
+        return f"body {massless[0]!r} lacks mass or a moment of inertia; {able}"
     if found.redundant and not formulation.handles_redundancy:
-        able = _bearing(redundancy=True)
-        return f"constraint rows are redundant ({found.redundant} of {found.rows}); use {able}"
-    return FOLLOWS if run.model.closed_loops else ""
+        able = _completes(run) or _bearing(redundancy=True)
+        return f"constraint rows are redundant ({found.redundant} of {found.rows}); {able}"
+    return _follows(run) if run.model.closed_loops else ""
+
+
+def _completes(run: Run) -> str:
+    """Return the fact that `taylor` completes the motion; empty if it does not, or is not tried."""
+    trial = trial_of(run)
+    return COMPLETES if trial is not None and trial.completed else ""
 
 
 def _bearing(mass: bool = False, redundancy: bool = False) -> str:
-    """Return the formulations that claim to handle a singular mass matrix, or redundant rows."""
+    """Return the advice to use a formulation that claims to handle such a matrix or such rows."""
     able = [
         f.name
         for f in FORMULATIONS.values()
@@ -58,20 +74,18 @@ def _bearing(mass: bool = False, redundancy: bool = False) -> str:
         and (f.handles_redundancy or not redundancy)
         and not f.needs_independent_columns
     ]
-    return " or ".join(filter(None, (", ".join(able[:-1]), able[-1])))
+    return "use " + " or ".join(filter(None, (", ".join(able[:-1]), able[-1])))
 
 
 def _of_iteration(run: Run) -> str:
     if run.method.integrator.holds_constraints:
         return f"a step below {run.memory.control.fixed_step:g} s may converge"
-    return (
-        "mpi-svd and mpi-qr solve without iteration"
-        if run.method.formulation.name.startswith("alf")
-        else FOLLOWS
-    )
+    if run.method.formulation.name.startswith("alf"):
+        return _completes(run) or "mpi-svd and mpi-qr solve without iteration"
+    return _follows(run)
 
 
 def _of_steps(run: Run) -> str:
     if run.method.is_series or not run.model.closed_loops:
         return "mbref diagnose prints the distance of the motion from singular positions"
-    return FOLLOWS
+    return _follows(run)

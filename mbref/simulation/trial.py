@@ -1,0 +1,49 @@
+"""Trials: how far `taylor` follows the motion on which another method failed, so that advice is true."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+from mbref.method import MOST_BODIES, SERIES, Method
+from mbref.simulation.limits import GENERIC, Limits
+from mbref.simulation.run import Run
+from mbref.simulation.start_run import start_run
+from mbref.simulation.stepping import DONE
+from mbref.taylor.preparation import KERNELS_OF_SERIES
+
+MOST_STEPS = 2000  # of a trial, which takes a fraction of a second
+
+
+_TRIALS: WeakKeyDictionary[Run, Trial | None] = WeakKeyDictionary()
+
+
+@dataclass(frozen=True)
+class Trial:
+    """End of a trial: whether the motion was completed, and the time reached, s."""
+
+    completed: bool
+    reached: float
+
+
+def trial_of(run: Run) -> Trial | None:
+    """Return the trial of a run, which is made once.
+
+    None where it is not cheap, or says nothing: for a run of `taylor` itself, for more than 100 bodies, and
+    before the kernels of `taylor` are compiled.
+    """
+    if run not in _TRIALS:
+        _TRIALS[run] = _made(run)
+    return _TRIALS[run]
+
+
+def _made(run: Run) -> Trial | None:
+    is_cheap = len(run.scene.body) <= MOST_BODIES and all(kernel.is_kept for kernel in KERNELS_OF_SERIES)
+    if run.method.is_series or not is_cheap:
+        return None
+    limits = Limits(code=GENERIC, most_steps=MOST_STEPS)
+    trial = start_run(run.scene, Method.parse(SERIES), run.times, limits)
+    status, _ = trial.stepper.advance(None)
+    reached = float(trial.memory.loop.clock.time)
+    trial.release()
+    return Trial(status == DONE, reached)
