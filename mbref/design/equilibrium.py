@@ -45,7 +45,7 @@ class Equilibrium:
         Exponents s of small motions exp(s t), 1/s, of the f degrees of freedom.
     shapes : ndarray, shape (2f, nb, 6), complex
         Motion of each body for each eigenvalue: displacement of the centre of mass (m) and rotation vector
-        (rad), world frame. The largest is one length of the mechanism, or one radian.
+        (rad), world frame. The largest is one length of the mechanism, or one radian, and real.
     reactions : dict of str to ndarray, shape (6,)
         Force (N) and moment (N m) on the second body of each joint at its anchor, world frame.
     """
@@ -223,7 +223,7 @@ def _balanced(tangent: Tangent, scale: float) -> Tangent | None:
         step = -np.linalg.solve(slope.T @ slope + weight * np.eye(freedoms), slope.T @ off)
         size = float(np.linalg.norm(step)) / (LONGEST * tangent.model.length)
         moved = _moved(tangent, step / max(1.0, size))
-        after = moved and moved.accelerations(*_rest(moved))
+        after = off if moved is None else moved.accelerations(*_rest(moved))
         if moved is None or moved.freedoms != freedoms or np.linalg.norm(after) >= np.linalg.norm(off):
             damping = max(10 * damping, 1e-3)
             if damping > 1e6:
@@ -256,7 +256,8 @@ def _equilibrium(tangent: Tangent) -> Equilibrium:
     turned = tangent.q.reshape(model.nb, 7)[: len(model.scene.body), 3:]
     for part in (shapes.real, shapes.imag):
         part[..., 3:] = rotations.rotate(turned, part[..., 3:])
-    sizes = np.abs(shapes / np.repeat([model.length, 1.0], 3)).max(axis=(1, 2), keepdims=True)
+    in_units = (shapes / np.repeat([model.length, 1.0], 3)).reshape(len(order), -1)
+    largest = in_units[np.arange(len(order)), np.abs(in_units).argmax(axis=1)]  # becomes 1
     q = tangent.q.reshape(1, model.nb, 7)
     forces = reactions(model, q, model.blocks_along(np.zeros(1), q), multipliers(model, tangent.q)[None])
     scene = _with_angles(placed(model, tangent.q), model, tangent.q)
@@ -264,7 +265,7 @@ def _equilibrium(tangent: Tangent) -> Equilibrium:
     return Equilibrium(
         scene.with_(body=still),
         values[order],
-        shapes / np.where(sizes > 0, sizes, 1.0),
+        shapes / largest[:, None, None],
         {name: wrench[0] for name, wrench in forces.items()},
     )
 
