@@ -253,7 +253,7 @@ class Bench:
     def floors(self) -> str:
         """The differences that `own_accuracy` was measured from, in words."""
         steps = f"the two finest settings by {self.steps_apart:.1e}"
-        return f"perturbed runs differ by {self.twins_apart:.1e}, {steps}"
+        return f"perturbed runs differ by {self.perturbed_apart:.1e}, {steps}"
 
     @cached_property
     def exact(self) -> Trajectory:

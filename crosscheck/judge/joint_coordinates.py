@@ -102,10 +102,9 @@ def coordinate_jacobian(scene: Scene, name: str, position: np.ndarray, orientati
     """(2, 6 nb): the rates of a joint's angle and displacement per twist of the bodies (see ``jacobian``)."""
     n = 6 * len(scene.body)
     joint = next(joint for joint in joint_frames(scene) if joint.name == name)
-    poses = (np.broadcast_to(a, (n, *a.shape)) for a in with_ground(position, orientation))
+    r, p = (np.broadcast_to(a, (n, *a.shape)) for a in with_ground(position, orientation))
     unit = np.eye(n).reshape(n, -1, 6)
-    twists = grounded(unit[..., :3]), grounded(unit[..., 3:])
-    return coordinate_rates(joint, *poses, *twists).T
+    return coordinate_rates(joint, r, p, grounded(unit[..., :3]), grounded(unit[..., 3:])).T
 
 
 @dataclass(frozen=True)

@@ -185,7 +185,7 @@ def _coupled_bodies(places: Places) -> tuple[list[list[int]], tuple[list[int], l
     the columns of its first and of its second body stand."""
     coupled: list[list[int]] = []
     columns: tuple[list[int], list[int]] = [], []
-    ahead = [*places.primitives[1:], None]
+    ahead = [*places.primitives, None][1:]
     bodies: list[int] = []
     for place, other in zip(places.primitives, ahead, strict=True):
         if place.part == 1 and other is not None:

@@ -335,7 +335,7 @@ def test_certify_tells_its_progress_and_looks_for_its_folder_first(capsys, tmp_p
     pytest.importorskip("flint", reason="python-flint is the extra `certify`")
     asked = ("certify", "four_bar_gravity", "--digits", "4", "--duration", "0.002", "--out")
     status, _, err = run_main(capsys, *asked, str(tmp_path / "nowhere" / "table.json"))
-    assert status == 2 and err == f"--out: {tmp_path / 'nowhere'} is no folder\n", err
+    assert status == 2 and err == f"--out: {tmp_path / 'nowhere'} must be in an existing folder\n", err
     status, _, err = run_main(capsys, *asked, str(tmp_path / "table.json"))
     assert status == 0 and (tmp_path / "table.json").exists(), err
     for name in "AB":
@@ -382,7 +382,7 @@ def test_pasted_command_and_the_same_record(capsys, still):
 def test_engine_that_hangs_over_its_settings_is_left_out(capsys, still):
     asked = ("--engine", FAKE, "--engine", "fake_engines:NO_SETTINGS")
     status, out, err = run_main(capsys, "run", still, *asked)
-    assert status == 0 and "its settings cannot be found out: ValueError: none" in err, err
+    assert status == 0 and "its settings are unknown: ValueError: none" in err, err
     assert "plain" in out
 
 

@@ -312,7 +312,7 @@ def test_newton_says_where_the_closures_cannot_be_met() -> None:
     run = simulate("mujoco", scene, 5, NEWTON, tolerance=1e-10, turn=0.1)
     assert run.outcome is Outcome.NOT_CONVERGED and "closures" in run.message
     assert 0 < len(run.times) < 5 and 0 < run.t_end < scene.duration
-    with pytest.raises(ValueError, match="leave some of the motion open"):
+    with pytest.raises(ValueError, match="do not prescribe the whole motion"):
         simulate("mujoco", SCENES["planar_slider_crank"](), 5, NEWTON, tolerance=1e-10, turn=0.1)
 
 

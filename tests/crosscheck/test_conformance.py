@@ -70,7 +70,7 @@ def test_shaken_scene_and_truth():
 def test_an_engine_that_refuses_every_scene_is_not_shown_to_conform(capsys, monkeypatch):
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
     assert main(["verify", "fake_engines:REFUSING", "--scene", "free_fall", "--in-process"]) == 1
-    assert "an engine that runs none is not shown to conform" in " ".join(capsys.readouterr().out.split())
+    assert "an engine that runs no scene is not shown to conform" in " ".join(capsys.readouterr().out.split())
     assert main(["verify", "fake_engines:REFUSING", "--mechanisms", "1"]) == 1
 
 

@@ -192,7 +192,7 @@ def test_tables_of_other_tools(table, tmp_path):
         ("time,upper.x\n0,1\n", {"uper.position.x": "2"}, "did you mean 'upper.position.x'"),
         ("time,upper.x\n0,1\n", {"upper.position.x": "3"}, "no column '3'"),
         ("time,upper.x [furlong]\n0,1\n", {}, "unknown unit 'furlong'"),
-        ("time,upper.x [deg]\n0,1\n", {}, "'deg' is no unit of a quantity in m"),
+        ("time,upper.x [deg]\n0,1\n", {}, "'deg' is not a unit of a quantity in m"),
     ],
 )
 def test_faulty_tables_are_refused(text, columns, says, tmp_path):

@@ -385,7 +385,7 @@ def test_states_that_are_not_finite_have_a_reason(monkeypatch):
     right = Stepper._gaps
     monkeypatch.setattr(Stepper, "_gaps", lambda *given: tuple(np.nan * gap for gap in right(*given)))
     motion = natural_motion(SCENES["sarrus"](), [0.1], EXTENDED, seconds=SECONDS)
-    assert motion.reason == "a pivot of its equations cannot be told from zero in so many digits"
+    assert motion.reason == "a pivot of its equations is zero to the digits of the arithmetic"
 
 
 def test_contradicting_joints_are_replaced_before_digits_are_certified():

@@ -13,6 +13,7 @@ from mbref.equations.joint_reactions import reactions
 from mbref.equations.model import Model
 from mbref.formulations import FORMULATIONS
 from mbref.linear_algebra.elimination import determinant, product_of_pivots
+from mbref.motion import Motion
 from mbref.scene import (
     Body,
     Driver,
@@ -117,7 +118,8 @@ def test_cost_that_a_run_prints(capsys):
         outcome=Outcome.TIMED_OUT,
         message="",
     )
-    show(Scene(name="s", body=(BALL,)), replace(none, cost=cost))
+    scene = Scene(name="s", body=(BALL,))
+    show(scene, Motion.of(scene, replace(none, cost=cost)))
     assert capsys.readouterr().out.splitlines()[1:] == [
         "11 steps, 22 rejected, 33 evaluations",
         "44 factorisations, 55 Newton iterations",

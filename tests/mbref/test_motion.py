@@ -82,7 +82,9 @@ def test_energies_are_the_judge_s(name, request):
     scene = scene.with_(load=[load for load in scene.load if load.type == "spring"])
     of_springs = Motion.of(scene, motion).potential_energy
     rates = motion.velocity, motion.angular_velocity
-    assert np.allclose(motion.kinetic_energy, kinetic_energy(scene, motion.orientation, *rates), rtol=1e-12)
+    assert np.allclose(
+        motion.kinetic_energy, kinetic_energy(scene, motion.position, motion.orientation, *rates), rtol=1e-12
+    )
     judged = potential_energy(scene, motion.position, motion.orientation)
     assert np.allclose(of_springs, judged, rtol=1e-12)
 

@@ -10,6 +10,7 @@ import pytest
 
 from mbref.cli import main
 from mbref.cli.run import show
+from mbref.motion import Motion
 from mbref.scene import Body, Scene
 from mbref.trajectory import Trajectory
 
@@ -33,7 +34,8 @@ def test_a_name_is_shown_as_it_is(name: str, capsys: pytest.CaptureFixture[str])
     still = np.zeros((1, 1, 3))
     first = (name, "mbref", "1", name, {}, np.zeros(1), (name,))
     run = Trajectory(*first, still, np.zeros((1, 1, 4)), still, still, message=name)
-    show(Scene(name=name, body=(body,)), run)
+    scene = Scene(name=name, body=(body,))
+    show(scene, Motion.of(scene, run))
     out = capsys.readouterr().out
     assert out.count(name.strip()) >= 4, out
 

@@ -120,5 +120,5 @@ def test_ali3_says_that_its_iteration_does_not_converge():
 
 @pytest.mark.parametrize("stabilisation", ["baumgarte", "projection", "null-space", "partitioning"])
 def test_ali3_goes_without_stabilisation(stabilisation):
-    with pytest.raises(MethodError, match="ali3 holds the constraints itself"):
+    with pytest.raises(MethodError, match="ali3 enforces constraints itself"):
         Method.parse(f"mpi-qr+{stabilisation}/ali3")

@@ -157,7 +157,7 @@ def test_a_start_on_a_singular_position():
 
 
 def test_a_branch_is_for_the_method_that_crosses():
-    with pytest.raises(MethodError, match="taylor does"):
+    with pytest.raises(MethodError, match="use taylor"):
         simulate(four_bar(), "alf-dual+projection", [0.05], Limits(branches={2: 2}))
 
 

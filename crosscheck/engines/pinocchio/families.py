@@ -69,7 +69,7 @@ def _steps(scene: Scene, rate: float, angles: Sequence[float]) -> list[float]:
 
 def own_code(setting: Setting) -> str:
     """Return the settings of constraintDynamics in steps h of RK4, and the closures' Baumgarte terms."""
-    if setting.family not in FIXED:
+    if setting.family not in FIXED or "step" not in setting.options:
         return ""
     step = float(setting.options["step"])
     given = () if setting.family == "defaults" else CONVERGED
