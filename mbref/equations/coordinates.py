@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numpy import sqrt
 
-from mbref.kernels.compilation import inlined, kernel
+from mbref.kernels.compilation import INT, MATRIX, VECTOR, entry, inlined, kernel
 from mbref.linear_algebra.vectors import copy
 
 
@@ -47,11 +47,12 @@ def displace(q, x, change):
     normalise(q)
 
 
-@kernel
+@entry(INT(MATRIX, MATRIX, VECTOR))
 def displace_all(q, x, change):
-    """``displace`` of every row of q (k, 7 nb) by one of x (k, 6 nb)."""
+    """Displace every row of q (k, 7 nb) by one of x (k, 6 nb), both contiguous; return their number."""
     for k in range(q.shape[0]):
         displace(q[k], x[k], change)
+    return q.shape[0]
 
 
 @inlined

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbref.equations.coordinates import displace_all
 from mbref.equations.evaluation import evaluate_along
 from mbref.kernels.compilation import Exchangeable
 from mbref.method import Method
@@ -17,10 +18,10 @@ def prepare(method: Method) -> None:
 def kernels_of(method: Method) -> list[Exchangeable]:
     """Return the kernels that a run by the method calls."""
     if method.is_series:
-        return [evaluate_along]
+        return [evaluate_along, displace_all]
     integrator, chart = method.integrator, method.stabilisation
     kernels = (
         integrator.step, integrator.propose, chart.rates, chart.accept, method.formulation.accelerate,
-        advance_to_end, evaluate_along, chart.enter.callable,
+        advance_to_end, evaluate_along, displace_all, chart.enter.callable,
     )  # fmt: skip
     return [kernel for kernel in kernels if kernel is not None]

@@ -280,6 +280,19 @@ def test_help_touches_no_cache(program, tmp_path: Path):
     assert not (tmp_path / "cache").exists()
 
 
+def test_a_warm_run_compiles_nothing():
+    """Helpers are compiled with the kernels that call them, and never for a call from Python."""
+    simulate("four_bar_gravity", times=[0.01])
+    code = "from numba.core.event import Listener, register\nimport mbref\n"
+    code += (
+        "class Shown(Listener):\n    def on_start(self, event):\n        print(event.data['dispatcher'])\n"
+    )
+    code += "    def on_end(self, event):\n        pass\n"
+    code += "register('numba:compile', Shown())\nmbref.simulate('four_bar_gravity', times=[0.01])\n"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout == ""
+
+
 def test_a_warm_start_imports_no_large_parts_of_scipy():
     simulate("four_bar_gravity", times=[0.01])  # which keeps what SciPy has found
     code = "import sys, mbref; mbref.simulate('four_bar_gravity', times=[0.01])\n"
