@@ -12,7 +12,8 @@ import numpy as np
 
 from crosscheck.judge.joint_residuals import (
     JointFrames,
-    difference,
+    anchor_acceleration,
+    anchor_velocity,
     grounded,
     in_world,
     joint_frames,
@@ -24,7 +25,6 @@ from crosscheck.judge.joint_residuals import (
     wrapped,
 )
 from mbref import rotations
-from mbref.rotations import cross
 from mbref.scene import Scene
 from mbref.scene_joints import ANGLE, DISPLACEMENT
 
@@ -40,8 +40,7 @@ def coordinate_rates(
 ) -> np.ndarray:
     """(…, 2) rates of angle and displacement along the axis, as the first body sees them."""
     arms, offset, frames = in_world(joint, position, orientation)
-    w = [angular_velocity[..., b, :] for b in joint.bodies]
-    dv = difference(velocity[..., b, :] + cross(w[k], arms[k]) for k, b in enumerate(joint.bodies))
+    dv, w = anchor_velocity(joint, arms, velocity, angular_velocity)
     linear, angular = relative_twist(frames, offset, dv, w)
     return np.stack([angular[..., 2], linear[..., 2]], axis=-1)
 
@@ -57,13 +56,8 @@ def coordinate_accelerations(
 ) -> np.ndarray:
     """(…, 2) time derivatives of ``coordinate_rates``."""
     arms, offset, frames = in_world(joint, position, orientation)
-    w = [angular_velocity[..., b, :] for b in joint.bodies]
-    dw = [angular_acceleration[..., b, :] for b in joint.bodies]
-    dv = difference(velocity[..., b, :] + cross(w[k], arms[k]) for k, b in enumerate(joint.bodies))
-    da = difference(
-        acceleration[..., b, :] + cross(dw[k], arms[k]) + cross(w[k], cross(w[k], arms[k]))
-        for k, b in enumerate(joint.bodies)
-    )
+    dv, w = anchor_velocity(joint, arms, velocity, angular_velocity)
+    da, dw = anchor_acceleration(joint, arms, w, acceleration, angular_acceleration)
     linear, angular = relative_acceleration(frames, offset, (dv, da), w, dw)
     return np.stack([angular[..., 2], linear[..., 2]], axis=-1)
 

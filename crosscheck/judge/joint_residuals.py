@@ -138,8 +138,7 @@ def velocity_rows(
 ) -> np.ndarray:
     """Forbidden components (…, rows) of the frames' relative twist, of world velocities (…, nb + 1, 3)."""
     arms, offset, frames = in_world(joint, position, orientation)
-    w = [angular_velocity[..., b, :] for b in joint.bodies]
-    dv = difference(velocity[..., b, :] + cross(w[k], arms[k]) for k, b in enumerate(joint.bodies))
+    dv, w = anchor_velocity(joint, arms, velocity, angular_velocity)
     if joint.keeps_distance:
         return _dot(offset, dv) / np.linalg.norm(offset, axis=-1, keepdims=True)
     crossing = [_dot(w[1] - w[0], _crossing(frames)[0])] if joint.keeps_axes_perpendicular else []
@@ -165,13 +164,8 @@ def acceleration_rows(
 ) -> np.ndarray:
     """Time derivative (…, rows) of `velocity_rows`, of world accelerations (…, nb + 1, 3)."""
     arms, offset, frames = in_world(joint, position, orientation)
-    w = [angular_velocity[..., b, :] for b in joint.bodies]
-    dw = [angular_acceleration[..., b, :] for b in joint.bodies]
-    dv = difference(velocity[..., b, :] + cross(w[k], arms[k]) for k, b in enumerate(joint.bodies))
-    da = difference(
-        acceleration[..., b, :] + cross(dw[k], arms[k]) + cross(w[k], cross(w[k], arms[k]))
-        for k, b in enumerate(joint.bodies)
-    )
+    dv, w = anchor_velocity(joint, arms, velocity, angular_velocity)
+    da, dw = anchor_acceleration(joint, arms, w, acceleration, angular_acceleration)
     if joint.keeps_distance:
         length = np.linalg.norm(offset, axis=-1, keepdims=True)
         along = _dot(offset, dv) / length
@@ -206,6 +200,31 @@ def in_world(
     arms = [rotations.rotate(p[k], joint.points[k]) for k in (0, 1)]
     offset = difference(position[..., b, :] + arms[k] for k, b in enumerate(joint.bodies))
     return arms, offset, [rotations.multiply(p[k], joint.frames[k]) for k in (0, 1)]
+
+
+def anchor_velocity(
+    joint: JointFrames, arms: list[np.ndarray], velocity: np.ndarray, angular_velocity: np.ndarray
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Return v₂ - v₁ (…, 3) of the two anchors, and the angular velocities (…, 3) of both bodies."""
+    w = [angular_velocity[..., b, :] for b in joint.bodies]
+    dv = difference(velocity[..., b, :] + cross(w[k], arms[k]) for k, b in enumerate(joint.bodies))
+    return dv, w
+
+
+def anchor_acceleration(
+    joint: JointFrames,
+    arms: list[np.ndarray],
+    w: list[np.ndarray],
+    acceleration: np.ndarray,
+    angular_acceleration: np.ndarray,
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Return a₂ - a₁ (…, 3) of the two anchors, and both angular accelerations (…, 3)."""
+    dw = [angular_acceleration[..., b, :] for b in joint.bodies]
+    da = difference(
+        acceleration[..., b, :] + cross(dw[k], arms[k]) + cross(w[k], cross(w[k], arms[k]))
+        for k, b in enumerate(joint.bodies)
+    )
+    return da, dw
 
 
 def _rows(

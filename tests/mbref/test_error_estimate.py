@@ -144,10 +144,10 @@ def test_the_estimate_is_the_true_error_of_an_oscillation(oscillator):
 
 def test_a_sensitive_motion_is_reported_in_the_message(pendulums):
     motion = simulate(pendulums, "taylor", rtol=1e-4)
-    told = motion.with_error_estimate()
-    found = told.error_estimate
-    assert motion.outcome is told.outcome is Outcome.COMPLETED and motion.message == ""
-    assert told.message == found.warning and found.warning.startswith("sensitive motion: error about ")
+    warned = motion.with_error_estimate()
+    found = warned.error_estimate
+    assert motion.outcome is warned.outcome is Outcome.COMPLETED and motion.message == ""
+    assert warned.message == found.warning and found.warning.startswith("sensitive motion: error about ")
     assert found.largest > 0.1 and found.tighter is not None and found.tighter[1] < 1e-2 * found.largest
     accurate = simulate(pendulums, "taylor", rtol=1e-12).error_estimate
     assert 0.1 < accurate.largest / found.tighter[1] < 10 and accurate.tighter is None
