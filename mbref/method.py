@@ -34,7 +34,6 @@ MOST_BODIES = 100  # up to here `taylor`, whose matrix is dense, is the default,
 # four-bars with 81 bodies, and 0.05 times as much on a chain of slider-cranks with 90
 SHORT = {
     "kinematic": "alf-dual+projection/predictor",  # Newton–Raphson on Eqs. 1 to 3: integrators/predictor.py
-    "ali3-p": "mpi-qr+none/ali3",  # see integrators/ali3.py
     "taylor": "alf-dual+projection/taylor",  # see mbref/taylor
 }
 
@@ -144,8 +143,6 @@ class Method:
             raise MethodError(f"integrator {parts[2].name} only extrapolates: use it with +projection")
         if parts[2].step is None and not parts[1].projects:
             raise MethodError(f"integrator {parts[2].name} projects every step: use it with +projection")
-        if parts[2].holds_constraints and parts[1].name != "none":
-            raise MethodError(f"integrator {parts[2].name} enforces constraints itself: use it with +none")
         return Method(*parts, options)
 
 

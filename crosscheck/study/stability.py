@@ -37,12 +37,7 @@ METHODS = (
     "mpi-gs+none",
     "alf+baumgarte",
     "lm1+baumgarte",
-    "mpi-qr+null-space",
-    "ali3-p",
-    "lm2-first-rows+baumgarte",
-    "lm2-step-rows+baumgarte",
 )
-FIXED_STEPS = {"ali3-p": 10_000}  # steps of a run by methods without a tolerance
 RANK_TOLERANCE = "rank_tolerance"  # the ladder whose difficulty is an option of mbref's methods
 FAMILIES = {"mujoco": "projected", "pinocchio": "tuned", "exudyn": "tuned"}
 MBREF = "mbref"
@@ -257,7 +252,7 @@ def cases(engines: Sequence[str]) -> list[Case]:
 
 def _settings(scene: Scene, engines: Sequence[str]) -> Iterator[tuple[str, Setting]]:
     for method in METHODS:
-        yield MBREF, Setting(method, _options(method, scene))
+        yield MBREF, Setting(method, _options(scene))
     if place(scene.name)[0] == RANK_TOLERANCE:
         return
     for name in engines:
@@ -266,12 +261,10 @@ def _settings(scene: Scene, engines: Sequence[str]) -> Iterator[tuple[str, Setti
             yield name, offered[max(0, len(offered) - 2)]
 
 
-def _options(method: str, scene: Scene) -> dict[str, float]:
+def _options(scene: Scene) -> dict[str, float]:
     ladder, difficulty = place(scene.name)
     swept = {"rank_tolerance": difficulty} if ladder == RANK_TOLERANCE else {}
     most = MOST_STEPS * max(1, round(scene.duration / 30.0))
-    if method in FIXED_STEPS:
-        return {"largest_step": scene.duration / FIXED_STEPS[method], "most_steps": most, **swept}
     return {"rtol": RTOL, "most_steps": most, **swept}
 
 

@@ -23,12 +23,10 @@ MEANINGS = {  # meanings of stabilisations and integrators
     "none": "constraint violations grow",
     "baumgarte": "violations decay by feedback; an error in the motion remains",
     "partitioning": "integrates independent coordinates and solves for the others",
-    "null-space": "integrates speeds in the tangent space of the constraints",
     "projection": "projects onto the constraints after each step; ends at singular positions",
     "dop853": "Runge-Kutta of order 8 with adaptive steps",
     "rk4": "classical Runge-Kutta with a fixed step (s)",
     "adams": "predictor-corrector of orders 1 to 12 with adaptive steps",
-    "ali3": "trapezoidal rule on positions, fixed step (s); without formulation: ali3-p",
     "predictor": "extrapolation only, for fully driven mechanisms; without formulation: kinematic",
     "taylor": "power series of order 4 to 30; crosses singular positions; the default: taylor",
 }

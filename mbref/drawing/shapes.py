@@ -95,11 +95,6 @@ def attached(
     return carried(rotations.rotate(turned_back, at_start - np.array(body.position)), trajectory, b)
 
 
-def is_planar(points: np.ndarray) -> bool:
-    """Whether points (n, 3) stay in one plane of constant z."""
-    return bool(np.ptp(points[:, 2]) <= FLAT * max(np.ptp(points[:, :2], axis=0).max(), 1e-300))
-
-
 def at_rest(scene: Scene) -> Trajectory:
     """The trajectory of one sample, t = 0, at the scene's own poses, with zero velocities."""
     nb = len(scene.body)

@@ -168,17 +168,6 @@ def _contradiction(model: Model, row: int) -> SceneError:
     return SceneError([f"driver[{names[0]}]: {who} the joints {where}"])
 
 
-def corrected_positions(model: Model, q: np.ndarray) -> tuple[np.ndarray, float]:
-    """Consistent coordinates (7 nb,) near q at t = 0, and the largest |Φ| before.
-
-    Raises SceneError naming the joint where q is grossly inconsistent or cannot be corrected.
-    """
-    corrected, before, faults, _ = _corrected(_alone(model), q[None])
-    if faults:
-        raise faults[0]
-    return corrected[0], float(before[0])
-
-
 def _corrected(scenes: Alike, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[int, SceneError], Terms]:
     """Consistent coordinates near q (s, 7 nb), the largest |Φ| (s,) before, errors by place, and the terms
     there at rest."""

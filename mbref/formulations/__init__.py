@@ -3,7 +3,6 @@
 from mbref.formulations.alf import ALF
 from mbref.formulations.alf_dual import ALF_DUAL
 from mbref.formulations.base import Formulation
-from mbref.formulations.dropped_rows import LM2_FIRST_ROWS, LM2_STEP_ROWS
 from mbref.formulations.lm1 import LM1
 from mbref.formulations.lm2 import LM2
 from mbref.formulations.mpi_gs import MPI_GS
@@ -16,8 +15,6 @@ FORMULATIONS: dict[str, Formulation] = {
     for f in (
         LM1,
         LM2,
-        LM2_FIRST_ROWS,
-        LM2_STEP_ROWS,
         ALF,
         ALF_DUAL,
         MPI_SVD,

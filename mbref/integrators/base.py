@@ -37,7 +37,6 @@ class Integrator:
     adaptive: bool
     options: Mapping[str, float] = field(default_factory=dict)
     crosses: Literal["no", "by series"] = "no"  # how it crosses singular positions
-    holds_constraints: bool = False  # True if its steps end on the constraints; requires `none`
     integrates: bool = True  # otherwise only where drivers leave no freedom
     largest_turn: float = inf  # rad that a body may turn in a step, where the stabilisation allows more
 

@@ -78,8 +78,6 @@ def _bearing(mass: bool = False, redundancy: bool = False) -> str:
 
 
 def _of_iteration(run: Run) -> str:
-    if run.method.integrator.holds_constraints:
-        return f"a step below {run.memory.control.fixed_step:g} s may converge"
     if run.method.formulation.name.startswith("alf"):
         return _completes(run) or "mpi-svd and mpi-qr solve without iteration"
     return _follows(run)

@@ -3,10 +3,7 @@
 from mbref.stabilisation.base import Stabilisation
 from mbref.stabilisation.baumgarte import BAUMGARTE
 from mbref.stabilisation.none import NONE
-from mbref.stabilisation.null_space import NULL_SPACE
 from mbref.stabilisation.partitioning import PARTITIONING
 from mbref.stabilisation.projection import PROJECTION
 
-STABILISATIONS: dict[str, Stabilisation] = {
-    s.name: s for s in (NONE, BAUMGARTE, PARTITIONING, NULL_SPACE, PROJECTION)
-}
+STABILISATIONS: dict[str, Stabilisation] = {s.name: s for s in (NONE, BAUMGARTE, PARTITIONING, PROJECTION)}

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from crosscheck.judge.tolerances import FALSE_SUCCESS
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error, is_completed
-from crosscheck.study.stability import FIXED_STEPS, MBREF, METHODS, RTOL, Ladder, ladders, place
+from crosscheck.study.stability import MBREF, METHODS, RTOL, Ladder, ladders, place
 from mbref.trajectory import Outcome
 from reports.blocks import Block, Cell, Heading, HeatMap, Table, Text
 from reports.runs import Curve
@@ -26,8 +26,8 @@ LETTERS = {  # letters of outcomes that the paper's tables do not have
 }
 HOW = (
     "Numbers are digits kept: minus the logarithm of the largest error. Red cells, bold in the text, are "
-    f"false successes: completed with an error above {ALLOWED:g}, or {FALSE_SUCCESS:g} of engines and "
-    "ali3-p, which has no tolerance. A letter names the outcome of a run that ended early: a singular "
+    f"false successes: completed with an error above {ALLOWED:g}, of other engines above {FALSE_SUCCESS:g}. "
+    "A letter names the outcome of a run that ended early: a singular "
     "matrix, b iteration not converged, c violation, d step failed, s singular position, u branch undecided, "
     "m left the motion, t out of time, x crashed, n not finite. Empty cells were not run."
 )
@@ -61,9 +61,8 @@ def _runs(records: Iterable[Record]) -> dict[str, Runs]:
 
 
 def is_false(record: Record) -> bool:
-    """Whether a run completed with an error above ALLOWED, or FALSE_SUCCESS where it has no tolerance."""
-    has_tolerance = record["engine"] == MBREF and record["family"] not in FIXED_STEPS
-    allowed = ALLOWED if has_tolerance else FALSE_SUCCESS
+    """Whether a run completed with an error above ALLOWED, or of other engines above FALSE_SUCCESS."""
+    allowed = ALLOWED if record["engine"] == MBREF else FALSE_SUCCESS
     return is_completed(record) and not error(record) <= allowed
 
 

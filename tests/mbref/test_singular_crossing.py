@@ -71,7 +71,7 @@ def door(tilt: float, seed: int) -> Scene:
 
 
 @pytest.mark.parametrize("tilt", [1e-3, 1e-5, 1e-6])
-@pytest.mark.parametrize("method", ["taylor", "mpi-svd+none", "mpi-qr+null-space"])
+@pytest.mark.parametrize("method", ["taylor", "mpi-svd+none"])
 def test_a_mechanism_without_a_freedom_stays(method, tilt):
     """Series without a variable have been an error of shapes, and small tilts one of iterations."""
     scene = door(tilt, seed=0)
