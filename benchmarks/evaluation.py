@@ -22,7 +22,7 @@ from mbref.kernels.layout import MEMORY, OK
 from mbref.method import Method
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.simulation.run import Limits, Run
+from mbref.stepping.run import Limits, Run
 
 SCENE_NAMES = ("spatial_slider_crank", "planar_slider_crank", "four_bar", "five_bar")
 CALLS, REPEATS = 2000, 15

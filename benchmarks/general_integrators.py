@@ -21,7 +21,7 @@ from mbref.kernels.compilation import FLOAT, INT, VECTOR, entry
 from mbref.kernels.layout import MEMORY
 from mbref.method import Method
 from mbref.scene import Scene
-from mbref.simulation.run import Limits, Run
+from mbref.stepping.run import Limits, Run
 from mbref.trajectory import Cost, Outcome, Trajectory
 
 for kind in ("WARNING", "ERROR"):  # of SUNDIALS: a run that fails says so itself

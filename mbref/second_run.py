@@ -19,8 +19,8 @@ from mbref.error_estimate import ErrorEstimate
 from mbref.method import MOST_BODIES, SERIES, Method, MethodError, default_method
 from mbref.motion import Motion
 from mbref.scene import Scene, SceneError
-from mbref.simulation.limits import AUTO, FINEST, GENERATED, Limits
 from mbref.simulation.simulate import checked_run, finish_run
+from mbref.stepping.limits import AUTO, FINEST, GENERATED, Limits
 
 ORDER = 24  # order of the second run; other runs use at most 22 at tolerances down to 1e-13
 RTOL_SERIES, RTOL_EXPLICIT = 1e-13, 1e-12  # of the second run

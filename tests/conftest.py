@@ -30,7 +30,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     match os.environ.get("PYTEST_XDIST_WORKER"):
         case "gw0":
             from mbref.method import Method
-            from mbref.simulation.preparation import prepare
+            from mbref.stepping.preparation import prepare
 
             for name in GENERAL:
                 prepare(Method.parse(name))

@@ -7,7 +7,7 @@ from dataclasses import replace
 from mbref.cli.first_run import Simulate
 from mbref.method import MethodError
 from mbref.motion import Motion
-from mbref.simulation.limits import Limits
+from mbref.stepping.limits import Limits
 from mbref.trajectory import Outcome
 
 FRAMES = 101  # samples of a motion

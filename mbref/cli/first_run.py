@@ -22,8 +22,8 @@ import numpy as np
 from mbref.method import Method, MethodError
 from mbref.motion import Motion
 from mbref.scene import Scene, SceneError
-from mbref.simulation.limits import Limits
 from mbref.simulation.simulate import are_compiled, prepare, simulate
+from mbref.stepping.limits import Limits
 
 SPAWN = multiprocessing.get_context("spawn")
 INTERPRETED = "NUMBA_DISABLE_JIT"  # environment variable that turns numba's compilation off

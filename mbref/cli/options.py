@@ -15,7 +15,7 @@ from mbref.scene import Scene
 from mbref.stabilisation import STABILISATIONS
 
 if TYPE_CHECKING:
-    from mbref.simulation.limits import Limits
+    from mbref.stepping.limits import Limits
 
 TEXT = argparse.RawDescriptionHelpFormatter
 
@@ -80,7 +80,7 @@ def sample_times(options: argparse.Namespace, scene: Scene) -> np.ndarray:
 def limits_of(options: argparse.Namespace, branches: Mapping[int, int] | None = None) -> Limits:
     """Return the limits; a ValueError names the field, which is the option except for --max-step and
     --branch."""
-    from mbref.simulation.limits import Limits
+    from mbref.stepping.limits import Limits
 
     try:
         return Limits(

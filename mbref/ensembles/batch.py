@@ -26,9 +26,9 @@ from mbref.scene import Scene
 from mbref.simulation.comparison import may_leave
 from mbref.simulation.crossings import Crossings
 from mbref.simulation.outcome import OUTCOMES, cost_of, facts_of, reactions_of, report_of
-from mbref.simulation.run import NEARLY, Run
-from mbref.simulation.singular_start import begins_at_rest, begins_in_motion
-from mbref.simulation.stepping import DONE
+from mbref.stepping.loop import DONE
+from mbref.stepping.run import NEARLY, Run
+from mbref.stepping.singular_start import begins_at_rest, begins_in_motion
 from mbref.trajectory import Crossing
 
 

@@ -17,9 +17,9 @@ from mbref.equations.packing import Packs
 from mbref.equations.reduction import Reduction
 from mbref.kernels.layout import Memory
 from mbref.scene import Scene
-from mbref.simulation.control import largest_violation
-from mbref.simulation.ranks import Ranks, all_ranks
-from mbref.simulation.run import NEARLY, Run
+from mbref.stepping.control import largest_violation
+from mbref.stepping.ranks import Ranks, all_ranks
+from mbref.stepping.run import NEARLY, Run
 
 
 class Candidates(NamedTuple):

@@ -14,9 +14,9 @@ from mbref.method import Method
 from mbref.motion import Motion
 from mbref.scene import Scene
 from mbref.simulation.comparison import DROPS
-from mbref.simulation.limits import Limits
-from mbref.simulation.run import Run
 from mbref.simulation.simulate import checked_run, finish_run, simulate
+from mbref.stepping.limits import Limits
+from mbref.stepping.run import Run
 
 FEW = 0.5  # fraction of a batch: where so few completed, no further batch is tried, but single runs
 

@@ -48,7 +48,7 @@ FLOAT = f8
 INT = i8
 
 WITH_KERNELS = (
-    "kernels", "linear_algebra", "equations", "formulations", "stabilisation", "integrators", "simulation",
+    "kernels", "linear_algebra", "equations", "formulations", "stabilisation", "integrators", "stepping",
     "taylor",
 )  # fmt: skip
 

@@ -206,7 +206,7 @@ class Clock(NamedTuple):
     ratio: float = 0.0  # error of the last step over its tolerance
     past_length: float = 0.0  # s, of the step before the last
     past_ratio: float = 0.0  # error / tolerance of the past step
-    share: float = 1.0  # tolerance of a step / rtol and atol (``simulation.stepping.share``)
+    share: float = 1.0  # tolerance of a step / rtol and atol (``stepping.loop.share``)
     y_size: int = 0  # length of y
     sample: int = 0  # the next one to take
     restart: int = 0  # the step since which the states are one smooth piece

@@ -1,1 +1,1 @@
-"""Simulation: method, run, compiled stepping loop, singular positions, ensembles."""
+"""Simulation: a scene by a method, from the call to the motion, its outcome and its message."""

@@ -16,10 +16,10 @@ import numpy as np
 from mbref import rotations
 from mbref.kernels.layout import SINGULAR_AHEAD
 from mbref.method import Method, default_method
-from mbref.simulation.limits import GENERIC, Limits
-from mbref.simulation.run import Run
 from mbref.simulation.start_run import start_run
-from mbref.simulation.stepping import DONE, LEFT_MOTION, UNDECIDED
+from mbref.stepping.limits import GENERIC, Limits
+from mbref.stepping.loop import DONE, LEFT_MOTION, UNDECIDED
+from mbref.stepping.run import Run
 
 MOST_STEPS = 100_000
 TOLERANCE = 1e-10  # of the reference

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbref.simulation.run import Run
 from mbref.simulation.trial import trial_of
+from mbref.stepping.run import Run
 
 TRANSMISSION = 1e2  # largest velocity / driver rate: above it the position is dead
 ROUNDING = 1e-13  # relative singular value of redundant rows

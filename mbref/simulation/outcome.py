@@ -13,12 +13,10 @@ from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR, SINGULAR_A
 from mbref.motion import Motion
 from mbref.simulation.crossings import Crossings
 from mbref.simulation.dead_position import is_at_dead_position
-from mbref.simulation.ranks import Ranks
 from mbref.simulation.remedies import remedy
-from mbref.simulation.run import NEARLY, Run
 from mbref.simulation.singular_position import Met, is_near, met_by
-from mbref.simulation.singular_start import begins_at_rest, fits_no_branch
-from mbref.simulation.stepping import (
+from mbref.simulation.trial import trial_of
+from mbref.stepping.loop import (
     CREEPING,
     DONE,
     LEFT_MOTION,
@@ -27,7 +25,9 @@ from mbref.simulation.stepping import (
     UNDECIDED,
     VIOLATED,
 )
-from mbref.simulation.trial import trial_of
+from mbref.stepping.ranks import Ranks
+from mbref.stepping.run import NEARLY, Run
+from mbref.stepping.singular_start import begins_at_rest, fits_no_branch
 from mbref.trajectory import Cost, Crossing, Outcome
 
 OUTCOMES = {

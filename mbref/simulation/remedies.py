@@ -8,8 +8,8 @@ from __future__ import annotations
 from mbref.equations.diagnosis import counts
 from mbref.formulations import FORMULATIONS
 from mbref.kernels.layout import NOT_CONVERGED, SINGULAR
-from mbref.simulation.run import Run
-from mbref.simulation.stepping import (
+from mbref.simulation.trial import trial_of
+from mbref.stepping.loop import (
     CREEPING,
     LEFT_MOTION,
     STEP_TOO_SMALL,
@@ -17,7 +17,7 @@ from mbref.simulation.stepping import (
     UNDECIDED,
     VIOLATED,
 )
-from mbref.simulation.trial import trial_of
+from mbref.stepping.run import Run
 
 FOLLOWS, COMPLETES = "taylor crosses singular positions", "taylor completes this motion"
 BY_STATUS = {

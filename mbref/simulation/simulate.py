@@ -14,13 +14,13 @@ from mbref.method import Method, MethodError, default_method
 from mbref.motion import Motion
 from mbref.scene import Scene
 from mbref.scenes import find_scene
-from mbref.simulation import preparation
 from mbref.simulation.comparison import compare_with_default
-from mbref.simulation.limits import GENERATED, Limits
 from mbref.simulation.outcome import trajectory_of
-from mbref.simulation.run import Run
 from mbref.simulation.start_run import start_run
-from mbref.simulation.stepping import DONE
+from mbref.stepping import preparation
+from mbref.stepping.limits import GENERATED, Limits
+from mbref.stepping.loop import DONE
+from mbref.stepping.run import Run
 from mbref.taylor.preparation import (
     KERNELS_OF_SERIES,
     STEPPING,

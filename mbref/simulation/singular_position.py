@@ -11,7 +11,7 @@ import numpy as np
 
 from mbref.equations.branches import MOST_ROWS
 from mbref.equations.units import row_lengths
-from mbref.simulation.run import Run
+from mbref.stepping.run import Run
 
 TAKES_PART = 0.05  # part of a row / largest part in a dependence: smaller parts are ignored
 NEAR = 0.03  # relative pivot below which steps that fail are near a singular position

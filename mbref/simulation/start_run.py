@@ -9,15 +9,18 @@ import numpy as np
 
 from mbref.method import Method
 from mbref.scene import Scene
-from mbref.simulation.explicit import ExplicitStepper
-from mbref.simulation.limits import Limits
-from mbref.simulation.run import Run, Stepper
+from mbref.stepping.explicit import ExplicitStepper
+from mbref.stepping.limits import Limits
+from mbref.stepping.run import Run, Stepper
+from mbref.taylor.preparation import prepare_series
 from mbref.taylor.stepper import SeriesStepper
 
 
 def start_run(scene: Scene, method: Method, times: np.ndarray, limits: Limits) -> Run:
     """Return the run of a scene, ready to be advanced; its stepper may raise NoGeneratedCode."""
     began = time.process_time()
+    if method.is_series:
+        prepare_series()
     run = Run(scene, method, times, limits, stepper_of(method))
     run.built = time.process_time() - began - run.making
     return run

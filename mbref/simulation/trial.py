@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 from mbref.method import MOST_BODIES, SERIES, Method
-from mbref.simulation.limits import GENERIC, Limits
-from mbref.simulation.run import Run
 from mbref.simulation.start_run import start_run
-from mbref.simulation.stepping import DONE
+from mbref.stepping.limits import GENERIC, Limits
+from mbref.stepping.loop import DONE
+from mbref.stepping.run import Run
 from mbref.taylor.preparation import KERNELS_OF_SERIES
 
 MOST_STEPS = 2000  # of a trial, which takes a fraction of a second

@@ -4,7 +4,7 @@ Mass-orthogonal: the correction is the least in the metric of M (Bayo & Ledesma,
 1996): positions by Newton's method, velocities with the same factor.  Only active coordinates are integrated
 (``equations.active_coordinates``, ``equations.static_constraints``).  Near a singular position the last of as
 many pivots as there are independent rows, in order of size, falls with the distance, which
-``simulation.singular_crossing`` watches.  A redundant row has a pivot of α^(-1/2); where two rows
+``stepping.singular_crossing`` watches.  A redundant row has a pivot of α^(-1/2); where two rows
 exchange their roles, the larger of their pivots is still about α^(-1/4).
 """
 

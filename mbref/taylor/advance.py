@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mbref.kernels.compilation import INT, entry
 from mbref.kernels.layout import OK, SINGULAR_AHEAD
-from mbref.simulation.stepping import DONE, PAUSED, TOO_MANY_STEPS
+from mbref.stepping.loop import DONE, PAUSED, TOO_MANY_STEPS
 from mbref.taylor.crossing.short_crossing import cross_briefly, is_full, switches_branch
 from mbref.taylor.layout import SERIES
 from mbref.taylor.samples import put_angles, put_terms

@@ -13,7 +13,7 @@ from numpy import exp, isfinite, log
 from mbref.kernels.compilation import INT, entry, kernel
 from mbref.kernels.layout import OK, SINGULAR_AHEAD
 from mbref.linear_algebra.vectors import larger
-from mbref.simulation.stepping import DONE, PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED
+from mbref.stepping.loop import DONE, PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED
 from mbref.taylor.coefficients import largest_used
 from mbref.taylor.crossing.detection import (
     ends_near_singular,

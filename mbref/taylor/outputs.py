@@ -15,8 +15,8 @@ from mbref.kernels.layout import OK, SINGULAR
 from mbref.linear_algebra.minimum_norm import find_least_multipliers
 from mbref.linear_algebra.sparse_cholesky import regularised_factor
 from mbref.linear_algebra.vectors import copy
-from mbref.simulation.samples import take_sample
 from mbref.stabilisation.projection import ALPHA
+from mbref.stepping.samples import take_sample
 from mbref.taylor.layout import SAMPLE, SERIES
 from mbref.taylor.loads import expand_drivers
 from mbref.taylor.samples import find_poses, put_state

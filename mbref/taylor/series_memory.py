@@ -9,7 +9,7 @@ import numpy as np
 from mbref.equations.branches import SMOOTH
 from mbref.kernels.memory_pool import Pooled, acquire, copied, fill, shapes_of
 from mbref.kernels.named_memory import allocate
-from mbref.simulation.run import Run
+from mbref.stepping.run import Run
 from mbref.taylor.crossing.detection import contains_singular_position
 from mbref.taylor.layout import Polynomials, Series, SeriesKernels, TaylorMemory
 from mbref.taylor.outputs import complete_sample

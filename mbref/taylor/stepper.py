@@ -15,11 +15,11 @@ from mbref.equations.packing import Packs
 from mbref.kernels.layout import OK, SINGULAR_AHEAD
 from mbref.kernels.machine_code import NoGeneratedCode
 from mbref.kernels.memory_pool import release
-from mbref.simulation.limits import AUTO, GENERATED, GENERIC
-from mbref.simulation.pace import Pace
-from mbref.simulation.run import Run
-from mbref.simulation.singular_start import fits_no_branch, leaving
-from mbref.simulation.stepping import DONE, PAUSED, UNDECIDED
+from mbref.stepping.limits import AUTO, GENERATED, GENERIC
+from mbref.stepping.loop import DONE, PAUSED, UNDECIDED
+from mbref.stepping.pace import Pace
+from mbref.stepping.run import Run
+from mbref.stepping.singular_start import fits_no_branch, leaving
 from mbref.taylor.advance import advance_series, enter_series
 from mbref.taylor.batch_equations import equations_of_all
 from mbref.taylor.crossing.departure import Departure
@@ -42,7 +42,6 @@ from mbref.taylor.geometry import geometry_of
 from mbref.taylor.layout import Options, TaylorMemory
 from mbref.taylor.mode import REGULAR
 from mbref.taylor.outputs import complete_samples
-from mbref.taylor.preparation import prepare_series
 from mbref.taylor.series_memory import acquire_memory, put_equations
 
 EXACT, EXACT_ORDER = 1e-13, 22  # tolerance and least order of high-accuracy steps
@@ -74,7 +73,6 @@ class SeriesStepper:
         self.run = run
         self._pace = Pace(run)
         self._decide_rank()
-        prepare_series()
         columns = run.memory.active.velocities.size
         self.is_driven = run.ranks.rank == columns and not run.model.has_angles
         self.follows_drivers, tolerance, order = self._kind_of_steps()

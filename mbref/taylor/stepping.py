@@ -14,7 +14,7 @@ from numpy import exp, isfinite, log
 from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import NOT_FINITE, OK, SINGULAR_AHEAD
 from mbref.linear_algebra.vectors import larger
-from mbref.simulation.stepping import STEP_TOO_SMALL, UNDECIDED, share
+from mbref.stepping.loop import STEP_TOO_SMALL, UNDECIDED, share
 from mbref.taylor.coefficients import largest_used
 from mbref.taylor.correction import correct_state
 from mbref.taylor.crossing.acceptance import crossing_tolerance, judge_branch, step_tolerance

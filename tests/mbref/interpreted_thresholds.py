@@ -14,7 +14,7 @@ import pytest
 
 from mbref.kernels.compilation import PLAIN
 from mbref.kernels.layout import OK
-from mbref.simulation.stepping import STEP_TOO_SMALL, UNDECIDED
+from mbref.stepping.loop import STEP_TOO_SMALL, UNDECIDED
 from mbref.taylor import stepping
 from mbref.taylor.crossing import (
     acceptance,

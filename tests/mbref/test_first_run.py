@@ -13,7 +13,7 @@ from mbref.method import SPARSE
 from mbref.scene import SceneError
 from mbref.scenes import SCENES
 from mbref.simulation import simulate as compiled
-from mbref.simulation.limits import Limits
+from mbref.stepping.limits import Limits
 
 TIMES = np.linspace(0.0, 0.05, 6)
 

@@ -18,7 +18,7 @@ from mbref.scenes import SCENES, find_scene
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.simulate import Limits, simulate, why_no_code
 from mbref.simulation.start_run import start_run
-from mbref.simulation.stepping import DONE
+from mbref.stepping.loop import DONE
 from mbref.taylor.generated import build
 from mbref.trajectory import Outcome
 

@@ -7,8 +7,8 @@ import pytest
 
 from mbref.cli import main
 from mbref.scenes import SCENES
-from mbref.simulation.limits import Limits
 from mbref.simulation.simulate import simulate
+from mbref.stepping.limits import Limits
 
 NUMBERS = (
     "rtol",

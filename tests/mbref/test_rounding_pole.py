@@ -9,9 +9,9 @@ from mbref.kernels.compilation import INT, entry
 from mbref.kernels.layout import OK
 from mbref.method import Method
 from mbref.scenes import SCENES
-from mbref.simulation.run import Run
 from mbref.simulation.simulate import Limits, simulate
 from mbref.simulation.start_run import start_run
+from mbref.stepping.run import Run
 from mbref.taylor.crossing.rounding_pole import remove_pole, time_of_pole
 from mbref.taylor.layout import SERIES
 

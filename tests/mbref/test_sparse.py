@@ -27,9 +27,9 @@ from mbref.linear_algebra.sparse_lu import factorise_product
 from mbref.linear_algebra.symbolic_factorisation import _of_pattern, sparse_factor, symbolic_factorisation
 from mbref.method import Method
 from mbref.scenes import find_scene
-from mbref.simulation.ranks import MOST_ROWS, are_clear
 from mbref.simulation.simulate import Limits, simulate
 from mbref.simulation.start_run import start_run
+from mbref.stepping.ranks import MOST_ROWS, are_clear
 
 
 @given(bodies=st.integers(1, 12), rows=st.integers(1, 40), seed=st.integers(0, 999))

@@ -106,6 +106,20 @@ def circles(arrows: Graph) -> list[list[str]]:
     return found
 
 
+def floors(arrows: Graph) -> dict[str, int]:
+    """Return the floor of each module of a graph without circles: one above the highest that it imports."""
+    found: dict[str, int] = {}
+
+    def floor(module: str) -> int:
+        if module not in found:
+            found[module] = 1 + max(map(floor, arrows[module]), default=0)
+        return found[module]
+
+    for module in arrows:
+        floor(module)
+    return found
+
+
 def upward(arrows: Graph, floors: Sequence[Sequence[str]]) -> list[str]:
     """Arrows from a lower floor to a higher one; ``floors`` lists the parts of a package, lowest first.
 

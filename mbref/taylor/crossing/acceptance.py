@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from mbref.kernels.compilation import kernel
 from mbref.kernels.layout import OK
-from mbref.simulation.stepping import SINGULAR_AHEAD, STEP_TOO_SMALL, UNDECIDED
+from mbref.stepping.loop import SINGULAR_AHEAD, STEP_TOO_SMALL, UNDECIDED
 from mbref.taylor.coefficients import turns_back
 from mbref.taylor.crossing.detection import (
     ends_near_singular,

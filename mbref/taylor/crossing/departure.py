@@ -14,9 +14,9 @@ import numpy as np
 from mbref.equations.branches import SMOOTH, Passed, SingularPosition, singular_position
 from mbref.equations.model import displaced, displacement
 from mbref.kernels.layout import OK
-from mbref.simulation.run import Run
-from mbref.simulation.singular_start import Leaving
-from mbref.simulation.stepping import PAUSED, UNDECIDED
+from mbref.stepping.loop import PAUSED, UNDECIDED
+from mbref.stepping.run import Run
+from mbref.stepping.singular_start import Leaving
 from mbref.taylor.crossing.thresholds import (
     DEPARTURE,
     DEPARTURE_CORRECTIONS,

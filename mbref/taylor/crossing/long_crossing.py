@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from mbref.kernels.compilation import FLOAT, INT, entry, kernel
 from mbref.kernels.layout import OK
-from mbref.simulation.stepping import DONE, PAUSED, TOO_MANY_STEPS, UNDECIDED
+from mbref.stepping.loop import DONE, PAUSED, TOO_MANY_STEPS, UNDECIDED
 from mbref.taylor.crossing.short_crossing import record_crossings
 from mbref.taylor.crossing.thresholds import LONG_CROSSING_ORDER, PIVOT_CLEAR
 from mbref.taylor.crossing.uniqueness import perturbed_run_agrees

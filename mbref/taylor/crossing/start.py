@@ -9,7 +9,7 @@ from mbref.equations.coordinates import copy_state
 from mbref.kernels.compilation import kernel
 from mbref.kernels.layout import OK, SINGULAR
 from mbref.linear_algebra.vectors import larger, largest
-from mbref.simulation.stepping import UNDECIDED
+from mbref.stepping.loop import UNDECIDED
 from mbref.taylor.crossing.thresholds import (
     MIN_PIVOT_FREE,
     MIN_PIVOT_RESOLVED,

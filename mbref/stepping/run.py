@@ -32,12 +32,12 @@ from mbref.kernels.scene_layout import SceneData
 from mbref.linear_algebra.symbolic_factorisation import empty_factor, no_static_rows, unsigned
 from mbref.method import Method
 from mbref.scene import Scene, SceneError
-from mbref.simulation.control import control_of
-from mbref.simulation.limits import Limits
-from mbref.simulation.preparation import prepare
-from mbref.simulation.ranks import NO_RANKS, Ranks, ranks_at
 from mbref.stabilisation.all_coordinates import rates as rates_of_all_rows
 from mbref.stabilisation.base import Stabilisation
+from mbref.stepping.control import control_of
+from mbref.stepping.limits import Limits
+from mbref.stepping.preparation import prepare
+from mbref.stepping.ranks import NO_RANKS, Ranks, ranks_at
 
 NEARLY = 1e-5  # smallest singular value below which rows are nearly dependent
 

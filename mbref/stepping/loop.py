@@ -7,8 +7,8 @@ from mbref.equations.loads import remember_angles
 from mbref.kernels.compilation import INT, entry, kernel
 from mbref.kernels.layout import CHANGED, MEMORY, NOT_FINITE, OK, SINGULAR_AHEAD
 from mbref.linear_algebra.vectors import all_finite, copy
-from mbref.simulation.samples import take_sample
-from mbref.simulation.singular_crossing import (
+from mbref.stepping.samples import take_sample
+from mbref.stepping.singular_crossing import (
     keep_position,
     meets_singular_position,
     remember_state,

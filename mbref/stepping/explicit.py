@@ -10,12 +10,12 @@ import numpy as np
 
 from mbref.equations.packing import Packs
 from mbref.kernels.layout import SINGULAR_AHEAD, Memory
-from mbref.simulation.control import STEPS_PER_CALL
-from mbref.simulation.pace import Pace
-from mbref.simulation.ranks import ranks_at
-from mbref.simulation.run import NEARLY, Run
-from mbref.simulation.singular_start import begins_on_singular_position
-from mbref.simulation.stepping import PAUSED, advance_to_end
+from mbref.stepping.control import STEPS_PER_CALL
+from mbref.stepping.loop import PAUSED, advance_to_end
+from mbref.stepping.pace import Pace
+from mbref.stepping.ranks import ranks_at
+from mbref.stepping.run import NEARLY, Run
+from mbref.stepping.singular_start import begins_on_singular_position
 
 
 class ExplicitStepper:

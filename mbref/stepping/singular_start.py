@@ -14,7 +14,7 @@ import numpy as np
 
 from mbref.equations.branches import MOST_ROWS, fit_to_branches, tangents
 from mbref.equations.initial_state import MET, rate_violation
-from mbref.simulation.run import Run
+from mbref.stepping.run import Run
 
 NEAR_SINGULAR = 1e-6  # smallest singular value of unit rows below which a start is near-singular
 STILL = 1e-12  # force along a branch / largest force: below it the body stays at rest

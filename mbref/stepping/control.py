@@ -9,7 +9,7 @@ import numpy as np
 from mbref.equations.model import Model
 from mbref.kernels.layout import Control
 from mbref.method import Method
-from mbref.simulation.limits import Limits
+from mbref.stepping.limits import Limits
 
 STEPS_PER_CALL = 5_000  # steps between returns to Python, for interrupts and progress
 UNWRAPPED = 1.0  # rad that a body may turn in a step where torsion springs unwrap: two turn less than π apart

@@ -6,7 +6,7 @@ from mbref.equations.coordinates import displace_all
 from mbref.equations.evaluation import evaluate_along
 from mbref.kernels.compilation import Exchangeable
 from mbref.method import Method
-from mbref.simulation.stepping import advance_to_end
+from mbref.stepping.loop import advance_to_end
 
 
 def prepare(method: Method) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from mbref.simulation.run import Run
-from mbref.simulation.stepping import CREEPING, PAUSED
+from mbref.stepping.loop import CREEPING, PAUSED
+from mbref.stepping.run import Run
 
 OUT_OF_REACH, PACE_STEPS = 100.0, 20_000  # limits of steps that the end is away, at the pace of so many
 
