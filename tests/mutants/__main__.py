@@ -4,11 +4,12 @@
 prints a line for each and the score of each package.  A mutant is killed where a test fails; where the tests
 run out of time it is counted apart.  ``--only mbref/taylor`` draws from files of that path alone, and
 ``--list`` prints the mutants without running tests.  Mutants that change nothing are listed with the reason
-in ``tests/mutants/equivalent.py``.
+in ``tests/mutants/equivalent.py``.  No mutant is drawn of an adapter whose engine is not installed.
 
-Results stay in ``build/mutants.jsonl`` and are taken from there as long as the file and its tests are the
-same, so that an interrupted run goes on where it ended.  Kernels run as plain Python, so that none is
-compiled for a mutant.  Exit status 1 where a mutant survives or runs out of time.
+The tests of a mutant run in one process, the quickest first.  Their limits are CPU time, so that other work
+on the machine does not end them.  Results and the times of tests stay in ``build/mutants.jsonl`` as long as
+the file and its tests are the same, so that an interrupted run goes on where it ended.  Kernels run as plain
+Python, so that none is compiled for a mutant.  Exit status 1 where a mutant survives or runs out of time.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ import hashlib
 import json
 import os
 import random
+import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -26,9 +29,11 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
+from crosscheck.engine import installed
 from tests.mutants.equivalent import reason
-from tests.mutants.importers import PACKAGES, importers
+from tests.mutants.importers import ADAPTERS, PACKAGES, engines, importers
 from tests.mutants.operators import Mutant, mutants
 
 ROOT = Path(__file__).parents[2]
@@ -36,16 +41,20 @@ COPIED = (*PACKAGES, "tests", "examples", "benchmarks", "docs", "pyproject.toml"
 KEPT = ROOT / "build" / "mutants.jsonl"
 KILLED, SURVIVED, TIMED_OUT = "killed", "survived", "timed out"
 EQUIVALENT, UNTESTED = "equivalent", "untested"
-LEAST, FACTOR = 60.0, 4.0  # s that tests may take with a mutant, and multiples of their time without
-LONGEST = 240.0  # s that they may take without; tests that take longer are left out
+LEAST, FACTOR = 20.0, 4.0  # CPU s that tests may take with a mutant, and multiples of their time without
+LONGEST = 60.0  # CPU s that a test file may take without; others are left out
+WAITING = 50.0  # wall time / CPU time, after which tests wait for something that does not come
 JITTED = ("mbref/kernels/",)  # what plain Python does not run
 
 
 class Tree:
-    """A copy of the sources, in which mutants are planted."""
+    """A copy of the sources, in which mutants are planted; it keeps the CPU times of tests in a file."""
 
-    def __init__(self, place: Path, root: Path = ROOT, copied: Sequence[str] = COPIED) -> None:
-        self.place, self._seconds = place, {}  # type: ignore[var-annotated]
+    def __init__(
+        self, place: Path, root: Path = ROOT, copied: Sequence[str] = COPIED, kept: Path = KEPT
+    ) -> None:
+        self.place, self._kept = place, kept
+        self._seconds = {r["time of"]: r["seconds"] for r in _records(kept) if "time of" in r}
         for name in (name for name in copied if (root / name).exists()):
             copy = shutil.copytree if (root / name).is_dir() else shutil.copy
             copy(root / name, place / name)
@@ -54,31 +63,35 @@ class Tree:
         """Return whether the tests see a mutant: KILLED, SURVIVED or TIMED_OUT, or UNTESTED where no test
         passes without it.  The tree is left as it was."""
         jitted = mutant.file.startswith(JITTED)
-        sound = [test for test in tests if self._time(test, jitted) <= LONGEST]
+        seconds = {test: self._time(test, jitted) for test in tests}
+        sound = sorted((test for test in tests if seconds[test] <= LONGEST), key=lambda test: seconds[test])
+        if not sound:
+            return UNTESTED
         path = self.place / mutant.file
         good = path.read_text()
         path.write_text(mutant.planted(good))
         try:
-            for test in sound:
-                limit = max(LEAST, FACTOR * self._time(test, jitted))
-                status = self._run(test, jitted, limit)
-                if status != 0:
-                    return TIMED_OUT if status is None else KILLED
+            limit = max(LEAST, FACTOR * sum(seconds[test] for test in sound))
+            status, _ = self._run(sound, jitted, limit)
         finally:
             path.write_text(good)
-        return SURVIVED if sound else UNTESTED
+        return TIMED_OUT if status is None else SURVIVED if status == 0 else KILLED
 
     def _time(self, test: str, jitted: bool) -> float:
-        """The seconds that a test file takes without a mutant; infinite where it fails."""
-        if (test, jitted) not in self._seconds:
-            begun = time.monotonic()
-            passed = self._run(test, jitted, LONGEST) == 0
-            self._seconds[test, jitted] = time.monotonic() - begun if passed else float("inf")
-        return self._seconds[test, jitted]
+        """The CPU seconds that a test file takes without a mutant; infinite where it fails."""
+        text = f"{test} {jitted} {(self.place / test).read_text()}"
+        name = hashlib.sha256(text.encode()).hexdigest()[:16]
+        if name not in self._seconds:
+            status, seconds = self._run([test], jitted, LONGEST)
+            self._seconds[name] = seconds if status == 0 else float("inf")
+            with self._kept.open("a") as file:
+                record = {"time of": name, "seconds": self._seconds[name], "test": test}
+                print(json.dumps(record), file=file)
+        return self._seconds[name]
 
-    def _run(self, test: str, jitted: bool, limit: float) -> int | None:
-        """Return the exit status of pytest on a file: 0 passed, 1 failed, 2 not even collected, 5 without
-        a test, which passes; None when the time was up."""
+    def _run(self, tests: Sequence[str], jitted: bool, limit: float) -> tuple[int | None, float]:
+        """Return the exit status of pytest and its CPU seconds: 0 passed, 1 failed, 2 not even collected; 0
+        where there is no test; None when the time was up."""
         environment = {
             **os.environ,
             "PYTHONPATH": str(self.place),
@@ -87,7 +100,8 @@ class Tree:
         }
         if not jitted:
             environment["NUMBA_DISABLE_JIT"] = "1"
-        command = [sys.executable, "-P", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", test]
+        command = [sys.executable, "-P", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *tests]
+        begun = _children_seconds()
         try:
             done = subprocess.run(
                 command,
@@ -95,12 +109,19 @@ class Tree:
                 env=environment,
                 capture_output=True,
                 text=True,
-                timeout=limit,
+                timeout=WAITING * limit,
                 check=False,
+                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit) + 5)),
             )
         except subprocess.TimeoutExpired:
-            return None
-        return 0 if done.returncode == 5 else done.returncode
+            return None, _children_seconds() - begun
+        status = {5: 0, -signal.SIGXCPU: None, -signal.SIGKILL: None}.get(done.returncode, done.returncode)
+        return status, _children_seconds() - begun
+
+
+def _children_seconds() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def drawn(seed: int, count: int, only: str = "") -> list[Mutant]:
@@ -121,10 +142,11 @@ def drawn(seed: int, count: int, only: str = "") -> list[Mutant]:
 
 
 def _files(only: str) -> Iterator[str]:
+    absent = tuple(f"{ADAPTERS}{name}/" for name in engines() if not installed(name))
     for package in PACKAGES:
         for path in sorted((ROOT / package).rglob("*.py")):
             name = path.relative_to(ROOT).as_posix()
-            if name.startswith(only):
+            if name.startswith(only) and not name.startswith(absent):
                 yield name
 
 
@@ -136,8 +158,11 @@ def key(mutant: Mutant, tests: Sequence[str]) -> str:
 
 def known(path: Path = KEPT) -> dict[str, str]:
     """Return the results of runs before, by key."""
-    lines = path.read_text().splitlines() if path.exists() else []
-    return {record["key"]: record["result"] for record in map(json.loads, lines) if "result" in record}
+    return {record["key"]: record["result"] for record in _records(path) if "result" in record}
+
+
+def _records(path: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
 
 
 def run(chosen: Sequence[Mutant], seconds: float) -> dict[Mutant, str]:

@@ -1,7 +1,8 @@
-"""The tests that import a source file, the nearest first."""
+"""The tests that import a source file, the nearest first; ``engine("name")`` imports the adapter."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 from tests.meta.imports import ROOT, imported, module_name, sources
 
 PACKAGES = ("mbref", "crosscheck", "reports")
+ADAPTERS = "crosscheck/engines/"
 FEWEST = 4  # test files that are run, where so many reach the source
 FARTHEST = 3  # imports between a test and the source
 SNAPSHOTS = ("tests/reports/test_reference_report.py",)  # they see that a text changed, not that it is wrong
@@ -49,7 +51,7 @@ def _tests() -> Mapping[str, set[str]]:
         name = path.relative_to(ROOT).as_posix()
         if name in SNAPSHOTS or name.startswith(("tests/meta/", "tests/mutants/")):
             continue
-        used = _known(path, modules)
+        used = _known(path, modules) | _adapters(path)
         for helper in _known(path, helpers):
             used |= _known(helpers[helper], modules)
         found[name] = used
@@ -59,3 +61,15 @@ def _tests() -> Mapping[str, set[str]]:
 def _known(path: Path, modules: Sequence[str] | Mapping[str, Path]) -> set[str]:
     """The modules, of those given, that a file imports."""
     return set(imported(path)) & set(modules)
+
+
+def engines() -> list[str]:
+    """Return the names of the engines whose adapter is a folder."""
+    return sorted(path.parent.name for path in (ROOT / ADAPTERS).glob("*/adapter.py"))
+
+
+def _adapters(path: Path) -> set[str]:
+    """The modules of the engines that a test asks for by name."""
+    named = set(re.findall(r"""\bengine\("(\w+)"\)""", path.read_text())) & set(engines())
+    inside = tuple(f"crosscheck.engines.{name}." for name in named)
+    return {module for module in sources("crosscheck") if inside and module.startswith(inside)}

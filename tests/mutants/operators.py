@@ -32,6 +32,8 @@ EXTREMES = {
     "sin": "cos",
     "cos": "sin",
 }
+UNCHANGED = ("min", "max", "minimum", "maximum", "hypot", "isclose", "allclose", "logical_or", "logical_and")
+"""Functions that give the same for arguments in any order."""
 KINDS = (
     "sign",
     "factor",
@@ -153,7 +155,7 @@ def _calls(node: ast.AST) -> Changes:
         whole = ast.unparse(node.func)
         yield "extreme", node.func, whole.removesuffix(called) + EXTREMES[called]
     pairs = zip(node.args, node.args[1:], strict=False)
-    if called in ("isinstance", "getattr", "hasattr", "replace", "open"):
+    if called in (*UNCHANGED, "isinstance", "getattr", "hasattr", "replace", "open"):
         return
     for k, (first, second) in enumerate(pairs):
         if isinstance(first, ast.Starred) or isinstance(second, ast.Starred):

@@ -38,6 +38,7 @@ BY_KIND = {
     "a formatted text": ("x = f'{3} {a - b}'", set()),
     "imports for types": ("if TYPE_CHECKING:\n    import a", set()),
     "equal arguments": ("x = f(a, a)", set()),
+    "arguments in any order": ("x = np.hypot(a, b)", set()),
     "umlauts before the place": ("x = 'ä', a - b", {"x = 'ä', ((a) + (b))"}),
 }
 
@@ -72,6 +73,14 @@ def test_tests_are_those_that_import_the_file_the_nearest_first():
     assert "tests/crosscheck/test_verdict.py" in found, found
     assert not set(found) & set(SNAPSHOTS)
     assert importers("tests/nothing.py") == []
+    assert "tests/crosscheck/test_ondsel.py" in importers("crosscheck/engines/ondsel/model.py")
+
+
+def test_no_mutant_is_drawn_of_an_engine_that_is_not_installed(monkeypatch):
+    monkeypatch.setattr(runner, "installed", lambda name: name != "bullet")
+    files = list(runner._files("crosscheck/engines/"))
+    assert "crosscheck/engines/ondsel/model.py" in files
+    assert not [name for name in files if "/bullet/" in name]
 
 
 TINY = {
@@ -103,10 +112,14 @@ def test_results_of_tests_that_see_it_or_not(tmp_path, monkeypatch, tests, new, 
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text(text)
     place.mkdir()
-    tree = runner.Tree(place, root, ("mbref", *(name for name in TINY if name.startswith("test"))))
+    copied = ("mbref", *(name for name in TINY if name.startswith("test")))
+    tree = runner.Tree(place, root, copied, tmp_path / "kept.jsonl")
     [mutant] = [m for m in mutants("mbref/sums.py", TINY["mbref/sums.py"]) if m.new == new]
     assert tree.result(mutant, tests) == expected
     assert (place / "mbref/sums.py").read_text() == TINY["mbref/sums.py"], "the mutant was left in the tree"
+    again = runner.Tree(place, root, (), tmp_path / "kept.jsonl")
+    monkeypatch.setattr(again, "_run", None)
+    assert all(again._time(test, False) > 0 for test in tests), "times of tests are measured once"
 
 
 def test_the_score_counts_no_equivalent_mutant_and_no_time_out():
