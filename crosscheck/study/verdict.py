@@ -72,8 +72,11 @@ class Judged:
 
     @property
     def is_judged(self) -> bool:
-        """Whether a run by an engine that is judged has an error."""
-        return any(record["metrics"].get("error") is not None for record in self.comparable)
+        """Whether a run by an engine that is judged has an error, or none completes a known motion."""
+        runs = self.comparable
+        if any(record["metrics"].get("error") is not None for record in runs):
+            return True
+        return bool(self.truth.get("kind") and runs) and not any(map(is_completed, runs))
 
     def grade(self, record: Record) -> Grade:
         """The grade of a record; UNJUDGED where its engine simulates another mechanism."""

@@ -381,3 +381,19 @@ def test_tables_of_eighty_columns_and_whole_numbers():
     for number in ("2.71e-05", "1.13e-13", "2.50e-12", "7.81e-06", "accuracy=0.0001", "7.8125e-06"):
         assert len(re.findall(rf"{re.escape(number)}(?!\d)", text)) >= 2, (number, text)
     assert "0.00e+00" not in text and "-1e-08" not in text, "a run that never moved has no numbers"
+
+
+def test_a_known_motion_that_no_engine_completes_is_not_without_a_reference():
+    """Runs that end without a state have no error; their failure is the verdict."""
+    late = record("mujoco", "defaults", None, outcome="TIMED_OUT", t_end=0.0)
+    found = group([late, failed("exudyn", "tuned", 0.25)])
+    assert headline([found]) == (
+        "No engine is right at any setting that was run; with its library's defaults MuJoCo is not."
+    )
+    assert right([found]) == (
+        "MuJoCo completes no run: no result within 60 s (--time-limit). "
+        "Exudyn completes no run: not finite at t = 0.25 s."
+    )
+    assert fast([found]).startswith("No engine reaches an error of 1e-6")
+    unknown = replace(found, truth={**found.truth, "kind": "", "reason": "two ways"})
+    assert headline([unknown]).startswith("There is no reference for this motion")
