@@ -23,6 +23,7 @@ from typing import Any
 
 import numba
 from numba import cfunc, f8, i8, njit, types, u4
+from numba.core.typing import Signature
 
 import mbref
 from mbref.kernels.disk_cache import (
@@ -36,8 +37,10 @@ from mbref.kernels.disk_cache import (
 
 # No fastmath: the same bits with and without the JIT.  Without numba's runtime (``_nrt``, undocumented there)
 # no kernel can allocate, and none counts references to its arrays, which takes time.
-OPTIONS = {"cache": True, "error_model": "numpy", "_nrt": False}
-PLAIN = bool(numba.config.DISABLE_JIT)
+OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
+CONFIG: Any = numba.config  # whose names are made on import
+PLAIN = bool(CONFIG.DISABLE_JIT)
+Function = Callable[..., Any]
 
 VECTOR = types.Array(f8, 1, "C")
 MATRIX = types.Array(f8, 2, "C")
@@ -69,12 +72,12 @@ def _cache_root() -> Path:
 CACHE = _cache_root() / f"kernels-{_source_hash()}"
 
 
-def kernel(function: Callable) -> Callable:
+def kernel(function: Function) -> Function:
     """A compiled helper, callable from kernels and from Python."""
     return _compiled(function)
 
 
-def inlined(function: Callable) -> Callable:
+def inlined(function: Function) -> Function:
     """A kernel compiled into each of its callers: of an evaluation, half of whose time calls would take.
 
     Each caller compiles it again: inlined kernels that call each other take long to compile.
@@ -82,12 +85,12 @@ def inlined(function: Callable) -> Callable:
     return _compiled(function, forceinline=True)
 
 
-def allocating(function: Callable) -> Callable:
+def allocating(function: Function) -> Function:
     """A kernel that allocates: numpy's decompositions do."""
     return _compiled(function, _nrt=True)
 
 
-def _compiled(function: Callable, **options: bool) -> Callable:
+def _compiled(function: Function, **options: Any) -> Function:
     return function if PLAIN else Helper(function, {**OPTIONS, "cache": False, **options})
 
 
@@ -99,7 +102,7 @@ class Helper:
     cannot be read where that module is missing.
     """
 
-    def __init__(self, function: Callable, options: dict[str, bool]):
+    def __init__(self, function: Function, options: dict[str, Any]):
         self.function, self._options = function, options
         functools.update_wrapper(self, function)
 
@@ -112,18 +115,18 @@ class Helper:
         return self._dispatcher._numba_type_
 
     @functools.cached_property
-    def _dispatcher(self) -> Callable:
+    def _dispatcher(self) -> Any:
         return njit(**self._options)(self.function)
 
 
 class Exchangeable:
     """A kernel of fixed signature that other kernels take as an argument; ``pointer`` compiles it."""
 
-    def __init__(self, function: Callable, signature: types.Type):
+    def __init__(self, function: Function, signature: Signature):
         self.function, self.signature = function, signature
 
     @functools.cached_property
-    def pointer(self) -> Callable:
+    def pointer(self) -> Function:
         """The function that kernels take: the compiled one, or the plain one without the JIT."""
         if PLAIN:
             return self.function
@@ -154,12 +157,12 @@ class Exchangeable:
         copy.__module__, copy.__qualname__ = f.__module__, f"{f.__qualname__}_entry"
         return Entry(copy, self.signature)
 
-    def _compile(self, **options: bool) -> Callable:
+    def _compile(self, **options: Any) -> Function:
         """The compiled function, loaded where the cache has it."""
         with cached_in(CACHE):
             return self._decorator(**{**OPTIONS, **options})(self.function)
 
-    def _decorator(self, **options: bool) -> Callable:
+    def _decorator(self, **options: Any) -> Function:
         return cfunc(self.signature, **options)
 
     def _is_loaded(self, compiled: Any) -> bool:
@@ -178,24 +181,24 @@ class Entry(Exchangeable):
     def __call__(self, *arguments: object) -> Any:
         return self.pointer(*arguments)
 
-    def _decorator(self, **options: bool) -> Callable:
+    def _decorator(self, **options: Any) -> Function:
         return njit(self.signature, **options)
 
     def _is_loaded(self, compiled: Any) -> bool:
         return bool(compiled.stats.cache_hits)
 
 
-def exchangeable(signature: types.Type) -> Callable[[Callable], Exchangeable]:
+def exchangeable(signature: Signature) -> Callable[[Function], Exchangeable]:
     """Decorator: a kernel that is passed to other kernels."""
     return lambda function: Exchangeable(function, signature)
 
 
-def entry(signature: types.Type) -> Callable[[Callable], Entry]:
+def entry(signature: Signature) -> Callable[[Function], Entry]:
     """Decorator: a kernel that Python calls."""
     return lambda function: Entry(function, signature)
 
 
-def pointer_to(signature: types.Type) -> types.Type:
+def pointer_to(signature: Signature) -> types.Type:
     """The argument type of an exchangeable kernel."""
     return types.FunctionType(signature)
 

@@ -17,6 +17,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numba
 
@@ -28,11 +29,12 @@ LINE = hashlib.sha256().digest_size * 2 + 1  # characters before the path
 @contextlib.contextmanager
 def cached_in(folder: Path) -> Iterator[None]:
     """Let numba cache in the folder the functions that are decorated meanwhile (``NUMBA_CACHE_DIR``)."""
-    before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
+    config: Any = numba.config  # whose names are made on import
+    before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
     try:
         yield
     finally:
-        numba.config.CACHE_DIR = before
+        config.CACHE_DIR = before
 
 
 @functools.cache
@@ -49,7 +51,7 @@ def is_writable(folder: Path) -> bool:
     return True
 
 
-def files_of(folder: Path, function: Callable) -> list[Path]:
+def files_of(folder: Path, function: Callable[..., Any]) -> list[Path]:
     """The files of a function in the folder: an index, and the code of each of its signatures."""
     source = Path(function.__code__.co_filename)
     stem = f"{source.stem}.{function.__qualname__}-".replace("<", "").replace(">", "")
@@ -62,7 +64,7 @@ def files_of(folder: Path, function: Callable) -> list[Path]:
     ]
 
 
-def remove_damaged(folder: Path, function: Callable) -> None:
+def remove_damaged(folder: Path, function: Callable[..., Any]) -> None:
     """Remove the files of a function unless the list has all their checksums; stderr names damaged ones.
 
     Files written since this process began to use the folder are of a process that compiles now, and stay.

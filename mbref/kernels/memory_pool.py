@@ -43,7 +43,7 @@ def arrays_in(values: Any) -> Iterator[np.ndarray]:
         for value in values:
             yield from arrays_in(value)
     elif isinstance(values, Numbers):
-        yield values.base
+        yield np.asarray(values.base)
     elif isinstance(values, np.ndarray):
         yield values
 
@@ -55,12 +55,13 @@ class Pooled:
     """
 
     def __init__(self, values: Any, key: Hashable, part: Pooled | None = None):
-        self.values, self.key, self.number = values, key, next(_numbers)
-        self.packed = packed(values, part.packed if part else None)
+        self.values: Any = values
+        self.key, self.number = key, next(_numbers)
+        self.packed: Packed = packed(values, part.packed if part else None)
         self._first = SavedNumbers(
             values if part is None else tuple(v for v in values if v is not part.values)
         )
-        self.size = self._first.size + (part.size if part else 0)  # bytes in arrays and records
+        self.size: int = self._first.size + (part.size if part else 0)  # bytes in arrays and records
 
     def restore(self) -> None:
         """Write the numbers with which the memory was made to its arrays and records, except its part's."""
@@ -105,7 +106,7 @@ def fill(target: Any, source: Any) -> None:
             mine[...] = theirs
 
 
-def write(record: Numbers, values: Any) -> None:
+def write(record: Any, values: Any) -> None:
     """Write numbers to a record."""
     for name, value in zip(values._fields, values, strict=True):
         record[name] = value

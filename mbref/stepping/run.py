@@ -221,17 +221,20 @@ class Run:
         """The kernels of the method on this chart, which leaves rows out that some formulations need; none of
         a series."""
         integrator, formulation = self.method.integrator, self.method.formulation
-        if self.method.is_series:
-            return Kernels(*[None] * len(Kernels._fields))
-        kernels = Kernels(
-            step=integrator.step,
-            propose=integrator.propose,
-            rates=rates_of_all_rows if formulation.needs_all_rows and chart.projects else chart.rates,
-            rates_with_outputs=chart.rates_with_outputs,
-            accept=chart.accept,
-            accelerate=formulation.accelerate,
-        )
-        return Kernels(*(kernel.pointer if kernel else None for kernel in kernels))
+        of_all_rows = formulation.needs_all_rows and chart.projects
+        chosen = {
+            "step": integrator.step,
+            "propose": integrator.propose,
+            "rates": rates_of_all_rows if of_all_rows else chart.rates,
+            "rates_with_outputs": chart.rates_with_outputs,
+            "accept": chart.accept,
+            "accelerate": formulation.accelerate,
+        }
+        is_series = self.method.is_series
+        pointers: dict[str, Any] = {
+            name: None if is_series or kernel is None else kernel.pointer for name, kernel in chosen.items()
+        }
+        return Kernels(**pointers)
 
     def put_start(self) -> None:
         """Write the initial state and its ranks into memory."""

@@ -30,7 +30,7 @@ def combination(*terms: tuple[float, Expression]) -> Expression:
     return cleaned(total)
 
 
-def cleaned(expression: dict) -> dict:
+def cleaned(expression: dict[Key, float]) -> dict[Key, float]:
     """Return an expression without coefficients of round-off size."""
     small = ROUNDING * largest(expression.values())
     return {key: value for key, value in expression.items() if abs(value) > small}

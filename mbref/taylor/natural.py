@@ -121,7 +121,7 @@ class NaturalCoordinates:
         self.eliminate.settle()
         kinds = self.model.data.primitives.kind
         rows, turned = [], set()
-        for p in np.flatnonzero((kinds != POINT) & (kinds != ANGLE) & (kinds != SLIDE)):
+        for p in np.flatnonzero((kinds != POINT) & (kinds != ANGLE) & (kinds != SLIDE)).tolist():
             number = self._turned(p)
             if number is not None and number not in turned:
                 turned.add(number)
@@ -186,7 +186,7 @@ class NaturalCoordinates:
         pairs = [(numbered[one].direction_vector(a), numbered[other].direction_vector(b))
                  for (one, a), (other, b) in self.orientations.shared_axes()]  # fmt: skip
         primitives = self.model.data.primitives
-        pairs += [self._ends(p) for p in np.flatnonzero(primitives.kind == POINT)]
+        pairs += [self._ends(p) for p in np.flatnonzero(primitives.kind == POINT).tolist()]
         for first, second in pairs:
             yield from _difference(first, second)
 
@@ -249,7 +249,7 @@ class NaturalCoordinates:
         cosine, sine = self._prescribed(driver, (COSINE, SINE))
         x, y = (self.direction(body, w) for w in (table.direction_first[p], table.turning_first[p]))
         turned = [product_sum([({cosine: 1.0}, b), ({sine: -1.0}, a)]) for a, b in zip(x, y, strict=True)]
-        rows = []
+        rows: list[Polynomial] = []
         if max(map(degree, turned)) == 2 or not all(ONE in (i, j) for row in turned for i, j in row):
             turned, rows = self._own_variables(p, turned)
         e = tuple(map(as_expression, turned))
@@ -273,7 +273,7 @@ class NaturalCoordinates:
 
     def _reduced(self, row: Polynomial) -> Polynomial:
         """Return a row without eliminated variables."""
-        gone, total = self.eliminate.expressed, {}
+        gone, total = self.eliminate.expressed, Polynomial()
         for (i, j), coefficient in row.items():
             if i in gone or j in gone:
                 pair = (self.eliminate({i: 1.0}), self.eliminate({j: 1.0}))

@@ -127,14 +127,15 @@ class Orientations:
     def _axes_at_rest(self) -> dict[int, list[np.ndarray]]:
         """Return up to two axes of each orientation that rest, in world axes."""
         known: dict[int, list[np.ndarray]] = {-1: [np.eye(3)[0], np.eye(3)[1]]}
-        for b, (group, turns) in enumerate(zip(self.group, self._moving, strict=True)):
-            for k in (0, 1, 2) if not turns.any() else np.flatnonzero(turns) if turns.sum() == 1 else ():
-                _keep(known, group, self._axes[b][:, k])
+        for body, (group, turns) in enumerate(zip(self.group, self._moving, strict=True)):
+            turning = np.flatnonzero(turns).tolist()
+            for k in turning if len(turning) == 1 else [] if turning else [0, 1, 2]:
+                _keep(known, group, self._axes[body][:, k])
         shared, grown = list(self.shared_axes()), True
         while grown:
             grown = False
-            for (one, a), (other, b) in itertools.chain(shared, (pair[::-1] for pair in shared)):
-                axes = known.get(one, ())
+            for (one, a), (other, b) in (*shared, *((other, one) for one, other in shared)):
+                axes = known.get(one, [])
                 if len(axes) > 1 or any(map(functools.partial(_are_parallel, a), axes)):
                     grown |= _keep(known, other, b)
         return known
@@ -184,7 +185,7 @@ class Orientations:
         basis = _basis(self._directions(group))
         return Orientation(self._variables(group, np.eye(3), basis), basis=basis)
 
-    def _variables(self, group: int, axes: np.ndarray, directions: Sequence[np.ndarray]) -> tuple[int, ...]:
+    def _variables(self, group: int, axes: np.ndarray, directions: Iterable[np.ndarray]) -> tuple[int, ...]:
         """Add components along axes at rest (k, 3) of directions that move with an orientation."""
         body = self.group.index(group)
         forms = [direction_forms(axes, dot(self._axes[body].T, w)) for w in directions]

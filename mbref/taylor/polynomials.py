@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -68,8 +69,8 @@ class Forms:
     def __call__(self, expressions: Sequence[Expression]) -> tuple[np.ndarray, np.ndarray]:
         """Return constants (k,) and coefficients (k, d)."""
         number_type = self.of.numbers.number_type
-        constant = np.full(len(expressions), 0.0, number_type)
-        matrix = np.full((len(expressions), self.d), 0.0, number_type)
+        constant: np.ndarray = np.full(len(expressions), 0.0, number_type)
+        matrix: np.ndarray = np.full((len(expressions), self.d), 0.0, number_type)
         for row, expression in enumerate(expressions):
             for variable, coefficient in self.of.eliminate(expression).items():
                 if variable == ONE:
@@ -131,7 +132,9 @@ def _sum_of_products(one: np.ndarray, other: np.ndarray | None = None) -> np.nda
 
 
 def _rows(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Rows:
-    constant, linear, twofold = np.full(lanes, 0.0, of.numbers.number_type), [], []
+    constant: np.ndarray = np.full(lanes, 0.0, of.numbers.number_type)
+    linear: list[tuple[float, ...]] = []
+    twofold: list[tuple[float, ...]] = []
     for r, row in enumerate(of.rows):
         for (i, j), coefficient in row.items():
             if j == ONE:
@@ -140,7 +143,8 @@ def _rows(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Rows:
                 linear.append((r, lane[j], coefficient))
             else:
                 twofold += [(r, lane[i], lane[j], coefficient), (r, lane[j], lane[i], coefficient)]
-    return Rows(*_columns(twofold, 3), *_columns(linear, 2), constant)
+    columns = [*_columns(twofold, 3), *_columns(linear, 2), constant]
+    return Rows(*columns)
 
 
 def _tableau(rows: Rows, nz: int, nr: int, lanes: int) -> tuple[np.ndarray, np.ndarray]:
@@ -177,13 +181,16 @@ def _products(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Produ
     return products_of_lanes(terms)
 
 
-def products_of_lanes(terms: Sequence[Sequence[tuple]]) -> Products:
+def products_of_lanes(terms: Sequence[Sequence[tuple[Any, ...]]]) -> Products:
     """Return products by the factors and weights of each lane, with padded slots."""
     slots, start = _slots(terms, (0, 0, 0.0))
-    return Products(*_columns(slots, 2), start)
+    left, right, weight = _columns(slots, 2)
+    return Products(left, right, weight, start)
 
 
-def _slots(terms: Sequence[Sequence[tuple]], nothing: tuple) -> tuple[list[tuple], np.ndarray]:
+def _slots(
+    terms: Sequence[Sequence[tuple[Any, ...]]], nothing: tuple[Any, ...]
+) -> tuple[list[tuple[Any, ...]], np.ndarray]:
     """Return the terms of each lane in vectors, padded with nothing; where each block of lanes begins."""
     slots, start = [], [0]
     for block in range(0, len(terms), WIDTH):
@@ -198,7 +205,7 @@ def _inertia(model: Model, forms: Forms, lanes: int) -> Inertia:
     data, d = model.data, forms.d
     scenes, pattern = data.bodies.mass.shape[:-1], forms.of.numbers.pattern
     force, linear = _constant_forces(data, forms)
-    terms: list[list[tuple]] = [[] for _ in range(lanes)]
+    terms: list[list[tuple[Any, ...]]] = [[] for _ in range(lanes)]
     for i, j in zip(*(place.tolist() for place in np.nonzero(pattern(linear))), strict=True):
         terms[i].append((j, i * d + j))
     slots, start = _slots(terms, (0, d * d))
@@ -281,7 +288,7 @@ def _springs(loads: Loads, forms: Forms) -> Springs:
     return Springs(*_stacked(rows, 3, forms.d))
 
 
-def _coupled_angles(forms: Forms) -> list[tuple]:
+def _coupled_angles(forms: Forms) -> list[tuple[Any, ...]]:
     """Return the angles in the rows of couplings, as rows of ``Torsions`` without stiffness."""
     of, rows = forms.of, []
     table = of.model.data.primitives
@@ -294,7 +301,7 @@ def _coupled_angles(forms: Forms) -> list[tuple]:
     return rows
 
 
-def _torsions(loads: Loads, forms: Forms) -> list[tuple]:
+def _torsions(loads: Loads, forms: Forms) -> list[tuple[Any, ...]]:
     """Return the torsion springs, as rows of ``Torsions``."""
     of, rows = forms.of, []
     for k in np.flatnonzero(loads.kind == TORSION_SPRING):
@@ -307,13 +314,13 @@ def _torsions(loads: Loads, forms: Forms) -> list[tuple]:
     return rows
 
 
-def _torsions_of(rows: Sequence[tuple], d: int) -> Torsions:
+def _torsions_of(rows: Sequence[tuple[Any, ...]], d: int) -> Torsions:
     constant, form, stiffness, damping, natural, slot, row, factor = _stacked(rows, 9, d, 6)
     indices = slot.astype(np.int64), row.astype(np.int64)
     return Torsions(constant, form, stiffness, damping, natural, *indices, factor)
 
 
-def _stacked(rows: Sequence[tuple], width: int, d: int, numbers: int = 3) -> list[np.ndarray]:
+def _stacked(rows: Sequence[tuple[Any, ...]], width: int, d: int, numbers: int = 3) -> list[np.ndarray]:
     """Return constants (k, width), forms (k width, d) and columns of numbers (k,)."""
     columns = [[row[i] for row in rows] for i in range(2 + numbers)]
     return [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from typing import Any
 
 from llvmlite import ir
 
@@ -30,7 +31,8 @@ def put_code(taylor: TaylorMemory) -> Code:
     Raises NoGeneratedCode where the functions would be long, or there is no JIT.
     """
     names = functions_of(taylor)
-    code, addresses = code_of(taylor, names), taylor.code
+    code = code_of(taylor, names)
+    addresses: Any = taylor.code
     addresses.rank = rank_of_rows(taylor)
     for name in names:
         addresses[name] = code.address(name)

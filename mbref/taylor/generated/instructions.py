@@ -190,7 +190,7 @@ def _whole(number: int | ir.Value) -> ir.Value:
     return WORD(number) if isinstance(number, int) else number
 
 
-def constant(numbers: Sequence[float]) -> ir.Constant:
+def constant(numbers: Sequence[float] | np.ndarray) -> ir.Constant:
     """Return a vector of constants."""
     return ir.Constant(VECTOR, [float(number) for number in numbers])
 

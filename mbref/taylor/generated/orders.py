@@ -87,7 +87,8 @@ class Orders(ABC):
     # --- products -----------------------------------------------------------------------------------------
     def _factors_of_products(self, k: ir.Value, row: Vectors) -> dict[int, Factors]:
         """Return the factors of ``products`` at order k, stored for later orders."""
-        write, products, known = self._write, self._products, {}
+        write, products = self._write, self._products
+        known: dict[tuple[int, ...], ir.Value] = {}
         place, factors = write.multiplied(k, self._slots), {}
         for c in range(0, products.weight.size, WIDTH):
             weight = self._weights[c // WIDTH]
