@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.cli.request import find_certifiable
+from crosscheck.cli.scene_request import find_certifiable
 from crosscheck.judge.reference import certify
 
 DIGITS, SAMPLES = 20, 3

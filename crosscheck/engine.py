@@ -53,6 +53,8 @@ __all__ = [
 
 BRANCHES = "branches"  # the option that chooses branches at singular positions, where an engine has one
 BEST = "tuned"  # the family that is an engine's best, where it has one of that name
+AS_IN_FILE = "as in file"  # the family that runs the file from which a scene was read, at its own settings
+ORIGIN = ("file", "import")  # the options of that family that say where the file is and how it is read
 FamilyParts = Mapping[str, Mapping[str, Mapping[str, float]]]  # kind of part → name → options and defaults
 
 

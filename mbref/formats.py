@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import argparse
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from mbref.scene import Scene
 
@@ -27,12 +29,102 @@ class ImportOptions:
         Joint coordinates to begin at (rad or m), by joint.
     close : sequence of str
         Pairs of frames that close a loop, such as ``frame_a=frame_b:revolute:y``.
+    hold : sequence of str
+        Bodies that hang on the world and lose their joints there, such as the trunk of a walking robot.
     """
 
     without: Collection[str] = ()
     keyframe: str = ""
     pose: Mapping[str, float] = field(default_factory=dict)
     close: Sequence[str] = ()
+    hold: Sequence[str] = ()
+
+    def words(self) -> list[str]:
+        """Return the words of a command line that give these options."""
+        words = ["--without", ",".join(self.without)] if self.without else []
+        words += ["--keyframe", self.keyframe] if self.keyframe else []
+        for name, values in (
+            ("--pose", [f"{joint}={value!r}" for joint, value in self.pose.items()]),
+            ("--close", self.close),
+            ("--hold", self.hold),
+        ):
+            words += [word for value in values for word in (name, value)]
+        return words
+
+
+def add_options(parser: Any) -> None:
+    """Add the options for reading a file to a parser or a group of options."""
+    parser.add_argument(
+        "--without",
+        metavar="KINDS",
+        default="",
+        help="kinds of parts that may be left out although they change the motion, separated by commas:\n"
+        "armature, couplings, damping, flexible-bodies, fluid, friction, gravity-compensation, motors,\n"
+        "springs, or everything",
+    )
+    parser.add_argument(
+        "--keyframe", metavar="NAME", default="", help="begin at the pose of a keyframe (MJCF)"
+    )
+    parser.add_argument(
+        "--pose",
+        metavar="JOINT=VALUE",
+        action="append",
+        type=_coordinate,
+        default=[],
+        help="begin with a joint coordinate (rad or m); may be given several times",
+    )
+    parser.add_argument(
+        "--close",
+        metavar="A=B[:TYPE[:AXIS]]",
+        action="append",
+        default=[],
+        help="close a loop between two links, bodies or sites: spherical (default), revolute,\n"
+        "translational, cylindrical or fixed, about the axis x, y or z (default) of both frames;\n"
+        "or a .yaml file with closed_loop: [[A, B], ...] and type: [3d, 6d, ...]; may be given several times",
+    )
+    parser.add_argument(
+        "--hold",
+        metavar="BODY",
+        action="append",
+        default=[],
+        help="fix a body to the ground, such as the trunk of a walking robot; may be given several times",
+    )
+
+
+def options_of(arguments: argparse.Namespace) -> ImportOptions:
+    """Return the options that a command line gives."""
+    kinds = [word.strip() for word in arguments.without.split(",") if word.strip()]
+    pose = dict(arguments.pose)
+    return ImportOptions(kinds, arguments.keyframe, pose, arguments.close, arguments.hold)
+
+
+def _coordinate(text: str) -> tuple[str, float]:
+    """Return the joint and the coordinate of ``joint=value``."""
+    name, _, value = text.rpartition("=")
+    try:
+        number = float(value)
+    except ValueError:
+        number = math.nan
+    if not name or not math.isfinite(number):
+        raise argparse.ArgumentTypeError(f"must be joint=value with a number, got {text!r}")
+    return name, number
+
+
+@dataclass(frozen=True)
+class OriginalRun:
+    """A run of the file's own model by the program that the file is written for.
+
+    Attributes
+    ----------
+    engine, family : str
+        The engine, and its family of settings that runs the file.
+    options : mapping of str to Any
+        Options of the setting, among them the file.
+    """
+
+    engine: str
+    family: str
+    options: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -47,11 +139,14 @@ class Imported:
         One sentence for each part of the file that the scene does not represent.
     notes : tuple of str
         One sentence for each decision made while the file was read, such as a loop that was closed.
+    originals : tuple of OriginalRun
+        Runs of the file's own model, the file's own settings first. Empty where no engine runs the file.
     """
 
     scene: Scene
     left_out: tuple[str, ...]
     notes: tuple[str, ...] = ()
+    originals: tuple[OriginalRun, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -86,6 +181,11 @@ class Format(Protocol):
 def read(path: str | Path, options: ImportOptions | None = None) -> Imported:
     """The scene of a file, by the format of its ending; raises ValueError, SceneError, OSError."""
     return _found(path, "reads").read(Path(path), options or ImportOptions())
+
+
+def is_readable(path: str | Path) -> bool:
+    """Return whether an installed format reads files of this suffix."""
+    return any(Path(path).suffix in point.load().reads for point in entry_points(group=GROUP))
 
 
 def write(scene: Scene, path: str | Path) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from pathlib import Path
 from crosscheck.cli import collection
 from crosscheck.cli.options import add_depth, add_engines, add_reference_time
 from crosscheck.cli.passage import passage
-from crosscheck.cli.request import RequestError, find_scenes
+from crosscheck.cli.scene_request import RequestError, find_scenes
 from mbref.command_line import Parser
 from mbref.scene import SceneError
 from reports.blocks import Block

@@ -7,7 +7,7 @@ import importlib.util
 import json
 from pathlib import Path
 
-from crosscheck.cli import request
+from crosscheck.cli import request, scene_request
 from crosscheck.cli.request import RequestError
 from crosscheck.study.progress import followed
 
@@ -21,7 +21,7 @@ def certify(arguments: argparse.Namespace) -> int:
 
     _refuse_without_flint()
     _refuse_missing_folder(arguments.out)
-    scene = request.find_certifiable(arguments.scene)
+    scene = scene_request.find_certifiable(arguments.scene)
     times = request.sample_times(request.lasting(scene, None, arguments.duration), None, arguments.samples)
     try:
         table = certified(scene, times, arguments.digits, shown=lambda name: followed(name, times[-1]))

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from concurrent.futures import ThreadPoolExecutor
 
-from crosscheck.cli import request, tables
+from crosscheck.cli import request, scene_request, tables
 from crosscheck.cli.comparison import WIDTH, comparisons
 from crosscheck.cli.request import Choice, RequestError
 from crosscheck.cli.running import COMPLETED, OTHERWISE, asked_of, console, missing_truths, notice, print_json
@@ -19,6 +20,7 @@ from crosscheck.study.progress import counted
 from crosscheck.study.record_view import public
 from crosscheck.study.timings import REPEATS, with_timings
 from crosscheck.study.tuning import by_closure, by_error, tuned
+from mbref.formats import options_of
 
 
 def compare(arguments: argparse.Namespace) -> int:
@@ -36,7 +38,10 @@ def compare(arguments: argparse.Namespace) -> int:
         asked.chosen.is_named,
     )
     found = collected(asked.scenes, asked.engines, wanted, lambda: request.plan(*asked, notice), notice)
-    paths = {request.find_scenes([path])[0].name: path for path in arguments.scene}
+    words = options_of(arguments).words()
+    paths = {
+        s.name: shlex.join([path, *words]) for s, path in zip(asked.scenes, arguments.scene, strict=True)
+    }
     compared = comparisons(found, paths, arguments.reference_time)
     for comparison in compared:
         if comparison.difference:
@@ -55,7 +60,9 @@ def compare(arguments: argparse.Namespace) -> int:
 
 def tune(arguments: argparse.Namespace) -> int:
     """Print the cheapest settings of an engine that reach an error; returns 1 where none does."""
-    (scene,) = request.find_scenes([arguments.scene])
+    reading = options_of(arguments)
+    (scene,) = scene_request.find_scenes([arguments.scene], reading, notice)
+    path = shlex.join([arguments.scene, *reading.words()])
     (name,) = request.find_engines([arguments.engine], notice)
     scene = request.lasting(scene, None, arguments.duration)
     times = request.sample_times(scene, None, sweep.QUICK_SAMPLES)
@@ -72,7 +79,7 @@ def tune(arguments: argparse.Namespace) -> int:
         shown = [
             {
                 **public(r),
-                "command": command(r, arguments.scene),
+                "command": command(r, path),
                 "own_code": tables.own_code(scene, r),
                 "integrated_here": r["family"] in ours,
             }
@@ -81,7 +88,7 @@ def tune(arguments: argparse.Namespace) -> int:
         goal = "closure" if arguments.closure else "error"
         print_json([{"scene": scene.name, goal: wanted.level, "records": shown}])
     else:
-        tables.print_tuning(console(), wanted, best, found.records, scene, arguments.scene)
+        tables.print_tuning(console(), wanted, best, found.records, scene, path)
         for sentence in missing_truths(cases, found.records):
             console().print(sentence, soft_wrap=True)
     return COMPLETED if best else OTHERWISE

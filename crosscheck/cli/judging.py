@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rich.table import Table
 
-from crosscheck.cli import request
+from crosscheck.cli import request, scene_request
 from crosscheck.cli.request import RequestError
 from crosscheck.cli.running import COMPLETED, OTHERWISE, console
 from crosscheck.recorded.columns import SI, kind_of
@@ -20,7 +20,7 @@ from crosscheck.recorded.reading import read
 
 def judge(arguments: argparse.Namespace) -> int:
     """Print the judgement of a table; 0 where all columns are right.  Raises RequestError, SceneError."""
-    (scene,) = request.find_scenes([arguments.scene])
+    (scene,) = scene_request.find_scenes([arguments.scene])
     columns = dict(_assigned(text) for text in arguments.column)
     try:
         recording = read(Path(arguments.table), scene, columns, arguments.unit, arguments.quaternion)
@@ -61,7 +61,7 @@ def _show(found: Judgement, ignored: Sequence[str]) -> None:
 
 def write_reference(arguments: argparse.Namespace) -> int:
     """Write the reference as a table; 0 where it reaches the end.  Raises RequestError."""
-    (scene,) = request.find_scenes([arguments.scene])
+    (scene,) = scene_request.find_scenes([arguments.scene])
     scene = request.lasting(scene, arguments.times, arguments.duration)
     times = request.sample_times(scene, arguments.times, arguments.samples)
     table = reference_table(scene, times, arguments.reference_time)

@@ -12,8 +12,10 @@ from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.study.command import parsed_option
 from crosscheck.study.grid import TIME_LIMIT
 from crosscheck.study.sweep import QUICK_LIMIT
+from mbref import formats
 from mbref.scene_units import in_si
 
+FILES = "an MJCF (.xml) or URDF file, of which MJCF also runs in MuJoCo at its own settings"
 DIGITS = f"{FEWEST_DIGITS} to {MOST_DIGITS}"  # allowed values of --digits
 
 
@@ -23,7 +25,7 @@ def add_selection(parser: argparse.ArgumentParser) -> None:
         "scene",
         nargs="+",
         metavar="SCENE",
-        help="a built-in scene (`crosscheck list scenes`) or a .toml file",
+        help=f"a built-in scene (`crosscheck list scenes`), a .toml file, or {FILES}",
     )
     add_engines(parser)
     parser.add_argument(
@@ -56,6 +58,12 @@ def add_selection(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
     add_limits(parser, None)
+    add_reading(parser)
+
+
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """Add the options for reading a file of another program."""
+    formats.add_options(parser.add_argument_group("how an MJCF or URDF file is read"))
 
 
 def add_engines(parser: argparse.ArgumentParser) -> None:

@@ -12,6 +12,7 @@ from crosscheck.cli.options import (
     add_depth,
     add_engines,
     add_limits,
+    add_reading,
     add_reference_time,
     add_selection,
     digits,
@@ -149,7 +150,7 @@ def _add_run(commands: Commands) -> None:
 
 
 def _add_compare(commands: Commands) -> None:
-    example = "crosscheck compare my.toml"
+    example = "crosscheck compare my.toml\n  crosscheck compare robot.xml --hold trunk --duration 0.5"
     about = "compare engines on a mechanism: which are right, how accurate and how fast, and why others fail"
     parser = _add(commands, "compare", about, example)
     add_selection(parser)
@@ -163,7 +164,7 @@ def _add_tune(commands: Commands) -> None:
     about = "find the cheapest settings of an engine that reach an error or a closure gap on a mechanism"
     parser = _add(commands, "tune", about, example)
     parser.add_argument("engine", metavar="ENGINE", help="a known engine (`crosscheck list engines`)")
-    parser.add_argument("scene", metavar="SCENE", help="a built-in scene or a .toml file")
+    parser.add_argument("scene", metavar="SCENE", help="a built-in scene, a .toml, MJCF (.xml) or URDF file")
     goal = parser.add_mutually_exclusive_group()
     goal.add_argument("--error", type=positive, default=1e-6, metavar="E", help="default: %(default)g")
     goal.add_argument(
@@ -175,6 +176,7 @@ def _add_tune(commands: Commands) -> None:
     )
     parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
     add_limits(parser)
+    add_reading(parser)
 
 
 def _add_verify(commands: Commands) -> None:

@@ -5,75 +5,22 @@ from __future__ import annotations
 import dataclasses
 import math
 import traceback
-from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from crosscheck.cli.scene_request import Notice, RequestError
 from crosscheck.conformance.planar import left_out, planar_specimens
 from crosscheck.conformance.trial import Specimen, specimens
 from crosscheck.engine import ALL, BUILT_IN, Setting, all_engines, default_engines, engine
-from crosscheck.judge.constraints import initial_twists
 from crosscheck.study.grid import Case, default_cases
-from crosscheck.study.scouting import scout, settings
+from crosscheck.study.scouting import of_file, scout, settings
 from crosscheck.study.sweep import of_few_families
-from mbref.scene import Scene, SceneError
+from mbref.scene import Scene
 from mbref.scene_fields import meant
-from mbref.scene_lines import with_lines
-from mbref.scenes import SCENES, find_scene
 
 SAMPLES = 101
-
-
-class RequestError(Exception):
-    """A request that cannot be carried out; ``faults`` has one line each."""
-
-    def __init__(self, *faults: str):
-        self.faults = faults
-        super().__init__("\n".join(faults))
-
-
-Notice = Callable[[str], None]  # takes one sentence for the user
-
-
-def find_scenes(names: Sequence[str]) -> list[Scene]:
-    """The scenes; RequestError with every fault of every scene, and when two have the same name."""
-    scenes, faults = [], []
-    for name in names:
-        try:
-            scenes.append(_started(name))
-        except SceneError as error:
-            several = f"{name}: " if len(names) > 1 else ""
-            faults += [several + fault for fault in error.faults]
-    if faults:
-        raise RequestError(*faults)
-    called = [scene.name for scene in scenes]
-    if twice := sorted({name for name in called if called.count(name) > 1}):
-        raise RequestError(*(f"scene {name!r} is asked for twice" for name in twice))
-    return scenes
-
-
-def _started(name: str) -> Scene:
-    """The scene; SceneError with lines where the velocities that a file gives contradict its joints."""
-    scene = find_scene(name)
-    if name not in SCENES and Path(name).exists():
-        try:
-            initial_twists(scene)
-        except SceneError as error:
-            raise SceneError(with_lines(Path(name).read_text(encoding="utf-8-sig"), error.faults)) from None
-    return scene
-
-
-def find_certifiable(name: str) -> Scene:
-    """The scene of that name or file, or the random mechanism ``random_N`` that the tests draw from seed N;
-    raises RequestError."""
-    seed = name.removeprefix("random_")
-    if seed == name or not seed.isdecimal():
-        return find_scenes([name])[0]
-    from crosscheck.conformance.random_mechanisms import random_mechanism
-
-    return random_mechanism(int(seed))
 
 
 def find_engines(names: Sequence[str] | None, notice: Notice) -> list[str]:
@@ -233,13 +180,22 @@ def _single(
     scenes: Sequence[Scene], name: str, setting: Setting, times: Sequence[np.ndarray], time_limit: float
 ) -> list[Case]:
     """One run a scene; RequestError for the scenes that the engine cannot run."""
-    gaps = {scene.name: engine(name).cannot(scene) for scene in scenes}
+    gaps = {s.name: engine(name).cannot(s) for s in scenes if not of_file(name, s)}
     if faults := [f"{name} cannot run {scene}: {gap}" for scene, gap in gaps.items() if gap]:
         raise RequestError(*faults)
     scout([name], scenes, lambda _: None)
     if strange := [fault for scene in scenes for fault in _strange_options(scene, name, setting)]:
         raise RequestError(*dict.fromkeys(strange))
-    return [Case(s, when, name, setting, time_limit) for s, when in zip(scenes, times, strict=True)]
+    return [
+        Case(s, when, name, _with_file(s, name, setting), time_limit)
+        for s, when in zip(scenes, times, strict=True)
+    ]
+
+
+def _with_file(scene: Scene, name: str, setting: Setting) -> Setting:
+    """The setting with the options of the file that the scene was read from, where it runs that file."""
+    own = next((s for s in of_file(name, scene) if s.family == setting.family), None)
+    return setting if own is None else Setting(setting.family, {**own.options, **setting.options})
 
 
 def _strange_options(scene: Scene, name: str, setting: Setting) -> list[str]:

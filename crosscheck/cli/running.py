@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from rich.console import Console
 
-from crosscheck.cli import request
+from crosscheck.cli import request, scene_request
 from crosscheck.cli.request import Choice
 from crosscheck.study.comparison import scouted
 from crosscheck.study.grid import TIME_LIMIT, Case, Record, study
@@ -21,6 +21,7 @@ from crosscheck.study.record_view import is_judged, public
 from crosscheck.study.sweep import QUICK_LIMIT, thinned
 from crosscheck.study.truth_sentences import unknown
 from crosscheck.study.truths import known_at
+from mbref.formats import options_of
 from mbref.scene import Scene
 
 Document = dict[str, Any]
@@ -41,7 +42,7 @@ class Asked(NamedTuple):
 
 def asked_of(arguments: argparse.Namespace, samples: int = SAMPLES) -> Asked:
     """The request of a command line; RequestError where it cannot be carried out."""
-    scenes = request.find_scenes(arguments.scene)
+    scenes = scene_request.find_scenes(arguments.scene, options_of(arguments), notice)
     engines = request.find_engines(arguments.engine, notice)
     named = [*(arguments.method or ()), *(arguments.setting or ())]
     is_quick = arguments.depth == "quick"

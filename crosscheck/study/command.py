@@ -7,14 +7,28 @@ import shlex
 from collections.abc import Mapping
 from typing import Any
 
+from crosscheck.engine import ORIGIN
 from crosscheck.study.grid import TIME_LIMIT, Record
 
 
 def command(record: Record, scene: str) -> str:
-    """``crosscheck run`` with what the record was asked for; ``scene`` is a built-in name or a path."""
+    """``crosscheck run`` with what the record was asked for.
+
+    ``scene`` is a built-in name or a path with options for reading it, as words of a shell.
+    """
     asked = record["asked"]
-    words = ["crosscheck", "run", scene, "--engine", asked["engine"], "--setting", record["family"]]
+    words = [
+        "crosscheck",
+        "run",
+        *shlex.split(scene),
+        "--engine",
+        asked["engine"],
+        "--setting",
+        record["family"],
+    ]
     for name, value in asked["options"].items():
+        if name in ORIGIN:
+            continue
         words += ["--option", f"{name}={json.dumps(value)}"]
     return shlex.join([*words, *_when(asked), *_limit(record["time_limit"])])
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from crosscheck.engine import ORIGIN
 from crosscheck.judge.reference.cache import mechanism
 from crosscheck.study.grid import Record
 from mbref.scene import Scene
@@ -121,7 +122,7 @@ def varied_settings(record: Record, records: Sequence[Record]) -> str:
     settings = [r["settings"] for r in records if engine_and_family(r) == engine_and_family(record)]
     names = [k for k in own if any(s.get(k, own[k]) != own[k] for s in settings)]
     if len(settings) == 1:
-        own = names = record["asked"]["options"]
+        own = names = {k: v for k, v in record["asked"]["options"].items() if k not in ORIGIN}
     return ", ".join(f"{k}={own[k]:g}" if isinstance(own[k], float) else f"{k}={own[k]}" for k in names)
 
 

@@ -9,11 +9,28 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from crosscheck.engine import Cannot, Owner, Setting, engine
 from crosscheck.processes.child import ChildFailed
 from crosscheck.processes.pool import READY_SECONDS, capabilities
+from mbref.formats import OriginalRun
 from mbref.scene import Scene
 
 Offer = tuple[Setting, ...] | Cannot  # the settings of an engine for a scene, or its refusal
 
 _found: dict[tuple[str, Scene], Offer] = {}
+_of_files: dict[Scene, tuple[OriginalRun, ...]] = {}  # scenes read from files, with one duration
+
+
+def remember(scene: Scene, originals: Sequence[OriginalRun]) -> None:
+    """Offer runs of the file that a scene was read from among the settings of their engines."""
+    _of_files[_any_duration(scene)] = tuple(originals)
+
+
+def of_file(engine_name: str, scene: Scene) -> tuple[Setting, ...]:
+    """Return the settings by which an engine runs the file that a scene was read from."""
+    runs = _of_files.get(_any_duration(scene), ()) if _of_files else ()
+    return tuple(Setting(run.family, run.options) for run in runs if run.engine == engine_name)
+
+
+def _any_duration(scene: Scene) -> Scene:
+    return scene.with_(duration=1.0)
 
 
 def scout(engines: Sequence[str], scenes: Sequence[Scene], advance: Callable[[str], None]) -> None:
@@ -31,10 +48,12 @@ def scout(engines: Sequence[str], scenes: Sequence[Scene], advance: Callable[[st
 
 
 def offer(engine_name: str, scene: Scene) -> Offer:
-    """Settings that ``scout`` found out, else those that the engine gives in this process."""
+    """Settings that ``scout`` found out, else those that the engine gives in this process; settings that run
+    the scene's file come first, also where the engine refuses the scene."""
     if (engine_name, scene) not in _found:
         _found[engine_name, scene] = _offered(engine_name, scene)
-    return _found[engine_name, scene]
+    found, own = _found[engine_name, scene], of_file(engine_name, scene)
+    return (*own, *(() if isinstance(found, Cannot) else found)) if own else found
 
 
 def settings(engine_name: str, scene: Scene) -> tuple[Setting, ...]:

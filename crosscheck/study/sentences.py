@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
+from crosscheck.study.file_sentences import as_in_file, free_falls
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error, error_text
 from crosscheck.study.speed_sentences import fast, title
@@ -31,10 +32,12 @@ class Verdict(NamedTuple):
     fast: str
     breaks: str
     truth: str
+    file: str = ""
 
     def labelled(self) -> dict[str, str]:
         """The sentences below the headline, by what they answer."""
-        answers = {"Who is right": self.right, "How fast": self.fast, "Where each breaks": self.breaks}
+        own = {"How wrong the file is": self.file} if self.file else {}
+        answers = {**own, "Who is right": self.right, "How fast": self.fast, "Where each breaks": self.breaks}
         return {**answers, "How the truth is known": self.truth}
 
 
@@ -43,7 +46,12 @@ def verdict(groups: Sequence[Judged], difference: str | None = None) -> Verdict:
     truth and their mechanisms have a ``difference``, times are not compared."""
     times = f"Times are not compared, the engines simulate different mechanisms: {difference}."
     return Verdict(
-        headline(groups), right(groups), times if difference else fast(groups), breaks(groups), truth(groups)
+        headline=" ".join([headline(groups), *free_falls(groups)]),
+        right=right(groups),
+        fast=times if difference else fast(groups),
+        breaks=breaks(groups),
+        truth=truth(groups),
+        file=as_in_file(groups),
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from crosscheck.engine import AS_IN_FILE
 from crosscheck.study.grid import Case, Unable, default_cases
 from crosscheck.study.ladder import families
 from mbref.scene import Scene
@@ -18,7 +19,7 @@ QUICK_SCENES = {  # name → end time (s)
     "four_bar": 0.05,
     "five_bar": 0.05,
 }
-QUICK_FAMILIES = ("defaults", "tuned", "forward, compiled", "newton, compiled")  # else: the first
+QUICK_FAMILIES = (AS_IN_FILE, "defaults", "tuned", "forward, compiled", "newton, compiled")  # else: the first
 MOST_FAMILIES, MOST_SETTINGS = 2, 3  # quick sweep: families of an engine, settings of a family
 QUICK_SAMPLES, SAMPLES = 31, 101
 QUICK_LIMIT, LIMIT = 5.0, 120.0  # s of a run

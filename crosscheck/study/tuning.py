@@ -38,14 +38,18 @@ def by_error(level: float) -> Criterion:
 def by_closure(gap: float, scene: Scene) -> Criterion:
     """Return the criterion that closures open by no more than a gap, m; angles count times the scene's
     length."""
-    length = scene_length(scene)
 
     def measure(record: Record) -> float:
-        violation = record["metrics"].get("violation_position")
-        return math.inf if violation is None else length * float(violation)
+        return closure_gap(record, scene)
 
     name = f"a closure gap of {gap * 1e3:g} mm"
     return Criterion(name, gap, measure, lambda record: f"{measure(record) * 1e3:.2g} mm")
+
+
+def closure_gap(record: Record, scene: Scene) -> float:
+    """Return by how much the closures of a run open (m); angles count times the scene's length."""
+    violation = record["metrics"].get("violation_position")
+    return math.inf if violation is None else scene_length(scene) * float(violation)
 
 
 def known_error(record: Record) -> float:

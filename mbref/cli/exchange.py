@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -29,31 +28,7 @@ def add(commands: Any) -> None:
     )
     take.add_argument("file", metavar="FILE", help="the .xml or .urdf file")
     take.add_argument("--out", metavar="FILE", help="the scene file (default: the same name with .toml)")
-    take.add_argument(
-        "--without",
-        metavar="KINDS",
-        default="",
-        help="kinds of parts that may be left out although they change the motion, separated by commas:\n"
-        "armature, couplings, damping, flexible-bodies, fluid, friction, gravity-compensation, motors,\n"
-        "springs, or everything",
-    )
-    take.add_argument("--keyframe", metavar="NAME", default="", help="begin at the pose of a keyframe (MJCF)")
-    take.add_argument(
-        "--pose",
-        metavar="JOINT=VALUE",
-        action="append",
-        default=[],
-        help="begin with a joint coordinate (rad or m); may be given several times",
-    )
-    take.add_argument(
-        "--close",
-        metavar="A=B[:TYPE[:AXIS]]",
-        action="append",
-        default=[],
-        help="close a loop between two links, bodies or sites: spherical (default), revolute,\n"
-        "translational, cylindrical or fixed, about the axis x, y or z (default) of both frames;\n"
-        "or a .yaml file with closed_loop: [[A, B], ...] and type: [3d, 6d, ...]; may be given several times",
-    )
+    formats.add_options(take)
     take.set_defaults(action=_import)
 
     give = commands.add_parser(
@@ -73,30 +48,12 @@ def _import(options: argparse.Namespace) -> int:
     out = Path(options.out or Path(options.file).with_suffix(".toml"))
     if out.suffix != ".toml":
         raise ValueError(f"--out: must end in .toml, got {str(out)!r}")
-    found = formats.read(options.file, _import_options(options))
+    found = formats.read(options.file, formats.options_of(options))
     found.scene.save(out)
     status = _report(out, found.left_out)
     for sentence in found.notes:
         print(f"note: {sentence}")
     return status
-
-
-def _import_options(options: argparse.Namespace) -> formats.ImportOptions:
-    kinds = [word.strip() for word in options.without.split(",") if word.strip()]
-    pose = dict(_coordinate(text) for text in options.pose)
-    return formats.ImportOptions(kinds, options.keyframe, pose, options.close)
-
-
-def _coordinate(text: str) -> tuple[str, float]:
-    """A joint and its coordinate from ``joint=value``; raises ValueError."""
-    name, _, value = text.rpartition("=")
-    try:
-        number = float(value)
-    except ValueError:
-        number = math.nan
-    if not name or not math.isfinite(number):
-        raise ValueError(f"--pose: must be joint=value with a number, got {text!r}")
-    return name, number
 
 
 def _export(options: argparse.Namespace) -> int:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import mbref.equations.packing
-from crosscheck.cli.request import find_certifiable
+from crosscheck.cli.scene_request import find_certifiable
 from crosscheck.conformance.closed_forms import CLOSED_FORMS, free_fall, pendulum
 from crosscheck.conformance.features import BODY, JOINTS, feature_scenes, massless, undetermined
 from crosscheck.conformance.moving import moving_probes, several_springs

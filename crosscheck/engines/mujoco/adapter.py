@@ -16,7 +16,7 @@ import numpy as np
 from crosscheck.engine import Cannot, Engine, Setting
 from crosscheck.engines.driver_motion import fastest_rate, motion, stated_rate
 from crosscheck.engines.initial_velocities import lacks_mass
-from crosscheck.engines.mujoco import compiled_run
+from crosscheck.engines.mujoco import compiled_run, original
 from crosscheck.engines.mujoco.families import (
     ADAPTIVE,
     COMPILED,
@@ -52,7 +52,8 @@ class MuJoCo(Engine):
     name = "mujoco"
     package = "mujoco"
     supports = SUPPORTS
-    families, options, integrated_here = FAMILIES, OPTIONS, INTEGRATED_HERE
+    families, options = FAMILIES | original.FAMILIES, OPTIONS | original.OPTIONS
+    integrated_here = INTEGRATED_HERE
 
     def version(self) -> str:
         """Version of MuJoCo; raises ImportError when it is not installed."""
@@ -74,7 +75,7 @@ class MuJoCo(Engine):
 
     def own_code(self, scene: Scene, setting: Setting) -> str:
         """Return the MJCF of a setting, and Python for what MJCF does not have."""
-        return own_code(setting)
+        return original.own_code(setting) if setting.family in original.FAMILIES else own_code(setting)
 
     def prepare(self, families: Sequence[str]) -> None:
         """Compile the code of the compiled families."""
@@ -83,6 +84,8 @@ class MuJoCo(Engine):
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         """Simulate a scene; raises ValueError for an unknown family of settings."""
+        if setting.family in original.FAMILIES:
+            return original.run(scene, times, setting, self.version())
         if setting.family in COMPILED and (planar := planar_scene(scene)) is not scene:
             return replace(self.run(planar, times, setting), reactions=None)
         start = time.process_time()

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
-from crosscheck.engines.mujoco.importing.reading import read
+from crosscheck.engines.mujoco.importing.reading import source
+from crosscheck.engines.mujoco.original import originals
 from crosscheck.engines.mujoco.writing import write
 from mbref.formats import Exported, Imported, ImportOptions
 from mbref.scene import Scene, SceneError
@@ -19,7 +21,8 @@ class MujocoFiles:
     def read(self, path: Path, options: ImportOptions) -> Imported:
         """The scene of a .xml or .urdf file; raises SceneError, ValueError, OSError."""
         _need_mujoco()
-        return read(path, options)
+        found = source(path, options)
+        return replace(found.imported, originals=originals(path, options, found))
 
     def write(self, scene: Scene) -> Exported:
         """The scene as MJCF; raises SceneError where a body has no mass."""

@@ -6,6 +6,7 @@ and the axes of the file's body.  A scene is given back only after its matrices 
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +20,7 @@ from crosscheck.engines.mujoco.importing.asked_closures import Frames, asked, un
 from crosscheck.engines.mujoco.importing.chains import Chain, chains, joints_of, kind_of, without_effect
 from crosscheck.engines.mujoco.importing.closures import Closure, of_equalities
 from crosscheck.engines.mujoco.importing.groups import Groups
+from crosscheck.engines.mujoco.importing.holding import compiled
 from crosscheck.engines.mujoco.importing.left_out import Part
 from crosscheck.engines.mujoco.importing.posing import JointRow, Poses
 from mbref.formats import Imported, ImportOptions
@@ -33,17 +35,14 @@ class Source:
     """A file that was read: the scene, and MuJoCo's model of it at the pose of the scene.
 
     ``model`` is without the parts that were left out; ``qpos`` and ``qvel`` are its coordinates.
+    ``original`` is ``model`` with the file's own options.
     """
 
     imported: Imported
     model: Any
+    original: Any
     qpos: np.ndarray
     qvel: np.ndarray
-
-
-def read(path: Path, options: ImportOptions) -> Imported:
-    """The scene of a .xml (MJCF) or .urdf file; raises as ``source``."""
-    return source(path, options).imported
 
 
 def source(path: Path, options: ImportOptions) -> Source:
@@ -55,7 +54,7 @@ def source(path: Path, options: ImportOptions) -> Source:
     import mujoco
 
     without = left_out.checked(options.without)
-    model, text = _compiled(mujoco, path)
+    model, text = _compiled(mujoco, path, options)
     if model.nbody < 2:  # the first is the world
         raise SceneError([f"{path}: has no body"])
     reader = _Reader(mujoco, model, text, options, without)
@@ -66,23 +65,26 @@ def source(path: Path, options: ImportOptions) -> Source:
     scene, data = reader.scene(path.stem), reader.poses.data
     state = data.qpos.copy(), data.qvel.copy()
     left_out.stripped(model, reader.kept)
+    original = copy.copy(model)
     Agreement(mujoco, model, reader.groups, reader.poses).check(scene, reader.tree)
     wanted = tuple(f"{part.sentence} (--without {part.kind})" for part in reader.parts)
     imported = Imported(scene, (*wanted, *left_out.notes(mujoco, model)), tuple(reader.notes))
-    return Source(imported, model, *state)
+    return Source(imported, model, original, *state)
 
 
-def _compiled(mujoco: Any, path: Path) -> tuple[Any, urdf.Text | None]:
+def _compiled(mujoco: Any, path: Path, options: ImportOptions) -> tuple[Any, urdf.Text | None]:
     """The compiled model, and the text of a URDF."""
     try:
         if path.suffix != ".urdf":
             path.read_bytes()  # raises OSError, which MuJoCo does not
-            return mujoco.MjModel.from_xml_path(str(path)), None
+            return compiled(mujoco, path, options.hold, options.keyframe), None
         text = urdf.prepared(path.read_text(encoding="utf-8"))
         model = mujoco.MjModel.from_xml_string(text.text)
     except ValueError as error:
         raise SceneError([f"{path}: MuJoCo cannot read it: {' '.join(str(error).split())}"]) from None
     text.take_back(mujoco, model)
+    if options.hold:
+        raise SceneError([f"--hold {options.hold[0]}: the base of a URDF is fixed to the ground already"])
     return model, text
 
 

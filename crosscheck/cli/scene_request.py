@@ -1,0 +1,98 @@
+"""Scenes of a command line: built-in ones, scene files, and files of other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from crosscheck.judge.constraints import initial_twists
+from crosscheck.study.scouting import remember
+from mbref import formats
+from mbref.formats import ImportOptions
+from mbref.scene import GROUND, Fixed, Scene, SceneError
+from mbref.scene_fields import meant
+from mbref.scene_lines import with_lines
+from mbref.scenes import SCENES, find_scene
+
+
+class RequestError(Exception):
+    """A request that cannot be carried out; ``faults`` has one line each."""
+
+    def __init__(self, *faults: str):
+        self.faults = faults
+        super().__init__("\n".join(faults))
+
+
+Notice = Callable[[str], None]  # takes one sentence for the user
+
+
+def find_scenes(
+    names: Sequence[str], reading: ImportOptions | None = None, notice: Notice = lambda _: None
+) -> list[Scene]:
+    """The scenes; RequestError with every fault of every scene, and when two have the same name.
+
+    A file of another program is read with the options ``reading``; parts of it that the scene does not have
+    are reported by ``notice``.
+    """
+    scenes, faults = [], []
+    for name in names:
+        try:
+            scenes.append(_started(name, reading or ImportOptions(), notice))
+        except SceneError as error:
+            several = f"{name}: " if len(names) > 1 else ""
+            faults += [several + fault for fault in error.faults]
+    if faults:
+        raise RequestError(*faults)
+    called = [scene.name for scene in scenes]
+    if twice := sorted({name for name in called if called.count(name) > 1}):
+        raise RequestError(*(f"scene {name!r} is asked for twice" for name in twice))
+    return scenes
+
+
+def _started(name: str, reading: ImportOptions, notice: Notice) -> Scene:
+    """The scene; SceneError with lines where the velocities that a file gives contradict its joints."""
+    if formats.is_readable(name):
+        return _imported(name, reading, notice)
+    scene = held(find_scene(name), reading.hold)
+    if name not in SCENES and Path(name).exists():
+        try:
+            initial_twists(scene)
+        except SceneError as error:
+            raise SceneError(with_lines(Path(name).read_text(encoding="utf-8-sig"), error.faults)) from None
+    return scene
+
+
+def _imported(name: str, reading: ImportOptions, notice: Notice) -> Scene:
+    """The scene of another program's file, whose own runs the engines then offer."""
+    try:
+        found = formats.read(name, reading)
+    except (OSError, ValueError) as error:
+        raise SceneError([str(error)]) from None
+    for sentence in found.left_out:
+        notice(f"{name}: left out: {sentence}")
+    for sentence in found.notes:
+        notice(f"{name}: {sentence}")
+    remember(found.scene, found.originals)
+    return found.scene
+
+
+def held(scene: Scene, names: Sequence[str]) -> Scene:
+    """The scene with some bodies fixed to the ground; SceneError for an unknown body."""
+    known = {body.name: body for body in scene.body}
+    if unknown := [name for name in names if name not in known]:
+        raise SceneError(
+            [f"--hold {n}: no such body; known: {', '.join(known)}{meant(n, known)}" for n in unknown]
+        )
+    fixed = [Fixed.at(f"hold {n}", (GROUND, n), anchor=known[n].position) for n in names]
+    return scene.with_(joint=(*scene.joint, *fixed)) if fixed else scene
+
+
+def find_certifiable(name: str) -> Scene:
+    """The scene of that name or file, or the random mechanism ``random_N`` that the tests draw from seed N;
+    raises RequestError."""
+    seed = name.removeprefix("random_")
+    if seed == name or not seed.isdecimal():
+        return find_scenes([name])[0]
+    from crosscheck.conformance.random_mechanisms import random_mechanism
+
+    return random_mechanism(int(seed))

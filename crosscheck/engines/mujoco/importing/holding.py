@@ -1,0 +1,48 @@
+"""Bodies that are fixed to the world: robots with a free base would only fall without contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from mbref.scene import SceneError
+
+
+def compiled(mujoco: Any, path: Path, hold: Sequence[str], keyframe: str) -> Any:
+    """Return the model of an MJCF file in which some bodies have no joint to the world.
+
+    They stay at the pose of the keyframe, or of the reference.  Raises SceneError for a body that does not
+    hang on the world by joints, ValueError where MuJoCo cannot read the file.
+    """
+    if not hold:
+        return mujoco.MjModel.from_xml_path(str(path))
+    spec = mujoco.MjSpec.from_file(str(path))
+    placed = _placed(mujoco, spec.compile(), keyframe)
+    world = [body for body in spec.bodies if body.parent == spec.worldbody and body.joints]
+    known = {body.name: body for body in world}
+    for name in hold:
+        if name not in known:
+            raise SceneError(
+                [
+                    f"--hold {name}: is not a body that a joint connects to the ground; "
+                    f"known: {', '.join(known) or 'none'}"
+                ]
+            )
+        for joint in known[name].joints:
+            spec.delete(joint)
+    model = spec.compile()
+    for name in hold:  # after compilation, because a position in the file may count from a frame
+        body = model.body(name).id
+        model.body_pos[body], model.body_quat[body] = placed.body(name).xpos, placed.body(name).xquat
+    return model
+
+
+def _placed(mujoco: Any, model: Any, keyframe: str) -> Any:
+    """Return the data of a model at a keyframe, or at the reference where the model has none of that name."""
+    data = mujoco.MjData(model)
+    key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, keyframe or "\0")
+    if key >= 0:
+        mujoco.mj_resetDataKeyframe(model, data, key)
+    mujoco.mj_kinematics(model, data)
+    return data

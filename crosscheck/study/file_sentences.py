@@ -1,0 +1,58 @@
+"""Sentences on a file at its own settings, and on motions that verify nothing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from crosscheck.engine import AS_IN_FILE
+from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.free_fall import falls_freely
+from crosscheck.study.grid import Record
+from crosscheck.study.record_view import ended, is_completed
+from crosscheck.study.tuning import closure_gap
+from crosscheck.study.verdict import Grade, Judged, grade
+
+SETTINGS = {"step": "time step {:g} s", "integrator": "{}", "solref": "solref {}", "solimp": "solimp {}"}
+SHUT = 1e-12  # fraction of the scene's length: smaller gaps are rounding of joints that a tree keeps
+OFF = "Contacts, limits, dry friction and motors are off, as in the scene."
+
+
+def as_in_file(groups: Sequence[Judged]) -> str:
+    """Return how wrong each file is at its own settings, with the gap of its closures in millimetres; empty
+    where no file ran."""
+    found = [(group, r) for group in groups for r in group.records if r["family"] == AS_IN_FILE]
+    return " ".join([*(_one(group, r) for group, r in found), *[OFF] * bool(found)])
+
+
+def _one(group: Judged, record: Record) -> str:
+    scene = group.scene
+    own = [text.format(record["settings"][k]) for k, text in SETTINGS.items() if k in record["settings"]]
+    start = f"{scene.name} at its own settings ({', '.join(own)})"
+    if not is_completed(record):
+        return f"{start} is {ended(record)}: {record['message']}."
+    metrics, found = record["metrics"], grade(record)
+    parts = [] if found is Grade.UNJUDGED else [_bodies(metrics, scene_length(scene))]
+    gap = closure_gap(record, scene)
+    if SHUT * scene_length(scene) < gap < math.inf:
+        parts.append(f"its closures open by up to {gap * 1e3:.2g} mm")
+    said = "has no known error" if found is Grade.UNJUDGED else f"is {found}"
+    advice = ""
+    if found in (Grade.INACCURATE, Grade.WRONG):
+        advice = " `crosscheck tune` finds the solref and the time step for an error or a gap."
+    return f"{start} {said}{': ' if parts else ''}{', and '.join(parts)}.{advice}"
+
+
+def _bodies(metrics: dict[str, float], length: float) -> str:
+    moved, turned = metrics["position_error"] * length, metrics["rotation_error"]
+    return f"bodies are off by up to {moved * 1e3:.2g} mm and {turned:.2g} rad"
+
+
+def free_falls(groups: Sequence[Judged]) -> list[str]:
+    """Return a sentence on the scenes that only fall: such a run verifies nothing."""
+    falling = [group.scene for group in groups if falls_freely(group.scene)]
+    return [
+        f"{scene.name} falls freely as one rigid piece, which verifies nothing but gravity: "
+        f"`--hold {scene.body[0].name}` fixes a body to the ground."
+        for scene in falling
+    ]
