@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 import string
 from collections.abc import Mapping, Sequence
-from typing import Literal
+from typing import Any, Literal
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from crosscheck.cli.terminal_plot import scatter
-from crosscheck.engine import Engine, Setting, engine
+from crosscheck.engine import ORIGIN, Engine, Setting, engine
 from crosscheck.study.command import command
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import (
@@ -130,8 +130,9 @@ def _to_set(found: Engine, record: Record) -> str:
     """Return the description of a run's family of settings, and its options with their descriptions."""
     family = found.families.get(record["family"], "")
     options = [
-        f"{n} = {v:g} ({found.options[n]})" if n in found.options else f"{n} = {v}"
+        f"{n} = {_value(v)} ({found.options[n]})" if n in found.options else f"{n} = {v}"
         for n, v in record["asked"]["options"].items()
+        if n not in ORIGIN
     ]
     parts = [f"{record['family']}: {family}" if family else record["family"], *options]
     return "; ".join(parts) + "."
@@ -204,9 +205,12 @@ def own_code(scene: Scene, record: Record) -> str:
 
 
 def _options(record: Record) -> str:
-    return ", ".join(
-        f"{k}={v:g}" if isinstance(v, float) else f"{k}={v}" for k, v in record["asked"]["options"].items()
-    )
+    asked = record["asked"]["options"].items()
+    return ", ".join(f"{name}={_value(value)}" for name, value in asked if name not in ORIGIN)
+
+
+def _value(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _graded(group: Judged, record: Record) -> str:
