@@ -30,6 +30,7 @@ READY_SECONDS = 600.0  # s for imports and compilation, before the time of a run
 _idle: list[tuple[str, Child]] = []  # idle children and their engines, the last used one at the end
 _lending = Lock()
 _preparing: dict[str, Lock] = {}  # keyed by engine
+_asked: set[str] = set()  # engines that have answered a question
 _starting: dict[int, Child] = {}  # keyed by thread: children that are made ready
 _prepared: set[tuple[str, str]] = set()  # engines and families that a child has made ready
 
@@ -109,7 +110,7 @@ def ask(engine_name: str, question: Callable[..., Any], about: tuple[Any, ...], 
     Raises ChildFailed when that fails, LookupError for an unknown engine.
     """
     _check(engine_name)
-    with _in_use(engine_name) as child, _starts(child):
+    with _in_use(engine_name) as child, _starts(child), _alone_at_first(engine_name):
         return child.call(question, (engine_name, *about), time_limit).value
 
 
@@ -177,6 +178,18 @@ def _made_ready(child: Child, engine_name: str, family: str) -> Observation:
             ready = child.call(*arguments)
             _prepared.add((engine_name, family))
         return ready
+
+
+@contextmanager
+def _alone_at_first(engine_name: str) -> Iterator[None]:
+    """Hold back other questions to an engine until its first answer: two children would compile it twice."""
+    lock = _preparing.setdefault(engine_name, Lock())
+    if engine_name in _asked:
+        yield
+        return
+    with lock:
+        yield
+        _asked.add(engine_name)
 
 
 @contextmanager

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from statistics import median
 
-from crosscheck.engine import Setting
+from crosscheck.engine import Setting, best_family
 from crosscheck.judge.model_identity import along, differences, gate_times
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth import NoSolution, truth_for
@@ -23,8 +23,9 @@ from mbref.trajectory import Trajectory
 
 def identity_cases(scene: Scene, engines: Sequence[str], time_limit: float) -> list[Case]:
     """Return short runs by which `model_difference` checks that all engines simulate the scene: each at
-    its finest setting, without compiled families, whose compilation may take a minute."""
-    finest = {name: found[-1] for name in engines if (found := _called_from_python(settings(name, scene)))}
+    the finest setting of its best family, without compiled families, whose compilation may take a minute."""
+    best = {name: best_family(_called_from_python(settings(name, scene))) for name in engines}
+    finest = {name: found[-1] for name, found in best.items() if found}
     return [Case(scene, gate_times(scene), name, s, time_limit) for name, s in finest.items()]
 
 

@@ -181,6 +181,22 @@ class Compiling(Fake):
         time.sleep(0.5)
 
 
+class Searching(Fake):
+    """Compiles for its settings: writes to the file FAKE_LOG when that begins and ends, and waits a while for
+    a second process that does so."""
+
+    def settings(self, scene: Scene) -> list[Setting]:
+        log = Path(os.environ["FAKE_LOG"])
+        with log.open("a", encoding="utf-8", buffering=1) as lines:
+            lines.write("begin\n")
+            for _ in range(40):
+                if log.read_text(encoding="utf-8").count("begin") > 1:
+                    break
+                time.sleep(0.05)
+            lines.write("end\n")
+        return super().settings(scene)
+
+
 class Stuck(Fake):
     def prepare(self, families: Sequence[str]) -> None:
         time.sleep(600)
@@ -275,7 +291,7 @@ class Versionless(Fake):
 FAKE, SEGFAULT, HANG, CHATTER, RAISE, QUIT = Fake(), Segfault(), Hang(), Chatter(), Raise(), Quit()
 THREADS, MISSING, RECORDER, AGING = Threads(), Missing(), Recorder(), Aging()
 KEEPING, HERALD = Keeping(), Herald()
-SLOW, STUCK, COMPILING = Slow(), Stuck(), Compiling()
+SLOW, STUCK, COMPILING, SEARCHING = Slow(), Stuck(), Compiling(), Searching()
 NO_SETTINGS, REFUSING = NoSettings(), Refusing()
 MALFORMED, SCALARS, VERSIONLESS = Malformed(), Scalars(), Versionless()
 LOSES_LOADS, LAST_ONE_RUNS = LosesLoads(), LastOneRuns()

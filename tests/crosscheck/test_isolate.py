@@ -19,6 +19,7 @@ import pytest
 from crosscheck.engine import Setting
 from crosscheck.processes.child import ChildFailed, stop_all
 from crosscheck.processes.pool import (
+    capabilities,
     end_idle,
     observe,
     run_in_turn,
@@ -195,6 +196,18 @@ def test_engine_that_compiles_and_what_it_prints_meanwhile():
             seen |= set(starting().values())
         assert made.result().outcome is Outcome.COMPLETED, made.result().message
     assert "compiling kernels" in seen and not starting(), seen
+
+
+def test_engine_is_asked_alone_until_it_has_answered_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    log = tmp_path / "log"
+    monkeypatch.setenv("FAKE_LOG", str(log))
+    with ThreadPoolExecutor(2) as threads:
+        asked = [
+            threads.submit(capabilities, "fake_engines:SEARCHING", still(name), 60.0)
+            for name in ("one", "two")
+        ]
+    assert all(len(answer.result()[2]) == 3 for answer in asked), asked
+    assert log.read_text().split() == ["begin", "end"] * 2, log.read_text()
 
 
 def test_engines_do_not_share_a_process(tmp_path: Path):
