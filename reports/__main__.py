@@ -12,14 +12,19 @@ from crosscheck.cli import collection
 from crosscheck.cli.options import add_depth, add_engines, add_reference_time
 from crosscheck.cli.passage import passage
 from crosscheck.cli.scene_request import RequestError, find_scenes
+from crosscheck.closed_loops.records import read as closed_loop_records
 from mbref.command_line import Parser
 from mbref.scene import SceneError
 from reports.blocks import Block
 from reports.runs import Run, by_scene
 
 NEEDS = {"matplotlib": "matplotlib", "jinja2": "jinja2", "resvg_py": "resvg-py"}  # package by module
-PAPER, STABILITY = "paper", "stability"  # the sections whose runs are their own
-OF_PAPER = "Stabilisation methods for redundant constraints"  # title of a page of the paper alone
+PAPER, STABILITY, CLOSED_LOOPS = "paper", "stability", "closed_loops"
+OWN = (STABILITY, CLOSED_LOOPS, PAPER)  # the sections whose runs are their own
+TITLES = {  # titles of pages of one section
+    (PAPER,): "Stabilisation methods for redundant constraints",
+    (CLOSED_LOOPS,): "Who closes a loop: engines against truth",
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -29,14 +34,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     from reports.sections import NAMES
 
-    arguments = _parser((*NAMES, STABILITY, PAPER)).parse_args(argv)
+    arguments = _parser((*NAMES, *OWN)).parse_args(argv)
     if arguments.picture:
         return _picture(Path(arguments.picture))
     if arguments.render:
         return _render(Path(arguments.render), arguments.section or NAMES)
     is_quick, out = arguments.depth == "quick", Path(arguments.out)
-    names = arguments.section or (NAMES if is_quick or arguments.scene else (*NAMES, STABILITY, PAPER))
-    if set(names) <= {PAPER, STABILITY} and (arguments.scene or arguments.engine):
+    names = arguments.section or (NAMES if is_quick or arguments.scene else (*NAMES, *OWN))
+    if set(names) <= set(OWN) and (arguments.scene or arguments.engine):
         given = "scenes" if arguments.scene else "engines"
         _notice(f"--section {names[0]}: has {given} of its own; leave them out, or ask for another section")
         return 2
@@ -87,16 +92,18 @@ def _render(folder: Path, names: Sequence[str]) -> int:
 def _blocks(out: Path, wanted: collection.Runs, names: Sequence[str]) -> list[Block]:
     """The blocks of the named sections; only the records they need are made."""
     from reports import sections, stored
-    from reports.sections import paper, stability
+    from reports.sections import closed_loops, paper, stability
 
     blocks: list[Block] = []
-    if set(names) - {PAPER, STABILITY}:
+    if set(names) - set(OWN):
         found = collection.comparison(out, wanted, _notice)
         named = {scene.name: scene for scene in found.scenes}
         groups = by_scene(found.records, named, found.identities, found.truths, found.motions, found.branches)
         blocks += sections.blocks(groups, names, stored.verified(out))
     if STABILITY in names:
         blocks += stability.render(collection.stability_ladders(out, _notice))
+    if CLOSED_LOOPS in names:
+        blocks += closed_loops.render(closed_loop_records())
     if PAPER in names:
         found_of_paper = collection.paper(out, not wanted.is_quick, _notice)
         print(paper.score(found_of_paper.records))
@@ -107,7 +114,7 @@ def _blocks(out: Path, wanted: collection.Runs, names: Sequence[str]) -> list[Bl
 def _write(blocks: Sequence[Block], out: Path, names: Sequence[str]) -> None:
     from reports import render
 
-    render.write(blocks, out, OF_PAPER if list(names) == [PAPER] else render.TITLE)
+    render.write(blocks, out, TITLES.get(tuple(names), render.TITLE))
     _notice(f"written: {out / 'index.html'} and {out / 'report.md'}")
 
 

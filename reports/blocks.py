@@ -86,12 +86,13 @@ class Moving:
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of a heat map: its text, its kind ("kept", "false", "ended" or ""), and how deep its colour is,
-    from 0 to 1."""
+    """A cell of a heat map: its text, its kind ("kept", "false", "ended" or ""), how deep its colour is, from
+    0 to 1, and the id of the place of the page that it leads to."""
 
     text: str
     kind: str
     depth: float = 0.0
+    href: str = ""
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from crosscheck.cli import listing, request, tables
 from crosscheck.cli.certifying import certify
+from crosscheck.cli.closed_loops import closed_loops
 from crosscheck.cli.comparing import compare, tune
 from crosscheck.cli.judging import judge, write_reference
 from crosscheck.cli.parser import parser
@@ -165,6 +166,7 @@ COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "tune": tune,
     "verify": _verify,
     "findings": _findings,
+    "closed-loops": closed_loops,
     "report": _report,
     "paper": _paper,
     "diff": _diff,

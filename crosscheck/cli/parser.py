@@ -21,6 +21,7 @@ from crosscheck.cli.options import (
     positive,
     whole,
 )
+from crosscheck.closed_loops.records import FILE
 from crosscheck.study.timings import REPEATS
 from mbref.command_line import Parser, commands
 
@@ -61,6 +62,7 @@ def parser() -> argparse.ArgumentParser:
         _add_tune,
         _add_verify,
         _add_findings,
+        _add_closed_loops,
         _add_report,
         _add_paper,
         _add_diff,
@@ -220,6 +222,26 @@ def _add_findings(commands: Commands) -> None:
     parser.add_argument(
         "--recheck", action="store_true", help="run the proofs, and report which findings are still present"
     )
+
+
+def _add_closed_loops(commands: Commands) -> None:
+    about = (
+        "who closes a loop: every engine on mechanisms that are hard in one way each, from stored records; "
+        "--run measures installed engines again"
+    )
+    parser = _add(commands, "closed-loops", about, "crosscheck closed-loops --run --engine drake")
+    parser.add_argument("--run", action="store_true", help="make the runs that the records lack")
+    parser.add_argument(
+        "--engine",
+        action="append",
+        metavar="E",
+        help="measure this engine only; may repeat; default: every installed one",
+    )
+    parser.add_argument("--family", action="append", metavar="F", help="measure this family only; may repeat")
+    parser.add_argument(
+        "--records", default=str(FILE), metavar="FILE", help="default: the records of the package"
+    )
+    parser.add_argument("--page", metavar="FILE", help="also write the matrix as a page in Markdown")
 
 
 def _add_report(commands: Commands) -> None:

@@ -38,7 +38,7 @@ class LeastError:
     @property
     def best(self) -> Record:
         """The run of least error; if none completed, the one that got furthest."""
-        return min(self.families.values(), key=_rank)
+        return min(self.families.values(), key=rank)
 
     @property
     def is_reached(self) -> bool:
@@ -73,12 +73,13 @@ def least_errors(records: Sequence[Record]) -> list[LeastError]:
         for engine in dict.fromkeys(record["engine"] for record in group):
             own = [record for record in group if record["engine"] == engine]
             families = dict.fromkeys(record["family"] for record in own)
-            best = {name: min((r for r in own if r["family"] == name), key=_rank) for name in families}
+            best = {name: min((r for r in own if r["family"] == name), key=rank) for name in families}
             found.append(LeastError(scene, engine, best, own))
     return found
 
 
-def _rank(record: Record) -> tuple[bool, float, float]:
+def rank(record: Record) -> tuple[bool, float, float]:
+    """Return the order of a run: completed runs by their error, before others by their end time."""
     done = is_completed(record)
     return not done, 0.0 if done else -record["t_end"], error(record)
 

@@ -64,6 +64,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["study"],
         ["conformance"],
         ["findings"],
+        ["closed_loops"],
         ["paper"],
         ["cli"],
         ["__main__"],

@@ -1,0 +1,57 @@
+"""`crosscheck closed-loops`: measure engines on closed loops, and show the matrix of the stored records."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Table
+
+from crosscheck.cli import request
+from crosscheck.cli.running import COMPLETED, console, notice
+from crosscheck.closed_loops import document, records
+from crosscheck.closed_loops.matrix import LEGEND, Cell, matrix, shown
+from crosscheck.study.progress import shown as progress_of
+
+LOOKS = {"✓": "green", "≈": "yellow", "✗": "bold red", "!": "magenta"}
+
+
+def closed_loops(arguments: argparse.Namespace) -> int:
+    """Measure if asked to, write the page if asked to, and print the matrix."""
+    path = Path(arguments.records)
+    if arguments.run:
+        _measure(arguments, path)
+    found = records.read(path)
+    if arguments.page:
+        Path(arguments.page).write_text(document.page(found))
+        notice(f"written: {arguments.page}")
+    for is_best in (True, False):
+        console().print(_table(matrix(found), is_best))
+    _legend(console())
+    return COMPLETED
+
+
+def _measure(arguments: argparse.Namespace, path: Path) -> None:
+    engines = request.find_engines(arguments.engine or ["all"], notice)
+    wanted, unable = records.cases(engines, arguments.family)
+    with progress_of("measuring", len(wanted)) as progress:
+        records.measure(wanted, unable, path, progress)
+
+
+def _table(cells: dict[str, dict[str, Cell]], is_best: bool) -> Table:
+    title = "at its best settings" if is_best else "by the library's defaults"
+    headings = next(iter(cells.values()), {})
+    table = Table("engine", *headings, title=title, box=SIMPLE)
+    for name, row in cells.items():
+        found = [cell.best() if is_best else cell.defaults() for cell in row.values()]
+        texts = [shown(record) for record in found]
+        if is_best or any(texts):
+            table.add_row(name, *(f"[{LOOKS.get(t[:1], 'dim')}]{t}[/]" if t else "" for t in texts))
+    return table
+
+
+def _legend(out: Console) -> None:
+    for sign, meaning in LEGEND.items():
+        out.print(f"{sign:10} {meaning}", soft_wrap=True)

@@ -1,0 +1,81 @@
+"""The matrix as a page of the documentation, from the stored records alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from crosscheck.closed_loops.matrix import LEGEND, Cell, is_refusal, matrix, rerun, sentence, shown
+from crosscheck.closed_loops.mechanisms import DIFFICULTIES
+from crosscheck.study.grid import Record
+
+HEAD = """# Who closes a loop
+
+Each row is an engine, each column a mechanism with closed loops that is hard in one way. A cell is the
+largest error of any body at any sample, against a closed form or the [reference solution](reference.md).
+A cell leads to its settings, its reason and the command that makes it again.
+"""
+TAIL = """
+`crosscheck closed-loops` prints this matrix; `crosscheck closed-loops --run --engine drake` measures an
+engine again; `crosscheck closed-loops --page docs/closed-loops.md` writes this page. Matrix and page are
+made from `crosscheck/closed_loops/records.jsonl`; nothing is simulated for them.
+"""
+BEST = "Each engine by its best family of settings, at the finest setting of each family:"
+DEFAULTS = "Solver parameters as the library has them, with a fine step:"
+Cells = Mapping[str, Mapping[str, Cell]]
+
+
+def page(records: Sequence[Record]) -> str:
+    """Return the page in Markdown."""
+    cells = matrix(records)
+    parts = [HEAD, *_legend(), BEST, "", *_table(cells, True), DEFAULTS, "", *_table(cells, False)]
+    parts += ["## The mechanisms", "", *_mechanisms(), "## The runs", ""]
+    parts += [line for name, row in cells.items() for line in _engine(name, row)]
+    return "\n".join(parts) + TAIL
+
+
+def _legend() -> Iterator[str]:
+    yield "| sign | meaning |"
+    yield "| :-- | --- |"
+    yield from (f"| {sign} | {meaning} |" for sign, meaning in LEGEND.items())
+    yield ""
+
+
+def _table(cells: Cells, is_best: bool) -> Iterator[str]:
+    headings = [column.heading for column in DIFFICULTIES]
+    yield "| engine | " + " | ".join(headings) + " |"
+    yield "| --- |" + " :-: |" * len(headings)
+    for name, row in cells.items():
+        texts = [_linked(cell, cell.best() if is_best else cell.defaults()) for cell in row.values()]
+        if is_best or any(texts):
+            yield f"| {name} | " + " | ".join(texts) + " |"
+    yield ""
+
+
+def _linked(cell: Cell, record: Record | None) -> str:
+    return f"[{shown(record)}](#{cell.place})" if record else ""
+
+
+def _mechanisms() -> Iterator[str]:
+    for column in DIFFICULTIES:
+        yield f"- **{column.heading}** (`{column.place()}`, to {column.end:g} s): {column.about}"
+    yield ""
+
+
+def _engine(name: str, row: Mapping[str, Cell]) -> Iterator[str]:
+    version = next(record["version"] for cell in row.values() for record in cell.records)
+    yield f"### {name}\n\nVersion {version}.\n"
+    for cell in row.values():
+        yield from _cell(cell)
+
+
+def _cell(cell: Cell) -> Iterator[str]:
+    """The runs of a cell by family, the best run's command below."""
+    best = cell.best()
+    if best is None:
+        return
+    yield f'<a id="{cell.place}"></a>**{cell.column.heading}**\n'
+    found = [best] if is_refusal(best) else list(cell.families().values())
+    yield from (f"- {shown(record)} {sentence(record)}" for record in found)
+    yield ""
+    if not is_refusal(best):
+        yield f"```sh\n{rerun(best)}\n```\n"

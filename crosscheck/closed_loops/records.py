@@ -1,0 +1,120 @@
+"""Records of the matrix: runs and refusals, kept without their motions in one small file."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from crosscheck.closed_loops.mechanisms import DIFFICULTIES, Difficulty
+from crosscheck.engine import engine
+from crosscheck.study.grid import Case, Record, Unable, default_cases, key, made_by, study
+
+FILE = Path(__file__).parent / "records.jsonl"
+SAMPLES = 21
+TIME_LIMIT = 60.0  # s of CPU time of a run, so that the matrix takes an hour
+REFUSED = "REFUSED"  # outcome of a record without a run
+KEPT = (
+    "key",
+    "scene",
+    "engine",
+    "version",
+    "family",
+    "settings",
+    "asked",
+    "time_limit",
+    "outcome",
+    "message",
+    "t_end",
+    "metrics",
+    "cost",
+    "commit",
+    "date",
+)
+METRICS = ("error", "error_bound", "violation_position")
+
+
+def read(path: Path = FILE) -> list[Record]:
+    """Return the records of a file in their order; none where there is no file."""
+    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+
+
+def write(records: Sequence[Record], path: Path = FILE) -> None:
+    """Replace the file; a reader sees the old file or the new one."""
+    fresh = path.with_suffix(".new")
+    fresh.write_text("".join(json.dumps(record) + "\n" for record in records))
+    os.replace(fresh, path)
+
+
+def cases(
+    engines: Sequence[str], families: Sequence[str] | None, columns: Sequence[Difficulty] = DIFFICULTIES
+) -> tuple[list[Case], list[Unable]]:
+    """Return the finest setting of every family of the engines on each scene, and the refusals."""
+    wanted: list[Case] = []
+    unable: list[Unable] = []
+    for column in columns:
+        scene = column.make()
+        times = np.linspace(0.0, column.end, SAMPLES)
+        found, refused = default_cases(scene, engines, families, times, TIME_LIMIT)
+        wanted += {(case.engine, case.setting.family): case for case in found}.values()  # the last one stays
+        unable += refused
+    return wanted, unable
+
+
+def measure(
+    wanted: Sequence[Case],
+    unable: Sequence[Unable],
+    path: Path = FILE,
+    progress: Callable[[int, int, Record], None] | None = None,
+) -> None:
+    """Run the cases that the file lacks, and store each record as its run ends."""
+    for refusal in unable:
+        _store(_refused(refusal), path)
+    known = {record["key"] for record in read(path)}
+
+    def store(done: int, total: int, record: Record) -> None:
+        _store(kept(record), path)
+        if progress:
+            progress(done, total, record)
+
+    study([case for case in wanted if key(case) not in known], progress=store)
+
+
+def kept(record: Record) -> Record:
+    """Return a study's record without the motion."""
+    found = {name: record[name] for name in KEPT}
+    metrics = record["metrics"]
+    found["metrics"] = {name: metrics[name] for name in METRICS if math.isfinite(metrics.get(name) or 0.0)}
+    return found
+
+
+def _refused(refusal: Unable) -> Record:
+    name, cannot = refusal.engine, refusal.cannot
+    return {
+        "key": f"{name} refuses {refusal.scene.name}",
+        "scene": refusal.scene.name,
+        "engine": name,
+        "version": engine(name).version(),
+        "outcome": REFUSED,
+        "owner": cannot.owner.value,
+        "message": cannot.reason,
+        **{part: made_by()[part] for part in ("commit", "date")},
+    }
+
+
+def _store(record: Record, path: Path) -> None:
+    """Add a record to the file in place of the records that it supersedes."""
+    write([*(old for old in read(path) if not supersedes(record, old)), record], path)
+
+
+def supersedes(new: Record, old: Record) -> bool:
+    """Return whether a record replaces another: an engine either refuses a scene or runs it, and only
+    the last measured version of an engine counts."""
+    if (new["engine"], new["scene"]) != (old["engine"], old["scene"]):
+        return False
+    is_refusal = REFUSED in (new["outcome"], old["outcome"])
+    return is_refusal or new["version"] != old["version"] or new["key"] == old["key"]

@@ -1,0 +1,82 @@
+"""Who closes a loop: engines on mechanisms that are hard in one way each, from crosscheck's own records."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+from crosscheck.closed_loops.matrix import LEGEND, Cell, is_refusal, matrix, rerun, sentence, shown
+from crosscheck.closed_loops.mechanisms import DIFFICULTIES
+from crosscheck.study.grid import Record
+from crosscheck.study.record_view import error
+from crosscheck.study.verdict import Grade, grade
+from reports.blocks import Block, Heading, HeatMap, Listing, Table, Text
+from reports.blocks import Cell as Shown
+
+KINDS = {Grade.RIGHT: "kept", Grade.INACCURATE: "kept", Grade.WRONG: "false", Grade.FAILED: "ended"}
+MOST_DIGITS = 14  # digits of a cell of the deepest colour
+ABOUT = (
+    "Each row is an engine, each column a mechanism with closed loops that is hard in one way. A cell is "
+    "the largest error of any body at any sample, as a fraction of the mechanism's length or in rad. A cell "
+    "leads to its settings and its command."
+)
+Cells = Mapping[str, Mapping[str, Cell]]
+
+
+def render(records: Sequence[Record]) -> list[Block]:
+    """The matrix at best and by defaults, the mechanisms, and the runs behind each cell."""
+    cells = matrix(records)
+    return [
+        Heading("Who closes a loop", 2),
+        Text(ABOUT),
+        _map(
+            cells, True, "Each engine by its best family of settings, at the finest setting of each family."
+        ),
+        _map(cells, False, "Solver parameters as the library has them, with a fine step."),
+        Table("Signs.", ("Sign", "Meaning"), list(LEGEND.items())),
+        Heading("The mechanisms", 2),
+        Table("Scenes that the columns run.", ("Column", "Scene", "Until (s)", "Mechanism"), _mechanisms()),
+        *(block for name, row in cells.items() for block in _engine(name, row)),
+    ]
+
+
+def _map(cells: Cells, is_best: bool, caption: str) -> HeatMap:
+    rows = {}
+    for name, row in cells.items():
+        found = [_shown(cell, cell.best() if is_best else cell.defaults()) for cell in row.values()]
+        if is_best or any(cell.text for cell in found):
+            rows[name] = found
+    return HeatMap(caption, "engine", [column.heading for column in DIFFICULTIES], rows)
+
+
+def _shown(cell: Cell, record: Record | None) -> Shown:
+    if record is None:
+        return Shown("", "")
+    if is_refusal(record):
+        return Shown(shown(record), "", href=f"#{cell.engine}")
+    digits = -math.log10(max(error(record), 1e-16)) if grade(record) is not Grade.FAILED else 0.0
+    depth = min(1.0, max(0.0, digits / MOST_DIGITS))
+    return Shown(shown(record), KINDS.get(grade(record), ""), depth, f"#{cell.engine}")
+
+
+def _mechanisms() -> list[tuple[str, ...]]:
+    return [(c.heading, c.place(), f"{c.end:g}", c.about) for c in DIFFICULTIES]
+
+
+def _engine(name: str, row: Mapping[str, Cell]) -> Iterator[Block]:
+    yield Heading(name, 2)
+    version = next(record["version"] for cell in row.values() for record in cell.records)
+    rows = [(cell.column.heading, *line) for cell in row.values() for line in _runs(cell)]
+    yield Table(f"Version {version}.", ("Mechanism", "Result", "Run"), rows)
+    commands = [rerun(best) for cell in row.values() if (best := cell.best()) and not is_refusal(best)]
+    if commands:
+        yield Text("Commands of the best runs, from the root of the checkout:")
+        yield Listing("\n".join(commands))
+
+
+def _runs(cell: Cell) -> list[tuple[str, str]]:
+    best = cell.best()
+    if best is None:
+        return []
+    found = [best] if is_refusal(best) else list(cell.families().values())
+    return [(shown(record), sentence(record)) for record in found]

@@ -1,0 +1,131 @@
+"""The matrix of closed loops / grades by hand, records that supersede others, the committed page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crosscheck.closed_loops import document, records
+from crosscheck.closed_loops.matrix import LEGEND, matrix, rerun, sentence, shown
+from crosscheck.closed_loops.mechanisms import DIFFICULTIES, ROOT
+from crosscheck.engine import Cannot, Owner
+from crosscheck.judge.truth import truth_for
+from crosscheck.study.grid import Unable
+from mbref.scenes import find_scene
+
+DOCUMENT = Path(__file__).parents[2] / "docs" / "closed-loops.md"
+FIRST = DIFFICULTIES[0]
+
+
+def run(error: float | None, family: str = "tuned", outcome: str = "COMPLETED", **changes) -> dict:
+    record = {
+        "key": f"{family}{error}",
+        "scene": FIRST.scene,
+        "engine": "mujoco",
+        "version": "4.0.0",
+        "family": family,
+        "asked": {"engine": "mujoco", "options": {"step": 1e-3}, "end": 1.0, "samples": 21},
+        "time_limit": records.TIME_LIMIT,
+        "outcome": outcome,
+        "message": "the Jacobian is singular" if outcome != "COMPLETED" else "",
+        "t_end": 1.0 if outcome == "COMPLETED" else 0.3,
+        "metrics": {} if error is None else {"error": error},
+        "cost": {"seconds": 0.5},
+    }
+    return {**record, **changes}
+
+
+def refusal() -> dict:
+    record = run(None, outcome=records.REFUSED, key="mujoco refuses", owner="missing in the engine")
+    return {**record, "message": "no hinge"}
+
+
+@pytest.mark.parametrize("column", DIFFICULTIES, ids=lambda column: column.heading)
+def test_every_mechanism_can_be_named_in_a_command_and_has_a_truth(column) -> None:
+    scene = column.make()
+    place = column.place()
+    found = find_scene(str(ROOT / place) if place.endswith(".toml") else place)
+    assert found.with_(duration=column.end) == scene and scene.name == column.scene
+    assert truth_for(scene) is not None
+    assert scene.load or scene.driver or any(scene.gravity), "nothing moves it"
+
+
+def test_turned_four_bar_is_the_four_bar() -> None:
+    by_heading = {column.heading: column.make() for column in DIFFICULTIES}
+    plain, turned = by_heading["four-bar"], by_heading["turned"]
+    for one, other in zip(plain.joint, turned.joint, strict=True):
+        assert np.linalg.norm(one.anchor) == pytest.approx(np.linalg.norm(other.anchor), abs=1e-12)
+    angle = np.arccos(np.dot(plain.joint[0].axis, turned.joint[0].axis))
+    assert 0.3 < angle < 0.7, "an axis along no axis of the world"
+    assert by_heading["long run"].with_(name="", duration=1.0) == plain.with_(name="", duration=1.0)
+
+
+@pytest.mark.parametrize(
+    ("record", "text"),
+    [
+        (run(9.9e-9), "✓ 1e-08"),
+        (run(1.1e-8), "≈ 1e-08"),
+        (run(9.9e-3), "≈ 1e-02"),
+        (run(0.0101), "✗ 0.01"),
+        (run(0.9512), "✗ 0.95"),
+        (run(1e-13, metrics={"error": 1e-13, "error_bound": 2e-12}), "✓ <2e-12"),
+        (run(None, outcome="STEP_FAILED"), "! stopped"),
+        (run(None, outcome="CRASHED"), "! crashed"),
+        (run(None, outcome="TIMED_OUT"), "! no end"),
+        (refusal(), "–"),
+        (None, ""),
+    ],
+)
+def test_cells_by_hand(record, text) -> None:
+    assert shown(record) == text
+    assert record is None or any(text[:1] == sign[:1] for sign in LEGEND)
+
+
+def test_best_and_default_runs_of_a_cell() -> None:
+    found = [run(1e-3, "defaults"), run(1e-9), run(1e-5, "euler"), run(None, "other", "CRASHED")]
+    cell = matrix(found)["mujoco"][FIRST.heading]
+    assert cell.best() is found[1] and cell.defaults() is found[0]
+    assert list(cell.families()) == ["defaults", "tuned", "euler", "other"]
+    assert matrix(found)["mujoco"]["Bennett"].best() is None
+    assert "tuned (step 0.001)" in sentence(found[1]) and "1e-09" in sentence(found[1])
+    assert rerun(found[1]).startswith(f"crosscheck run {FIRST.place()} --engine mujoco --setting tuned")
+    assert "the Jacobian is singular" in sentence(run(None, outcome="STEP_FAILED"))
+
+
+def test_a_refusal_is_shown_with_its_owner_and_has_no_command() -> None:
+    cell = matrix([refusal()])["mujoco"][FIRST.heading]
+    assert cell.best() is cell.defaults() is cell.records[0]
+    assert sentence(cell.records[0]) == "refused: no hinge (missing in the engine)"
+    assert rerun(cell.records[0]) == "" and not cell.families()
+
+
+def test_new_records_supersede_old_ones() -> None:
+    new = run(1e-9)
+    assert records.supersedes(new, run(1e-9)), "the same key"
+    assert not records.supersedes(new, run(1e-3, "defaults"))
+    assert records.supersedes(new, run(1e-3, "defaults", version="3.0.0")), "an older version"
+    assert records.supersedes(new, refusal()) and records.supersedes(refusal(), new)
+    assert not records.supersedes(new, run(1e-3, scene="bennett", version="3.0.0"))
+
+
+def test_measuring_stores_each_run_and_resumes(tmp_path, monkeypatch) -> None:
+    path = tmp_path / "records.jsonl"
+    column = next(c for c in DIFFICULTIES if c.heading == "redundant")
+    wanted, unable = records.cases(["mujoco"], ["tuned"], [column])
+    assert [case.setting.family for case in wanted] == ["tuned"] and not unable
+    refused = Unable(column.make().with_(name="another"), "mujoco", Cannot(Owner.ENGINE, "no hinge"))
+    records.measure(wanted, [refused], path)
+    made, stored = records.read(path)
+    assert made["outcome"] == records.REFUSED and made["owner"] == "missing in the engine"
+    assert stored["metrics"]["error"] < 1e-8 and stored["version"] and "bodies" not in stored
+    monkeypatch.setattr(records, "study", lambda cases, **_: pytest.fail("again") if cases else [])
+    records.measure(wanted, [], path)
+    assert records.read(path) == [made, stored]
+
+
+def test_committed_page_follows_from_the_committed_records() -> None:
+    assert DOCUMENT.read_text() == document.page(records.read()), (
+        "docs/closed-loops.md is stale: crosscheck closed-loops --page docs/closed-loops.md renews it"
+    )
