@@ -17,6 +17,8 @@ EVERYTHING = Supports(
     joints=tuple(kind for kind in JOINT_TYPES if kind != "inline"),
     drivers=("angle", "displacement"),
     loads=("moment", "force", "spring", "torsion_spring"),
+    couplings=("angle", "displacement"),
+    armatures=("angle", "displacement"),
 )
 O = np.zeros(3)
 

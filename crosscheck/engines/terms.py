@@ -95,10 +95,35 @@ class Simulation:
         places = dict(zip(self.at.single.tolist(), self.at.single_q.tolist(), strict=True))
         self.driven_q = [places[i] for i, _ in self.driven]
         self.free = np.setdiff1d(np.arange(self.at.nv), [i for i, _ in self.driven])
+        self.coupled = self._couplings()
+        self.rotors = self._rotors()
         self.y = np.concatenate([self.at.start(), initial_rates(self.scene, self.tree)])
         longest = TURN_PER_STEP / stated_rate(self.scene) if self.driven else np.inf
         limits = setting.options["rtol"], setting.options["min_step"], longest
         self.integrator = Adaptive(self.rates, self.settled, *limits, self.counts)
+
+    def _couplings(self) -> np.ndarray:
+        """(couplings, nv): rows J of q₂ - ratio q₁ = 0."""
+        rows = np.zeros((len(self.scene.coupling), self.at.nv))
+        for row, coupling in zip(rows, self.scene.coupling, strict=True):
+            for factor, (joint, kind) in zip(
+                (-coupling.ratio, 1.0), self.scene.coupled(coupling), strict=True
+            ):
+                row[self.tree.coordinate(self.scene, joint.name, kind)] += factor
+        return rows
+
+    def _rotors(self) -> np.ndarray:
+        """(nv, nv): armatures, on the diagonal."""
+        found = np.zeros(self.at.nv)
+        for joint in self.scene.joint:
+            if joint.reflected_inertia:
+                found[self.tree.coordinate(self.scene, joint.name)] = joint.reflected_inertia
+        return np.diag(found)
+
+    def _terms(self, q: np.ndarray, v: np.ndarray) -> Terms:
+        """The engine's terms, with the armatures in the mass matrix."""
+        found = self.mechanism.terms(q, v)
+        return found._replace(mass=found.mass + self.rotors)
 
     def advance(self, t0: float, t1: float) -> None:
         """Moves the state from t0 to t1; raises Failed."""
@@ -122,8 +147,8 @@ class Simulation:
         self, t: float, q: np.ndarray, v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, LinkMotion, _Rows]:
         """v' (nv,), the closures' forces λ (m,), the links' motion with these accelerations, and the rows."""
-        terms = self.mechanism.terms(q, v)
-        motion_now, rows = self._motion(terms, q, v), self._rows(terms, v)
+        terms = self._terms(q, v)
+        motion_now, rows = self._motion(terms, q, v), self._rows(terms, q, v)
         a = np.zeros(self.at.nv)
         for i, driver in self.driven:
             a[i] = motion(driver, t)[2]
@@ -140,16 +165,16 @@ class Simulation:
     def settled(self, t: float, y: np.ndarray) -> np.ndarray:
         """The state nearest to y, by kinetic energy, that satisfies closures and drivers; raises Failed."""
         q, v = self.split(t, y)
-        if not self.tree.closures:
+        if not (self.tree.closures or self.scene.coupling):
             return np.concatenate([q, v])
-        terms = self.mechanism.terms(q, v)
+        terms = self._terms(q, v)
         root = self._root(t, terms)
         for _ in range(PROJECTIONS):
-            rows = self._rows(terms, v)
+            rows = self._rows(terms, q, v)
             if not abs(rows.residual).max() > CLOSED:
                 break
             q = self.at.moved(q, self._least(t, root, rows.jacobian, -rows.residual))
-            terms = self.mechanism.terms(q, v)
+            terms = self._terms(q, v)
         if not abs(rows.residual).max() < CLOSED_ENOUGH:
             raise Failed(Outcome.NOT_CONVERGED, t, f"the closures could not be met at {t:.6g} s")
         return np.concatenate([q, v - self._least(t, root, rows.jacobian, rows.jacobian @ v)])
@@ -206,7 +231,8 @@ class Simulation:
             tau += terms.jacobian[link].T @ np.concatenate([force, moment])
         return tau
 
-    def _rows(self, terms: Terms, v: np.ndarray) -> _Rows:
+    def _rows(self, terms: Terms, q: np.ndarray, v: np.ndarray) -> _Rows:
+        """Return the rows of the closures, then of the couplings."""
         residual, jacobian, drift, places = [np.zeros(0)], [np.zeros((0, self.at.nv))], [np.zeros(0)], []
         for closure in self.tree.closures:
             first, second = (self._end(terms, v, link, closure.anchor) for link in closure.links)
@@ -219,6 +245,9 @@ class Simulation:
             jacobian.append((second[1] - first[1])[:n])
             drift.append((second[2] - first[2])[:n])
             places.append(second[0])
+        residual.append(self.coupled @ self.at.of_velocities(q))
+        jacobian.append(self.coupled)
+        drift.append(np.zeros(len(self.coupled)))
         return _Rows(np.concatenate(residual), np.vstack(jacobian), np.concatenate(drift), places)
 
     def _rotation(self, terms: Terms, link: int) -> np.ndarray:

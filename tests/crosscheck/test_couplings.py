@@ -8,7 +8,8 @@ import pytest
 import mbref
 from crosscheck.conformance.geared_mechanisms import geared_mechanism
 from crosscheck.conformance.random_mechanisms import PRINCIPLE, compare
-from crosscheck.engine import Owner, engine
+from crosscheck.engine import Owner, Setting, engine
+from crosscheck.engines import terms
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.gauss_principle import gauss
 from crosscheck.judge.metrics import measure, violation_series
@@ -18,10 +19,19 @@ from crosscheck.judge.reference.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from crosscheck.judge.truth import closed_form, truth_for
-from tests.coupled_scenes import EVERY, gear_pair, pendulum, spatial_chain
+from tests.coupled_scenes import EVERY, gear_pair, pendulum, planetary, spatial_chain
 
 TIMES = np.array([0.0, 0.2, 0.5, 0.8])
 ENGINES = 1e-8  # at best settings
+TERMS = Setting("terms", {"rtol": 1e-11, "min_step": 1e-4})
+FINE = {
+    "drake": TERMS,
+    "dart": TERMS,
+    "pinocchio": Setting("tuned", {"rtol": 1e-11, "min_step": 1e-4}),
+    "simbody": Setting("merson", {"accuracy": 1e-10}),
+}
+MODULES = {"drake": "pydrake", "dart": "dartpy", "pinocchio": "pinocchio", "simbody": "opensim"}
+LACKS = {"pinocchio": ("coupling",), "simbody": ("armature",)}  # missing in the engines
 APART = 1e-13  # of both formulations
 every = pytest.mark.parametrize("make", EVERY, ids=lambda make: make.__name__)
 
@@ -85,6 +95,48 @@ def test_free_velocities_have_the_least_kinetic_energy_with_armatures():
     scene = spatial_chain()
     exact = natural_motion(scene, TIMES[:1], EXTENDED, seconds=60.0)
     assert np.abs(mbref.simulate(scene, times=[0.0]).velocity[0] - doubles(exact.velocity[0])).max() < 1e-13
+
+
+def refused_parts(name, scene):
+    """The kinds of parts of a scene that an engine refuses, although its adapter declares them."""
+    parts = {"coupling": scene.coupling, "armature": any(j.reflected_inertia for j in scene.joint)}
+    return [kind for kind, found in parts.items() if found and kind in LACKS.get(name, ())]
+
+
+@every
+@pytest.mark.parametrize("name", FINE)
+def test_tree_engines_move_as_the_reference_or_refuse(name, make):
+    pytest.importorskip(MODULES[name])
+    scene, simulator = make().with_(duration=0.4), engine(name)
+    if lacking := refused_parts(name, scene):
+        refusal = simulator.cannot(scene)
+        assert refusal is not None and refusal.owner is Owner.ENGINE and lacking[0] in refusal.reason
+        return
+    run = simulator.run(scene, np.array([0.0, 0.2, 0.4]), FINE[name])
+    found = measure(scene, run, truth_for(scene))
+    assert found["error"] <= ENGINES and found["violation_position"] <= ENGINES, (found, run.message)
+    assert found["reaction_error"] is None or found["reaction_error"] <= 1e-6, found
+
+
+@pytest.mark.parametrize("name", ["drake", "dart"])
+def test_a_slipping_coupling_or_a_lost_rotor_is_seen(name, monkeypatch):
+    """The terms of an engine without the rows of couplings, or without armatures, move otherwise."""
+    pytest.importorskip(MODULES[name])
+    scene = planetary().with_(duration=0.2)
+    for part, nothing in (("_couplings", (0, 2)), ("_rotors", (2, 2))):
+        with monkeypatch.context() as changed:
+            changed.setattr(terms.Simulation, part, lambda self, shape=nothing: np.zeros(shape))
+            run = engine(name).run(scene, np.array([0.0, 0.2]), FINE[name])
+        assert measure(scene, run, truth_for(scene))["error"] > 1e-3, part
+
+
+def test_drakes_own_steps_couple_and_turn_rotors():
+    """Its step is of first order: a coupling that is lost would leave 0.1 and more."""
+    pytest.importorskip("pydrake")
+    scene = planetary().with_(duration=0.2)
+    run = engine("drake").run(scene, np.array([0.0, 0.2]), Setting("discrete", {"step": 1e-4}))
+    found = measure(scene, run, truth_for(scene))
+    assert found["error"] < 1e-3 and found["violation_position"] < 1e-3, found
 
 
 @every

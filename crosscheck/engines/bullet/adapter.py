@@ -7,6 +7,7 @@ step, by which positions are met.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib import metadata
 
 import numpy as np
@@ -39,7 +40,7 @@ class Bullet(Engine):
 
     name = "bullet"
     package = "pybullet"
-    supports = EVERYTHING
+    supports = replace(EVERYTHING, couplings=(), armatures=())
     families, options = FAMILIES, OPTIONS
 
     def version(self) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 from crosscheck.engine import Cannot, Engine, Setting
 from crosscheck.engines import terms
 from crosscheck.engines.dart.model import Mechanism
-from crosscheck.engines.driver_motion import mean_rate, motion
+from crosscheck.engines.driver_motion import mean_rate, motion, stated_rate
 from crosscheck.engines.fixed_steps import FixedSteps, Simulation, is_constant, scouted_rate, simulated, steps
 from crosscheck.engines.initial_velocities import lacks_mass
 from crosscheck.engines.pieces import EVERYTHING
@@ -62,7 +62,10 @@ class Dart(Engine):
         return lacks_mass(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
-        """Tolerances, and steps by the angle turned in one."""
+        """Tolerances, and steps by the angle turned in one; tolerances alone where DART's own steps do not
+        serve."""
+        if _is_geared(scene):
+            return terms.sweep(stated_rate(scene))
         rate = scouted_rate(self, scene, "defaults", erp=DEFAULT_ERP)
         fine = steps(scene, rate, finer=FINER)
         return [
@@ -75,14 +78,20 @@ class Dart(Engine):
         ]
 
     def serves(self, scene: Scene, family: str) -> bool:
-        """Every family serves every scene."""
-        return family in FAMILIES
+        """Return whether a family serves a scene: DART's own steps have no couplings and armatures here."""
+        return family in FAMILIES and (family == terms.FAMILY or not _is_geared(scene))
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """Simulate; raises ValueError for a family it does not have."""
+        """Simulate; raises ValueError for a family it does not have, or one that does not serve the scene."""
+        if setting.family in FAMILIES and not self.serves(scene, setting.family):
+            raise ValueError("DART's own steps have no couplings and armatures here; family 'terms' has them")
         if setting.family == "balls" and (planar := planar_scene(scene)) is not scene:
             return replace(self.run(planar, times, setting), reactions=None)
         return simulated(self, scene, times, setting, lambda: _simulation(scene, setting))
+
+
+def _is_geared(scene: Scene) -> bool:
+    return bool(scene.coupling) or any(joint.reflected_inertia for joint in scene.joint)
 
 
 def _simulation(scene: Scene, setting: Setting) -> Simulation:

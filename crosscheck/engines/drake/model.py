@@ -44,12 +44,28 @@ class Mechanism:
         self.plant.mutable_gravity_field().set_gravity_vector(scene.gravity)
         self.joints: dict[int, Any] = {}  # keyed by first joint velocity of the tree
         self.bodies = self._bodies()
-        for closure in tree.closures if time_step else ():
-            self._close(closure)
+        if time_step:
+            self._constrain()
         self.plant.Finalize()
         self.context = self.plant.CreateDefaultContext()
         self._number()
         self.put(self.coordinates.start(), initial_rates(scene, tree))
+
+    def _constrain(self) -> None:
+        """Add closures, couplings and armatures, the parts of a discrete plant."""
+        for closure in self.tree.closures:
+            self._close(closure)
+        for coupling in self.scene.coupling:
+            first, second = (
+                self.joints[self.tree.coordinate(self.scene, joint.name, kind)]
+                for joint, kind in self.scene.coupled(coupling)
+            )
+            self.plant.AddCouplerConstraint(second, first, coupling.ratio)
+        for joint in self.scene.joint:
+            if joint.reflected_inertia:
+                turned = self.joints[self.tree.coordinate(self.scene, joint.name)]
+                rotor = self.plant.AddJointActuator(joint.name, turned)
+                rotor.set_default_rotor_inertia(joint.reflected_inertia)
 
     def _bodies(self) -> list[Any]:
         parts = pieces(self.tree, NEGLIGIBLE)

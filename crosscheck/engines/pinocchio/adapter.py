@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from crosscheck.engine import Cannot, Engine, Setting
+from crosscheck.engine import Cannot, Engine, Owner, Setting
 from crosscheck.engines.driver_motion import fastest_rate, motion, stated_rate
 from crosscheck.engines.initial_velocities import lacks_mass
 from crosscheck.engines.pinocchio import compiled_run
@@ -74,7 +74,10 @@ class Pinocchio(Engine):
         return pinocchio.__version__
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Scenes without masses whose motion is not prescribed in full."""
+        """Refuse couplings, and scenes without masses whose motion is not prescribed in full."""
+        if scene.coupling:
+            reason = f"coupling {scene.coupling[0].name!r}: constraintDynamics couples no joint coordinates"
+            return Cannot(Owner.ENGINE, reason)
         return lacks_mass(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:

@@ -42,6 +42,8 @@ SUPPORTS = Supports(
     ),
     drivers=("angle", "displacement"),
     loads=("moment", "force", "spring", "torsion_spring"),
+    couplings=("angle", "displacement"),  # refused by the engine with a reason
+    armatures=("angle", "displacement"),
 )
 DRIVEN_ARMATURE = 1e18  # inertia of a driven coordinate: it then moves with its torque alone
 
@@ -102,6 +104,9 @@ class Mechanism:
 
     def _make_heavy(self, coordinates: list[int]) -> None:
         armature = self.model.armature.copy()
+        for joint in self.scene.joint:
+            if joint.reflected_inertia:
+                armature[self.tree.coordinate(self.scene, joint.name)] = joint.reflected_inertia
         armature[coordinates] = DRIVEN_ARMATURE
         self.model.armature = armature
 

@@ -50,8 +50,12 @@ class Simbody(Engine):
         import opensim  # noqa: F401
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Drivers that add a sine to a polynomial; scenes without masses whose motion is not prescribed in
-        full."""
+        """Refuse armatures, drivers that add a sine to a polynomial, and scenes without masses whose motion
+        is not prescribed in full."""
+        if rotor := next((j.name for j in scene.joint if j.reflected_inertia), ""):
+            return Cannot(
+                Owner.ENGINE, f"joint {rotor!r} has an armature, which Simbody's joints do not have"
+            )
         mixed = [d.joint for d in scene.driver if d.sine and any(d.polynomial[1:])]
         if mixed:
             reason = "OpenSim's sum of a polynomial and a sine has a wrong second derivative; it would drive"

@@ -14,7 +14,7 @@ from crosscheck.engine import Supports
 from crosscheck.engines.geometry import joint_frame, unit
 from crosscheck.engines.initial_velocities import initial_rates
 from crosscheck.engines.spanning_tree import FREE, GROUND_LINK, Closure, Link, spanning_tree
-from mbref.scene import Driver, Force, Moment, Scene, Spring, TorsionSpring
+from mbref.scene import Coupling, Driver, Force, Moment, Scene, Spring, TorsionSpring
 
 JOINTS = {  # joint type: OpenSim's joint, and its coordinates in the order of the tree's
     "fixed": ("WeldJoint", ()),
@@ -30,6 +30,8 @@ SUPPORTS = Supports(
     joints=(*(kind for kind in JOINTS if kind != FREE), "distance"),  # a distance joint is a rod in the tree
     drivers=("angle", "displacement"),
     loads=("moment", "force", "spring", "torsion_spring"),
+    couplings=("angle", "displacement"),
+    armatures=("angle", "displacement"),  # refused by the engine with a reason
 )
 UNLIMITED = 1e9  # rad or m; limit of a coordinate's range, which OpenSim requires
 LOCKED = 1e-12  # cosine of the second angle below which the first and third axis coincide
@@ -52,6 +54,8 @@ class Mechanism:
         self.closures = [self._close(k, closure) for k, closure in enumerate(self.tree.closures)]
         for driver in scene.driver:
             self._drive(driver)
+        for k, coupling in enumerate(scene.coupling):
+            self._couple(k, coupling)
         for k, load in enumerate(scene.load if scene.has_mass() else ()):
             self.model.addForce(self._force(f"load{k}", load))
         self.model.finalizeConnections()
@@ -130,6 +134,22 @@ class Mechanism:
         constraint.setName(f"closure{k}")
         self.model.addConstraint(constraint)
         return constraint
+
+    def _couple(self, k: int, coupling: Coupling) -> None:
+        """Add q₂ = ratio q₁ as OpenSim's coupler."""
+        o = self.opensim
+        first, second = (
+            self.coordinates[self.tree.coordinate(self.scene, joint.name, kind)].getName()
+            for joint, kind in self.scene.coupled(coupling)
+        )
+        names = o.ArrayStr()
+        names.append(first)
+        coupler = o.CoordinateCouplerConstraint()
+        coupler.setName(f"coupling{k}")
+        coupler.setIndependentCoordinateNames(names)
+        coupler.setDependentCoordinateName(second)
+        coupler.setFunction(o.LinearFunction(coupling.ratio, 0.0))
+        self.model.addConstraint(coupler)
 
     def _drive(self, driver: Driver) -> None:
         coordinate = self.coordinates[self.tree.coordinate(self.scene, driver.joint)]
