@@ -12,7 +12,6 @@ from crosscheck.cli import collection
 from crosscheck.cli.options import add_depth, add_engines, add_reference_time
 from crosscheck.cli.passage import passage
 from crosscheck.cli.scene_request import RequestError, find_scenes
-from crosscheck.closed_loops.records import read as closed_loop_records
 from mbref.command_line import Parser
 from mbref.scene import SceneError
 from reports.blocks import Block
@@ -103,7 +102,7 @@ def _blocks(out: Path, wanted: collection.Runs, names: Sequence[str]) -> list[Bl
     if STABILITY in names:
         blocks += stability.render(collection.stability_ladders(out, _notice))
     if CLOSED_LOOPS in names:
-        blocks += closed_loops.render(closed_loop_records())
+        blocks += closed_loops.render(collection.closed_loops())
     if PAPER in names:
         found_of_paper = collection.paper(out, not wanted.is_quick, _notice)
         print(paper.score(found_of_paper.records))

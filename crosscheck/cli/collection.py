@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck.cli.request import RequestError, find_engines
+from crosscheck.closed_loops import records
 from crosscheck.paper import runs, store
 from crosscheck.paper.illustration import Illustration, illustration
 from crosscheck.study import stability, sweep
@@ -63,6 +64,11 @@ def comparison(out: Path, wanted: Runs, notice: Notice) -> Collection:
         return cases
 
     return collected(chosen, engines, Wanted(times, wanted.reference_time, is_quick, out), plan, notice)
+
+
+def closed_loops() -> list[Record]:
+    """Return the stored records of the matrix of closed loops."""
+    return records.read()
 
 
 def stability_ladders(out: Path, notice: Notice) -> list[Record]:
