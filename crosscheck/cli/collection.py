@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck.cli.request import RequestError, find_engines
-from crosscheck.closed_loops import records
+from crosscheck.closed_loops.records import read
 from crosscheck.paper import runs, store
 from crosscheck.paper.illustration import Illustration, illustration
 from crosscheck.study import stability, sweep
@@ -68,7 +68,7 @@ def comparison(out: Path, wanted: Runs, notice: Notice) -> Collection:
 
 def closed_loops() -> list[Record]:
     """Return the stored records of the matrix of closed loops."""
-    return records.read()
+    return read()
 
 
 def stability_ladders(out: Path, notice: Notice) -> list[Record]:

@@ -10,14 +10,15 @@ from crosscheck.study.grid import Record
 
 HEAD = """# Who closes a loop
 
-Each row is an engine, each column a mechanism with closed loops that is hard in one way. A cell is the
-largest error of any body at any sample, against a closed form or the [reference solution](reference.md).
-A cell leads to its settings, its reason and the command that makes it again.
-"""
-TAIL = """
-`crosscheck closed-loops` prints this matrix; `crosscheck closed-loops --run --engine drake` measures an
-engine again; `crosscheck closed-loops --page docs/closed-loops.md` writes this page. Matrix and page are
-made from `crosscheck/closed_loops/records.jsonl`; nothing is simulated for them.
+This page helps to choose an engine for a mechanism with closed loops. Each row is an engine, each column a
+mechanism that is hard in one way. A cell is the largest error of any body at any sample, against a closed
+form or the [reference solution](reference.md). A cell leads to its settings, its reason and its command.
+
+```sh
+crosscheck closed-loops                        # print this matrix; nothing is simulated
+crosscheck closed-loops --run --engine drake   # measure an engine that is installed here
+crosscheck closed-loops --page docs/closed-loops.md
+```
 """
 BEST = "Each engine by its best family of settings, at the finest setting of each family:"
 DEFAULTS = "Solver parameters as the library has them, with a fine step:"
@@ -30,7 +31,7 @@ def page(records: Sequence[Record]) -> str:
     parts = [HEAD, *_legend(), BEST, "", *_table(cells, True), DEFAULTS, "", *_table(cells, False)]
     parts += ["## The mechanisms", "", *_mechanisms(), "## The runs", ""]
     parts += [line for name, row in cells.items() for line in _engine(name, row)]
-    return "\n".join(parts) + TAIL
+    return "\n".join(parts).rstrip() + "\n"
 
 
 def _legend() -> Iterator[str]:
@@ -78,4 +79,4 @@ def _cell(cell: Cell) -> Iterator[str]:
     yield from (f"- {shown(record)} {sentence(record)}" for record in found)
     yield ""
     if not is_refusal(best):
-        yield f"```sh\n{rerun(best)}\n```\n"
+        yield f"```text\n{rerun(best)}\n```\n"
