@@ -1,7 +1,9 @@
 """`crosscheck tune` against a brute-force sweep: by how much dearer are the settings that it finds?
 
-Of every family the sweep runs settings 10 % of work apart, from the coarsest up to those dearer than the
-cheapest that was found.  Both cheapest settings are then timed in turns.
+Of every family that `tune` reaches the error with, the sweep runs settings 10 % of work apart, from the longest
+step or loosest tolerance on, up to the first that reaches the error.  Both are compared by their work, which is
+the number of right-hand sides, otherwise of steps, so that other programs on the machine do not count.
+Families that `tune` gave up are swept as far as they cost less CPU time than its answer.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ import argparse
 import math
 import sys
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,12 +23,11 @@ from crosscheck.cli import request
 from crosscheck.cli.request import Choice
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from crosscheck.engine import Setting, engine
-from crosscheck.processes.pool import end_idle
-from crosscheck.study.between import LOOSEST, STEP
-from crosscheck.study.grid import Case, Record, study
+from crosscheck.study.between import LOOSEST, STEP, work
+from crosscheck.study.grid import Case, Record, run_here
 from crosscheck.study.ladder import families
 from crosscheck.study.record_view import error, is_completed
-from crosscheck.study.timings import with_timings
+from crosscheck.study.speed_sentences import COMPILED
 from crosscheck.study.tuning import tuned
 from mbref.scene import Scene
 from mbref.scenes import SCENES
@@ -46,8 +47,16 @@ MECHANISMS = {  # end times, s
 SAMPLES = 31
 FINER = 1.1  # ratio of neighbouring steps
 LOOSER = 10 ** (1 / 3)  # of neighbouring tolerances, whose work is about 1.1 apart at order 8
-WORTHWHILE = 1.0  # of the cheapest time: a setting that took longer ends the sweep of its family
-LIMIT = 20.0  # s of a run
+LIMIT = 20.0  # CPU s of a run; the runs are in this process and not ended
+
+
+class Row(NamedTuple):
+    """A family, the settings of `tune` and of the sweep (None where it gave up, or found none), and runs."""
+
+    family: str
+    tune: Record | None
+    sweep: Record | None
+    runs: tuple[int, int]
 
 
 def swept(family: Sequence[Case]) -> Iterator[Case]:
@@ -68,72 +77,56 @@ def swept(family: Sequence[Case]) -> Iterator[Case]:
         yield family[0]._replace(setting=Setting(first.family, options))
 
 
-def cheapest_by_sweep(
-    groups: Sequence[Sequence[Case]], level: float, threads: ThreadPoolExecutor, limit: float
-) -> tuple[list[tuple[Case, Record]], int]:
-    """The cheapest run within the level of each family that has one dearer than ``limit`` (s) at most, and
-    the number of runs."""
-    found, count = [], 0
-    for group in groups:
-        for case in swept(group):
-            [record] = study([case], threads)
-            count += 1
-            if is_completed(record) and error(record) <= level:
-                found.append((case, record))
-                break
-            if record["outcome"] == "TIMED_OUT" or record["cost"]["seconds"] > WORTHWHILE * limit:
-                break
-    return found, count
+def cheapest(family: Sequence[Case], level: float, limit: float) -> tuple[Record | None, int]:
+    """The coarsest run of a family within the level, and the number of runs; None where each costs more than
+    ``limit`` (CPU s)."""
+    count = 0
+    for case in swept(family):
+        record, count = run_here(case), count + 1
+        if is_completed(record) and error(record) <= level:
+            return record, count
+        if record["cost"]["seconds"] > limit:
+            break
+    return None, count
 
 
-def compared(scene: Scene, name: str, level: float) -> Iterator[str]:
-    """A line for the settings of the engine itself, and one for those that crosscheck integrates."""
+def compared(scene: Scene, name: str, level: float, with_compiled: bool) -> list[Row]:
+    """A row for each family of an engine, in the order of its grid."""
     times = [np.linspace(0.0, scene.duration, SAMPLES)]
     cases = request.plan([scene], [name], Choice(is_quick=False), times, LIMIT, lambda _: None)
-    ours = engine(name).integrated_here
-    with ThreadPoolExecutor(1) as threads:
-        found = tuned(cases, level, lambda some: study(some, threads), ours)
-        for is_ours in (False, True):
-            pairs = [
-                (case, record)
-                for case, record in zip(found.cases, found.reached, strict=True)
-                if (case.setting.family in ours) is is_ours
-            ]
-            if not pairs:
-                continue
-            groups = [g for g in families(cases) if (g[0].setting.family in ours) is is_ours]
-            limit = pairs[0][1]["cost"]["seconds"]
-            swept_pairs, runs = cheapest_by_sweep(groups, level, threads, limit)
-            both = [*pairs, *swept_pairs]
-            timed = with_timings([c for c, _ in both], [r for _, r in both], None, lambda _: None)
-            yield _line(
-                scene, name, is_ours, timed[: len(pairs)], timed[len(pairs) :], (len(found.records), runs)
-            )
-    end_idle()
+    cases = [case for case in cases if with_compiled or not case.setting.family.endswith(COMPILED)]
+    found = tuned(cases, level, lambda some: [run_here(c) for c in some], engine(name).integrated_here)
+    reached = {record["family"]: record for record in found.reached}
+    limit = min((record["cost"]["seconds"] for record in found.reached), default=LIMIT)
+    rows = []
+    for family in families(cases):
+        label = family[0].setting.family
+        count = sum(record["family"] == label for record in found.records)
+        here = reached.get(label)
+        least, runs = cheapest(family, level, LIMIT if here else limit)
+        rows.append(Row(label, here, least, (count, runs)))
+    return rows
 
 
-def _line(
-    scene: Scene,
-    name: str,
-    is_ours: bool,
-    tune: Sequence[Record],
-    sweep: Sequence[Record],
-    runs: tuple[int, int],
-) -> str:
-    best = min(tune, key=lambda r: r["cost"]["seconds"])
-    rival = min([*sweep, best], key=lambda r: r["cost"]["seconds"])
-    ratio = best["cost"]["seconds"] / rival["cost"]["seconds"]
-    whose = "crosscheck" if is_ours else "itself"
-    return (
-        f"{scene.name:30s} {name:10s} {whose:10s} {_said(best):42s} {_said(rival):42s} {ratio:5.2f}"
-        f" {runs[0]:4d} {runs[1]:5d}"
-    )
+def lines(scene: Scene, name: str, rows: Sequence[Row]) -> Iterator[str]:
+    """A line for each row."""
+    whose = {family: "crosscheck" for family in engine(name).integrated_here}
+    for row in rows:
+        ratio = "given up"
+        if row.tune:
+            ratio = f"{work(row.tune) / min(work(r) for r in (row.tune, row.sweep) if r):.2f}"
+        yield (
+            f"{scene.name:30s} {name:10s} {whose.get(row.family, 'itself'):10s} {row.family:20s} "
+            f"{_said(row.tune):30s} {_said(row.sweep):30s} {ratio:>8s} {row.runs[0]:4d} {row.runs[1]:4d}"
+        )
 
 
-def _said(record: Record) -> str:
+def _said(record: Record | None) -> str:
+    if record is None:
+        return "–"
     options = record["asked"]["options"]
     first = next((f"{k}={v:g}" for k, v in options.items()), "")
-    return f"{record['family']} {first} {1e3 * record['cost']['seconds']:.3g} ms"
+    return f"{first} {work(record):.6g} {1e3 * record['cost']['seconds']:.3g} ms"
 
 
 def _scene(name: str, end: float) -> Scene:
@@ -147,17 +140,15 @@ def main() -> None:
     parser.add_argument("--engine", action="append", help="default: mujoco, pinocchio, exudyn, mbref")
     parser.add_argument("--mechanism", action="append", choices=MECHANISMS, help="default: all ten")
     parser.add_argument("--error", type=float, default=1e-3)
+    parser.add_argument("--compiled", action="store_true", help="families that are compiled first, too")
     given = parser.parse_args()
-    print("error", given.error)
-    print(
-        f"{'mechanism':30s} {'engine':10s} {'integrated':10s} {'tune':42s} {'sweep':42s} ratio runs of each"
-    )
+    print(f"error {given.error:g}; of each setting its work and CPU time; work of tune / work of sweep; runs")
     for mechanism in given.mechanism or MECHANISMS:
         scene = _scene(mechanism, MECHANISMS[mechanism])
         for name in given.engine or ("mujoco", "pinocchio", "exudyn", "mbref"):
             if engine(name).cannot(scene):
                 continue
-            for line in compared(scene, name, given.error):
+            for line in lines(scene, name, compared(scene, name, given.error, given.compiled)):
                 print(line, flush=True)
 
 
