@@ -1,7 +1,7 @@
 """`crosscheck tune` against a brute-force sweep: by how much dearer are the settings that it finds?
 
-Of every family that `tune` reaches the error with, the sweep runs settings 10 % of work apart, from the longest
-step or loosest tolerance on, up to the first that reaches the error.  Both are compared by their work, which is
+Of every family that reaches the error with `tune`, the sweep runs settings 10 % of work apart, from the
+longest step or loosest tolerance on, up to the first that reaches the error.  Work is compared, not time:
 the number of right-hand sides, otherwise of steps, so that other programs on the machine do not count.
 Families that `tune` gave up are swept as far as they cost less CPU time than its answer.
 """
